@@ -1,0 +1,63 @@
+PYTHON ?= python3
+CORES ?= 2
+
+SHELL := bash
+ENV := .venv
+READY := $(ENV)/.ready
+INSTALL := pip install --quiet --no-build-isolation --require-hashes --requirement requirements.lock
+
+# The workflow's shell commands find the environment's python by the path alone.
+export PATH := $(CURDIR)/$(ENV)/bin:$(PATH)
+export VIRTUAL_ENV := $(CURDIR)/$(ENV)
+export PYTHONNOUSERSITE := 1
+unexport PYTHONPATH PYTHONHOME
+# Snakemake fills the cores with jobs; threads within a job would only compete with them.
+export OPENBLAS_NUM_THREADS := 1
+export OMP_NUM_THREADS := 1
+export MKL_NUM_THREADS := 1
+
+.PHONY: help env test smoke reproduce lint lock clean
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "%-12s%s\n", $$1, $$2 }' Makefile
+	@echo 'PYTHON=python3.12 chooses the interpreter of a new environment, CORES=8 the cores used.'
+
+env: $(READY) ## make the environment, from locked versions, in .venv
+
+test: lint ## check and test the package, with coverage
+	pytest --cov
+
+smoke: $(READY) ## run the whole workflow on a small configuration
+	snakemake --cores $(CORES) --configfile config/smoke.yaml
+
+reproduce: $(READY) ## run the whole study
+	snakemake --cores $(CORES)
+
+lint: $(READY) ## check style, types and the workflow
+	ruff check
+	ruff format --check
+	mypy
+	snakefmt --check Snakefile workflow
+	snakemake --lint
+
+lock: $(READY) ## lock the newest versions that pyproject.toml allows
+	uv lock --upgrade --default-index https://pypi.org/simple
+	uv export --quiet --frozen --no-emit-project --all-groups --output-file requirements.lock
+	uv export --quiet --frozen --no-emit-project --only-group build --output-file requirements-build.lock
+
+clean: ## remove the environment, the results and all caches
+	rm -rf $(ENV) results .snakemake .coverage* .*_cache .hypothesis
+	find accelstudy tests -name __pycache__ -prune -exec rm -r {} +
+
+# The stamp comes last: an environment without it is unfinished and made anew. The old one goes
+# first: while it is there, it is what `python3` names. uv is fast, but pip is what a machine with
+# an index of its own has configured.
+$(READY): pyproject.toml requirements.lock requirements-build.lock
+	rm -rf $(ENV)
+	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(None if (3, 11) <= v < (3, 14) else \
+	  "accelstudy needs Python 3.11, 3.12 or 3.13, not %d.%d: make PYTHON=python3.12" % v)'
+	$(PYTHON) -m venv $(ENV)
+	python -m pip install --quiet --require-hashes --requirement requirements-build.lock
+	uv $(INSTALL) || python -m $(INSTALL)
+	uv pip install --quiet --no-build-isolation --no-deps --editable .
+	touch $@

@@ -1,0 +1,241 @@
+"""The calibration of an accelerometer as a Gauss–Helmert adjustment.
+
+The condition equations are those of an approach, applied to the specific force f_b that belongs to
+the adjusted output of the sensor. They are made from the definitions of the effects and of the
+approach alone: with f_s = h(f_a, x) and f_b = T(x) f_a,
+
+    ∂f_a/∂f_s = H⁻¹,  ∂f_a/∂x = −H⁻¹ ∂h/∂x,   H = ∂h/∂f_a,
+
+and the chain rule give A and B. The force f_a is carried through the iterations (the `latent`
+quantity of the adjustment) and improved by one Newton step in each; it is exact when they end.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+
+import numpy as np
+import sympy as sp
+from numpy.typing import ArrayLike, NDArray
+
+from accelstudy.adjustment.gauss_helmert import Adjustment, Linearisation, adjust, whiten
+from accelstudy.approaches import Approach
+from accelstudy.effects import Hold
+from accelstudy.errors import InputError
+from accelstudy.sensor import SensorModel
+from accelstudy.tracing import TracedFunction, derivative, symbolic, symbols
+from accelstudy.units import STANDARD_GRAVITY
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Observations:
+    """What was observed in n positions, R times.
+
+    Parameters
+    ----------
+    forces : (R, n, 3) array, m/s², sensor output f_s
+    sigma_force : float or (n, 3) array, m/s²
+    angles : (R, n, 2) array, rad, roll and pitch of the robot; None without a robot
+    sigma_angle : float or (n, 2) array, rad
+    gravity : float or (R,) array, m/s²; one number where it is held fixed
+    sigma_gravity : float, m/s²; 0 holds gravity fixed
+    hold : Hold, what else is known of the positions
+    """
+
+    forces: Array
+    sigma_force: ArrayLike
+    angles: Array | None = None
+    sigma_angle: ArrayLike = 0.0
+    gravity: ArrayLike = STANDARD_GRAVITY
+    sigma_gravity: float = 0.0
+    hold: Hold | None = None
+
+    def first(self, replicates: int) -> Observations:
+        """Return the first `replicates` sessions; all if there are fewer."""
+        angles, gravity = self.angles, np.asarray(self.gravity)
+        return replace(
+            self,
+            forces=self.forces[:replicates],
+            angles=None if angles is None else angles[:replicates],
+            gravity=gravity[:replicates] if gravity.ndim else gravity,
+        )
+
+
+class CalibrationEquations:
+    """Condition equations of a sensor model and an approach.
+
+    Parameters
+    ----------
+    model : SensorModel
+    approach : Approach
+    estimates_gravity : bool
+        Whether g is the last of the parameters, or fixed.
+    """
+
+    def __init__(self, model: SensorModel, approach: Approach, estimates_gravity: bool) -> None:
+        self.model = model
+        self.approach = approach
+        self.estimates_gravity = estimates_gravity
+        trace = model.trace
+        self.trace = trace
+        self.angles = symbols("phi_r", "theta_r") if approach.uses_angles else ()
+        self.parameters = (*trace.p, trace.g) if estimates_gravity else trace.p
+        self.observations = (*trace.output, *self.angles)
+
+    @cached_property
+    def linear(self) -> TracedFunction:
+        """[ψ | A | B] as a function of f_a, x and the robot's readings, generated."""
+        trace = self.trace
+        errors = trace.reading_errors(self.angles) if self.angles else ()
+        attitude = tuple(a - e for a, e in zip(self.angles, errors, strict=True))
+        force = symbols("f_b_x", "f_b_y", "f_b_z")
+        psi = sp.Matrix(self.approach.conditions(force, attitude, trace.g, symbolic))
+
+        by_force = derivative(psi, force)
+        a = by_force * trace.body_by(self.parameters) + derivative(psi, self.parameters)
+        b = by_force * trace.body_by_output
+        if self.angles:
+            b = sp.Matrix.hstack(b, derivative(psi, self.angles))
+        at = dict(zip(force, trace.t_matrix * sp.Matrix(trace.force), strict=True))
+        expressions = sp.Matrix.hstack(psi, a, b).subs(at, simultaneous=True)
+        return TracedFunction((*trace.arguments, *self.angles), expressions)
+
+    def at(self, gravity: ArrayLike, hold: Hold | None) -> CalibrationConditions:
+        """Return the conditions for a given gravity (float, where fixed) and given holds."""
+        return CalibrationConditions(self, gravity, hold)
+
+
+@dataclass(frozen=True)
+class CalibrationConditions:
+    """`CalibrationEquations` at known gravity and holds, as the adjustment takes them."""
+
+    equations: CalibrationEquations
+    gravity: ArrayLike
+    hold: Hold | None
+
+    def linearise(self, parameters: Array, adjusted: Array, latent: Array) -> Linearisation:
+        """Linearise; `latent` is f_a of the iteration before."""
+        eq, trace = self.equations, self.equations.trace
+        x, g = parameters, np.asarray(self.gravity, dtype=float)
+        if eq.estimates_gravity:
+            x, g = parameters[:-1], parameters[-1]
+        forces, angles = adjusted[:3], adjusted[3:]
+        f_a = latent + trace.evaluate(trace.newton_step, latent, forces, x, g, self.hold)[:, 0]
+        values = trace.evaluate(eq.linear, f_a, forces, x, g, self.hold, *angles)
+        u = len(parameters)
+        return Linearisation(values[:, 0], values[:, 1 : 1 + u], values[:, 1 + u :], f_a)
+
+
+@lru_cache(maxsize=256)
+def equations_of(
+    model: SensorModel, approach: Approach, estimates_gravity: bool
+) -> CalibrationEquations:
+    """Return the traced condition equations; tracing takes a fraction of a second, so once."""
+    return CalibrationEquations(model, approach, estimates_gravity)
+
+
+def calibrate(model: SensorModel, approach: Approach, observed: Observations) -> Adjustment:
+    """Calibrate R simulated or measured sessions.
+
+    Parameters
+    ----------
+    model : SensorModel
+    approach : Approach
+    observed : Observations
+
+    Returns
+    -------
+    Adjustment
+        Parameters in the order of ``model.parameters``; gravity follows as the last one if it is
+        observed (``sigma_gravity > 0``). Observations are f_x, f_y, f_z and, with a robot, roll and
+        pitch; variances are absolute, so the variance of unit weight a priori is 1.
+
+    Raises
+    ------
+    InputError
+        If the approach needs angles that were not observed, a column that is absent, or there are
+        fewer conditions than unknowns.
+    """
+    problem = _Problem.of(model, approach, observed)
+    return adjust(
+        problem.conditions,
+        problem.observations,
+        problem.cofactors,
+        problem.initial,
+        parameter_observations=problem.initial,
+        parameter_weights=problem.weights,
+        latent=np.moveaxis(problem.observations[..., :3], -1, 0),
+    )
+
+
+def whitened_jacobian(
+    model: SensorModel, approach: Approach, observed: Observations, parameters: ArrayLike
+) -> Array:
+    """Design matrix of the first session, scaled to unit weight, at given parameters.
+
+    Parameters
+    ----------
+    model, approach, observed : as in `calibrate`; the observations must fit the parameters
+    parameters : (u,) array, SI, without gravity
+
+    Returns
+    -------
+    (m, u') array; AᵀA is the normal matrix. With observed gravity a column and a row are added.
+    """
+    problem = _Problem.of(model, approach, observed)
+    x = problem.initial[:1].copy()
+    x[0, : model.n_parameters] = parameters
+    forces = problem.observations[:1, :, :3]
+    f_b = model.correct(forces, x[:, : model.n_parameters], observed.gravity, observed.hold)
+    t_inverse = np.linalg.inv(model.axes_matrix(parameters))
+    at = problem.conditions.linearise(
+        x.T,
+        np.moveaxis(problem.observations[:1], -1, 0),
+        np.moveaxis(f_b @ t_inverse.T, -1, 0),
+    )
+    _, white = whiten(at, problem.cofactors.T)
+    rows = np.moveaxis(white[:, :, 0], 1, -1).reshape(-1, x.shape[1])
+    weighted = np.flatnonzero(problem.weights)
+    return np.concatenate([rows, np.diag(np.sqrt(problem.weights))[weighted]])
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """Observed sessions in the form in which `adjust` takes them."""
+
+    conditions: CalibrationConditions
+    observations: Array
+    cofactors: Array
+    initial: Array
+    weights: Array
+
+    @classmethod
+    def of(cls, model: SensorModel, approach: Approach, observed: Observations) -> _Problem:
+        forces = np.asarray(observed.forces, dtype=float)
+        n = forces.shape[1]
+        observations, sigmas = [forces], [np.broadcast_to(observed.sigma_force, (n, 3))]
+        if approach.uses_angles:
+            if observed.angles is None:
+                raise InputError(f"approach {approach.name!r} needs the robot's roll and pitch")
+            observations.append(np.asarray(observed.angles, dtype=float))
+            sigmas.append(np.broadcast_to(observed.sigma_angle, (n, 2)))
+
+        with_gravity = observed.sigma_gravity > 0
+        equations = equations_of(model, approach, with_gravity)
+        initial = np.zeros((len(forces), len(equations.parameters)))
+        weights = np.zeros(len(equations.parameters))
+        if with_gravity:
+            initial[:, -1] = observed.gravity
+            weights[-1] = observed.sigma_gravity**-2
+        # Gravity is one number for all replicates where it is held fixed.
+        fixed = float(np.ravel(observed.gravity)[0])
+        return cls(
+            conditions=equations.at(fixed, observed.hold),
+            observations=np.concatenate(observations, axis=-1),
+            cofactors=np.concatenate(sigmas, axis=-1) ** 2,
+            initial=initial,
+            weights=weights,
+        )

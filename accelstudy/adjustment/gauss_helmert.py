@@ -1,0 +1,312 @@
+"""Rigorous Gauss–Helmert adjustment, batched over replicates.
+
+Conditions ψ(l + v, x) = 0 between observations l with cofactors Q and parameters x, in independent
+blocks (the positions of a calibration; one block for a general problem). Each iteration linearises
+at the *adjusted* observations (Pope 1972; Lenzmann & Lenzmann 2004; Neitzel 2010),
+
+    A dx + B v + w = 0,   w = ψ(l + v₀, x₀) − B v₀,
+
+not at the raw ones. All replicates of a batch are solved together; each stops at its own
+convergence, so its result does not depend on what else is in the batch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from accelstudy.adjustment import cholesky
+from accelstudy.errors import InputError
+
+Array = NDArray[np.float64]
+
+MAX_ITERATIONS = 30
+STEP_TOLERANCE = 1e-6
+"""Convergence: the last step is below this fraction of a standard deviation."""
+PIVOT_TOLERANCE = 1e-12
+"""A normal matrix, scaled to unit diagonal, is singular when a Cholesky pivot is below this."""
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """Condition equations at (x, l + v): values and Jacobians, components first.
+
+    psi : (c, R, n); jac_parameters A : (c, u, R, n); jac_observations B : (c, o, R, n);
+    latent : what the equations carry from iteration to iteration, an array (k, R, n) or None.
+    """
+
+    psi: Array
+    jac_parameters: Array
+    jac_observations: Array
+    latent: Array | None = None
+
+
+class ConditionEquations(Protocol):
+    """Condition equations that the adjustment can linearise."""
+
+    def linearise(self, parameters: Array, adjusted: Array, latent: Any) -> Linearisation:
+        """Linearise at parameters (u, R) and adjusted observations (o, R, n)."""
+
+
+@dataclass(frozen=True)
+class FunctionConditions:
+    """Condition equations given as functions of parameters (R, u) and observations (R, n, o).
+
+    psi -> (R, n, c), jac_parameters A -> (R, n, c, u), jac_observations B -> (R, n, c, o).
+    """
+
+    psi: Callable[[Array, Array], Array]
+    jac_parameters: Callable[[Array, Array], Array]
+    jac_observations: Callable[[Array, Array], Array]
+
+    def linearise(self, parameters: Array, adjusted: Array, latent: Any) -> Linearisation:
+        """Evaluate the three functions."""
+        x, l_hat = np.moveaxis(parameters, 0, -1), np.moveaxis(adjusted, 0, -1)
+        return Linearisation(
+            np.moveaxis(self.psi(x, l_hat), -1, 0),
+            np.moveaxis(self.jac_parameters(x, l_hat), (-2, -1), (0, 1)),
+            np.moveaxis(self.jac_observations(x, l_hat), (-2, -1), (0, 1)),
+        )
+
+
+@dataclass(frozen=True)
+class Adjustment:
+    """Result of an adjustment of R replicates; NaN where a replicate has no valid result.
+
+    Attributes
+    ----------
+    parameters : (R, u) array
+    residuals : (R, n, o) array, v
+    cofactors : (R, u, u) array, Q_xx
+    omega : (R,) array, Ω = vᵀ Q⁻¹ v
+    redundancy : int, r = conditions − unknowns
+    converged : (R,) bool array
+    iterations : (R,) int array
+    singular : (R,) bool array, the normal matrix had no full rank
+    variance_priori : float, σ0²; cofactors times σ0² are variances
+    """
+
+    parameters: Array
+    residuals: Array
+    cofactors: Array
+    omega: Array
+    redundancy: int
+    converged: NDArray[np.bool_]
+    iterations: NDArray[np.int_]
+    singular: NDArray[np.bool_]
+    variance_priori: float = 1.0
+
+    @property
+    def variance_posteriori(self) -> Array:
+        """Variance of unit weight a posteriori σ̂0² = Ω/r, (R,); NaN without redundancy."""
+        if self.redundancy <= 0:
+            return np.full_like(self.omega, np.nan)
+        return self.omega / self.redundancy
+
+    @property
+    def covariance_priori(self) -> Array:
+        """Σ_xx = σ0² Q_xx, (R, u, u)."""
+        return self.variance_priori * self.cofactors
+
+    @property
+    def covariance_posteriori(self) -> Array:
+        """Σ_xx = σ̂0² Q_xx, (R, u, u)."""
+        return self.variance_posteriori[:, None, None] * self.cofactors
+
+    @property
+    def sigma_priori(self) -> Array:
+        """Standard deviations a priori, (R, u)."""
+        return np.sqrt(np.diagonal(self.covariance_priori, axis1=1, axis2=2))
+
+    @property
+    def sigma_posteriori(self) -> Array:
+        """Standard deviations a posteriori, (R, u)."""
+        return np.sqrt(np.diagonal(self.covariance_posteriori, axis1=1, axis2=2))
+
+
+def adjust(
+    equations: ConditionEquations,
+    observations: ArrayLike,
+    cofactors: ArrayLike,
+    initial: ArrayLike,
+    *,
+    parameter_observations: ArrayLike | None = None,
+    parameter_weights: ArrayLike | None = None,
+    latent: Array | None = None,
+    max_iterations: int = MAX_ITERATIONS,
+) -> Adjustment:
+    """Adjust R replicates of one problem.
+
+    Parameters
+    ----------
+    equations : ConditionEquations
+    observations : (R, n, o) array, l
+    cofactors : (n, o) array of variances, or (n, o, o) array of matrices, Q of each block
+    initial : (u,) or (R, u) array, initial values of the parameters
+    parameter_observations, parameter_weights : (R, u) and (u,) arrays, optional
+        Direct observations of parameters (gravity with σ_g, say) and their weights; a weight of
+        zero means that the parameter is not observed.
+    latent : (R, ...) array, optional
+        First value of what the equations carry along.
+    max_iterations : int
+
+    Returns
+    -------
+    Adjustment
+        A replicate that does not converge or whose normal matrix is singular is flagged and its
+        numbers are NaN.
+
+    Raises
+    ------
+    InputError
+        If there are fewer conditions than unknowns.
+    """
+    observed = np.moveaxis(np.asarray(observations, dtype=float), -1, 0).copy()
+    q = np.moveaxis(np.asarray(cofactors, dtype=float), 0, -1).copy()
+    n_observations, n_replicates, n_blocks = observed.shape
+    n_unknowns = np.shape(initial)[-1]
+    x = np.empty((n_unknowns, n_replicates))
+    x[:] = np.moveaxis(np.atleast_2d(np.asarray(initial, dtype=float)), -1, 0)
+    v = np.zeros_like(observed)
+    weights = np.zeros(n_unknowns) if parameter_weights is None else np.asarray(parameter_weights)
+    direct = np.zeros_like(x)
+    if parameter_observations is not None:
+        direct[:] = np.moveaxis(np.atleast_2d(np.asarray(parameter_observations)), -1, 0)
+
+    result = Adjustment(
+        parameters=np.full((n_replicates, n_unknowns), np.nan),
+        residuals=np.full((n_replicates, n_blocks, n_observations), np.nan),
+        cofactors=np.full((n_replicates, n_unknowns, n_unknowns), np.nan),
+        omega=np.full(n_replicates, np.nan),
+        redundancy=0,
+        converged=np.zeros(n_replicates, dtype=bool),
+        iterations=np.zeros(n_replicates, dtype=int),
+        singular=np.zeros(n_replicates, dtype=bool),
+    )
+    tolerance = _tolerance(observed, q)
+    active = np.arange(n_replicates)
+    redundancy = 0
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        for iteration in range(1, max_iterations + 1):
+            at = equations.linearise(x, observed + v, latent)
+            redundancy = _redundancy(at.psi, weights)
+            step = _step(at, v, q, weights, direct - x)
+            x, v, latent = x + step.dx, step.v, at.latent
+            converged = step.size <= tolerance
+            going_on = ~converged & np.isfinite(step.size)
+
+            result.iterations[active] = iteration
+            result.singular[active] = step.singular
+            result.converged[active] = converged
+            ended = active[converged]
+            result.parameters[ended] = x[:, converged].T
+            result.residuals[ended] = np.moveaxis(v[:, converged], 0, -1)
+            result.omega[ended] = step.omega[converged]
+            result.cofactors[ended] = step.cofactors(converged)
+
+            if not going_on.any():
+                break
+            if not going_on.all():
+                active, x, v = active[going_on], x[:, going_on], v[:, going_on]
+                observed, direct = observed[:, going_on], direct[:, going_on]
+                latent = None if latent is None else latent[:, going_on]
+    return replace(result, redundancy=redundancy)
+
+
+@dataclass(frozen=True)
+class _Step:
+    """One iteration: the step, the new residuals, and their size in standard deviations."""
+
+    dx: Array
+    v: Array
+    omega: Array
+    size: Array
+    factor: Array
+    scale: Array
+
+    @property
+    def singular(self) -> NDArray[np.bool_]:
+        return np.asarray(np.isnan(self.factor[-1, -1]))
+
+    def cofactors(self, chosen: NDArray[np.bool_]) -> Array:
+        """Q_xx = N⁻¹ of the chosen replicates, (R, u, u)."""
+        scale = self.scale[:, chosen]
+        inverse = cholesky.inverse(self.factor[..., chosen])
+        return np.moveaxis(inverse / (scale[:, None] * scale), -1, 0)
+
+
+def _step(at: Linearisation, v: Array, q: Array, weights: Array, prior_misclosure: Array) -> _Step:
+    """Solve the linearised problem; `prior_misclosure` is observed minus present parameters."""
+    b = at.jac_observations
+    whitening, a_white = whiten(at, q)
+    w_white = cholesky.forward(whitening, at.psi - np.einsum("corn,orn->crn", b, v))
+    normal, right = _normal_equations(a_white, w_white)
+    diagonal = np.einsum("uur->ur", normal)
+    diagonal += weights[:, None]
+    right += weights[:, None] * prior_misclosure
+
+    scale = np.sqrt(diagonal)
+    lower = cholesky.factor(normal / (scale[:, None] * scale), PIVOT_TOLERANCE)
+    half = cholesky.forward(lower, right / scale)
+    dx = cholesky.backward(lower, half) / scale
+
+    misclosure = w_white + np.einsum("curn,ur->crn", a_white, dx)
+    v_new = np.einsum("crn,corn->orn", -cholesky.backward(whitening, misclosure), _times(b, q))
+    omega = np.einsum("crn,crn->r", misclosure, misclosure)
+    omega += (weights[:, None] * (prior_misclosure - dx) ** 2).sum(axis=0)
+
+    # The three that must vanish: the step in x and in v, and ψ at the adjusted observations.
+    size_x = np.sqrt((half**2).sum(axis=0))
+    size_v = (np.abs(v_new - v) / _sigma(q)[:, None]).max(axis=(0, 2))
+    size_psi = np.abs(cholesky.forward(whitening, at.psi)).max(axis=(0, 2))
+    size = np.maximum(np.maximum(size_x, size_v), size_psi)
+    return _Step(dx, v_new, omega, size, lower, scale)
+
+
+def whiten(at: Linearisation, q: Array) -> tuple[Array, Array]:
+    """Scale conditions to unit weight: M = B Q Bᵀ = L Lᵀ; returns L and L⁻¹A.
+
+    q : (o, n) variances or (o, o, n) matrices. L is (c, c, R, n), L⁻¹A is (c, u, R, n).
+    """
+    b = at.jac_observations
+    lower = cholesky.factor(np.einsum("corn,dorn->cdrn", _times(b, q), b))
+    return lower, cholesky.forward(lower, at.jac_parameters)
+
+
+def _times(b: Array, q: Array) -> Array:
+    """B Q, (c, o, R, n)."""
+    return b * q[:, None] if q.ndim == 2 else np.einsum("corn,opn->cprn", b, q)
+
+
+def _normal_equations(a: Array, w: Array) -> tuple[Array, Array]:
+    """N = Σ AᵀA (u, u, R) and −Σ Aᵀw (u, R) of whitened conditions (c, u, R, n) and (c, R, n)."""
+    u, n_replicates = a.shape[1:3]
+    normal = np.empty((u, u, n_replicates))
+    for i in range(u):
+        normal[i, : i + 1] = np.einsum("crn,cjrn->jr", a[:, i], a[:, : i + 1])
+        normal[: i + 1, i] = normal[i, : i + 1]
+    return normal, -np.einsum("curn,crn->ur", a, w)
+
+
+def _redundancy(psi: Array, weights: Array) -> int:
+    """r = conditions (direct observations of parameters included) − unknowns."""
+    n_conditions = psi.shape[0] * psi.shape[2] + int(np.count_nonzero(weights))
+    if n_conditions < len(weights):
+        raise InputError(f"{n_conditions} condition equations cannot determine {len(weights)} parameters")
+    return n_conditions - len(weights)
+
+
+def _sigma(q: Array) -> Array:
+    """Standard deviations (o, n) of the observations; infinite where one is held fixed."""
+    variances = q if q.ndim == 2 else np.einsum("oon->on", q)
+    return np.sqrt(np.where(variances > 0, variances, np.inf))
+
+
+def _tolerance(observed: Array, q: Array) -> float:
+    """Step at which to stop, in standard deviations: never finer than rounding allows."""
+    largest = np.max(np.abs(observed) / _sigma(q)[:, None], initial=0.0)
+    return max(STEP_TOLERANCE, 64 * np.finfo(float).eps * float(largest))

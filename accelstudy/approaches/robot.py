@@ -1,0 +1,22 @@
+"""Robot-aided calibration: a robot also observes roll and pitch of every attitude."""
+
+from accelstudy.approaches.base import Approach, register
+from accelstudy.leveling import specific_force
+
+
+@register
+class Robot(Approach):
+    """Three conditions per position, f_b − f(φ_r, θ_r, g) = 0.
+
+    They hold exactly where the three of Thalmann & Neuner (2018, eq. 10, with the sign of f_y
+    corrected) hold, so the adjustment is the same; but in components they need no wrapping of roll
+    residuals and stay regular where the x axis is vertical and roll has no meaning.
+    """
+
+    name = "robot"
+    n_conditions = 3
+    uses_angles = True
+
+    def conditions(self, f, angles, g, xp):
+        """Return f_b − f(φ_r, θ_r, g)."""
+        return tuple(a - b for a, b in zip(f, specific_force(*angles, g, xp), strict=True))

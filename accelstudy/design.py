@@ -1,0 +1,138 @@
+"""What a scheme can determine: rank, condition and linear theory, before any simulation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.adjustment import whitened_jacobian
+from accelstudy.approaches import Approach
+from accelstudy.schemes import Scheme, get_scheme
+from accelstudy.sensor import SensorModel
+from accelstudy.simulation import Noise, session
+from accelstudy.units import STANDARD_GRAVITY
+
+Array = NDArray[np.float64]
+
+SINGULAR = 1e-7
+"""Singular values of the scaled design below this fraction of the largest count as zero."""
+
+
+@dataclass(frozen=True)
+class Design:
+    """Diagnosis of one scheme with one model and one approach.
+
+    Attributes
+    ----------
+    parameter_names : tuple of str
+    rank : int, of the design at the ideal sensor
+    condition : float, of the design with columns scaled to unit length; inf if singular
+    redundancy : int, r = conditions − unknowns
+    fourth_moment : float, m = ⟨x²y²⟩ of the directions, mean over the three pairs of axes
+    pole_distance : float, rad, smallest angle of a direction to the x axis, where roll is undefined
+    not_estimable : tuple of str, parameters that the scheme cannot determine
+    reason : str, why; empty if all is estimable
+    cofactors : (u, u) array, Q_xx of linear theory at the given parameters; NaN if not estimable
+    """
+
+    parameter_names: tuple[str, ...]
+    rank: int
+    condition: float
+    redundancy: int
+    fourth_moment: float
+    pole_distance: float
+    not_estimable: tuple[str, ...]
+    reason: str
+    cofactors: Array
+
+    @property
+    def estimable(self) -> bool:
+        """Whether every parameter is determined."""
+        return not self.not_estimable
+
+    @property
+    def sigma(self) -> Array:
+        """Standard deviations of linear theory, (u,), SI."""
+        return np.sqrt(np.diag(self.cofactors))
+
+
+def diagnose(
+    scheme: Scheme,
+    model: SensorModel,
+    approach: Approach,
+    noise: Noise | None = None,
+    parameters: Array | None = None,
+    gravity: float = STANDARD_GRAVITY,
+) -> Design:
+    """Diagnose what a scheme determines.
+
+    Rank and condition are those at the ideal sensor (all parameters zero): what is singular there
+    is near-singular for every real sensor. The cofactors are taken at `parameters`.
+
+    Parameters
+    ----------
+    scheme : Scheme
+    model : SensorModel
+    approach : Approach
+    noise : Noise, optional
+    parameters : (u,) array, SI, optional; the ideal sensor by default
+    gravity : float, m/s²
+    """
+    noise = noise or Noise()
+    ideal = np.zeros(model.n_parameters)
+    names = (*model.parameter_names, "g") if noise.sigma_gravity > 0 else model.parameter_names
+    a = _design(scheme, model, approach, noise, ideal, gravity)
+    rank, condition, free = _rank(a)
+    not_estimable = tuple(name for name, is_free in zip(names, free, strict=True) if is_free)
+    reason = ""
+    cofactors = np.full((len(names), len(names)), np.nan)
+    if not_estimable:
+        everywhere = get_scheme("fibonacci-60")
+        best_rank, *_ = _rank(_design(everywhere, model, approach, noise, ideal, gravity))
+        blind = best_rank < len(names)
+        reason = (
+            f"rank {rank} of {len(names)}: {', '.join(not_estimable)} cannot be told apart by "
+            + (f"the {approach.name} approach in any scheme" if blind else "these positions")
+        )
+    else:
+        at = ideal if parameters is None else np.asarray(parameters, dtype=float)
+        a = _design(scheme, model, approach, noise, at, gravity)
+        scale = np.linalg.norm(a, axis=0)
+        cofactors = np.linalg.inv((a / scale).T @ (a / scale)) / np.outer(scale, scale)
+    return Design(
+        parameter_names=names,
+        rank=rank,
+        condition=condition,
+        redundancy=len(a) - len(names),
+        fourth_moment=scheme.fourth_moment,
+        pole_distance=scheme.pole_distance,
+        not_estimable=not_estimable,
+        reason=reason,
+        cofactors=cofactors,
+    )
+
+
+def _design(
+    scheme: Scheme,
+    model: SensorModel,
+    approach: Approach,
+    noise: Noise,
+    parameters: Array,
+    gravity: float,
+) -> Array:
+    """Design matrix (conditions, u) with unit weights."""
+    ideal = session(model, parameters, scheme.directions, gravity)
+    return whitened_jacobian(model, approach, ideal.observations(noise), parameters)
+
+
+def _rank(a: Array) -> tuple[int, float, NDArray[np.bool_]]:
+    """Rank, condition and which columns lie in the null space of a design."""
+    length = np.linalg.norm(a, axis=0)
+    scaled = a / np.where(length > 0, length, 1.0)
+    _, values, vt = np.linalg.svd(scaled, full_matrices=True)
+    rank = int(np.count_nonzero(values > SINGULAR * values[0]))
+    complete = rank == a.shape[1]
+    condition = float(values[0] / values[-1]) if complete else np.inf
+    return rank, condition, np.linalg.norm(vt[rank:], axis=0) > 1e-3

@@ -1,0 +1,136 @@
+"""What an effect is, and the registry of effects.
+
+The sensor turns the specific force f_b (body frame) into its output f_s in two steps,
+
+    f_a = T⁻¹ f_b,        T = I + Σ axes(p),
+    f_s = f_a + Σ output(f_a, p),
+
+and a robot that carries it reads the angles (φ, θ) + Σ reading(φ, θ, p). Each effect says what it
+adds to one of the three sums; what it does not override is zero. The formulas are written in
+components with ordinary arithmetic and functions of the namespace `xp`, so that one definition
+serves NumPy arrays, symbols to differentiate, and generated code.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.errors import InputError, UnknownNameError
+
+AXES = ("x", "y", "z")
+
+# Numbers, arrays or symbols, whatever the namespace `xp` works on.
+Number = Any
+Vector = tuple[Number, Number, Number]
+Matrix = tuple[Vector, Vector, Vector]
+
+ZERO_VECTOR: Vector = (0, 0, 0)
+ZERO_MATRIX: Matrix = (ZERO_VECTOR, ZERO_VECTOR, ZERO_VECTOR)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of an effect: its name, its SI unit and its symbol in figures (mathtext)."""
+
+    name: str
+    unit: str
+    symbol: str
+
+
+def per_axis(name: str, unit: str, symbol: str) -> tuple[Parameter, ...]:
+    """Make the three parameters of an effect that acts on each axis alike; `%` is the axis."""
+    return tuple(Parameter(f"{name}_{i}", unit, f"${symbol.replace('%', i)}$") for i in AXES)
+
+
+@dataclass(frozen=True)
+class Hold:
+    """What is known of the static holds (positions) besides the forces, in order of acquisition.
+
+    Every column is optional and holds one value per position; an effect that needs a column that
+    is absent cannot be simulated or estimated, and says so.
+
+    Parameters
+    ----------
+    temperature : (n,) array, K above the reference temperature
+    time : (n,) array, s since the start of the session
+    vibration : (n,) array, m/s², rms during the hold
+    roll, pitch, yaw : (n,) arrays, rad, attitude known from outside
+    previous_x, previous_y, previous_z : (n,) arrays, m/s², specific force of the hold before
+    """
+
+    temperature: NDArray[np.float64] | None = None
+    time: NDArray[np.float64] | None = None
+    vibration: NDArray[np.float64] | None = None
+    roll: NDArray[np.float64] | None = None
+    pitch: NDArray[np.float64] | None = None
+    yaw: NDArray[np.float64] | None = None
+    previous_x: NDArray[np.float64] | None = None
+    previous_y: NDArray[np.float64] | None = None
+    previous_z: NDArray[np.float64] | None = None
+
+    @classmethod
+    def columns(cls) -> tuple[str, ...]:
+        """Names of all columns."""
+        return tuple(field.name for field in fields(cls))
+
+    def column(self, name: str) -> NDArray[np.float64]:
+        """Return a column, or raise `InputError` if these holds do not have it."""
+        values = getattr(self, name)
+        if values is None:
+            raise InputError(f"the model needs the column {name!r} of each position; it is absent")
+        return np.asarray(values, dtype=float)
+
+
+class Effect:
+    """One systematic effect; subclasses set the class attributes and override what they add.
+
+    In the methods `p` is the tuple of the effect's own parameters, `f` the specific force in sensor
+    axes (f_a), `g` the local gravity, `hold` a `Hold` whose columns are numbers, arrays or symbols,
+    and `xp` the namespace of functions (``np`` or a symbolic twin with the same names).
+    """
+
+    name: ClassVar[str]
+    parameters: ClassVar[tuple[Parameter, ...]]
+
+    def axes(self, p: tuple[Number, ...], xp: Any) -> Matrix:
+        """Add to the matrix T of the sensitive axes."""
+        return ZERO_MATRIX
+
+    def output(self, f: Vector, p: tuple[Number, ...], g: Number, hold: Any, xp: Any) -> Vector:
+        """Add to the output f_s, in m/s²."""
+        return ZERO_VECTOR
+
+    def reading(
+        self, angles: tuple[Number, Number], p: tuple[Number, ...], hold: Any, xp: Any
+    ) -> tuple[Number, Number]:
+        """Add to the robot's reading of roll and pitch, in rad."""
+        return (0, 0)
+
+
+_REGISTRY: dict[str, Effect] = {}
+EffectClass = TypeVar("EffectClass", bound=type[Effect])
+
+
+def register(effect: EffectClass) -> EffectClass:
+    """Class decorator: enter an effect into the registry under its name."""
+    if effect.name in _REGISTRY:
+        raise ValueError(f"effect {effect.name!r} is registered twice")
+    _REGISTRY[effect.name] = effect()
+    return effect
+
+
+def get_effect(name: str) -> Effect:
+    """Return the effect registered under `name`; raise `UnknownNameError` if there is none."""
+    try:
+        return _REGISTRY[name]
+    except KeyError:
+        raise UnknownNameError("effect", name, _REGISTRY) from None
+
+
+def effect_names() -> tuple[str, ...]:
+    """Names of all registered effects, in order of registration."""
+    return tuple(_REGISTRY)

@@ -1,0 +1,20 @@
+"""Non-orthogonality: the three angles by which the sensitive axes are not at right angles."""
+
+from accelstudy.effects.base import Effect, Parameter, register
+
+
+@register
+class NonOrthogonality(Effect):
+    """Upper triangle of T (Thalmann & Neuner 2018, eq. 4); α_ij turns axis i around body axis j."""
+
+    name = "nonorthogonality"
+    parameters = (
+        Parameter("alpha_yz", "rad", r"$\alpha_{yz}$"),
+        Parameter("alpha_zy", "rad", r"$\alpha_{zy}$"),
+        Parameter("alpha_zx", "rad", r"$\alpha_{zx}$"),
+    )
+
+    def axes(self, p, xp):
+        """Return the upper triangle of eq. (4)."""
+        yz, zy, zx = p
+        return ((0, -yz, zy), (0, 0, -zx), (0, 0, 0))

@@ -1,0 +1,15 @@
+"""Scale: the linear scale-factor error of each axis."""
+
+from accelstudy.effects.base import Effect, per_axis, register
+
+
+@register
+class Scale(Effect):
+    """Scale error s_i, S = diag(1 + s) (Thalmann & Neuner 2018, eq. 1 and 2)."""
+
+    name = "scale"
+    parameters = per_axis("s", "1", "s_%")
+
+    def output(self, f, p, g, hold, xp):
+        """Return s_i f_i."""
+        return tuple(s * f_i for s, f_i in zip(p, f, strict=True))

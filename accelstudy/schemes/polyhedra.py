@@ -1,0 +1,135 @@
+"""Faces, edges and corners of the cube, and vertices of other polyhedra."""
+
+from itertools import product
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from accelstudy.schemes.registry import Array, register
+
+GOLDEN_RATIO = (1 + np.sqrt(5)) / 2
+
+
+def cyclic_permutations(x: float, y: float, z: float) -> Array:
+    """All distinct points (±x, ±y, ±z), (±z, ±x, ±y) and (±y, ±z, ±x), shape (n, 3).
+
+    A point and its antipode follow each other.
+    """
+    points: dict[tuple[float, ...], None] = {}  # a set that keeps the order
+    for order in ((x, y, z), (z, x, y), (y, z, x)):
+        for signs in product((1, -1), repeat=3):
+            point = np.multiply(order, signs)
+            points[tuple(point)] = points[tuple(-point)] = None
+    return np.array(list(points))
+
+
+def generic(directions: Array) -> Array:
+    """Turn directions by Euler angles xyz of (15°, 25°, 35°), which no symmetry of theirs knows.
+
+    Aligned with the axes, orbits of the octahedral and icosahedral groups leave cubic terms
+    singular under the gravity norm; and a vertex on the x axis has no roll.
+    """
+    turned: Array = Rotation.from_euler("xyz", [15, 25, 35], degrees=True).apply(directions)
+    return turned
+
+
+@register(
+    "faces-6",
+    title="faces",
+    status="standard",
+    source="Lötters et al. (1998), Sensors and Actuators A 68, 221-228",
+)
+def faces() -> Array:
+    """The sensor on each side of a cube, +z (level) first."""
+    return cyclic_permutations(0, 0, 1)
+
+
+def edges() -> Array:
+    """The sensor on each edge of a cube: two axes share gravity."""
+    return cyclic_permutations(0, 1, 1)
+
+
+def corners() -> Array:
+    """The sensor on each corner of a cube: three axes share gravity."""
+    return cyclic_permutations(1, 1, 1)
+
+
+@register(
+    "faces-edges-18",
+    title="faces + edges",
+    status="standard",
+    source="Shin & El-Sheimy (2002), ZfV 127, 41-50; Skog & Händel (2006); Syed et al. (2007); "
+    "Fong et al. (2008); Qureshi & Golnaraghi (2017)",
+)
+def faces_edges() -> Array:
+    """The 18 positions most often used in the field."""
+    return np.vstack([faces(), edges()])
+
+
+@register(
+    "faces-edges-corners-26",
+    title="faces + edges + corners",
+    status="standard",
+    source="Syed et al. (2007), Meas. Sci. Technol. 18, 1897-1907, with the corners",
+)
+def faces_edges_corners() -> Array:
+    """The 18 positions and the corners."""
+    return np.vstack([faces(), edges(), corners()])
+
+
+@register(
+    "rhombicuboctahedron-24",
+    title="rhombicuboctahedron",
+    status="generated",
+    source="vertices of the rhombicuboctahedron",
+)
+def rhombicuboctahedron() -> Array:
+    """The 24 vertices, aligned with the axes and yet 30° off the roll pole.
+
+    A rotation would change their fourth moment and cure what the alignment costs: cubic terms
+    are singular under the gravity norm.
+    """
+    return cyclic_permutations(1, 1, 1 + np.sqrt(2))
+
+
+@register(
+    "icosahedron-12",
+    title="icosahedron",
+    status="generated",
+    source="vertices of the icosahedron, a spherical 5-design",
+)
+def icosahedron() -> Array:
+    """The 12 vertices in a generic orientation.
+
+    No fewer positions match the sphere's moments through degree 4, on which the cofactors of the
+    nine parameters depend. They are six axes only, too few for terms beyond.
+    """
+    return generic(cyclic_permutations(0, 1, GOLDEN_RATIO))
+
+
+@register(
+    "dodecahedron-20",
+    title="dodecahedron",
+    status="generated",
+    source="vertices of the dodecahedron, a spherical 5-design",
+)
+def dodecahedron() -> Array:
+    """The 20 vertices in a generic orientation."""
+    inner = cyclic_permutations(0, 1 / GOLDEN_RATIO, GOLDEN_RATIO)
+    return generic(np.vstack([corners(), inner]))
+
+
+@register(
+    "icosidodecahedron-30",
+    title="icosidodecahedron",
+    status="stand-in",
+    source="vertices of the icosidodecahedron for the 30 positions of Lv et al. (2016), "
+    "SII 2016, 373-378",
+)
+def icosidodecahedron() -> Array:
+    """The 30 vertices in a generic orientation, 9.7° off the roll pole.
+
+    Aligned with the axes six of them are faces, two of these on the pole.
+    """
+    inner = cyclic_permutations(1, GOLDEN_RATIO, GOLDEN_RATIO**2)
+    return generic(np.vstack([faces(), inner]))

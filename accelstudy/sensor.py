@@ -1,0 +1,315 @@
+"""Sensor models: compositions of effects, evaluated forwards and backwards.
+
+    f_a = T⁻¹ f_b,   T = I + Σ axes(p),      f_s = f_a + Σ output(f_a, p)
+
+With the effects bias, scale and non-orthogonality this is f_s = S T⁻¹ f_b + b (Thalmann & Neuner
+2018, eq. 5). The way back solves the second equation for f_a by Newton's method, so that an effect
+needs no inverse of its own, and has f_b = T f_a in closed form.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import ArrayLike, NDArray
+
+from accelstudy.effects import Effect, Hold, Parameter, get_effect
+from accelstudy.errors import InputError
+from accelstudy.tracing import TracedFunction, derivative, symbolic, symbols
+from accelstudy.units import STANDARD_GRAVITY
+
+
+
+@dataclass(frozen=True)
+class SensorModel:
+    """A named composition of effects.
+
+    Parameters
+    ----------
+    name : str
+    effects : tuple of Effect
+        No two of them share a parameter name.
+    """
+
+    name: str
+    effects: tuple[Effect, ...]
+
+    def __post_init__(self) -> None:
+        names = [parameter.name for parameter in self.parameters]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise InputError(
+                f"model {self.name!r}: parameters {', '.join(twice)} occur in two effects"
+            )
+
+    @classmethod
+    def of(cls, name: str, effects: Iterable[str]) -> SensorModel:
+        """Compose a model of registered effects by their names."""
+        return cls(name, tuple(get_effect(effect) for effect in effects))
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """All parameters, effect after effect."""
+        return tuple(p for effect in self.effects for p in effect.parameters)
+
+    @property
+    def n_parameters(self) -> int:
+        """Number of parameters u."""
+        return len(self.parameters)
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of all parameters."""
+        return tuple(p.name for p in self.parameters)
+
+    def vector(self, values: Mapping[str, float]) -> NDArray[np.float64]:
+        """Parameter vector (u,) in SI from a mapping; what it does not name is zero."""
+        return np.array([values.get(name, 0.0) for name in self.parameter_names], dtype=float)
+
+    @cached_property
+    def trace(self) -> SensorTrace:
+        """The model in symbols, and the functions generated from it."""
+        return SensorTrace(self)
+
+    def sense(
+        self,
+        f_b: ArrayLike,
+        parameters: ArrayLike,
+        g: ArrayLike = STANDARD_GRAVITY,
+        hold: Hold | None = None,
+    ) -> NDArray[np.float64]:
+        """Output of the sensor for a specific force in the body frame (forward, no noise).
+
+        Parameters
+        ----------
+        f_b : (..., n, 3) array, m/s²
+        parameters : (..., u) array, SI
+        g : float or (...) array, local gravity, m/s²
+        hold : Hold, optional
+            What else is known of the n positions; only effects that depend on it need it.
+
+        Returns
+        -------
+        f_s : (..., n, 3) array, m/s²
+        """
+        return self.trace.apply(self.trace.sense, f_b, parameters, g, hold)
+
+    def correct(
+        self,
+        f_s: ArrayLike,
+        parameters: ArrayLike,
+        g: ArrayLike = STANDARD_GRAVITY,
+        hold: Hold | None = None,
+    ) -> NDArray[np.float64]:
+        """Specific force in the body frame for a sensor output: the inverse of `sense`.
+
+        Parameters and result as in `sense`, with f_s and f_b exchanged. Where the Newton iteration
+        does not converge (effects as large as the signal) the result is NaN.
+        """
+        f_a = self._sensitive_force(f_s, parameters, g, hold)
+        return self.trace.apply(self.trace.body, f_a, parameters, g, hold)
+
+    def correction_jacobian(
+        self,
+        f_s: ArrayLike,
+        parameters: ArrayLike,
+        g: ArrayLike = STANDARD_GRAVITY,
+        hold: Hold | None = None,
+    ) -> NDArray[np.float64]:
+        """Derivative of `correct` with respect to the parameters, (..., n, 3, u)."""
+        f_a = np.moveaxis(self._sensitive_force(f_s, parameters, g, hold), -1, 0)
+        x = np.moveaxis(np.asarray(parameters, dtype=float), -1, 0)
+        jacobian = self.trace.evaluate(
+            self.trace.body_jacobian, f_a, f_a, x, np.asarray(g, dtype=float), hold
+        )
+        return np.moveaxis(jacobian, (0, 1), (-2, -1))
+
+    def _sensitive_force(
+        self, f_s: ArrayLike, parameters: ArrayLike, g: ArrayLike, hold: Hold | None
+    ) -> NDArray[np.float64]:
+        """f_a of f_s by Newton's method, NaN where it does not converge."""
+        f_s = np.asarray(f_s, dtype=float)
+        batch = np.broadcast_shapes(f_s.shape[:-2], np.shape(parameters)[:-1])
+        f_a = np.broadcast_to(f_s, batch + f_s.shape[-2:])
+        step = np.zeros_like(f_a)
+        for _ in range(25):
+            step = self.trace.apply(self.trace.newton_step, f_a, parameters, g, hold, f_s)
+            f_a = f_a + step
+            if not np.any(np.abs(step) > 1e-14 * STANDARD_GRAVITY):
+                break
+        return np.where(np.abs(step) <= 1e-12 * STANDARD_GRAVITY, f_a, np.nan)
+
+    def axes_matrix(self, parameters: ArrayLike) -> NDArray[np.float64]:
+        """Return T, (3, 3), which turns forces in the sensitive axes into the body frame."""
+        return self.trace.apply(
+            self.trace.body, np.eye(3), parameters, STANDARD_GRAVITY, None
+        ).T
+
+    def reading_errors(
+        self, angles: ArrayLike, parameters: ArrayLike, hold: Hold | None = None
+    ) -> NDArray[np.float64]:
+        """Return what the effects add to a robot's reading of roll and pitch.
+
+        Parameters
+        ----------
+        angles : (n, 2) array, rad
+        parameters : (u,) array, SI
+        hold : Hold, optional
+
+        Returns
+        -------
+        (n, 2) array, rad
+        """
+        trace = self.trace
+        angles = np.asarray(angles, dtype=float)
+        padded = np.concatenate([angles, np.zeros((len(angles), 1))], axis=1)
+        return trace.apply(trace.reading, padded, parameters, STANDARD_GRAVITY, hold)
+
+
+class SensorTrace:
+    """A sensor model evaluated with symbols.
+
+    Attributes
+    ----------
+    force, output, p, g, hold : the symbols of a force, of the output, of the parameters, of gravity
+        and of the columns of `Hold`
+    t_matrix : Matrix (3, 3), T
+    h : list of 3 expressions, f_s as a function of f_a
+    """
+
+    def __init__(self, model: SensorModel) -> None:
+        self.force = symbols("f_x", "f_y", "f_z")
+        self.output = symbols("l_x", "l_y", "l_z")
+        self.p = symbols(*model.parameter_names)
+        (self.g,) = symbols("g")
+        self.hold = dict(
+            zip(Hold.columns(), symbols(*(f"hold_{c}" for c in Hold.columns())), strict=True)
+        )
+        hold = _HoldSymbols(self.hold)
+
+        self.t_matrix = sp.eye(3)
+        self.h = list(self.force)
+        self._readings = []
+        position = 0
+        for effect in model.effects:
+            p = self.p[position : position + len(effect.parameters)]
+            position += len(p)
+            self.t_matrix += sp.Matrix(effect.axes(p, symbolic))
+            added = effect.output(self.force, p, self.g, hold, symbolic)
+            self.h = [a + b for a, b in zip(self.h, added, strict=True)]
+            self._readings.append((effect, p))
+        self._hold_symbols = hold
+
+    def reading_errors(self, angles: tuple[Any, Any]) -> tuple[Any, Any]:
+        """Sum of what the effects add to the robot's reading of roll and pitch."""
+        total: tuple[Any, Any] = (sp.S.Zero, sp.S.Zero)
+        for effect, p in self._readings:
+            added = effect.reading(angles, p, self._hold_symbols, symbolic)
+            total = (total[0] + added[0], total[1] + added[1])
+        return total
+
+    @property
+    def arguments(self) -> tuple[sp.Symbol, ...]:
+        """Symbols in the order in which generated functions take them."""
+        return (*self.force, *self.output, *self.p, self.g, *self.hold.values())
+
+    def evaluate(
+        self,
+        function: TracedFunction,
+        force: NDArray[np.float64],
+        output: NDArray[np.float64],
+        parameters: NDArray[np.float64],
+        g: NDArray[np.float64],
+        hold: Hold | None,
+        *more: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """Call a generated function, components first.
+
+        force, output : (3, ..., n); parameters : (u, ...); g : (...); more : (..., n), arguments
+        of the function beyond `arguments`. Returns (rows, columns, ..., n).
+        """
+        hold = hold or Hold()
+        columns = [
+            hold.column(name) if str(symbol) in function.used else 0.0
+            for name, symbol in self.hold.items()
+        ]
+        shape = np.broadcast_shapes(force.shape[1:], (*parameters.shape[1:], 1), (*g.shape, 1))
+        return function(
+            shape, *force, *output, *parameters[..., None], g[..., None], *columns, *more
+        )
+
+    def apply(
+        self,
+        function: TracedFunction,
+        force: ArrayLike,
+        parameters: ArrayLike,
+        g: ArrayLike,
+        hold: Hold | None,
+        output: ArrayLike | None = None,
+    ) -> NDArray[np.float64]:
+        """Call a generated function of vectors, components last: (..., n, 3) in and out."""
+        force = np.moveaxis(np.asarray(force, dtype=float), -1, 0)
+        output = force if output is None else np.moveaxis(np.asarray(output, dtype=float), -1, 0)
+        parameters = np.moveaxis(np.asarray(parameters, dtype=float), -1, 0)
+        g = np.asarray(g, dtype=float)
+        result = self.evaluate(function, force, output, parameters, g, hold)
+        return np.moveaxis(result[:, 0], 0, -1)
+
+    @cached_property
+    def sense(self) -> TracedFunction:
+        """f_s of f_b."""
+        f_a = self.t_matrix.inv(method="ADJ") * sp.Matrix(self.force)
+        at = dict(zip(self.force, f_a, strict=True))
+        h = [sp.sympify(e).subs(at, simultaneous=True) for e in self.h]
+        return TracedFunction(self.arguments, sp.Matrix(h))
+
+    @cached_property
+    def reading(self) -> TracedFunction:
+        """Errors of the robot's reading, with roll and pitch in place of the first two forces."""
+        return TracedFunction(self.arguments, sp.Matrix(self.reading_errors(self.force[:2])))
+
+    @cached_property
+    def h_inverse(self) -> sp.Matrix:
+        """(∂f_s/∂f_a)⁻¹, (3, 3)."""
+        jacobian = derivative(self.h, self.force)
+        if jacobian.is_diagonal():
+            return sp.diag(*(1 / jacobian[i, i] for i in range(3)))
+        return jacobian.inv(method="ADJ")
+
+    @cached_property
+    def body_by_output(self) -> sp.Matrix:
+        """∂f_b/∂f_s = T H⁻¹, (3, 3), as a function of f_a."""
+        return self.t_matrix * self.h_inverse
+
+    def body_by(self, parameters: tuple[sp.Symbol, ...]) -> sp.Matrix:
+        """∂f_b/∂x at a given output, (3, u), as a function of f_a."""
+        f_b = self.t_matrix * sp.Matrix(self.force)
+        return derivative(f_b, parameters) - self.body_by_output * derivative(self.h, parameters)
+
+    @cached_property
+    def body_jacobian(self) -> TracedFunction:
+        """∂f_b/∂x for the parameters of the model, generated."""
+        return TracedFunction(self.arguments, self.body_by(self.p))
+
+    @cached_property
+    def newton_step(self) -> TracedFunction:
+        """What to add to f_a so that the model's output comes closer to l."""
+        misfit = sp.Matrix(self.output) - sp.Matrix(self.h)
+        return TracedFunction(self.arguments, self.h_inverse * misfit)
+
+    @cached_property
+    def body(self) -> TracedFunction:
+        """f_b of f_a."""
+        return TracedFunction(self.arguments, self.t_matrix * sp.Matrix(self.force))
+
+
+class _HoldSymbols:
+    """Columns of `Hold` as attributes, each a symbol."""
+
+    def __init__(self, columns: Mapping[str, sp.Symbol]) -> None:
+        self.__dict__.update(columns)

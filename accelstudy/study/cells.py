@@ -1,0 +1,192 @@
+"""Cells: the combinations of model, scheme, approach and noise that a study simulates."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from accelstudy.approaches import Approach, approach_names, get_approach
+from accelstudy.models import PRESETS, compose, get_model
+from accelstudy.schemes import Scheme, get_scheme, scheme_names
+from accelstudy.sensor import SensorModel
+from accelstudy.simulation import Noise
+from accelstudy.study.config import Grid, StudyConfig
+from accelstudy.units import MGON
+
+REPLICATES_PER_BATCH = 100_000
+"""Calibrations in one job: long enough that starting Python does not matter."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One set-up, complete in itself.
+
+    Parameters
+    ----------
+    name : str, unique within the study
+    model : str, name of the model that is estimated
+    effects : tuple of str, its effects
+    simulated_effects : tuple of str, the effects of the simulated sensor
+    scheme, approach : str
+    replicates : int
+    noise : Noise
+    gravity : float, true local gravity, m/s²
+    truth : dict of parameter name to true value, SI
+    """
+
+    name: str
+    model: str
+    effects: tuple[str, ...]
+    simulated_effects: tuple[str, ...]
+    scheme: str
+    approach: str
+    replicates: int
+    noise: Noise
+    gravity: float
+    truth: dict[str, float]
+
+    @property
+    def estimated_model(self) -> SensorModel:
+        """The model of the adjustment."""
+        return compose(self.model, self.effects)
+
+    @property
+    def simulated_model(self) -> SensorModel:
+        """The model of the simulated sensor."""
+        if self.simulated_effects == self.effects:
+            return self.estimated_model
+        return compose("simulated", self.simulated_effects)
+
+    @property
+    def positions(self) -> Scheme:
+        """The scheme."""
+        return get_scheme(self.scheme)
+
+    @property
+    def conditions(self) -> Approach:
+        """The approach."""
+        return get_approach(self.approach)
+
+    def seed(self, seed: int, block: int) -> np.random.SeedSequence:
+        """Seed of one block of replicates.
+
+        It depends on the study's seed, on what the cell is and on the block, so that no other cell
+        and no other block changes it.
+        """
+        identity = [
+            list(self.effects),
+            list(self.simulated_effects),
+            self.scheme,
+            self.approach,
+            asdict(self.noise),
+        ]
+        digest = hashlib.sha256(json.dumps(identity).encode()).digest()
+        words = np.frombuffer(digest, dtype="<u4").tolist()
+        return np.random.SeedSequence([seed, *words], spawn_key=(block,))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data, from which `from_dict` makes the cell again."""
+        return json.loads(json.dumps(asdict(self)))
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Cell:
+        """Make a cell of plain data."""
+        return cls(
+            **{
+                **data,
+                "effects": tuple(data["effects"]),
+                "simulated_effects": tuple(data["simulated_effects"]),
+                "noise": Noise(**data["noise"]),
+            }
+        )
+
+
+def study_cells(study: StudyConfig) -> list[Cell]:
+    """All cells of a study, in the order of its configuration, without repetition.
+
+    A cell that occurs more than once (as a Table 1 row and in a grid, say) runs once, with the
+    largest number of replicates.
+    """
+    grids = list(study.grids)
+    if study.presets is not None:
+        grids += [
+            Grid(
+                models=[preset.model],
+                schemes=[preset.scheme],
+                approaches=study.presets.approaches,
+                replicates=study.presets.replicates,
+            )
+            for preset in PRESETS
+        ]
+    cells: dict[str, Cell] = {}
+    for grid in grids:
+        for cell in _grid_cells(study, grid):
+            known = cells.get(cell.name)
+            if known is None or cell.replicates > known.replicates:
+                cells[cell.name] = cell
+    return list(cells.values())
+
+
+def _grid_cells(study: StudyConfig, grid: Grid) -> Iterable[Cell]:
+    noise = study.noise
+    schemes = scheme_names() if grid.schemes == ["all"] else grid.schemes
+    approaches = approach_names() if grid.approaches == ["all"] else grid.approaches
+    for model, scheme, approach, sensor, robot, gravity, error in product(
+        study.model_names(grid.models),
+        schemes,
+        approaches,
+        grid.sensor_sigma_mps2 or [noise.sensor.sigma_mps2],
+        grid.robot_sigma_mgon or [noise.robot.sigma_mgon],
+        grid.gravity_sigma_mps2 or [noise.gravity.sigma_mps2],
+        grid.gravity_error_mps2 or [noise.gravity.error_mps2],
+    ):
+        uses_angles = get_approach(approach).uses_angles
+        if not uses_angles:  # the same cell whatever the robot's accuracy
+            robot = noise.robot.sigma_mgon
+        settings = {
+            "sensor_sigma_mps2": (sensor, noise.sensor.sigma_mps2),
+            "robot_sigma_mgon": (robot, noise.robot.sigma_mgon),
+            "gravity_sigma_mps2": (gravity, noise.gravity.sigma_mps2),
+            "gravity_error_mps2": (error, noise.gravity.error_mps2),
+        }
+        changed = [f"{key}={value:g}" for key, (value, usual) in settings.items() if value != usual]
+        effects = tuple(e.name for e in get_model(model, study.models).effects)
+        simulated = (
+            effects if study.simulated_effects == "model" else tuple(study.simulated_effects)
+        )
+        yield Cell(
+            name="/".join([model, scheme, approach, *changed]),
+            model=model,
+            effects=effects,
+            simulated_effects=simulated,
+            scheme=scheme,
+            approach=approach,
+            replicates=grid.replicates,
+            noise=Noise(
+                study.position_sigma(sensor), robot * MGON if uses_angles else 0.0, gravity, error
+            ),
+            gravity=study.gravity_mps2,
+            truth=study.truth(dict.fromkeys([*effects, *simulated])),
+        )
+
+
+def batches(cells: Iterable[Cell], size: int = REPLICATES_PER_BATCH) -> list[list[Cell]]:
+    """Divide cells into batches of about `size` calibrations, in order.
+
+    What a cell computes does not depend on its batch.
+    """
+    result: list[list[Cell]] = []
+    room = 0
+    for cell in cells:
+        if not result or cell.replicates > room:
+            result.append([])
+            room = size
+        result[-1].append(cell)
+        room -= cell.replicates
+    return result

@@ -1,0 +1,131 @@
+"""Parquet files with their origin in the metadata, written whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from accelstudy import __version__
+from accelstudy.errors import InputError
+
+METADATA_KEY = b"accelstudy"
+
+
+@cache
+def git_commit() -> str:
+    """Commit of the checkout that the package runs from; `+` marks uncommitted changes."""
+    folder = Path(__file__).parent
+
+    def git(*arguments: str) -> str:
+        command = ["git", "-C", str(folder), *arguments]
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+
+    try:
+        changed = git("status", "--porcelain", "--untracked-files=no", ".")
+        return git("rev-parse", "HEAD") + ("+" if changed else "")
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+
+
+def origin(provenance: Mapping[str, Any]) -> dict[str, Any]:
+    """What is written into each file: where its numbers come from.
+
+    `provenance` holds `config_hash` and `seed`; version and commit are added.
+    """
+    return {
+        "config_hash": provenance["config_hash"],
+        "seed": provenance["seed"],
+        "version": __version__,
+        "commit": git_commit(),
+    }
+
+
+@contextmanager
+def whole_file(path: str | Path) -> Iterator[Path]:
+    """Give a temporary name beside `path`, and rename it only if all went well."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        yield temporary
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def parquet_writer(
+    path: str | Path, schema: pa.Schema, provenance: Mapping[str, Any]
+) -> Iterator[Callable[[pa.Table], None]]:
+    """Write tables of one schema into one file, a row group each."""
+    metadata = {METADATA_KEY: json.dumps(origin(provenance)).encode()}
+    with (
+        whole_file(path) as temporary,
+        pq.ParquetWriter(temporary, schema.with_metadata(metadata), compression="zstd") as writer,
+    ):
+        yield writer.write_table
+
+
+def write_table(path: str | Path, table: pd.DataFrame, provenance: Mapping[str, Any]) -> None:
+    """Write a table with its origin."""
+    content = pa.Table.from_pandas(table, preserve_index=False)
+    metadata = {**(content.schema.metadata or {}), METADATA_KEY: json.dumps(origin(provenance))}
+    with whole_file(path) as temporary:
+        pq.write_table(content.replace_schema_metadata(metadata), temporary, compression="zstd")
+
+
+def read_table(path: str | Path, **options: Any) -> pd.DataFrame:
+    """Read a table.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, or is no whole Parquet file.
+    """
+    try:
+        return pq.read_table(path, partitioning=None, **options).to_pandas()
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
+    except (pa.ArrowInvalid, OSError) as error:
+        reason = str(error).splitlines()[0]
+        raise InputError(
+            f"{path}: not a whole Parquet file ({reason}); delete it and run again"
+        ) from None
+
+
+def read_origin(path: str | Path) -> dict[str, Any]:
+    """Origin of a file: config hash, seed, package version and commit."""
+    return json.loads(pq.read_schema(path).metadata[METADATA_KEY])
+
+
+def read_estimates(path: str | Path, cell: str | None = None) -> pd.DataFrame:
+    """Estimates of one file or of a folder of files, with what follows from the stored columns.
+
+    Parameters
+    ----------
+    path : file or folder
+    cell : str, optional
+        Only this cell.
+
+    Returns
+    -------
+    DataFrame
+        The stored columns, and error, sigma0_squared and sigma_posteriori (NaN without
+        redundancy), all in SI.
+    """
+    filters = None if cell is None else [("cell", "==", cell)]
+    table = read_table(path, filters=filters)
+    table["error"] = table["estimate"] - table["truth"]
+    table["sigma0_squared"] = table["omega"] / table["redundancy"].where(table["redundancy"] > 0)
+    table["sigma_posteriori"] = table["sigma0_squared"] ** 0.5 * table["sigma_priori"]
+    return table

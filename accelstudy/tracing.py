@@ -1,0 +1,106 @@
+"""From formulas to fast array functions: trace once with symbols, differentiate, generate code.
+
+A sensor model, an approach and the leveling equations are written once, in components. Here they
+are evaluated with SymPy symbols, differentiated exactly, freed of common subexpressions and turned
+into NumPy functions. The symbolic form is kept (`TracedFunction.expressions`), so that other
+kernels can be generated from the same definitions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+symbolic = SimpleNamespace(
+    sqrt=sp.sqrt,
+    sin=sp.sin,
+    cos=sp.cos,
+    tan=sp.tan,
+    arctan2=sp.atan2,
+    exp=sp.exp,
+    abs=sp.Abs,
+    sign=sp.sign,
+    maximum=sp.Max,
+    minimum=sp.Min,
+    pi=sp.pi,
+)
+"""The namespace `xp` for tracing: SymPy's functions under NumPy's names."""
+
+
+def symbols(*names: str) -> tuple[sp.Symbol, ...]:
+    """Real symbols, so that derivatives of abs and of squares stay simple."""
+    return tuple(sp.Symbol(name, real=True) for name in names)
+
+
+def derivative(expressions: Sequence[Any], variables: Sequence[sp.Symbol]) -> sp.Matrix:
+    """Jacobian matrix; steps contribute nothing to it, as almost everywhere."""
+    matrix = sp.Matrix(list(expressions)).jacobian(list(variables))
+    return matrix.replace(sp.DiracDelta, lambda *_: sp.S.Zero)
+
+
+@dataclass(frozen=True)
+class TracedFunction:
+    """A generated NumPy function and the symbolic form from which it was generated.
+
+    Parameters
+    ----------
+    arguments : tuple of Symbol
+    expressions : matrix of expressions; its shape leads the shape of what a call returns
+    """
+
+    arguments: tuple[sp.Symbol, ...]
+    expressions: sp.Matrix
+
+    @cached_property
+    def _entries(self) -> list[tuple[int, int]]:
+        rows, columns = self.expressions.shape
+        return [
+            (i, j) for i in range(rows) for j in range(columns) if self.expressions[i, j] != 0
+        ]
+
+    @cached_property
+    def _function(self) -> Callable[..., list[Any]]:
+        nonzero = [self.expressions[entry] for entry in self._entries]
+        function: Callable[..., list[Any]] = sp.lambdify(
+            self.arguments, nonzero, modules="numpy", cse=True
+        )
+        return function
+
+    @cached_property
+    def used(self) -> frozenset[str]:
+        """Names of the arguments on which the result depends."""
+        return frozenset(str(symbol) for symbol in self.expressions.free_symbols)
+
+    def __call__(self, shape: tuple[int, ...], *arguments: Any) -> NDArray[np.float64]:
+        """Evaluate at arrays that broadcast to `shape`; returns an array (rows, columns, *shape).
+
+        The components come first, so that each is contiguous. Entries that are zero by structure
+        cost nothing.
+        """
+        result = np.zeros((*self.expressions.shape, *shape))
+        for entry, value in zip(self._entries, self._function(*arguments), strict=True):
+            result[entry] = value
+        return result
+
+
+def jacobian_of(
+    function: Callable[..., Sequence[Any]], n: int
+) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+    """Jacobian of a function ``function(components, xp)`` of `n` components, by tracing.
+
+    Returns a function of an array (..., n) with values (..., m, n).
+    """
+    variables = symbols(*(f"v{i}" for i in range(n)))
+    traced = TracedFunction(variables, derivative(function(variables, symbolic), variables))
+
+    def evaluate(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.moveaxis(traced(values.shape[:-1], *np.moveaxis(values, -1, 0)), (0, 1), (-2, -1))
+
+    return evaluate
