@@ -10,7 +10,7 @@ INSTALL := pip install --quiet --no-build-isolation --require-hashes --requireme
 export PATH := $(CURDIR)/$(ENV)/bin:$(PATH)
 export VIRTUAL_ENV := $(CURDIR)/$(ENV)
 export PYTHONNOUSERSITE := 1
-unexport PYTHONPATH PYTHONHOME
+unexport PYTHONPATH PYTHONHOME PYTHONDONTWRITEBYTECODE
 # Snakemake fills the cores with jobs; threads within a job would only compete with them.
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
@@ -58,6 +58,6 @@ $(READY): pyproject.toml requirements.lock requirements-build.lock
 	  "accelstudy needs Python 3.11, 3.12 or 3.13, not %d.%d: make PYTHON=python3.12" % v)'
 	$(PYTHON) -m venv $(ENV)
 	python -m pip install --quiet --require-hashes --requirement requirements-build.lock
-	uv $(INSTALL) || python -m $(INSTALL)
+	uv $(INSTALL) --compile-bytecode || python -m $(INSTALL)
 	uv pip install --quiet --no-build-isolation --no-deps --editable .
 	touch $@

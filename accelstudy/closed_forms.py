@@ -1,8 +1,8 @@
 """Closed forms of linear theory, against which the Monte Carlo is held.
 
 They are valid for the models of bias, scale and non-orthogonality in schemes with octahedral
-moments: over the n directions ⟨x⟩ = ⟨xy⟩ = 0 and all third moments vanish, ⟨x⁴⟩ is the same for each
-axis and m = ⟨x²y²⟩ the same for each pair, and no moment such as ⟨x³y⟩ remains.
+moments: over the n directions ⟨x⟩ = ⟨xy⟩ = 0 and all third moments vanish, ⟨x⁴⟩ is the same for
+each axis and m = ⟨x²y²⟩ the same for each pair, and no moment such as ⟨x³y⟩ remains.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ COVERED_EFFECTS = ({"bias", "scale"}, {"bias", "scale", "nonorthogonality"})
 
 
 def has_octahedral_moments(directions: Array, tolerance: float = 1e-6) -> bool:
-    """Whether the moments of `directions` (n, 3) through degree 4 are those of a cube's symmetry."""
+    """Whether `directions` (n, 3) have the moments of a cube's symmetry through degree 4."""
     fourth = np.mean(directions[:, 0] ** 4)
     m = np.mean(directions[:, 0] ** 2 * directions[:, 1] ** 2)
     for degree in range(1, 5):

@@ -80,6 +80,8 @@ def leveling_error(
     square = (
         constant
         + 2 * delta @ linear.T
-        + np.stack([np.einsum("ru,uw,rw->r", delta, q, delta, optimize=True) for q in quadratic], -1)
+        + np.stack(
+            [np.einsum("ru,uw,rw->r", delta, q, delta, optimize=True) for q in quadratic], -1
+        )
     )
     return LevelingError(np.sqrt(np.maximum(square, 0.0)))

@@ -24,7 +24,6 @@ from accelstudy.tracing import TracedFunction, derivative, symbolic, symbols
 from accelstudy.units import STANDARD_GRAVITY
 
 
-
 @dataclass(frozen=True)
 class SensorModel:
     """A named composition of effects.
@@ -137,27 +136,29 @@ class SensorModel:
         batch = np.broadcast_shapes(f_s.shape[:-2], np.shape(parameters)[:-1])
         f_a = np.broadcast_to(f_s, batch + f_s.shape[-2:])
         step = np.zeros_like(f_a)
-        for _ in range(25):
-            step = self.trace.apply(self.trace.newton_step, f_a, parameters, g, hold, f_s)
-            f_a = f_a + step
-            if not np.any(np.abs(step) > 1e-14 * STANDARD_GRAVITY):
-                break
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            for _ in range(25):
+                step = self.trace.apply(self.trace.newton_step, f_a, parameters, g, hold, f_s)
+                f_a = f_a + step
+                if not np.any(np.abs(step) > 1e-14 * STANDARD_GRAVITY):
+                    break
         return np.where(np.abs(step) <= 1e-12 * STANDARD_GRAVITY, f_a, np.nan)
 
     def axes_matrix(self, parameters: ArrayLike) -> NDArray[np.float64]:
         """Return T, (3, 3), which turns forces in the sensitive axes into the body frame."""
-        return self.trace.apply(
-            self.trace.body, np.eye(3), parameters, STANDARD_GRAVITY, None
-        ).T
+        return self.trace.apply(self.trace.body, np.eye(3), parameters, STANDARD_GRAVITY, None).T
 
     def reading_errors(
         self, angles: ArrayLike, parameters: ArrayLike, hold: Hold | None = None
     ) -> NDArray[np.float64]:
         """Return what the effects add to a robot's reading of roll and pitch.
 
+        Effects are functions of what the robot reads, as in the adjustment, so the reading r of an
+        attitude a is the solution of r = a + e(r).
+
         Parameters
         ----------
-        angles : (n, 2) array, rad
+        angles : (n, 2) array, rad, roll and pitch of the attitude
         parameters : (u,) array, SI
         hold : Hold, optional
 
@@ -167,8 +168,11 @@ class SensorModel:
         """
         trace = self.trace
         angles = np.asarray(angles, dtype=float)
-        padded = np.concatenate([angles, np.zeros((len(angles), 1))], axis=1)
-        return trace.apply(trace.reading, padded, parameters, STANDARD_GRAVITY, hold)
+        errors = np.zeros_like(angles)
+        for _ in range(10):  # each gains as many digits as the relative errors are small
+            reading = np.concatenate([angles + errors, np.zeros((len(angles), 1))], axis=1)
+            errors = trace.apply(trace.reading, reading, parameters, STANDARD_GRAVITY, hold)
+        return errors
 
 
 class SensorTrace:

@@ -83,13 +83,14 @@ class Session:
 
         The draws are made in a fixed order (forces, angles, gravity) whatever is used of them.
         """
-        silent = self.observations(noise)
         n = len(self.forces)
         return replace(
-            silent,
-            forces=silent.forces + noise.sigma_force * rng.standard_normal((replicates, n, 3)),
-            angles=silent.angles + noise.sigma_angle * rng.standard_normal((replicates, n, 2)),
-            gravity=silent.gravity + noise.sigma_gravity * rng.standard_normal(replicates),
+            self.observations(noise),
+            forces=self.forces + noise.sigma_force * rng.standard_normal((replicates, n, 3)),
+            angles=self.angles + noise.sigma_angle * rng.standard_normal((replicates, n, 2)),
+            gravity=self.gravity
+            + noise.gravity_error
+            + noise.sigma_gravity * rng.standard_normal(replicates),
         )
 
 
@@ -130,4 +131,3 @@ def session(
         gravity=gravity,
         hold=known,
     )
-

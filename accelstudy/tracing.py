@@ -61,9 +61,7 @@ class TracedFunction:
     @cached_property
     def _entries(self) -> list[tuple[int, int]]:
         rows, columns = self.expressions.shape
-        return [
-            (i, j) for i in range(rows) for j in range(columns) if self.expressions[i, j] != 0
-        ]
+        return [(i, j) for i in range(rows) for j in range(columns) if self.expressions[i, j] != 0]
 
     @cached_property
     def _function(self) -> Callable[..., list[Any]]:

@@ -8,8 +8,15 @@ the adjustment promises of batches, cofactor matrices, observed parameters and f
 import numpy as np
 import pytest
 
-from accelstudy.adjustment import FunctionConditions, adjust
+from accelstudy.adjustment import FunctionConditions, adjust, gauss_helmert
 from accelstudy.errors import InputError
+
+
+@pytest.fixture
+def all_digits(monkeypatch):
+    """Iterate until published digits can be compared, beyond what the default stops at."""
+    monkeypatch.setattr(gauss_helmert, "STEP_TOLERANCE", 1e-11)
+
 
 # --- Pearson's line with York's weights ----------------------------------------------------------
 
@@ -66,6 +73,7 @@ def as_one_block(equations, n_blocks):
     )
 
 
+@pytest.mark.usefixtures("all_digits")
 def test_york_line_is_the_published_one():
     result = york()
     assert result.converged.all()
@@ -78,6 +86,7 @@ def test_york_line_is_the_published_one():
     assert result.variance_posteriori[0] == pytest.approx(YORK_OMEGA / 8, rel=1e-9)
 
 
+@pytest.mark.usefixtures("all_digits")
 def test_unweighted_line_is_the_published_one():
     result = york(cofactors=np.ones((10, 2)))
     np.testing.assert_allclose(result.parameters[0], [5.784043775, -0.545561198], atol=1e-9)
@@ -85,8 +94,9 @@ def test_unweighted_line_is_the_published_one():
 
 
 @pytest.mark.parametrize("initial", [(5.0, -0.5), (0.0, 0.0), (10.0, -3.0)])
-def test_york_line_does_not_depend_on_the_initial_values(initial):
-    np.testing.assert_allclose(york(initial=initial).parameters[0], YORK, atol=1e-9)
+def test_the_default_stops_at_a_millionth_of_sigma_from_any_start(initial):
+    result = york(initial=initial)
+    assert np.abs((result.parameters[0] - YORK) / result.sigma_priori[0]).max() < 1e-6
 
 
 def test_adjusted_observations_fulfil_the_conditions():
@@ -131,7 +141,8 @@ def test_all_points_in_one_dense_block():
     equations = as_one_block(LINE, 10)
     matrix = np.diag(YORK_COFACTORS.ravel())[None]
     result = adjust(equations, PEARSON.reshape(1, 1, 20), matrix, [5.0, -0.5])
-    np.testing.assert_allclose(result.parameters[0], YORK, atol=1e-9)
+    np.testing.assert_allclose(result.parameters, york().parameters, rtol=1e-10)
+    np.testing.assert_allclose(result.cofactors, york().cofactors, rtol=1e-10)
     assert result.omega[0] == pytest.approx(YORK_OMEGA, abs=2e-9)
     assert result.redundancy == 8
 
@@ -208,11 +219,6 @@ def noisy_lines(replicates, seed=0):
     return PEARSON + 0.3 * noise
 
 
-def assert_same(one, other, rtol=1e-12):
-    for name in ("parameters", "cofactors", "omega", "residuals"):
-        np.testing.assert_allclose(getattr(one, name), getattr(other, name), rtol, 1e-12)
-
-
 def test_a_repeated_run_is_identical():
     one, other = york(noisy_lines(50)), york(noisy_lines(50))
     assert np.array_equal(one.parameters, other.parameters)
@@ -236,7 +242,10 @@ def test_replicates_do_not_depend_on_their_batch():
 def test_each_replicate_may_have_its_own_initial_values():
     lines = noisy_lines(5)
     result = york(lines, initial=np.linspace([4, -1], [7, 0], 5))
-    np.testing.assert_allclose(result.parameters, york(lines).parameters, atol=1e-9)
+    expected = york(lines)
+    np.testing.assert_array_less(
+        np.abs(result.parameters - expected.parameters), 1e-6 * expected.sigma_priori
+    )
 
 
 def assert_no_result(result, i):
@@ -290,14 +299,14 @@ def test_without_redundancy_there_is_no_variance_a_posteriori():
 # --- implicit ellipse of ODRPACK -----------------------------------------------------------------
 
 # Boggs et al. (1992), User's Reference Guide for ODRPACK, p. 49.
-ELLIPSE_POINTS = np.array(
-    [
-        [0.5, 1.2, 1.6, 1.86, 2.12, 2.36, 2.44, 2.36, 2.06, 1.74]
-        + [1.34, 0.9, -0.28, -0.78, -1.36, -1.9, -2.5, -2.88, -3.18, -3.44],
-        [-0.12, -0.6, -1.0, -1.4, -2.54, -3.36, -4.0, -4.75, -5.25, -5.64]
-        + [-5.97, -6.32, -6.44, -6.44, -6.41, -6.25, -5.88, -5.5, -5.24, -4.86],
-    ]
-).T
+# fmt: off
+ELLIPSE_POINTS = np.array([
+    [0.5, 1.2, 1.6, 1.86, 2.12, 2.36, 2.44, 2.36, 2.06, 1.74,
+     1.34, 0.9, -0.28, -0.78, -1.36, -1.9, -2.5, -2.88, -3.18, -3.44],
+    [-0.12, -0.6, -1.0, -1.4, -2.54, -3.36, -4.0, -4.75, -5.25, -5.64,
+     -5.97, -6.32, -6.44, -6.44, -6.41, -6.25, -5.88, -5.5, -5.24, -4.86],
+]).T
+# fmt: on
 ELLIPSE_START = [-1.0, -3.0, 0.09, 0.02, 0.08]
 
 
@@ -354,14 +363,18 @@ def regression(model, derivatives):
     )
 
 
-MISRA1A = np.array(
-    [
-        [10.07, 14.73, 17.94, 23.93, 29.61, 35.18, 40.02]
-        + [44.82, 50.76, 55.05, 61.01, 66.40, 75.47, 81.78],
-        [77.6, 114.9, 141.1, 190.8, 239.9, 289.0, 332.8]
-        + [378.4, 434.8, 477.3, 536.8, 593.1, 689.1, 760.0],
-    ]
-)
+# fmt: off
+MISRA1A = np.array([
+    [10.07, 14.73, 17.94, 23.93, 29.61, 35.18, 40.02,
+     44.82, 50.76, 55.05, 61.01, 66.40, 75.47, 81.78],
+    [77.6, 114.9, 141.1, 190.8, 239.9, 289.0, 332.8,
+     378.4, 434.8, 477.3, 536.8, 593.1, 689.1, 760.0],
+])
+RAT43 = np.array([
+    16.08, 33.83, 65.80, 97.20, 191.55, 326.20, 386.87, 520.53,
+    590.03, 651.92, 724.93, 699.56, 689.96, 637.56, 717.41,
+])
+# fmt: on
 
 
 def misra1a():
@@ -376,12 +389,6 @@ def misra1a():
         return np.stack([1 - e, b[:, :1] * t * e], -1)
 
     return regression(model, derivatives)
-
-
-RAT43 = np.array(
-    [16.08, 33.83, 65.80, 97.20, 191.55, 326.20, 386.87, 520.53]
-    + [590.03, 651.92, 724.93, 699.56, 689.96, 637.56, 717.41]
-)
 
 
 def rat43():
@@ -431,15 +438,16 @@ CERTIFIED = {
         ("Rat43", [700.0, 5.0, 0.75, 1.3]),  # NIST's second start
     ],
 )
+@pytest.mark.usefixtures("all_digits")
 def test_certified_regression(problem, start):
     equations, y, parameters, sigma, rss = CERTIFIED[problem]
-    # The unit in which the step is judged: NIST leaves the variance to be estimated.
+    # NIST leaves the variance to be estimated; here it is the unit in which steps are judged.
     variance = np.full((len(y), 1), rss / (len(y) - len(start)))
     result = adjust(equations, y[None, :, None], variance, start)
     assert result.converged.all()
-    np.testing.assert_allclose(result.parameters[0], parameters, rtol=1e-9)
-    np.testing.assert_allclose(result.sigma_posteriori[0], sigma, rtol=1e-8)
-    assert np.sum(result.residuals**2) == pytest.approx(rss, rel=1e-9)
+    np.testing.assert_allclose(result.parameters[0], parameters, rtol=1e-10)
+    np.testing.assert_allclose(result.sigma_posteriori[0], sigma, rtol=1e-9)
+    assert np.sum(result.residuals**2) == pytest.approx(rss, rel=1e-10)
 
 
 def test_rat43_from_afar_is_flagged():

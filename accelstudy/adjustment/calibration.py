@@ -230,8 +230,12 @@ class _Problem:
         if with_gravity:
             initial[:, -1] = observed.gravity
             weights[-1] = observed.sigma_gravity**-2
-        # Gravity is one number for all replicates where it is held fixed.
         fixed = float(np.ravel(observed.gravity)[0])
+        if not with_gravity and np.any(np.asarray(observed.gravity) != fixed):
+            raise InputError(
+                "gravity differs between the sessions, but is held fixed: give one value for all, "
+                "or sigma_gravity > 0"
+            )
         return cls(
             conditions=equations.at(fixed, observed.hold),
             observations=np.concatenate(observations, axis=-1),

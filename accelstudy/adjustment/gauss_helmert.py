@@ -150,7 +150,7 @@ def adjust(
     parameter_observations, parameter_weights : (R, u) and (u,) arrays, optional
         Direct observations of parameters (gravity with σ_g, say) and their weights; a weight of
         zero means that the parameter is not observed.
-    latent : (R, ...) array, optional
+    latent : (k, R, n) array, optional
         First value of what the equations carry along.
     max_iterations : int
 
@@ -196,7 +196,7 @@ def adjust(
             redundancy = _redundancy(at.psi, weights)
             step = _step(at, v, q, weights, direct - x)
             x, v, latent = x + step.dx, step.v, at.latent
-            converged = step.size <= tolerance
+            converged = step.size <= tolerance[active]
             going_on = ~converged & np.isfinite(step.size)
 
             result.iterations[active] = iteration
@@ -293,10 +293,12 @@ def _normal_equations(a: Array, w: Array) -> tuple[Array, Array]:
 
 
 def _redundancy(psi: Array, weights: Array) -> int:
-    """r = conditions (direct observations of parameters included) − unknowns."""
+    """R = conditions (direct observations of parameters included) − unknowns."""
     n_conditions = psi.shape[0] * psi.shape[2] + int(np.count_nonzero(weights))
     if n_conditions < len(weights):
-        raise InputError(f"{n_conditions} condition equations cannot determine {len(weights)} parameters")
+        raise InputError(
+            f"{n_conditions} condition equations cannot determine {len(weights)} parameters"
+        )
     return n_conditions - len(weights)
 
 
@@ -306,7 +308,7 @@ def _sigma(q: Array) -> Array:
     return np.sqrt(np.where(variances > 0, variances, np.inf))
 
 
-def _tolerance(observed: Array, q: Array) -> float:
-    """Step at which to stop, in standard deviations: never finer than rounding allows."""
-    largest = np.max(np.abs(observed) / _sigma(q)[:, None], initial=0.0)
-    return max(STEP_TOLERANCE, 64 * np.finfo(float).eps * float(largest))
+def _tolerance(observed: Array, q: Array) -> Array:
+    """Step at which each replicate stops, in standard deviations: never finer than rounding."""
+    largest = np.max(np.abs(observed) / _sigma(q)[:, None], axis=(0, 2), initial=0.0)
+    return np.asarray(np.maximum(STEP_TOLERANCE, 64 * np.finfo(float).eps * largest))

@@ -19,4 +19,6 @@ class Robot(Approach):
 
     def conditions(self, f, angles, g, xp):
         """Return f_b − f(φ_r, θ_r, g)."""
-        return tuple(a - b for a, b in zip(f, specific_force(*angles, g, xp), strict=True))
+        return tuple(
+            a - b for a, b in zip(f, specific_force(angles[0], angles[1], g, xp), strict=True)
+        )

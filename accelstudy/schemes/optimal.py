@@ -3,10 +3,9 @@
 from typing import Literal
 
 import numpy as np
-from scipy.optimize import minimize
 
-from accelstudy.schemes.fibonacci import fibonacci
 from accelstudy.errors import InputError
+from accelstudy.schemes.fibonacci import fibonacci
 from accelstudy.schemes.registry import Array, register
 
 Criterion = Literal["D", "I"]
@@ -77,6 +76,8 @@ def optimal_directions(n: int, criterion: Criterion = "D", starts: int = 8) -> A
     InputError
         If n is less than the number of parameters.
     """
+    from scipy.optimize import minimize  # slow to import, and only optimal schemes need it
+
     if n < 9:
         raise InputError(f"9 parameters need at least 9 positions, not {n}")
     rng = np.random.default_rng(np.random.SeedSequence(n))

@@ -323,7 +323,7 @@ def _overlay(below: dict[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
     for key, value in above.items():
         old = result.get(key)
         both = isinstance(old, dict) and isinstance(value, Mapping)
-        result[key] = _overlay(old, value) if both else value
+        result[key] = _overlay(dict(old or {}), value) if both else value
     return result
 
 

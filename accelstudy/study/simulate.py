@@ -121,7 +121,10 @@ CORRELATIONS = pa.schema(
 
 
 def simulate_batch(
-    spec: Mapping[str, Any], estimates: str | Path, correlations: str | Path
+    spec: Mapping[str, Any],
+    estimates: str | Path,
+    correlations: str | Path,
+    provenance: Mapping[str, Any],
 ) -> None:
     """Simulate the cells of a batch and write two Parquet files, cell by cell.
 
@@ -131,15 +134,19 @@ def simulate_batch(
     ----------
     spec : mapping with `seed` and `cells` (plain data of `Cell`)
     estimates, correlations : paths of the files to write
+    provenance : see `accelstudy.study.tables.origin`
     """
     cells = [Cell.from_dict(data) for data in spec["cells"]]
     with (
-        parquet_writer(estimates, ESTIMATES, spec) as write_estimates,
-        parquet_writer(correlations, CORRELATIONS, spec) as write_correlations,
+        parquet_writer(estimates, ESTIMATES, provenance) as write_estimates,
+        parquet_writer(correlations, CORRELATIONS, provenance) as write_correlations,
     ):
         for number, cell in enumerate(cells, 1):
             design = diagnose(
-                cell.positions, cell.estimated_model, cell.conditions, cell.noise,
+                cell.positions,
+                cell.estimated_model,
+                cell.conditions,
+                cell.noise,
                 gravity=cell.gravity,
             )
             if not design.estimable:
@@ -149,7 +156,11 @@ def simulate_batch(
             failed = int(np.count_nonzero(~result.converged))
             log.info(
                 "%d/%d %s: %d replicates, %d not converged",
-                number, len(cells), cell.name, cell.replicates, failed,
+                number,
+                len(cells),
+                cell.name,
+                cell.replicates,
+                failed,
             )
             write_estimates(_estimates_table(cell, result))
             write_correlations(_correlations_table(cell, result))

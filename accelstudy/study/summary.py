@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,13 +18,12 @@ from accelstudy.effects import get_effect
 from accelstudy.leveling_error import cap_forces, leveling_error
 from accelstudy.study.cells import Cell
 from accelstudy.study.simulate import parameter_units
-from accelstudy.study.tables import read_table, write_table
+from accelstudy.study.tables import TABLES, read_table, write_table
 from accelstudy.units import GON, MGON, display_unit, to_display
 
 Array = NDArray[np.float64]
 
 Z95 = float(stats.norm.ppf(0.975))
-TABLES = ("cells", "summary", "correlations", "leveling")
 
 
 def summarise_batch(
@@ -33,6 +32,7 @@ def summarise_batch(
     correlations: str | Path,
     leveling: Mapping[str, Any],
     outputs: Mapping[str, str],
+    provenance: Mapping[str, Any],
 ) -> None:
     """Summarise the cells of a batch.
 
@@ -42,9 +42,11 @@ def summarise_batch(
     estimates, correlations : paths that `simulate_batch` wrote
     leveling : mapping with max_tilt_gon and attitudes
     outputs : path of each of `TABLES`
+    provenance : see `accelstudy.study.tables.origin`
     """
-    found = read_table(estimates)
-    found = {name: group for name, group in found.groupby("cell", observed=True)}
+    found: dict[Any, pd.DataFrame] = dict(
+        iter(read_table(estimates).groupby("cell", observed=True))
+    )
     from_adjustment = read_table(correlations)
     rows: dict[str, list[pd.DataFrame]] = {name: [] for name in TABLES}
     for data in spec["cells"]:
@@ -66,7 +68,7 @@ def summarise_batch(
             rows["correlations"].append(_correlation_rows(adjusted, fits))
     for name, path in outputs.items():
         table = pd.concat(rows[name], ignore_index=True) if rows[name] else pd.DataFrame()
-        write_table(path, table, spec)
+        write_table(path, table, provenance)
 
 
 @dataclass(frozen=True)
@@ -289,9 +291,3 @@ def _leveling_row(cell: Cell, fits: Fits, settings: Mapping[str, Any]) -> pd.Dat
         row[f"{angle}_rms_mgon"] = error.rms[i] / MGON
         row[f"{angle}_rms_q95_mgon"] = error.quantile(0.95)[i] / MGON
     return pd.DataFrame({**row, "n_converged": len(fits.estimates)}, index=[0])
-
-
-def collect(parts: Sequence[str | Path], output: str | Path, provenance: Mapping[str, Any]) -> None:
-    """Join the tables of all batches into one."""
-    tables = [table for table in map(read_table, parts) if len(table)]
-    write_table(output, pd.concat(tables, ignore_index=True), provenance)

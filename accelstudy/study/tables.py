@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -19,6 +19,9 @@ from accelstudy import __version__
 from accelstudy.errors import InputError
 
 METADATA_KEY = b"accelstudy"
+
+TABLES = ("cells", "summary", "correlations", "leveling")
+"""Tables that each batch of cells contributes to."""
 
 
 @cache
@@ -84,14 +87,19 @@ def write_table(path: str | Path, table: pd.DataFrame, provenance: Mapping[str, 
         pq.write_table(content.replace_schema_metadata(metadata), temporary, compression="zstd")
 
 
-def read_table(path: str | Path, **options: Any) -> pd.DataFrame:
-    """Read a table.
+def read_table(path: str | Path | Sequence[str | Path], **options: Any) -> pd.DataFrame:
+    """Read a table from a file, a folder of files, or several files.
 
     Raises
     ------
     InputError
         If the file is missing, or is no whole Parquet file.
     """
+    if not isinstance(path, str | Path):
+        return pd.concat([read_table(each, **options) for each in path], ignore_index=True)
+    path = Path(path)
+    if path.is_dir():
+        return read_table(sorted(path.glob("*.parquet")), **options)
     try:
         return pq.read_table(path, partitioning=None, **options).to_pandas()
     except FileNotFoundError:
@@ -103,19 +111,27 @@ def read_table(path: str | Path, **options: Any) -> pd.DataFrame:
         ) from None
 
 
+def collect(parts: Sequence[str | Path], output: str | Path, provenance: Mapping[str, Any]) -> None:
+    """Join the parts of a table into one."""
+    tables = [table for table in map(read_table, parts) if len(table)]
+    write_table(output, pd.concat(tables, ignore_index=True), provenance)
+
+
 def read_origin(path: str | Path) -> dict[str, Any]:
     """Origin of a file: config hash, seed, package version and commit."""
     return json.loads(pq.read_schema(path).metadata[METADATA_KEY])
 
 
-def read_estimates(path: str | Path, cell: str | None = None) -> pd.DataFrame:
-    """Estimates of one file or of a folder of files, with what follows from the stored columns.
+def read_estimates(
+    path: str | Path | Sequence[str | Path], cells: str | Sequence[str] | None = None
+) -> pd.DataFrame:
+    """Estimates, with what follows from the stored columns.
 
     Parameters
     ----------
-    path : file or folder
-    cell : str, optional
-        Only this cell.
+    path : file, folder of files, or several files
+    cells : str or several, optional
+        Only these cells.
 
     Returns
     -------
@@ -123,8 +139,8 @@ def read_estimates(path: str | Path, cell: str | None = None) -> pd.DataFrame:
         The stored columns, and error, sigma0_squared and sigma_posteriori (NaN without
         redundancy), all in SI.
     """
-    filters = None if cell is None else [("cell", "==", cell)]
-    table = read_table(path, filters=filters)
+    names = [cells] if isinstance(cells, str) else cells
+    table = read_table(path, filters=None if names is None else [("cell", "in", list(names))])
     table["error"] = table["estimate"] - table["truth"]
     table["sigma0_squared"] = table["omega"] / table["redundancy"].where(table["redundancy"] > 0)
     table["sigma_posteriori"] = table["sigma0_squared"] ** 0.5 * table["sigma_priori"]

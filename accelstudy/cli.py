@@ -1,0 +1,155 @@
+"""The command line: what there is to choose from, and what a configuration would do.
+
+The study itself is run by Snakemake.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+import numpy as np
+import pandas as pd
+
+from accelstudy import __version__
+from accelstudy.errors import InputError
+
+
+class Commands(click.Group):
+    """Commands that end bad input with one line and exit status 2."""
+
+    def invoke(self, ctx: click.Context) -> object:
+        """Run the chosen command."""
+        try:
+            return super().invoke(ctx)
+        except InputError as error:
+            click.echo(f"error: {error}", err=True)
+            ctx.exit(2)
+
+
+@click.group(cls=Commands)
+@click.version_option(__version__, package_name="accelstudy")
+def main() -> None:
+    """Monte Carlo study of accelerometer calibration for leveling.
+
+    `snakemake --cores 2` runs the study; these commands show what it can be made of.
+    """
+
+
+@main.command()
+@click.option("--model", default="bias-scale-nonorthogonality", show_default=True)
+@click.option("--approach", default="gravity", show_default=True)
+@click.argument("names", nargs=-1)
+def schemes(model: str, approach: str, names: tuple[str, ...]) -> None:
+    """List position schemes and what they determine with a model and an approach.
+
+    NAMES chooses schemes (fibonacci-60, random-20-7, ...); all named ones by default.
+    """
+    from accelstudy.approaches import get_approach
+    from accelstudy.design import diagnose
+    from accelstudy.models import get_model
+    from accelstudy.schemes import get_scheme, scheme_families, scheme_names
+    from accelstudy.units import GON
+
+    chosen_model, chosen_approach = get_model(model), get_approach(approach)
+    rows = []
+    for name in names or scheme_names():
+        scheme = get_scheme(name)
+        design = diagnose(scheme, chosen_model, chosen_approach)
+        rows.append(
+            {
+                "scheme": scheme.name,
+                "n": scheme.n_positions,
+                "status": scheme.status,
+                "rank": f"{design.rank}/{len(design.parameter_names)}",
+                "condition": f"{design.condition:.1f}" if design.estimable else "-",
+                "r": design.redundancy,
+                "m": f"{design.fourth_moment:.4f}",
+                "pole/gon": f"{design.pole_distance / GON:.1f}",
+                "not estimable": ", ".join(design.not_estimable),
+            }
+        )
+    click.echo(f"model {model}, approach {approach}\n")
+    click.echo(pd.DataFrame(rows).to_string(index=False))
+    click.echo(
+        "\nrank and condition: of the scaled design at the ideal sensor; r: conditions - unknowns;"
+        "\nm: mean of x²y²; pole: distance to the x axis, where roll is undefined."
+        f"\nFamilies: {', '.join(scheme_families())}."
+    )
+
+
+@main.command()
+@click.argument("name")
+def scheme(name: str) -> None:
+    """Print the directions of a scheme (gravity in the body frame), with its source."""
+    from accelstudy.leveling import roll_pitch
+    from accelstudy.schemes import get_scheme
+    from accelstudy.units import GON
+
+    chosen = get_scheme(name)
+    click.echo(f"# {chosen.title} ({chosen.status}): {chosen.source}")
+    roll, pitch = roll_pitch(tuple(-chosen.directions.T))
+    table = np.column_stack([chosen.directions, roll / GON, pitch / GON])
+    click.echo(
+        pd.DataFrame(table, columns=["x", "y", "z", "roll_gon", "pitch_gon"]).to_csv(
+            index_label="position", float_format="%.6f"
+        ),
+        nl=False,
+    )
+
+
+@main.command()
+def models() -> None:
+    """List sensor models and their parameters, and the presets of the paper's Table 1."""
+    from accelstudy.models import MODELS, PRESETS, get_model
+
+    for name in MODELS:
+        model = get_model(name)
+        click.echo(f"{name} ({model.n_parameters}): {', '.join(model.parameter_names)}")
+    click.echo("\nTable 1:")
+    for preset in PRESETS:
+        click.echo(f"  {preset.source:28s} {preset.model} in {preset.scheme}")
+
+
+@main.command()
+def effects() -> None:
+    """List effects, of which models are composed, with parameters and units."""
+    from accelstudy.effects import effect_names, get_effect
+    from accelstudy.units import display_unit
+
+    for name in effect_names():
+        effect = get_effect(name)
+        parameters = ", ".join(f"{p.name} [{display_unit(p.unit)}]" for p in effect.parameters)
+        click.echo(f"{name}: {parameters}\n    {(effect.__doc__ or '').splitlines()[0]}")
+
+
+@main.command()
+@click.argument("configs", nargs=-1, required=True, type=click.Path(path_type=Path))
+def cells(configs: tuple[Path, ...]) -> None:
+    """List the cells of a study, and which of them cannot be estimated.
+
+    CONFIGS are YAML files; later ones overlay earlier ones, as with --configfile.
+    """
+    from accelstudy.design import diagnose
+    from accelstudy.study.cells import study_cells
+    from accelstudy.study.config import read_study
+
+    study = read_study(*configs)
+    for cell in study_cells(study):
+        design = diagnose(cell.positions, cell.estimated_model, cell.conditions, cell.noise)
+        state = design.reason or f"r = {design.redundancy}, {cell.replicates} replicates"
+        click.echo(f"{cell.name}: {state}")
+
+
+@main.command()
+@click.argument("results", type=click.Path(path_type=Path))
+def claims(results: Path) -> None:
+    """Print the verdicts on the paper's claims, from a folder of results, as Markdown."""
+    from accelstudy.study.report import claims_markdown
+    from accelstudy.study.tables import read_table
+
+    click.echo(claims_markdown(read_table(results / "claims.parquet")), nl=False)
+
+
+if __name__ == "__main__":
+    main()

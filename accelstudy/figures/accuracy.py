@@ -1,0 +1,97 @@
+"""Figures 2 and 3: how accurately roll and pitch follow from a noisy specific force."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike, NDArray
+
+from accelstudy.figures.registry import Tables, figure
+from accelstudy.figures.style import ANGLE_COLOURS, COLUMN, FULL, INK, new_figure
+from accelstudy.leveling import sigma_roll_pitch, specific_force
+from accelstudy.study.config import StudyConfig
+from accelstudy.units import GON, MGON
+
+ROLL = np.linspace(-100.0, 100.0, 81)
+"""gon"""
+PITCH = np.linspace(-75.0, 75.0, 61)
+"""gon"""
+TILTED = (0.0, 50.0)
+"""Roll and pitch of figure 3, gon."""
+
+
+def sigma_mgon(
+    roll_gon: ArrayLike, pitch_gon: ArrayLike, sigma_force: ArrayLike, g: float
+) -> NDArray[np.float64]:
+    """Standard deviations (..., 2) of roll and pitch in mgon, for equal noise on all axes."""
+    roll, pitch, sigma = np.broadcast_arrays(roll_gon, pitch_gon, sigma_force)
+    force = np.stack(specific_force(roll * GON, pitch * GON, g), axis=-1)
+    return sigma_roll_pitch(force, sigma[..., None, None] ** 2 * np.eye(3)) / MGON
+
+
+@figure(
+    "figure-2",
+    title="Figure 2: accuracy of roll and pitch over the attitude",
+    category="Paper",
+    when=lambda study: study.paper,
+)
+def accuracy_over_attitude(tables: Tables, study: StudyConfig) -> Figure:
+    """Two maps of the standard deviation over roll and pitch."""
+    roll, pitch = np.meshgrid(ROLL, PITCH)
+    sigma = sigma_mgon(roll, pitch, study.sigma_force, study.gravity_mps2)
+    fig = new_figure(FULL, 66)
+    axes = fig.subplots(1, 2, sharex=True, sharey=True)
+    for ax, title, values in zip(axes, ("roll", "pitch"), np.moveaxis(sigma, -1, 0), strict=True):
+        image = ax.pcolormesh(
+            roll, pitch, values, shading="gouraud", cmap="viridis", rasterized=True,
+            vmin=np.floor(sigma.min()), vmax=np.ceil(sigma.max()),
+        )
+        ax.set_title(f"$\\sigma_\\{'phi' if title == 'roll' else 'theta'}$ of {title}")
+        ax.set_xlabel("roll $\\phi$ / gon")
+        ax.grid(False)
+        if np.ptp(values) > 1e-6 * values.max():
+            lines = ax.contour(roll, pitch, values, levels=8, colors="white", linewidths=0.7)
+            ax.clabel(lines, fmt="%g", fontsize=7)
+        else:
+            ax.text(
+                0, 0, f"{values.mean():.2f} mgon\nat every attitude",
+                ha="center", va="center", color="white",
+            )
+    axes[0].set_ylabel("pitch $\\theta$ / gon")
+    fig.colorbar(image, ax=axes, label="standard deviation / mgon", pad=0.02)
+    return fig
+
+
+@figure(
+    "figure-3",
+    title="Figure 3: accuracy of roll and pitch over the sensor noise",
+    category="Paper",
+    when=lambda study: study.paper,
+)
+def accuracy_over_noise(tables: Tables, study: StudyConfig) -> Figure:
+    """Standard deviations in a tilted attitude, with those at the study's noise marked."""
+    fig = new_figure(COLUMN, 62)
+    ax = fig.subplots()
+    noise = np.linspace(0.0, 5.0, 51) * study.sigma_force
+    over_noise = sigma_mgon(*TILTED, noise, study.gravity_mps2)
+    at_study = sigma_mgon(*TILTED, study.sigma_force, study.gravity_mps2)
+    x = study.sigma_force * 1e3
+    ax.axvline(x, color="#999999", linewidth=0.8, linestyle=":")
+    for i, (name, greek) in enumerate((("roll", "phi"), ("pitch", "theta"))):
+        colour = ANGLE_COLOURS[name]
+        ax.plot(noise * 1e3, over_noise[:, i], color=colour, label=f"{name} $\\sigma_\\{greek}$",
+                linestyle=("-", "--")[i])
+        ax.plot(x, at_study[i], "o", color=colour)
+        above = name == "roll"
+        ax.annotate(
+            f"{at_study[i]:.2f} mgon", (x, at_study[i]), textcoords="offset points",
+            xytext=(-5, 4) if above else (5, -4), color=INK,
+            ha="right" if above else "left", va="bottom" if above else "top",
+        )
+    ax.set_xlim(0, noise[-1] * 1e3)
+    ax.set_ylim(bottom=0)
+    ax.set_xlabel("accelerometer noise $\\sigma_f$ / mm/s²")
+    ax.set_ylabel("standard deviation / mgon")
+    ax.set_title(f"roll {TILTED[0]:g} gon, pitch {TILTED[1]:g} gon")
+    ax.legend(loc="upper left")
+    return fig

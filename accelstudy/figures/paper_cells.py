@@ -1,0 +1,191 @@
+"""Figures 7 and 8: the paper's two calibrations, by gravity alone and with the robot."""
+
+from __future__ import annotations
+
+from itertools import groupby
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from accelstudy.figures.registry import Tables, figure
+from accelstudy.figures.style import (
+    FULL,
+    INK,
+    approach_colour,
+    approach_marker,
+    group_label,
+    group_of,
+    in_order,
+    new_figure,
+    say_empty,
+    symbol,
+    unit_label,
+)
+from accelstudy.models import get_model
+from accelstudy.study.config import StudyConfig
+from accelstudy.units import display_unit, to_display
+
+APPROACHES = ("gravity", "robot")
+ANNOTATED = 0.005
+"""Correlations above this are written into their field."""
+WIDTH = 0.36
+"""Width of a bar; the parameters are 1 apart."""
+
+
+@figure(
+    "figure-7",
+    title="Figure 7: errors and standard deviations of the two calibrations",
+    category="Paper",
+    tables=("estimates",),
+    when=lambda study: study.paper,
+)
+def errors_and_sigmas(tables: Tables, study: StudyConfig) -> Figure:
+    """One simulation before the distribution of all, a row of panels for each unit."""
+    parameters = _parameters(study)
+    units = list(dict.fromkeys(unit for _, unit in parameters))
+    fig = new_figure(FULL, 16 + 46 * len(units))
+    axes = fig.subplots(len(units), 2, squeeze=False)
+    for row, unit in zip(axes, units, strict=True):
+        names = [name for name, its in parameters if its == unit]
+        shown = unit_label(display_unit(unit))
+        for ax in row:
+            ax.axhline(0, color=INK, linewidth=0.6)
+            ax.set_xticks(range(len(names)), [symbol(name) for name in names])
+            ax.set_xlim(-0.6, len(names) - 0.4)
+            ax.grid(False, axis="x")
+        row[0].set_ylabel(f"error / {shown}")
+        row[1].set_ylabel(f"sd a posteriori / {shown}")
+        drawn = False
+        for cell, approach in _cells(study):
+            for x, name in enumerate(names):
+                rows = tables["estimates"]
+                rows = rows[(rows["cell"] == cell) & (rows["parameter"] == name)]
+                drawn |= _draw_parameter(row, x, rows[rows["converged"]], approach, unit)
+        if not drawn:
+            for ax in row:
+                say_empty(ax)
+        groups = " and ".join(group_label(g) for g in in_order(group_of(name) for name in names))
+        for ax in row:
+            ax.set_title(groups, loc="left")
+    one = {"color": INK, "marker": "o", "markersize": 4, "linestyle": ""}
+    fig.legend(
+        handles=[
+            *[Patch(color=approach_colour(name), label=name) for name in APPROACHES],
+            Line2D([], [], **one, markerfacecolor="white", label="one simulation"),
+            Line2D([], [], color="#888888", linewidth=3, label="95 % of all simulations"),
+        ],
+        loc="outside lower center", ncols=4,
+    )
+    return fig
+
+
+def _parameters(study: StudyConfig) -> list[tuple[str, str]]:
+    """Names and SI units of the parameters of the paper's model."""
+    assert study.sensitivity is not None
+    model = get_model(study.sensitivity.model, study.models)
+    return [(parameter.name, parameter.unit) for parameter in model.parameters]
+
+
+def _cells(study: StudyConfig) -> list[tuple[str, str]]:
+    """Name and approach of the paper's two cells."""
+    assert study.sensitivity is not None
+    setting = study.sensitivity
+    return [(f"{setting.model}/{setting.scheme}/{name}", name) for name in APPROACHES]
+
+
+def _draw_parameter(
+    axes: NDArray[np.object_], x: int, rows: pd.DataFrame, approach: str, unit: str
+) -> bool:
+    """Draw one parameter of one approach into the panels of errors and of sds; False if none."""
+    if rows.empty:
+        return False
+    colour, marker = approach_colour(approach), approach_marker(approach)
+    at = x + (APPROACHES.index(approach) - 0.5) * (WIDTH + 0.04)
+    first = rows["replicate"] == rows["replicate"].min()
+    one = {
+        "marker": marker, "markersize": 4, "color": colour, "markerfacecolor": "white", "zorder": 4
+    }
+
+    errors = to_display(rows["error"], unit)
+    axes[0].vlines(at, *np.quantile(errors, (0.025, 0.975)), color=colour, alpha=0.35, lw=4)
+    axes[0].plot(at, errors[first], **one)
+
+    sigmas = to_display(rows["sigma_posteriori"], unit)
+    if np.isfinite(sigmas).all():
+        axes[1].bar(at, sigmas.mean(), WIDTH, color=colour, alpha=0.85)
+        axes[1].vlines(at, *np.quantile(sigmas, (0.025, 0.975)), color="#AAAAAA", lw=2, zorder=3)
+        axes[1].plot(at, sigmas[first], **one)
+    else:
+        axes[1].text(at, 0, "no redundancy ", rotation=90, ha="center", va="bottom", fontsize=7)
+    return True
+
+
+@figure(
+    "figure-8",
+    title="Figure 8: correlations of the parameters of the two calibrations",
+    category="Paper",
+    tables=("correlations",),
+    when=lambda study: study.paper,
+)
+def correlations(tables: Tables, study: StudyConfig) -> Figure:
+    """Absolute correlations less the identity, from the cofactors of the adjustment."""
+    names = [name for name, _ in _parameters(study)]
+    found = {
+        approach: _matrix(tables["correlations"], cell, names) for cell, approach in _cells(study)
+    }
+    largest = max((np.nanmax(matrix) for matrix in found.values() if matrix is not None), default=0)
+    top = max(0.1, np.ceil(largest * 20) / 20)
+    fig = new_figure(FULL, 84)
+    axes = fig.subplots(1, 2)
+    image = None
+    for ax, (approach, matrix) in zip(axes, found.items(), strict=True):
+        ax.set_title(f"{approach}-based" if approach == "gravity" else f"{approach}-aided")
+        ax.grid(False)
+        ax.set_xticks(range(len(names)), [symbol(name) for name in names])
+        ax.set_yticks(range(len(names)), [symbol(name) for name in names])
+        ax.tick_params(length=0)
+        ax.spines[:].set_visible(False)
+        if matrix is None:
+            say_empty(ax)
+            continue
+        image = ax.imshow(matrix, cmap="Blues", vmin=0, vmax=top)
+        _write_values(ax, matrix, top)
+        _separate(ax, [group_of(name) for name in names])
+    if image is not None:
+        fig.colorbar(image, ax=axes, label="|correlation| − I", pad=0.02, shrink=0.8)
+    return fig
+
+
+def _matrix(
+    table: pd.DataFrame, cell: str, names: list[str]
+) -> NDArray[np.float64] | None:
+    rows = table[table["cell"] == cell]
+    if rows.empty:
+        return None
+    square = rows.pivot(index="parameter_1", columns="parameter_2", values="adjustment")
+    return np.abs(square.reindex(index=names, columns=names).to_numpy(float)) - np.eye(len(names))
+
+
+def _write_values(ax: Axes, matrix: NDArray[np.float64], top: float) -> None:
+    if len(matrix) > 12:  # no room
+        return
+    for i, j in np.argwhere(np.abs(matrix) > ANNOTATED):
+        ax.text(
+            j, i, f"{matrix[i, j]:.2f}".replace("0.", "."), ha="center", va="center", fontsize=7,
+            color="white" if matrix[i, j] > 0.6 * top else INK,
+        )
+
+
+def _separate(ax: Axes, groups: list[str]) -> None:
+    """Thin lines between the groups of parameters."""
+    edge = -0.5
+    for _, members in groupby(groups):
+        edge += len(list(members))
+        if edge < len(groups) - 1:
+            ax.axhline(edge, color="#BBBBBB", linewidth=0.6)
+            ax.axvline(edge, color="#BBBBBB", linewidth=0.6)

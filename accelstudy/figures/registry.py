@@ -1,0 +1,136 @@
+"""The registry of figures, and how one is drawn and written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import pandas as pd
+from matplotlib.figure import Figure
+
+from accelstudy.errors import UnknownNameError
+from accelstudy.figures.style import DPI, STYLE
+from accelstudy.study.config import StudyConfig
+from accelstudy.study.tables import whole_file
+
+Tables = Mapping[str, pd.DataFrame]
+Draw = Callable[[Tables, StudyConfig], Figure]
+
+TABLES = ("cells", "summary", "correlations", "leveling", "sensitivity", "estimates")
+"""What a figure may ask for; of the estimates it gets those of the paper's two cells only."""
+
+
+@dataclass(frozen=True)
+class FigureEntry:
+    """A registered figure.
+
+    Attributes
+    ----------
+    name, title, category : str
+    tables : tuple of str, those of `TABLES` that it draws
+    when : callable, whether a study has this figure
+    draw : callable, takes the tables and the study
+    """
+
+    name: str
+    title: str
+    category: str
+    tables: tuple[str, ...]
+    when: Callable[[StudyConfig], bool]
+    draw: Draw
+
+
+_REGISTRY: dict[str, FigureEntry] = {}
+
+
+def figure(
+    name: str,
+    *,
+    title: str,
+    category: str,
+    tables: tuple[str, ...] = (),
+    when: Callable[[StudyConfig], bool] = lambda study: True,
+) -> Callable[[Draw], Draw]:
+    """Register the decorated function as a figure; the arguments are those of `FigureEntry`.
+
+    Raises
+    ------
+    ValueError
+        If the name is taken or a table is not one of `TABLES`.
+    """
+    if name in _REGISTRY:
+        raise ValueError(f"figure {name!r} is registered twice")
+    if unknown := set(tables) - set(TABLES):
+        raise ValueError(f"figure {name!r}: no such tables: {', '.join(sorted(unknown))}")
+
+    def decorate(function: Draw) -> Draw:
+        _REGISTRY[name] = FigureEntry(name, title, category, tables, when, function)
+        return function
+
+    return decorate
+
+
+def get_figure(name: str) -> FigureEntry:
+    """Return the figure registered under `name`; raise `UnknownNameError` if there is none."""
+    try:
+        return _REGISTRY[name]
+    except KeyError:
+        raise UnknownNameError("figure", name, _REGISTRY) from None
+
+
+def figure_names(study: StudyConfig) -> tuple[str, ...]:
+    """Names of the figures that a study has."""
+    return tuple(sorted(name for name, entry in _REGISTRY.items() if entry.when(study)))
+
+
+def figure_tables(name: str) -> tuple[str, ...]:
+    """Names of the tables that a figure needs."""
+    return get_figure(name).tables
+
+
+def draw(
+    name: str,
+    tables: Mapping[str, pd.DataFrame | Callable[[], pd.DataFrame]],
+    study: StudyConfig,
+) -> Figure:
+    """Draw a figure.
+
+    Parameters
+    ----------
+    name : str
+    tables : mapping of table name to table, or to a function that reads it; those that the figure
+        does not need are left alone
+    study : StudyConfig
+    """
+    entry = get_figure(name)
+    needed: dict[str, pd.DataFrame] = {}
+    for key in entry.tables:
+        table = tables[key]
+        needed[key] = table if isinstance(table, pd.DataFrame) else table()
+    with mpl.rc_context(STYLE):
+        return entry.draw(needed, study)
+
+
+def render(
+    name: str,
+    tables: Mapping[str, pd.DataFrame | Callable[[], pd.DataFrame]],
+    study: StudyConfig,
+    svg_path: str | Path,
+    png_path: str | Path,
+) -> None:
+    """Draw a figure and write it as SVG and PNG, each whole or not at all.
+
+    The same tables give the same bytes. Parameters as in `draw`.
+    """
+    drawn = draw(name, tables, study)
+    metadata: dict[str, dict[str, Any]] = {
+        "svg": {"Date": None, "Creator": None, "Title": get_figure(name).title},
+        "png": {"Software": None, "Title": get_figure(name).title},
+    }
+    with mpl.rc_context(STYLE):
+        for kind, path in (("svg", svg_path), ("png", png_path)):
+            with whole_file(path) as temporary:
+                drawn.savefig(temporary, format=kind, dpi=DPI, metadata=metadata[kind])

@@ -1,0 +1,157 @@
+"""How all figures look: sizes, fonts, and one colour for each thing wherever it occurs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cache
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from accelstudy.effects import Parameter, effect_names, get_effect
+from accelstudy.models import TITLES
+
+MM = 1 / 25.4
+"""One millimetre in inches."""
+COLUMN = 85 * MM
+"""Width of a journal's column, inches."""
+FULL = 175 * MM
+"""Width of a journal's page, inches."""
+DPI = 300
+
+STYLE: dict[str, Any] = {
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.labelsize": 8,
+    "axes.linewidth": 0.6,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlesize": 8,
+    "figure.constrained_layout.h_pad": 0.03,
+    "figure.constrained_layout.w_pad": 0.03,
+    "figure.titlesize": 9,
+    "font.family": "DejaVu Sans",
+    "font.size": 8,
+    "grid.color": "#DDDDDD",
+    "grid.linewidth": 0.5,
+    "hatch.color": "#999999",
+    "hatch.linewidth": 0.5,
+    "legend.fontsize": 7.5,
+    "legend.frameon": False,
+    "lines.linewidth": 1.2,
+    "lines.markersize": 4,
+    "mathtext.default": "it",
+    "mathtext.fontset": "dejavusans",
+    "savefig.facecolor": "white",
+    "svg.fonttype": "path",
+    "svg.hashsalt": "accelstudy",
+    "xtick.labelsize": 7.5,
+    "xtick.major.width": 0.6,
+    "ytick.labelsize": 7.5,
+    "ytick.major.width": 0.6,
+}
+
+INK = "#222222"
+MISSING = "#E6E6E6"
+"""Background of what does not exist; drawn hatched."""
+HATCH = "////"
+
+# Okabe & Ito's colours for the groups of parameters, and two others for the approaches.
+APPROACH_COLOURS = {"gravity": "#4A4A4A", "robot": "#C2247A"}
+APPROACH_MARKERS = {"gravity": "o", "robot": "s"}
+ANGLE_COLOURS = {"roll": "#0072B2", "pitch": "#D55E00"}
+GROUPS = {
+    "force": ("force", "#0072B2"),
+    "bias": ("bias", "#009E73"),
+    "scale": ("scale", "#E69F00"),
+    "nonorthogonality": ("non-orthogonality", "#D55E00"),
+    "cross_axis_misalignment": ("cross-axis", "#56B4E9"),
+    "quadratic_scale": ("quadratic", "#8A8A2B"),
+    "cubic_scale": ("cubic", "#7F5539"),
+    "gravity": ("gravity", "#4A4A4A"),
+}
+"""Group of parameters (an effect, or what else varies): its label and its colour."""
+
+UNIT_LABELS = {"mm/s^2": "mm/s²", "m/s^2": "m/s²"}
+
+
+def approach_colour(approach: str) -> str:
+    """Colour of an approach."""
+    return APPROACH_COLOURS.get(approach, "#0072B2")
+
+
+def approach_marker(approach: str) -> str:
+    """Marker of an approach."""
+    return APPROACH_MARKERS.get(approach, "D")
+
+
+def group_label(group: str) -> str:
+    """Return the label of a group of parameters."""
+    return GROUPS.get(group, (group.replace("_", " "), ""))[0]
+
+
+def group_colour(group: str) -> str:
+    """Colour of a group of parameters."""
+    return GROUPS.get(group, ("", "#999999"))[1]
+
+
+@cache
+def _parameters() -> dict[str, tuple[str, Parameter]]:
+    known = {
+        parameter.name: (effect, parameter)
+        for effect in effect_names()
+        for parameter in get_effect(effect).parameters
+    }
+    for axis in "xyz":
+        known[f"f_{axis}"] = ("force", Parameter(f"f_{axis}", "m/s^2", f"$f_{axis}$"))
+    known["g"] = ("gravity", Parameter("g", "m/s^2", "$g$"))
+    return known
+
+
+def group_of(parameter: str) -> str:
+    """Group of a parameter: the effect it belongs to, "force" or "gravity"."""
+    return _parameters()[parameter][0]
+
+
+def symbol(parameter: str) -> str:
+    """Return the symbol of a parameter (mathtext)."""
+    return _parameters()[parameter][1].symbol
+
+
+def unit_label(unit: str) -> str:
+    """Return a unit as it is printed."""
+    return UNIT_LABELS.get(unit, unit)
+
+
+def in_order(groups: Iterable[str]) -> list[str]:
+    """Groups in the order of `GROUPS`, those that are not in it last."""
+    found = set(groups)
+    return [name for name in GROUPS if name in found] + sorted(found - set(GROUPS))
+
+
+def model_title(model: str) -> str:
+    """Short title of a model."""
+    return TITLES.get(model, model)
+
+
+def new_figure(width: float, height_mm: float) -> Figure:
+    """Make an empty figure, `width` in inches."""
+    return Figure(figsize=(width, height_mm * MM), layout="constrained")
+
+
+def say_empty(ax: Axes, text: str = "no estimable cell") -> None:
+    """Write into axes why nothing is drawn there."""
+    ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", color="#777777")
+
+
+def approach_handles(approaches: Iterable[str], **options: Any) -> list[Line2D]:
+    """Entries of a legend, one for each approach."""
+    return [
+        Line2D(
+            [], [], color=approach_colour(name), marker=approach_marker(name), label=name,
+            **{"linestyle": "", **options},
+        )
+        for name in approaches
+    ]

@@ -1,0 +1,161 @@
+"""Variance-based sensitivity of leveling: which inputs make roll and pitch uncertain.
+
+Total effects by Sobol's method (SALib) over a grid of attitudes, for the forces alone (the
+parameter-free model f_s = f_b + v, figure 4) and for the forces and all parameters of a calibrated
+sensor model (figures 5 and 6 of Thalmann & Neuner 2018).
+
+The total effect of an input is the share of the output's variance that would remain if all others
+were known. The inputs are sampled independently, as classic indices assume; the parameters of a
+calibration are correlated, so for correlated ones the shares are an approximation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import product
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from accelstudy.leveling import roll_pitch, specific_force
+from accelstudy.sensor import SensorModel
+from accelstudy.units import GON, MGON, STANDARD_GRAVITY
+
+Array = NDArray[np.float64]
+
+FORCES = ("f_x", "f_y", "f_z")
+OUTPUTS = ("roll", "pitch")
+
+NEGLIGIBLE_VARIANCE = 1e-24
+"""Variance in rad² below which an output does not vary: rounding, not an effect."""
+
+
+def total_effects(
+    function: Callable[[Array], Array],
+    names: Sequence[str],
+    mean: ArrayLike,
+    sigma: ArrayLike,
+    base_samples: int,
+    resamples: int,
+    seed: int,
+) -> tuple[Array, Array, Array]:
+    """Total effects of independent normal inputs on the outputs of a function.
+
+    Parameters
+    ----------
+    function : takes (N, d), returns (N, k)
+    names : names of the d inputs
+    mean, sigma : (d,) arrays; inputs with sigma 0 have total effect 0
+    base_samples : int, a power of two
+    resamples : int, bootstrap resamples of the confidence interval
+    seed : int
+
+    Returns
+    -------
+    total : (k, d) array; NaN where an output has no variance
+    ci95 : (k, d) array, half width of its 95 % confidence interval
+    sd : (k,) array, standard deviation of the outputs
+    """
+    # Slow to import, and figures need only the names of this module.
+    from SALib.analyze import sobol as sobol_analyze
+    from SALib.sample import sobol as sobol_sample
+
+    mean, sigma = np.asarray(mean, dtype=float), np.asarray(sigma, dtype=float)
+    varied = np.flatnonzero(sigma > 0)
+    problem = {
+        "num_vars": len(varied),
+        "names": [names[int(i)] for i in varied],
+        "bounds": [[0.0, 1.0]] * len(varied),
+        "dists": ["norm"] * len(varied),
+    }
+    normal = sobol_sample.sample(problem, base_samples, calc_second_order=False, seed=seed)
+    inputs = np.tile(mean, (len(normal), 1))
+    inputs[:, varied] += sigma[varied] * normal
+    outputs = function(inputs)
+
+    total = np.full((outputs.shape[1], len(mean)), np.nan)
+    ci95 = np.full_like(total, np.nan)
+    for k, values in enumerate(outputs.T):
+        if values.var() <= NEGLIGIBLE_VARIANCE:
+            continue
+        result = sobol_analyze.analyze(
+            problem,
+            (values - values.mean()) / values.std(),
+            calc_second_order=False,
+            num_resamples=resamples,
+            seed=seed,
+        )
+        total[k] = ci95[k] = 0.0
+        total[k, varied], ci95[k, varied] = result["ST"], result["ST_conf"]
+    return total, ci95, outputs.std(axis=0)
+
+
+def leveling_sensitivity(
+    roll_gon: Sequence[float],
+    pitch_gon: Sequence[float],
+    sigma_force: float,
+    base_samples: int,
+    resamples: int,
+    seed: int,
+    model: SensorModel | None = None,
+    parameters: Array | None = None,
+    sigma_parameters: Array | None = None,
+    g: float = STANDARD_GRAVITY,
+) -> pd.DataFrame:
+    """Total effects on roll and pitch over a grid of attitudes.
+
+    Parameters
+    ----------
+    roll_gon, pitch_gon : the grid
+    sigma_force : float, m/s², of each component of the sensor's output
+    base_samples, resamples, seed : as in `total_effects`
+    model, parameters, sigma_parameters : sensor model with its (u,) parameters and their sds, SI;
+        without them the output is the force itself
+    g : float, m/s²
+
+    Returns
+    -------
+    DataFrame
+        output, roll_gon, pitch_gon, input, total_effect, ci95, sd_output_mgon, defined; where the
+        output has no variance the total effect is NaN and `defined` False.
+    """
+    names, u = list(FORCES), 0
+    if model is not None:
+        names += model.parameter_names
+        u = model.n_parameters
+    x = np.zeros(u) if parameters is None else parameters
+    sigma = np.concatenate(
+        [np.full(3, sigma_force), np.zeros(u) if sigma_parameters is None else sigma_parameters]
+    )
+    rows: list[pd.DataFrame] = []
+    for roll, pitch in product(roll_gon, pitch_gon):
+        attitude = np.array([roll * GON, pitch * GON])
+        f_s = np.array(specific_force(attitude[0], attitude[1], g))
+        if model is not None:
+            f_s = model.sense(f_s[None], x, g)[0]
+
+        def leveled(inputs: Array, attitude: Array = attitude) -> Array:
+            force = inputs[:, :3]
+            if model is not None:
+                force = model.correct(force[:, None, :], inputs[:, 3:], g)[:, 0]
+            angles = np.stack(roll_pitch(tuple(force.T)), axis=-1) - attitude
+            return (angles + np.pi) % (2 * np.pi) - np.pi
+
+        total, ci95, sd = total_effects(
+            leveled, names, np.concatenate([f_s, x]), sigma, base_samples, resamples, seed
+        )
+        for k, output in enumerate(OUTPUTS):
+            columns: dict[str, Any] = {
+                "output": output,
+                "roll_gon": float(roll),
+                "pitch_gon": float(pitch),
+                "input": names,
+                "total_effect": total[k],
+                "ci95": ci95[k],
+                "sd_output_mgon": sd[k] / MGON,
+                "defined": bool(np.isfinite(total[k]).all()),
+            }
+            rows.append(pd.DataFrame(columns))
+    return pd.concat(rows, ignore_index=True)

@@ -1,0 +1,143 @@
+"""The later stages of a study: sensitivity, claims and figures, from tables to files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from accelstudy.errors import InputError
+from accelstudy.models import get_model
+from accelstudy.sensitivity import leveling_sensitivity
+from accelstudy.study.cells import study_cells
+from accelstudy.study.config import StudyConfig
+from accelstudy.study.tables import read_estimates, read_table, whole_file, write_table
+from accelstudy.units import to_si
+
+
+def analyse_sensitivity(
+    study: StudyConfig,
+    analysis: str,
+    summary: str | Path | None,
+    output: str | Path,
+    provenance: Mapping[str, Any],
+) -> None:
+    """Analyse the sensitivity of leveling and write the table.
+
+    Parameters
+    ----------
+    study : StudyConfig, with `sensitivity`
+    analysis : "forces" for the parameter-free model (figure 4), or the approach whose calibration
+        gives the sds of the parameters (figures 5 and 6)
+    summary : path of the table of that name; not needed for "forces"
+    output : path of the table to write
+    provenance : see `accelstudy.study.tables.origin`
+    """
+    settings = study.sensitivity
+    assert settings is not None
+    calibrated: dict[str, Any] = {}
+    if analysis != "forces":
+        model = get_model(settings.model, study.models)
+        truth = model.vector(study.truth(e.name for e in model.effects))
+        sigma = _empirical_sigma(study, analysis, summary)
+        calibrated = {"model": model, "parameters": truth, "sigma_parameters": sigma}
+    table = leveling_sensitivity(
+        settings.roll_gon,
+        settings.pitch_gon,
+        study.sigma_force,
+        settings.base_samples,
+        settings.resamples,
+        study.seed,
+        g=study.gravity_mps2,
+        **calibrated,
+    )
+    table.insert(0, "analysis", analysis)
+    write_table(output, table, provenance)
+
+
+def _empirical_sigma(study: StudyConfig, approach: str, summary: Any) -> np.ndarray:
+    """Standard deviations of the parameters over the Monte Carlo, (u,), SI."""
+    settings = study.sensitivity
+    assert settings is not None
+    model = get_model(settings.model, study.models)
+    cell = "/".join([settings.model, settings.scheme, approach])
+    rows = read_table(summary)
+    rows = rows[rows["cell"] == cell].set_index("parameter")
+    if rows.empty or rows["sd_empirical"].isna().any():
+        raise InputError(f"sensitivity: the study has no estimates of the cell {cell}")
+    sigma, units = rows["sd_empirical"].to_dict(), rows["unit"].astype(str).to_dict()
+    return np.array([float(to_si(sigma[p.name], units[p.name], p.unit)) for p in model.parameters])
+
+
+def judge_claims(
+    study: StudyConfig,
+    estimates: Sequence[str | Path],
+    correlations: str | Path,
+    sensitivity: str | Path,
+    outputs: Mapping[str, str],
+    provenance: Mapping[str, Any],
+) -> None:
+    """Judge the paper's claims.
+
+    Parameters
+    ----------
+    study : StudyConfig, with `sensitivity`
+    estimates, correlations, sensitivity : paths of the tables
+    outputs : paths of `claims`, `by_scheme` and `html`
+    provenance : see `accelstudy.study.tables.origin`
+    """
+    from accelstudy.study.claims import evidence_from, judge
+    from accelstudy.study.report import claims_page
+
+    settings = study.sensitivity
+    assert settings is not None
+    cells = [
+        cell
+        for cell in study_cells(study)
+        if cell.name == "/".join([settings.model, cell.scheme, cell.approach])
+    ]
+    evidence = evidence_from(
+        cells,
+        read_table(list(estimates), filters=[("cell", "in", [cell.name for cell in cells])]),
+        scheme=settings.scheme,
+        correlations=read_table(correlations),
+        sensitivity=read_table(sensitivity),
+        base_samples=settings.base_samples,
+        resamples=settings.resamples,
+        seed=study.seed,
+    )
+    claims, by_scheme = judge(evidence)
+    write_table(outputs["claims"], claims, provenance)
+    write_table(outputs["by_scheme"], by_scheme, provenance)
+    with whole_file(outputs["html"]) as path:
+        path.write_text(claims_page(claims, by_scheme), encoding="utf-8")
+
+
+def draw_figure(
+    study: StudyConfig,
+    name: str,
+    tables: Mapping[str, Any],
+    svg: str | Path,
+    png: str | Path,
+) -> None:
+    """Draw one figure from tables given by their paths."""
+    from accelstudy.figures import render
+
+    render(
+        name,
+        {key: _figure_table(study, key, path) for key, path in tables.items()},
+        study,
+        svg,
+        png,
+    )
+
+
+def _figure_table(study: StudyConfig, name: str, path: Any) -> Any:
+    if name != "estimates":
+        return read_table(path)
+    settings = study.sensitivity
+    assert settings is not None
+    cells = ["/".join([settings.model, settings.scheme, a]) for a in ("gravity", "robot")]
+    return read_estimates(path, cells)

@@ -1,0 +1,36 @@
+"""What every job of the workflow does: log to its file, and end with one line on bad input."""
+
+from __future__ import annotations
+
+import logging
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+from accelstudy.errors import InputError
+from accelstudy.study.config import StudyConfig, parse_study
+
+
+@contextmanager
+def job(snakemake: Any) -> Iterator[tuple[StudyConfig, Mapping[str, Any]]]:
+    """Run the body of a rule's script.
+
+    Gives the study and the provenance of what the job writes (`config_hash` and `seed`).
+    """
+    logging.basicConfig(
+        filename=snakemake.log[0],
+        filemode="w",
+        level=logging.INFO,
+        format="%(asctime)s %(levelname)s %(message)s",
+    )
+    try:
+        study = parse_study(snakemake.config)
+        yield study, {"config_hash": study.fingerprint, "seed": study.seed}
+    except InputError as error:
+        logging.error("%s", error)
+        print(f"error: {error}", file=sys.stderr)
+        sys.exit(2)
+    except Exception:
+        logging.exception("%s failed", snakemake.rule)
+        raise

@@ -1,0 +1,53 @@
+"""Where numbers come from: the code that made them, and a place where they can be written."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from pathlib import Path
+
+import accelstudy
+from accelstudy.errors import InputError
+
+# Files that a stage does not use, so that an edit of them does not run it again. What is not named
+# counts: a new file runs everything again rather than nothing.
+_FRONT = ("cli.py", "figures/", "study/claims.py", "study/report.py", "study/job.py")
+_TABLES = ("study/summary.py", "leveling_error.py", "closed_forms.py")
+_UNUSED = {
+    "simulate": (*_FRONT, *_TABLES, "sensitivity.py", "study/config.py"),
+    "summarise": (*_FRONT, "sensitivity.py", "study/config.py"),
+    "sensitivity": (*_FRONT, *_TABLES),
+    "claims": ("cli.py", "figures/"),
+    "figures": ("cli.py", "study/claims.py"),
+}
+
+
+def code_hash(stage: str) -> str:
+    """Hash of the package's files on which a stage of the workflow depends.
+
+    Snakemake does not see that a package has changed; as a parameter of a rule this shows it.
+    """
+    root = Path(accelstudy.__file__).parent
+    digest = hashlib.sha256()
+    for path in sorted(root.rglob("*.py")):
+        name = path.relative_to(root).as_posix()
+        if not name.startswith(_UNUSED[stage]):
+            digest.update(name.encode())
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def check_writable(folder: str | Path) -> None:
+    """Check that a folder can be made and written to, without making it.
+
+    Raises
+    ------
+    InputError
+        If it, or the nearest folder above it that exists, is no folder or is not writable.
+    """
+    folder = Path(folder)
+    nearest = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    if not nearest.is_dir():
+        raise InputError(f"{folder}: cannot hold results: {nearest} is not a folder")
+    if not os.access(nearest, os.W_OK | os.X_OK):
+        raise InputError(f"{folder}: cannot hold results: {nearest} is not writable")

@@ -1,0 +1,56 @@
+"""Tables for people: the claims and their verdicts as a page and as Markdown."""
+
+from __future__ import annotations
+
+import math
+
+import pandas as pd
+from jinja2 import Environment, PackageLoader
+
+
+def number(value: float) -> str:
+    """Show a number with three significant digits; a dash where there is none."""
+    if math.isnan(value):
+        return "–"
+    if value == 0:
+        return "0"
+    digits = max(0, 2 - math.floor(math.log10(abs(value))))
+    return f"{value:.{digits}f}".replace("-", "−")
+
+
+def interval(low: float, high: float) -> str:
+    """Show an interval; nothing where there is none."""
+    return "" if math.isnan(low) else f"{number(low)} … {number(high)}"
+
+
+def claims_page(claims: pd.DataFrame, by_scheme: pd.DataFrame) -> str:
+    """Page (HTML, self-contained) with all claims and their verdicts."""
+    environment = Environment(
+        loader=PackageLoader("accelstudy", "study"), autoescape=True, trim_blocks=True
+    )
+    environment.filters["number"] = number
+    template = environment.get_template("claims.html.j2")
+    return template.render(
+        claims=claims.to_dict("records"),
+        schemes=by_scheme.to_dict("records"),
+        interval=interval,
+    )
+
+
+def claims_markdown(claims: pd.DataFrame) -> str:
+    """The claims as a table in Markdown, one row each."""
+    lines = [
+        "| section | claim | paper | ours (95 % interval) | verdict | |",
+        "|---|---|---|---|---|---|",
+    ]
+    for row in claims.to_dict("records"):
+        unit = "" if row["unit"] in ("1", "ratio") else f" {row['unit']}"
+        paper = "–" if math.isnan(row["paper"]) else f"{number(row['paper'])}{unit}"
+        ours = f"{number(row['ours'])}{unit}"
+        spread = interval(row["ci95_low"], row["ci95_high"])
+        ours += f" ({spread})" if spread else ""
+        lines.append(
+            f"| {row['section']} | {row['statement']} | {paper} | {ours} | "
+            f"**{row['verdict']}** | {row['sentence']} |"
+        )
+    return "\n".join(lines) + "\n"

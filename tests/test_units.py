@@ -1,0 +1,66 @@
+"""Units at the border, and what is said of a unit that is unknown."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from accelstudy.errors import UnknownNameError
+from accelstudy.units import GON, MGON, UNITS, display_unit, to_display, to_si
+
+
+def test_a_full_turn_is_400_gon():
+    np.testing.assert_allclose(400 * GON, 2 * math.pi, rtol=1e-15)
+    np.testing.assert_allclose(1000 * MGON, GON, rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("value", "given", "unit", "expected"),
+    [
+        (200, "gon", "rad", math.pi),
+        (1000, "mgon", "rad", math.pi / 200),
+        (90, "deg", "rad", math.pi / 2),
+        (3600, "arcsec", "rad", math.pi / 180),
+        (2, "mrad", "rad", 2e-3),
+        (200, "ppm", "1", 2e-4),
+        (3, "%", "1", 0.03),
+        (1, "g", "m/s^2", 9.80665),
+        (1, "mg", "m/s^2", 9.80665e-3),
+        (50, "mm/s^2", "m/s^2", 0.05),
+        (7, "K", "K", 7),  # a unit that is shown as it is
+    ],
+)
+def test_conversions(value, given, unit, expected):
+    assert to_si(value, given, unit) == pytest.approx(expected, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("unit", "shown"),
+    [("rad", "mgon"), ("1", "ppm"), ("m/s^2", "mm/s^2"), ("m/s^2/K", "m/s^2/K")],
+)
+def test_units_that_people_read(unit, shown):
+    assert display_unit(unit) == shown
+
+
+@given(unit=st.sampled_from([*UNITS, "s"]), value=st.floats(-1e6, 1e6))
+def test_what_is_shown_can_be_read_back(unit, value):
+    back = to_si(to_display(value, unit), display_unit(unit), unit)
+    assert back == pytest.approx(value, rel=1e-14)
+
+
+def test_arrays_are_converted():
+    np.testing.assert_allclose(to_display([0.0, 1e-6, 2e-4], "1"), [0, 1, 200], rtol=1e-14)
+
+
+def test_an_unknown_unit_is_named_with_what_is_known():
+    with pytest.raises(UnknownNameError) as error:
+        to_si(1.0, "mgn", "rad")
+    assert "unit of a quantity in rad 'mgn'; did you mean 'mgon'?" in str(error.value)
+    assert "arcsec" in str(error.value)
+
+
+def test_a_unit_of_another_quantity_is_refused():
+    with pytest.raises(UnknownNameError, match="unknown unit of a quantity in rad 'ppm'"):
+        to_si(1.0, "ppm", "rad")

@@ -1,0 +1,44 @@
+from snakemake.exceptions import WorkflowError
+
+from accelstudy.errors import InputError
+from accelstudy.figures import figure_names, figure_tables, get_figure
+from accelstudy.study.cells import batches, study_cells
+from accelstudy.study.config import parse_study
+from accelstudy.study.provenance import check_writable, code_hash
+from accelstudy.study.tables import TABLES
+
+try:
+    STUDY = parse_study(config, ", ".join(map(str, workflow.configfiles)) or "config")
+    RESULTS = f"results/{STUDY.study}"
+    check_writable(RESULTS)
+except InputError as error:
+    raise WorkflowError(str(error)) from None
+
+# Cells run in batches, so that starting Python does not dominate; a batch is a job.
+BATCHES = {f"{i:04d}": cells for i, cells in enumerate(batches(study_cells(STUDY)))}
+PARTS = RESULTS + "/batches/{batch}"
+ANALYSES = ["forces", "gravity", "robot"]
+FINAL_TABLES = [
+    *TABLES,
+    *(["sensitivity"] if STUDY.sensitivity else []),
+    *(["claims", "claims_by_scheme"] if STUDY.paper else []),
+]
+
+
+wildcard_constraints:
+    batch=r"\d{4}",
+    analysis="|".join(ANALYSES),
+
+
+def batch_spec(wildcards):
+    """All on which the numbers of a batch depend, as plain data."""
+    return {"seed": STUDY.seed, "cells": [cell.to_dict() for cell in BATCHES[wildcards.batch]]}
+
+
+def estimates_of(choose):
+    """Files that hold the estimates of the chosen cells."""
+    return [
+        f"{RESULTS}/estimates/{batch}.parquet"
+        for batch, cells in BATCHES.items()
+        if any(map(choose, cells))
+    ]
