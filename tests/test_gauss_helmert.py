@@ -105,6 +105,21 @@ def test_adjusted_observations_fulfil_the_conditions():
     assert np.abs(LINE.psi(result.parameters, adjusted)).max() < 1e-9
 
 
+def test_residuals_converge_even_where_the_parameters_are_found_at_once():
+    """x = l₁ needs no iteration; the foot of the perpendicular of (l₂, l₃) on a circle does."""
+    circle = FunctionConditions(
+        psi=lambda x, l: np.stack([x[:, :1] - l[..., 0], l[..., 1] ** 2 + l[..., 2] ** 2 - 1], -1),
+        jac_parameters=lambda x, l: np.broadcast_to([[1.0], [0.0]], (len(l), 1, 2, 1)),
+        jac_observations=lambda x, l: np.stack(
+            [np.broadcast_to([-1.0, 0, 0], l.shape), 2 * l * [0, 1, 1]], axis=-2
+        ),
+    )
+    l = np.array([[[5.0, 3.0, 4.0]]])
+    result = adjust(circle, l, np.ones((1, 3)), [0.0])
+    np.testing.assert_allclose(l + result.residuals, [[[5.0, 0.6, 0.8]]], rtol=1e-9)
+    assert result.omega[0] == pytest.approx(4**2, rel=1e-9)
+
+
 def test_omega_is_that_of_the_residuals():
     result = york()
     assert result.omega[0] == pytest.approx(np.sum(YORK_WEIGHTS * result.residuals[0] ** 2))

@@ -104,6 +104,17 @@ def test_generated_functions_equal_the_effects_in_numpy(name):
     np.testing.assert_allclose(model.sense(f_b, p), expected.T, rtol=0, atol=1e-14 * G)
 
 
+@ALL_MODELS
+def test_derivative_of_the_correction_against_finite_differences(name):
+    model = get_model(name)
+    p = random_parameters(model, seed=6)
+    found = model.correction_jacobian(forces(), p)
+    assert found.shape == (24, 3, model.n_parameters)
+    for i, step in enumerate(1e-5 * np.eye(len(p))):
+        difference = model.correct(forces(), p + step) - model.correct(forces(), p - step)
+        np.testing.assert_allclose(found[..., i], difference / 2e-5, rtol=0, atol=1e-6)
+
+
 def test_a_perfect_sensor_changes_nothing():
     model = get_model(TWELVE)
     np.testing.assert_array_equal(model.sense(forces(), np.zeros(12)), forces())

@@ -16,7 +16,7 @@ except InputError as error:
 
 # Cells run in batches, so that starting Python does not dominate; a batch is a job.
 BATCHES = {f"{i:04d}": cells for i, cells in enumerate(batches(study_cells(STUDY)))}
-PARTS = RESULTS + "/batches/{batch}"
+PARTS = f"{RESULTS}/batches/{{batch}}"
 ANALYSES = ["forces", "gravity", "robot"]
 FINAL_TABLES = [
     *TABLES,
@@ -42,3 +42,17 @@ def estimates_of(choose):
         for batch, cells in BATCHES.items()
         if any(map(choose, cells))
     ]
+
+
+def figure_inputs(wildcards):
+    """Tables that a figure needs; of the estimates only the files with the paper's two cells."""
+    inputs = {}
+    for table in figure_tables(wildcards.figure):
+        if table == "estimates":
+            inputs[table] = estimates_of(
+                lambda cell: (cell.model, cell.scheme)
+                == (STUDY.sensitivity.model, STUDY.sensitivity.scheme)
+            )
+        else:
+            inputs[table] = f"{RESULTS}/{table}.parquet"
+    return inputs

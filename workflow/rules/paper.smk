@@ -1,12 +1,12 @@
 rule sensitivity_analysis:
     input:
-        lambda wildcards: [] if wildcards.analysis == "forces" else RESULTS + "/summary.parquet",
+        lambda wildcards: [] if wildcards.analysis == "forces" else f"{RESULTS}/summary.parquet",
     output:
-        RESULTS + "/sensitivity/{analysis}.parquet",
+        f"{RESULTS}/sensitivity/{{analysis}}.parquet",
     log:
-        RESULTS + "/logs/sensitivity/{analysis}.log",
+        f"{RESULTS}/logs/sensitivity/{{analysis}}.log",
     benchmark:
-        RESULTS + "/benchmarks/sensitivity/{analysis}.tsv"
+        f"{RESULTS}/benchmarks/sensitivity/{{analysis}}.tsv"
     threads: 1
     resources:
         mem_mb=2000,
@@ -22,13 +22,13 @@ rule sensitivity_analysis:
 
 rule sensitivity:
     input:
-        sensitivity=expand(RESULTS + "/sensitivity/{analysis}.parquet", analysis=ANALYSES),
+        sensitivity=expand(f"{RESULTS}/sensitivity/{{analysis}}.parquet", analysis=ANALYSES),
     output:
-        sensitivity=RESULTS + "/sensitivity.parquet",
+        sensitivity=f"{RESULTS}/sensitivity.parquet",
     log:
-        RESULTS + "/logs/sensitivity.log",
+        f"{RESULTS}/logs/sensitivity.log",
     benchmark:
-        RESULTS + "/benchmarks/sensitivity.tsv"
+        f"{RESULTS}/benchmarks/sensitivity.tsv"
     threads: 1
     resources:
         mem_mb=2000,
@@ -43,21 +43,21 @@ rule claims:
         estimates=(
             estimates_of(lambda cell: cell.model == STUDY.sensitivity.model) if STUDY.paper else []
         ),
-        correlations=RESULTS + "/correlations.parquet",
-        sensitivity=RESULTS + "/sensitivity.parquet",
+        correlations=f"{RESULTS}/correlations.parquet",
+        sensitivity=f"{RESULTS}/sensitivity.parquet",
     output:
-        claims=RESULTS + "/claims.parquet",
-        by_scheme=RESULTS + "/claims_by_scheme.parquet",
+        claims=f"{RESULTS}/claims.parquet",
+        by_scheme=f"{RESULTS}/claims_by_scheme.parquet",
         html=report(
-            RESULTS + "/claims.html",
+            f"{RESULTS}/claims.html",
             caption="../report/claims.rst",
             category="1 Claims of the paper",
             labels={"content": "All claims with verdicts"},
         ),
     log:
-        RESULTS + "/logs/claims.log",
+        f"{RESULTS}/logs/claims.log",
     benchmark:
-        RESULTS + "/benchmarks/claims.tsv"
+        f"{RESULTS}/benchmarks/claims.tsv"
     threads: 1
     resources:
         mem_mb=4000,

@@ -1,11 +1,11 @@
 rule simulate:
     output:
-        estimates=RESULTS + "/estimates/{batch}.parquet",
-        correlations=PARTS + "/correlations_adjustment.parquet",
+        estimates=f"{RESULTS}/estimates/{{batch}}.parquet",
+        correlations=f"{PARTS}/correlations_adjustment.parquet",
     log:
-        RESULTS + "/logs/simulate/{batch}.log",
+        f"{RESULTS}/logs/simulate/{{batch}}.log",
     benchmark:
-        RESULTS + "/benchmarks/simulate/{batch}.tsv"
+        f"{RESULTS}/benchmarks/simulate/{{batch}}.tsv"
     threads: 1
     resources:
         mem_mb=2000,

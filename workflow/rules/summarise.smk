@@ -1,13 +1,13 @@
 rule summarise:
     input:
-        estimates=RESULTS + "/estimates/{batch}.parquet",
-        correlations=PARTS + "/correlations_adjustment.parquet",
+        estimates=f"{RESULTS}/estimates/{{batch}}.parquet",
+        correlations=f"{PARTS}/correlations_adjustment.parquet",
     output:
         **{table: f"{PARTS}/{table}.parquet" for table in TABLES},
     log:
-        RESULTS + "/logs/summarise/{batch}.log",
+        f"{RESULTS}/logs/summarise/{{batch}}.log",
     benchmark:
-        RESULTS + "/benchmarks/summarise/{batch}.tsv"
+        f"{RESULTS}/benchmarks/summarise/{{batch}}.tsv"
     threads: 1
     resources:
         mem_mb=4000,
@@ -27,9 +27,9 @@ rule collect:
     output:
         **{table: f"{RESULTS}/{table}.parquet" for table in TABLES},
     log:
-        RESULTS + "/logs/collect.log",
+        f"{RESULTS}/logs/collect.log",
     benchmark:
-        RESULTS + "/benchmarks/collect.tsv"
+        f"{RESULTS}/benchmarks/collect.tsv"
     threads: 1
     resources:
         mem_mb=2000,
