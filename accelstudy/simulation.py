@@ -114,14 +114,14 @@ def session(
     """
     f_b = -gravity * np.asarray(directions, dtype=float)
     roll, pitch = roll_pitch(tuple(f_b.T))
-    previous = np.concatenate([f_b[:1], f_b[:-1]])
+    step = np.diff(f_b, axis=0, prepend=f_b[:1])
     known = replace(
         hold or Hold(),
         roll=roll,
         pitch=pitch,
-        previous_x=previous[:, 0],
-        previous_y=previous[:, 1],
-        previous_z=previous[:, 2],
+        step_x=step[:, 0],
+        step_y=step[:, 1],
+        step_z=step[:, 2],
     )
     angles = np.stack([roll, pitch], axis=-1)
     return Session(

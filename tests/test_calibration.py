@@ -432,8 +432,8 @@ class Hysteresis(Effect):
     parameters = per_axis("h", "m/s^2", "h_%")
 
     def output(self, f, p, g, hold, xp):
-        previous = (hold.previous_x, hold.previous_y, hold.previous_z)
-        return tuple(h * xp.sign(a - b) for h, a, b in zip(p, f, previous, strict=True))
+        step = (hold.step_x, hold.step_y, hold.step_z)
+        return tuple(h * xp.sign(d) for h, d in zip(p, step, strict=True))
 
 
 class EncoderOffset(Effect):
@@ -509,7 +509,7 @@ def test_hysteresis_has_no_sign_in_the_first_position():
 
 @BOTH
 @pytest.mark.parametrize(
-    ("case", "column"), [("temperature", "temperature"), ("previous position", "previous_x")]
+    ("case", "column"), [("temperature", "temperature"), ("previous position", "step_x")]
 )
 def test_a_missing_column_is_named(case, column, approach):
     model, ideal, _ = extended_session(case)

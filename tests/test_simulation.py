@@ -138,11 +138,11 @@ def test_attitude_of_the_holds():
     np.testing.assert_array_equal(IDEAL.hold.pitch, IDEAL.angles[:, 1])
 
 
-def test_the_previous_position_of_the_first_is_itself():
+def test_the_first_position_makes_no_step():
     hold = IDEAL.hold
-    previous = np.stack([hold.previous_x, hold.previous_y, hold.previous_z], axis=1)
-    np.testing.assert_array_equal(previous[1:], IDEAL.f_b[:-1])
-    np.testing.assert_array_equal(previous[0], IDEAL.f_b[0])
+    step = np.stack([hold.step_x, hold.step_y, hold.step_z], axis=1)
+    np.testing.assert_array_equal(step[1:], IDEAL.f_b[1:] - IDEAL.f_b[:-1])
+    np.testing.assert_array_equal(step[0], 0)
 
 
 def test_columns_of_the_caller_are_kept():

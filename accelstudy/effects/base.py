@@ -59,7 +59,8 @@ class Hold:
     time : (n,) array, s since the start of the session
     vibration : (n,) array, m/s², rms during the hold
     roll, pitch, yaw : (n,) arrays, rad, attitude known from outside
-    previous_x, previous_y, previous_z : (n,) arrays, m/s², specific force of the hold before
+    step_x, step_y, step_z : (n,) arrays, m/s², specific force less that of the hold before; 0 in
+        the first hold
     """
 
     temperature: NDArray[np.float64] | None = None
@@ -68,9 +69,9 @@ class Hold:
     roll: NDArray[np.float64] | None = None
     pitch: NDArray[np.float64] | None = None
     yaw: NDArray[np.float64] | None = None
-    previous_x: NDArray[np.float64] | None = None
-    previous_y: NDArray[np.float64] | None = None
-    previous_z: NDArray[np.float64] | None = None
+    step_x: NDArray[np.float64] | None = None
+    step_y: NDArray[np.float64] | None = None
+    step_z: NDArray[np.float64] | None = None
 
     @classmethod
     def columns(cls) -> tuple[str, ...]:

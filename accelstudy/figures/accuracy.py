@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.figures.registry import Tables, figure
-from accelstudy.figures.style import ANGLE_COLOURS, COLUMN, FULL, INK, new_figure
+from accelstudy.figures.style import ANGLE_COLOURS, COLUMN, FULL, new_figure
 from accelstudy.leveling import sigma_roll_pitch, specific_force
 from accelstudy.study.config import StudyConfig
 from accelstudy.units import GON, MGON
 
+Array = NDArray[np.float64]
+
 ROLL = np.linspace(-100.0, 100.0, 81)
 """gon"""
-PITCH = np.linspace(-75.0, 75.0, 61)
+PITCH = np.linspace(-80.0, 80.0, 65)
 """gon"""
 TILTED = (0.0, 50.0)
 """Roll and pitch of figure 3, gon."""
@@ -22,7 +26,7 @@ TILTED = (0.0, 50.0)
 
 def sigma_mgon(
     roll_gon: ArrayLike, pitch_gon: ArrayLike, sigma_force: ArrayLike, g: float
-) -> NDArray[np.float64]:
+) -> Array:
     """Standard deviations (..., 2) of roll and pitch in mgon, for equal noise on all axes."""
     roll, pitch, sigma = np.broadcast_arrays(roll_gon, pitch_gon, sigma_force)
     force = np.stack(specific_force(roll * GON, pitch * GON, g), axis=-1)
@@ -50,16 +54,30 @@ def accuracy_over_attitude(tables: Tables, study: StudyConfig) -> Figure:
         ax.set_xlabel("roll $\\phi$ / gon")
         ax.grid(False)
         if np.ptp(values) > 1e-6 * values.max():
-            lines = ax.contour(roll, pitch, values, levels=8, colors="white", linewidths=0.7)
-            ax.clabel(lines, fmt="%g", fontsize=7)
+            _contours(ax, roll, pitch, values)
         else:
             ax.text(
                 0, 0, f"{values.mean():.2f} mgon\nat every attitude",
                 ha="center", va="center", color="white",
             )
+    axes[0].set_yticks([-75, -50, -25, 0, 25, 50, 75])
     axes[0].set_ylabel("pitch $\\theta$ / gon")
     fig.colorbar(image, ax=axes, label="standard deviation / mgon", pad=0.02)
     return fig
+
+
+def _contours(ax: Axes, roll: Array, pitch: Array, values: Array) -> None:
+    """Labelled lines at round values, away from the edges."""
+    highest = values[np.abs(pitch) <= 72].max()
+    levels = [x for x in MaxNLocator(7).tick_values(values.min(), highest) if x < highest]
+    lines = ax.contour(roll, pitch, values, levels=levels, colors="white", linewidths=0.7)
+    places = [
+        (0.0, sign * np.abs(pitch[np.abs(values - level).argmin() // values.shape[1], 0]))
+        for level in lines.levels
+        if level > values.min()
+        for sign in (-1, 1)
+    ]
+    ax.clabel(lines, fmt="%g", fontsize=7, manual=places)
 
 
 @figure(
@@ -76,18 +94,13 @@ def accuracy_over_noise(tables: Tables, study: StudyConfig) -> Figure:
     over_noise = sigma_mgon(*TILTED, noise, study.gravity_mps2)
     at_study = sigma_mgon(*TILTED, study.sigma_force, study.gravity_mps2)
     x = study.sigma_force * 1e3
-    ax.axvline(x, color="#999999", linewidth=0.8, linestyle=":")
+    ax.vlines(x, 0, at_study.max(), color="#777777", linewidth=0.8, linestyle=":")
     for i, (name, greek) in enumerate((("roll", "phi"), ("pitch", "theta"))):
-        colour = ANGLE_COLOURS[name]
-        ax.plot(noise * 1e3, over_noise[:, i], color=colour, label=f"{name} $\\sigma_\\{greek}$",
-                linestyle=("-", "--")[i])
-        ax.plot(x, at_study[i], "o", color=colour)
-        above = name == "roll"
-        ax.annotate(
-            f"{at_study[i]:.2f} mgon", (x, at_study[i]), textcoords="offset points",
-            xytext=(-5, 4) if above else (5, -4), color=INK,
-            ha="right" if above else "left", va="bottom" if above else "top",
+        ax.plot(
+            noise * 1e3, over_noise[:, i], color=ANGLE_COLOURS[name], linestyle=("-", "--")[i],
+            label=f"{name} $\\sigma_\\{greek}$: {at_study[i]:.2f} mgon at {x:g} mm/s²",
         )
+        ax.plot(x, at_study[i], "o", color=ANGLE_COLOURS[name])
     ax.set_xlim(0, noise[-1] * 1e3)
     ax.set_ylim(bottom=0)
     ax.set_xlabel("accelerometer noise $\\sigma_f$ / mm/s²")

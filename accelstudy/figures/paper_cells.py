@@ -73,11 +73,15 @@ def errors_and_sigmas(tables: Tables, study: StudyConfig) -> Figure:
         for ax in row:
             ax.set_title(groups, loc="left")
     one = {"color": INK, "marker": "o", "markersize": 4, "linestyle": ""}
+    fig.align_ylabels(axes)
     fig.legend(
         handles=[
-            *[Patch(color=approach_colour(name), label=name) for name in APPROACHES],
+            *[
+                Patch(color=approach_colour(name), alpha=0.4, label=f"{name}, mean of all")
+                for name in APPROACHES
+            ],
+            Line2D([], [], color=INK, label="95 % of all simulations"),
             Line2D([], [], **one, markerfacecolor="white", label="one simulation"),
-            Line2D([], [], color="#888888", linewidth=3, label="95 % of all simulations"),
         ],
         loc="outside lower center", ncols=4,
     )
@@ -112,17 +116,25 @@ def _draw_parameter(
     }
 
     errors = to_display(rows["error"], unit)
-    axes[0].vlines(at, *np.quantile(errors, (0.025, 0.975)), color=colour, alpha=0.35, lw=4)
+    _draw_range(axes[0], at, errors, colour)
     axes[0].plot(at, errors[first], **one)
 
     sigmas = to_display(rows["sigma_posteriori"], unit)
     if np.isfinite(sigmas).all():
-        axes[1].bar(at, sigmas.mean(), WIDTH, color=colour, alpha=0.85)
-        axes[1].vlines(at, *np.quantile(sigmas, (0.025, 0.975)), color="#AAAAAA", lw=2, zorder=3)
+        axes[1].bar(at, sigmas.mean(), WIDTH, color=colour, alpha=0.4)
+        _draw_range(axes[1], at, sigmas, colour)
         axes[1].plot(at, sigmas[first], **one)
     else:
         axes[1].text(at, 0, "no redundancy ", rotation=90, ha="center", va="bottom", fontsize=7)
     return True
+
+
+def _draw_range(ax: Axes, at: float, values: NDArray[np.float64], colour: str) -> None:
+    """Bar with caps over the middle 95 % of the values."""
+    low, high = np.quantile(values, (0.025, 0.975))
+    ax.errorbar(
+        at, (low + high) / 2, yerr=(high - low) / 2, color=colour, elinewidth=1.2, capsize=3
+    )
 
 
 @figure(

@@ -158,7 +158,7 @@ def _styles(inputs: list[str]) -> dict[str, dict[str, str]]:
 def _draw_pitch(ax: Axes, table: pd.DataFrame, styles: dict[str, dict[str, str]]) -> None:
     ax.set_yscale("log")
     ax.set_ylim(3e-5, 1.6)
-    ax.set_yticks([ZERO, 1e-4, 1e-3, 1e-2, 1e-1, 1], ["0", "", "0.001", "0.01", "0.1", "1"])
+    ax.set_yticks([ZERO, 1e-4, 1e-3, 1e-2, 1e-1, 1], ["0", "0.0001", "0.001", "0.01", "0.1", "1"])
     ax.yaxis.set_minor_locator(NullLocator())
     ax.axhspan(3e-5, SMALLEST, color="#F0F0F0", linewidth=0, zorder=0)
     for name, style in styles.items():

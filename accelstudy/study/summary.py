@@ -265,6 +265,7 @@ def _closed_forms(cell: Cell) -> dict[str, float]:
         parameter.name: sigma[effect]
         for effect in cell.effects
         for parameter in get_effect(effect).parameters
+        if np.isfinite(sigma[effect])
     }
 
 

@@ -1,0 +1,118 @@
+"""Claims of section 3.2: which inputs make roll and pitch uncertain."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import pandas as pd
+
+from accelstudy.sensitivity import leveling_sensitivity
+from accelstudy.study.claims.base import Claim, Evidence, verdict
+
+
+def sensitivity_claims(evidence: Evidence) -> Iterable[Claim]:
+    """Judge the claims of section 3.2."""
+    table = leveling_sensitivity(
+        [0, 30, 50],
+        [0],
+        evidence.cell.noise.sigma_force,
+        evidence.base_samples,
+        evidence.resamples,
+        evidence.seed,
+        g=evidence.cell.gravity,
+    )
+
+    def effect(output: str, roll: float, name: str) -> tuple[float, float, float]:
+        rows = table[
+            (table["output"] == output) & (table["roll_gon"] == roll) & (table["input"] == name)
+        ]
+        return _largest_effect(rows)
+
+    ours = effect("roll", 50, "f_x")
+    yield Claim(
+        "f_x-roll",
+        "3.2",
+        "f_x does not influence roll",
+        "%",
+        0.0,
+        *ours,
+        verdict(ours[0] == 0),
+        "Roll does not contain f_x.",
+    )
+    ours = effect("roll", 50, "f_y")
+    yield Claim(
+        "f_y-f_z-50gon",
+        "3.2",
+        "f_y and f_z matter equally for roll at a roll of 50 gon",
+        "%",
+        50.0,
+        *ours,
+        verdict(ours[1] <= 50 <= ours[2]),
+        "cos²φ = sin²φ = 1/2 at 50 gon.",
+    )
+    ours = effect("roll", 30, "f_z")
+    yield Claim(
+        "f_z-small-tilt",
+        "3.2",
+        "f_z is inessential for both angles below a tilt of 30 gon",
+        "%",
+        0.0,
+        *ours,
+        verdict(ours[0] < 10),
+        f"At 30 gon f_z has {ours[0]:.0f} % of the variance of roll (sin²φ); it stays below 10 % "
+        "up to 20 gon only.",
+    )
+
+    grid = evidence.sensitivity
+    grid = grid[(grid["analysis"] == "gravity") & (grid["pitch_gon"] >= 0) & grid["defined"]]
+
+    def largest(output: str, prefix: tuple[str, ...], **at: float) -> tuple[float, float, float]:
+        rows = grid[(grid["output"] == output) & grid["input"].str.startswith(prefix)]
+        for column, value in at.items():
+            rows = rows[rows[column] == value]
+        return _largest_effect(rows)
+
+    level = {"roll_gon": 0.0, "pitch_gon": 0.0}
+    force = largest("roll", ("f_y",), **level)[0]
+    ours = largest("roll", ("alpha_zx",), **level)
+    yield Claim(
+        "alpha_zx-roll",
+        "3.2",
+        "α_zx has a big share of the variance of roll",
+        "%",
+        np.nan,
+        *ours,
+        verdict(ours[0] > 10),
+        f"At level α_zx has {ours[0]:.0f} % beside {force:.0f} % of f_y.",
+    )
+    ours = largest("roll", ("b_", "s_"))
+    yield Claim(
+        "bias-scale-roll",
+        "3.2",
+        "biases and scales have about 1 to 8 % of the variance of roll",
+        "%",
+        8.0,
+        *ours,
+        verdict(abs(ours[0] - 8) <= 1.5),
+        f"The largest share of a bias or scale over the grid of attitudes is {ours[0]:.1f} %.",
+    )
+    ours = largest("pitch", ("s_",))
+    yield Claim(
+        "scale-pitch",
+        "3.2",
+        "scales stay below 3 % of the variance of pitch",
+        "%",
+        3.0,
+        *ours,
+        verdict(ours[1] < 3),
+        f"The largest share of a scale over the grid of attitudes is {ours[0]:.1f} %.",
+    )
+
+
+def _largest_effect(rows: pd.DataFrame) -> tuple[float, float, float]:
+    """Largest total effect in % with its 95 % confidence interval."""
+    at = int(rows["total_effect"].to_numpy().argmax())
+    value = 100 * float(rows["total_effect"].iloc[at])
+    half = 100 * float(rows["ci95"].iloc[at])
+    return value, value - half, value + half
