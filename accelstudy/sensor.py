@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -194,11 +195,12 @@ class SensorTrace:
         self.hold = dict(
             zip(Hold.columns(), symbols(*(f"hold_{c}" for c in Hold.columns())), strict=True)
         )
-        hold = _HoldSymbols(self.hold)
+        hold = SimpleNamespace(**self.hold)
 
         self.t_matrix = sp.eye(3)
         self.h = list(self.force)
         self._readings = []
+        self._hold = hold
         position = 0
         for effect in model.effects:
             p = self.p[position : position + len(effect.parameters)]
@@ -207,13 +209,12 @@ class SensorTrace:
             added = effect.output(self.force, p, self.g, hold, symbolic)
             self.h = [a + b for a, b in zip(self.h, added, strict=True)]
             self._readings.append((effect, p))
-        self._hold_symbols = hold
 
     def reading_errors(self, angles: tuple[Any, Any]) -> tuple[Any, Any]:
         """Sum of what the effects add to the robot's reading of roll and pitch."""
         total: tuple[Any, Any] = (sp.S.Zero, sp.S.Zero)
         for effect, p in self._readings:
-            added = effect.reading(angles, p, self._hold_symbols, symbolic)
+            added = effect.reading(angles, p, self._hold, symbolic)
             total = (total[0] + added[0], total[1] + added[1])
         return total
 
@@ -310,10 +311,3 @@ class SensorTrace:
     def body(self) -> TracedFunction:
         """f_b of f_a."""
         return TracedFunction(self.arguments, self.t_matrix * sp.Matrix(self.force))
-
-
-class _HoldSymbols:
-    """Columns of `Hold` as attributes, each a symbol."""
-
-    def __init__(self, columns: Mapping[str, sp.Symbol]) -> None:
-        self.__dict__.update(columns)

@@ -18,33 +18,34 @@ def factor(matrices: Array, tolerance: float = 0.0) -> Array:
 
     A member whose pivot is at or below `tolerance` is NaN from that pivot on.
     """
-    k = len(matrices)
     lower = np.zeros(matrices.shape)
-    for j in range(k):
-        pivot = matrices[j, j] - (lower[j, :j] ** 2).sum(axis=0)
-        root = np.sqrt(np.where(pivot > tolerance, pivot, np.nan))
-        lower[j, j] = root
-        for i in range(j + 1, k):
-            lower[i, j] = (matrices[i, j] - (lower[i, :j] * lower[j, :j]).sum(axis=0)) / root
+    for j in range(len(matrices)):
+        column = matrices[j:, j].copy()
+        for i in range(j):
+            column -= lower[j:, i] * lower[j, i]
+        column[0][~(column[0] > tolerance)] = np.nan
+        lower[j, j] = np.sqrt(column[0])
+        lower[j + 1 :, j] = column[1:] / lower[j, j]
     return lower
 
 
 def forward(lower: Array, right: Array) -> Array:
     """Solve L y = b for `right` (k, ...) or (k, m, ...), L (k, k, ...)."""
-    result = np.empty(right.shape)
+    result = right.copy()
     for i in range(len(lower)):
-        total = right[i] - sum(lower[i, j] * result[j] for j in range(i))
-        result[i] = total / lower[i, i]
+        for j in range(i):
+            result[i] -= lower[i, j] * result[j]
+        result[i] *= 1 / lower[i, i]
     return result
 
 
 def backward(lower: Array, right: Array) -> Array:
     """Solve Lᵀ x = y, shapes as in `forward`."""
-    result = np.empty(right.shape)
-    k = len(lower)
-    for i in reversed(range(k)):
-        total = right[i] - sum(lower[j, i] * result[j] for j in range(i + 1, k))
-        result[i] = total / lower[i, i]
+    result = right.copy()
+    for i in reversed(range(len(lower))):
+        for j in range(i + 1, len(lower)):
+            result[i] -= lower[j, i] * result[j]
+        result[i] *= 1 / lower[i, i]
     return result
 
 

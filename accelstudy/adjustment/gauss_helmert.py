@@ -293,7 +293,7 @@ def _normal_equations(a: Array, w: Array) -> tuple[Array, Array]:
 
 
 def _redundancy(psi: Array, weights: Array) -> int:
-    """R = conditions (direct observations of parameters included) − unknowns."""
+    """Redundancy r = conditions (direct observations of parameters included) − unknowns."""
     n_conditions = psi.shape[0] * psi.shape[2] + int(np.count_nonzero(weights))
     if n_conditions < len(weights):
         raise InputError(

@@ -161,7 +161,7 @@ def correlations(tables: Tables, study: StudyConfig) -> Figure:
         ax.set_xticks(range(len(names)), [symbol(name) for name in names])
         ax.set_yticks(range(len(names)), [symbol(name) for name in names])
         ax.tick_params(length=0)
-        ax.spines[:].set_visible(False)
+        ax.spines[:].set(visible=True, color="#BBBBBB")
         if matrix is None:
             say_empty(ax)
             continue

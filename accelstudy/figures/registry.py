@@ -91,35 +91,21 @@ def figure_tables(name: str) -> tuple[str, ...]:
     return get_figure(name).tables
 
 
-def draw(
-    name: str,
-    tables: Mapping[str, pd.DataFrame | Callable[[], pd.DataFrame]],
-    study: StudyConfig,
-) -> Figure:
+def draw(name: str, tables: Tables, study: StudyConfig) -> Figure:
     """Draw a figure.
 
     Parameters
     ----------
     name : str
-    tables : mapping of table name to table, or to a function that reads it; those that the figure
-        does not need are left alone
+    tables : mapping of table name to table, at least those of `figure_tables`
     study : StudyConfig
     """
-    entry = get_figure(name)
-    needed: dict[str, pd.DataFrame] = {}
-    for key in entry.tables:
-        table = tables[key]
-        needed[key] = table if isinstance(table, pd.DataFrame) else table()
     with mpl.rc_context(STYLE):
-        return entry.draw(needed, study)
+        return get_figure(name).draw(tables, study)
 
 
 def render(
-    name: str,
-    tables: Mapping[str, pd.DataFrame | Callable[[], pd.DataFrame]],
-    study: StudyConfig,
-    svg_path: str | Path,
-    png_path: str | Path,
+    name: str, tables: Tables, study: StudyConfig, svg_path: str | Path, png_path: str | Path
 ) -> None:
     """Draw a figure and write it as SVG and PNG, each whole or not at all.
 

@@ -1,0 +1,101 @@
+"""The Monte Carlo held against closed forms and linear theory."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from scipy import stats
+
+from accelstudy.figures.registry import Tables, figure
+from accelstudy.figures.style import (
+    FULL,
+    INK,
+    approach_colour,
+    approach_handles,
+    approach_marker,
+    group_label,
+    group_of,
+    in_order,
+    new_figure,
+    say_empty,
+)
+from accelstudy.study.config import StudyConfig
+
+Z95 = float(stats.norm.ppf(0.975))
+GAP = 0.2
+"""Between two groups of parameters, which are 1 wide each."""
+
+
+@figure(
+    "closed-forms",
+    title="Monte Carlo against closed forms and linear theory",
+    category="Study",
+    tables=("summary",),
+)
+def monte_carlo_against_theory(tables: Tables, study: StudyConfig) -> Figure:
+    """Ratios of the empirical to the expected sd: where a closed form exists, and all others."""
+    rows = tables["summary"]
+    rows = rows[rows["sd_empirical"].notna() & (rows["n_converged"] > 1)]
+    rows = rows.assign(
+        group=[group_of(name) for name in rows["parameter"]],
+        half=Z95 / np.sqrt(2 * (rows["n_converged"] - 1)),
+    )
+    exact = rows["sd_closed_form"].notna()
+    panels = {
+        "closed form": (rows[exact], "sd_closed_form"),
+        "linear theory (other cells)": (rows[~exact], "sd_linear"),
+    }
+    groups = [max(len(set(its["group"])), 1) for its, _ in panels.values()]
+    fig = new_figure(FULL, 80)
+    axes = fig.subplots(1, 2, sharey=True, width_ratios=[max(n, 2) for n in groups])
+    for ax, (title, (its, reference)) in zip(axes, panels.items(), strict=True):
+        its = its[its[reference].gt(0) & np.isfinite(its[reference])]
+        ratio = its["sd_empirical"] / its[reference]
+        _draw_ratios(ax, its.assign(ratio=ratio, low=ratio - its["half"] * ratio))
+        ax.set_title(title)
+    axes[0].set_ylabel("empirical sd / expected sd")
+    approaches = [name for name in ("gravity", "robot") if (rows["approach"] == name).any()]
+    fig.legend(
+        handles=[
+            *approach_handles(approaches),
+            Patch(color="#DDDDDD", label="expected band, 95 %"),
+            Line2D([], [], color=INK, linewidth=0.6, label="equal"),
+        ],
+        loc="outside lower center", ncols=4,
+    )
+    return fig
+
+
+def _draw_ratios(ax: Axes, rows: pd.DataFrame) -> None:
+    """Points of each group side by side, gravity left of robot, each with its interval."""
+    ax.axhline(1, color=INK, linewidth=0.6)
+    ax.grid(False, axis="x")
+    groups = in_order(rows["group"])
+    if not groups:
+        ax.set_xticks([])
+        say_empty(ax)
+        return
+    half = rows["half"].mode().iloc[0]
+    ax.axhspan(1 - half, 1 + half, color="#DDDDDD", linewidth=0, zorder=0)
+    labels = []
+    for i, group in enumerate(groups):
+        its = rows[rows["group"] == group].sort_values("approach", kind="stable")
+        x = i * (1 + GAP) + (np.arange(len(its)) + 0.5) / len(its)
+        for approach in its["approach"].unique():
+            chosen = (its["approach"] == approach).to_numpy()
+            some = its[chosen]
+            ax.errorbar(
+                x[chosen], some["ratio"], yerr=some["half"] * some["ratio"], linestyle="",
+                marker=approach_marker(approach), markersize=1.5, elinewidth=0.3,
+                color=approach_colour(approach), rasterized=True,
+            )
+        within = (its["ratio"] - 1).abs() <= its["half"]
+        labels.append(f"{group_label(group)}\n{100 * within.mean():.0f} % of {len(its)}")
+    ax.set_xticks([i * (1 + GAP) + 0.5 for i in range(len(groups))], labels)
+    ax.tick_params(axis="x", length=0)
+    within = (rows["ratio"] - 1).abs() <= rows["half"]
+    ax.set_xlabel(f"within the band: {100 * within.mean():.1f} % of {len(rows)} sds")
