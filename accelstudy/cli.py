@@ -5,6 +5,7 @@ The study itself is run by Snakemake.
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import click
@@ -139,6 +140,14 @@ def cells(configs: tuple[Path, ...]) -> None:
         design = diagnose(cell.positions, cell.estimated_model, cell.conditions, cell.noise)
         state = design.reason or f"r = {design.redundancy}, {cell.replicates} replicates"
         click.echo(f"{cell.name}: {state}")
+
+
+@main.command()
+def config_schema() -> None:
+    """Print the JSON schema of configurations, kept in workflow/schemas/config.schema.json."""
+    from accelstudy.study.config import config_schema as schema
+
+    click.echo(json.dumps(schema(), indent=2, ensure_ascii=False))
 
 
 @main.command()

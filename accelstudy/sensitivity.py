@@ -70,6 +70,7 @@ def total_effects(
         "bounds": [[0.0, 1.0]] * len(varied),
         "dists": ["norm"] * len(varied),
     }
+    seed += 1  # to SALib, the seed 0 is none
     normal = sobol_sample.sample(problem, base_samples, calc_second_order=False, seed=seed)
     inputs = np.tile(mean, (len(normal), 1))
     inputs[:, varied] += sigma[varied] * normal

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, ClassVar, TypeVar
 
 from accelstudy.effects.base import Number, Vector
-from accelstudy.errors import UnknownNameError
+from accelstudy.registry import Registry
 
 
 class Approach:
@@ -31,24 +31,14 @@ class Approach:
         raise NotImplementedError
 
 
-_REGISTRY: dict[str, Approach] = {}
+_registry: Registry[Approach] = Registry("approach")
 ApproachClass = TypeVar("ApproachClass", bound=type[Approach])
+
+get_approach = _registry.get
+approach_names = _registry.names
 
 
 def register(approach: ApproachClass) -> ApproachClass:
     """Class decorator: enter an approach into the registry under its name."""
-    _REGISTRY[approach.name] = approach()
+    _registry.add(approach.name, approach())
     return approach
-
-
-def get_approach(name: str) -> Approach:
-    """Return the approach registered under `name`; raise `UnknownNameError` if there is none."""
-    try:
-        return _REGISTRY[name]
-    except KeyError:
-        raise UnknownNameError("approach", name, _REGISTRY) from None
-
-
-def approach_names() -> tuple[str, ...]:
-    """Names of all registered approaches."""
-    return tuple(_REGISTRY)

@@ -19,7 +19,8 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.errors import InputError, UnknownNameError
+from accelstudy.errors import InputError
+from accelstudy.registry import Registry
 
 AXES = ("x", "y", "z")
 
@@ -112,26 +113,14 @@ class Effect:
         return (0, 0)
 
 
-_REGISTRY: dict[str, Effect] = {}
+_registry: Registry[Effect] = Registry("effect")
 EffectClass = TypeVar("EffectClass", bound=type[Effect])
+
+get_effect = _registry.get
+effect_names = _registry.names
 
 
 def register(effect: EffectClass) -> EffectClass:
     """Class decorator: enter an effect into the registry under its name."""
-    if effect.name in _REGISTRY:
-        raise ValueError(f"effect {effect.name!r} is registered twice")
-    _REGISTRY[effect.name] = effect()
+    _registry.add(effect.name, effect())
     return effect
-
-
-def get_effect(name: str) -> Effect:
-    """Return the effect registered under `name`; raise `UnknownNameError` if there is none."""
-    try:
-        return _REGISTRY[name]
-    except KeyError:
-        raise UnknownNameError("effect", name, _REGISTRY) from None
-
-
-def effect_names() -> tuple[str, ...]:
-    """Names of all registered effects, in order of registration."""
-    return tuple(_REGISTRY)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import LogLocator
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.figures.registry import Tables, figure
@@ -68,13 +68,13 @@ def accuracy_over_attitude(tables: Tables, study: StudyConfig) -> Figure:
 
 def _contours(ax: Axes, roll: Array, pitch: Array, values: Array) -> None:
     """Labelled lines at round values, away from the edges."""
-    highest = values[np.abs(pitch) <= 72].max()
-    levels = [x for x in MaxNLocator(7).tick_values(values.min(), highest) if x < highest]
+    highest = values[np.abs(pitch) <= 75].max()
+    round_values = LogLocator(subs=(1, 1.5, 2, 3, 5, 7)).tick_values(values.min(), highest)
+    levels = [x for x in round_values if values.min() < x < highest]
     lines = ax.contour(roll, pitch, values, levels=levels, colors="white", linewidths=0.7)
     places = [
         (0.0, sign * np.abs(pitch[np.abs(values - level).argmin() // values.shape[1], 0]))
         for level in lines.levels
-        if level > values.min()
         for sign in (-1, 1)
     ]
     ax.clabel(lines, fmt="%g", fontsize=7, manual=places)
@@ -106,5 +106,5 @@ def accuracy_over_noise(tables: Tables, study: StudyConfig) -> Figure:
     ax.set_xlabel("accelerometer noise $\\sigma_f$ / mm/s²")
     ax.set_ylabel("standard deviation / mgon")
     ax.set_title(f"roll {TILTED[0]:g} gon, pitch {TILTED[1]:g} gon")
-    ax.legend(loc="upper left")
+    ax.legend(loc="upper left", frameon=True, framealpha=1, edgecolor="white")
     return fig

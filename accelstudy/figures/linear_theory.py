@@ -26,7 +26,8 @@ from accelstudy.figures.style import (
 from accelstudy.study.config import StudyConfig
 
 Z95 = float(stats.norm.ppf(0.975))
-GAP = 0.2
+BAND = "#DDDDDD"
+GAP = 0.25
 """Between two groups of parameters, which are 1 wide each."""
 
 
@@ -55,14 +56,14 @@ def monte_carlo_against_theory(tables: Tables, study: StudyConfig) -> Figure:
     for ax, (title, (its, reference)) in zip(axes, panels.items(), strict=True):
         its = its[its[reference].gt(0) & np.isfinite(its[reference])]
         ratio = its["sd_empirical"] / its[reference]
-        _draw_ratios(ax, its.assign(ratio=ratio, low=ratio - its["half"] * ratio))
+        _draw_ratios(ax, its.assign(ratio=ratio))
         ax.set_title(title)
     axes[0].set_ylabel("empirical sd / expected sd")
     approaches = [name for name in ("gravity", "robot") if (rows["approach"] == name).any()]
     fig.legend(
         handles=[
             *approach_handles(approaches),
-            Patch(color="#DDDDDD", label="expected band, 95 %"),
+            Patch(color=BAND, label="where 95 % are expected"),
             Line2D([], [], color=INK, linewidth=0.6, label="equal"),
         ],
         loc="outside lower center", ncols=4,
@@ -71,7 +72,7 @@ def monte_carlo_against_theory(tables: Tables, study: StudyConfig) -> Figure:
 
 
 def _draw_ratios(ax: Axes, rows: pd.DataFrame) -> None:
-    """Points of each group side by side, gravity left of robot, each with its interval."""
+    """Points of each group side by side, approach after approach, before their expected band."""
     ax.axhline(1, color=INK, linewidth=0.6)
     ax.grid(False, axis="x")
     groups = in_order(rows["group"])
@@ -79,22 +80,21 @@ def _draw_ratios(ax: Axes, rows: pd.DataFrame) -> None:
         ax.set_xticks([])
         say_empty(ax)
         return
-    half = rows["half"].mode().iloc[0]
-    ax.axhspan(1 - half, 1 + half, color="#DDDDDD", linewidth=0, zorder=0)
     labels = []
     for i, group in enumerate(groups):
-        its = rows[rows["group"] == group].sort_values("approach", kind="stable")
+        its = rows[rows["group"] == group].sort_values(["approach", "half"], kind="stable")
         x = i * (1 + GAP) + (np.arange(len(its)) + 0.5) / len(its)
+        ends = np.linspace(i * (1 + GAP), i * (1 + GAP) + 1, len(its) + 1)
+        ax.stairs(1 + its["half"], ends, baseline=1 - its["half"], fill=True, color=BAND, zorder=0)
         for approach in its["approach"].unique():
             chosen = (its["approach"] == approach).to_numpy()
-            some = its[chosen]
-            ax.errorbar(
-                x[chosen], some["ratio"], yerr=some["half"] * some["ratio"], linestyle="",
-                marker=approach_marker(approach), markersize=1.5, elinewidth=0.3,
-                color=approach_colour(approach), rasterized=True,
+            ax.plot(
+                x[chosen], its["ratio"][chosen], linestyle="", markersize=1.6, markeredgewidth=0,
+                marker=approach_marker(approach), color=approach_colour(approach),
             )
         within = (its["ratio"] - 1).abs() <= its["half"]
-        labels.append(f"{group_label(group)}\n{100 * within.mean():.0f} % of {len(its)}")
+        name = group_label(group).replace("non-orthogonality", "non-orthogo-\nnality")
+        labels.append(f"{name}\n{100 * within.mean():.0f} %\nof {len(its)}")
     ax.set_xticks([i * (1 + GAP) + 0.5 for i in range(len(groups))], labels)
     ax.tick_params(axis="x", length=0)
     within = (rows["ratio"] - 1).abs() <= rows["half"]

@@ -16,6 +16,7 @@ from accelstudy.figures.registry import Tables, figure
 from accelstudy.figures.style import (
     FULL,
     INK,
+    Style,
     approach_colour,
     approach_marker,
     group_label,
@@ -72,7 +73,7 @@ def errors_and_sigmas(tables: Tables, study: StudyConfig) -> Figure:
         groups = " and ".join(group_label(g) for g in in_order(group_of(name) for name in names))
         for ax in row:
             ax.set_title(groups, loc="left")
-    one = {"color": INK, "marker": "o", "markersize": 4, "linestyle": ""}
+    one: Style = {"color": INK, "marker": "o", "markersize": 4, "linestyle": ""}
     fig.align_ylabels(axes)
     fig.legend(
         handles=[
@@ -111,7 +112,7 @@ def _draw_parameter(
     colour, marker = approach_colour(approach), approach_marker(approach)
     at = x + (APPROACHES.index(approach) - 0.5) * (WIDTH + 0.04)
     first = rows["replicate"] == rows["replicate"].min()
-    one = {
+    one: Style = {
         "marker": marker, "markersize": 4, "color": colour, "markerfacecolor": "white", "zorder": 4
     }
 
@@ -176,10 +177,10 @@ def correlations(tables: Tables, study: StudyConfig) -> Figure:
 def _matrix(
     table: pd.DataFrame, cell: str, names: list[str]
 ) -> NDArray[np.float64] | None:
-    rows = table[table["cell"] == cell]
+    rows = table if table.empty else table[table["cell"] == cell]
     if rows.empty:
         return None
-    square = rows.pivot(index="parameter_1", columns="parameter_2", values="adjustment")
+    square = rows.pivot_table("adjustment", "parameter_1", "parameter_2", dropna=False)
     return np.abs(square.reindex(index=names, columns=names).to_numpy(float)) - np.eye(len(names))
 
 

@@ -100,7 +100,7 @@ def draw(name: str, tables: Tables, study: StudyConfig) -> Figure:
     tables : mapping of table name to table, at least those of `figure_tables`
     study : StudyConfig
     """
-    with mpl.rc_context(STYLE):
+    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
         return get_figure(name).draw(tables, study)
 
 
@@ -116,7 +116,8 @@ def render(
         "svg": {"Date": None, "Creator": None, "Title": get_figure(name).title},
         "png": {"Software": None, "Title": get_figure(name).title},
     }
-    with mpl.rc_context(STYLE):
+    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
         for kind, path in (("svg", svg_path), ("png", png_path)):
             with whole_file(path) as temporary:
                 drawn.savefig(temporary, format=kind, dpi=DPI, metadata=metadata[kind])
+            drawn.set_layout_engine("none")  # laid out once, alike in both

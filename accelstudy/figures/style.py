@@ -6,9 +6,13 @@ from collections.abc import Iterable
 from functools import cache
 from typing import Any
 
+import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import Locator, LogLocator, MaxNLocator, NullLocator
+from numpy.typing import NDArray
 
 from accelstudy.effects import Parameter, effect_names, get_effect
 from accelstudy.models import TITLES
@@ -21,7 +25,10 @@ FULL = 175 * MM
 """Width of a journal's page, inches."""
 DPI = 300
 
-STYLE: dict[str, Any] = {
+Style = dict[str, Any]
+"""Keyword arguments of an artist."""
+
+STYLE: Style = {
     "axes.grid": True,
     "axes.axisbelow": True,
     "axes.labelsize": 8,
@@ -141,6 +148,28 @@ def new_figure(width: float, height_mm: float) -> Figure:
     return Figure(figsize=(width, height_mm * MM), layout="constrained")
 
 
+def log_ticks(axis: Axis, low: float, high: float) -> None:
+    """Ticks of a logarithmic axis from `low` to `high`: a few, all of them labelled."""
+    if high / low > 100:
+        locator: Locator = LogLocator()
+    elif high / low > 4:
+        locator = LogLocator(subs=(1, 2, 5))
+    else:
+        locator = MaxNLocator(4, steps=[1, 2, 2.5, 5, 10])
+    axis.set_major_locator(locator)
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_locator(NullLocator())
+
+
+def spread(places: NDArray[np.float64], apart: float) -> list[int]:
+    """Indices of those places, from the first on, that lie at least `apart` from the last."""
+    chosen: list[int] = []
+    for i, place in enumerate(places):
+        if not chosen or place - places[chosen[-1]] >= apart:
+            chosen.append(i)
+    return chosen
+
+
 def say_empty(ax: Axes, text: str = "no estimable cell") -> None:
     """Write into axes why nothing is drawn there."""
     ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", color="#777777")
@@ -148,10 +177,11 @@ def say_empty(ax: Axes, text: str = "no estimable cell") -> None:
 
 def approach_handles(approaches: Iterable[str], **options: Any) -> list[Line2D]:
     """Entries of a legend, one for each approach."""
+    style: Style = {"linestyle": "", **options}
     return [
         Line2D(
-            [], [], color=approach_colour(name), marker=approach_marker(name), label=name,
-            **{"linestyle": "", **options},
+            [], [], label=name, **{"marker": approach_marker(name), **style},
+            color=approach_colour(name),
         )
         for name in approaches
     ]

@@ -7,24 +7,26 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import LogLocator, NullFormatter, NullLocator
+from matplotlib.ticker import LogLocator, NullLocator
 
+from accelstudy.approaches import approach_names
 from accelstudy.figures.registry import Tables, figure
 from accelstudy.figures.style import (
     FULL,
     INK,
+    Style,
     approach_colour,
     approach_handles,
     approach_marker,
     group_label,
     group_of,
     in_order,
-    model_title,
     new_figure,
     say_empty,
+    spread,
     unit_label,
 )
-from accelstudy.models import PRESETS, Preset
+from accelstudy.models import PRESETS, Preset, get_model
 from accelstudy.schemes import get_scheme
 from accelstudy.study.config import StudyConfig
 
@@ -55,14 +57,14 @@ def published_calibrations(tables: Tables, study: StudyConfig) -> Figure:
     for ax, group in zip(axes, groups, strict=False):
         rows = summary[summary["group"] == group]
         _draw_group(ax, rows, approaches)
-        ax.set_title(_on_two_lines(group_label(group)))
+        ax.set_title(group_label(group).replace("non-orthogonality", "non-orthogo-\nnality"))
         ax.set_xlabel(f"sd / {unit_label(rows['unit'].iloc[0])}")
     _draw_tilt(axes[-1], tables["leveling"], summary, approaches)
     for ax in axes:
         _finish(ax)
     axes[0].set_ylim(len(PRESETS) - 0.5, -0.5)
     axes[0].set_yticks(range(len(PRESETS)), [_row_label(preset) for preset in PRESETS])
-    cross = {"linestyle": "", "marker": "x", "color": INK}
+    cross: Style = {"linestyle": "", "marker": "x", "color": INK}
     fig.legend(
         handles=[
             *approach_handles(approaches),
@@ -76,8 +78,6 @@ def published_calibrations(tables: Tables, study: StudyConfig) -> Figure:
 
 
 def _spelled_out(approaches: list[str]) -> list[str]:
-    from accelstudy.approaches import approach_names
-
     return list(approach_names()) if approaches == ["all"] else approaches
 
 
@@ -86,14 +86,8 @@ def _cell(preset: Preset, approach: str) -> str:
 
 
 def _row_label(preset: Preset) -> str:
-    source, _, _ = preset.source.partition(", 2") if "Tedaldi" not in preset.source else (
-        preset.source, "", ""
-    )
-    return f"{source}\n{model_title(preset.model)} | {get_scheme(preset.scheme).title}"
-
-
-def _on_two_lines(label: str) -> str:
-    return label.replace("-", "-\n", 1) if len(label) > 10 else label
+    n = get_model(preset.model).n_parameters
+    return f"{preset.source}\n{n} parameters, {get_scheme(preset.scheme).title}"
 
 
 def _places(approaches: list[str]) -> dict[str, float]:
@@ -165,7 +159,9 @@ def _finish(ax: Axes) -> None:
     low, high = values.min() / 1.5, values.max() * 1.5
     ax.set_xscale("log")
     ax.set_xlim(low, high * (high / low) ** 0.25)
-    ax.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if high / low < 20 else (1, 3)))
+    low, high = ax.get_xlim()
+    ticks = np.asarray(LogLocator(subs=(1, 2, 5)).tick_values(low, high))
+    shown = ticks[(ticks >= low) & (ticks <= high)]
+    shown = shown[spread(np.log(shown) / np.log(high / low), 0.38)]
+    ax.set_xticks(shown, [f"{value:g}" for value in shown])
     ax.xaxis.set_minor_locator(NullLocator())
-    ax.xaxis.set_minor_formatter(NullFormatter())
-    ax.xaxis.set_major_formatter("{x:g}")

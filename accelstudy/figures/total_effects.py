@@ -15,6 +15,7 @@ from accelstudy.figures.style import (
     FULL,
     HATCH,
     MISSING,
+    Style,
     group_colour,
     group_label,
     group_of,
@@ -58,7 +59,7 @@ def effects_of_forces(tables: Tables, study: StudyConfig) -> Figure:
             if cells.empty:
                 say_empty(ax, NO_DATA)
                 continue
-            grid = cells.pivot(index="pitch_gon", columns="roll_gon", values="share")
+            grid = cells.pivot_table("share", "pitch_gon", "roll_gon", dropna=False)
             roll, pitch = grid.columns.to_numpy(float), grid.index.to_numpy(float)
             ax.patch.set(facecolor=MISSING, hatch=HATCH, edgecolor="#999999")
             image = ax.pcolormesh(
@@ -141,7 +142,7 @@ def _effects_over_roll(table: pd.DataFrame, output: str) -> Figure:
     return fig
 
 
-def _styles(inputs: list[str]) -> dict[str, dict[str, str]]:
+def _styles(inputs: list[str]) -> dict[str, Style]:
     """Colour of the group, line and marker by the position in it."""
     count: dict[str, int] = {}
     styles = {}
@@ -155,7 +156,7 @@ def _styles(inputs: list[str]) -> dict[str, dict[str, str]]:
     return styles
 
 
-def _draw_pitch(ax: Axes, table: pd.DataFrame, styles: dict[str, dict[str, str]]) -> None:
+def _draw_pitch(ax: Axes, table: pd.DataFrame, styles: dict[str, Style]) -> None:
     ax.set_yscale("log")
     ax.set_ylim(3e-5, 1.6)
     ax.set_yticks([ZERO, 1e-4, 1e-3, 1e-2, 1e-1, 1], ["0", "0.0001", "0.001", "0.01", "0.1", "1"])

@@ -3,9 +3,7 @@
 To add one, write a module next to this file with a function under `register`.
 """
 
-from importlib import import_module
-from pkgutil import iter_modules
-
+from accelstudy.registry import import_modules
 from accelstudy.schemes.optimal import optimal_directions
 from accelstudy.schemes.registry import (
     Scheme,
@@ -29,5 +27,4 @@ __all__ = [
 ]
 
 # A module registers its schemes when it is imported.
-for _module in iter_modules(__path__):
-    import_module(f"{__name__}.{_module.name}")
+import_modules(__name__, __path__)

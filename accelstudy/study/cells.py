@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from accelstudy.approaches import Approach, approach_names, get_approach
-from accelstudy.models import PRESETS, compose, get_model
+from accelstudy.models import compose, get_model
 from accelstudy.schemes import Scheme, get_scheme, scheme_names
 from accelstudy.sensor import SensorModel
 from accelstudy.simulation import Noise
@@ -113,19 +113,8 @@ def study_cells(study: StudyConfig) -> list[Cell]:
     A cell that occurs more than once (as a Table 1 row and in a grid, say) runs once, with the
     largest number of replicates.
     """
-    grids = list(study.grids)
-    if study.presets is not None:
-        grids += [
-            Grid(
-                models=[preset.model],
-                schemes=[preset.scheme],
-                approaches=study.presets.approaches,
-                replicates=study.presets.replicates,
-            )
-            for preset in PRESETS
-        ]
     cells: dict[str, Cell] = {}
-    for grid in grids:
+    for grid in study.all_grids:
         for cell in _grid_cells(study, grid):
             known = cells.get(cell.name)
             if known is None or cell.replicates > known.replicates:
@@ -155,10 +144,12 @@ def _grid_cells(study: StudyConfig, grid: Grid) -> Iterable[Cell]:
             "gravity_sigma_mps2": (gravity, noise.gravity.sigma_mps2),
             "gravity_error_mps2": (error, noise.gravity.error_mps2),
         }
-        changed = [f"{key}={value:g}" for key, (value, usual) in settings.items() if value != usual]
+        changed = [
+            f"{key}={_shown(value)}" for key, (value, usual) in settings.items() if value != usual
+        ]
         effects = tuple(e.name for e in get_model(model, study.models).effects)
         simulated = (
-            effects if study.simulated_effects == "model" else tuple(study.simulated_effects)
+            effects if study.simulated_effects == ["model"] else tuple(study.simulated_effects)
         )
         yield Cell(
             name="/".join([model, scheme, approach, *changed]),
@@ -174,6 +165,12 @@ def _grid_cells(study: StudyConfig, grid: Grid) -> Iterable[Cell]:
             gravity=study.gravity_mps2,
             truth=study.truth(dict.fromkeys([*effects, *simulated])),
         )
+
+
+def _shown(value: float) -> str:
+    """Show a number briefly, but never two numbers alike."""
+    short = f"{value:g}"
+    return short if float(short) == value else repr(value)
 
 
 def batches(cells: Iterable[Cell], size: int = REPLICATES_PER_BATCH) -> list[list[Cell]]:

@@ -7,27 +7,38 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from accelstudy.approaches import approach_names, get_approach
+from accelstudy.design import diagnose
 from accelstudy.effects import get_effect
 from accelstudy.errors import InputError
-from accelstudy.models import MODELS, get_model
+from accelstudy.models import MODELS, PRESETS, get_model
 from accelstudy.schemes import get_scheme, scheme_names
 from accelstudy.sensor import SensorModel
-from accelstudy.simulation import sigma_of_mean
+from accelstudy.simulation import Noise, sigma_of_mean
+from accelstudy.study.config_errors import first_error
+from accelstudy.study.config_types import (
+    Count,
+    Finite,
+    NotNegative,
+    OneOrMore,
+    Pitch,
+    Positive,
+    PowerOfTwo,
+    Seed,
+    Tilt,
+)
+from accelstudy.study.yaml_layers import overlay, read_layer
 from accelstudy.units import STANDARD_GRAVITY, to_si
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Count = Annotated[int, Field(gt=0)]
-PowerOfTwo = Annotated[int, Field(ge=2)]
+CLAIMED_EFFECTS = ("bias", "scale", "nonorthogonality")
+"""Effects that the model of the paper's claims and figures has."""
 
 
 class Block(BaseModel):
@@ -73,52 +84,46 @@ class NoiseConfig(Block):
 class Quantity(Block):
     """True values of the parameters of one effect."""
 
-    value: list[Finite] = Field(description="one number per parameter of the effect")
+    value: OneOrMore[Finite] = Field(description="one number per parameter of the effect")
     unit: str = Field(description="unit of the values, e.g. mgon, ppm, m/s^2")
 
 
 class Grid(Block):
     """Cells: every combination of what is listed. A single value may stand for a list of one."""
 
-    models: list[str] = Field(description="names of models, or all")
-    schemes: list[str] = Field(description="names of schemes, or all")
-    approaches: list[str] = Field(default=["gravity", "robot"], description="names, or all")
+    models: OneOrMore[str] = Field(description="names of models, or all")
+    schemes: OneOrMore[str] = Field(description="names of schemes, or all")
+    approaches: OneOrMore[str] = Field(
+        default=["gravity", "robot"], description="names of approaches, or all"
+    )
     replicates: Count = Field(description="simulated calibrations per cell")
-    sensor_sigma_mps2: list[Positive] | None = Field(None, description="noise.sensor.sigma_mps2")
-    robot_sigma_mgon: list[NotNegative] | None = Field(None, description="noise.robot.sigma_mgon")
-    gravity_sigma_mps2: list[NotNegative] | None = Field(
+    sensor_sigma_mps2: OneOrMore[Positive] | None = Field(
+        None, description="noise.sensor.sigma_mps2"
+    )
+    robot_sigma_mgon: OneOrMore[NotNegative] | None = Field(
+        None, description="noise.robot.sigma_mgon"
+    )
+    gravity_sigma_mps2: OneOrMore[NotNegative] | None = Field(
         None, description="noise.gravity.sigma_mps2"
     )
-    gravity_error_mps2: list[Finite] | None = Field(None, description="noise.gravity.error_mps2")
-
-    @field_validator(
-        "models",
-        "schemes",
-        "approaches",
-        "sensor_sigma_mps2",
-        "robot_sigma_mgon",
-        "gravity_sigma_mps2",
-        "gravity_error_mps2",
-        mode="before",
+    gravity_error_mps2: OneOrMore[Finite] | None = Field(
+        None, description="noise.gravity.error_mps2"
     )
-    @classmethod
-    def _one_is_a_list(cls, value: Any) -> Any:
-        return [value] if isinstance(value, str | int | float) else value
 
 
 class Presets(Block):
     """The rows of the paper's Table 1, each with its own model and scheme."""
 
     replicates: Count = Field(description="simulated calibrations per row and approach")
-    approaches: list[str] = Field(default=["gravity", "robot"], description="names")
+    approaches: OneOrMore[str] = Field(
+        default=["gravity", "robot"], description="names of approaches, or all"
+    )
 
 
 class LevelingConfig(Block):
     """Where the tilt error that a calibration leaves is evaluated."""
 
-    max_tilt_gon: Annotated[float, Field(gt=0, lt=100)] = Field(
-        50.0, description="largest tilt of the z axis from the vertical"
-    )
+    max_tilt_gon: Tilt = Field(50.0, description="largest tilt of the z axis from the vertical")
     attitudes: Count = Field(200, description="attitudes, spread evenly over that cap")
 
 
@@ -127,38 +132,33 @@ class SensitivityConfig(Block):
 
     base_samples: PowerOfTwo = Field(1024, description="Sobol base samples, a power of two")
     resamples: Count = Field(100, description="bootstrap resamples for confidence intervals")
-    roll_gon: list[Finite] = Field(description="rolls of the grid")
-    pitch_gon: list[Annotated[float, Field(gt=-100, lt=100)]] = Field(
-        description="pitches of the grid"
-    )
+    roll_gon: OneOrMore[Finite] = Field(description="rolls of the grid")
+    pitch_gon: OneOrMore[Pitch] = Field(description="pitches of the grid")
     model: str = Field("bias-scale-nonorthogonality", description="model of figures 5 and 6")
     scheme: str = Field("mclaren-24", description="scheme whose calibration gives the sds")
 
-    @field_validator("base_samples")
-    @classmethod
-    def _is_power_of_two(cls, value: int) -> int:
-        if value & (value - 1):
-            raise ValueError("must be a power of two, as Sobol sequences are balanced only there")
-        return value
+
+_NAME = "[A-Za-z0-9][A-Za-z0-9_-]*"
 
 
 class StudyConfig(Block):
     """A study."""
 
-    study: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")] = Field(
+    study: Annotated[str, Field(pattern=f"^{_NAME}$")] = Field(
         description="name; results go to results/<study>/"
     )
-    seed: Annotated[int, Field(ge=0)] = Field(description="seed of all random numbers")
+    seed: Seed = Field(description="seed of all random numbers")
     gravity_mps2: Positive = Field(STANDARD_GRAVITY, description="true local gravity")
     noise: NoiseConfig = NoiseConfig()
     sensor: dict[str, Quantity] = Field(
         default_factory=dict, description="true parameters of the simulated sensor, by effect"
     )
-    simulated_effects: Literal["model"] | list[str] = Field(
-        "model",
-        description="effects that the simulated sensor has: those of the cell's model, or a list",
+    simulated_effects: OneOrMore[str] = Field(
+        default=["model"],
+        description="effects that the simulated sensor has: model, for those of the cell's model, "
+        "or a list",
     )
-    models: dict[str, list[str]] = Field(
+    models: dict[str, OneOrMore[str]] = Field(
         default_factory=dict, description="models of your own: name and effects"
     )
     grids: list[Grid] = Field(default_factory=list, description="sets of cells")
@@ -177,6 +177,8 @@ class StudyConfig(Block):
             with _at(f"models.{name}"):
                 if name in MODELS:
                     raise InputError("is the name of a registered model; choose another")
+                if name == "all" or not re.fullmatch(_NAME, name):
+                    raise InputError("is no name: use letters, digits, _ and -, and not `all`")
                 SensorModel.of(name, effects)
         for name, quantity in self.sensor.items():
             with _at(f"sensor.{name}"):
@@ -187,10 +189,9 @@ class StudyConfig(Block):
                         f"{len(parameters)} parameters ({', '.join(p.name for p in parameters)})"
                     )
                 to_si(quantity.value, quantity.unit, parameters[0].unit)
-        if isinstance(self.simulated_effects, list):
+        if self.simulated_effects != ["model"]:
             with _at("simulated_effects"):
-                for effect in self.simulated_effects:
-                    get_effect(effect)
+                SensorModel.of("simulated", self.simulated_effects)
         for index, grid in enumerate(self.grids):
             with _at(f"grids.{index}.models"):
                 self.model_names(grid.models)
@@ -201,16 +202,82 @@ class StudyConfig(Block):
         if self.presets is not None:
             with _at("presets.approaches"):
                 _known_approaches(self.presets.approaches)
-        if self.sensitivity is not None:
-            with _at("sensitivity.model"):
-                get_model(self.sensitivity.model, self.models)
-            with _at("sensitivity.scheme"):
-                get_scheme(self.sensitivity.scheme)
         if not self.grids and self.presets is None:
             raise ValueError("neither grids nor presets are given: the study has no cells")
-        if self.paper and self.sensitivity is None:
+        if self.sensitivity is not None:
+            self._check_sensitivity(self.sensitivity)
+        elif self.paper:
             raise ValueError("paper: true needs the block `sensitivity` (figures 4 to 6)")
         return self
+
+    def _check_sensitivity(self, settings: SensitivityConfig) -> None:
+        """Check that the cells exist whose standard deviations later stages need."""
+        with _at("sensitivity.model"):
+            model = get_model(settings.model, self.models)
+            missing = set(CLAIMED_EFFECTS) - {effect.name for effect in model.effects}
+            if self.paper and missing:
+                raise InputError(
+                    f"{settings.model!r} lacks {', '.join(sorted(missing))}, of which the paper's "
+                    "claims are; choose another model, or paper: false"
+                )
+        with _at("sensitivity.scheme"):
+            scheme = get_scheme(settings.scheme)
+        for name in ("roll_gon", "pitch_gon"):
+            if self.paper and 0 not in getattr(settings, name):
+                raise ValueError(f"sensitivity.{name}: must contain 0, as paper: true looks there")
+        for approach in ("gravity", "robot"):
+            cell = f"{settings.model}/{settings.scheme}/{approach}"
+            if self._usual_replicates(settings.model, settings.scheme, approach) < 2:
+                raise ValueError(
+                    f"sensitivity: needs at least 2 replicates of the cell {cell}, with the noise "
+                    "of `noise`; add it to `grids`"
+                )
+            noise = Noise(sigma_gravity=self.noise.gravity.sigma_mps2)
+            design = diagnose(scheme, model, get_approach(approach), noise)
+            if not design.estimable:
+                raise ValueError(f"sensitivity: {cell} cannot be estimated: {design.reason}")
+            if self.paper and design.redundancy == 0:
+                raise ValueError(f"sensitivity: {cell} has no redundancy, which paper: true needs")
+
+    @property
+    def all_grids(self) -> list[Grid]:
+        """The grids, and the presets as grids."""
+        if self.presets is None:
+            return self.grids
+        return [
+            *self.grids,
+            *(
+                Grid(
+                    models=[preset.model],
+                    schemes=[preset.scheme],
+                    approaches=self.presets.approaches,
+                    replicates=self.presets.replicates,
+                )
+                for preset in PRESETS
+            ),
+        ]
+
+    def _usual_replicates(self, model: str, scheme: str, approach: str) -> int:
+        """Replicates of a cell with the noise of `noise`; 0 if the study has no such cell."""
+
+        def has(values: list[float] | None, usual: float) -> bool:
+            return values is None or usual in values
+
+        noise = self.noise
+        return max(
+            (
+                grid.replicates
+                for grid in self.all_grids
+                if model in self.model_names(grid.models)
+                and scheme in _known_schemes(grid.schemes)
+                and approach in _known_approaches(grid.approaches)
+                and has(grid.sensor_sigma_mps2, noise.sensor.sigma_mps2)
+                and (approach == "gravity" or has(grid.robot_sigma_mgon, noise.robot.sigma_mgon))
+                and has(grid.gravity_sigma_mps2, noise.gravity.sigma_mps2)
+                and has(grid.gravity_error_mps2, noise.gravity.error_mps2)
+            ),
+            default=0,
+        )
 
     def model_names(self, names: Sequence[str]) -> list[str]:
         """Spell out `all` and check that the models exist."""
@@ -292,7 +359,7 @@ def parse_study(content: Mapping[str, Any], source: str = "config") -> StudyConf
     try:
         return StudyConfig.model_validate(content)
     except ValidationError as error:
-        raise InputError(f"{source}: {_first_error(error)}") from None
+        raise InputError(f"{source}: {first_error(error, StudyConfig)}") from None
 
 
 def read_study(*paths: str | Path) -> StudyConfig:
@@ -305,58 +372,13 @@ def read_study(*paths: str | Path) -> StudyConfig:
     """
     content: dict[str, Any] = {}
     for path in paths:
-        try:
-            layer = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-        except OSError as error:
-            raise InputError(f"{path}: {error.strerror or error}") from None
-        except (yaml.YAMLError, UnicodeDecodeError) as error:
-            line = " ".join(str(error).split())
-            raise InputError(f"{path}: not valid YAML: {line}") from None
-        if not isinstance(layer, dict):
-            raise InputError(f"{path}: not a mapping of keys to values")
-        content = _overlay(content, layer)
+        content = overlay(content, read_layer(path))
     return parse_study(content, ", ".join(str(path) for path in paths))
 
 
-def _overlay(below: dict[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
-    result = dict(below)
-    for key, value in above.items():
-        old = result.get(key)
-        both = isinstance(old, dict) and isinstance(value, Mapping)
-        result[key] = _overlay(dict(old or {}), value) if both else value
-    return result
-
-
-def _first_error(error: ValidationError) -> str:
-    first, *others = error.errors()
-    key = ".".join(str(part) for part in first["loc"])
-    if first["type"] == "extra_forbidden":
-        text = f"{key}: unknown key"
-        siblings = _keys_beside(first["loc"])
-        if siblings:
-            text += f" (known: {', '.join(siblings)})"
-    elif first["type"] == "value_error":
-        text = ": ".join(filter(None, [key, str(first["ctx"]["error"])]))
-    else:
-        given = first["input"]
-        shown = "" if first["type"] == "missing" else f", not {given!r}"
-        text = f"{key}: {first['msg'][0].lower()}{first['msg'][1:]}{shown}"
-    more = f" (and {len(others)} more)" if others else ""
-    return f"{text}{more}"
-
-
-def _keys_beside(location: Sequence[str | int]) -> list[str]:
-    """Keys that are known where an unknown one stands."""
-    block: Any = StudyConfig
-    for part in location[:-1]:
-        if isinstance(part, int):
-            continue
-        field = block.model_fields.get(part)
-        if field is None:
-            continue
-        candidates = [field.annotation, *getattr(field.annotation, "__args__", ())]
-        nested = [c for c in candidates if isinstance(c, type) and issubclass(c, Block)]
-        if not nested:
-            return []
-        block = nested[0]
-    return list(block.model_fields)
+def config_schema() -> dict[str, Any]:
+    """JSON schema of the configuration, as kept in `workflow/schemas/config.schema.json`."""
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **StudyConfig.model_json_schema(),
+    }

@@ -11,14 +11,15 @@ from accelstudy.errors import InputError
 
 # Files that a stage does not use, so that an edit of them does not run it again. What is not named
 # counts: a new file runs everything again rather than nothing.
-_FRONT = ("cli.py", "figures/", "study/claims/", "study/report.py", "study/job.py")
+_FRONT = ("cli.py", "figures/", "study/claims", "study/report.py", "study/job.py")
 _TABLES = ("study/summary.py", "leveling_error.py", "closed_forms.py")
+_CONFIG = ("study/config", "study/yaml_layers.py")
 _UNUSED = {
-    "simulate": (*_FRONT, *_TABLES, "sensitivity.py", "study/config.py"),
-    "summarise": (*_FRONT, "sensitivity.py", "study/config.py"),
+    "simulate": (*_FRONT, *_TABLES, "sensitivity.py", *_CONFIG),
+    "summarise": (*_FRONT, "sensitivity.py", *_CONFIG),
     "sensitivity": (*_FRONT, *_TABLES),
     "claims": ("cli.py", "figures/"),
-    "figures": ("cli.py", "study/claims/"),
+    "figures": ("cli.py", "study/claims"),
 }
 
 
@@ -29,7 +30,7 @@ def code_hash(stage: str) -> str:
     """
     root = Path(accelstudy.__file__).parent
     digest = hashlib.sha256()
-    for path in sorted(root.rglob("*.py")):
+    for path in sorted([*root.rglob("*.py"), *root.rglob("*.j2")]):
         name = path.relative_to(root).as_posix()
         if not name.startswith(_UNUSED[stage]):
             digest.update(name.encode())

@@ -138,7 +138,9 @@ def simulate_batch(
     """
     cells = [Cell.from_dict(data) for data in spec["cells"]]
     with (
-        parquet_writer(estimates, ESTIMATES, provenance) as write_estimates,
+        parquet_writer(
+            estimates, ESTIMATES, provenance, measured=("estimate", "sigma_priori")
+        ) as write_estimates,
         parquet_writer(correlations, CORRELATIONS, provenance) as write_correlations,
     ):
         for number, cell in enumerate(cells, 1):

@@ -62,13 +62,12 @@ def summarise_batch(
         fits = Fits.of(cell, found.get(cell.name))
         rows["cells"].append(_cell_row(cell, design, fits))
         rows["summary"].append(_summary_rows(cell, design, fits))
-        if design.estimable:
-            rows["leveling"].append(_leveling_row(cell, fits, leveling))
-            adjusted = from_adjustment[from_adjustment["cell"] == cell.name]
-            rows["correlations"].append(_correlation_rows(adjusted, fits))
+        row = _leveling_row(cell, fits, leveling)
+        rows["leveling"].append(row if design.estimable else row[:0])
+        adjusted = from_adjustment[from_adjustment["cell"] == cell.name]
+        rows["correlations"].append(_correlation_rows(adjusted, fits))
     for name, path in outputs.items():
-        table = pd.concat(rows[name], ignore_index=True) if rows[name] else pd.DataFrame()
-        write_table(path, table, provenance)
+        write_table(path, pd.concat(rows[name], ignore_index=True), provenance)
 
 
 @dataclass(frozen=True)
@@ -271,24 +270,27 @@ def _closed_forms(cell: Cell) -> dict[str, float]:
 
 def _correlation_rows(from_adjustment: pd.DataFrame, fits: Fits) -> pd.DataFrame:
     """Mean correlation from Σ_xx beside the empirical one over the calibrations."""
-    rows = from_adjustment.copy()
+    rows = from_adjustment.astype({"cell": str, "parameter_1": str, "parameter_2": str})
     enough = len(fits.errors) > len(fits.names)
     rows["empirical"] = np.corrcoef(fits.errors.T).ravel() if enough else np.nan
     return rows
 
 
 def _leveling_row(cell: Cell, fits: Fits, settings: Mapping[str, Any]) -> pd.DataFrame:
-    simulated, estimated = cell.simulated_model, cell.estimated_model
-    error = leveling_error(
-        simulated,
-        simulated.vector(cell.truth),
-        estimated,
-        fits.estimates[:, : estimated.n_parameters],
-        cap_forces(settings["max_tilt_gon"] * GON, settings["attitudes"], cell.gravity),
-        cell.gravity,
-    )
+    rms = q95 = np.full(2, np.nan)
+    if len(fits.estimates):
+        simulated, estimated = cell.simulated_model, cell.estimated_model
+        error = leveling_error(
+            simulated,
+            simulated.vector(cell.truth),
+            estimated,
+            fits.estimates[:, : estimated.n_parameters],
+            cap_forces(settings["max_tilt_gon"] * GON, settings["attitudes"], cell.gravity),
+            cell.gravity,
+        )
+        rms, q95 = error.rms, error.quantile(0.95)
     row = _labels(cell)
     for i, angle in enumerate(("roll", "pitch")):
-        row[f"{angle}_rms_mgon"] = error.rms[i] / MGON
-        row[f"{angle}_rms_q95_mgon"] = error.quantile(0.95)[i] / MGON
+        row[f"{angle}_rms_mgon"] = rms[i] / MGON
+        row[f"{angle}_rms_q95_mgon"] = q95[i] / MGON
     return pd.DataFrame({**row, "n_converged": len(fits.estimates)}, index=[0])

@@ -6,8 +6,11 @@ from accelstudy.study.cells import batches, study_cells
 from accelstudy.study.config import parse_study
 from accelstudy.study.provenance import check_writable, code_hash
 from accelstudy.study.tables import TABLES
+from accelstudy.study.yaml_layers import read_layer
 
 try:
+    for path in workflow.configfiles:
+        read_layer(path)  # more strictly than Snakemake does
     STUDY = parse_study(config, ", ".join(map(str, workflow.configfiles)) or "config")
     RESULTS = f"results/{STUDY.study}"
     check_writable(RESULTS)

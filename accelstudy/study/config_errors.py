@@ -1,0 +1,51 @@
+"""What pydantic finds wrong with a configuration, in one line for a person."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from difflib import get_close_matches
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+
+def first_error(error: ValidationError, root: type[BaseModel]) -> str:
+    """Say in one line which key of a `root` is wrong, and what would be right."""
+    first, *others = error.errors()
+    key = ".".join(str(part) for part in first["loc"])
+    if first["type"] == "extra_forbidden":
+        text = f"{key}: unknown key"
+        siblings = _keys_beside(first["loc"], root)
+        near = get_close_matches(str(first["loc"][-1]), siblings, n=1)
+        text += f"; did you mean {near[0]!r}?" if near else ""
+        text += f" (known: {', '.join(siblings)})"
+    elif first["type"] == "value_error":
+        text = ": ".join(filter(None, [key, str(first["ctx"]["error"])]))
+    else:
+        shown = "" if first["type"] == "missing" else f", not {_short(first['input'])}"
+        text = f"{key}: {first['msg'][0].lower()}{first['msg'][1:]}{shown}"
+    more = f" (and {len(others)} more)" if others else ""
+    return " ".join(f"{text}{more}".split())
+
+
+def _short(value: Any, length: int = 60) -> str:
+    text = repr(value)
+    return text if len(text) <= length else f"{text[:length]} …"
+
+
+def _keys_beside(location: Sequence[str | int], root: type[BaseModel]) -> list[str]:
+    """Keys that are known where an unknown one stands."""
+    block = root
+    for part in location[:-1]:
+        field = block.model_fields.get(str(part))
+        if field is not None:
+            block = next(_blocks(field.annotation), block)
+    return list(block.model_fields)
+
+
+def _blocks(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Blocks that occur in an annotation such as `list[Grid] | None`."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for argument in getattr(annotation, "__args__", ()):
+        yield from _blocks(argument)

@@ -1,0 +1,55 @@
+"""The types of numbers and lists that stand in a configuration."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, TypeVar
+
+from pydantic import AfterValidator, BeforeValidator, Field, GetCoreSchemaHandler
+from pydantic import GetJsonSchemaHandler as JsonHandler
+from pydantic_core import core_schema
+
+
+def _no_truth_value(value: Any) -> Any:
+    if isinstance(value, bool):
+        raise ValueError(f"must be a number, not {str(value).lower()}")
+    return value
+
+
+def _power_of_two(value: int) -> int:
+    if value & (value - 1):
+        raise ValueError("must be a power of two, as Sobol sequences are balanced only there")
+    return value
+
+
+Number = BeforeValidator(_no_truth_value)
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False), Number]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False), Number]
+Finite = Annotated[float, Field(allow_inf_nan=False), Number]
+Tilt = Annotated[float, Field(gt=0, lt=100), Number]
+Pitch = Annotated[float, Field(gt=-100, lt=100), Number]
+Count = Annotated[int, Field(gt=0), Number]
+Seed = Annotated[int, Field(ge=0), Number]
+PowerOfTwo = Annotated[int, Field(ge=2), Number, AfterValidator(_power_of_two)]
+
+
+class _OneOrMore:
+    """Take a single value for a list of one, in the schema too."""
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        return core_schema.no_info_before_validator_function(self._as_list, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: JsonHandler
+    ) -> dict[str, Any]:
+        many = handler(schema)
+        return {"anyOf": [many["items"], many]}
+
+    @staticmethod
+    def _as_list(value: Any) -> Any:
+        return [value] if isinstance(value, str | int | float) else value
+
+
+T = TypeVar("T")
+OneOrMore = Annotated[list[T], Field(min_length=1), _OneOrMore()]

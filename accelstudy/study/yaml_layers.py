@@ -1,0 +1,60 @@
+"""YAML files, of which one overlays the other, read strictly."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from accelstudy.errors import InputError
+
+
+def read_layer(path: str | Path) -> dict[str, Any]:
+    """Read one YAML file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, is not valid YAML, names a key twice, or is no mapping.
+    """
+    try:
+        layer = yaml.load(Path(path).read_text(encoding="utf-8"), _Loader)
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from None
+    except RecursionError:
+        raise InputError(f"{path}: not valid YAML: nested too deeply") from None
+    except (yaml.YAMLError, ValueError) as error:  # an impossible date, say
+        line = " ".join(str(error).split())
+        raise InputError(f"{path}: not valid YAML: {line}") from None
+    if not isinstance(layer, dict):
+        raise InputError(f"{path}: not a mapping of keys to values")
+    return layer
+
+
+def overlay(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    """Lay one configuration over another, key by key; lists are replaced."""
+    result = dict(below)
+    for key, value in above.items():
+        old = result.get(key)
+        if isinstance(old, Mapping) and isinstance(value, Mapping):
+            value = overlay(old, value)
+        result[key] = value
+    return result
+
+
+class _Loader(yaml.SafeLoader):
+    """A safe loader to which a key that stands twice is an error."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        seen: set[str] = set()
+        for key, _ in node.value:
+            if isinstance(key, yaml.ScalarNode):
+                if key.value in seen:
+                    mark = key.start_mark
+                    raise yaml.constructor.ConstructorError(
+                        None, None, f"the key {key.value!r} stands twice", mark
+                    )
+                seen.add(key.value)
+        return super().construct_mapping(node, deep)

@@ -1,0 +1,269 @@
+"""Figures draw from the tables of a study, small or incomplete, and show the right numbers."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.figure import Figure
+
+from accelstudy.effects import effect_names
+from accelstudy.errors import InputError
+from accelstudy.figures import draw, figure, figure_names, figure_tables, get_figure, render, style
+from accelstudy.study.analysis import analyse_sensitivity
+from accelstudy.study.cells import study_cells
+from accelstudy.study.config import StudyConfig, parse_study
+from accelstudy.study.simulate import simulate_batch
+from accelstudy.study.summary import summarise_batch
+from accelstudy.study.tables import TABLES, read_estimates, read_table
+
+CAPTIONS = Path(__file__).parents[1] / "workflow" / "report" / "figures"
+PROVENANCE = {"config_hash": "test", "seed": 1}
+NINE = "bias-scale-nonorthogonality"
+SENSOR = {
+    "bias": {"value": [0.05, 0.01, 0.03], "unit": "m/s^2"},
+    "scale": {"value": [200, 200, 200], "unit": "ppm"},
+    "nonorthogonality": {"value": [12, 12, 44], "unit": "mgon"},
+}
+PAPER = {
+    "study": "tiny",
+    "seed": 1,
+    "sensor": SENSOR,
+    "grids": [
+        {"models": NINE, "schemes": ["faces-6", "mclaren-24"], "replicates": 30},
+        {"models": f"{NINE}-crossaxis", "schemes": "mclaren-24", "replicates": 10},
+    ],
+    "presets": {"replicates": 5},
+    "leveling": {"attitudes": 10},
+    "sensitivity": {
+        "base_samples": 32,
+        "resamples": 10,
+        "roll_gon": [-50, 0, 50],
+        "pitch_gon": [-25, 0, 25],
+    },
+    "paper": True,
+}
+SWEEPS = {
+    "sensor": {"sensor_sigma_mps2": [0.001, 0.002]},
+    "robot": {"robot_sigma_mgon": [0, 3.2, 10]},
+    "gravity": {"gravity_error_mps2": [-0.01, 0, 0.01], "gravity_sigma_mps2": [0, 0.001]},
+    "positions": {"schemes": ["fibonacci-12", "fibonacci-24"]},
+}
+
+
+def run(study: StudyConfig, folder: Path) -> dict[str, pd.DataFrame]:
+    """All tables of a study."""
+    spec = {"seed": study.seed, "cells": [cell.to_dict() for cell in study_cells(study)]}
+    estimates, correlations = folder / "estimates.parquet", folder / "adjusted.parquet"
+    paths = {name: str(folder / f"{name}.parquet") for name in TABLES}
+    simulate_batch(spec, estimates, correlations, PROVENANCE)
+    summarise_batch(
+        spec, estimates, correlations, study.leveling.model_dump(), paths, PROVENANCE
+    )
+    tables = {name: read_table(path) for name, path in paths.items()}
+    if study.sensitivity:
+        parts = []
+        for analysis in ("forces", "gravity", "robot"):
+            path = folder / f"sensitivity-{analysis}.parquet"
+            analyse_sensitivity(study, analysis, paths["summary"], path, PROVENANCE)
+            parts.append(read_table(path))
+        tables["sensitivity"] = pd.concat(parts, ignore_index=True)
+        setting = study.sensitivity
+        cells = [f"{setting.model}/{setting.scheme}/{name}" for name in ("gravity", "robot")]
+        tables["estimates"] = read_estimates(estimates, cells)
+    return tables
+
+
+@pytest.fixture(autouse=True)
+def _few_pixels(monkeypatch):
+    monkeypatch.setattr("accelstudy.figures.registry.DPI", 40)
+
+
+@pytest.fixture(scope="module")
+def paper() -> StudyConfig:
+    return parse_study(PAPER)
+
+
+@pytest.fixture(scope="module")
+def tables(paper, tmp_path_factory) -> dict[str, pd.DataFrame]:
+    return run(paper, tmp_path_factory.mktemp("paper"))
+
+
+def sweep_study(name: str) -> StudyConfig:
+    grid = {"models": NINE, "schemes": "mclaren-24", "replicates": 5, **SWEEPS[name]}
+    return parse_study(
+        {"study": name, "seed": 1, "sensor": SENSOR, "grids": [grid], "leveling": {"attitudes": 5}}
+    )
+
+
+def texts(drawn: Figure) -> list[str]:
+    """All axis labels."""
+    return [
+        text
+        for ax in drawn.findobj(lambda artist: hasattr(artist, "get_xlabel"))
+        for text in (ax.get_xlabel(), ax.get_ylabel())
+        if text
+    ]
+
+
+ALL = figure_names(parse_study(PAPER))
+
+
+def test_a_paper_study_has_the_figures_of_the_paper_and_of_every_study():
+    expected = [f"figure-{n}" for n in range(2, 9)] + ["figure-5-robot", "figure-6-robot"]
+    expected += ["closed-forms", "leveling-overview", "table-1"]
+    assert sorted(ALL) == sorted(expected)
+
+
+def test_other_studies_have_the_figures_that_fit_them():
+    assert figure_names(sweep_study("sensor")) == ("closed-forms", "sweep")
+    assert figure_names(sweep_study("positions")) == ("closed-forms", "leveling-overview", "sweep")
+
+
+@pytest.mark.parametrize("name", [*ALL, "sweep"])
+def test_every_figure_has_a_caption_and_a_title(name):
+    assert len((CAPTIONS / f"{name}.rst").read_text(encoding="utf-8").split()) > 20
+    assert get_figure(name).title
+    assert get_figure(name).category
+
+
+def test_every_caption_has_a_figure():
+    assert {path.stem for path in CAPTIONS.glob("*.rst")} == {*ALL, "sweep"}
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_svg_and_png_are_the_same_bytes_each_time(name, tables, paper, tmp_path):
+    for folder in ("first", "second"):
+        render(name, tables, paper, tmp_path / folder / "a.svg", tmp_path / folder / "a.png")
+    for kind in ("svg", "png"):
+        first, second = (tmp_path / f / f"a.{kind}" for f in ("first", "second"))
+        assert first.read_bytes() == second.read_bytes()
+    assert not list(tmp_path.rglob("*.part"))
+
+
+@pytest.mark.parametrize("name", sorted(set(ALL) - {"figure-8", "closed-forms"}))
+def test_labels_have_units(name, tables, paper):
+    quantities = texts(draw(name, tables, paper))
+    assert any(
+        unit in text for text in quantities for unit in ("mgon", "gon", "ppm", "mm/s²", "share")
+    )
+    assert not any("m/s^2" in text for text in quantities)
+
+
+@pytest.mark.parametrize("name", SWEEPS)
+def test_sweeps_draw(name, tmp_path):
+    study = sweep_study(name)
+    found = run(study, tmp_path)
+    for each in figure_names(study):
+        render(each, found, study, tmp_path / "a.svg", tmp_path / "a.png")
+
+
+def test_figure_2_shows_the_closed_form(paper):
+    roll, pitch = (ax.collections[0] for ax in draw("figure-2", {}, paper).axes[:2])
+    mesh = roll.get_coordinates()
+    level = np.abs(mesh[..., 1]) < 1e-9
+    tilted = np.abs(np.abs(mesh[..., 1]) - 50) < 1e-9
+    sigma = np.reshape(roll.get_array(), mesh.shape[:2])
+    assert level.any()
+    assert tilted.any()
+    np.testing.assert_allclose(sigma[level], 12.9836, atol=1e-3)
+    np.testing.assert_allclose(sigma[tilted], 18.3616, atol=1e-3)
+    np.testing.assert_allclose(pitch.get_array(), 12.9836, atol=1e-3)
+
+
+def test_figure_3_marks_the_closed_form(paper):
+    lines = draw("figure-3", {}, paper).axes[0].get_lines()
+    marks = {round(float(line.get_ydata()[0]), 2) for line in lines if len(line.get_xdata()) == 1}
+    assert marks == {12.98, 18.36}
+
+
+def test_figure_4_shows_what_does_not_vary_as_missing_and_not_as_zero(tables, paper):
+    table = tables["sensitivity"].copy()
+    gone = (table["roll_gon"] == 0) & (table["output"] == "roll")
+    table.loc[gone, ["total_effect", "ci95"]] = np.nan
+    table.loc[gone, "defined"] = False
+    drawn = draw("figure-4", {"sensitivity": table}, paper)
+    shown = np.ma.getmaskarray(drawn.axes[0].collections[0].get_array())
+    assert shown[:, 1].all()
+    assert not shown[:, [0, 2]].any()
+    draw("figure-5", {"sensitivity": table}, paper)
+
+
+def test_figure_7_draws_the_mean_sd_and_the_first_simulation(tables, paper):
+    rows = tables["estimates"]
+    rows = rows[(rows["parameter"] == "b_x") & rows["cell"].str.endswith("gravity")]
+    axes = draw("figure-7", tables, paper).axes
+    bars = [patch.get_height() for patch in axes[1].patches]
+    assert 1e3 * rows["sigma_posteriori"].mean() == pytest.approx(bars[0])
+    errors = [y for line in axes[0].get_lines() for y in np.atleast_1d(line.get_ydata())]
+    assert np.isclose(errors, 1e3 * rows.loc[rows["replicate"] == 0, "error"].iloc[0]).any()
+
+
+def test_figure_8_has_no_diagonal(tables, paper):
+    for ax in draw("figure-8", tables, paper).axes[:2]:
+        matrix = np.asarray(ax.images[0].get_array())
+        np.testing.assert_allclose(np.diag(matrix), 0, atol=1e-12)
+        assert matrix.shape == (9, 9)
+
+
+def test_what_cannot_be_estimated_is_marked(tables, paper):
+    overview = draw("leveling-overview", tables, paper)
+    assert sum(len(ax.patches) for ax in overview.axes[:4]) > 0
+    crosses = [
+        line
+        for ax in draw("table-1", tables, paper).axes
+        for line in ax.get_lines()
+        if line.get_marker() == "x"
+    ]
+    assert len(crosses) == 3 * 5  # three rows with the cross-axis angles, by gravity
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_study_without_estimable_cells_draws(name, tables, paper):
+    cells, summary = tables["cells"].copy(), tables["summary"].copy()
+    cells["estimable"] = summary["estimable"] = False
+    numbers = summary.columns[summary.columns.str.startswith(("bias", "sd_", "coverage"))]
+    summary[numbers] = np.nan
+    summary["n_converged"] = 0
+    nothing = {
+        "cells": cells,
+        "summary": summary,
+        "leveling": pd.DataFrame(),
+        "correlations": pd.DataFrame(),
+        "estimates": tables["estimates"].iloc[:0],
+        "sensitivity": tables["sensitivity"].iloc[:0],
+    }
+    needed = {key: nothing[key] for key in figure_tables(name)}
+    draw(name, needed, paper).draw_without_rendering()
+
+
+def test_every_effect_and_approach_has_a_colour_of_its_own():
+    groups = [style.group_colour(name) for name in ("force", *effect_names())]
+    approaches = [style.approach_colour(name) for name in ("gravity", "robot")]
+    assert len({*groups, *approaches}) == len(groups) + len(approaches)
+
+
+def test_colours_are_the_same_in_every_figure(tables, paper):
+    robot = style.approach_colour("robot")
+    for name in ("figure-7", "table-1", "closed-forms"):
+        lines = draw(name, tables, paper).findobj(lambda artist: hasattr(artist, "get_marker"))
+        assert robot in {line.get_color() for line in lines}
+    legend = draw("figure-5", tables, paper).legends[0]
+    colours = {
+        text.get_text().split()[0]: line.get_color()
+        for text, line in zip(legend.get_texts(), legend.get_lines(), strict=True)
+    }
+    for group in ("force", "bias", "scale"):
+        assert colours[group] == style.group_colour(group)
+
+
+def test_an_unknown_figure_is_an_input_error_that_names_a_near_one():
+    with pytest.raises(InputError, match="figure-2"):
+        get_figure("figure-22")
+
+
+def test_a_name_is_registered_once_and_needs_known_tables():
+    with pytest.raises(ValueError, match="twice"):
+        figure("figure-2", title="", category="")
+    with pytest.raises(ValueError, match="no such tables: nothing"):
+        figure("new", title="", category="", tables=("nothing",))
