@@ -47,8 +47,14 @@ def accuracy_over_attitude(tables: Tables, study: StudyConfig) -> Figure:
     axes = fig.subplots(1, 2, sharex=True, sharey=True)
     for ax, title, values in zip(axes, ("roll", "pitch"), np.moveaxis(sigma, -1, 0), strict=True):
         image = ax.pcolormesh(
-            roll, pitch, values, shading="gouraud", cmap="viridis", rasterized=True,
-            vmin=np.floor(sigma.min()), vmax=np.ceil(sigma.max()),
+            roll,
+            pitch,
+            values,
+            shading="gouraud",
+            cmap="viridis",
+            rasterized=True,
+            vmin=np.floor(sigma.min()),
+            vmax=np.ceil(sigma.max()),
         )
         ax.set_title(f"$\\sigma_\\{'phi' if title == 'roll' else 'theta'}$ of {title}")
         ax.set_xlabel("roll $\\phi$ / gon")
@@ -57,8 +63,12 @@ def accuracy_over_attitude(tables: Tables, study: StudyConfig) -> Figure:
             _contours(ax, roll, pitch, values)
         else:
             ax.text(
-                0, 0, f"{values.mean():.2f} mgon\nat every attitude",
-                ha="center", va="center", color="white",
+                0,
+                0,
+                f"{values.mean():.2f} mgon\nat every attitude",
+                ha="center",
+                va="center",
+                color="white",
             )
     axes[0].set_yticks([-75, -50, -25, 0, 25, 50, 75])
     axes[0].set_ylabel("pitch $\\theta$ / gon")
@@ -97,7 +107,10 @@ def accuracy_over_noise(tables: Tables, study: StudyConfig) -> Figure:
     ax.vlines(x, 0, at_study.max(), color="#777777", linewidth=0.8, linestyle=":")
     for i, (name, greek) in enumerate((("roll", "phi"), ("pitch", "theta"))):
         ax.plot(
-            noise * 1e3, over_noise[:, i], color=ANGLE_COLOURS[name], linestyle=("-", "--")[i],
+            noise * 1e3,
+            over_noise[:, i],
+            color=ANGLE_COLOURS[name],
+            linestyle=("-", "--")[i],
             label=f"{name} $\\sigma_\\{greek}$: {at_study[i]:.2f} mgon at {x:g} mm/s²",
         )
         ax.plot(x, at_study[i], "o", color=ANGLE_COLOURS[name])

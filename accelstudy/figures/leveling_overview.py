@@ -29,7 +29,10 @@ from accelstudy.study.config import StudyConfig
 ANGLES = ("roll", "pitch")
 ROW_MM = 4.6
 NOT_ESTIMABLE: Style = {
-    "facecolor": MISSING, "edgecolor": "#999999", "hatch": HATCH, "linewidth": 0
+    "facecolor": MISSING,
+    "edgecolor": "#999999",
+    "hatch": HATCH,
+    "linewidth": 0,
 }
 
 
@@ -65,8 +68,9 @@ def tilt_errors(tables: Tables, study: StudyConfig) -> Figure:
     for ax in axes[-1]:
         ax.tick_params(axis="x", rotation=90)
     if image is not None and len(known):
-        bar = fig.colorbar(image, ax=axes, label="rms tilt error / mgon", pad=0.02, aspect=50,
-                           extend="max")
+        bar = fig.colorbar(
+            image, ax=axes, label="rms tilt error / mgon", pad=0.02, aspect=50, extend="max"
+        )
         log_ticks(bar.ax.yaxis, float(norm.vmin or 1), float(norm.vmax or 10))
     fig.legend(handles=[Patch(**NOT_ESTIMABLE, label="not estimable")], loc="outside lower center")
     return fig
@@ -92,7 +96,12 @@ def _draw_matrix(
         for j, model in enumerate(grid.columns):
             if np.isfinite(values[i, j]):
                 ax.text(
-                    j, i, _short(values[i, j]), ha="center", va="center", fontsize=7,
+                    j,
+                    i,
+                    _short(values[i, j]),
+                    ha="center",
+                    va="center",
+                    fontsize=7,
                     color="white" if values[i, j] > middle else INK,
                 )
             elif (scheme, model) in in_study:

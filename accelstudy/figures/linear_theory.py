@@ -66,7 +66,8 @@ def monte_carlo_against_theory(tables: Tables, study: StudyConfig) -> Figure:
             Patch(color=BAND, label="where 95 % are expected"),
             Line2D([], [], color=INK, linewidth=0.6, label="equal"),
         ],
-        loc="outside lower center", ncols=4,
+        loc="outside lower center",
+        ncols=4,
     )
     return fig
 
@@ -89,8 +90,13 @@ def _draw_ratios(ax: Axes, rows: pd.DataFrame) -> None:
         for approach in its["approach"].unique():
             chosen = (its["approach"] == approach).to_numpy()
             ax.plot(
-                x[chosen], its["ratio"][chosen], linestyle="", markersize=1.6, markeredgewidth=0,
-                marker=approach_marker(approach), color=approach_colour(approach),
+                x[chosen],
+                its["ratio"][chosen],
+                linestyle="",
+                markersize=1.6,
+                markeredgewidth=0,
+                marker=approach_marker(approach),
+                color=approach_colour(approach),
             )
         within = (its["ratio"] - 1).abs() <= its["half"]
         name = group_label(group).replace("non-orthogonality", "non-orthogo-\nnality")

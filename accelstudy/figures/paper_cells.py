@@ -84,7 +84,8 @@ def errors_and_sigmas(tables: Tables, study: StudyConfig) -> Figure:
             Line2D([], [], color=INK, label="95 % of all simulations"),
             Line2D([], [], **one, markerfacecolor="white", label="one simulation"),
         ],
-        loc="outside lower center", ncols=4,
+        loc="outside lower center",
+        ncols=4,
     )
     return fig
 
@@ -113,7 +114,11 @@ def _draw_parameter(
     at = x + (APPROACHES.index(approach) - 0.5) * (WIDTH + 0.04)
     first = rows["replicate"] == rows["replicate"].min()
     one: Style = {
-        "marker": marker, "markersize": 4, "color": colour, "markerfacecolor": "white", "zorder": 4
+        "marker": marker,
+        "markersize": 4,
+        "color": colour,
+        "markerfacecolor": "white",
+        "zorder": 4,
     }
 
     errors = to_display(rows["error"], unit)
@@ -174,9 +179,7 @@ def correlations(tables: Tables, study: StudyConfig) -> Figure:
     return fig
 
 
-def _matrix(
-    table: pd.DataFrame, cell: str, names: list[str]
-) -> NDArray[np.float64] | None:
+def _matrix(table: pd.DataFrame, cell: str, names: list[str]) -> NDArray[np.float64] | None:
     rows = table if table.empty else table[table["cell"] == cell]
     if rows.empty:
         return None
@@ -189,7 +192,12 @@ def _write_values(ax: Axes, matrix: NDArray[np.float64], top: float) -> None:
         return
     for i, j in np.argwhere(np.abs(matrix) > ANNOTATED):
         ax.text(
-            j, i, f"{matrix[i, j]:.2f}".replace("0.", "."), ha="center", va="center", fontsize=7,
+            j,
+            i,
+            f"{matrix[i, j]:.2f}".replace("0.", "."),
+            ha="center",
+            va="center",
+            fontsize=7,
             color="white" if matrix[i, j] > 0.6 * top else INK,
         )
 

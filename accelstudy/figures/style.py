@@ -180,7 +180,10 @@ def approach_handles(approaches: Iterable[str], **options: Any) -> list[Line2D]:
     style: Style = {"linestyle": "", **options}
     return [
         Line2D(
-            [], [], label=name, **{"marker": approach_marker(name), **style},
+            [],
+            [],
+            label=name,
+            **{"marker": approach_marker(name), **style},
             color=approach_colour(name),
         )
         for name in approaches

@@ -195,7 +195,9 @@ def _draw_panel(ax: Axes, rows: pd.DataFrame, quantity: Swept, series: list[str]
 
 def _series_style(i: int) -> Style:
     return {
-        "linestyle": LINES[i % len(LINES)], "marker": MARKERS[i % len(MARKERS)], "markersize": 3
+        "linestyle": LINES[i % len(LINES)],
+        "marker": MARKERS[i % len(MARKERS)],
+        "markersize": 3,
     }
 
 

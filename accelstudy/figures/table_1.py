@@ -72,7 +72,10 @@ def published_calibrations(tables: Tables, study: StudyConfig) -> Figure:
             Line2D([], [], **cross, alpha=PALE, label="estimable, but other parameters are not"),
             Line2D([], [], linestyle="", marker="$–$", color="#999999", label="not in the model"),
         ],
-        loc="outside lower center", ncols=5, handletextpad=0.2, columnspacing=1.2,
+        loc="outside lower center",
+        ncols=5,
+        handletextpad=0.2,
+        columnspacing=1.2,
     )
     return fig
 
@@ -103,8 +106,13 @@ def _draw_group(ax: Axes, rows: pd.DataFrame, approaches: list[str]) -> None:
             if its.empty:
                 continue
             known = True
-            _mark(ax, its["sd_empirical"].mean(), y + offset, approach,
-                  pale=bool(its["estimable"].all()))
+            _mark(
+                ax,
+                its["sd_empirical"].mean(),
+                y + offset,
+                approach,
+                pale=bool(its["estimable"].all()),
+            )
         if not known:
             _dash(ax, y)
 
@@ -130,24 +138,33 @@ def _mark(ax: Axes, value: float, y: float, approach: str, *, pale: bool) -> Non
         ax.plot(value, y, approach_marker(approach), color=colour)
     else:
         ax.plot(
-            CROSS_AT, y, "x", color=colour, transform=ax.get_yaxis_transform(),
+            CROSS_AT,
+            y,
+            "x",
+            color=colour,
+            transform=ax.get_yaxis_transform(),
             alpha=PALE if pale else 1,
         )
 
 
 def _dash(ax: Axes, y: int) -> None:
     ax.text(
-        0.5, y, "–", transform=ax.get_yaxis_transform(), color="#999999",
-        ha="center", va="center",
+        0.5,
+        y,
+        "–",
+        transform=ax.get_yaxis_transform(),
+        color="#999999",
+        ha="center",
+        va="center",
     )
 
 
 def _finish(ax: Axes) -> None:
     """Logarithmic axis from one power of ten to another, with room for the crosses."""
-    values = np.concatenate([
-        np.asarray(line.get_xdata(), float)
-        for line in ax.get_lines() if line.get_marker() != "x"
-    ] or [np.empty(0)])
+    values = np.concatenate(
+        [np.asarray(line.get_xdata(), float) for line in ax.get_lines() if line.get_marker() != "x"]
+        or [np.empty(0)]
+    )
     ax.grid(False, axis="y")
     ax.tick_params(axis="y", length=0)
     for y in range(len(PRESETS) - 1):

@@ -151,7 +151,9 @@ def _styles(inputs: list[str]) -> dict[str, Style]:
         i = count.get(group, 0) % 3
         count[group] = count.get(group, 0) + 1
         styles[name] = {
-            "color": group_colour(group), "linestyle": LINE_STYLES[i], "marker": MARKERS[i]
+            "color": group_colour(group),
+            "linestyle": LINE_STYLES[i],
+            "marker": MARKERS[i],
         }
     return styles
 
@@ -169,12 +171,24 @@ def _draw_pitch(ax: Axes, table: pd.DataFrame, styles: dict[str, Style]) -> None
         ci95 = rows["ci95"].to_numpy(float)
         below = np.minimum(ci95, seen - SMALLEST)
         ax.errorbar(
-            roll, seen, yerr=[below, ci95], **style, markersize=3, linewidth=1, elinewidth=0.6,
+            roll,
+            seen,
+            yerr=[below, ci95],
+            **style,
+            markersize=3,
+            linewidth=1,
+            elinewidth=0.6,
         )
         none = share < SMALLEST
         ax.plot(
-            roll[none], np.full(none.sum(), ZERO), linestyle="", marker=style["marker"],
-            markersize=3, markerfacecolor="none", markeredgewidth=0.6, color=style["color"],
+            roll[none],
+            np.full(none.sum(), ZERO),
+            linestyle="",
+            marker=style["marker"],
+            markersize=3,
+            markerfacecolor="none",
+            markeredgewidth=0.6,
+            color=style["color"],
         )
     undefined = table.loc[table["share"].isna(), "roll_gon"].unique()
     for roll in undefined:

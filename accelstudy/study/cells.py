@@ -21,6 +21,8 @@ from accelstudy.units import MGON
 
 REPLICATES_PER_BATCH = 100_000
 """Calibrations in one job: long enough that starting Python does not matter."""
+CELLS_PER_BATCH = 50
+"""Cells in one job, however few their replicates, so that small studies use all cores too."""
 
 
 @dataclass(frozen=True)
@@ -174,14 +176,14 @@ def _shown(value: float) -> str:
 
 
 def batches(cells: Iterable[Cell], size: int = REPLICATES_PER_BATCH) -> list[list[Cell]]:
-    """Divide cells into batches of about `size` calibrations, in order.
+    """Divide cells into batches of at most `size` calibrations (or one cell), in order.
 
     What a cell computes does not depend on its batch.
     """
     result: list[list[Cell]] = []
     room = 0
     for cell in cells:
-        if not result or cell.replicates > room:
+        if not result or cell.replicates > room or len(result[-1]) == CELLS_PER_BATCH:
             result.append([])
             room = size
         result[-1].append(cell)

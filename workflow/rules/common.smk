@@ -1,3 +1,5 @@
+from pathlib import Path
+
 from snakemake.exceptions import WorkflowError
 
 from accelstudy.errors import InputError
@@ -45,6 +47,12 @@ def estimates_of(choose):
         for batch, cells in BATCHES.items()
         if any(map(choose, cells))
     ]
+
+
+def figure_caption(wildcards):
+    """Text below the figure in the report."""
+    captions = Path(workflow.basedir) / "report/figures"
+    return (captions / f"{wildcards.figure}.rst").read_text(encoding="utf-8")
 
 
 def figure_inputs(wildcards):

@@ -4,7 +4,7 @@ rule figure:
     output:
         svg=report(
             f"{RESULTS}/figures/{{figure}}.svg",
-            caption="../report/figures/{figure}.rst",
+            caption="../report/figure.rst",
             category=lambda wildcards: get_figure(wildcards.figure).category,
             labels=lambda wildcards: {"content": get_figure(wildcards.figure).title},
         ),
@@ -18,6 +18,7 @@ rule figure:
         mem_mb=2000,
     params:
         study=STUDY.model_dump(mode="json"),
+        caption=figure_caption,
         code=code_hash("figures"),
     message:
         "Draw {wildcards.figure}"
