@@ -22,6 +22,7 @@ except InputError as error:
 # Cells run in batches, so that starting Python does not dominate; a batch is a job.
 BATCHES = {f"{i:04d}": cells for i, cells in enumerate(batches(study_cells(STUDY)))}
 PARTS = f"{RESULTS}/batches/{{batch}}"
+CAPTIONS = Path(str(workflow.current_basedir)).parent / "report/figures"
 ANALYSES = ["forces", "gravity", "robot"]
 FINAL_TABLES = [
     *TABLES,
@@ -51,8 +52,7 @@ def estimates_of(choose):
 
 def figure_caption(wildcards):
     """Text below the figure in the report."""
-    captions = Path(workflow.basedir) / "report/figures"
-    return (captions / f"{wildcards.figure}.rst").read_text(encoding="utf-8")
+    return (CAPTIONS / f"{wildcards.figure}.rst").read_text(encoding="utf-8")
 
 
 def figure_inputs(wildcards):
