@@ -21,7 +21,7 @@ from accelstudy.units import MGON
 
 REPLICATES_PER_BATCH = 100_000
 """Calibrations in one job: long enough that starting Python does not matter."""
-CELLS_PER_BATCH = 50
+CELLS_PER_BATCH = 100
 """Cells in one job, however few their replicates, so that small studies use all cores too."""
 
 
