@@ -16,7 +16,7 @@ export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: help env test smoke reproduce lint lock clean
+.PHONY: help env test smoke reproduce report lint lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "%-12s%s\n", $$1, $$2 }' Makefile
@@ -30,8 +30,11 @@ test: lint ## check and test the package, with coverage
 smoke: $(READY) ## run the whole workflow on a small configuration
 	snakemake --cores $(CORES) --configfile config/smoke.yaml
 
-reproduce: $(READY) ## run the whole study
+reproduce: $(READY) ## reproduce the paper
 	snakemake --cores $(CORES)
+
+report: reproduce ## make results/paper/report.zip, to be opened in a browser
+	snakemake --cores $(CORES) --report results/paper/report.zip
 
 lint: $(READY) ## check style, types and the workflow
 	ruff check
@@ -45,8 +48,8 @@ lock: $(READY) ## lock the newest versions that pyproject.toml allows
 	uv export --quiet --frozen --no-emit-project --all-groups --output-file requirements.lock
 	uv export --quiet --frozen --no-emit-project --only-group build --output-file requirements-build.lock
 
-clean: ## remove the environment, the results and all caches
-	rm -rf $(ENV) results .snakemake .coverage* .*_cache .hypothesis
+clean: ## remove the environment and all caches, but no results
+	rm -rf $(ENV) .coverage* .*_cache .hypothesis
 	find accelstudy tests -name __pycache__ -prune -exec rm -r {} +
 
 # The stamp comes last: an environment without it is unfinished and made anew. The old one goes

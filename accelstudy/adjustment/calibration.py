@@ -19,7 +19,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
-from accelstudy.adjustment.gauss_helmert import Adjustment, Linearisation, adjust, whiten
+from accelstudy.adjustment.gauss_helmert import Adjustment, Linearisation, adjust, whitened_design
 from accelstudy.approaches import Approach
 from accelstudy.effects import Hold
 from accelstudy.errors import InputError
@@ -196,7 +196,7 @@ def whitened_jacobian(
         np.moveaxis(problem.observations[:1], -1, 0),
         np.moveaxis(f_b @ t_inverse.T, -1, 0),
     )
-    _, white = whiten(at, problem.cofactors.T)
+    white = whitened_design(at, problem.cofactors.T)
     rows = np.moveaxis(white[:, :, 0], 1, -1).reshape(-1, x.shape[1])
     weighted = np.flatnonzero(problem.weights)
     return np.concatenate([rows, np.diag(np.sqrt(problem.weights))[weighted]])

@@ -30,6 +30,11 @@ STEP_TOLERANCE = 1e-6
 PIVOT_TOLERANCE = 1e-12
 """A normal matrix, scaled to unit diagonal, is singular when a Cholesky pivot is below this."""
 
+# glibc hands blocks above a threshold back to the system as soon as they are freed, and to fetch
+# them again page by page in each iteration costs a quarter of the time. Freeing one large block, never
+# touched, raises the threshold (mallopt(3), M_MMAP_THRESHOLD). Elsewhere it does nothing.
+np.empty(31 << 20, dtype=np.uint8)
+
 
 @dataclass(frozen=True)
 class Linearisation:
@@ -242,7 +247,8 @@ class _Step:
 def _step(at: Linearisation, v: Array, q: Array, weights: Array, prior_misclosure: Array) -> _Step:
     """Solve the linearised problem; `prior_misclosure` is observed minus present parameters."""
     b = at.jac_observations
-    whitening, a_white = whiten(at, q)
+    bq = _times(b, q)
+    whitening, a_white = _whiten(at, bq)
     w_white = cholesky.forward(whitening, at.psi - np.einsum("corn,orn->crn", b, v))
     normal, right = _normal_equations(a_white, w_white)
     diagonal = np.einsum("uur->ur", normal)
@@ -255,7 +261,7 @@ def _step(at: Linearisation, v: Array, q: Array, weights: Array, prior_misclosur
     dx = cholesky.backward(lower, half) / scale
 
     misclosure = w_white + np.einsum("curn,ur->crn", a_white, dx)
-    v_new = np.einsum("crn,corn->orn", -cholesky.backward(whitening, misclosure), _times(b, q))
+    v_new = np.einsum("crn,corn->orn", -cholesky.backward(whitening, misclosure), bq)
     omega = np.einsum("crn,crn->r", misclosure, misclosure)
     omega += (weights[:, None] * (prior_misclosure - dx) ** 2).sum(axis=0)
 
@@ -267,13 +273,21 @@ def _step(at: Linearisation, v: Array, q: Array, weights: Array, prior_misclosur
     return _Step(dx, v_new, omega, size, lower, scale)
 
 
-def whiten(at: Linearisation, q: Array) -> tuple[Array, Array]:
-    """Scale conditions to unit weight: M = B Q Bᵀ = L Lᵀ; returns L and L⁻¹A.
+def whitened_design(at: Linearisation, q: Array) -> Array:
+    """Jacobian of the conditions with respect to the parameters, at unit weight, (c, u, R, n).
 
-    q : (o, n) variances or (o, o, n) matrices. L is (c, c, R, n), L⁻¹A is (c, u, R, n).
+    q : (o, n) variances or (o, o, n) matrices
     """
+    return _whiten(at, _times(at.jac_observations, q))[1]
+
+
+def _whiten(at: Linearisation, bq: Array) -> tuple[Array, Array]:
+    """Scale conditions to unit weight: M = B Q Bᵀ = L Lᵀ; L (c, c, R, n), L⁻¹A (c, u, R, n)."""
     b = at.jac_observations
-    lower = cholesky.factor(np.einsum("corn,dorn->cdrn", _times(b, q), b))
+    m = np.empty((len(b), len(b), *b.shape[2:]))
+    for i in range(len(b)):  # the lower triangle is all that the factorisation reads
+        m[i:, i] = np.einsum("corn,orn->crn", bq[i:], b[i])
+    lower = cholesky.factor(m)
     return lower, cholesky.forward(lower, at.jac_parameters)
 
 

@@ -7,7 +7,7 @@ from accelstudy.schemes.registry import Array, register
 
 @register(
     "rings-24",
-    title="3 axes × 45°",
+    title="on 3 rings",
     status="stand-in",
     source="three turns in steps of 45° for the 24 positions of Fong et al. (2008), "
     "Meas. Sci. Technol. 19, 085202",

@@ -25,6 +25,8 @@ def read_layer(path: str | Path) -> dict[str, Any]:
         raise InputError(f"{path}: {error.strerror or error}") from None
     except RecursionError:
         raise InputError(f"{path}: not valid YAML: nested too deeply") from None
+    except yaml.MarkedYAMLError as error:
+        raise InputError(f"{path}: not valid YAML: {_where(error)}") from None
     except (yaml.YAMLError, ValueError) as error:  # an impossible date, say
         line = " ".join(str(error).split())
         raise InputError(f"{path}: not valid YAML: {line}") from None
@@ -42,6 +44,12 @@ def overlay(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any
             value = overlay(old, value)
         result[key] = value
     return result
+
+
+def _where(error: yaml.MarkedYAMLError) -> str:
+    mark = error.problem_mark or error.context_mark
+    place = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
+    return f"{place}{error.problem or error.context}"
 
 
 class _Loader(yaml.SafeLoader):

@@ -51,7 +51,7 @@ rule claims:
         html=report(
             f"{RESULTS}/claims.html",
             caption="../report/claims.rst",
-            category="1 Claims of the paper",
+            category="Claims",
             labels={"content": "All claims with verdicts"},
         ),
     log:
