@@ -9,6 +9,8 @@ import yaml
 from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from snakemake.exceptions import WorkflowError
+from snakemake.utils import validate
 from study_helpers import NINE, content, grid, make_study
 
 from accelstudy.cli import main
@@ -18,6 +20,7 @@ from accelstudy.models import MODELS
 from accelstudy.schemes import scheme_names
 from accelstudy.study.cells import Cell, batches, study_cells
 from accelstudy.study.config import StudyConfig, config_schema, parse_study, read_study
+from accelstudy.study.yaml_layers import overlay, read_layer
 from accelstudy.units import GON, MGON
 
 ROOT = Path(__file__).parents[1]
@@ -72,6 +75,17 @@ def test_the_schema_file_is_that_of_the_models():
     path = ROOT / "workflow" / "schemas" / "config.schema.json"
     assert path.read_text(encoding="utf-8") == printed.stdout
     assert json.loads(printed.stdout) == config_schema()
+
+
+def test_the_schema_accepts_what_the_models_accept():
+    schema = str(ROOT / "workflow" / "schemas" / "config.schema.json")
+    base = yaml.safe_load(CONFIG.read_text())
+    validate(base, schema, set_default=False)
+    for path in OVERLAYS:
+        validate(overlay(base, read_layer(path)), schema, set_default=False)
+    for changes in ({"seeed": 1}, {"grids": [grid(models=[])]}, {"seed": -1}):
+        with pytest.raises(WorkflowError):
+            validate({**base, **changes}, schema, set_default=False)
 
 
 def blocks_of(schema):

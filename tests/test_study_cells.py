@@ -135,7 +135,8 @@ def test_batches():
 
 
 def test_every_cell_and_block_has_its_own_seed():
-    study = make_study(grids=[grid("all", "all", 1), grid(sensor_sigma_mps2=[1e-3, 3e-3])])
+    more = grid(sensor_sigma_mps2=[1e-3, 3e-3], robot_sigma_mgon=[0, 3.2])
+    study = make_study(grids=[grid("all", "all", 1), more])
     cells = study_cells(study)
     words = {tuple(cell.seed(1, block).generate_state(4)) for cell in cells for block in range(3)}
     assert len(words) == 3 * len(cells)

@@ -121,6 +121,7 @@ def test_origin_is_in_every_file(tmp_path):
 
 
 def test_commit(monkeypatch):
+    git_commit.cache_clear()
     try:
         head = subprocess.run(
             ["git", "rev-parse", "HEAD"],

@@ -36,7 +36,7 @@ def study(tmp_path_factory):
 @pytest.fixture(scope="module")
 def summary(study):
     table = study["summary"]
-    return table[table["estimable"]]
+    return table[table["n_converged"] > 0]
 
 
 def of(table, cell):
@@ -321,16 +321,24 @@ def test_an_effect_that_the_model_lacks_shows_in_the_tilt(tmp_path):
     assert table.loc[NINE, ["roll_rms_mgon", "pitch_rms_mgon"]].max() < 0.2
 
 
-def test_tilt_of_a_calibrated_sensor(study):
-    """Near level, from the sds of the parameters: σ_φ² = (σ_b/g)² + σ_α², if all else is exact."""
+def test_tilt_of_a_calibrated_sensor(study, tmp_path):
+    """At level σ_φ² = (σ_b/g)² + σ_α²: 11.24 mgon, and as much in pitch."""
+    grids = [grid(replicates=3000, approaches="gravity")]
+    near = {"max_tilt_gon": 0.01, "attitudes": 3}
+    level = run_study(tmp_path, grids=grids, leveling=near)["leveling"].iloc[0]
+    expected = np.hypot(0.70711e-3 / 9.80665 / np.pi * 200e3, 10.264)
+    assert expected == pytest.approx(11.24, abs=0.005)
+    for angle in ("roll", "pitch"):
+        limit = STANDARD_ERRORS / np.sqrt(2 * 3000)
+        assert level[f"{angle}_rms_mgon"] == pytest.approx(expected, rel=limit)
+        # One normal error: 95 % of the calibrations stay below 1.96 σ.
+        q95 = level[f"{angle}_rms_q95_mgon"] / expected
+        density = 2 * np.exp(-(1.96**2) / 2) / np.sqrt(2 * np.pi)
+        assert abs(q95 - 1.96) < STANDARD_ERRORS * np.sqrt(0.95 * 0.05 / 3000) / density
+
     table = study["leveling"].set_index("cell")
-    rms = table.loc[f"{MCLAREN}/gravity", "roll_rms_mgon"]
-    level = np.hypot(0.7071e-3 / 9.80665 / np.pi * 200e3, 10.264)
-    assert rms > level  # up to 50 gon of tilt scales and further angles come in
-    assert rms < 2 * level
     gravity, robot = (table.loc[f"{MCLAREN}/{name}"] for name in ("gravity", "robot"))
-    assert (robot.filter(like="rms") < gravity.filter(like="rms")).all()
-    assert (table["roll_rms_q95_mgon"] > table["roll_rms_mgon"]).all()
+    assert (robot.filter(like="_rms") < gravity.filter(like="_rms")).all()
 
 
 def test_units_and_truth(summary):

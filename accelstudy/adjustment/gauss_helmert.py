@@ -31,8 +31,8 @@ PIVOT_TOLERANCE = 1e-12
 """A normal matrix, scaled to unit diagonal, is singular when a Cholesky pivot is below this."""
 
 # glibc hands blocks above a threshold back to the system as soon as they are freed, and to fetch
-# them again page by page in each iteration costs a quarter of the time. Freeing one large block, never
-# touched, raises the threshold (mallopt(3), M_MMAP_THRESHOLD). Elsewhere it does nothing.
+# them again page by page in each iteration costs a quarter of the time. Freeing one large block,
+# never touched, raises the threshold (mallopt(3), M_MMAP_THRESHOLD). Elsewhere it does nothing.
 np.empty(31 << 20, dtype=np.uint8)
 
 
