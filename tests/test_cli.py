@@ -1,0 +1,198 @@
+"""The command line: what it lists, and that bad input ends with one line and exit status 2."""
+
+import re
+import subprocess
+import sys
+
+import pandas as pd
+import pytest
+import yaml
+from click.testing import CliRunner
+from study_helpers import NINE, PROVENANCE, content, grid
+
+import accelstudy
+from accelstudy.cli import main
+from accelstudy.effects import effect_names
+from accelstudy.errors import InputError
+from accelstudy.models import MODELS, PRESETS, get_model
+from accelstudy.schemes import get_scheme, scheme_families, scheme_names
+from accelstudy.study.tables import write_table
+
+
+def call(*arguments):
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+def output(*arguments):
+    result = call(*arguments)
+    assert result.exit_code == 0, result.output
+    assert result.stderr == ""
+    return result.stdout
+
+
+def test_version():
+    assert output("--version").split()[-1] == accelstudy.__version__
+
+
+def test_help_names_every_command():
+    text = output("--help")
+    for name in main.commands:
+        assert re.search(rf"^  {name} ", text, re.MULTILINE)
+        assert "Usage:" in output(name, "--help")
+
+
+# --- schemes -------------------------------------------------------------------------------------
+
+
+def rows_of(text, names):
+    return {
+        line.split()[0]: line.split() for line in text.splitlines() if line.strip() and
+        line.split()[0] in names
+    }  # fmt: skip
+
+
+def test_schemes_with_every_model_and_approach():
+    wanted = ("faces-6", "mclaren-24", "random-20-7")
+    for model in MODELS:
+        u = get_model(model).n_parameters
+        for approach, conditions in (("gravity", 1), ("robot", 3)):
+            text = output("schemes", "--model", model, "--approach", approach, *wanted)
+            assert f"model {model}, approach {approach}" in text
+            rows = rows_of(text, wanted)
+            assert [*rows] == [*wanted]
+            for name, row in rows.items():
+                n = get_scheme(name).n_positions
+                assert int(row[1]) == n
+                assert row[3].endswith(f"/{u}")
+                assert int(row[5]) == conditions * n - u
+
+
+def test_all_schemes_by_default():
+    text = output("schemes")
+    assert [*rows_of(text, scheme_names())] == [*scheme_names()]
+    for family in scheme_families():
+        assert family in text
+    faces = rows_of(text, scheme_names())["faces-6"]
+    assert faces[3:5] == ["6/9", "-"]
+    assert faces[-3:] == ["alpha_yz,", "alpha_zy,", "alpha_zx"]
+    assert rows_of(text, scheme_names())["mclaren-24"][6] == "0.0667"  # m = 1/15
+
+
+def test_directions_of_a_scheme():
+    text = output("scheme", "faces-6")
+    head, *table = text.splitlines()
+    assert head.startswith("# ")
+    assert get_scheme("faces-6").source in head
+    assert table[0] == "position,x,y,z,roll_gon,pitch_gon"
+    numbers = pd.DataFrame([line.split(",") for line in table[1:]]).astype(float)
+    assert numbers.shape == (6, 6)
+    assert (numbers.iloc[:, 1:4] ** 2).sum(axis=1).tolist() == pytest.approx(6 * [1])
+    level = numbers[numbers[3] == 1].iloc[0]  # z down
+    assert level[[4, 5]].tolist() == pytest.approx([0, 0])
+    nose = numbers[numbers[1] == 1].iloc[0]  # x down
+    assert nose[5] == pytest.approx(-100)
+
+
+# --- models and effects --------------------------------------------------------------------------
+
+
+def test_models():
+    text = output("models")
+    for name in MODELS:
+        model = get_model(name)
+        line = f"{name} ({model.n_parameters}): {', '.join(model.parameter_names)}"
+        assert line in text.splitlines()
+    for preset in PRESETS:
+        assert re.search(f"{re.escape(preset.source)} +{preset.model} in {preset.scheme}$", text, 8)
+    assert "s_x, s_y, s_z" in text
+
+
+def test_effects():
+    text = output("effects")
+    for name in effect_names():
+        assert re.search(rf"^{name}: \w+ \[.+\]", text, re.MULTILINE)
+    assert "bias: b_x [mm/s^2], b_y [mm/s^2], b_z [mm/s^2]" in text
+    assert "nonorthogonality: alpha_yz [mgon], alpha_zy [mgon], alpha_zx [mgon]" in text
+
+
+# --- a study -------------------------------------------------------------------------------------
+
+
+def test_cells(tmp_path):
+    base, over = tmp_path / "base.yaml", tmp_path / "over.yaml"
+    base.write_text(yaml.safe_dump(content(grids=[grid(schemes=["faces-6", "mclaren-24"])])))
+    lines = output("cells", base).splitlines()
+    assert len(lines) == 4
+    assert f"{NINE}/mclaren-24/gravity: r = 15, 60 replicates" in lines
+    assert f"{NINE}/mclaren-24/robot: r = 63, 60 replicates" in lines
+    assert lines[0].startswith(f"{NINE}/faces-6/gravity: rank 6 of 9: alpha_yz, ")
+    over.write_text(yaml.safe_dump({"grids": [grid(approaches="robot", replicates=7)]}))
+    assert output("cells", base, over) == f"{NINE}/mclaren-24/robot: r = 63, 7 replicates\n"
+
+
+def test_claims(tmp_path):
+    row = {
+        "claim": "c", "section": "4.2", "statement": "it holds", "unit": "%", "paper": 50.0,
+        "ours": 41.25, "ci95_low": 40.0, "ci95_high": 42.0, "verdict": "reproduced",
+        "sentence": "So it is.",
+    }  # fmt: skip
+    write_table(tmp_path / "claims.parquet", pd.DataFrame([row]), PROVENANCE)
+    assert output("claims", tmp_path).splitlines()[2:] == [
+        "| 4.2 | it holds | 50.0 % | 41.2 % (40.0 … 42.0) | **reproduced** | So it is. |"
+    ]
+
+
+# --- bad input -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["scheme", "mclaren-42"], "unknown scheme 'mclaren-42'"),
+        (["scheme", "../etc"], "unknown scheme"),
+        (["schemes", "faces-6", "nothing"], "unknown scheme 'nothing'"),
+        (["schemes", "--model", "bias-scales"], "did you mean 'bias-scale'?"),
+        (["schemes", "--approach", "robots"], "did you mean 'robot'?"),
+        (["cells", "/nowhere/study.yaml"], "/nowhere/study.yaml: No such file"),
+        (["claims", "/nowhere"], "/nowhere/claims.parquet: no such file"),
+    ],
+)
+def test_unknown_names_and_files(arguments, expected):
+    result = call(*arguments)
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    assert result.stderr.startswith("error: ")
+    assert expected in result.stderr
+    assert len(result.stderr.splitlines()) == 1
+
+
+def test_usage_errors():
+    for arguments in (["scheme"], ["cells"], ["nothing"], ["schemes", "--nothing"]):
+        result = call(*arguments)
+        assert result.exit_code == 2
+        assert "Usage:" in result.stderr
+
+
+def test_a_defect_is_not_taken_for_bad_input(monkeypatch):
+    """Only InputError is the user's to mend."""
+
+    def broken(name):
+        raise ValueError("a defect")
+
+    monkeypatch.setattr("accelstudy.schemes.get_scheme", broken)
+    assert isinstance(call("scheme", "faces-6").exception, ValueError)
+    monkeypatch.setattr(
+        "accelstudy.schemes.get_scheme", lambda name: (_ for _ in ()).throw(InputError("bad"))
+    )
+    assert call("scheme", "faces-6").stderr == "error: bad\n"
+
+
+def test_as_a_program():
+    run = subprocess.run(
+        [sys.executable, "-m", "accelstudy.cli", "scheme", "nothing"],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert run.returncode == 2
+    assert run.stdout == ""
+    assert run.stderr.startswith("error: unknown scheme 'nothing'")
+    assert "Traceback" not in run.stderr

@@ -1,0 +1,349 @@
+"""The workflow end to end: the same content however it is run, and bad input ends in one line."""
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import zipfile
+from pathlib import Path
+
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+import yaml
+from study_helpers import NINE, grid
+
+import accelstudy
+from accelstudy.errors import InputError
+from accelstudy.study import provenance
+from accelstudy.study.provenance import check_writable, code_hash
+from accelstudy.study.tables import TABLES, read_origin, read_table
+
+ROOT = Path(__file__).parents[1]
+CONFIG = ROOT / "config" / "config.yaml"
+SNAKEMAKE = [sys.executable, "-m", "snakemake", "--workflow-profile", ROOT / "profiles" / "default"]
+ENVIRONMENT = {
+    **os.environ,
+    "PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]),
+    "OPENBLAS_NUM_THREADS": "1",
+    "NO_COLOR": "1",
+}
+ENVIRONMENT.pop("SNAKEMAKE_PROFILE", None)
+
+# Two models, two schemes, two approaches: eight cells, of which one cannot be estimated.
+TINY = {
+    "study": "tiny",
+    "paper": False,
+    "sensitivity": None,
+    "presets": None,
+    "leveling": {"attitudes": 20},
+    "grids": [grid(["bias-scale", NINE], ["mclaren-24", "faces-6"], 60, approaches="all")],
+}
+TABLE_PATHS = [f"results/tiny/{name}.parquet" for name in TABLES]
+
+IN_BATCHES = f"""\
+from functools import partial
+
+from accelstudy.study import cells
+
+cells.batches = partial(cells.batches, size=130)
+
+
+include: "{ROOT}/workflow/Snakefile"
+
+
+rule study:
+    default_target: True
+    input:
+        rules.all.input,
+"""
+"""The workflow with batches of two cells."""
+
+
+def command(folder, *arguments, snakefile=ROOT / "Snakefile", cores=2, config=TINY):
+    path = folder / "tiny.yaml"
+    path.write_text(config if isinstance(config, str) else yaml.safe_dump(config))
+    fixed = ["--snakefile", snakefile, "--cores", cores, "--configfile", CONFIG, path]
+    return [str(word) for word in (*SNAKEMAKE, *arguments, *fixed)]
+
+
+def run(folder, *arguments, environment=ENVIRONMENT, **options):
+    """Run Snakemake in a folder; both streams together."""
+    return subprocess.run(
+        command(folder, *arguments, **options),
+        cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        text=True, check=False, timeout=300,
+    )  # fmt: skip
+
+
+def succeed(folder, *arguments, **options):
+    result = run(folder, *arguments, **options)
+    assert result.returncode == 0, result.stdout
+    return result.stdout
+
+
+def refuse(folder, *arguments, **options):
+    """Run what must fail; nothing half-written is left."""
+    result = run(folder, *arguments, **options)
+    assert result.returncode != 0, result.stdout
+    assert "Traceback" not in result.stdout
+    assert remains(folder) == []
+    return result.stdout
+
+
+def remains(folder):
+    return [str(path) for path in folder.rglob("*") if path.name.endswith(".part")]
+
+
+def in_batches(folder):
+    path = folder / "Snakefile"
+    path.write_text(IN_BATCHES)
+    return path
+
+
+def content(folder):
+    """All tables and estimates of a finished study, as they are."""
+    results = folder / "results" / "tiny"
+    tables = {name: read_table(results / f"{name}.parquet") for name in TABLES}
+    estimates = read_table(results / "estimates")
+    labels = dict.fromkeys(("cell", "parameter", "unit"), str)  # coded by file
+    return {**tables, "estimates": estimates.astype(labels)}
+
+
+def assert_same(one, other):
+    assert one.keys() == other.keys()
+    for name, table in one.items():
+        pd.testing.assert_frame_equal(table, other[name], check_exact=True)
+
+
+@pytest.fixture(scope="module")
+def single(tmp_path_factory):
+    """The study run on one core, in one batch, with everything that `all` asks for."""
+    folder = tmp_path_factory.mktemp("single")
+    succeed(folder, cores=1)
+    return folder
+
+
+@pytest.fixture
+def finished(single, tmp_path):
+    """A copy of the finished study, with Snakemake's records of it."""
+    return Path(shutil.copytree(single, tmp_path / "copy"))
+
+
+# --- the same content ----------------------------------------------------------------------------
+
+
+def test_all_is_made(single):
+    results = single / "results" / "tiny"
+    for name in TABLES:
+        table = read_table(results / f"{name}.parquet")
+        assert table["cell"].nunique() == (8 if name in ("cells", "summary") else 7)
+    estimates = read_table(results / "estimates")
+    assert len(estimates) == 60 * (2 * 2 * 6 + 9 + 2 * 9)
+    hashes = {read_origin(path)["config_hash"] for path in results.rglob("*.parquet")}
+    assert len(hashes) == 1
+    assert not list(results.glob("claims*"))
+    assert (results / "logs" / "simulate" / "0000.log").read_text().count(" replicates, ") == 7
+    assert remains(single) == []
+
+
+def test_cores_and_batches_change_nothing(single, tmp_path):
+    succeed(tmp_path, *TABLE_PATHS, snakefile=in_batches(tmp_path), cores=2)
+    assert len(list((tmp_path / "results" / "tiny" / "estimates").iterdir())) == 4
+    assert_same(content(tmp_path), content(single))
+    for path in TABLE_PATHS:
+        assert pq.read_schema(tmp_path / path).equals(pq.read_schema(single / path))
+
+
+def test_a_second_run_does_nothing(single):
+    before = {path: path.stat().st_mtime_ns for path in (single / "results").rglob("*")}
+    assert "Nothing to be done" in succeed(single)
+    assert {path: path.stat().st_mtime_ns for path in (single / "results").rglob("*")} == before
+
+
+def test_killed_and_resumed(single, tmp_path):
+    snakefile = in_batches(tmp_path)
+    estimates = tmp_path / "results" / "tiny" / "estimates"
+    with subprocess.Popen(
+        command(tmp_path, *TABLE_PATHS, snakefile=snakefile),
+        cwd=tmp_path, env=ENVIRONMENT, start_new_session=True,
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    ) as process:  # fmt: skip
+        while not list(estimates.glob("[0-9]*.parquet")):
+            assert process.poll() is None
+            time.sleep(0.02)
+        os.killpg(process.pid, signal.SIGKILL)
+    assert process.returncode == -signal.SIGKILL
+    assert not any((tmp_path / path).exists() for path in TABLE_PATHS)
+    assert len(read_table(estimates)) > 0  # what is there is whole
+
+    locked = run(tmp_path, *TABLE_PATHS, snakefile=snakefile)
+    assert locked.returncode != 0
+    assert "--unlock" in locked.stdout
+    succeed(tmp_path, "--unlock", snakefile=snakefile)
+    succeed(tmp_path, *TABLE_PATHS, snakefile=snakefile)
+    assert_same(content(tmp_path), content(single))
+    assert remains(tmp_path) == []
+
+
+# --- what runs again -----------------------------------------------------------------------------
+
+
+def planned(folder, environment=ENVIRONMENT, config=TINY):
+    """Rules that a dry run would run, with the number of jobs."""
+    text = succeed(folder, "--dry-run", environment=environment, config=config)
+    counts = re.findall(r"^(\w+) +(\d+)$", text.split("Reasons:")[0], re.MULTILINE)
+    return {rule: int(count) for rule, count in counts if rule not in ("study", "total")}
+
+
+def test_dry_run(tmp_path):
+    plan = planned(tmp_path)
+    figures = plan.pop("figure", 0)
+    assert plan == {"simulate": 1, "summarise": 1, "collect": 1}
+    assert figures >= 1
+    assert not (tmp_path / "results").exists()
+
+
+def test_other_attitudes_do_not_simulate_again(finished):
+    plan = planned(finished, config={**TINY, "leveling": {"attitudes": 30}})
+    assert "summarise" in plan
+    assert "simulate" not in plan
+
+
+def test_an_edit_of_the_package_runs_what_depends_on_it(finished, tmp_path):
+    """Snakemake run with a copy of the package."""
+    package = Path(shutil.copytree(accelstudy.__path__[0], tmp_path / "package" / "accelstudy"))
+    environment = {**ENVIRONMENT, "PYTHONPATH": str(package.parent)}
+
+    def edit(name):
+        path = package / name
+        path.write_text(path.read_text() + "\n# an edit\n")
+        return planned(finished, environment)
+
+    drawn = edit("figures/style.py")
+    assert [*drawn] == ["figure"]
+    assert edit("effects/bias.py").keys() >= {"simulate", "summarise", "collect", "figure"}
+
+
+STAGES = ("simulate", "summarise", "sensitivity", "claims", "figures")
+SEVERAL = {*STAGES}
+
+
+@pytest.mark.parametrize(
+    ("name", "stages"),
+    [
+        ("effects/bias.py", SEVERAL),
+        ("approaches/robot.py", SEVERAL),
+        ("schemes/mclaren.py", SEVERAL),
+        ("adjustment/gauss_helmert.py", SEVERAL),
+        ("simulation.py", SEVERAL),
+        ("study/simulate.py", SEVERAL),
+        ("leveling_error.py", {"summarise", "claims", "figures"}),
+        ("closed_forms.py", {"summarise", "claims", "figures"}),
+        ("sensitivity.py", {"sensitivity", "claims", "figures"}),
+        ("figures/style.py", {"figures"}),
+        ("study/claims/base.py", {"claims"}),
+        ("study/claims.html.j2", {"claims"}),
+        ("cli.py", set()),
+    ],
+)
+def test_hash_of_the_code_that_a_stage_uses(name, stages, tmp_path, monkeypatch):
+    package = Path(shutil.copytree(accelstudy.__path__[0], tmp_path / "accelstudy"))
+    before = {stage: code_hash(stage) for stage in STAGES}
+    monkeypatch.setattr(accelstudy, "__file__", str(package / "__init__.py"))
+    assert {stage: code_hash(stage) for stage in STAGES} == before
+    (package / name).write_text((package / name).read_text() + "\n# an edit\n")
+    assert {stage for stage in STAGES if code_hash(stage) != before[stage]} == stages
+
+
+def test_a_new_file_counts_everywhere(tmp_path, monkeypatch):
+    package = Path(shutil.copytree(accelstudy.__path__[0], tmp_path / "accelstudy"))
+    monkeypatch.setattr(accelstudy, "__file__", str(package / "__init__.py"))
+    before = [code_hash(stage) for stage in STAGES]
+    (package / "effects" / "new.py").write_text("")
+    after = [code_hash(stage) for stage in STAGES]
+    assert all(a != b for a, b in zip(after, before, strict=True))
+
+
+# --- bad input -----------------------------------------------------------------------------------
+
+
+def one_line(text, *parts):
+    """The only line with all parts."""
+    (line,) = (line for line in text.splitlines() if all(part in line for part in parts))
+    return line
+
+
+def test_unknown_key_on_the_command_line(tmp_path):
+    text = refuse(tmp_path, "--config", "seeed=1")
+    one_line(text, "tiny.yaml: seeed: unknown key; did you mean 'seed'?", "known: study, seed")
+    assert not (tmp_path / "results").exists()
+
+
+def test_paper_without_what_it_needs(tmp_path):
+    text = refuse(tmp_path, config={**TINY, "paper": True})
+    one_line(text, "tiny.yaml: paper: true needs the block `sensitivity`")
+
+
+def test_a_key_twice(tmp_path):
+    text = refuse(tmp_path, config="study: a\nseed: 1\nstudy: b\n")
+    one_line(text, "tiny.yaml: not valid YAML: line 3, column 1: the key 'study' stands twice")
+
+
+def test_results_is_a_file(tmp_path):
+    (tmp_path / "results").write_text("not a folder")
+    text = refuse(tmp_path)
+    one_line(text, "results/tiny: cannot hold results: ", f"{tmp_path}/results is not a folder")
+    assert (tmp_path / "results").read_text() == "not a folder"
+
+
+def test_results_cannot_be_written(tmp_path, monkeypatch):
+    closed = tmp_path / "closed"
+    closed.mkdir(mode=0o500)
+    if os.geteuid() == 0:  # whom permission bits do not bind
+        monkeypatch.setattr(provenance.os, "access", lambda path, mode: Path(path) != closed)
+    expected = re.escape(f"{closed}/a/b: cannot hold results: {closed} is not writable")
+    with pytest.raises(InputError, match=f"^{expected}$"):
+        check_writable(closed / "a" / "b")
+    check_writable(tmp_path / "a" / "b")
+    assert not (tmp_path / "a").exists()
+
+
+def test_truncated_estimates(finished):
+    results = finished / "results" / "tiny"
+    estimates = results / "estimates" / "0000.parquet"
+    whole = estimates.read_bytes()
+    estimates.write_bytes(whole[: len(whole) // 2])
+    for path in (results / "summary.parquet", results / "batches" / "0000" / "summary.parquet"):
+        path.unlink()
+    text = refuse(finished, *TABLE_PATHS)
+    name = "results/tiny/estimates/0000.parquet"
+    one_line(text, f"error: {name}: not a whole Parquet file", "delete it and run again")
+    assert not (results / "summary.parquet").exists()
+
+    # And so it is.
+    estimates.unlink()
+    succeed(finished, *TABLE_PATHS)
+    assert len(read_table(results / "summary.parquet")) == 2 * 2 * 6 + 2 * 2 * 9
+    assert read_table(estimates).shape[0] == 60 * (2 * 2 * 6 + 9 + 2 * 9)
+
+
+# --- around it -----------------------------------------------------------------------------------
+
+
+def test_lint(tmp_path):
+    assert "Congratulations" in succeed(tmp_path, "--lint")
+
+
+def test_report(finished):
+    succeed(finished, "--report", "report.zip")
+    with zipfile.ZipFile(finished / "report.zip") as archive:
+        assert archive.testzip() is None
+        names = archive.namelist()
+        (page,) = (name for name in names if name.endswith("report.html"))
+        text = archive.read(page).decode()
+    for figure in (finished / "results" / "tiny" / "figures").glob("*.svg"):
+        assert figure.name in text
