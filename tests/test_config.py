@@ -19,8 +19,14 @@ from accelstudy.errors import InputError
 from accelstudy.models import MODELS
 from accelstudy.schemes import scheme_names
 from accelstudy.study.cells import Cell, batches, study_cells
-from accelstudy.study.config import StudyConfig, config_schema, parse_study, read_study
-from accelstudy.study.yaml_layers import overlay, read_layer
+from accelstudy.study.config import (
+    StudyConfig,
+    config_schema,
+    overlay,
+    parse_study,
+    read_layer,
+    read_study,
+)
 from accelstudy.units import GON, MGON
 
 ROOT = Path(__file__).parents[1]

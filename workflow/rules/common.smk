@@ -5,10 +5,9 @@ from snakemake.exceptions import WorkflowError
 from accelstudy.errors import InputError
 from accelstudy.figures import figure_names, figure_tables, get_figure
 from accelstudy.study.cells import batches, study_cells
-from accelstudy.study.config import parse_study
+from accelstudy.study.config import parse_study, read_layer
 from accelstudy.study.provenance import check_writable, code_hash
 from accelstudy.study.tables import TABLES
-from accelstudy.study.yaml_layers import read_layer
 
 try:
     for path in workflow.configfiles:

@@ -33,6 +33,8 @@ rule collect:
     threads: 1
     resources:
         mem_mb=2000,
+    params:
+        code=code_hash("summarise"),
     message:
         "Collect the tables of all batches"
     script:

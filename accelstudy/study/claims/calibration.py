@@ -217,7 +217,10 @@ def _columns(fits: Fits, effect: str) -> list[int]:
 
 
 def _single_runs(evidence: Evidence, scheme: str, effect: str) -> tuple[Array, Array]:
-    """Mean sigma a posteriori of an effect's parameters per simulation: gravity, robot (SI)."""
+    """Mean sigma a posteriori of an effect's parameters per simulation: gravity, robot (SI).
+
+    The two are sessions of their own, paired by number.
+    """
     pair = []
     for approach in ("gravity", "robot"):
         fits = evidence.fits[scheme, approach]

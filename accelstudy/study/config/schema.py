@@ -8,11 +8,10 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Iterable, Sequence
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from accelstudy.approaches import approach_names, get_approach
 from accelstudy.design import diagnose
@@ -22,8 +21,7 @@ from accelstudy.models import MODELS, PRESETS, get_model
 from accelstudy.schemes import get_scheme, scheme_names
 from accelstudy.sensor import SensorModel
 from accelstudy.simulation import Noise, sigma_of_mean
-from accelstudy.study.config_errors import first_error
-from accelstudy.study.config_types import (
+from accelstudy.study.config.types import (
     Count,
     Finite,
     NotNegative,
@@ -34,7 +32,6 @@ from accelstudy.study.config_types import (
     Seed,
     Tilt,
 )
-from accelstudy.study.yaml_layers import overlay, read_layer
 from accelstudy.units import STANDARD_GRAVITY, to_si
 
 CLAIMED_EFFECTS = ("bias", "scale", "nonorthogonality")
@@ -341,44 +338,3 @@ def _known_approaches(names: Sequence[str]) -> list[str]:
     if list(names) == ["all"]:
         return list(approach_names())
     return [get_approach(name).name for name in names]
-
-
-def parse_study(content: Mapping[str, Any], source: str = "config") -> StudyConfig:
-    """Check a configuration.
-
-    Parameters
-    ----------
-    content : mapping, as read from YAML
-    source : str, named in errors
-
-    Raises
-    ------
-    InputError
-        One line that names the source, the key, what is wrong and what would be right.
-    """
-    try:
-        return StudyConfig.model_validate(content)
-    except ValidationError as error:
-        raise InputError(f"{source}: {first_error(error, StudyConfig)}") from None
-
-
-def read_study(*paths: str | Path) -> StudyConfig:
-    """Read a configuration from YAML files; later ones overlay earlier ones key by key.
-
-    Raises
-    ------
-    InputError
-        If a file cannot be read, is no YAML mapping, or does not fit the schema.
-    """
-    content: dict[str, Any] = {}
-    for path in paths:
-        content = overlay(content, read_layer(path))
-    return parse_study(content, ", ".join(str(path) for path in paths))
-
-
-def config_schema() -> dict[str, Any]:
-    """JSON schema of the configuration, as kept in `workflow/schemas/config.schema.json`."""
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        **StudyConfig.model_json_schema(),
-    }
