@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 
 from accelstudy import __version__
+from accelstudy.campaign.commands import COMMANDS
 from accelstudy.errors import InputError
 
 
@@ -33,7 +34,8 @@ class Commands(click.Group):
 def main() -> None:
     """Monte Carlo study of accelerometer calibration for leveling.
 
-    `snakemake --cores 2` runs the study; these commands show what it can be made of.
+    `snakemake --cores 2` runs the study; these commands show what it can be made of, and calibrate
+    measured data with the same adjustment.
     """
 
 
@@ -159,6 +161,9 @@ def claims(results: Path) -> None:
 
     click.echo(claims_markdown(read_table(results / "claims.parquet")), nl=False)
 
+
+for command in COMMANDS:
+    main.add_command(command)
 
 if __name__ == "__main__":
     main()

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment import whitened_jacobian
 from accelstudy.approaches import Approach
+from accelstudy.effects import Hold
+from accelstudy.errors import InputError
 from accelstudy.schemes import Scheme, get_scheme
 from accelstudy.sensor import SensorModel
 from accelstudy.simulation import Noise, session
@@ -65,6 +67,7 @@ def diagnose(
     noise: Noise | None = None,
     parameters: Array | None = None,
     gravity: float = STANDARD_GRAVITY,
+    hold: Hold | None = None,
 ) -> Design:
     """Diagnose what a scheme determines.
 
@@ -79,26 +82,26 @@ def diagnose(
     noise : Noise, optional
     parameters : (u,) array, SI, optional; the ideal sensor by default
     gravity : float, m/s²
+    hold : Hold, optional
+        What a session knows of its positions beyond their directions (temperature, time, …).
     """
     noise = noise or Noise()
     ideal = np.zeros(model.n_parameters)
     names = (*model.parameter_names, "g") if noise.sigma_gravity > 0 else model.parameter_names
-    a = _design(scheme, model, approach, noise, ideal, gravity)
+    a = _design(scheme, model, approach, noise, ideal, gravity, hold)
     rank, condition, free = _rank(a)
     not_estimable = tuple(name for name, is_free in zip(names, free, strict=True) if is_free)
     reason = ""
     cofactors = np.full((len(names), len(names)), np.nan)
     if not_estimable:
-        everywhere = get_scheme("fibonacci-60")
-        best_rank, *_ = _rank(_design(everywhere, model, approach, noise, ideal, gravity))
-        blind = best_rank < len(names)
+        blind = _is_blind(model, approach, noise, gravity)
         reason = (
             f"rank {rank} of {len(names)}: {', '.join(not_estimable)} cannot be told apart by "
             + (f"the {approach.name} approach in any scheme" if blind else "these positions")
         )
     else:
         at = ideal if parameters is None else np.asarray(parameters, dtype=float)
-        a = _design(scheme, model, approach, noise, at, gravity)
+        a = _design(scheme, model, approach, noise, at, gravity, hold)
         scale = np.linalg.norm(a, axis=0)
         cofactors = np.linalg.inv((a / scale).T @ (a / scale)) / np.outer(scale, scale)
     return Design(
@@ -121,10 +124,21 @@ def _design(
     noise: Noise,
     parameters: Array,
     gravity: float,
+    hold: Hold | None = None,
 ) -> Array:
     """Design matrix (conditions, u) with unit weights."""
-    ideal = session(model, parameters, scheme.directions, gravity)
+    ideal = session(model, parameters, scheme.directions, gravity, hold)
     return whitened_jacobian(model, approach, ideal.observations(noise), parameters)
+
+
+def _is_blind(model: SensorModel, approach: Approach, noise: Noise, gravity: float) -> bool:
+    """Whether not even many positions all around determine the model."""
+    try:
+        ideal = np.zeros(model.n_parameters)
+        a = _design(get_scheme("fibonacci-60"), model, approach, noise, ideal, gravity)
+    except InputError:  # it depends on more than directions
+        return False
+    return _rank(a)[0] < a.shape[1]
 
 
 def _rank(a: Array) -> tuple[int, float, NDArray[np.bool_]]:

@@ -43,6 +43,7 @@ class Observations:
     gravity : float or (R,) array, m/s²; one number where it is held fixed
     sigma_gravity : float, m/s²; 0 holds gravity fixed
     hold : Hold, what else is known of the positions
+    initial : (u,) array, SI, initial values of the model's parameters; an ideal sensor if None
     """
 
     forces: Array
@@ -52,6 +53,7 @@ class Observations:
     gravity: ArrayLike = STANDARD_GRAVITY
     sigma_gravity: float = 0.0
     hold: Hold | None = None
+    initial: Array | None = None
 
     def first(self, replicates: int) -> Observations:
         """Return the first `replicates` sessions; all if there are fewer."""
@@ -227,6 +229,8 @@ class _Problem:
         equations = equations_of(model, approach, with_gravity)
         initial = np.zeros((len(forces), len(equations.parameters)))
         weights = np.zeros(len(equations.parameters))
+        if observed.initial is not None:
+            initial[:, : model.n_parameters] = observed.initial
         if with_gravity:
             initial[:, -1] = observed.gravity
             weights[-1] = observed.sigma_gravity**-2

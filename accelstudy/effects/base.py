@@ -56,7 +56,7 @@ class Hold:
 
     Parameters
     ----------
-    temperature : (n,) array, K above the reference temperature
+    temperature : (n,) array, °C or K above any reference, which the bias absorbs
     time : (n,) array, s since the start of the session
     vibration : (n,) array, m/s², rms during the hold
     roll, pitch, yaw : (n,) arrays, rad, attitude known from outside

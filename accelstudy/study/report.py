@@ -12,6 +12,8 @@ def number(value: float) -> str:
     """Show a number with three significant digits; a dash where there is none."""
     if math.isnan(value):
         return "–"
+    if math.isinf(value):
+        return "∞" if value > 0 else "−∞"
     if value == 0:
         return "0"
     digits = max(0, 2 - math.floor(math.log10(abs(value))))

@@ -27,6 +27,9 @@ def read_layer(path: str | Path) -> dict[str, Any]:
         raise InputError(f"{path}: not valid YAML: nested too deeply") from None
     except yaml.MarkedYAMLError as error:
         raise InputError(f"{path}: not valid YAML: {_where(error)}") from None
+    except (LookupError, TypeError, AttributeError):
+        # PyYAML trips over explicit tags that do not fit their value, such as !!int "".
+        raise InputError(f"{path}: not valid YAML: a tag does not fit its value") from None
     except (yaml.YAMLError, ValueError) as error:  # an impossible date, say
         line = " ".join(str(error).split())
         raise InputError(f"{path}: not valid YAML: {line}") from None

@@ -1,0 +1,46 @@
+"""Quality of a calibration: tests, redundancy, reliability, held-out errors, components."""
+
+from accelstudy.adjustment.quality.components import (
+    VarianceComponents,
+    variance_components,
+)
+from accelstudy.adjustment.quality.positions import (
+    PositionTests,
+    Suspect,
+    holm,
+    position_tests,
+    select,
+    suspects,
+)
+from accelstudy.adjustment.quality.prediction import HeldOut, held_out
+from accelstudy.adjustment.quality.redundancy import (
+    Redundancy,
+    Reliability,
+    noncentrality,
+    redundancy_numbers,
+    reliability,
+)
+from accelstudy.adjustment.quality.solution import Solution, solve
+from accelstudy.adjustment.quality.whole_model import GlobalTest, global_test
+
+__all__ = [
+    "GlobalTest",
+    "HeldOut",
+    "PositionTests",
+    "Redundancy",
+    "Reliability",
+    "Solution",
+    "Suspect",
+    "VarianceComponents",
+    "global_test",
+    "held_out",
+    "holm",
+    "noncentrality",
+    "position_tests",
+    "redundancy_numbers",
+    "reliability",
+    "select",
+    "solve",
+    "suspects",
+    "variance_components",
+]

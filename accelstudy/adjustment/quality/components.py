@@ -1,0 +1,137 @@
+"""Variance components: whether accelerometer and robot are as accurate as they are assumed to be.
+
+With M = M₀ + Σ θ_i M_i the variance of the misclosures w, M_i = B Q_i Bᵀ, and
+
+    W = M⁻¹ − M⁻¹ A (Aᵀ M⁻¹ A)⁻¹ Aᵀ M⁻¹,   q_i = wᵀ W M_i W w,   S_ij = tr(W M_i W M_j),
+
+the factors θ on the a-priori variances obey S θ = q − S₀, iterated (Helmert; Koch 1999, chapter 3).
+θ_i q_i is the share of group i in Ω, and θ_i tr(W M_i) its share r_i in the redundancy. Where
+Helmert's step would leave the positive numbers, Förstner's (1979, Ein Verfahren zur Schätzung von
+Varianz- und Kovarianzkomponenten), θ_i ← θ_i · (θ_i q_i / r_i), is taken: it has the same fixed
+point and cannot. A component that is not there runs to zero, never below.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.adjustment.calibration import Observations
+from accelstudy.adjustment.quality.solution import Solution, solve
+from accelstudy.approaches import Approach
+from accelstudy.sensor import SensorModel
+
+Array = NDArray[np.float64]
+
+MAX_STEPS = 300
+MAX_FITS = 10
+STEP = 1e-6
+"""Convergence with given derivatives: a step below this fraction of a standard deviation."""
+REFIT = 1e-3
+"""Convergence with adjustments repeated, likewise."""
+
+
+@dataclass(frozen=True)
+class VarianceComponents:
+    """Factors on the variances of two groups, the accelerometer and the robot.
+
+    Attributes
+    ----------
+    factors : (2,) array, on σ² of the forces and of the angles; 1 if the a-priori values are right
+    sigma : (2,) array, standard deviations of the factors, √(2 S⁻¹), at the estimate
+    redundancy : (2,) array, shares of the groups in r
+    converged : bool
+    """
+
+    factors: Array
+    sigma: Array
+    redundancy: Array
+    converged: bool
+
+
+def variance_components(
+    model: SensorModel, approach: Approach, observed: Observations
+) -> VarianceComponents | None:
+    """Estimate the variance components of one session; None if there are no two to estimate.
+
+    Forces alone (no robot), a group that is free of noise, and positions that cannot separate the
+    two leave nothing to estimate. The factors are unbiased only as long as they stay clear of zero:
+    where one of them has a standard deviation of its own size it is often cut off there, and its
+    mean is too large.
+
+    Parameters
+    ----------
+    model, approach, observed : as in `calibrate`, one session
+
+    Raises
+    ------
+    InputError
+        If the session has no solution.
+    """
+    if not (approach.uses_angles and np.any(observed.sigma_angle)):
+        return None
+    solution = solve(model, approach, observed)
+    variances = solution.variances
+    groups = np.zeros((2, *variances.shape))
+    groups[0, :, :3], groups[1, :, 3:] = variances[:, :3], variances[:, 3:]
+
+    found = _estimate(solution, groups, np.ones(2))
+    for _ in range(MAX_FITS):
+        if found is None:
+            return None
+        # The derivatives are taken at adjusted observations, which depend on the weights.
+        force, angle = np.sqrt(found.factors)
+        rescaled = replace(
+            observed,
+            sigma_force=force * np.asarray(observed.sigma_force),
+            sigma_angle=angle * np.asarray(observed.sigma_angle),
+        )
+        before = found
+        found = _estimate(solve(model, approach, rescaled), groups, before.factors)
+        if found is not None and np.all(
+            np.abs(found.factors - before.factors) <= REFIT * found.sigma
+        ):
+            return found
+    return None if found is None else replace(found, converged=False)
+
+
+def _estimate(solution: Solution, groups: Array, factors: Array) -> VarianceComponents | None:
+    """Estimate the factors with the derivatives of one solution; None if S is singular."""
+    n, c, u = solution.jac_parameters.shape
+    b = solution.jac_observations
+    rows, errors = solution.prior
+    a = np.concatenate([solution.jac_parameters.reshape(n * c, u), rows])
+    w = np.concatenate([solution.misclosures.ravel(), errors])
+    m = np.zeros((2, len(w), len(w)))
+    for matrix, q in zip(m, groups, strict=True):
+        position = np.einsum("nco,no,ndo->ncd", b, q, b)
+        for i, block in enumerate(position):
+            matrix[i * c : (i + 1) * c, i * c : (i + 1) * c] = block
+    known = np.diag(np.arange(len(w)) >= n * c).astype(float)  # observed gravity keeps its weight
+    a = a / np.linalg.norm(a, axis=0)
+
+    for _ in range(MAX_STEPS):
+        inverse = np.linalg.inv(known + np.tensordot(factors, m, 1))
+        weighted = inverse @ a
+        projected = inverse - weighted @ np.linalg.solve(a.T @ weighted, weighted.T)
+        wm = projected @ m
+        s = np.einsum("iab,jba->ij", wm, wm)
+        pw = projected @ w
+        share = np.einsum("a,iab,b->i", pw, m, pw)
+        trace = np.einsum("iaa->i", wm)
+        length = np.sqrt(np.diag(s))
+        if not np.all(length > 0) or np.linalg.cond(s / np.outer(length, length)) > 1e10:
+            return None
+        covariance = 2 * np.linalg.inv(s)
+        target = np.linalg.solve(s, share - np.einsum("iab,ba->i", wm, projected @ known))
+        if np.any(target <= 0):
+            # Förstner's step alone would creep towards zero where that is the solution.
+            target = factors * np.minimum(share / trace, np.where(target <= 0, 0.5, np.inf))
+        step = target - factors
+        factors = target
+        sigma = np.sqrt(np.diag(covariance))
+        if np.all(np.abs(step) <= STEP * sigma):
+            return VarianceComponents(factors, sigma, factors * trace, True)
+    return VarianceComponents(factors, sigma, factors * trace, False)

@@ -1,0 +1,127 @@
+"""How well positions are predicted that were not used."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.adjustment.calibration import Observations, _Problem
+from accelstudy.adjustment.gauss_helmert import (
+    ConditionEquations,
+    Linearisation,
+    adjust,
+)
+from accelstudy.approaches import Approach
+from accelstudy.leveling import roll_pitch
+from accelstudy.sensor import SensorModel
+
+Array = NDArray[np.float64]
+
+NEAR_POLE = 0.1
+"""Cosine of pitch below which an error of roll says nothing of the tilt."""
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """How well each position is predicted by a calibration from all others.
+
+    Attributes
+    ----------
+    misclosures : (n, c) array, m/s², |f_b| − g, or f_b less the force in the robot's attitude; NaN
+        where the others do not determine the parameters
+    cofactors : (n, c, c) array, (m/s²)², covariance matrices a priori of the misclosures
+    angles : (n, 2) array, rad, calibrated roll and pitch less the robot's; None without a robot.
+        NaN in roll where the x axis is nearly vertical
+    """
+
+    misclosures: Array
+    cofactors: Array
+    angles: Array | None
+
+    @property
+    def n_predicted(self) -> int:
+        """Number of positions that could be predicted; the rms are over these."""
+        return int(np.count_nonzero(~np.isnan(self.misclosures[:, 0])))
+
+    @property
+    def rms(self) -> float:
+        """Rms of |misclosure|, m/s²."""
+        return float(_rms(np.linalg.norm(self.misclosures, axis=1)))
+
+    @property
+    def rms_angles(self) -> Array | None:
+        """Rms of roll and of pitch, rad, (2,)."""
+        return None if self.angles is None else np.array([_rms(a) for a in self.angles.T])
+
+
+def _rms(values: Array) -> float:
+    known = values[~np.isnan(values)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
+
+
+def held_out(model: SensorModel, approach: Approach, observed: Observations) -> HeldOut | None:
+    """Leave each position out in turn, calibrate, and predict it; None if r < c.
+
+    Parameters
+    ----------
+    model, approach, observed : as in `calibrate`, one session
+    """
+    problem = _Problem.of(model, approach, observed)
+    n, c, u = observed.forces.shape[1], approach.n_conditions, len(problem.weights)
+    if n * c + np.count_nonzero(problem.weights) - u < c:
+        return None
+    forces = np.repeat(np.moveaxis(problem.observations[..., :3], -1, 0), n, axis=1)
+    initial = np.repeat(np.pad(problem.initial, ((0, 0), (0, c))), n, axis=0)
+    result = adjust(
+        _WithoutOne(problem.conditions, c),
+        np.repeat(problem.observations, n, axis=0),
+        problem.cofactors,
+        initial,
+        parameter_observations=initial,
+        parameter_weights=np.pad(problem.weights, (0, c)),
+        latent=np.concatenate([forces, np.eye(n)[None]]),
+    )
+    misclosures = -result.parameters[:, u:]
+    angles = None
+    if approach.uses_angles:
+        x = result.parameters[:, : model.n_parameters]
+        g = result.parameters[:, u - 1] if problem.weights.any() else problem.conditions.gravity
+        each = np.arange(n)
+        f_b = model.correct(observed.forces[0], x, g, observed.hold)[each, each]
+        angles = _attitude_error(f_b, f_b - misclosures)
+    return HeldOut(misclosures, result.cofactors[:, u:, u:], angles)
+
+
+@dataclass(frozen=True)
+class _WithoutOne:
+    """Condition equations in which replicate i does without position i, all of equal shape.
+
+    Instead of being removed, the conditions of the position get an unknown shift each, the last c
+    parameters. It takes up all that the position says, and ends as minus what the others predict
+    for its misclosure. Which position that is, the last row of `latent` marks.
+    """
+
+    conditions: ConditionEquations
+    n_conditions: int
+
+    def linearise(self, parameters: Array, adjusted: Array, latent: Array) -> Linearisation:
+        c, left_out = self.n_conditions, latent[-1]
+        at = self.conditions.linearise(parameters[:-c], adjusted, latent[:-1])
+        shifts = np.eye(c)[:, :, None, None] * left_out
+        carried = () if at.latent is None else at.latent
+        return Linearisation(
+            at.psi + parameters[-c:, :, None] * left_out,
+            np.concatenate([at.jac_parameters, shifts], axis=1),
+            at.jac_observations,
+            np.concatenate([carried, left_out[None]]),
+        )
+
+
+def _attitude_error(f: Array, reference: Array) -> Array:
+    """Roll and pitch of `f` less those of `reference`, (n, 2), roll wrapped into ±π."""
+    (roll, pitch), (roll_0, pitch_0) = roll_pitch(tuple(f.T)), roll_pitch(tuple(reference.T))
+    roll = (roll - roll_0 + np.pi) % (2 * np.pi) - np.pi
+    roll = np.where(np.cos(pitch_0) < NEAR_POLE, np.nan, roll)
+    return np.stack([roll, pitch - pitch_0], axis=-1)

@@ -1,0 +1,124 @@
+"""Redundancy numbers, and what the tests of positions do not find."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize, stats
+
+from accelstudy.adjustment.quality.solution import Solution
+from accelstudy.effects import Hold
+from accelstudy.leveling import jacobian, roll_pitch
+from accelstudy.leveling_error import cap_forces
+from accelstudy.units import GON
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Redundancy:
+    """Shares of the observations in the redundancy; with that of gravity they sum up to r.
+
+    Attributes
+    ----------
+    observations : (n, o) array, diagonal of Q_vv Q⁻¹; 0 shows nothing of an error, 1 all of it
+    positions : (n,) array, their sums, which are the traces of R
+    gravity : float, of the observed gravity; None where it is fixed
+    """
+
+    observations: Array
+    positions: Array
+    gravity: float | None
+
+
+def redundancy_numbers(solution: Solution) -> Redundancy:
+    """Redundancy numbers of observations and positions (Baarda 1968; Koch 1999, chapter 4)."""
+    b = np.linalg.solve(solution.whitening, solution.jac_observations)
+    # v = −Q B̃ᵀ e, so that Q_vv Q⁻¹ = Q B̃ᵀ R B̃, which also holds for an observation without noise.
+    shares = solution.variances * np.einsum("nco,ncd,ndo->no", b, solution.blocks, b)
+    return Redundancy(
+        observations=shares,
+        positions=np.einsum("ncc->n", solution.blocks),
+        gravity=float(solution.projector[-1, -1]) if len(solution.prior[1]) else None,
+    )
+
+
+@dataclass(frozen=True)
+class Reliability:
+    """What the tests of positions do not find; infinite where a position is not controlled.
+
+    Attributes
+    ----------
+    noncentrality : float, λ0
+    mdb : (n, c) array, m/s², minimal detectable error of |f_b| (gravity-based) or semi-axes of the
+        ellipsoid of barely detectable errors of the vector f_b, ascending (robot)
+    parameters : (n, u) array, SI, largest effect of such an error on each parameter
+    leveling : (n, 2) array, rad, largest effect on roll and on pitch, rms over all tilts up to
+        `max_tilt`
+    """
+
+    noncentrality: float
+    mdb: Array
+    parameters: Array
+    leveling: Array
+
+
+def noncentrality(dof: int, alpha: float = 0.001, power: float = 0.8) -> float:
+    """λ0 at which a χ² test of level `alpha` has `power`; 17.075 by default for one dof."""
+    critical = stats.chi2.isf(alpha, dof)
+    return float(optimize.brentq(lambda x: stats.ncx2.sf(critical, dof, x) - power, 1e-6, 1e3))
+
+
+def reliability(
+    solution: Solution,
+    alpha: float = 0.001,
+    power: float = 0.8,
+    max_tilt: float = 50 * GON,
+    attitudes: int = 64,
+) -> Reliability:
+    """Minimal detectable errors and their effects (Baarda 1968; Teunissen 2006).
+
+    Leveling is taken at the reference temperature, at time zero, without vibration and without a
+    change of position, where effects depend on such things.
+
+    Parameters
+    ----------
+    solution : Solution
+    alpha, power : float, of the single test
+    max_tilt : float, rad
+    attitudes : int, number of attitudes over which leveling is averaged
+    """
+    n, c = solution.misclosures.shape
+    root, rank = solution.root
+    lambda0 = noncentrality(c, alpha, power)
+
+    # Barely detectable errors are ∇ = √λ0 L H s with a unit vector s; maxima are over s.
+    axes = np.linalg.svd(solution.whitening @ root, compute_uv=False)[:, ::-1]
+    a = solution.design[: n * c].reshape(n, c, -1)
+    on_parameters = solution.cofactors @ np.swapaxes(a, 1, 2) @ root
+    slope = _leveling_slope(solution, max_tilt, attitudes)
+    on_leveling = np.einsum("kau,nuc->nakc", slope, on_parameters[:, : slope.shape[-1]])
+    largest = np.linalg.svd(on_leveling, compute_uv=False)[..., 0] / np.sqrt(attitudes)
+
+    def scaled(values: NDArray[np.floating]) -> Array:
+        return np.where((rank == c)[:, None], np.sqrt(lambda0) * values, np.inf)
+
+    return Reliability(
+        noncentrality=lambda0,
+        mdb=scaled(axes),
+        parameters=scaled(np.linalg.norm(on_parameters, axis=-1)),
+        leveling=scaled(largest),
+    )
+
+
+def _leveling_slope(solution: Solution, max_tilt: float, attitudes: int) -> Array:
+    """Derivatives of roll and pitch by the model's parameters, (k, 2, u)."""
+    model, g = solution.model, solution.gravity
+    p = solution.parameters[: model.n_parameters]
+    f_b = cap_forces(max_tilt, attitudes, g)
+    roll, pitch = roll_pitch(tuple(f_b.T))
+    at_rest = dict.fromkeys(Hold.columns(), np.zeros(attitudes))
+    hold = Hold(**{**at_rest, "roll": roll, "pitch": pitch})
+    return jacobian(f_b) @ model.correction_jacobian(model.sense(f_b, p, g, hold), p, g, hold)

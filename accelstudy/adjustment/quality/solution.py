@@ -1,0 +1,166 @@
+"""How good one calibration is: tests, redundancy, reliability and held-out errors.
+
+All of it follows from the adjustment linearised at its solution, A dx + B v + w = 0. Scaled to unit
+weight with B Q Bᵀ = L Lᵀ, the misclosures are e = L⁻¹ w = R ε with the projector
+
+    R = I − Ã (Ãᵀ Ã)⁻¹ Ãᵀ,   Ã = L⁻¹ A,   ε ~ N(0, σ0² I),
+
+so that eᵀe = Ω and tr R = r. A gross error shifts the conditions of its position by ∇ and e by
+R L⁻¹ ∇. In the gravity-based approach one condition covers the three forces of a position, which no
+test can tell apart: here positions are tested, not single observations.
+
+Sources: Baarda (1968), A testing procedure for use in geodetic networks; Pope (1976), The
+statistics of residuals and the detection of outliers; Koch (1999), Parameter estimation and
+hypothesis testing in linear models; Teunissen (2006), Testing theory; Holm (1979).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.adjustment.calibration import Observations, _Problem, calibrate
+from accelstudy.adjustment.gauss_helmert import (
+    Adjustment,
+)
+from accelstudy.approaches import Approach
+from accelstudy.errors import InputError
+from accelstudy.sensor import SensorModel
+
+Array = NDArray[np.float64]
+
+CONTROLLED = 1e-6
+"""A direction of a position whose redundancy is below this is checked by no other position."""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """One calibrated session, linearised at its solution; n positions of c conditions.
+
+    Attributes
+    ----------
+    model, approach, observed : what was calibrated, R = 1
+    parameters : (u,) array, SI; gravity last, if it is observed
+    gravity : float, m/s², estimated or fixed
+    cofactors : (u, u) array, Q_xx
+    residuals : (n, o) array, v, in m/s² and rad
+    variances : (n, o) array, diagonal of Q, (m/s²)² and rad²
+    jac_parameters : (n, c, u) array, A
+    jac_observations : (n, c, o) array, B
+    misclosures : (n, c) array, w = ψ(l + v, x) − B v, m/s²; what the raw readings lack of ψ = 0
+    prior : (k, u) array and (k,) array, rows of unit weight of Ã and of e for observed gravity;
+        k is 0 or 1
+    omega : float, Ω
+    redundancy : int, r
+    """
+
+    model: SensorModel
+    approach: Approach
+    observed: Observations
+    parameters: Array
+    gravity: float
+    cofactors: Array
+    residuals: Array
+    variances: Array
+    jac_parameters: Array
+    jac_observations: Array
+    misclosures: Array
+    prior: tuple[Array, Array]
+    omega: float
+    redundancy: int
+
+    @cached_property
+    def whitening(self) -> Array:
+        """L of each position, (n, c, c)."""
+        b = self.jac_observations
+        return np.linalg.cholesky(np.einsum("nco,no,ndo->ncd", b, self.variances, b))
+
+    @cached_property
+    def design(self) -> Array:
+        """Ã, (n c + k, u)."""
+        a = np.linalg.solve(self.whitening, self.jac_parameters)
+        return np.concatenate([a.reshape(-1, a.shape[-1]), self.prior[0]])
+
+    @cached_property
+    def errors(self) -> Array:
+        """Misclosures e of unit weight, (n c + k,)."""
+        e = np.linalg.solve(self.whitening, self.misclosures[..., None])
+        return np.concatenate([e.ravel(), self.prior[1]])
+
+    @cached_property
+    def projector(self) -> Array:
+        """R, (n c + k, n c + k)."""
+        a = self.design
+        basis, _ = np.linalg.qr(a / np.linalg.norm(a, axis=0))
+        return np.eye(len(a)) - basis @ basis.T
+
+    @cached_property
+    def blocks(self) -> Array:
+        """R of each position, (n, c, c)."""
+        n, c = self.misclosures.shape
+        return np.einsum("icid->icd", self.projector[: n * c, : n * c].reshape(n, c, n, c))
+
+    @cached_property
+    def root(self) -> tuple[Array, NDArray[np.int_]]:
+        """H (n, c, c) with H Hᵀ = R⁺ of each position, and the rank of R, (n,)."""
+        values, vectors = np.linalg.eigh(self.blocks)
+        seen = values > CONTROLLED
+        scale = np.where(seen, 1 / np.sqrt(np.where(seen, values, 1.0)), 0.0)
+        return vectors * scale[:, None], np.count_nonzero(seen, axis=1)
+
+
+def solve(
+    model: SensorModel,
+    approach: Approach,
+    observed: Observations,
+    result: Adjustment | None = None,
+) -> Solution:
+    """Linearise a session at its solution.
+
+    Parameters
+    ----------
+    model, approach, observed : as in `calibrate`, one session
+    result : Adjustment, optional, what `calibrate` returned for it
+
+    Raises
+    ------
+    InputError
+        If there is not exactly one session, or it has no valid solution.
+    """
+    if len(observed.forces) != 1:
+        raise InputError(f"quality is that of one session, not of {len(observed.forces)}")
+    result = calibrate(model, approach, observed) if result is None else result
+    if not result.converged[0]:
+        why = "its normal matrix is singular" if result.singular[0] else "it does not converge"
+        raise InputError(f"the calibration of model {model.name!r} has no solution: {why}")
+
+    problem = _Problem.of(model, approach, observed)
+    x, v = result.parameters[0], result.residuals[0]
+    p = x[: model.n_parameters]
+    gravity = float(x[-1]) if problem.weights.any() else float(np.ravel(observed.gravity)[0])
+    adjusted = problem.observations[0] + v
+    f_b = model.correct(adjusted[:, :3], p, gravity, observed.hold)
+    f_a = f_b @ np.linalg.inv(model.axes_matrix(p)).T
+    at = problem.conditions.linearise(x[:, None], adjusted.T[:, None], f_a.T[:, None])
+    b = np.moveaxis(at.jac_observations[:, :, 0], -1, 0)
+    root_weight = np.sqrt(problem.weights)
+    seen = problem.weights > 0
+    return Solution(
+        model=model,
+        approach=approach,
+        observed=observed,
+        parameters=x,
+        gravity=gravity,
+        cofactors=result.cofactors[0],
+        residuals=v,
+        variances=problem.cofactors,
+        jac_parameters=np.moveaxis(at.jac_parameters[:, :, 0], -1, 0),
+        jac_observations=b,
+        misclosures=at.psi[:, 0].T - np.einsum("nco,no->nc", b, v),
+        prior=(np.diag(root_weight)[seen], (root_weight * (x - problem.initial[0]))[seen]),
+        omega=float(result.omega[0]),
+        redundancy=result.redundancy,
+    )

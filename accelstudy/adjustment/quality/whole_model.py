@@ -1,0 +1,60 @@
+"""The test of a whole model against the noise of its observations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+Array = NDArray[np.float64]
+
+NO_POWER = 2
+"""Up to this redundancy the global test finds next to nothing."""
+
+
+@dataclass(frozen=True)
+class GlobalTest:
+    """Test of the whole model, Ω/σ0² ~ χ²_r, two-sided (Koch 1999, chapter 4).
+
+    Attributes
+    ----------
+    statistic : float
+    dof : int, r
+    p_value : float
+    accepted : bool, at the level asked for
+    remark : str, empty unless the test has no power
+    """
+
+    statistic: float
+    dof: int
+    p_value: float
+    accepted: bool
+    remark: str
+
+
+def global_test(
+    omega: float, redundancy: int, alpha: float = 0.05, variance: float = 1.0
+) -> GlobalTest | None:
+    """Test Ω against its distribution; None without redundancy, where there is nothing to test.
+
+    Parameters
+    ----------
+    omega, redundancy : of the adjustment
+    alpha : float, level
+    variance : float, σ0² a priori
+    """
+    if redundancy <= 0:
+        return None
+    statistic = omega / variance
+    below = stats.chi2.cdf(statistic, redundancy)
+    p_value = 2 * min(below, stats.chi2.sf(statistic, redundancy))
+    remark = f"redundancy {redundancy}: the test has next to no power"
+    return GlobalTest(
+        statistic=float(statistic),
+        dof=redundancy,
+        p_value=float(p_value),
+        accepted=bool(p_value >= alpha),
+        remark=remark if redundancy <= NO_POWER else "",
+    )

@@ -1,0 +1,121 @@
+"""Checks of a campaign: each wrong value is named with what would be right."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.campaign.header import COLUMNS, COUNTING, HEADER, LEAST, Header
+from accelstudy.errors import InputError
+from accelstudy.leveling import specific_force
+from accelstudy.units import GON, STANDARD_GRAVITY, to_si
+
+Array = NDArray[np.float64]
+
+
+def check_names(names: Sequence[str], path: Path) -> None:
+    """Check that no column stands twice."""
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"{path}: {name!r}: the column stands twice")
+
+
+def check_column(
+    attribute: str, name: str, values: Array, labels: Sequence[str], path: Path
+) -> None:
+    """Check what a column must be, whatever its unit."""
+
+    def complain_of(wrong: NDArray[np.bool_], text: str) -> None:
+        if wrong.any():
+            i = int(np.argmax(wrong))
+            raise InputError(f"{path}: {name}: {labels[i]}: {values[i]:.15g} {text}")
+
+    if attribute in COUNTING:
+        # Beyond 2^53 not every integer is a float.
+        complain_of((values % 1 != 0) | (abs(values) > 2**53), "is no whole number")
+    if attribute in LEAST:
+        least = LEAST[attribute]
+        complain_of(values < least, f"is too small; it must be {least} or more")
+    behind = np.diff(values, prepend=-np.inf)
+    if attribute == "positions":
+        text = "follows no smaller number; number the holds 1, 2, 3 … in order of acquisition"
+        complain_of(behind <= 0, text)
+    if attribute == "time":
+        complain_of(behind < 0, "is before the hold above; rows must be in order of acquisition")
+    if attribute == "forces" and len(values) > 1 and np.ptp(values) == 0:
+        raise InputError(
+            f"{path}: {name}: {values[0]:.15g} in all positions; a channel that works changes"
+        )
+
+
+def check_robot(given: Mapping[str, Array], header: Header, path: Path) -> None:
+    """Check that angles and their sigma come together."""
+    roll, pitch = COLUMNS["angles"]
+    key = f"{path.with_name(HEADER)}: robot.angle_sigma_mgon"
+    if "yaw" in given and "angles" not in given:
+        raise InputError(f"{path}: yaw_robot_gon: goes with {roll} and {pitch}, which are missing")
+    if "angles" in given and header.robot is None:
+        raise InputError(f"{key}: missing, but {path.name} has {roll} and {pitch}")
+    if header.robot is not None and "angles" not in given:
+        raise InputError(f"{key}: is given, but {path.name} has no {roll} and {pitch}")
+
+
+def check_norm(raw: Array, forces: Array, header: Header, path: Path) -> None:
+    """Check that the forces are roughly as large as gravity, and say which unit would make them so.
+
+    Real sensors are wrong by some tenths at worst, so a factor of two is not theirs.
+    """
+
+    def near(size: np.floating[Any] | float, gravity: float) -> bool:
+        return bool(gravity / 2 < size < gravity * 2)
+
+    gravity = header.gravity.value_mps2
+    norm, given = (np.median(np.linalg.norm(array, axis=1)) for array in (forces, raw))
+    if near(norm, gravity):
+        return
+    what = f"fx, fy, fz: their norm is about {given:.3g} {header.unit}"
+    if header.unit == "counts":
+        what = f"{what}, by `nominal` {norm:.3g} m/s^2"
+    if near(norm, STANDARD_GRAVITY):
+        raise InputError(
+            f"{path.with_name(HEADER)}: gravity.value_mps2: {gravity:g} does not fit the forces, "
+            f"whose norm is about {norm:.3g} m/s^2; expected some 9.8"
+        )
+    fits = {"m/s^2": 1.0, "g": STANDARD_GRAVITY}
+    better = [u for u, size in fits.items() if u != header.unit and near(given * size, gravity)]
+    if not better and header.unit != "counts" and given > 100:
+        better = ["counts"]
+    if better:
+        advice = f"looks like {better[0]}, not {header.unit}; correct `unit` in {HEADER}"
+    else:
+        advice = f"nowhere near gravity, {gravity:g} m/s^2; correct the unit" + (
+            " or `nominal`" if header.unit == "counts" else " or the columns"
+        )
+    raise InputError(f"{path}: {what}: {advice}")
+
+
+def check_angles(angles: Array, forces: Array, gravity: float, path: Path) -> None:
+    """Check that no other reading of the robot's angles fits the forces clearly better than gon.
+
+    A sensor fits its robot within some hundredths of g. If gon fits worse than that, and another
+    reading several times better, that is no accident.
+    """
+
+    def misfit(unit: float, sign: int = 1) -> float:
+        roll, pitch = (angles * unit).T
+        expected = np.column_stack(specific_force(roll, pitch, gravity))
+        squares = np.sum((sign * forces - expected) ** 2, axis=1)
+        return float(np.sqrt(np.mean(squares)) / gravity)
+
+    readings = {
+        "the angles look like degrees, not gon": misfit(to_si(1.0, "deg", "rad").item()),
+        "the angles look like radians, not gon": misfit(1.0),
+        "the forces have the opposite sign; at level specific force is (0, 0, -g)": misfit(GON, -1),
+    }
+    best = min(readings, key=lambda text: readings[text])
+    if misfit(GON) > max(0.05, 4 * readings[best]):
+        raise InputError(f"{path}: {', '.join(COLUMNS['angles'])}: {best}")

@@ -1,0 +1,137 @@
+"""Commands for measured data: calibrate a campaign, use the calibration, check its sigmas."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+import numpy as np
+import pandas as pd
+
+PATH = click.Path(path_type=Path)
+
+
+@click.command("calibrate")
+@click.argument("campaign", type=PATH)
+@click.option("--model", default="bias-scale-nonorthogonality", show_default=True)
+@click.option("--approach", default="gravity", show_default=True)
+@click.option("--out", type=PATH, required=True, help="folder to write to")
+def calibrate_command(campaign: Path, model: str, approach: str, out: Path) -> None:
+    """Calibrate a measured CAMPAIGN (a folder) and report on it."""
+    from accelstudy.approaches import get_approach
+    from accelstudy.campaign.fit import fit_campaign
+    from accelstudy.campaign.format import read_campaign
+    from accelstudy.campaign.output import write_calibration
+    from accelstudy.models import get_model
+    from accelstudy.study.provenance import check_writable
+
+    chosen = get_model(model), get_approach(approach)
+    check_writable(out)
+    measured = read_campaign(campaign)
+    for warning in measured.warnings:
+        click.echo(f"warning: {warning}", err=True)
+    content = write_calibration(fit_campaign(measured, *chosen), out)
+    for entry in content["parameters"]:
+        shown = entry["shown"]
+        sigma = "unknown" if shown["sigma"] is None else f"{shown['sigma']:.4f}"
+        click.echo(f"{entry['name']:>9} = {shown['value']:12.4f} ± {sigma} {shown['unit']}")
+    click.echo(content["quality"]["verdict"])
+    click.echo(f"report: {out / 'report.html'}")
+
+
+@click.command("check-sigmas")
+@click.argument("campaign", type=PATH)
+@click.option("--model", default="bias-scale-nonorthogonality", show_default=True)
+@click.option("--approach", default="gravity", show_default=True)
+@click.option("--replicates", default=2000, show_default=True, type=click.IntRange(min=2))
+@click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0))
+def check_sigmas_command(
+    campaign: Path, model: str, approach: str, replicates: int, seed: int
+) -> None:
+    """Check by simulation the sigmas that the calibration of a CAMPAIGN claims."""
+    from accelstudy.approaches import get_approach
+    from accelstudy.campaign.fit import fit_campaign
+    from accelstudy.campaign.format import read_campaign
+    from accelstudy.campaign.monte_carlo import check_sigmas
+    from accelstudy.models import get_model
+
+    fit = fit_campaign(read_campaign(campaign), get_model(model), get_approach(approach))
+    table = check_sigmas(fit, replicates, seed)
+    click.echo(table.to_string(index=False, float_format=lambda value: f"{value:.4g}"))
+    click.echo("sigma: as the adjustment claims it; ratio: sigma / sd_empirical.")
+
+
+@click.command("apply")
+@click.argument("calibration", type=PATH)
+@click.argument("log", type=PATH)
+@click.option("--out", type=PATH, required=True, help="CSV or Parquet file to write")
+@click.option("--columns", default="fx,fy,fz", show_default=True, help="names of the three columns")
+@click.option("--sigma", type=float, help="noise of a reading, m/s²; that of a position by default")
+def apply_command(
+    calibration: Path, log: Path, out: Path, columns: str, sigma: float | None
+) -> None:
+    """Apply a CALIBRATION (calibration.json) to a LOG (CSV or Parquet) and level with it.
+
+    The log is in the unit of the campaign. Adds the calibrated force, roll and pitch with sigmas.
+    """
+    from accelstudy.campaign.applying import read_calibration
+    from accelstudy.campaign.export import raw_conversion
+    from accelstudy.errors import InputError
+    from accelstudy.study.tables import whole_file
+    from accelstudy.units import GON, MGON
+
+    read = read_calibration(calibration)
+    table = _read_log(log)
+    names = columns.split(",")
+    missing = [name for name in names if name not in table]
+    if missing or len(names) != 3:
+        raise InputError(
+            f"{log}: --columns must name three columns of {', '.join(map(str, table.columns))}"
+        )
+    values = table[names].apply(pd.to_numeric, errors="coerce").to_numpy(float)
+    bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
+    if len(bad):
+        raise InputError(f"{log}: row {bad[0] + 1}: {columns} must be three finite numbers")
+    scale, offset = raw_conversion(read.content)
+    forces = (values - offset) * scale
+    noise = read.content["sigma_position_mps2"] if sigma is None else sigma
+    angles, sigmas = read.level(forces, noise or 0.0)
+    corrected = read.correct(forces)
+    for i, axis in enumerate("xyz"):
+        table[f"f{axis}_calibrated_mps2"] = corrected[:, i]
+    for i, angle in enumerate(("roll", "pitch")):
+        table[f"{angle}_gon"] = angles[:, i] / GON
+        table[f"sigma_{angle}_mgon"] = sigmas[:, i] / MGON
+    with whole_file(out) as path:
+        if out.suffix == ".parquet":
+            table.to_parquet(path, index=False)
+        else:
+            table.to_csv(path, index=False)
+
+
+def _read_log(path: Path) -> pd.DataFrame:
+    from accelstudy.errors import InputError
+    from accelstudy.study.tables import read_table
+
+    if path.suffix == ".parquet":
+        return read_table(path)
+    try:
+        return pd.read_csv(path)
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from None
+    except (ValueError, pd.errors.ParserError) as error:
+        raise InputError(f"{path}: no CSV table: {' '.join(str(error).split())}") from None
+
+
+@click.command("export")
+@click.argument("calibration", type=PATH)
+@click.option("--form", default="json", show_default=True, help="json, yaml, c or matrix")
+def export_command(calibration: Path, form: str) -> None:
+    """Print a CALIBRATION (calibration.json) in a form that a device or program takes."""
+    from accelstudy.campaign.applying import read_calibration
+    from accelstudy.campaign.export import export
+
+    click.echo(export(read_calibration(calibration).content, form), nl=False)
+
+
+COMMANDS = (calibrate_command, check_sigmas_command, apply_command, export_command)

@@ -1,0 +1,202 @@
+"""The calibration of a measured campaign, by the same adjustment as the simulated ones."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.adjustment import Adjustment, Observations, calibrate
+from accelstudy.adjustment.quality import GlobalTest, global_test
+from accelstudy.approaches import Approach
+from accelstudy.campaign.format import Campaign
+from accelstudy.design import Design, diagnose
+from accelstudy.errors import InputError
+from accelstudy.schemes import Scheme
+from accelstudy.sensor import SensorModel
+from accelstudy.simulation import Noise
+
+Array = NDArray[np.float64]
+
+ALPHA = 0.05
+"""Level of the tests."""
+
+UNIT_SIGMA = 1e-3
+"""m/s², stands for an unknown sigma; only sigmas a posteriori mean anything then."""
+
+
+@dataclass(frozen=True)
+class CampaignFit:
+    """A calibrated campaign.
+
+    Attributes
+    ----------
+    campaign, model, approach : what was fitted, with what
+    observed : Observations, R = 1
+    adjustment : Adjustment, R = 1
+    design : Design, of the campaign's own positions
+    """
+
+    campaign: Campaign
+    model: SensorModel
+    approach: Approach
+    observed: Observations
+    adjustment: Adjustment
+    design: Design
+
+    @property
+    def sigma_known(self) -> bool:
+        """Whether the campaign gives the noise of its position means."""
+        return self.campaign.sigma_force is not None
+
+    @property
+    def parameters(self) -> Array:
+        """Estimates of the model's parameters, (u,), SI."""
+        return self.adjustment.parameters[0, : self.model.n_parameters]
+
+    @property
+    def global_test(self) -> GlobalTest | None:
+        """Test of the whole model; None where sigma is unknown or there is no redundancy."""
+        if not self.sigma_known:
+            return None
+        return global_test(float(self.adjustment.omega[0]), self.adjustment.redundancy, ALPHA)
+
+    @property
+    def trusts_sigma(self) -> bool:
+        """Whether the a-priori noise is quoted: it is given, and the residuals do not refute it."""
+        test = self.global_test
+        return self.sigma_known and (test is None or test.accepted)
+
+    @property
+    def variance_factor(self) -> float:
+        """Variance of unit weight to quote: 1 if a-priori noise is trusted, else a posteriori."""
+        return 1.0 if self.trusts_sigma else float(self.adjustment.variance_posteriori[0])
+
+    @property
+    def sigma_position(self) -> float:
+        """Noise of a position mean, m/s², a priori or a posteriori likewise."""
+        return campaign_noise(self.campaign).sigma_force * float(np.sqrt(self.variance_factor))
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance matrix of the model's parameters to quote, (u, u), SI: likewise."""
+        u = self.model.n_parameters
+        return self.variance_factor * self.adjustment.cofactors[0, :u, :u]
+
+    @property
+    def sigma(self) -> Array:
+        """Standard deviations of the parameters to quote, (u,), SI: likewise."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def gravity(self) -> float:
+        """Gravity, m/s²: the adjusted value if it was observed."""
+        if self.campaign.sigma_gravity > 0:
+            return float(self.adjustment.parameters[0, -1])
+        return self.campaign.gravity
+
+    @property
+    def corrected(self) -> Array:
+        """Calibrated specific forces of the holds, (n, 3), m/s²."""
+        campaign = self.campaign
+        return self.model.correct(campaign.forces, self.parameters, self.gravity, campaign.hold)
+
+    @property
+    def norm_residuals(self) -> Array:
+        """|f_b| − g of the holds, (n,), m/s²."""
+        return np.linalg.norm(self.corrected, axis=1) - self.gravity
+
+    @property
+    def rms_norm_residual(self) -> float:
+        """Rms of |f_b| − g over the holds, m/s²."""
+        return float(np.sqrt(np.mean(self.norm_residuals**2)))
+
+
+def campaign_noise(campaign: Campaign) -> Noise:
+    """Stochastic model of a campaign; an unknown sigma is `UNIT_SIGMA`."""
+    return Noise(
+        sigma_force=UNIT_SIGMA if campaign.sigma_force is None else campaign.sigma_force,
+        sigma_angle=campaign.sigma_angle or 0.0,
+        sigma_gravity=campaign.sigma_gravity,
+    )
+
+
+def campaign_scheme(campaign: Campaign, directions: Array | None = None) -> Scheme:
+    """Positions of a campaign as a scheme; by default the directions that it measured."""
+    if directions is None:
+        directions = -campaign.forces
+    return Scheme(campaign.name, campaign.name, directions, "exact", f"campaign {campaign.name}")
+
+
+def fit_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> CampaignFit:
+    """Calibrate a campaign.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    model : SensorModel
+    approach : Approach
+
+    Raises
+    ------
+    InputError
+        If the campaign lacks what the approach or the model needs, if its positions do not
+        determine the model (says which parameters), or if the adjustment does not converge.
+    """
+    if approach.uses_angles and campaign.angles is None:
+        raise InputError(
+            f"{campaign.name}: approach {approach.name!r} needs the columns roll_robot_gon and "
+            "pitch_robot_gon"
+        )
+    noise = campaign_noise(campaign)
+    start = initial_values(model, campaign.forces, campaign.gravity)
+    rough = model.correct(campaign.forces, start, campaign.gravity, campaign.hold)
+    design = diagnose(
+        campaign_scheme(campaign, -rough),
+        model,
+        approach,
+        noise,
+        gravity=campaign.gravity,
+        hold=campaign.hold,
+    )
+    if not design.estimable:
+        raise InputError(
+            f"{campaign.name}: {campaign.n_positions} positions do not determine the model "
+            f"{model.name!r}: {design.reason}"
+        )
+    observed = Observations(
+        forces=campaign.forces[None],
+        sigma_force=noise.sigma_force,
+        angles=None if campaign.angles is None else campaign.angles[None],
+        sigma_angle=noise.sigma_angle,
+        gravity=campaign.gravity,
+        sigma_gravity=campaign.sigma_gravity,
+        hold=campaign.hold,
+        initial=start,
+    )
+    adjustment = calibrate(model, approach, observed)
+    if not adjustment.converged[0]:
+        raise InputError(
+            f"{campaign.name}: the adjustment of the model {model.name!r} does not converge; "
+            "a gross error in the data or a wrong unit is the usual cause"
+        )
+    return CampaignFit(campaign, model, approach, observed, adjustment, design)
+
+
+def initial_values(model: SensorModel, forces: Array, gravity: float) -> Array:
+    """Biases and a common scale from the sphere that fits best, (u,), SI; the rest is zero.
+
+    |f − b|² = (g (1 + s))² is linear in b and in (g (1 + s))² − |b|². Positions that do not
+    determine a sphere, and models without these parameters, start from an ideal sensor.
+    """
+    design = np.column_stack([2 * forces, np.ones(len(forces))])
+    solution, _, rank, _ = np.linalg.lstsq(design, np.sum(forces**2, axis=1), rcond=1e-6)
+    center = solution[:3]
+    square = solution[3] + center @ center
+    if rank < 4 or square <= 0:
+        return np.zeros(model.n_parameters)
+    scale = np.sqrt(square) / gravity - 1
+    names = ("x", "y", "z")
+    values = {f"b_{i}": b for i, b in zip(names, center, strict=True)}
+    return model.vector({**values, **{f"s_{i}": scale for i in names}})

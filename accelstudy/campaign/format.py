@@ -1,0 +1,349 @@
+"""A campaign: one calibration session of one sensor, as a folder with two files."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import yaml
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from accelstudy.campaign.checks import (
+    check_angles,
+    check_column,
+    check_names,
+    check_norm,
+    check_robot,
+)
+from accelstudy.campaign.header import COLUMNS, COUNTING, HEADER, KNOWN, TABLES, Header
+from accelstudy.effects import Hold
+from accelstudy.errors import InputError
+from accelstudy.study.config.errors import first_error
+from accelstudy.study.config.layers import read_layer
+from accelstudy.study.tables import whole_file
+from accelstudy.units import MGON
+
+Array = NDArray[np.float64]
+Columns = Mapping[str, Sequence[Any]]
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """One calibration session of one sensor, in SI; n static holds in order of acquisition.
+
+    Attributes
+    ----------
+    name : str
+    positions : (n,) int array, the column `position`
+    forces : (n, 3) array, m/s², mean specific force of the holds in sensor axes
+    gravity, sigma_gravity : float, m/s²
+    unit : str, of the file ("m/s^2", "g" or "counts")
+    sensor : str, optional
+    sigma_force : float, m/s², a-priori sd of a position mean; None if unknown
+    angles : (n, 2) array, rad, robot's roll and pitch; None without a robot
+    sigma_angle : float, rad; None without a robot
+    n_samples : (n,) int array, optional
+    sd : (n, 3) array, m/s², optional, sd of the samples within the holds
+    time, temperature, vibration, yaw : (n,) arrays in s, °C, m/s², rad, optional
+    nominal_scale, nominal_offset : (3,) arrays with unit "counts", f = (raw − offset) · scale
+    warnings : tuple of str, what was ignored when the campaign was read
+    source : Path, folder from which it was read, optional
+    """
+
+    name: str
+    positions: NDArray[np.int_]
+    forces: Array
+    gravity: float
+    sigma_gravity: float = 0.0
+    unit: str = "m/s^2"
+    sensor: str | None = None
+    sigma_force: float | None = None
+    angles: Array | None = None
+    sigma_angle: float | None = None
+    n_samples: NDArray[np.int_] | None = None
+    sd: Array | None = None
+    time: Array | None = None
+    temperature: Array | None = None
+    vibration: Array | None = None
+    yaw: Array | None = None
+    nominal_scale: Array | None = None
+    nominal_offset: Array | None = None
+    warnings: tuple[str, ...] = field(default=())
+    source: Path | None = None
+
+    @property
+    def n_positions(self) -> int:
+        """Number of static holds."""
+        return len(self.forces)
+
+    @property
+    def hold(self) -> Hold:
+        """What is known of the holds besides the forces, as the effects take it."""
+        roll, pitch = (None, None) if self.angles is None else self.angles.T
+        step = np.diff(self.forces, axis=0, prepend=self.forces[:1])
+        return Hold(
+            temperature=self.temperature,
+            time=self.time,
+            vibration=self.vibration,
+            roll=roll,
+            pitch=pitch,
+            yaw=self.yaw,
+            step_x=step[:, 0],
+            step_y=step[:, 1],
+            step_z=step[:, 2],
+        )
+
+
+def read_campaign(folder: str | Path) -> Campaign:
+    """Read a campaign folder: `campaign.yaml` and `positions.csv` or `positions.parquet`.
+
+    With ``unit: g`` forces are multiples of standard gravity, 9.80665 m/s², whatever `gravity`
+    says: the unit is the same everywhere, `gravity` is what holds at the place. For data scaled so
+    that local gravity is 1, give 9.80665 as the value of gravity; the norm to be met is 1 then.
+
+    With ``unit: counts`` forces are (raw − offset) · scale, and sds are sd · abs(scale).
+
+    Numbers in `position` grow, but some may be absent: holds that were removed. Where a robot gives
+    no yaw it is 0. Columns that the format does not know are left out and named in `warnings`.
+
+    Raises
+    ------
+    InputError
+        If a file is missing or not whole, or what it says cannot be right; one line says where.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise InputError(
+            f"{folder}: no such folder; a campaign is a folder with {HEADER} and "
+            f"{' or '.join(TABLES)}"
+        )
+    header = _parse_header(read_layer(folder / HEADER), folder / HEADER)
+    found = [folder / name for name in TABLES if (folder / name).exists()]
+    if len(found) != 1:
+        wrong = "two tables of positions" if found else "no table of positions"
+        raise InputError(f"{folder}: {wrong}; expected either {' or '.join(TABLES)}")
+    (path,) = found
+    columns, warnings = _read_csv(path) if path.suffix == ".csv" else _read_parquet(path)
+    warnings = warnings + [_ignored(path, name) for name in columns if name not in KNOWN]
+    campaign = _parse_table(columns, header, path)
+    return replace(campaign, warnings=tuple(warnings), source=folder)
+
+
+def write_campaign(
+    campaign: Campaign, folder: str | Path, table: Literal["csv", "parquet"] = "csv"
+) -> None:
+    """Write a campaign folder, in the unit that the campaign had.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        Its `warnings` and `source` are not written.
+    folder : path
+        Made if it is not there. A table of positions in it is replaced, whichever of the two kinds
+        it has; other files are left as they are.
+    table : "csv" or "parquet"
+
+    Raises
+    ------
+    InputError
+        If the campaign could not be read again (nothing is written then), or the folder cannot be
+        written.
+    """
+    folder = Path(folder)
+    path = folder / f"positions.{table}"
+    header = _parse_header(_content_of(campaign), folder / HEADER)
+    columns = _columns_of(campaign, header)
+    _parse_table(columns, header, path)
+    try:
+        with whole_file(path) as temporary:
+            if table == "csv":
+                with temporary.open("w", newline="", encoding="utf-8") as file:
+                    writer = csv.writer(file, lineterminator="\n")
+                    writer.writerow(columns)
+                    writer.writerows(zip(*columns.values(), strict=True))
+            else:
+                pq.write_table(pa.table(columns), temporary, write_page_checksum=True)
+        for name in set(TABLES) - {path.name}:
+            (folder / name).unlink(missing_ok=True)
+        with whole_file(folder / HEADER) as temporary:
+            content = header.model_dump(mode="json", exclude_none=True)
+            text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
+            temporary.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written: {error.strerror or error}") from None
+
+
+def _parse_header(content: dict[str, Any], path: Path) -> Header:
+    try:
+        return Header.model_validate(content)
+    except ValidationError as error:
+        raise InputError(f"{path}: {first_error(error, Header)}") from None
+
+
+def _read_csv(path: Path) -> tuple[Columns, list[str]]:
+    """Columns of text, and what is odd about the file."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+        reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
+        lines = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from None
+    except (csv.Error, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: not a whole CSV file in UTF-8 ({_one_line(error)})") from None
+    if not lines:
+        raise InputError(f"{path}: empty; expected a line of column names, position, fx, fy, fz …")
+    names = [name.strip() for name in lines[0][1]]
+    if len(names) == 1 and (mark := next((m for m in ";\t" if m in names[0]), None)):
+        raise InputError(f"{path}: columns are separated by {mark!r}; a comma would be right")
+    for line, row in lines[1:]:
+        if len(row) != len(names):
+            raise InputError(
+                f"{path}: line {line}: {len(row)} values for {len(names)} columns; "
+                "is the file whole?"
+            )
+    check_names(names, path)
+    columns = {name: [row[i] for _, row in lines[1:]] for i, name in enumerate(names)}
+    # Half a number is a number too, so a cut in the last one shows only in the missing line end.
+    whole = text.endswith(("\n", "\r"))
+    odd = [] if whole else [f"{path}: the last line does not end; check that it is whole"]
+    return columns, odd
+
+
+def _read_parquet(path: Path) -> tuple[Columns, list[str]]:
+    """Columns of whatever Python makes of them; those that are not known are not looked at."""
+    try:
+        with pq.ParquetFile(path, page_checksum_verification=True) as file:
+            names = [str(name) for name in file.schema_arrow.names]
+            check_names(names, path)
+            table = file.read(columns=[name for name in names if name in KNOWN])
+        return {n: table[n].to_pylist() if n in KNOWN else () for n in names}, []
+    except InputError:
+        raise
+    except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError) as error:
+        raise InputError(f"{path}: not a whole Parquet file ({_one_line(error)})") from None
+
+
+def _ignored(path: Path, name: str) -> str:
+    near = get_close_matches(name, KNOWN, n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    return f"{path}: column {name!r} is not known and ignored{hint}"
+
+
+def _parse_table(columns: Columns, header: Header, path: Path) -> Campaign:
+    """Check the columns, and turn them and the header into a campaign."""
+    given: dict[str, Array] = {}
+    labels: list[str] = []
+    for attribute, names in COLUMNS.items():
+        if attribute not in ("positions", "forces") and not {*names} & {*columns}:
+            continue
+        parts = [_numbers(columns, name, labels, path) for name in names]
+        if attribute == "positions":
+            labels = [f"position {value:.15g}" for value in parts[0]]
+        for name, part in zip(names, parts, strict=True):
+            check_column(attribute, name, part, labels, path)
+        given[attribute] = np.column_stack(parts) if len(parts) > 1 else parts[0]
+    check_robot(given, header, path)
+    values: dict[str, Any] = {}
+    with np.errstate(all="ignore"):  # what overflows is nowhere near gravity, and found so
+        for attribute, array in given.items():
+            scale, offset = header.to_si(attribute)
+            values[attribute] = (array - offset) * scale
+        check_norm(given["forces"], values["forces"], header, path)
+        if header.robot is not None:
+            check_angles(given["angles"], values["forces"], header.gravity.value_mps2, path)
+            values.setdefault("yaw", np.zeros(len(labels)))
+    for attribute in COUNTING:
+        if attribute in values:
+            values[attribute] = values[attribute].astype(np.int64)
+    nominal, noise, robot = header.nominal, header.sensor_noise, header.robot
+    return Campaign(
+        name=header.name,
+        sensor=header.sensor,
+        unit=header.unit,
+        gravity=header.gravity.value_mps2,
+        sigma_gravity=header.gravity.sigma_mps2,
+        sigma_force=None if noise is None else noise.sigma_mps2,
+        sigma_angle=None if robot is None else robot.angle_sigma_mgon * MGON,
+        nominal_scale=None if nominal is None else np.array(nominal.scale),
+        nominal_offset=None if nominal is None else np.array(nominal.offset),
+        **values,
+    )
+
+
+def _numbers(columns: Columns, name: str, labels: Sequence[str], path: Path) -> Array:
+    """Column of finite numbers; `labels` say what its rows are called."""
+    if name not in columns:
+        lower = {other.lower(): other for other in columns if other not in KNOWN}
+        near = get_close_matches(name.lower(), lower, n=1)
+        hint = f"; is {lower[near[0]]!r} meant?" if near else ""
+        beside = next((names for names in COLUMNS.values() if name in names), ())
+        group = f" (it goes with {', '.join(n for n in beside if n != name)})" if beside[1:] else ""
+        raise InputError(f"{path}: {name}: the column is missing{group}{hint}")
+    values = columns[name]
+    if not len(values):
+        raise InputError(f"{path}: no positions; expected one row per hold")
+    numbers = np.empty(len(values))
+    for i, value in enumerate(values):
+        where = f"{path}: {name}: {labels[i] if labels else f'row {i + 1}'}"
+        if value is None or value == "":
+            raise InputError(f"{where}: empty; expected a number")
+        try:
+            if isinstance(value, bool) or "_" in str(value):
+                raise ValueError
+            numbers[i] = float(value)
+        except (TypeError, ValueError, OverflowError):
+            shown = _one_line(repr(value), 60)
+            raise InputError(f"{where}: {shown} is no number, such as -9.81") from None
+        if not np.isfinite(numbers[i]):
+            raise InputError(f"{where}: {value} is not finite; leave out a hold that has no mean")
+    return numbers
+
+
+def _content_of(campaign: Campaign) -> dict[str, Any]:
+    """What `campaign.yaml` says of a campaign."""
+    content = {
+        "schema_version": 1,
+        "name": campaign.name,
+        "sensor": campaign.sensor,
+        "unit": campaign.unit,
+        "gravity": {"value_mps2": campaign.gravity, "sigma_mps2": campaign.sigma_gravity},
+    }
+    if campaign.nominal_scale is not None or campaign.nominal_offset is not None:
+        nominal = {"scale": campaign.nominal_scale, "offset": campaign.nominal_offset}
+        content["nominal"] = {k: np.asarray(v).tolist() for k, v in nominal.items()}
+    if campaign.sigma_force is not None:
+        content["sensor_noise"] = {"sigma_mps2": campaign.sigma_force}
+    if campaign.sigma_angle is not None:
+        content["robot"] = {"angle_sigma_mgon": campaign.sigma_angle / MGON}
+    return content
+
+
+def _columns_of(campaign: Campaign, header: Header) -> dict[str, list[Any]]:
+    """Columns of a campaign in the units of the files."""
+    columns: dict[str, list[Any]] = {}
+    for attribute, names in COLUMNS.items():
+        values = getattr(campaign, attribute)
+        if values is None:
+            continue
+        shape = (campaign.n_positions, len(names)) if len(names) > 1 else (campaign.n_positions,)
+        if np.shape(values) != shape:
+            raise InputError(f"{campaign.name}: {attribute}: shape {np.shape(values)}, not {shape}")
+        if attribute not in COUNTING:
+            scale, offset = header.to_si(attribute)
+            values = np.asarray(values, dtype=float) / scale + offset
+        columns.update(zip(names, np.reshape(values, (-1, len(names))).T.tolist(), strict=True))
+    return columns
+
+
+def _one_line(text: object, length: int = 100) -> str:
+    line = " ".join(str(text).split())
+    return line if len(line) <= length else f"{line[:length]} …"

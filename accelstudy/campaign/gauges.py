@@ -1,0 +1,53 @@
+"""The same calibration in other gauges, and as a matrix for a device.
+
+The norm of gravity determines K in f_b = K (f_s − b) only up to a rotation from the left. Authors
+fix it by a triangular or a symmetric K; all have the same KᵀK and the same residuals.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from accelstudy.sensor import SensorModel
+from accelstudy.units import STANDARD_GRAVITY
+
+Array = NDArray[np.float64]
+Gauge = Literal["upper", "lower", "symmetric"]
+GAUGES: tuple[Gauge, ...] = ("upper", "lower", "symmetric")
+
+
+def in_gauge(matrix: ArrayLike, gauge: Gauge) -> Array:
+    """Turn K (3, 3) into a gauge: the matrix R K, R a rotation, that is triangular or symmetric.
+
+    The diagonal is positive. "upper" is the gauge of Thalmann & Neuner (2018, eq. 4).
+    """
+    k = np.asarray(matrix, dtype=float)
+    gram = k.T @ k
+    if gauge == "upper":
+        return np.asarray(np.linalg.cholesky(gram).T)
+    if gauge == "lower":
+        # The Cholesky factor with rows and columns in reverse order.
+        return np.asarray(np.linalg.cholesky(gram[::-1, ::-1]).T[::-1, ::-1])
+    values, vectors = np.linalg.eigh(gram)
+    return np.asarray((vectors * np.sqrt(values)) @ vectors.T)
+
+
+def affine_form(model: SensorModel, parameters: ArrayLike) -> tuple[Array, Array] | None:
+    """K (3, 3) and b (3,) of f_b = K (f_s − b), or None if the model is not affine.
+
+    Parameters
+    ----------
+    model : SensorModel
+    parameters : (u,) array, SI
+    """
+    g = STANDARD_GRAVITY
+    probes = g * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3), np.ones((1, 3))])
+    corrected = model.correct(probes, parameters)
+    matrix = ((corrected[1:4] - corrected[4:7]) / (2 * g)).T
+    constant = corrected[0]
+    if not np.allclose(probes @ matrix.T + constant, corrected, rtol=0, atol=1e-9 * g):
+        return None
+    return matrix, -np.linalg.solve(matrix, constant)

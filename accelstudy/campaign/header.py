@@ -1,0 +1,97 @@
+"""What stands in a campaign's header, and what its columns are."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AfterValidator, Field, model_validator
+
+from accelstudy.study.config.schema import Block
+from accelstudy.study.config.types import Finite, NotNegative, Number, Positive
+from accelstudy.units import GON, to_si
+
+Array = NDArray[np.float64]
+
+HEADER = "campaign.yaml"
+TABLES = ("positions.csv", "positions.parquet")
+
+COLUMNS = {
+    "positions": ("position",),
+    "time": ("time_s",),
+    "forces": ("fx", "fy", "fz"),
+    "n_samples": ("n_samples",),
+    "sd": ("sd_fx", "sd_fy", "sd_fz"),
+    "temperature": ("temperature_degC",),
+    "angles": ("roll_robot_gon", "pitch_robot_gon"),
+    "yaw": ("yaw_robot_gon",),
+    "vibration": ("vibration_mps2",),
+}
+"""Attributes of a campaign and the columns that make them up, all of them or none."""
+KNOWN = tuple(name for names in COLUMNS.values() for name in names)
+COUNTING = ("positions", "n_samples")
+LEAST = {"positions": 1, "n_samples": 1, "sd": 0, "temperature": -273.15, "vibration": 0}
+
+
+def _not_zero(value: float) -> float:
+    if value == 0:
+        raise ValueError("must not be zero")
+    return value
+
+
+PerAxis = Field(min_length=3, max_length=3)
+
+
+class Nominal(Block):
+    """Nominal conversion of counts: f = (raw − offset) · scale, m/s², per axis."""
+
+    scale: list[Annotated[Finite, AfterValidator(_not_zero)]] = PerAxis
+    offset: list[Finite] = PerAxis
+
+
+class _Gravity(Block):
+    value_mps2: Positive
+    sigma_mps2: NotNegative = 0.0
+
+
+class _SensorNoise(Block):
+    # Forces are always observed, and an observation without noise has no finite weight.
+    sigma_mps2: Positive
+
+
+class _Robot(Block):
+    angle_sigma_mgon: NotNegative
+
+
+class Header(Block):
+    """What stands in `campaign.yaml`."""
+
+    schema_version: Annotated[Literal[1], Number]
+    name: Annotated[str, Field(min_length=1)]
+    sensor: str | None = None
+    unit: Literal["m/s^2", "g", "counts"]
+    nominal: Nominal | None = None
+    gravity: _Gravity
+    sensor_noise: _SensorNoise | None = None
+    robot: _Robot | None = None
+
+    @model_validator(mode="after")
+    def _nominal_with_counts(self) -> Self:
+        if self.unit == "counts" and self.nominal is None:
+            raise ValueError("nominal: missing; unit: counts needs scale and offset of each axis")
+        if self.unit != "counts" and self.nominal is not None:
+            raise ValueError(f"nominal: goes with unit: counts, not with unit: {self.unit}")
+        return self
+
+    def to_si(self, attribute: str) -> tuple[Array, Array]:
+        """Scale and offset of columns: SI = (value in the file − offset) · scale."""
+        zero, one = np.zeros(1), np.ones(1)
+        if attribute in ("angles", "yaw"):
+            return GON * one, zero
+        if attribute not in ("forces", "sd"):
+            return one, zero
+        if self.nominal is None:
+            return to_si(one, self.unit, "m/s^2"), zero
+        scale, offset = np.array(self.nominal.scale), np.array(self.nominal.offset)
+        return (scale, offset) if attribute == "forces" else (np.abs(scale), zero)

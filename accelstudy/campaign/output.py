@@ -1,0 +1,67 @@
+"""What a calibration writes: JSON, Parquet, figures and a page."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from jinja2 import Environment, PackageLoader
+
+from accelstudy.campaign.assessment import assess, positions_table, quality_document
+from accelstudy.campaign.document import calibration_document
+from accelstudy.campaign.figures import correlation_figure, residual_figure, svg
+from accelstudy.campaign.fit import CampaignFit
+from accelstudy.figures.style import STYLE, unit_label
+from accelstudy.study.report import number
+from accelstudy.study.tables import whole_file
+
+
+def write_calibration(fit: CampaignFit, folder: str | Path) -> dict[str, Any]:
+    """Assess a fit and write calibration.json, positions.parquet, figures/ and report.html.
+
+    Each file is whole or not there; calibration.json comes last. Returns its content.
+    """
+    folder = Path(folder)
+    assessment = assess(fit)
+    document = calibration_document(fit)
+    quality = quality_document(assessment)
+    positions = positions_table(assessment)
+    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
+        figures = {
+            "residuals": residual_figure(fit, positions),
+            "correlations": correlation_figure(fit),
+        }
+        drawn = {name: svg(figure) for name, figure in figures.items()}
+        for name, figure in figures.items():
+            with whole_file(folder / "figures" / f"{name}.svg") as path:
+                path.write_text(drawn[name], encoding="utf-8")
+            with whole_file(folder / "figures" / f"{name}.png") as path:
+                figure.savefig(path, format="png", dpi=200)
+    with whole_file(folder / "positions.parquet") as path:
+        positions.to_parquet(path, index=False)
+
+    environment = Environment(loader=PackageLoader("accelstudy", "campaign"), autoescape=True)
+    environment.filters.update(number=number, unit=unit_label)
+    page = environment.get_template("report.html.j2").render(
+        doc=document,
+        quality=quality,
+        positions=positions.to_dict("records"),
+        shown=_shown,
+        **drawn,
+    )
+    with whole_file(folder / "report.html") as path:
+        path.write_text(page, encoding="utf-8")
+    content = {**document, "quality": quality}
+    with whole_file(folder / "calibration.json") as path:
+        text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
+        path.write_text(text + "\n", encoding="utf-8")
+    return content
+
+
+def _shown(parameter: dict[str, Any], value: float | None) -> str:
+    """Show an SI value of a parameter in the unit of the table."""
+    if value is None or parameter["sigma"] is None:
+        return "–"
+    return number(value * parameter["shown"]["sigma"] / parameter["sigma"])

@@ -1,0 +1,149 @@
+"""Measured data from the command line: calibrate, apply, export, check-sigmas."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from click.testing import CliRunner
+from test_campaign_fit import NINE, simulated_campaign
+
+from accelstudy.campaign import Campaign, write_campaign
+from accelstudy.cli import main
+from accelstudy.simulation import Noise
+
+TRUTH = {"b_x": 0.05, "b_y": 0.01, "b_z": 0.03, "s_x": 2e-4, "alpha_zx": 7e-4}
+
+
+def run(*arguments):
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+@pytest.fixture
+def campaign(tmp_path):
+    write_campaign(simulated_campaign(TRUTH), tmp_path / "campaign")
+    return tmp_path / "campaign"
+
+
+@pytest.mark.parametrize("approach", ["gravity", "robot"])
+def test_calibrate_writes_everything(campaign, tmp_path, approach):
+    result = run("calibrate", campaign, "--approach", approach, "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    content = json.loads((tmp_path / "out/calibration.json").read_text(encoding="utf-8"))
+    errors = [(p["value"] - TRUTH.get(p["name"], 0)) / p["sigma"] for p in content["parameters"]]
+    assert np.abs(errors).max() < 4.5
+    assert content["redundancy"] == (15 if approach == "gravity" else 63)
+    assert content["quality"]["global_test"]["accepted"]
+    assert content["quality"]["verdict"] in result.output
+    positions = pd.read_parquet(tmp_path / "out/positions.parquet")
+    assert positions["redundancy"].sum() == pytest.approx(content["redundancy"])
+    rms = np.sqrt(np.mean(positions["norm_residual_mps2"] ** 2))
+    assert content["rms_norm_residual_mps2"] == pytest.approx(rms)
+    page = (tmp_path / "out/report.html").read_text(encoding="utf-8")
+    assert content["quality"]["verdict"].replace("'", "&#39;") in page
+    assert page.count("<svg") == 2
+    assert "nan" not in page.lower().replace("dominant", "")
+    for name in ("residuals", "correlations"):
+        assert (tmp_path / f"out/figures/{name}.png").stat().st_size > 1000
+    assert not list((tmp_path / "out").rglob("*.part"))
+
+
+def test_a_bumped_position_is_named(tmp_path):
+    good = simulated_campaign(TRUTH)
+    forces = good.forces.copy()
+    forces[7] *= 1 + 0.03 / np.linalg.norm(forces[7])  # 15 sigma
+    bumped = Campaign("bumped", good.positions, forces, good.gravity, sigma_force=0.002)
+    write_campaign(bumped, tmp_path / "bumped")
+    result = run("calibrate", tmp_path / "bumped", "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    content = json.loads((tmp_path / "out/calibration.json").read_text(encoding="utf-8"))
+    assert [s["position"] for s in content["quality"]["suspects"]] == [8]
+    assert "position 8" in content["quality"]["verdict"]
+    assert content["sigma_source"] == "a posteriori"
+
+
+def test_understated_noise_is_said(tmp_path):
+    drawn = simulated_campaign(TRUTH, noise=Noise(sigma_force=0.006), sigma=0.002)
+    write_campaign(drawn, tmp_path / "loud")
+    result = run("calibrate", tmp_path / "loud", "--out", tmp_path / "out")
+    assert "understated, or an effect is missing" in result.output
+
+
+@pytest.mark.parametrize(("n", "words"), [(9, "no redundancy"), (10, "no power")])
+def test_little_redundancy_is_said(tmp_path, n, words):
+    scheme = "d-optimal-9" if n == 9 else "fibonacci-10"
+    for sigma in (0.002, None):
+        drawn = simulated_campaign(TRUTH, scheme=scheme)
+        plain = Campaign("few", drawn.positions, drawn.forces, drawn.gravity, sigma_force=sigma)
+        write_campaign(plain, tmp_path / "few")
+        result = run("calibrate", tmp_path / "few", "--out", tmp_path / f"out{sigma}")
+        assert result.exit_code == 0, result.output
+        if sigma or n == 9:
+            assert words in result.output
+
+
+def test_apply_levels_a_log(campaign, tmp_path):
+    run("calibrate", campaign, "--approach", "robot", "--out", tmp_path / "out")
+    calibration = tmp_path / "out/calibration.json"
+    f_b = np.array([[0.5, -0.7, -9.0], [0.0, 0.0, -9.8]])
+    readings = NINE.sense(f_b, NINE.vector(TRUTH))
+    log = tmp_path / "log.csv"
+    pd.DataFrame(readings, columns=["fx", "fy", "fz"]).to_csv(log, index=False)
+    result = run("apply", calibration, log, "--out", tmp_path / "level.csv")
+    assert result.exit_code == 0, result.output
+    level = pd.read_csv(tmp_path / "level.csv")
+    roll = np.arctan2(-f_b[:, 1], -f_b[:, 2]) * 200 / np.pi
+    assert np.all(np.abs(level["roll_gon"] - roll) < 5e-3 * level["sigma_roll_mgon"])
+    assert (level["sigma_pitch_mgon"] > 12.9).all()
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("fx,fy\n1,2\n", "three columns"),
+        ("fx,fy,fz\n1,2,x\n", "row 1"),
+        ("", "no CSV table"),
+        (None, "No such file"),
+    ],
+)
+def test_a_bad_log_is_one_line(campaign, tmp_path, content, words):
+    run("calibrate", campaign, "--out", tmp_path / "out")
+    log = tmp_path / "log.csv"
+    if content is not None:
+        log.write_text(content, encoding="utf-8")
+    result = run("apply", tmp_path / "out/calibration.json", log, "--out", tmp_path / "x.csv")
+    assert result.exit_code == 2
+    assert words in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert not (tmp_path / "x.csv").exists()
+
+
+@pytest.mark.parametrize("form", ["json", "yaml", "c", "matrix"])
+def test_export_prints(campaign, tmp_path, form):
+    run("calibrate", campaign, "--out", tmp_path / "out")
+    result = run("export", tmp_path / "out/calibration.json", "--form", form)
+    assert result.exit_code == 0
+    assert len(result.output.splitlines()) >= 3
+
+
+def test_check_sigmas(campaign):
+    result = run("check-sigmas", campaign, "--replicates", 200)
+    assert result.exit_code == 0, result.output
+    assert "alpha_zx" in result.output
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["calibrate", "nowhere", "--out", "out"],
+        ["export", "nowhere.json"],
+        ["check-sigmas", "nowhere"],
+    ],
+)
+def test_what_is_not_there_is_one_line(arguments, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = run(*arguments)
+    assert result.exit_code == 2
+    assert "nowhere" in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,150 @@
+"""Public measurements: the registry knows the files, and a file is got whole or not at all."""
+
+import hashlib
+import os
+import threading
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+
+import pytest
+
+from accelstudy.campaign.public import PublicData, fetch, public_data, public_file
+from accelstudy.errors import InputError, UnknownNameError
+
+DATA = Path(os.environ.get("ACCELSTUDY_SHARED", Path(__file__).parents[2] / "shared")) / "data"
+CONTENT = bytes(range(256)) * 64
+
+
+def data(url, content=CONTENT):
+    return PublicData(
+        description="a file",
+        url=url,
+        sha256=hashlib.sha256(content).hexdigest(),
+        licence="MIT",
+    )
+
+
+class Server(BaseHTTPRequestHandler):
+    """Serves CONTENT; the path says how badly: /plain without ranges, /broken only half of it."""
+
+    def do_GET(self):
+        wanted = self.headers.get("Range")
+        self.server.ranges.append(wanted)
+        start = 0
+        if wanted and not self.path.startswith("/plain"):
+            start = int(wanted.removeprefix("bytes=").removesuffix("-"))
+        if self.path.startswith("/missing"):
+            return self.send_error(404)
+        if start >= len(CONTENT):
+            return self.send_error(416)
+        body = CONTENT[start:]
+        self.send_response(206 if start else 200)
+        if start:
+            self.send_header("Content-Range", f"bytes {start}-{len(CONTENT) - 1}/{len(CONTENT)}")
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body[: len(body) // 2] if self.path.startswith("/broken") else body)
+
+    def log_message(self, *arguments):
+        pass
+
+
+@pytest.fixture
+def server(monkeypatch):
+    monkeypatch.setenv("no_proxy", "127.0.0.1")
+    with ThreadingHTTPServer(("127.0.0.1", 0), Server) as running:
+        running.ranges = []
+        running.url = f"http://127.0.0.1:{running.server_port}"
+        thread = threading.Thread(target=running.serve_forever, args=(0.01,))
+        thread.start()
+        yield running
+        running.shutdown()
+        thread.join()
+
+
+def left(folder):
+    """Files below a folder."""
+    return sorted(path.name for path in folder.rglob("*") if path.is_file())
+
+
+@pytest.mark.parametrize("name", public_data())
+def test_the_registry_says_how_a_file_is_read(name):
+    known = public_data()[name]
+    assert known.url.startswith("https://raw.githubusercontent.com/")
+    assert known.licence in ("MIT", "BSD-2-Clause")
+    settings = known.settings
+    if settings is not None:
+        assert {"fx", "fy", "fz"} <= {*settings.columns}
+        assert (settings.nominal is not None) == (settings.unit == "counts")
+        assert (settings.variable is not None) == (settings.format == "matlab")
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason=f"needs the public data in {DATA}")
+@pytest.mark.parametrize("name", public_data())
+def test_the_registry_knows_the_files(name):
+    path = public_file(name, DATA)
+    assert path.is_relative_to(DATA)
+    assert path.name == public_data()[name].file_name
+
+
+def test_an_unknown_name(tmp_path):
+    with pytest.raises(UnknownNameError, match="did you mean 'xsens-mti'"):
+        public_file("xsens_mti", tmp_path)
+
+
+def test_a_file_that_is_there_is_not_downloaded(tmp_path):
+    (tmp_path / "a" / "b").mkdir(parents=True)
+    (tmp_path / "a" / "file.log").write_bytes(b"another file of that name")
+    (tmp_path / "a" / "b" / "file.log").write_bytes(CONTENT)
+    missing = data("file:///nowhere/at%20all/file.log")
+    assert fetch(missing, tmp_path, tmp_path / "new") == tmp_path / "a" / "b" / "file.log"
+
+
+def test_download_of_a_whole_file(tmp_path):
+    source = tmp_path / "source of data" / "file.log"
+    source.parent.mkdir()
+    source.write_bytes(CONTENT)
+    folder = tmp_path / "folder"
+    path = fetch(data(source.as_uri()), folder, folder / "name")
+    assert path == folder / "name" / "file.log"
+    assert path.read_bytes() == CONTENT
+    assert left(folder) == ["file.log"]
+    source.unlink()
+    assert fetch(data(source.as_uri()), folder, folder / "name") == path
+
+
+@pytest.mark.parametrize("have", [0, 1000, len(CONTENT)])
+@pytest.mark.parametrize("way", ["ranges", "plain"])
+def test_an_interrupted_download_goes_on(tmp_path, server, have, way):
+    (tmp_path / "file.log.part").write_bytes(CONTENT[:have])
+    path = fetch(data(f"{server.url}/{way}/file.log"), tmp_path, tmp_path)
+    assert path.read_bytes() == CONTENT
+    assert left(tmp_path) == ["file.log"]
+    assert server.ranges == [f"bytes={have}-" if have else None]
+
+
+def test_a_broken_connection_keeps_what_has_come(tmp_path, server):
+    broken = data(f"{server.url}/broken/file.log")
+    with pytest.raises(InputError, match="try again"):
+        fetch(broken, tmp_path, tmp_path)
+    assert left(tmp_path) == ["file.log.part"]
+    assert fetch(data(f"{server.url}/ranges/file.log"), tmp_path, tmp_path).exists()
+    assert server.ranges == [None, f"bytes={len(CONTENT) // 2}-"]
+
+
+@pytest.mark.parametrize("part", [b"", b"wrong", b"too long" * len(CONTENT)])
+def test_a_wrong_checksum(tmp_path, server, part):
+    """Nothing is left that the next download would go on with."""
+    (tmp_path / "file.log.part").write_bytes(part)
+    other = data(f"{server.url}/ranges/file.log", b"" if not part else CONTENT)
+    with pytest.raises(InputError, match="sha256") as caught:
+        fetch(other, tmp_path, tmp_path)
+    assert "\n" not in str(caught.value)
+    assert left(tmp_path) == []
+
+
+@pytest.mark.parametrize("where", ["/missing", None])
+def test_a_source_that_does_not_answer(tmp_path, server, where):
+    url = f"{server.url}{where}/file.log" if where else (tmp_path / "none" / "file.log").as_uri()
+    with pytest.raises(InputError, match=r"cannot be downloaded.*put the file file\.log below"):
+        fetch(data(url), tmp_path, tmp_path)
