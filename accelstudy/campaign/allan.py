@@ -1,0 +1,156 @@
+"""The Allan deviation, and from it how well the mean of a hold is known.
+
+Samples of a real sensor are not independent: the mean of n of them is less certain than their
+standard deviation over √n. The Allan deviation at an averaging time τ is that of means over τ,
+whatever the colour of the noise; for white noise the two agree.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+RELIABLE = 10
+"""Independent differences of neighbouring means behind a value that is trusted (about 20 %)."""
+
+
+@dataclass(frozen=True)
+class AllanDeviation:
+    """Allan deviation over averaging times.
+
+    Attributes
+    ----------
+    tau : (k,) array, s
+    deviation : (k, m) array, one column for each channel
+    differences : (k,) int array, independent differences of neighbouring means behind each value
+    """
+
+    tau: Array
+    deviation: Array
+    differences: NDArray[np.int_]
+
+    @property
+    def pooled(self) -> Array:
+        """Root mean square over the channels, (k,)."""
+        return np.sqrt(np.mean(self.deviation**2, axis=1))
+
+    def channels(self, chosen: slice) -> AllanDeviation:
+        """Curve of some of the channels."""
+        return AllanDeviation(self.tau, self.deviation[:, chosen], self.differences)
+
+
+class AllanSums:
+    """What the records of one sensor contribute to its Allan variance; records may be short."""
+
+    def __init__(self, channels: int = 3) -> None:
+        self._squares: dict[int, Array] = {}
+        self._terms: dict[int, int] = {}
+        self._independent: dict[int, int] = {}
+        self._channels = channels
+
+    def add(self, samples: ArrayLike) -> None:
+        """Add a record without gaps, (n, channels).
+
+        Over m samples: σ²(τ) = ⟨(S[k + 2m] − 2 S[k + m] + S[k])²⟩ / (2 m²), S the running sum, and
+        the mean over all k (overlapping estimate; IEEE Std 1139).
+        """
+        samples = np.asarray(samples, dtype=float).reshape(len(np.asarray(samples)), -1)
+        sums = np.zeros((len(samples) + 1, samples.shape[1]))
+        np.cumsum(samples - samples.mean(axis=0), axis=0, out=sums[1:])
+        for m in averaging_factors(len(samples) // 2):
+            second = sums[2 * m :] - 2.0 * sums[m:-m] + sums[: -2 * m]
+            squares = np.sum(second**2, axis=0) / (2.0 * m * m)
+            self._squares[m] = self._squares.get(m, np.zeros(self._channels)) + squares
+            self._terms[m] = self._terms.get(m, 0) + len(second)
+            self._independent[m] = self._independent.get(m, 0) + len(samples) // m - 1
+
+    def deviation(self, step: float) -> AllanDeviation:
+        """Allan deviation of all records together; `step` is the time between samples, s."""
+        factors = sorted(self._terms)
+        variance = [self._squares[m] / self._terms[m] for m in factors]
+        return AllanDeviation(
+            tau=step * np.array(factors, dtype=float),
+            deviation=np.sqrt(np.array(variance).reshape(len(factors), self._channels)),
+            differences=np.array([self._independent[m] for m in factors], dtype=int),
+        )
+
+
+def averaging_factors(largest: int) -> list[int]:
+    """Numbers of samples averaged, four to the octave, from 1 to `largest`."""
+    if largest < 1:
+        return []
+    steps = np.arange(np.floor(4 * np.log2(largest)) + 1)
+    return [int(m) for m in np.unique(np.round(2.0 ** (steps / 4)).astype(int)) if m <= largest]
+
+
+def allan_deviation(samples: ArrayLike, step: float) -> AllanDeviation:
+    """Overlapping Allan deviation of one record, (n,) or (n, channels); `step` in s."""
+    values = np.asarray(samples, dtype=float).reshape(len(np.asarray(samples)), -1)
+    sums = AllanSums(values.shape[1])
+    sums.add(values)
+    return sums.deviation(step)
+
+
+@dataclass(frozen=True)
+class MeanAccuracy:
+    """How well the mean over a hold is known.
+
+    Attributes
+    ----------
+    duration : float, s, of the hold
+    white : float, what white noise would give: sd / √n
+    allan : float, from the Allan deviation at `duration`
+    tau : float, s, largest averaging time that the data determine
+    slope : float, d log σ / d log τ by which `allan` was carried on from `tau` to `duration`;
+        None if that was not necessary
+    """
+
+    duration: float
+    white: float
+    allan: float
+    tau: float
+    slope: float | None
+
+    @property
+    def ratio(self) -> float:
+        """By how much white noise would have been too optimistic."""
+        return self.allan / self.white
+
+
+def accuracy_of_mean(curve: AllanDeviation, duration: float, sd: float, n: int) -> MeanAccuracy:
+    """Standard deviation of a mean over `duration`, averaged over the channels.
+
+    Beyond the largest averaging time with at least `RELIABLE` independent differences the curve is
+    carried on with the slope of its last two octaves, though neither steeper than white noise
+    (−1/2) nor than a random walk (+1/2).
+
+    Parameters
+    ----------
+    curve : AllanDeviation
+    duration : float, s
+    sd : float, of the samples within a hold
+    n : int, samples in `duration`
+    """
+    white = sd / np.sqrt(n)
+    usable = (curve.differences >= RELIABLE) & (curve.pooled > 0)
+    if not usable.any():
+        return MeanAccuracy(duration, white, white, 0.0, None)
+    log_tau, log_sigma = np.log(curve.tau[usable]), np.log(curve.pooled[usable])
+    tau = float(np.exp(log_tau[-1]))
+    if duration <= tau * (1 + 1e-9):
+        allan = np.exp(np.interp(np.log(duration), log_tau, log_sigma))
+        return MeanAccuracy(duration, white, float(allan), tau, None)
+    last = log_tau >= log_tau[-1] - np.log(4.0) - 1e-9
+    x, y, weight = log_tau[last], log_sigma[last], curve.differences[usable][last]
+    slope = -0.5
+    if len(x) > 1:
+        # The variance of log σ goes as one over the independent differences.
+        slope = float(np.clip(np.polyfit(x, y, 1, w=np.sqrt(weight))[0], -0.5, 0.5))
+    level = np.average(y - slope * x, weights=weight)
+    return MeanAccuracy(
+        duration, white, float(np.exp(level + slope * np.log(duration))), tau, slope
+    )

@@ -1,0 +1,99 @@
+"""The command that makes a campaign of a raw log."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from accelstudy.errors import InputError
+
+_PATH = click.Path(path_type=Path)
+
+
+@click.command("import")
+@click.argument("log", type=_PATH)
+@click.option("--out", type=_PATH, required=True, help="Folder of the campaign.")
+@click.option("--settings", "settings_path", type=_PATH, help="YAML file; options overlay it.")
+@click.option("--name", help="Name of the campaign.  [default: that of the file]")
+@click.option("--columns", help="Names or places from 0, as fx=1,fy=2,fz=3.")
+@click.option("--time", help="Column of time, by name or place.")
+@click.option("--rate", type=float, help="Samples per second, without a column of time.")
+@click.option("--unit", help="m/s^2, g or counts.  [default: m/s^2]")
+@click.option("--scale", help="With counts: m/s² per count, one number or three.")
+@click.option("--offset", help="With counts: reading at 0 m/s², one number or three.")
+@click.option("--gravity", type=float, help="Local gravity, m/s².  [default: 9.80665]")
+@click.option("--threshold", type=float, help="sd of a window at rest, m/s², instead of chosen.")
+@click.option("--means", is_flag=True, help="LOG is a table of means already.")
+@click.option("--figure/--no-figure", default=True, help="Draw the log with its holds.")
+def import_command(
+    log: Path,
+    out: Path,
+    settings_path: Path | None,
+    means: bool,
+    figure: bool,
+    **options: Any,
+) -> None:
+    """Make a campaign of a raw LOG: find its static holds and how well their means are known.
+
+    LOG is text (CSV or columns), MATLAB or Parquet. Without --threshold the noise of the log
+    itself says what is at rest; segmentation.png in the folder shows the outcome.
+    """
+    from accelstudy.campaign.format import write_campaign
+    from accelstudy.campaign.importing import import_log, import_means, log_of, read_settings
+    from accelstudy.study.provenance import check_writable
+
+    settings = read_settings(settings_path, _given(**options))
+    check_writable(out)
+    campaign, report = (import_means if means else import_log)(log, settings)
+    write_campaign(campaign, out)
+    for line in report.lines():
+        click.echo(line)
+    for warning in report.warnings:
+        click.echo(f"warning: {warning}", err=True)
+    if figure and report.holds is not None:
+        from accelstudy.campaign.segmentation_figure import render_segmentation
+
+        paths = out / "segmentation.svg", out / "segmentation.png"
+        render_segmentation(log_of(log, settings), report.holds, *paths)
+        click.echo(f"figure: {paths[1]}")
+    click.echo(f"campaign: {out}")
+
+
+def _given(
+    columns: str | None,
+    scale: str | None,
+    offset: str | None,
+    rate: float | None,
+    gravity: float | None,
+    threshold: float | None,
+    time: str | None,
+    **others: str | None,
+) -> dict[str, Any]:
+    """Options that were given, as the settings name them."""
+    content: dict[str, Any] = {
+        **others,
+        "columns": None if columns is None else _columns(columns),
+        "scale": None if scale is None else _numbers("--scale", scale),
+        "offset": None if offset is None else _numbers("--offset", offset),
+        "rate_hz": rate,
+        "time": time,
+        "threshold_mps2": threshold,
+        "gravity": None if gravity is None else {"value_mps2": gravity},
+    }
+    return {key: value for key, value in content.items() if value is not None}
+
+
+def _columns(text: str) -> dict[str, str]:
+    pairs = [part.split("=", 1) for part in text.split(",")]
+    if any(len(pair) != 2 for pair in pairs):
+        raise InputError(f"--columns: expected fx=1,fy=2,fz=3 or names, not {text!r}")
+    return {key.strip(): column.strip() for key, column in pairs}
+
+
+def _numbers(option: str, text: str) -> list[float]:
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise InputError(f"{option}: expected numbers, as 1.5 or 1,2,3, not {text!r}") from None

@@ -1,0 +1,101 @@
+"""Figure of a log with its static holds, by which a person judges the segmentation."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from matplotlib.ticker import NullLocator
+from numpy.typing import NDArray
+
+from accelstudy.campaign.holds import Holds, windows
+from accelstudy.campaign.logs import Log
+from accelstudy.figures.style import DPI, FULL, INK, STYLE, new_figure
+from accelstudy.study.tables import whole_file
+
+Array = NDArray[np.float64]
+
+COLUMNS = 1200
+"""Points of time drawn, about as many as a page can show."""
+# Okabe & Ito's colours.
+_COLOURS = ("#0072B2", "#D55E00", "#009E73")
+_THRESHOLD = "#CC79A7"
+_SHADE = "#DCE6F0"
+
+
+def draw_segmentation(log: Log, holds: Holds) -> Figure:
+    """Draw specific forces and the standard deviation of the windows over time, holds shaded.
+
+    The log is read once more, and reduced to the smallest and the largest value in each of
+    `COLUMNS` spans of time.
+    """
+    edges, low, high = _envelope(log, holds)
+    middle = (edges[:-1] + edges[1:]) / 2 - holds.span[0]
+    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
+        figure = new_figure(FULL, 90)
+        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+        for i, (name, colour) in enumerate(zip("xyz", _COLOURS, strict=True)):
+            _band(above, middle, low[:, i], high[:, i], colour, f"$f_{name}$")
+        _band(below, middle, low[:, 3], high[:, 3], INK, None)
+        label = f"threshold {holds.threshold.sd:.2g} m/s²"
+        below.axhline(holds.threshold.sd, color=_THRESHOLD, linestyle="--", label=label)
+        for ax in (above, below):
+            for start, end in zip(holds.t0, holds.t1, strict=True):
+                ax.axvspan(
+                    start - holds.span[0], end - holds.span[0], color=_SHADE, lw=0, zorder=0.5
+                )
+        above.set_ylabel("specific force / (m/s²)")
+        below.set(yscale="log", xlabel="time / s", ylabel="window sd / (m/s²)")
+        below.set_xlim(0, holds.span[1] - holds.span[0])
+        below.yaxis.set_minor_locator(NullLocator())
+        handles, labels = above.get_legend_handles_labels()
+        lines, texts = below.get_legend_handles_labels()
+        count = f"{len(holds)} static hold" + ("" if len(holds) == 1 else "s")
+        figure.legend(
+            [*handles, Patch(color=_SHADE), *lines],
+            [*labels, count, *texts],
+            loc="outside upper center",
+            ncols=5,
+        )
+        figure.align_ylabels()
+    return figure
+
+
+def render_segmentation(log: Log, holds: Holds, svg_path: str | Path, png_path: str | Path) -> None:
+    """Draw the segmentation and write it as SVG and PNG, each whole or not at all."""
+    figure = draw_segmentation(log, holds)
+    metadata: dict[str, dict[str, Any]] = {
+        "svg": {"Date": None, "Creator": None, "Title": "Static holds"},
+        "png": {"Software": None, "Title": "Static holds"},
+    }
+    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
+        for kind, path in (("svg", svg_path), ("png", png_path)):
+            with whole_file(path) as temporary:
+                figure.savefig(temporary, format=kind, dpi=DPI, metadata=metadata[kind])
+            figure.set_layout_engine("none")  # laid out once, alike in both
+
+
+def _envelope(log: Log, holds: Holds) -> tuple[Array, Array, Array]:
+    """Edges of the spans (k + 1,), and least and largest fx, fy, fz and sd in each (k, 4)."""
+    count = max(1, min(COLUMNS, holds.total // 4))
+    edges = np.linspace(*holds.span, count + 1)
+    low, high = np.full((count, 4), np.inf), np.full((count, 4), -np.inf)
+    for batch in windows(log, holds.window):
+        values = np.column_stack([batch.forces, np.sqrt(batch.variance)])
+        span = np.clip(np.searchsorted(edges, batch.time, side="right") - 1, 0, count - 1)
+        np.minimum.at(low, span, values)
+        np.maximum.at(high, span, values)
+    empty = ~np.isfinite(low)
+    low[empty] = high[empty] = np.nan  # a gap
+    return edges, low, high
+
+
+def _band(ax: Axes, x: Array, low: Array, high: Array, colour: str, label: str | None) -> None:
+    # A band without height would be invisible, so its middle is drawn too.
+    ax.fill_between(x, low, high, color=colour, alpha=0.5, linewidth=0)
+    ax.plot(x, (low + high) / 2, color=colour, linewidth=0.8, label=label)

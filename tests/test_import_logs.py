@@ -1,0 +1,269 @@
+"""Readers of raw logs: every layout gives the same numbers, and bad input one clear line."""
+
+from contextlib import contextmanager
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+from scipy.io import savemat
+
+from accelstudy.campaign.holds import find_holds
+from accelstudy.campaign.logs import open_log
+from accelstudy.errors import InputError
+from accelstudy.units import STANDARD_GRAVITY
+
+N = 50
+TIME = 0.25 * np.arange(N)
+FORCES = np.round(np.random.default_rng(1).normal(0, 5, (N, 3)), 3)
+TABLE = np.column_stack([TIME, FORCES])
+
+
+def everything(log):
+    times, forces = zip(*log.chunks(), strict=True)
+    return np.concatenate(times), np.concatenate(forces)
+
+
+def lines(separator=",", decimal=".", before=()):
+    rows = [separator.join(f"{value:.3f}".replace(".", decimal) for value in row) for row in TABLE]
+    return "\n".join([*before, *rows]) + "\n"
+
+
+def written(folder, text, name="log.csv"):
+    path = folder / name
+    path.write_text(text)
+    return path
+
+
+BY_PLACE = {"columns": {"fx": 1, "fy": "2", "fz": 3}, "time": 0}
+
+
+@pytest.mark.parametrize(
+    ("text", "options"),
+    [
+        (lines(before=["t,fx,fy,fz"]), {}),
+        (lines(before=["Fs,100", "Waiting time,3", '"Time_s","Acc X","Acc Y","Acc Z"']), {}),
+        (lines(before=["# made by hand", "# time,ax,ay,az"]), {}),
+        (lines(before=["% a comment", "", "%another"]), BY_PLACE),
+        (lines("\t", before=["time\tfx\tfy\tfz"]), {}),
+        (lines(";", ",", ["time;fx;fy;fz"]), {}),
+        (lines("   "), BY_PLACE),
+        (lines("   ", ","), BY_PLACE),
+        (lines(" , "), BY_PLACE),
+        (lines().replace("\n", ",x_a\n"), BY_PLACE),
+        (lines().replace("\n", "\r\n"), BY_PLACE),
+        (lines().rstrip("\n"), BY_PLACE),
+        ("\ufeff" + lines(before=["t,fx,fy,fz"]), {}),
+        (lines().replace("\n", "\n\n"), BY_PLACE),
+        (lines().replace("\n", "\n# why not\n", 3), BY_PLACE),
+    ],
+)
+@pytest.mark.parametrize("chunk_size", [7, 65536])
+def test_text(tmp_path, text, options, chunk_size):
+    path = written(tmp_path, text)
+    time, forces = everything(open_log(path, chunk_size=chunk_size, **options))
+    np.testing.assert_array_equal(time, TIME)
+    np.testing.assert_array_equal(forces, FORCES)
+
+
+def test_chunks_are_small(tmp_path):
+    log = open_log(written(tmp_path, lines(before=["t,fx,fy,fz"])), chunk_size=7)
+    assert [len(time) for time, _ in log.chunks()] == [7] * 7 + [1]
+
+
+@pytest.mark.parametrize("array", [TABLE, TABLE.T])
+def test_matlab(tmp_path, array):
+    savemat(tmp_path / "log.mat", {"log": array, "name": "x"})
+    time, forces = everything(open_log(tmp_path / "log.mat", chunk_size=9, **BY_PLACE))
+    np.testing.assert_array_equal(time, TIME)
+    np.testing.assert_array_equal(forces, FORCES)
+
+
+def test_matlab_4_and_a_chosen_array(tmp_path):
+    savemat(tmp_path / "log.mat", {"log": TABLE, "other": FORCES}, format="4")
+    with pytest.raises(InputError, match=r"which array\? There are log, other"):
+        open_log(tmp_path / "log.mat", rate=4)
+    _, forces = everything(open_log(tmp_path / "log.mat", rate=4, variable="other"))
+    np.testing.assert_array_equal(forces, FORCES)
+    with pytest.raises(InputError, match="did you mean 'other'"):
+        open_log(tmp_path / "log.mat", rate=4, variable="othr")
+
+
+def test_parquet(tmp_path):
+    frame = pd.DataFrame(TABLE, columns=["time", "accX", "accY", "accZ"]).assign(label="a")
+    frame.to_parquet(tmp_path / "log.parquet")
+    columns = {"fx": "accX", "fy": "accY", "fz": "accZ"}
+    log = open_log(tmp_path / "log.parquet", columns=columns, chunk_size=9)
+    time, forces = everything(log)
+    np.testing.assert_array_equal(time, TIME)
+    np.testing.assert_array_equal(forces, FORCES)
+    assert log.step == 0.25
+
+
+def test_units(tmp_path):
+    path = written(tmp_path, lines())
+    _, forces = everything(open_log(path, unit="g", **BY_PLACE))
+    np.testing.assert_allclose(forces, FORCES * STANDARD_GRAVITY)
+    log = open_log(path, unit="counts", scale=(0.1, 0.2, -0.3), offset=7, **BY_PLACE)
+    np.testing.assert_allclose(everything(log)[1], (FORCES - 7) * (0.1, 0.2, -0.3))
+    time, _ = everything(open_log(path, time_unit="ms", **BY_PLACE))
+    np.testing.assert_allclose(time, TIME * 1e-3)
+    time, _ = everything(open_log(path, columns=BY_PLACE["columns"], rate=50, chunk_size=8))
+    np.testing.assert_allclose(time, np.arange(N) / 50)
+
+
+def test_three_columns_need_no_names(tmp_path):
+    np.savetxt(tmp_path / "log.txt", FORCES, "%.3f")
+    np.testing.assert_array_equal(everything(open_log(tmp_path / "log.txt", rate=1))[1], FORCES)
+
+
+def changed(row, place, value):
+    rows = lines().splitlines()
+    cells = rows[row].split(",")
+    cells[place] = value
+    rows[row] = ",".join(cells)
+    return "\n".join(rows) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "the file is empty"),
+        ("\n\n", "no line of numbers"),
+        ("so,it,goes\nand,goes,on\n", "no line of numbers"),
+        (changed(20, 2, "nan"), r"line 21, column 2 \(fy\): 'nan', not a usable number"),
+        (changed(20, 3, "-inf"), r"line 21, column 3 \(fz\): '-inf', not"),
+        (changed(20, 1, "1.2.3"), r"line 21, column 1 \(fx\): '1.2.3', not"),
+        (changed(20, 1, ""), r"line 21, column 1 \(fx\): nothing, not"),
+        (changed(20, 1, "True"), r"line 21, column 1 \(fx\): 'True', not"),
+        (changed(20, 1, "1e300"), r"line 21, column 1 \(fx\): '1e300', not"),
+        (changed(20, 3, "1,5"), "line 21: 5 columns instead of 4"),
+        (changed(20, 3, "1,5,6"), "line 21: 6 columns instead of 4"),
+        (changed(20, 0, "0.1"), r"line 21, column 0 \(time\): time does not increase \('0.1'\)"),
+        (changed(20, 0, "4.75"), "line 21, .*time does not increase"),
+        (lines()[:-12], r"line 50, column 3 \(fz\): the line ends before it, not"),
+        ("\n".join(f"{i},1,2,{i}" for i in range(9)), r"column 1 \(fx\) is constant"),
+        ("0,1,2,3\n", r"too few samples \(1\)"),
+    ],
+)
+@pytest.mark.parametrize("chunk_size", [7, 65536])
+def test_bad_text(tmp_path, text, message, chunk_size):
+    path = written(tmp_path, text)
+    with pytest.raises(InputError, match=message) as caught:
+        everything(open_log(path, chunk_size=chunk_size, **BY_PLACE))
+    assert str(caught.value).startswith(str(path))
+    assert "\n" not in str(caught.value)
+
+
+def test_the_line_is_that_of_the_file(tmp_path):
+    text = "# one\nt,fx,fy,fz\n\n" + changed(20, 2, "x").replace("\n", "\n\n")
+    with pytest.raises(InputError, match=r"line 44, column fy \(fy\): 'x'"):
+        everything(open_log(written(tmp_path, text)))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({}, r"which column is fx\? The columns are a, b, a, c, counted from 0"),
+        ({"columns": {"fx": "q"}}, "fx: no column 'q'; there are a, b, a, c"),
+        ({"columns": {"fx": 4}}, "fx: no column 4; there are 4, counted from 0"),
+        ({"columns": {"fx": -1}}, "fx: no column -1"),
+        ({"columns": {"fx": "a"}}, "there are several columns 'a'"),
+        ({"columns": {"fx": 1, "fy": 1, "fz": 3}}, "name the same column"),
+        ({"columns": {"gx": 1}}, "unknown column 'gx'"),
+        ({"columns": {"fx": 1, "fy": 2, "fz": 3}}, "give the column of time, or the rate"),
+        ({**BY_PLACE, "rate": 100}, "not both"),
+        ({"columns": BY_PLACE["columns"], "rate": 0}, "rate must be positive"),
+        ({**BY_PLACE, "unit": "counts"}, "needs a nominal scale"),
+        ({**BY_PLACE, "unit": "counts", "scale": 0}, "must not be 0"),
+        ({**BY_PLACE, "unit": "counts", "scale": (1, 2)}, "one number or three"),
+        ({**BY_PLACE, "unit": "counts", "scale": 1, "offset": np.inf}, "must be finite"),
+        ({**BY_PLACE, "scale": 2}, "goes with unit counts"),
+        ({**BY_PLACE, "unit": "ft"}, "unknown unit of a log 'ft'"),
+        ({**BY_PLACE, "time_unit": "h"}, "unknown unit of time 'h'"),
+    ],
+)
+def test_bad_options(tmp_path, options, message):
+    path = written(tmp_path, lines(before=["a,b,a,c"]))
+    with pytest.raises(InputError, match=message):
+        open_log(path, **options)
+
+
+def test_bad_files(tmp_path):
+    with pytest.raises(InputError, match="no such file"):
+        open_log(tmp_path / "none.csv")
+    with pytest.raises(InputError, match="is a directory"):
+        open_log(tmp_path)
+    frame = pd.DataFrame(TABLE, columns=["time", "fx", "fy", "fz"])
+    whole = tmp_path / "whole.parquet"
+    frame.to_parquet(whole)
+    (tmp_path / "cut.parquet").write_bytes(whole.read_bytes()[:-40])
+    with pytest.raises(InputError, match="not a whole Parquet file"):
+        open_log(tmp_path / "cut.parquet")
+    frame.assign(fy=frame.fy.mask(frame.index == 20)).to_parquet(whole)
+    with pytest.raises(InputError, match=r"row 21, column fy \(fy\): nan, not"):
+        everything(open_log(whole, chunk_size=8))
+    frame.assign(fy="a").to_parquet(whole)
+    with pytest.raises(InputError, match=r"column fy is .*string, not numbers"):
+        everything(open_log(whole))
+    pq.write_table(pa.table({"time": pa.array([], pa.float64())}), whole)
+    with pytest.raises(InputError, match="which column is fx"):
+        open_log(whole)
+    savemat(tmp_path / "whole.mat", {"log": TABLE})
+    (tmp_path / "cut.mat").write_bytes((tmp_path / "whole.mat").read_bytes()[:300])
+    with pytest.raises(InputError, match="not a whole MATLAB file"):
+        open_log(tmp_path / "cut.mat")
+    (tmp_path / "new.mat").write_bytes(b"\x89HDF\r\n")
+    with pytest.raises(InputError, match="save it with -v7"):
+        open_log(tmp_path / "new.mat")
+
+
+@contextmanager
+def one_line_at_most():
+    """Let nothing pass but an `InputError` of one line."""
+    message = ""
+    try:
+        yield
+    except InputError as error:
+        message = str(error)
+    assert len(message.splitlines()) <= 1
+
+
+cells = st.one_of(
+    st.floats(-20, 20).map(str),
+    st.sampled_from(["nan", "", "1e400", "-", '"', "1_0", "a", "0x1", "1,5", "True", "1e15"]),
+    st.text("01.,;# \t%\"'\r\x00eE-+a\u2028é", max_size=6),
+)
+
+
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.lists(st.lists(cells, max_size=6), max_size=40),
+    st.sampled_from([",", ";", " ", "\t", ", "]),
+    st.sampled_from([{"rate": 100.0}, {"rate": 3.0}, {"time": 0}, {}]),
+    st.sampled_from([None, {"fx": 0, "fy": 1, "fz": 2}, {"fx": 3, "fy": 1, "fz": 2}]),
+    st.sampled_from([3, 65536]),
+)
+@example([["1", "2", "3"], ["1", "2", "3", "4"], ["2", "3", "4"]], ",", {"rate": 9.0}, None, 3)
+def test_whatever_the_text(tmp_path, rows, separator, timing, columns, chunk_size):
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(separator.join(row) for row in rows), encoding="utf-8")
+    with one_line_at_most():
+        log = open_log(path, columns=columns, chunk_size=chunk_size, **timing)
+        time, forces = everything(log)
+        assert len(time) == len(forces)
+        assert np.isfinite(forces).all()
+        find_holds(log, shortest=0.1, window=0.5)
+
+
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.binary(max_size=300), st.sampled_from(["log.txt", "log.mat", "log.parquet"]))
+@example(b"\x00\x00\x00\x00" + bytes(100), "log.mat")
+def test_whatever_the_bytes(tmp_path, content, name):
+    path = tmp_path / name
+    path.write_bytes(content)
+    with one_line_at_most():
+        everything(open_log(path, columns={"fx": 0, "fy": 1, "fz": 2}, rate=1))
