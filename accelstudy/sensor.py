@@ -111,7 +111,7 @@ class SensorModel:
         Parameters and result as in `sense`, with f_s and f_b exchanged. Where the Newton iteration
         does not converge (effects as large as the signal) the result is NaN.
         """
-        f_a = self._sensitive_force(f_s, parameters, g, hold)
+        f_a = self.sensitive_force(f_s, parameters, g, hold)
         return self.trace.apply(self.trace.body, f_a, parameters, g, hold)
 
     def correction_jacobian(
@@ -122,17 +122,21 @@ class SensorModel:
         hold: Hold | None = None,
     ) -> NDArray[np.float64]:
         """Derivative of `correct` with respect to the parameters, (..., n, 3, u)."""
-        f_a = np.moveaxis(self._sensitive_force(f_s, parameters, g, hold), -1, 0)
+        f_a = np.moveaxis(self.sensitive_force(f_s, parameters, g, hold), -1, 0)
         x = np.moveaxis(np.asarray(parameters, dtype=float), -1, 0)
         jacobian = self.trace.evaluate(
             self.trace.body_jacobian, f_a, f_a, x, np.asarray(g, dtype=float), hold
         )
         return np.moveaxis(jacobian, (0, 1), (-2, -1))
 
-    def _sensitive_force(
-        self, f_s: ArrayLike, parameters: ArrayLike, g: ArrayLike, hold: Hold | None
+    def sensitive_force(
+        self,
+        f_s: ArrayLike,
+        parameters: ArrayLike,
+        g: ArrayLike = STANDARD_GRAVITY,
+        hold: Hold | None = None,
     ) -> NDArray[np.float64]:
-        """f_a of f_s by Newton's method, NaN where it does not converge."""
+        """Specific force in the sensitive axes, f_a, for a sensor output; else as `correct`."""
         f_s = np.asarray(f_s, dtype=float)
         batch = np.broadcast_shapes(f_s.shape[:-2], np.shape(parameters)[:-1])
         f_a = np.broadcast_to(f_s, batch + f_s.shape[-2:])

@@ -191,12 +191,11 @@ def whitened_jacobian(
     x = problem.initial[:1].copy()
     x[0, : model.n_parameters] = parameters
     forces = problem.observations[:1, :, :3]
-    f_b = model.correct(forces, x[:, : model.n_parameters], observed.gravity, observed.hold)
-    t_inverse = np.linalg.inv(model.axes_matrix(parameters))
+    f_a = model.sensitive_force(forces, x[:, : model.n_parameters], observed.gravity, observed.hold)
     at = problem.conditions.linearise(
         x.T,
         np.moveaxis(problem.observations[:1], -1, 0),
-        np.moveaxis(f_b @ t_inverse.T, -1, 0),
+        np.moveaxis(f_a, -1, 0),
     )
     white = whitened_design(at, problem.cofactors.T)
     rows = np.moveaxis(white[:, :, 0], 1, -1).reshape(-1, x.shape[1])

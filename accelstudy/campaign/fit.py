@@ -122,13 +122,6 @@ def campaign_noise(campaign: Campaign) -> Noise:
     )
 
 
-def campaign_scheme(campaign: Campaign, directions: Array | None = None) -> Scheme:
-    """Positions of a campaign as a scheme; by default the directions that it measured."""
-    if directions is None:
-        directions = -campaign.forces
-    return Scheme(campaign.name, campaign.name, directions, "exact", f"campaign {campaign.name}")
-
-
 def fit_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> CampaignFit:
     """Calibrate a campaign.
 
@@ -153,7 +146,7 @@ def fit_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> 
     start = initial_values(model, campaign.forces, campaign.gravity)
     rough = model.correct(campaign.forces, start, campaign.gravity, campaign.hold)
     design = diagnose(
-        campaign_scheme(campaign, -rough),
+        Scheme(campaign.name, campaign.name, -rough, "exact", f"campaign {campaign.name}"),
         model,
         approach,
         noise,

@@ -3,9 +3,6 @@
 To add one, write a module next to this file with a function under `figure`.
 """
 
-from importlib import import_module
-from pkgutil import iter_modules
-
 from accelstudy.figures.registry import (
     FigureEntry,
     Tables,
@@ -16,6 +13,7 @@ from accelstudy.figures.registry import (
     get_figure,
     render,
 )
+from accelstudy.registry import import_modules
 
 __all__ = [
     "FigureEntry",
@@ -29,5 +27,4 @@ __all__ = [
 ]
 
 # A module registers its figures when it is imported.
-for _module in iter_modules(__path__):
-    import_module(f"{__name__}.{_module.name}")
+import_modules(__name__, __path__)

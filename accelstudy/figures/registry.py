@@ -11,8 +11,8 @@ import matplotlib as mpl
 import pandas as pd
 from matplotlib.figure import Figure
 
-from accelstudy.errors import UnknownNameError
 from accelstudy.figures.style import DPI, STYLE
+from accelstudy.registry import Registry
 from accelstudy.study.config import StudyConfig
 from accelstudy.study.tables import whole_file
 
@@ -43,7 +43,8 @@ class FigureEntry:
     draw: Draw
 
 
-_REGISTRY: dict[str, FigureEntry] = {}
+_registry: Registry[FigureEntry] = Registry("figure")
+get_figure = _registry.get
 
 
 def figure(
@@ -61,29 +62,19 @@ def figure(
     ValueError
         If the name is taken or a table is not one of `TABLES`.
     """
-    if name in _REGISTRY:
-        raise ValueError(f"figure {name!r} is registered twice")
     if unknown := set(tables) - set(TABLES):
         raise ValueError(f"figure {name!r}: no such tables: {', '.join(sorted(unknown))}")
 
     def decorate(function: Draw) -> Draw:
-        _REGISTRY[name] = FigureEntry(name, title, category, tables, when, function)
+        _registry.add(name, FigureEntry(name, title, category, tables, when, function))
         return function
 
     return decorate
 
 
-def get_figure(name: str) -> FigureEntry:
-    """Return the figure registered under `name`; raise `UnknownNameError` if there is none."""
-    try:
-        return _REGISTRY[name]
-    except KeyError:
-        raise UnknownNameError("figure", name, _REGISTRY) from None
-
-
 def figure_names(study: StudyConfig) -> tuple[str, ...]:
     """Names of the figures that a study has."""
-    return tuple(sorted(name for name, entry in _REGISTRY.items() if entry.when(study)))
+    return tuple(sorted(name for name in _registry.names() if get_figure(name).when(study)))
 
 
 def figure_tables(name: str) -> tuple[str, ...]:

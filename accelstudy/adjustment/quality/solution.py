@@ -142,8 +142,7 @@ def solve(
     p = x[: model.n_parameters]
     gravity = float(x[-1]) if problem.weights.any() else float(np.ravel(observed.gravity)[0])
     adjusted = problem.observations[0] + v
-    f_b = model.correct(adjusted[:, :3], p, gravity, observed.hold)
-    f_a = f_b @ np.linalg.inv(model.axes_matrix(p)).T
+    f_a = model.sensitive_force(adjusted[:, :3], p, gravity, observed.hold)
     at = problem.conditions.linearise(x[:, None], adjusted.T[:, None], f_a.T[:, None])
     b = np.moveaxis(at.jac_observations[:, :, 0], -1, 0)
     root_weight = np.sqrt(problem.weights)
