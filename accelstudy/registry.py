@@ -25,10 +25,14 @@ class Registry(Generic[Item]):
         self.kind = kind
         self._items: dict[str, Item] = {}
 
-    def add(self, name: str, item: Item) -> None:
-        """Register an item; raise `ValueError` if its name is taken."""
+    def check_free(self, name: str) -> None:
+        """Raise `ValueError` if the name is taken."""
         if name in self._items:
             raise ValueError(f"{self.kind} {name!r} is registered twice")
+
+    def add(self, name: str, item: Item) -> None:
+        """Register an item; raise `ValueError` if its name is taken."""
+        self.check_free(name)
         self._items[name] = item
 
     def get(self, name: str) -> Item:

@@ -62,6 +62,7 @@ def figure(
     ValueError
         If the name is taken or a table is not one of `TABLES`.
     """
+    _registry.check_free(name)
     if unknown := set(tables) - set(TABLES):
         raise ValueError(f"figure {name!r}: no such tables: {', '.join(sorted(unknown))}")
 
