@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.effects import Effect, Hold, Parameter, get_effect
 from accelstudy.errors import InputError
-from accelstudy.tracing import TracedFunction, derivative, symbolic, symbols
+from accelstudy.tracing import TracedFunction, derivative, inverse, symbolic, symbols
 from accelstudy.units import STANDARD_GRAVITY
 
 
@@ -272,7 +272,7 @@ class SensorTrace:
     @cached_property
     def sense(self) -> TracedFunction:
         """f_s of f_b."""
-        f_a = self.t_matrix.inv(method="ADJ") * sp.Matrix(self.force)
+        f_a = inverse(self.t_matrix) * sp.Matrix(self.force)
         at = dict(zip(self.force, f_a, strict=True))
         h = [sp.sympify(e).subs(at, simultaneous=True) for e in self.h]
         return TracedFunction(self.arguments, sp.Matrix(h))
@@ -285,10 +285,7 @@ class SensorTrace:
     @cached_property
     def h_inverse(self) -> sp.Matrix:
         """(∂f_s/∂f_a)⁻¹, (3, 3)."""
-        jacobian = derivative(self.h, self.force)
-        if jacobian.is_diagonal():
-            return sp.diag(*(1 / jacobian[i, i] for i in range(3)))
-        return jacobian.inv(method="ADJ")
+        return inverse(derivative(self.h, self.force))
 
     @cached_property
     def body_by_output(self) -> sp.Matrix:

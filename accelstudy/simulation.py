@@ -114,15 +114,7 @@ def session(
     """
     f_b = -gravity * np.asarray(directions, dtype=float)
     roll, pitch = roll_pitch(tuple(f_b.T))
-    step = np.diff(f_b, axis=0, prepend=f_b[:1])
-    known = replace(
-        hold or Hold(),
-        roll=roll,
-        pitch=pitch,
-        step_x=step[:, 0],
-        step_y=step[:, 1],
-        step_z=step[:, 2],
-    )
+    known = replace(hold or Hold(), roll=roll, pitch=pitch).with_steps(f_b)
     angles = np.stack([roll, pitch], axis=-1)
     return Session(
         f_b=f_b,

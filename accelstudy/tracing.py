@@ -45,6 +45,19 @@ def derivative(expressions: Sequence[Any], variables: Sequence[sp.Symbol]) -> sp
     return matrix.replace(sp.DiracDelta, lambda *_: sp.S.Zero)
 
 
+def inverse(matrix: sp.Matrix) -> sp.Matrix:
+    """Inverse of a 3 × 3 matrix.
+
+    It is formed of placeholders, since SymPy would expand the products of the entries: seconds for
+    a full matrix, and nothing that the elimination of common subexpressions would not find.
+    """
+    if matrix.is_diagonal():
+        return sp.diag(*(1 / matrix[i, i] for i in range(3)))
+    place = sp.Matrix(3, 3, lambda i, j: sp.Dummy() if matrix[i, j] != 0 else 0)
+    entries = {place[i, j]: matrix[i, j] for i in range(3) for j in range(3) if place[i, j] != 0}
+    return place.inv(method="ADJ").xreplace(entries)
+
+
 @dataclass(frozen=True)
 class TracedFunction:
     """A generated NumPy function and the symbolic form from which it was generated.

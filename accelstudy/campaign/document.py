@@ -24,7 +24,7 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
         "campaign": campaign.name,
         "sensor": campaign.sensor,
         "model": fit.model.name,
-        "effects": [effect.name for effect in fit.model.effects],
+        "effects": [effect.spec for effect in fit.model.effects],
         "approach": fit.approach.name,
         "unit": campaign.unit,
         "nominal": _nominal(fit),

@@ -89,18 +89,15 @@ class Campaign:
     def hold(self) -> Hold:
         """What is known of the holds besides the forces, as the effects take it."""
         roll, pitch = (None, None) if self.angles is None else self.angles.T
-        step = np.diff(self.forces, axis=0, prepend=self.forces[:1])
-        return Hold(
+        hold = Hold(
             temperature=self.temperature,
             time=self.time,
             vibration=self.vibration,
             roll=roll,
             pitch=pitch,
             yaw=self.yaw,
-            step_x=step[:, 0],
-            step_y=step[:, 1],
-            step_z=step[:, 2],
         )
+        return hold.with_steps(self.forces)
 
 
 def read_campaign(folder: str | Path) -> Campaign:

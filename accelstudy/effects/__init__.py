@@ -5,10 +5,18 @@ Simulation, adjustment, sensitivity analysis and diagnosis evaluate or different
 definition. To add one, write a module next to this file with a class under `register`.
 """
 
-from accelstudy.effects.base import Effect, Hold, Parameter, effect_names, get_effect, register
+from accelstudy.effects.base import (
+    Effect,
+    Hold,
+    Hyper,
+    Parameter,
+    effect_names,
+    get_effect,
+    register,
+)
 from accelstudy.registry import import_modules
 
-__all__ = ["Effect", "Hold", "Parameter", "effect_names", "get_effect", "register"]
+__all__ = ["Effect", "Hold", "Hyper", "Parameter", "effect_names", "get_effect", "register"]
 
 # A module registers its effects when it is imported.
 import_modules(__name__, __path__)

@@ -13,13 +13,16 @@ serves NumPy arrays, symbols to differentiate, and generated code.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import Any, ClassVar, TypeVar
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cache
+from typing import Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.errors import InputError
+from accelstudy.errors import InputError, UnknownNameError
 from accelstudy.registry import Registry
 
 AXES = ("x", "y", "z")
@@ -32,6 +35,11 @@ Matrix = tuple[Vector, Vector, Vector]
 ZERO_VECTOR: Vector = (0, 0, 0)
 ZERO_MATRIX: Matrix = (ZERO_VECTOR, ZERO_VECTOR, ZERO_VECTOR)
 
+REFERENCE_TEMPERATURE = 20.0
+"""°C, at which the bias and the scale are what their own parameters say."""
+STILL = 0.02
+"""m/s², a change of force from hold to hold below this is noise, and no step."""
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -40,6 +48,15 @@ class Parameter:
     name: str
     unit: str
     symbol: str
+
+
+@dataclass(frozen=True)
+class Hyper:
+    """A number that shapes an effect; it is chosen or searched, not adjusted."""
+
+    name: str
+    unit: str
+    default: float
 
 
 def per_axis(name: str, unit: str, symbol: str) -> tuple[Parameter, ...]:
@@ -56,7 +73,7 @@ class Hold:
 
     Parameters
     ----------
-    temperature : (n,) array, °C or K above any reference, which the bias absorbs
+    temperature : (n,) array, °C
     time : (n,) array, s since the start of the session
     vibration : (n,) array, m/s², rms during the hold
     roll, pitch, yaw : (n,) arrays, rad, attitude known from outside
@@ -74,6 +91,12 @@ class Hold:
     step_y: NDArray[np.float64] | None = None
     step_z: NDArray[np.float64] | None = None
 
+    def with_steps(self, forces: NDArray[np.float64]) -> Hold:
+        """Return the holds with the steps of forces (n, 3), m/s², in order of acquisition."""
+        step = np.diff(forces, axis=0, prepend=forces[:1])
+        step = np.where(np.abs(step) < STILL, 0.0, step)
+        return replace(self, step_x=step[:, 0], step_y=step[:, 1], step_z=step[:, 2])
+
     @classmethod
     def columns(cls) -> tuple[str, ...]:
         """Names of all columns."""
@@ -90,13 +113,45 @@ class Hold:
 class Effect:
     """One systematic effect; subclasses set the class attributes and override what they add.
 
-    In the methods `p` is the tuple of the effect's own parameters, `f` the specific force in sensor
-    axes (f_a), `g` the local gravity, `hold` a `Hold` whose columns are numbers, arrays or symbols,
-    and `xp` the namespace of functions (``np`` or a symbolic twin with the same names).
+    In the methods `p` is the tuple of the effect's own parameters, in which all formulas are
+    linear, `f` the specific force in sensor axes (f_a), `g` the local gravity, `hold` a `Hold`
+    whose columns are numbers, arrays or symbols, and `xp` the namespace of functions (``np`` or a
+    symbolic twin with the same names).
+
+    Attributes
+    ----------
+    name : str, canonical
+    parameters : tuple of Parameter
+    hypers : tuple of Hyper, numbers that shape the effect, found in ``self.shape``
+    equation : str, what is added, for people
+    typical : (float, float), usual size of a parameter from good to cheap equipment, SI
+    part : what has the effect, the "sensor" or the "rig" that turns it
     """
 
     name: ClassVar[str]
     parameters: ClassVar[tuple[Parameter, ...]]
+    hypers: ClassVar[tuple[Hyper, ...]] = ()
+    equation: ClassVar[str]
+    typical: ClassVar[tuple[float, float]]
+    part: ClassVar[Literal["sensor", "rig"]] = "sensor"
+
+    def __init__(self, **shape: float) -> None:
+        known = {hyper.name: hyper.default for hyper in self.hypers}
+        for name in shape:
+            if name not in known:
+                raise UnknownNameError(f"setting of the effect {self.name!r}", name, known)
+        self.shape = {**known, **shape}
+
+    @property
+    def spec(self) -> str:
+        """Name with its settings, as `get_effect` takes it: ``warm_up(tau=300)``."""
+        if not self.hypers:
+            return self.name
+        return f"{self.name}({', '.join(f'{k}={v:.12g}' for k, v in self.shape.items())})"
+
+    def candidates(self, hold: Hold, f: NDArray[np.float64], g: float) -> Sequence[Effect]:
+        """Shapes of the effect that are worth a search in given holds with forces f (n, 3)."""
+        return (self,)
 
     def axes(self, p: tuple[Number, ...], xp: Any) -> Matrix:
         """Add to the matrix T of the sensitive axes."""
@@ -116,8 +171,34 @@ class Effect:
 _registry: Registry[Effect] = Registry("effect")
 EffectClass = TypeVar("EffectClass", bound=type[Effect])
 
-get_effect = _registry.get
 effect_names = _registry.names
+
+
+@cache
+def get_effect(spec: str) -> Effect:
+    """Return an effect by its name, or by its name and settings: ``warm_up(tau=300)``.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such effect or setting.
+    InputError
+        If the settings cannot be read.
+    """
+    match = re.fullmatch(r"\s*(\w+)\s*\(([^()]*)\)\s*", str(spec))
+    if match is None:
+        return _registry.get(spec)
+    effect = _registry.get(match[1])
+    shape = {}
+    for part in filter(None, map(str.strip, match[2].split(","))):
+        key, _, value = part.partition("=")
+        try:
+            shape[key.strip()] = float(value)
+        except ValueError:
+            raise InputError(
+                f"effect {spec!r}: {part!r} is no setting; expected name=number, such as tau=300"
+            ) from None
+    return type(effect)(**shape)
 
 
 def register(effect: EffectClass) -> EffectClass:

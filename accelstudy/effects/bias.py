@@ -9,6 +9,8 @@ class Bias(Effect):
 
     name = "bias"
     parameters = per_axis("b", "m/s^2", "b_%")
+    equation = "b_i"
+    typical = (0.02, 0.5)
 
     def output(self, f, p, g, hold, xp):
         """Return b."""

@@ -17,6 +17,8 @@ class CrossAxisMisalignment(Effect):
         Parameter("alpha_xy", "rad", r"$\alpha_{xy}$"),
         Parameter("alpha_yx", "rad", r"$\alpha_{yx}$"),
     )
+    equation = "lower triangle of T"
+    typical = (1e-3, 0.02)
 
     def axes(self, p, xp):
         """Return the lower triangle of eq. (3)."""

@@ -9,6 +9,8 @@ class CubicScale(Effect):
 
     name = "cubic_scale"
     parameters = per_axis("k3", "1", "k_{3%}")
+    equation = "k_i f_i³ / g²"
+    typical = (100e-6, 1000e-6)
 
     def output(self, f, p, g, hold, xp):
         """Return k_i f_i³ / g²."""

@@ -13,6 +13,8 @@ class NonOrthogonality(Effect):
         Parameter("alpha_zy", "rad", r"$\alpha_{zy}$"),
         Parameter("alpha_zx", "rad", r"$\alpha_{zx}$"),
     )
+    equation = "upper triangle of T"
+    typical = (200e-6, 0.03)
 
     def axes(self, p, xp):
         """Return the upper triangle of eq. (4)."""

@@ -9,6 +9,8 @@ class QuadraticScale(Effect):
 
     name = "quadratic_scale"
     parameters = per_axis("k2", "1", "k_{2%}")
+    equation = "k_i f_i² / g"
+    typical = (100e-6, 2500e-6)
 
     def output(self, f, p, g, hold, xp):
         """Return k_i f_i² / g."""

@@ -9,6 +9,8 @@ class Scale(Effect):
 
     name = "scale"
     parameters = per_axis("s", "1", "s_%")
+    equation = "s_i f_i"
+    typical = (300e-6, 0.03)
 
     def output(self, f, p, g, hold, xp):
         """Return s_i f_i."""

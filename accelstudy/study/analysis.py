@@ -40,7 +40,7 @@ def analyse_sensitivity(
     calibrated: dict[str, Any] = {}
     if analysis != "forces":
         model = get_model(settings.model, study.models)
-        truth = model.vector(study.truth(e.name for e in model.effects))
+        truth = model.vector(study.truth(e.spec for e in model.effects))
         sigma = _empirical_sigma(study, analysis, summary)
         calibrated = {"model": model, "parameters": truth, "sigma_parameters": sigma}
     table = leveling_sensitivity(

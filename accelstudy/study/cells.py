@@ -149,7 +149,7 @@ def _grid_cells(study: StudyConfig, grid: Grid) -> Iterable[Cell]:
         changed = [
             f"{key}={_shown(value)}" for key, (value, usual) in settings.items() if value != usual
         ]
-        effects = tuple(e.name for e in get_model(model, study.models).effects)
+        effects = tuple(e.spec for e in get_model(model, study.models).effects)
         simulated = (
             effects if study.simulated_effects == ["model"] else tuple(study.simulated_effects)
         )

@@ -1,0 +1,17 @@
+"""Bias drift: the bias changes linearly with time."""
+
+from accelstudy.effects.base import Effect, per_axis, register
+
+
+@register
+class BiasDrift(Effect):
+    """Linear bias drift d t."""
+
+    name = "bias_drift"
+    parameters = per_axis("d", "m/s^2/s", "d_%")
+    equation = "d_i t"
+    typical = (0.3e-6, 3e-6)
+
+    def output(self, f, p, g, hold, xp):
+        """Return d t."""
+        return tuple(d * hold.time for d in p)

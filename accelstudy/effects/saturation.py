@@ -1,0 +1,31 @@
+"""Saturation: beyond a knee the output grows less than the input."""
+
+import numpy as np
+
+from accelstudy.effects.base import Effect, Hyper, per_axis, register
+from accelstudy.units import STANDARD_GRAVITY
+
+
+@register
+class Saturation(Effect):
+    """Loss of gain beyond a knee, −k_i sign(f_i) max(0, |f_i| − c); k = 1 is hard clipping.
+
+    The knee c, in m/s², is searched.
+    """
+
+    name = "saturation"
+    parameters = per_axis("k_sat", "1", "k_{s%}")
+    hypers = (Hyper("knee", "m/s^2", 0.95 * STANDARD_GRAVITY),)
+    equation = "−k_i sign(f_i) max(0, |f_i| − c)"
+    typical = (0.02, 0.5)
+
+    def output(self, f, p, g, hold, xp):
+        """Return −k sign(f) max(0, |f| − c)."""
+        excess = [xp.abs(f_i) - self.shape["knee"] for f_i in f]
+        return tuple(
+            -k * xp.sign(f_i) * (e + xp.abs(e)) / 2 for k, f_i, e in zip(p, f, excess, strict=True)
+        )
+
+    def candidates(self, hold, f, g):
+        """Return knees that some, but not most, of the forces exceed."""
+        return tuple(Saturation(knee=float(f"{part * g:.4g}")) for part in np.arange(0.5, 1, 0.05))
