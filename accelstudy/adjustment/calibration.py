@@ -55,6 +55,21 @@ class Observations:
     hold: Hold | None = None
     initial: Array | None = None
 
+    def take(self, positions: NDArray[np.int_]) -> Observations:
+        """Return the sessions with some of their positions."""
+
+        def chosen(values: ArrayLike) -> ArrayLike:
+            return np.asarray(values)[positions] if np.ndim(values) == 2 else values
+
+        return replace(
+            self,
+            forces=self.forces[:, positions],
+            angles=None if self.angles is None else self.angles[:, positions],
+            sigma_force=chosen(self.sigma_force),
+            sigma_angle=chosen(self.sigma_angle),
+            hold=None if self.hold is None else self.hold.take(positions),
+        )
+
     def first(self, replicates: int) -> Observations:
         """Return the first `replicates` sessions; all if there are fewer."""
         angles, gravity = self.angles, np.asarray(self.gravity)
@@ -161,7 +176,7 @@ def calibrate(model: SensorModel, approach: Approach, observed: Observations) ->
         If the approach needs angles that were not observed, a column that is absent, or there are
         fewer conditions than unknowns.
     """
-    problem = _Problem.of(model, approach, observed)
+    problem = CalibrationProblem.of(model, approach, observed)
     return adjust(
         problem.conditions,
         problem.observations,
@@ -187,7 +202,7 @@ def whitened_jacobian(
     -------
     (m, u') array; AᵀA is the normal matrix. With observed gravity a column and a row are added.
     """
-    problem = _Problem.of(model, approach, observed)
+    problem = CalibrationProblem.of(model, approach, observed)
     x = problem.initial[:1].copy()
     x[0, : model.n_parameters] = parameters
     forces = problem.observations[:1, :, :3]
@@ -204,7 +219,7 @@ def whitened_jacobian(
 
 
 @dataclass(frozen=True)
-class _Problem:
+class CalibrationProblem:
     """Observed sessions in the form in which `adjust` takes them."""
 
     conditions: CalibrationConditions
@@ -214,7 +229,9 @@ class _Problem:
     weights: Array
 
     @classmethod
-    def of(cls, model: SensorModel, approach: Approach, observed: Observations) -> _Problem:
+    def of(
+        cls, model: SensorModel, approach: Approach, observed: Observations
+    ) -> CalibrationProblem:
         forces = np.asarray(observed.forces, dtype=float)
         n = forces.shape[1]
         observations, sigmas = [forces], [np.broadcast_to(observed.sigma_force, (n, 3))]

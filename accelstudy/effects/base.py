@@ -52,11 +52,15 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Hyper:
-    """A number that shapes an effect; it is chosen or searched, not adjusted."""
+    """A number that shapes an effect; it is chosen or searched, not adjusted.
+
+    `smooth` says that the effect changes smoothly with it, so that a search can be refined.
+    """
 
     name: str
     unit: str
     default: float
+    smooth: bool = False
 
 
 def per_axis(name: str, unit: str, symbol: str) -> tuple[Parameter, ...]:
@@ -90,6 +94,13 @@ class Hold:
     step_x: NDArray[np.float64] | None = None
     step_y: NDArray[np.float64] | None = None
     step_z: NDArray[np.float64] | None = None
+
+    def take(self, positions: NDArray[np.int_]) -> Hold:
+        """Return some of the holds; steps stay those from the holds that were before them."""
+        columns = {name: getattr(self, name) for name in self.columns()}
+        return Hold(
+            **{k: None if v is None else np.asarray(v)[positions] for k, v in columns.items()}
+        )
 
     def with_steps(self, forces: NDArray[np.float64]) -> Hold:
         """Return the holds with the steps of forces (n, 3), m/s², in order of acquisition."""

@@ -5,13 +5,12 @@ from accelstudy.effects.base import Effect, per_axis, register
 
 @register
 class MountingRotation(Effect):
-    """Small rotation ε × f of the sensor against the flange."""
+    """Small rotation ε × f of the sensor against the flange, whose tilt it is to tell."""
 
     name = "mounting_rotation"
     parameters = per_axis("eps", "rad", "\\varepsilon_%")
     equation = "ε × f"
     typical = (2e-3, 17e-3)
-    part = "rig"
 
     def output(self, f, p, g, hold, xp):
         """Return ε × f."""

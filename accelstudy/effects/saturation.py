@@ -15,7 +15,7 @@ class Saturation(Effect):
 
     name = "saturation"
     parameters = per_axis("k_sat", "1", "k_{s%}")
-    hypers = (Hyper("knee", "m/s^2", 0.95 * STANDARD_GRAVITY),)
+    hypers = (Hyper("knee", "m/s^2", 0.95 * STANDARD_GRAVITY, smooth=True),)
     equation = "−k_i sign(f_i) max(0, |f_i| − c)"
     typical = (0.02, 0.5)
 

@@ -11,7 +11,7 @@ class WarmUp(Effect):
 
     name = "warm_up"
     parameters = per_axis("w", "m/s^2", "w_%")
-    hypers = (Hyper("tau", "s", 600.0),)
+    hypers = (Hyper("tau", "s", 600.0, smooth=True),)
     equation = "w_i exp(−t/τ)"
     typical = (0.01, 0.05)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.adjustment.calibration import Observations, _Problem
+from accelstudy.adjustment.calibration import CalibrationProblem, Observations
 from accelstudy.adjustment.gauss_helmert import (
     ConditionEquations,
     Linearisation,
@@ -68,7 +68,7 @@ def held_out(model: SensorModel, approach: Approach, observed: Observations) -> 
     ----------
     model, approach, observed : as in `calibrate`, one session
     """
-    problem = _Problem.of(model, approach, observed)
+    problem = CalibrationProblem.of(model, approach, observed)
     n, c, u = observed.forces.shape[1], approach.n_conditions, len(problem.weights)
     if n * c + np.count_nonzero(problem.weights) - u < c:
         return None

@@ -22,7 +22,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.adjustment.calibration import Observations, _Problem, calibrate
+from accelstudy.adjustment.calibration import CalibrationProblem, Observations, calibrate
 from accelstudy.adjustment.gauss_helmert import (
     Adjustment,
 )
@@ -137,7 +137,7 @@ def solve(
         why = "its normal matrix is singular" if result.singular[0] else "it does not converge"
         raise InputError(f"the calibration of model {model.name!r} has no solution: {why}")
 
-    problem = _Problem.of(model, approach, observed)
+    problem = CalibrationProblem.of(model, approach, observed)
     x, v = result.parameters[0], result.residuals[0]
     p = x[: model.n_parameters]
     gravity = float(x[-1]) if problem.weights.any() else float(np.ravel(observed.gravity)[0])

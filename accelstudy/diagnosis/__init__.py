@@ -1,0 +1,1 @@
+"""Where simulation and measurement disagree, and what is missing from the model."""

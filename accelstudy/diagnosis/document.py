@@ -1,0 +1,131 @@
+"""The machine-readable diagnosis: the content of `diagnosis.json`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from accelstudy.campaign.document import number
+from accelstudy.diagnosis.pipeline import Diagnosis, Named
+from accelstudy.units import GON, MGON
+
+
+def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Describe a diagnosis; all numbers are in SI but those whose key names another unit."""
+    d = diagnosis
+    test = d.global_test
+    z = d.setting.frame.residuals.z
+    return {
+        "schema_version": 1,
+        "campaign": d.campaign.name,
+        "approach": d.approach.name,
+        "model": d.model.name,
+        "verdict": d.verdict,
+        "reason": d.reason,
+        "global_test": {
+            "statistic": number(d.base.omega if test is None else test.statistic),
+            "dof": d.base.redundancy,
+            "p_value": None if test is None else number(test.p_value),
+            "sigma": "known" if d.sigma_known else "unknown",
+        },
+        "noise": {
+            "sigma_mps2": number(d.sigma_position),
+            "sigma_source": d.sigma_source,
+            "tests": [
+                {
+                    "name": test.name,
+                    "statistic": number(test.statistic),
+                    "p_value": number(test.p_value),
+                    "remark": test.remark,
+                }
+                for test in d.noise_tests
+            ],
+        },
+        "screening": {
+            "p_value": number(d.screening.smallest),
+            "simulations": d.simulations,
+            "candidates": [
+                {
+                    "name": name,
+                    "p_single": number(np.min(d.screening.p_single[name])),
+                    "p_family": number(d.screening.p_family[name]),
+                }
+                for name in sorted(d.screening.p_family, key=lambda n: d.screening.p_family[n])
+            ],
+        },
+        "posterior": {name: number(p) for name, p in d.probabilities.items()},
+        "effects": [_effect(named) for named in d.found],
+        "location": {name: number(share) for name, share in d.location.items()},
+        "gap": _gap(d),
+        "invisible_effects": list(d.setting.invisible),
+        "untestable_effects": list(d.setting.untestable),
+        "untestable_reasons": dict(d.setting.untestable),
+        "upper_limits": [
+            {
+                "name": limit.name,
+                "parameter": limit.parameter,
+                "value": number(limit.value),
+                "unit": limit.unit,
+            }
+            for limit in d.upper_limits
+        ],
+        "next_positions": [
+            {
+                "roll_gon": position.roll / GON,
+                "pitch_gon": position.pitch / GON,
+                **(
+                    {}
+                    if position.temperature is None
+                    else {"temperature_degC": position.temperature}
+                ),
+                "separates": list(position.separates),
+            }
+            for position in d.next_positions
+        ],
+        "redundancy": len(z),
+        "n_positions": d.campaign.n_positions,
+        "warnings": list(d.campaign.warnings),
+    }
+
+
+def _effect(named: Named) -> dict[str, Any]:
+    return {
+        "name": named.name,
+        "spec": named.spec,
+        **({} if named.position is None else {"position": named.position}),
+        "equivalence_class": list(named.equivalence_class),
+        "p_value": number(named.p_value),
+        "posterior": number(named.posterior),
+        "parameters": [
+            {"name": name, "value": number(value), "sigma": number(sigma), "unit": unit}
+            for name, value, sigma, unit in named.parameters
+        ],
+        "rivals": [{"name": name, "cosine": number(cosine)} for name, cosine in named.rivals],
+    }
+
+
+def _gap(d: Diagnosis) -> dict[str, Any]:
+    gap, held = d.gap, d.gap.held_out
+    roll_pitch = None if gap.leveling is None else [value / MGON for value in gap.leveling]
+    return {
+        "sigma0_squared": {"before": number(gap.before), "after": number(gap.after)},
+        "held_out_mse": {
+            "before": None if held is None else number(held.before),
+            "after": None if held is None else number(held.after),
+            "floor": None if held is None else number(held.floor),
+            "reduction_ci95": (
+                None if held is None else [number(value) for value in held.reduction_ci95]
+            ),
+        },
+        "held_out_z": None if held is None else number(held.z),
+        "held_out_positions": []
+        if held is None
+        else [int(d.campaign.positions[i]) for i in held.held],
+        "leveling_rms_mgon": {
+            "before": None if roll_pitch is None else number(roll_pitch[0]),
+            "after": None if roll_pitch is None else number(roll_pitch[1]),
+        },
+        "confirmed": gap.confirmed,
+        "reason": gap.reason,
+    }

@@ -1,0 +1,153 @@
+"""Gross errors that make all else meaningless: unit, axes, and order of the rows.
+
+They are recognised by trying what would mend them. A real sensor fits its robot within some
+hundredths of g before any calibration; a wrong unit, a swapped axis or exchanged rows do not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import permutations, product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from accelstudy.approaches import Approach
+from accelstudy.campaign.format import Campaign
+from accelstudy.leveling import specific_force
+from accelstudy.units import GON, STANDARD_GRAVITY, to_si
+
+Array = NDArray[np.float64]
+
+USUAL_MISFIT = 0.15
+"""Share of gravity by which a sensor may miss its robot before calibration."""
+CLEARLY = 4.0
+"""How many times better an explanation must fit."""
+FORCE_UNITS = {
+    "the forces are in g": STANDARD_GRAVITY,
+    "the forces are in mg": 1e-3 * STANDARD_GRAVITY,
+    "the forces are in m/s^2, not in g": 1 / STANDARD_GRAVITY,
+}
+ANGLE_UNITS = {
+    "the robot's angles are in degrees": float(to_si(1.0, "deg", "rad")) / GON,
+    "the robot's angles are in radians": 1 / GON,
+}
+
+
+@dataclass(frozen=True)
+class Recognised:
+    """A gross error that was recognised.
+
+    Attributes
+    ----------
+    name : str, "unit_error", "axis_error" or "row_order"
+    reason : str, what is wrong, in words
+    mended : Campaign, as it would have been right
+    """
+
+    name: str
+    reason: str
+    mended: Campaign
+
+
+def recognise(campaign: Campaign, approach: Approach) -> Recognised | None:
+    """Recognise a wrong unit, swapped axes or exchanged rows; None if all looks right."""
+    if not approach.uses_angles or campaign.angles is None:
+        return _by_norm(campaign)
+    if _misfit(campaign) < USUAL_MISFIT:
+        return _rows(campaign)
+    tried = [Recognised("axis_error", *mended) for mended in _axes(campaign)]
+    scaled = _by_norm(campaign)
+    if scaled is not None:
+        tried.append(scaled)
+    for reason, factor in ANGLE_UNITS.items():
+        yaw = None if campaign.yaw is None else campaign.yaw * factor
+        mended = replace(campaign, angles=campaign.angles * factor, yaw=yaw)
+        tried.append(Recognised("unit_error", reason, mended))
+    best = min(tried, key=lambda one: _misfit(one.mended))
+    if CLEARLY * _misfit(best.mended) < _misfit(campaign):
+        return best
+    return _rows(campaign)
+
+
+def _misfit(campaign: Campaign) -> float:
+    """Rms difference between forces and the robot's attitude, in g."""
+    difference = campaign.forces - _expected(campaign)
+    return float(np.sqrt(np.mean(np.sum(difference**2, axis=1))) / campaign.gravity)
+
+
+def _expected(campaign: Campaign) -> Array:
+    assert campaign.angles is not None
+    roll, pitch = campaign.angles.T
+    return np.column_stack(specific_force(roll, pitch, campaign.gravity))
+
+
+def _by_norm(campaign: Campaign) -> Recognised | None:
+    """Recognise a unit of the forces by their norm."""
+    norm = float(np.median(np.linalg.norm(campaign.forces, axis=1)))
+    if 0.5 < norm / campaign.gravity < 2:
+        return None
+    for reason, factor in FORCE_UNITS.items():
+        if 0.8 < norm * factor / campaign.gravity < 1.25:
+            sd = None if campaign.sd is None else campaign.sd * factor
+            return Recognised(
+                "unit_error", reason, replace(campaign, forces=campaign.forces * factor, sd=sd)
+            )
+    return None
+
+
+def _axes(campaign: Campaign) -> list[tuple[str, Campaign]]:
+    """Try the 48 signed permutations of the axes; return the best."""
+    correlation = _expected(campaign).T @ campaign.forces
+    best, chosen = -np.inf, (np.arange(3), np.ones(3))
+    for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
+        value = sum(
+            s * correlation[i, o] for i, (o, s) in enumerate(zip(order, signs, strict=True))
+        )
+        if value > best:
+            best, chosen = value, (np.array(order), np.array(signs))
+    order, signs = chosen
+    words = ", ".join(
+        f"{axis} is read as {'-' if s < 0 else ''}{'xyz'[o]}"
+        for axis, o, s in zip("xyz", order, signs, strict=True)
+    )
+    sd = None if campaign.sd is None else campaign.sd[:, order]
+    mended = replace(campaign, forces=campaign.forces[:, order] * signs, sd=sd)
+    return [(f"axes are swapped: {words}", mended)]
+
+
+def _rows(campaign: Campaign) -> Recognised | None:
+    """Recognise rows whose forces belong to other rows, after a robust affine calibration."""
+    expected = _expected(campaign)
+    forces = campaign.forces
+    design = np.column_stack([forces, np.ones(len(forces))])
+    if len(forces) < 8:
+        return None
+    weights = np.ones(len(forces))
+    for _ in range(50):  # least absolute deviations: a few wrong rows do not matter
+        root = np.sqrt(weights)[:, None]
+        solution = np.linalg.lstsq(root * design, root * expected, rcond=None)[0]
+        distance = np.linalg.norm(design @ solution - expected, axis=1)
+        weights = 1 / np.maximum(distance, 1e-4 * campaign.gravity)
+    cost = np.linalg.norm((design @ solution)[:, None] - expected[None], axis=2)
+    rows, belongs = linear_sum_assignment(cost**2)
+    moved = np.flatnonzero(belongs != rows)
+    if not len(moved):
+        return None
+    before, after = cost[moved, moved], cost[moved, belongs[moved]]
+    usual = np.median(cost[rows, belongs])
+    # Repeated attitudes can be exchanged at will; only a clear gain shows an exchange.
+    clear = (before > CLEARLY * after) & (before > 20 * usual) & (before > 0.01 * campaign.gravity)
+    if not np.all(clear):
+        return None
+    order = np.empty(len(forces), dtype=int)
+    order[belongs] = rows
+    mended = replace(
+        campaign,
+        forces=forces[order],
+        sd=None if campaign.sd is None else campaign.sd[order],
+        n_samples=None if campaign.n_samples is None else campaign.n_samples[order],
+    )
+    positions = ", ".join(str(p) for p in campaign.positions[moved])
+    return Recognised("row_order", f"the forces of positions {positions} are exchanged", mended)

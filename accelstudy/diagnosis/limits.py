@@ -1,0 +1,151 @@
+"""What a campaign can and cannot show of each effect: limits, detectable and nameable sizes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.adjustment.quality import noncentrality
+from accelstudy.diagnosis.hypotheses import ALIKE, OUTLIER, Frame, Hypothesis, Setting, cosines
+from accelstudy.diagnosis.signatures import signature
+from accelstudy.effects import get_effect
+
+Array = NDArray[np.float64]
+
+POWER = 0.8
+
+
+@dataclass(frozen=True)
+class UpperLimit:
+    """Largest value of a parameter that the campaign does not exclude at 95 %, SI."""
+
+    name: str
+    parameter: str
+    value: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Visibility:
+    """What a campaign or a scheme can show of an effect.
+
+    Attributes
+    ----------
+    name : str
+    status : str, "visible", "invisible" or "untestable"
+    reason : str, why it is untestable
+    mdb : float, minimal detectable size of a parameter, the worst one, SI; infinite if a
+        combination of parameters does not show
+    mib : float, size at which the effect can also be told from the nearest other one, likewise
+    unit : str, SI unit of the parameters
+    confused : tuple of (name, cosine), the nearest other effects
+    """
+
+    name: str
+    status: str
+    reason: str = ""
+    mdb: float = np.inf
+    mib: float = np.inf
+    unit: str = ""
+    confused: tuple[tuple[str, float], ...] = ()
+
+
+def signature_columns(frame: Frame, hypothesis: Hypothesis) -> Array:
+    """Signature of each parameter of an effect in the residual space, (r, k)."""
+    assert hypothesis.effect is not None
+    shown = signature(
+        hypothesis.effect, frame.sensed, frame.angles, frame.solution.gravity, frame.hold
+    )
+    return frame.residuals.project(frame.residuals.whitened(shown))
+
+
+def upper_limits(setting: Setting, variance: float, named: Sequence[str]) -> list[UpperLimit]:
+    """95 % limits |p̂| + 1.96 σ of the parameters of all effects that were not found.
+
+    Each effect is estimated beside the parameters of the model, in the shape that fits best; given
+    is the parameter that is known worst. Effects of which a combination of parameters does not show
+    have no limit.
+    """
+    limits = []
+    for name, shapes in setting.candidates.items():
+        if name == OUTLIER or name in named:
+            continue
+        best = max(shapes, key=lambda h: float(np.sum((setting.frame.residuals.z @ h.basis) ** 2)))
+        assert best.effect is not None
+        if best.dim < len(best.effect.parameters):
+            continue
+        columns = signature_columns(setting.frame, best)
+        inverse = np.linalg.pinv(columns)
+        values = inverse @ setting.frame.residuals.z
+        sigma = np.sqrt(variance * np.sum(inverse**2, axis=1))
+        bounds = np.abs(values) + 1.96 * sigma
+        worst = int(np.argmax(bounds))
+        parameter = best.effect.parameters[worst]
+        limits.append(UpperLimit(name, parameter.name, float(bounds[worst]), parameter.unit))
+    return limits
+
+
+def visibilities(setting: Setting, alpha: float = 0.001, power: float = POWER) -> list[Visibility]:
+    """What a campaign can show of each effect that is not in its model.
+
+    The MDB is the size √(λ0 / dᵀd) of a single parameter whose test of level `alpha` has `power`; for
+    the minimal identifiable bias only what the nearest rival cannot imitate of d counts.
+    """
+    root = np.sqrt(noncentrality(1, alpha, power))
+    rows = []
+    for name, shapes in setting.candidates.items():
+        if name == OUTLIER:
+            continue
+        # The shape that is hardest to see is what can be promised.
+        columns = [signature_columns(setting.frame, h) for h in shapes]
+        sizes = [np.linalg.norm(c, axis=0) for c in columns]
+        hardest = int(np.argmin([s.min() for s in sizes]))
+        best = shapes[hardest]
+        near = _nearest(setting, best)
+        rivals = [
+            max(setting.candidates[other], key=lambda h: float(cosines(best.ideal, h.ideal)[0]))
+            for other, cosine in near
+            if cosine <= ALIKE
+        ]
+        left = sizes[hardest]
+        for rival in rivals:
+            rest = columns[hardest] - rival.basis @ (rival.basis.T @ columns[hardest])
+            left = np.minimum(left, np.linalg.norm(rest, axis=0))
+        assert best.effect is not None
+        rows.append(
+            Visibility(
+                name=name,
+                status="visible",
+                mdb=_size(root, sizes[hardest]),
+                mib=_size(root, left),
+                unit=best.effect.parameters[0].unit,
+                confused=near[:3],
+            )
+        )
+    rows += [
+        Visibility(name, "invisible", unit=get_effect(name).parameters[0].unit)
+        for name in setting.invisible
+    ]
+    rows += [
+        Visibility(name, "untestable", reason, unit=get_effect(name).parameters[0].unit)
+        for name, reason in setting.untestable.items()
+    ]
+    return sorted(rows, key=lambda row: row.name)
+
+
+def _size(root: float, signature_norms: Array) -> float:
+    smallest = float(np.min(signature_norms))
+    return root / smallest if smallest > 1e-9 * np.max(signature_norms, initial=1e-300) else np.inf
+
+
+def _nearest(setting: Setting, hypothesis: Hypothesis) -> tuple[tuple[str, float], ...]:
+    """Other effects and their largest canonical cosines, nearest first."""
+    near = {
+        name: max(float(cosines(hypothesis.ideal, h.ideal)[0]) for h in shapes)
+        for name, shapes in setting.candidates.items()
+        if name not in (OUTLIER, hypothesis.name)
+    }
+    return tuple(sorted(near.items(), key=lambda item: -item[1]))

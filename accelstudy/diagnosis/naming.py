@@ -1,0 +1,106 @@
+"""Naming: how probable each hypothesis is, given that something is missing.
+
+For a hypothesis with an orthonormal basis Q (r, l) of its signature, Zellner's g-prior and an unknown
+noise level give the evidence in closed form (Liang et al. 2008, eq. 5 and 6),
+
+    log m = (r − l)/2 · log(1 + g) − r/2 · log(1 + g (1 − R²)),   R² = ‖Qᵀz‖²/‖z‖²,
+
+relative to that of white noise alone, with g at its most likely value. Shapes of an effect share its
+prior probability. Coloured noise is a hypothesis with a covariance matrix instead of a mean. So is
+"unknown": something in one of the groups of regressors that is none of the effects.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.diagnosis.noise import colour_kernels
+from accelstudy.diagnosis.residuals import Residuals
+from accelstudy.diagnosis.screening import share
+
+Array = NDArray[np.float64]
+
+UNKNOWN = "unknown"
+COLOUR = "coloured_noise"
+LEVEL = "noise_level"
+
+
+def log_evidence(r_squared: Array | float, dim: int, redundancy: int) -> Array:
+    """Log evidence against white noise, at the most likely g."""
+    t = np.minimum(np.asarray(r_squared, dtype=float), 1 - 1e-12)
+    f = (t / dim) / ((1 - t) / (redundancy - dim))
+    g = np.maximum(f - 1, 0.0)
+    return (redundancy - dim) / 2 * np.log1p(g) - redundancy / 2 * np.log1p(g * (1 - t))
+
+
+def shapes_evidence(shapes: Sequence[Array], z: Array) -> Array:
+    """Log evidence of each shape (basis)."""
+    return np.array([float(log_evidence(share(q, z), q.shape[1], len(z))) for q in shapes])
+
+
+def mean_evidence(logs: Array) -> float:
+    """Log of the mean evidence of equally probable shapes."""
+    top = float(np.max(logs))
+    return top + float(np.log(np.mean(np.exp(logs - top))))
+
+
+def colour_evidence(residuals: Residuals) -> float:
+    """Log evidence of coloured noise, mean over correlation lengths and strengths."""
+    n, c = residuals.whitening.shape[:2]
+    basis = residuals.basis[: n * c].reshape(n, c, -1)
+    g = np.einsum("ncr,nca->anr", basis, residuals.force_noise)
+    z, r = residuals.z, residuals.redundancy
+    logs = []
+    for kernel in colour_kernels(n):
+        covariance = np.einsum("anr,nm,ams->rs", g, kernel, g, optimize=True)
+        values, vectors = np.linalg.eigh(covariance)
+        values = np.maximum(values, 0.0)
+        square = (vectors.T @ z) ** 2
+        for strength in (0.25, 1.0, 4.0, 16.0, 64.0):
+            scale = 1 + strength * values
+            logs.append(
+                -0.5 * np.sum(np.log(scale)) - r / 2 * np.log(np.sum(square / scale) / square.sum())
+            )
+    return mean_evidence(np.array(logs))
+
+
+def posterior(
+    evidence: Mapping[str, float], prior: Mapping[str, float] | None = None
+) -> dict[str, float]:
+    """Posterior probabilities of hypotheses, sorted, most probable first."""
+    prior = prior or {}
+    logs = {name: value + np.log(prior.get(name, 1.0)) for name, value in evidence.items()}
+    top = max(logs.values())
+    weights = {name: float(np.exp(value - top)) for name, value in logs.items()}
+    total = sum(weights.values())
+    ranked = sorted(weights, key=lambda name: -weights[name])
+    return {name: weights[name] / total for name in ranked}
+
+
+def known_level_evidence(
+    candidates: Mapping[str, Sequence[Array]], z: Array
+) -> tuple[float, float, str]:
+    """Compare a wrong noise level with effects in noise of the given level.
+
+    Returns
+    -------
+    Log evidence that sigma is wrong (the variance factor at its most likely value, less half the
+    logarithm of the redundancy for having been chosen), log evidence of the effects together, and
+    the name of the strongest; relative to that sigma is right and nothing is missing.
+    """
+    r, omega = len(z), float(z @ z)
+    level = -r / 2 * np.log(omega / r) - r / 2 + omega / 2 - np.log(r) / 2
+    evidence = {}
+    for name, shapes in candidates.items():
+        logs = []
+        for q in shapes:
+            part, dim = float(np.sum((z @ q) ** 2)), q.shape[1]
+            g = max(part / dim - 1, 0.0)
+            logs.append(g / (1 + g) * part / 2 - dim / 2 * np.log1p(g))
+        evidence[name] = mean_evidence(np.array(logs))
+    best = max(evidence, key=lambda name: evidence[name])
+    # A wrong sigma is as probable beforehand as all effects together.
+    return float(level), mean_evidence(np.array(list(evidence.values()))), best

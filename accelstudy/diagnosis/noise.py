@@ -1,0 +1,211 @@
+"""Tests of the stochastic model on the residuals: level, axes, colour, tails, resolution.
+
+All but the first need no sigma: they are shares of the residuals, and what is usual is found by
+simulation of white, equal, Gaussian noise in the same adjustment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from accelstudy.diagnosis.residuals import Residuals
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class NoiseTest:
+    """One test of the stochastic model.
+
+    Attributes
+    ----------
+    name : str, the noise effect that it would show
+    statistic : float
+    p_value : float
+    estimate : tuple of float, what the data say of it: variance factor, variance factors of the
+        axes, correlation of successive holds, kurtosis, resolution in m/s²
+    remark : str
+    """
+
+    name: str
+    statistic: float
+    p_value: float
+    estimate: tuple[float, ...]
+    remark: str
+
+
+def force_residuals(residuals: Residuals, errors: Array) -> Array:
+    """Residuals of the forces in units of sigma, up to sign, (..., n, 3), of errors (..., m)."""
+    n, c = residuals.whitening.shape[:2]
+    blocks = errors[..., : n * c].reshape(*errors.shape[:-1], n, c)
+    return np.asarray(np.einsum("...nc,nca->...na", blocks, residuals.force_noise))
+
+
+def level_test(z: Array, variance: float = 1.0) -> NoiseTest:
+    """Whether the residuals are as large as sigma says, two-sided (the global test)."""
+    omega, r = float(z @ z) / variance, len(z)
+    p = 2 * min(stats.chi2.cdf(omega, r), stats.chi2.sf(omega, r))
+    factor = omega / r
+    size = "larger" if factor > 1 else "smaller"
+    return NoiseTest(
+        "noise_level",
+        omega,
+        float(min(p, 1.0)),
+        (factor,),
+        f"the residuals are {np.sqrt(max(factor, 1 / factor)):.2f} times {size} than sigma says",
+    )
+
+
+def axis_test(residuals: Residuals, null: Array) -> NoiseTest:
+    """Whether one axis is noisier than the others."""
+    e, chance = residuals.basis @ residuals.z, null @ residuals.basis.T
+
+    def shares(errors: Array) -> Array:
+        v = force_residuals(residuals, errors)
+        squares = np.sum(v**2, axis=-2)
+        return np.asarray(squares / np.sum(squares, axis=-1, keepdims=True))
+
+    usual = shares(chance)
+    scale = usual.std(axis=0)
+    statistic = float(np.max(np.abs(shares(e) - usual.mean(axis=0)) / scale))
+    p = _upper(np.max(np.abs(usual - usual.mean(axis=0)) / scale, axis=-1), statistic)
+    factors = axis_factors(residuals)
+    return NoiseTest(
+        "axis_noise",
+        statistic,
+        p,
+        tuple(factors),
+        "variance factors of the axes " + ", ".join(f"{k:.2f}" for k in factors),
+    )
+
+
+def axis_factors(residuals: Residuals) -> Array:
+    """Variance factors of the three axes (MINQUE with equal a-priori weights), (3,), at least 0."""
+    n, c = residuals.whitening.shape[:2]
+    basis = residuals.basis[: n * c].reshape(n, c, -1)
+    # Columns Nᵀ L⁻¹ B σ of one axis: the noise of the axes has the covariance Σ κ_a G_a G_aᵀ in z.
+    g = [np.einsum("ncr,nc->rn", basis, residuals.force_noise[..., a]) for a in range(3)]
+    right = np.array([np.sum((residuals.z @ part) ** 2) for part in g])
+    left = np.array([[np.sum((a.T @ b) ** 2) for b in g] for a in g])
+    return np.maximum(np.linalg.lstsq(left, right, rcond=1e-9)[0], 0.0)
+
+
+def colour_test(residuals: Residuals, null: Array) -> NoiseTest:
+    """Whether the residuals of holds close in time are alike."""
+    e, chance = residuals.basis @ residuals.z, null @ residuals.basis.T
+    n = len(residuals.whitening)
+    kernels = colour_kernels(n)
+
+    def statistics(errors: Array) -> Array:
+        v = force_residuals(residuals, errors)
+        total = np.sum(errors**2, axis=-1)
+        return np.stack(
+            [np.einsum("...ia,ij,...ja->...", v, k, v, optimize=True) / total for k in kernels], -1
+        )
+
+    usual = statistics(chance)
+    mean, scale = usual.mean(axis=0), usual.std(axis=0)
+    statistic = float(np.max((statistics(e) - mean) / scale))
+    v = force_residuals(residuals, e)
+    successive = float(np.sum(v[1:] * v[:-1]) / np.sum(v**2))
+    return NoiseTest(
+        "coloured_noise",
+        statistic,
+        _upper(np.max((usual - mean) / scale, axis=-1), statistic),
+        (successive,),
+        f"residuals of successive holds are correlated by {successive:.2f}",
+    )
+
+
+def colour_kernels(n: int) -> list[Array]:
+    """Correlations of n holds: Gauss–Markov over 1, 3 and 8 holds, and a random walk."""
+    i = np.arange(n)
+    lag = np.abs(i[:, None] - i)
+    walk = np.minimum(i[:, None], i) + 1.0
+    return [*(np.exp(-lag / length) for length in (1.0, 3.0, 8.0)), walk / n]
+
+
+def tail_test(residuals: Residuals, null: Array) -> NoiseTest:
+    """Whether large residuals are more frequent than a normal distribution has them."""
+    e, chance = residuals.basis @ residuals.z, null @ residuals.basis.T
+    scale = np.sqrt(np.sum(residuals.basis**2, axis=1))
+    controlled = scale > 0.05
+
+    def kurtosis(errors: Array) -> Array:
+        s = errors[..., controlled] / scale[controlled]
+        return np.asarray(np.mean(s**4, axis=-1) / np.mean(s**2, axis=-1) ** 2)
+
+    value = float(kurtosis(e))
+    return NoiseTest(
+        "heavy_tails",
+        value,
+        _upper(kurtosis(chance), value),
+        (value,),
+        f"kurtosis of the residuals {value:.1f}",
+    )
+
+
+def resolution_test(forces: Array, sigma: float) -> NoiseTest:
+    """Whether the readings of an axis are whole multiples of a resolution that matters.
+
+    The Rayleigh power of the readings is searched over resolutions from σ to 30 σ; without
+    quantisation n times the power is a standard exponential variable at each.
+    """
+    n = len(forces)
+    best, where = 0.0, 0.0
+    extent = float(np.max(np.ptp(forces, axis=0)))
+    steps = min(int(2 * extent / sigma), 100_000)
+    frequencies = np.linspace(1 / (30 * sigma), 1 / sigma, max(steps, 2))
+    for column in forces.T:
+        for block in np.array_split(frequencies, max(1, steps // 4096)):
+            power = np.abs(np.exp(2j * np.pi * np.outer(block, column)).mean(axis=1)) ** 2
+            k = int(np.argmax(power))
+            if power[k] > best:
+                best, where = float(power[k]), 1 / block[k]
+    p = -np.expm1(3 * len(frequencies) * np.log1p(-np.exp(-min(n * best, 700.0))))
+    return NoiseTest(
+        "quantisation",
+        n * best,
+        float(min(p, 1.0)),
+        (where,),
+        f"readings in steps of {1e3 * where:.2f} mm/s²",
+    )
+
+
+def within_hold_test(z: Array, unit: float, sd: Array, n_samples: Array) -> NoiseTest:
+    """Whether the means scatter more than white noise within the holds explains.
+
+    Parameters
+    ----------
+    z : (r,) array of unit weight
+    unit : float, m/s², σ of unit weight
+    sd : (n, 3) array, m/s², of the samples within the holds
+    n_samples : (n,) array
+    """
+    white = float(np.mean(sd**2 / n_samples[:, None]))
+    scatter = float(z @ z) / len(z) * unit**2
+    freedom = 3 * float(np.sum(n_samples - 1))
+    ratio = scatter / white if white > 0 else np.inf
+    return NoiseTest(
+        "coloured_noise",
+        ratio,
+        float(stats.f.sf(ratio, len(z), max(freedom, 1.0))),
+        (float(np.sqrt(white)),),
+        f"white noise within the holds explains {1e3 * np.sqrt(white):.2f} of "
+        f"{1e3 * np.sqrt(scatter):.2f} mm/s² of a position mean",
+    )
+
+
+def holm_smallest(tests: Sequence[NoiseTest]) -> float:
+    """Family-wise p-value of the strongest of several tests (Bonferroni)."""
+    return min(1.0, len(tests) * min((t.p_value for t in tests), default=1.0))
+
+
+def _upper(usual: Array, value: float) -> float:
+    """Share of simulated values that are as large."""
+    return float((1 + np.count_nonzero(usual >= value)) / (1 + len(usual)))

@@ -1,0 +1,136 @@
+"""The residuals of a calibration as a space in which hypotheses are compared.
+
+The misclosures of unit weight of an adjustment are e = R ε with R = I − Ã (ÃᵀÃ)⁻¹ Ãᵀ. With an
+orthonormal basis N of the null space of Ãᵀ they are r independent numbers z = Nᵀ e of one variance,
+whatever the parameters are. An effect that is missing from the model adds Nᵀ D p to them, D the
+derivatives of the conditions by its parameters p. All tests of the diagnosis work in this space, so
+they take into account what the parameters of the model have already absorbed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.adjustment.calibration import CalibrationProblem
+from accelstudy.adjustment.quality import Solution
+from accelstudy.diagnosis.signatures import Signature
+from accelstudy.leveling import roll_pitch, specific_force
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """The residual space of a set of linearised positions.
+
+    Attributes
+    ----------
+    design : (m, u) array, Ã
+    errors : (m,) array, e
+    whitening : (n, c, c) array, L of each position
+    jac_observations : (n, c, o) array, B
+    sigmas : (n, o) array, of the observations
+    """
+
+    design: Array
+    errors: Array
+    whitening: Array
+    jac_observations: Array
+    sigmas: Array
+
+    @classmethod
+    def of(cls, solution: Solution) -> Residuals:
+        """Residual space of a calibration at its solution."""
+        return cls(
+            solution.design,
+            solution.errors,
+            solution.whitening,
+            solution.jac_observations,
+            np.sqrt(solution.variances),
+        )
+
+    @cached_property
+    def basis(self) -> Array:
+        """N, (m, r)."""
+        scaled = self.design / np.linalg.norm(self.design, axis=0)
+        u = scaled.shape[1]
+        return np.linalg.qr(scaled, mode="complete")[0][:, u:]
+
+    @cached_property
+    def z(self) -> Array:
+        """Residuals as independent numbers of one variance, (r,)."""
+        return np.asarray(self.basis.T @ self.errors)
+
+    @property
+    def redundancy(self) -> int:
+        """R."""
+        return self.basis.shape[1]
+
+    @cached_property
+    def force_noise(self) -> Array:
+        """L⁻¹ B for the forces in units of their sigmas, (n, c, 3)."""
+        forces = self.jac_observations[..., :3] * self.sigmas[:, None, :3]
+        return np.asarray(np.linalg.solve(self.whitening, forces))
+
+    def whitened(self, signature: Signature) -> Array:
+        """Derivatives of the conditions of unit weight by the parameters of an effect, (m, k)."""
+        b = self.jac_observations
+        change = b[..., :3] @ signature.force
+        if b.shape[-1] > 3:
+            change = change + b[..., 3:] @ signature.angles
+        return self.rows(change)
+
+    def size(self, signature: Signature, g: float) -> Array:
+        """Size of a signature in the observations, of which the approach may see little, (k,).
+
+        Angles count as the forces by which they would show.
+        """
+        force = signature.force / self.sigmas[:, :3, None]
+        turned = g * signature.angles / np.mean(self.sigmas[:, :3])
+        return np.sqrt(np.sum(force**2, axis=(0, 1)) + np.sum(turned**2, axis=(0, 1)))
+
+    def rows(self, change: Array) -> Array:
+        """Scale changes of the conditions, (n, c, k), to unit weight, (m, k)."""
+        white = np.linalg.solve(self.whitening, change).reshape(-1, change.shape[-1])
+        prior = len(self.design) - len(white)
+        return np.concatenate([white, np.zeros((prior, white.shape[1]))])
+
+    def project(self, rows: Array) -> Array:
+        """Nᵀ rows: what the parameters of the model do not absorb, (r, k)."""
+        return np.asarray(self.basis.T @ rows)
+
+
+def ideal_residuals(solution: Solution) -> tuple[Residuals, Array]:
+    """Residual space of an ideal sensor in the same positions, and its forces (n, 3).
+
+    What is exactly invisible or exactly alike is so at the ideal sensor: a real one differs from it
+    by some hundredths, and so do the signatures.
+    """
+    observed, model, approach = solution.observed, solution.model, solution.approach
+    g = solution.gravity
+    if approach.uses_angles and observed.angles is not None:
+        angles = observed.angles[0]
+        forces = np.column_stack(specific_force(angles[:, 0], angles[:, 1], g))
+    else:
+        p = solution.parameters[: model.n_parameters]
+        forces = model.correct(observed.forces[0], p, g, observed.hold)
+        forces = g * forces / np.linalg.norm(forces, axis=1, keepdims=True)
+        angles = np.column_stack(roll_pitch(tuple(forces.T)))
+    problem = CalibrationProblem.of(model, approach, observed)
+    x = np.zeros((problem.initial.shape[1], 1))
+    if problem.weights.any():
+        x[-1] = g
+    values = [forces, angles] if approach.uses_angles else [forces]
+    adjusted = np.concatenate(values, axis=1).T[:, None]
+    at = problem.conditions.linearise(x, adjusted, forces.T[:, None])
+    b = np.moveaxis(at.jac_observations[:, :, 0], -1, 0)
+    whitening = np.linalg.cholesky(np.einsum("nco,no,ndo->ncd", b, solution.variances, b))
+    a = np.linalg.solve(whitening, np.moveaxis(at.jac_parameters[:, :, 0], -1, 0))
+    design = np.concatenate([a.reshape(-1, a.shape[-1]), solution.prior[0]])
+    return Residuals(
+        design, np.zeros(len(design)), whitening, b, np.sqrt(solution.variances)
+    ), forces
