@@ -129,7 +129,8 @@ def test_47_axis_errors_that_the_norm_of_gravity_does_not_see():
     """An axis error only renames parameters there; the residuals are the same."""
     nine, gravity = get_model("bias-scale-nonorthogonality"), get_approach("gravity")
     usual = fit_campaign(BLIND, nine, gravity).adjustment.omega[0]
-    for spec in ("axis_error(x=-1, y=2, z=3)", "axis_error(x=2, y=3, z=1)"):
+    for x, y, z in SIGNED_PERMUTATIONS[1:]:
+        spec = f"axis_error(x={x}, y={y}, z={z})"
         found = fit_campaign(spoiled(spec, campaign=BLIND), nine, gravity).adjustment.omega[0]
         assert found == pytest.approx(usual, rel=1e-6)
 
