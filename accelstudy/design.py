@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 SINGULAR = 1e-7
 """Singular values of the scaled design below this fraction of the largest count as zero."""
+ROUNDING = 1e-14
+"""Columns of the design shorter than this fraction of the longest count as zero."""
 
 
 @dataclass(frozen=True)
@@ -144,7 +146,9 @@ def _is_blind(model: SensorModel, approach: Approach, noise: Noise, gravity: flo
 def _rank(a: Array) -> tuple[int, float, NDArray[np.bool_]]:
     """Rank, condition and which columns lie in the null space of a design."""
     length = np.linalg.norm(a, axis=0)
-    scaled = a / np.where(length > 0, length, 1.0)
+    longest = length.max() or 1.0
+    # A column of rounding errors is no direction, and would be one at unit length.
+    scaled = a / np.where(length > ROUNDING * longest, length, longest)
     _, values, vt = np.linalg.svd(scaled, full_matrices=True)
     rank = int(np.count_nonzero(values > SINGULAR * values[0]))
     complete = rank == a.shape[1]

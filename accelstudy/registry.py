@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Iterable
+from dataclasses import dataclass
 from importlib import import_module
 from pkgutil import iter_modules
-from typing import Generic, TypeVar
+from typing import ClassVar, Generic, TypeVar
 
-from accelstudy.errors import UnknownNameError
+from accelstudy.errors import InputError, UnknownNameError
 
 Item = TypeVar("Item")
 
@@ -45,6 +48,95 @@ class Registry(Generic[Item]):
     def names(self) -> tuple[str, ...]:
         """Names of all items."""
         return tuple(self._items)
+
+
+@dataclass(frozen=True)
+class Hyper:
+    """A number that shapes a thing; it is chosen or searched, not adjusted.
+
+    Parameters
+    ----------
+    name, unit : str
+    default : float; NaN leaves it open, and who uses the thing draws it
+    above, below : float, between which it lies
+    smooth : bool, whether the thing changes smoothly with it, so that a search can be refined
+    """
+
+    name: str
+    unit: str
+    default: float
+    above: float = -math.inf
+    below: float = math.inf
+    smooth: bool = False
+
+
+class Shaped:
+    """Something with a name and with settings, written as ``name`` or ``name(setting=number)``.
+
+    Attributes
+    ----------
+    kind : str, what it is, for messages
+    name : str, canonical
+    hypers : tuple of Hyper, its settings, found in ``self.shape``
+    """
+
+    kind: ClassVar[str]
+    name: ClassVar[str]
+    hypers: ClassVar[tuple[Hyper, ...]] = ()
+
+    def __init__(self, **shape: float) -> None:
+        known = {hyper.name: hyper for hyper in self.hypers}
+        for name, value in shape.items():
+            if name not in known:
+                raise UnknownNameError(f"setting of the {self.kind} {self.name!r}", name, known)
+            above, below = known[name].above, known[name].below
+            if not above < value < below:
+                bounds = [f"above {above:g}"] if above > -math.inf else []
+                bounds += [f"below {below:g}"] if below < math.inf else []
+                raise InputError(
+                    f"{self.kind} {self.name!r}: {name}={value:g} must be a number "
+                    + (" and ".join(bounds) or "that is finite")
+                )
+        self.shape = {**{hyper.name: hyper.default for hyper in self.hypers}, **shape}
+
+    @property
+    def spec(self) -> str:
+        """Name with its settings, those left open excepted: ``warm_up(tau=300)``."""
+        fixed = [f"{k}={v:.12g}" for k, v in self.shape.items() if not math.isnan(v)]
+        return f"{self.name}({', '.join(fixed)})" if fixed else self.name
+
+
+ShapedItem = TypeVar("ShapedItem", bound=Shaped)
+
+
+class ShapedRegistry(Registry[ShapedItem]):
+    """Things found by their name, or by their name and settings: ``warm_up(tau=300)``."""
+
+    def get(self, spec: str) -> ShapedItem:
+        """Return the item of that name, shaped as the settings say.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such item or setting.
+        InputError
+            If the settings cannot be read.
+        """
+        match = re.fullmatch(r"\s*(\w+)\s*\(([^()]*)\)\s*", str(spec))
+        if match is None:
+            return super().get(spec)
+        item = super().get(match[1])
+        shape = {}
+        for part in filter(None, map(str.strip, match[2].split(","))):
+            key, _, value = part.partition("=")
+            try:
+                shape[key.strip()] = float(value)
+            except ValueError:
+                raise InputError(
+                    f"{self.kind} {spec!r}: {part!r} is no setting; expected name=number"
+                    + ("" if not item.hypers else f", such as {item.hypers[0].name}=300")
+                ) from None
+        return type(item)(**shape)
 
 
 def import_modules(package: str, path: Iterable[str]) -> None:

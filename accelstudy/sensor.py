@@ -76,6 +76,12 @@ class SensorModel:
         """The model in symbols, and the functions generated from it."""
         return SensorTrace(self)
 
+    @cached_property
+    def hold_columns(self) -> tuple[str, ...]:
+        """Columns of `Hold` on which the output of the sensor or the robot's reading depends."""
+        used = self.trace.sense.used | self.trace.reading.used
+        return tuple(name for name, symbol in self.trace.hold.items() if str(symbol) in used)
+
     def sense(
         self,
         f_b: ArrayLike,

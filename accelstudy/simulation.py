@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from accelstudy.adjustment import Observations
 from accelstudy.effects import Hold
 from accelstudy.leveling import roll_pitch
+from accelstudy.noise_effects import get_noise_effect
 from accelstudy.sensor import SensorModel
 from accelstudy.units import MGON, STANDARD_GRAVITY
 
@@ -27,12 +28,14 @@ class Noise:
     sigma_angle : float, rad, of the robot's roll and of its pitch
     sigma_gravity : float, m/s², of the value of gravity; 0 holds it fixed in the adjustment
     gravity_error : float, m/s², by which the value of gravity is wrong, besides its noise
+    effects : tuple of str, noise effects of the forces in the order in which they work
     """
 
     sigma_force: float = 0.002
     sigma_angle: float = 3.2 * MGON
     sigma_gravity: float = 0.0
     gravity_error: float = 0.0
+    effects: tuple[str, ...] = ()
 
 
 def sigma_of_mean(sigma_sample: float, rate: float, duration: float) -> float:
@@ -81,17 +84,24 @@ class Session:
     def draw(self, noise: Noise, replicates: int, rng: np.random.Generator) -> Observations:
         """Draw the observations of `replicates` sessions.
 
-        The draws are made in a fixed order (forces, angles, gravity) whatever is used of them.
+        The draws are made in a fixed order (forces, angles, gravity, then what noise effects draw)
+        whatever is used of them. The adjustment knows nothing of the noise effects.
         """
         n = len(self.forces)
-        return replace(
-            self.observations(noise),
-            forces=self.forces + noise.sigma_force * rng.standard_normal((replicates, n, 3)),
-            angles=self.angles + noise.sigma_angle * rng.standard_normal((replicates, n, 2)),
-            gravity=self.gravity
+        error = noise.sigma_force * rng.standard_normal((replicates, n, 3))
+        angles = self.angles + noise.sigma_angle * rng.standard_normal((replicates, n, 2))
+        gravity = (
+            self.gravity
             + noise.gravity_error
-            + noise.sigma_gravity * rng.standard_normal(replicates),
+            + noise.sigma_gravity * rng.standard_normal(replicates)
         )
+        effects = [get_noise_effect(spec) for spec in noise.effects]
+        for effect in effects:
+            error = effect.disturb(error, noise.sigma_force, self.hold, rng)
+        forces = self.forces + error
+        for effect in effects:
+            forces = effect.read(forces)
+        return replace(self.observations(noise), forces=forces, angles=angles, gravity=gravity)
 
 
 def session(

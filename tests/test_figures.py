@@ -9,7 +9,17 @@ from matplotlib.figure import Figure
 
 from accelstudy.effects import effect_names
 from accelstudy.errors import InputError
-from accelstudy.figures import draw, figure, figure_names, figure_tables, get_figure, render, style
+from accelstudy.figures import (
+    draw,
+    figure,
+    figure_names,
+    figure_tables,
+    get_figure,
+    render,
+    style,
+    total_effects,
+)
+from accelstudy.models import MODELS
 from accelstudy.study.analysis import analyse_sensitivity
 from accelstudy.study.cells import study_cells
 from accelstudy.study.config import StudyConfig, parse_study
@@ -241,10 +251,22 @@ def test_a_study_without_estimable_cells_draws(name, tables, paper):
     paint(draw(name, needed, paper))
 
 
-def test_every_effect_and_approach_has_a_colour_of_its_own():
-    groups = [style.group_colour(name) for name in ("force", *effect_names())]
+def test_effects_of_the_models_families_and_approaches_have_colours_of_their_own():
+    modelled = {effect for effects in MODELS.values() for effect in effects}
+    groups = [style.group_colour(name) for name in ("force", *modelled)]
     approaches = [style.approach_colour(name) for name in ("gravity", "robot")]
-    assert len({*groups, *approaches}) == len(groups) + len(approaches)
+    families = [*style.FAMILIES.values()]
+    assert len({*groups, *approaches, *families}) == len(groups) + len(approaches) + len(families)
+    for name in set(effect_names()) - modelled:
+        assert style.group_colour(name) == style.FAMILIES[style.family(name)]
+    assert {style.family(name) for name in set(effect_names()) - modelled} == set(style.FAMILIES)
+
+
+def test_parameters_of_one_colour_differ_in_line_and_marker():
+    names = ["b_x", "b_y", "b_z", "k_xy", "k_xz", "k_yx", "k_yz", "k_zx", "k_zy"]
+    names += ["k_abs_x", "k_abs_y", "k_abs_z"]
+    styles = [tuple(s.values()) for s in total_effects._styles(names).values()]
+    assert len(set(styles)) == len(names)
 
 
 def test_colours_are_the_same_in_every_figure(tables, paper):

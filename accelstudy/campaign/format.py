@@ -100,7 +100,7 @@ class Campaign:
         return hold.with_steps(self.forces)
 
 
-def read_campaign(folder: str | Path) -> Campaign:
+def read_campaign(folder: str | Path, plausible: bool = True) -> Campaign:
     """Read a campaign folder: `campaign.yaml` and `positions.csv` or `positions.parquet`.
 
     With ``unit: g`` forces are multiples of standard gravity, 9.80665 m/s², whatever `gravity`
@@ -111,6 +111,13 @@ def read_campaign(folder: str | Path) -> Campaign:
 
     Numbers in `position` grow, but some may be absent: holds that were removed. Where a robot gives
     no yaw it is 0. Columns that the format does not know are left out and named in `warnings`.
+
+    Parameters
+    ----------
+    folder : path
+    plausible : bool
+        Whether to refuse forces that are not as large as gravity, and angles that fit them better
+        in another unit. Who looks for such errors reads without.
 
     Raises
     ------
@@ -131,12 +138,15 @@ def read_campaign(folder: str | Path) -> Campaign:
     (path,) = found
     columns, warnings = _read_csv(path) if path.suffix == ".csv" else _read_parquet(path)
     warnings = warnings + [_ignored(path, name) for name in columns if name not in KNOWN]
-    campaign = _parse_table(columns, header, path)
+    campaign = _parse_table(columns, header, path, plausible)
     return replace(campaign, warnings=tuple(warnings), source=folder)
 
 
 def write_campaign(
-    campaign: Campaign, folder: str | Path, table: Literal["csv", "parquet"] = "csv"
+    campaign: Campaign,
+    folder: str | Path,
+    table: Literal["csv", "parquet"] = "csv",
+    plausible: bool = True,
 ) -> None:
     """Write a campaign folder, in the unit that the campaign had.
 
@@ -148,6 +158,8 @@ def write_campaign(
         Made if it is not there. A table of positions in it is replaced, whichever of the two kinds
         it has; other files are left as they are.
     table : "csv" or "parquet"
+    plausible : bool
+        As in `read_campaign`.
 
     Raises
     ------
@@ -159,7 +171,7 @@ def write_campaign(
     path = folder / f"positions.{table}"
     header = _parse_header(_content_of(campaign), folder / HEADER)
     columns = _columns_of(campaign, header)
-    _parse_table(columns, header, path)
+    _parse_table(columns, header, path, plausible)
     try:
         with whole_file(path) as temporary:
             if table == "csv":
@@ -235,7 +247,7 @@ def _ignored(path: Path, name: str) -> str:
     return f"{path}: column {name!r} is not known and ignored{hint}"
 
 
-def _parse_table(columns: Columns, header: Header, path: Path) -> Campaign:
+def _parse_table(columns: Columns, header: Header, path: Path, plausible: bool) -> Campaign:
     """Check the columns, and turn them and the header into a campaign."""
     given: dict[str, Array] = {}
     labels: list[str] = []
@@ -254,9 +266,11 @@ def _parse_table(columns: Columns, header: Header, path: Path) -> Campaign:
         for attribute, array in given.items():
             scale, offset = header.to_si(attribute)
             values[attribute] = (array - offset) * scale
-        check_norm(given["forces"], values["forces"], header, path)
+        if plausible:
+            check_norm(given["forces"], values["forces"], header, path)
         if header.robot is not None:
-            check_angles(given["angles"], values["forces"], header.gravity.value_mps2, path)
+            if plausible:
+                check_angles(given["angles"], values["forces"], header.gravity.value_mps2, path)
             values.setdefault("yaw", np.zeros(len(labels)))
     for attribute in COUNTING:
         if attribute in values:

@@ -8,13 +8,12 @@ definition. To add one, write a module next to this file with a class under `reg
 from accelstudy.effects.base import (
     Effect,
     Hold,
-    Hyper,
     Parameter,
     effect_names,
     get_effect,
     register,
 )
-from accelstudy.registry import import_modules
+from accelstudy.registry import Hyper, import_modules
 
 __all__ = ["Effect", "Hold", "Hyper", "Parameter", "effect_names", "get_effect", "register"]
 

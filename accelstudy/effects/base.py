@@ -13,7 +13,6 @@ serves NumPy arrays, symbols to differentiate, and generated code.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache
@@ -22,8 +21,8 @@ from typing import Any, ClassVar, Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.errors import InputError, UnknownNameError
-from accelstudy.registry import Registry
+from accelstudy.errors import InputError
+from accelstudy.registry import Shaped, ShapedRegistry
 
 AXES = ("x", "y", "z")
 
@@ -48,19 +47,6 @@ class Parameter:
     name: str
     unit: str
     symbol: str
-
-
-@dataclass(frozen=True)
-class Hyper:
-    """A number that shapes an effect; it is chosen or searched, not adjusted.
-
-    `smooth` says that the effect changes smoothly with it, so that a search can be refined.
-    """
-
-    name: str
-    unit: str
-    default: float
-    smooth: bool = False
 
 
 def per_axis(name: str, unit: str, symbol: str) -> tuple[Parameter, ...]:
@@ -121,7 +107,7 @@ class Hold:
         return np.asarray(values, dtype=float)
 
 
-class Effect:
+class Effect(Shaped):
     """One systematic effect; subclasses set the class attributes and override what they add.
 
     In the methods `p` is the tuple of the effect's own parameters, in which all formulas are
@@ -133,32 +119,17 @@ class Effect:
     ----------
     name : str, canonical
     parameters : tuple of Parameter
-    hypers : tuple of Hyper, numbers that shape the effect, found in ``self.shape``
+    hypers : tuple of Hyper, numbers that shape the effect
     equation : str, what is added, for people
     typical : (float, float), usual size of a parameter from good to cheap equipment, SI
     part : what has the effect, the "sensor" or the "rig" that turns it
     """
 
-    name: ClassVar[str]
+    kind = "effect"
     parameters: ClassVar[tuple[Parameter, ...]]
-    hypers: ClassVar[tuple[Hyper, ...]] = ()
     equation: ClassVar[str]
     typical: ClassVar[tuple[float, float]]
     part: ClassVar[Literal["sensor", "rig"]] = "sensor"
-
-    def __init__(self, **shape: float) -> None:
-        known = {hyper.name: hyper.default for hyper in self.hypers}
-        for name in shape:
-            if name not in known:
-                raise UnknownNameError(f"setting of the effect {self.name!r}", name, known)
-        self.shape = {**known, **shape}
-
-    @property
-    def spec(self) -> str:
-        """Name with its settings, as `get_effect` takes it: ``warm_up(tau=300)``."""
-        if not self.hypers:
-            return self.name
-        return f"{self.name}({', '.join(f'{k}={v:.12g}' for k, v in self.shape.items())})"
 
     def candidates(self, hold: Hold, f: NDArray[np.float64], g: float) -> Sequence[Effect]:
         """Shapes of the effect that are worth a search in given holds with forces f (n, 3)."""
@@ -179,7 +150,7 @@ class Effect:
         return (0, 0)
 
 
-_registry: Registry[Effect] = Registry("effect")
+_registry: ShapedRegistry[Effect] = ShapedRegistry("effect")
 EffectClass = TypeVar("EffectClass", bound=type[Effect])
 
 effect_names = _registry.names
@@ -196,20 +167,7 @@ def get_effect(spec: str) -> Effect:
     InputError
         If the settings cannot be read.
     """
-    match = re.fullmatch(r"\s*(\w+)\s*\(([^()]*)\)\s*", str(spec))
-    if match is None:
-        return _registry.get(spec)
-    effect = _registry.get(match[1])
-    shape = {}
-    for part in filter(None, map(str.strip, match[2].split(","))):
-        key, _, value = part.partition("=")
-        try:
-            shape[key.strip()] = float(value)
-        except ValueError:
-            raise InputError(
-                f"effect {spec!r}: {part!r} is no setting; expected name=number, such as tau=300"
-            ) from None
-    return type(effect)(**shape)
+    return _registry.get(spec)
 
 
 def register(effect: EffectClass) -> EffectClass:

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from accelstudy.effects.base import Effect, Hyper, per_axis, register
+from accelstudy.effects.base import Effect, per_axis, register
+from accelstudy.registry import Hyper
 
 
 @register

@@ -1,6 +1,7 @@
 """Encoder eccentricity: an angular error that repeats with each turn."""
 
-from accelstudy.effects.base import Effect, Hyper, Parameter, register
+from accelstudy.effects.base import Effect, Parameter, register
+from accelstudy.registry import Hyper
 
 
 @register
@@ -17,7 +18,7 @@ class EncoderEccentricity(Effect):
         Parameter("A_pitch", "rad", r"$A_\theta$"),
         Parameter("B_pitch", "rad", r"$B_\theta$"),
     )
-    hypers = (Hyper("order", "1", 1.0),)
+    hypers = (Hyper("order", "1", 1.0, above=0),)
     equation = "δφ = A_φ sin mφ + B_φ cos mφ, same in θ"
     typical = (15e-6, 300e-6)
     part = "rig"

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from accelstudy.effects.base import Effect, Hyper, per_axis, register
+from accelstudy.effects.base import Effect, per_axis, register
+from accelstudy.registry import Hyper
 from accelstudy.units import STANDARD_GRAVITY
 
 
@@ -15,7 +16,7 @@ class Saturation(Effect):
 
     name = "saturation"
     parameters = per_axis("k_sat", "1", "k_{s%}")
-    hypers = (Hyper("knee", "m/s^2", 0.95 * STANDARD_GRAVITY, smooth=True),)
+    hypers = (Hyper("knee", "m/s^2", 0.95 * STANDARD_GRAVITY, above=0, smooth=True),)
     equation = "−k_i sign(f_i) max(0, |f_i| − c)"
     typical = (0.02, 0.5)
 

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from accelstudy.effects.base import Effect, Hyper, per_axis, register
+from accelstudy.effects.base import Effect, per_axis, register
+from accelstudy.registry import Hyper
 
 
 @register
@@ -11,7 +12,7 @@ class WarmUp(Effect):
 
     name = "warm_up"
     parameters = per_axis("w", "m/s^2", "w_%")
-    hypers = (Hyper("tau", "s", 600.0, smooth=True),)
+    hypers = (Hyper("tau", "s", 600.0, above=0, smooth=True),)
     equation = "w_i exp(−t/τ)"
     typical = (0.01, 0.05)
 

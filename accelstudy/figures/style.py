@@ -15,7 +15,7 @@ from matplotlib.ticker import Locator, LogLocator, MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
 from accelstudy.effects import Parameter, effect_names, get_effect
-from accelstudy.models import TITLES
+from accelstudy.models import TITLES, compose
 
 MM = 1 / 25.4
 """One millimetre in inches."""
@@ -81,6 +81,15 @@ GROUPS = {
 }
 """Group of parameters (an effect, or what else varies): its label and its colour."""
 
+# Of Tol's muted colours. One cannot tell two dozen colours apart, so effects beyond the registered
+# models share the colour of their family.
+FAMILIES = {
+    "rig": "#332288",
+    "environment": "#CC6677",
+    "history": "#44AA99",
+    "nonlinearity": "#882255",
+}
+
 UNIT_LABELS = {"mm/s^2": "mm/s²", "m/s^2": "m/s²"}
 
 
@@ -100,8 +109,21 @@ def group_label(group: str) -> str:
 
 
 def group_colour(group: str) -> str:
-    """Colour of a group of parameters."""
-    return GROUPS.get(group, ("", "#999999"))[1]
+    """Colour of a group of parameters: its own, or that of the effect's family."""
+    if group in GROUPS:
+        return GROUPS[group][1]
+    return FAMILIES[family(group)] if group in effect_names() else "#999999"
+
+
+@cache
+def family(effect: str) -> str:
+    """Family of an effect: what has it, or on what it depends beside the force."""
+    if get_effect(effect).part == "rig":
+        return "rig"
+    columns = set(compose(effect, (effect,)).hold_columns)
+    if columns & {"temperature", "time", "vibration"}:
+        return "environment"
+    return "history" if columns else "nonlinearity"
 
 
 @cache

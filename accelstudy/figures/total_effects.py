@@ -143,17 +143,17 @@ def _effects_over_roll(table: pd.DataFrame, output: str) -> Figure:
 
 
 def _styles(inputs: list[str]) -> dict[str, Style]:
-    """Colour of the group, line and marker by the position in it."""
+    """Colour of the group; line and marker by the position among all that have the colour."""
     count: dict[str, int] = {}
     styles = {}
     for name in inputs:
-        group = group_of(name)
-        i = count.get(group, 0) % 3
-        count[group] = count.get(group, 0) + 1
+        colour = group_colour(group_of(name))
+        i = count.get(colour, 0)
+        count[colour] = i + 1
         styles[name] = {
-            "color": group_colour(group),
-            "linestyle": LINE_STYLES[i],
-            "marker": MARKERS[i],
+            "color": colour,
+            "linestyle": LINE_STYLES[i % len(LINE_STYLES)],
+            "marker": MARKERS[(i + i // len(LINE_STYLES)) % len(MARKERS)],
         }
     return styles
 

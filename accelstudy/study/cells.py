@@ -13,6 +13,7 @@ import numpy as np
 
 from accelstudy.approaches import Approach, approach_names, get_approach
 from accelstudy.models import compose, get_model
+from accelstudy.noise_effects import get_noise_effect
 from accelstudy.schemes import Scheme, get_scheme, scheme_names
 from accelstudy.sensor import SensorModel
 from accelstudy.simulation import Noise
@@ -86,7 +87,8 @@ class Cell:
             list(self.simulated_effects),
             self.scheme,
             self.approach,
-            asdict(self.noise),
+            # What a set-up does without is not part of it, so that new things leave old seeds be.
+            {key: value for key, value in asdict(self.noise).items() if value != ()},
         ]
         digest = hashlib.sha256(json.dumps(identity).encode()).digest()
         words = np.frombuffer(digest, dtype="<u4").tolist()
@@ -104,7 +106,7 @@ class Cell:
                 **data,
                 "effects": tuple(data["effects"]),
                 "simulated_effects": tuple(data["simulated_effects"]),
-                "noise": Noise(**data["noise"]),
+                "noise": Noise(**{**data["noise"], "effects": tuple(data["noise"]["effects"])}),
             }
         )
 
@@ -162,7 +164,11 @@ def _grid_cells(study: StudyConfig, grid: Grid) -> Iterable[Cell]:
             approach=approach,
             replicates=grid.replicates,
             noise=Noise(
-                study.position_sigma(sensor), robot * MGON if uses_angles else 0.0, gravity, error
+                study.position_sigma(sensor),
+                robot * MGON if uses_angles else 0.0,
+                gravity,
+                error,
+                tuple(get_noise_effect(spec).spec for spec in noise.effects),
             ),
             gravity=study.gravity_mps2,
             truth=study.truth(dict.fromkeys([*effects, *simulated])),

@@ -18,6 +18,7 @@ from accelstudy.design import diagnose
 from accelstudy.effects import get_effect
 from accelstudy.errors import InputError
 from accelstudy.models import MODELS, PRESETS, get_model
+from accelstudy.noise_effects import get_noise_effect
 from accelstudy.schemes import get_scheme, scheme_names
 from accelstudy.sensor import SensorModel
 from accelstudy.simulation import Noise, sigma_of_mean
@@ -76,6 +77,11 @@ class NoiseConfig(Block):
     sensor: SensorNoise = SensorNoise()
     robot: RobotNoise = RobotNoise()
     gravity: GravityNoise = GravityNoise()
+    effects: list[str] = Field(
+        default_factory=list,
+        description="noise effects of the forces, e.g. heavy_tails(nu=3), in the order in which "
+        "they work; the calibration does not know of them",
+    )
 
 
 class Quantity(Block):
@@ -186,6 +192,9 @@ class StudyConfig(Block):
                         f"{len(parameters)} parameters ({', '.join(p.name for p in parameters)})"
                     )
                 to_si(quantity.value, quantity.unit, parameters[0].unit)
+        with _at("noise.effects"):
+            for effect in self.noise.effects:
+                get_noise_effect(effect)
         if self.simulated_effects != ["model"]:
             with _at("simulated_effects"):
                 SensorModel.of("simulated", self.simulated_effects)

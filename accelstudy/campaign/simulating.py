@@ -1,0 +1,320 @@
+"""Simulated campaigns: measured data as it might be, with effects of one's choice and the truth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from accelstudy.approaches import get_approach
+from accelstudy.campaign.format import Campaign
+from accelstudy.effects import Effect, Hold, get_effect
+from accelstudy.errors import InputError, UnknownNameError
+from accelstudy.gross_errors import GrossError, get_gross_error
+from accelstudy.models import compose, get_model
+from accelstudy.noise_effects import NoiseEffect, get_noise_effect
+from accelstudy.registry import Shaped
+from accelstudy.schemes import get_scheme
+from accelstudy.simulation import Noise, session
+from accelstudy.study.tables import whole_file
+from accelstudy.units import MGON, STANDARD_GRAVITY
+
+Array = NDArray[np.float64]
+
+STREAMS = ("sensor", "effects", "order", "temperature", "vibration", "yaw", "noise", "sd", "gross")
+"""What is drawn, each from a stream of its own, so that none changes another."""
+
+CHOICES = {
+    "temperature_order": ("linear", "ABBA", "random"),
+    "yaw": ("none", "random"),
+    "order": ("scheme", "random"),
+}
+NEEDS = {"time": "interval", "temperature": "temperature", "vibration": "vibration"}
+"""Columns of the holds and the settings that provide them; the others are always there."""
+
+
+@dataclass(frozen=True)
+class CampaignSettings:
+    """What is simulated; SI but for temperatures.
+
+    Parameters
+    ----------
+    name : str
+    seed : int
+    scheme : str
+    repeats : int, how often the whole scheme is measured
+    repeat_first : int, how many of the first holds are measured again at the end
+    order : "scheme" or "random", of the holds
+    approach : str, whether there is a robot
+    model : str, effects that every sensor has; their parameters are drawn, of `Effect.typical` size
+    effects : tuple of str, effects beyond the model, "warm_up(tau=400)" or with their parameters in
+        SI, "thermal_bias: 0.004, -0.002, 0.001"; one of an effect of the model replaces it
+    size : float, factor of the parameters of `effects` that are not given; they are as large as
+        the larger typical size, with random signs
+    noise_effects, gross_errors : tuple of str
+    sigma : float, m/s², of a position mean
+    sigma_known : bool, whether the campaign tells it
+    sigma_angle : float, rad, of the robot's roll and pitch
+    gravity : float, m/s²
+    interval : float, s between holds; None leaves out the time
+    temperature : (float, float), °C, from and to, optional
+    temperature_order : "linear", "ABBA" (in quarters of the session) or "random"
+    vibration : (float, float), m/s² rms, between which it is drawn for each hold, optional
+    yaw : "none" or "random"
+    n_samples : int, samples per hold, optional; adds their sds
+    """
+
+    name: str = "simulated"
+    seed: int = 1
+    scheme: str = "mclaren-24"
+    repeats: int = 1
+    repeat_first: int = 0
+    order: str = "scheme"
+    approach: str = "robot"
+    model: str = "bias-scale-nonorthogonality"
+    effects: tuple[str, ...] = ()
+    size: float = 1.0
+    noise_effects: tuple[str, ...] = ()
+    gross_errors: tuple[str, ...] = ()
+    sigma: float = 0.002
+    sigma_known: bool = True
+    sigma_angle: float = 3.2 * MGON
+    gravity: float = STANDARD_GRAVITY
+    interval: float | None = 60.0
+    temperature: tuple[float, float] | None = None
+    temperature_order: str = "linear"
+    vibration: tuple[float, float] | None = None
+    yaw: str = "none"
+    n_samples: int | None = None
+
+    def __post_init__(self) -> None:
+        for key, known in CHOICES.items():
+            if getattr(self, key) not in known:
+                raise UnknownNameError(key, getattr(self, key), known)
+        limits = {"seed": 0, "repeats": 1, "repeat_first": 0, "sigma_angle": 0, "n_samples": 2}
+        for key, least in limits.items():
+            value = getattr(self, key)
+            if value is not None and not least <= value < math.inf:
+                raise InputError(f"{key}: must be {least} or more, not {value:g}")
+        for key in ("sigma", "gravity", "interval", "size"):
+            value = getattr(self, key)
+            if value is not None and not 0 < value < math.inf:
+                raise InputError(f"{key}: must be above 0, not {value:g}")
+        for key, lowest in (("temperature", -273.15), ("vibration", 0.0)):
+            pair = getattr(self, key)
+            if pair is not None and not all(lowest <= value < math.inf for value in pair):
+                raise InputError(
+                    f"{key}: must be two numbers of {lowest:g} or more, not {pair[0]:g}:{pair[1]:g}"
+                )
+
+
+def simulate_campaign(settings: CampaignSettings) -> tuple[Campaign, dict[str, Any]]:
+    """Simulate a campaign.
+
+    Parameters
+    ----------
+    settings : CampaignSettings
+
+    Returns
+    -------
+    campaign : Campaign
+    truth : dict
+        Plain data: the settings, and all that was drawn: the parameters of the sensor and of the
+        effects, the settings of the gross errors.
+
+    Raises
+    ------
+    InputError
+        If a name or a setting is unknown, or an effect needs a column that is not simulated.
+    """
+    seeds = np.random.SeedSequence(settings.seed).spawn(len(STREAMS))
+    rng = {name: np.random.default_rng(s) for name, s in zip(STREAMS, seeds, strict=True)}
+    hidden = _hidden_effects(settings, rng["effects"])
+    replaced = {effect.name for effect, _ in hidden}
+    usual = [
+        (effect, _usual_parameters(effect, rng["sensor"]))
+        for effect in get_model(settings.model).effects
+    ]
+    sensor = [(effect, values) for effect, values in usual if effect.name not in replaced]
+    present = [*sensor, *hidden]
+    model = compose("simulated", tuple(effect.spec for effect, _ in present))
+    noise_effects = [get_noise_effect(spec) for spec in settings.noise_effects]
+
+    directions = _directions(settings, rng["order"])
+    hold = _hold(settings, len(directions), rng)
+    for effect, _ in present:
+        _check_columns(effect, hold)
+    ideal = session(
+        model, np.concatenate([v for _, v in present]), directions, settings.gravity, hold
+    )
+    noise = Noise(settings.sigma, settings.sigma_angle, effects=settings.noise_effects)
+    drawn = ideal.draw(noise, 1, rng["noise"])
+    robot = get_approach(settings.approach).uses_angles
+    campaign = Campaign(
+        name=settings.name,
+        positions=np.arange(1, len(directions) + 1),
+        forces=drawn.forces[0],
+        gravity=settings.gravity,
+        sigma_force=settings.sigma if settings.sigma_known else None,
+        angles=drawn.angles[0] if robot and drawn.angles is not None else None,
+        sigma_angle=settings.sigma_angle if robot else None,
+        time=hold.time,
+        temperature=hold.temperature,
+        vibration=hold.vibration,
+        yaw=hold.yaw if robot and settings.yaw != "none" else None,
+        **_samples(settings, noise_effects, len(directions), rng["sd"]),
+    )
+    gross = []
+    for spec in settings.gross_errors:
+        gross.append(get_gross_error(spec).drawn(campaign, rng["gross"]))
+        campaign = gross[-1].act(campaign)
+    return campaign, _truth(settings, sensor, hidden, noise_effects, gross)
+
+
+def write_truth(truth: dict[str, Any], path: str | Path) -> None:
+    """Write the truth as YAML."""
+    text = yaml.safe_dump(truth, sort_keys=False, allow_unicode=True)
+    try:
+        with whole_file(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+
+def _hidden_effects(
+    settings: CampaignSettings, rng: np.random.Generator
+) -> list[tuple[Effect, Array]]:
+    """Effects beyond the model with their parameters."""
+    found = []
+    for text in settings.effects:
+        spec, colon, numbers = text.partition(":")
+        effect = get_effect(spec.strip())
+        n = len(effect.parameters)
+        values = settings.size * effect.typical[1] * rng.choice([-1.0, 1.0], n)
+        if colon:
+            try:
+                values = np.array([float(part) for part in numbers.split(",")])
+            except ValueError:
+                values = np.array([np.nan])
+            if len(values) != n or not np.isfinite(values).all():
+                names = ", ".join(f"{p.name} in {p.unit}" for p in effect.parameters)
+                raise InputError(f"effect {text!r}: expected {n} numbers after the colon ({names})")
+        found.append((effect, values))
+    return found
+
+
+def _usual_parameters(effect: Effect, rng: np.random.Generator) -> Array:
+    """Parameters of either sign and, on a scale of logarithms, anywhere between typical sizes."""
+    n = len(effect.parameters)
+    low, high = np.log(effect.typical)
+    return np.asarray(np.exp(rng.uniform(low, high, n)) * rng.choice([-1.0, 1.0], n))
+
+
+def _directions(settings: CampaignSettings, rng: np.random.Generator) -> Array:
+    directions = np.tile(get_scheme(settings.scheme).directions, (settings.repeats, 1))
+    if settings.order == "random":
+        directions = rng.permutation(directions)
+    if settings.repeat_first > len(directions):
+        raise InputError(
+            f"repeat_first: must be at most {len(directions)}, the holds of {settings.scheme}, "
+            f"not {settings.repeat_first}"
+        )
+    return np.concatenate([directions, directions[: settings.repeat_first]])
+
+
+def _hold(settings: CampaignSettings, n: int, rng: dict[str, np.random.Generator]) -> Hold:
+    """Columns that do not follow from the directions."""
+    temperature = None
+    if settings.temperature is not None:
+        low, high = settings.temperature
+        course = {
+            "linear": np.linspace(0, 1, n),
+            "ABBA": np.array([0.0, 1.0, 1.0, 0.0])[4 * np.arange(n) // n],
+            "random": rng["temperature"].uniform(0, 1, n),
+        }
+        temperature = low + (high - low) * course[settings.temperature_order]
+    return Hold(
+        time=None if settings.interval is None else settings.interval * np.arange(float(n)),
+        temperature=temperature,
+        vibration=None
+        if settings.vibration is None
+        else rng["vibration"].uniform(*settings.vibration, n),
+        yaw=rng["yaw"].uniform(-np.pi, np.pi, n) if settings.yaw == "random" else np.zeros(n),
+    )
+
+
+def _check_columns(effect: Effect, hold: Hold) -> None:
+    for column in compose(effect.spec, (effect.spec,)).hold_columns:
+        if column in NEEDS and getattr(hold, column) is None:
+            raise InputError(
+                f"{NEEDS[column]}: missing; the effect {effect.name!r} needs the {column} of each "
+                "hold"
+            )
+
+
+def _samples(
+    settings: CampaignSettings,
+    noise_effects: Sequence[NoiseEffect],
+    n_positions: int,
+    rng: np.random.Generator,
+) -> dict[str, Any]:
+    """Numbers of samples, and their sds: σ√n with the scatter of the sd of a normal sample."""
+    n = settings.n_samples
+    if n is None:
+        return {}
+    sigma = settings.sigma * np.sqrt(n) * np.prod([e.within_hold for e in noise_effects], axis=0)
+    scatter = np.sqrt(rng.chisquare(n - 1, (n_positions, 3)) / (n - 1))
+    return {"n_samples": np.full(n_positions, n), "sd": sigma * scatter}
+
+
+def _truth(
+    settings: CampaignSettings,
+    sensor: Sequence[tuple[Effect, Array]],
+    hidden: Sequence[tuple[Effect, Array]],
+    noise_effects: Sequence[NoiseEffect],
+    gross: Sequence[GrossError],
+) -> dict[str, Any]:
+    def described(effect: Effect, values: Array) -> dict[str, Any]:
+        return {
+            **_named(effect),
+            "parameters": [
+                {"name": p.name, "value": float(value), "unit": p.unit}
+                for p, value in zip(effect.parameters, values, strict=True)
+            ],
+        }
+
+    return {
+        "schema_version": 1,
+        "campaign": settings.name,
+        "seed": settings.seed,
+        "sensor": [described(*pair) for pair in sensor],
+        "effects": [described(*pair) for pair in hidden],
+        "noise": {
+            "sigma_mps2": settings.sigma,
+            "effects": [_named(effect) for effect in noise_effects],
+        },
+        "gross_errors": [_named(error) for error in gross],
+        "settings": {
+            key: list(value) if isinstance(value, tuple) else value
+            for key, value in asdict(settings).items()
+        },
+    }
+
+
+def _named(item: Shaped) -> dict[str, Any]:
+    """Name and settings, each setting with its unit."""
+    units = {hyper.name: hyper.unit for hyper in item.hypers}
+    return {
+        "name": item.name,
+        "settings": {
+            name: {"value": float(value), "unit": units[name]}
+            for name, value in item.shape.items()
+            if not math.isnan(value)
+        },
+    }

@@ -1,0 +1,95 @@
+"""The command that simulates a campaign."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from accelstudy.errors import InputError
+
+_PATH = click.Path(path_type=Path)
+
+
+@click.command("simulate-campaign")
+@click.option("--out", type=_PATH, required=True, help="Folder of the campaign.")
+@click.option("--truth", "truth_path", type=_PATH, help="YAML file for the truth, apart from it.")
+@click.option("--name", help="Name of the campaign.  [default: that of the folder]")
+@click.option("--seed", default=1, show_default=True, help="Of all random numbers.")
+@click.option("--scheme", default="mclaren-24", show_default=True)
+@click.option("--repeats", default=1, show_default=True, help="How often the whole scheme.")
+@click.option("--repeat-first", default=0, show_default=True, help="First holds, at the end again.")
+@click.option("--order", default="scheme", show_default=True, help="Of holds: scheme or random.")
+@click.option("--approach", default="robot", show_default=True, help="robot or gravity.")
+@click.option("--model", default="bias-scale-nonorthogonality", show_default=True)
+@click.option(
+    "--effect",
+    "effects",
+    multiple=True,
+    help="Beyond the model: 'warm_up(tau=400)' or 'thermal_bias: 0.004, -0.002, 0.001' (SI).",
+)
+@click.option("--size", default=1.0, show_default=True, help="Factor of effects' typical sizes.")
+@click.option("--noise-effect", "noise_effects", multiple=True, help="As 'heavy_tails(nu=3)'.")
+@click.option("--gross", "gross_errors", multiple=True, help="As 'row_order(first=3, second=4)'.")
+@click.option("--sigma", default=0.002, show_default=True, help="Noise of a position mean, m/s².")
+@click.option("--sigma-unknown", is_flag=True, help="Leave it out of the header.")
+@click.option("--robot-sigma-mgon", default=3.2, show_default=True)
+@click.option("--interval", default=60.0, show_default=True, help="Seconds between holds.")
+@click.option("--no-time", is_flag=True, help="Leave out the time of the holds.")
+@click.option("--temperature", help="From and to, °C, as 20:40.")
+@click.option(
+    "--temperature-order", default="linear", show_default=True, help="linear, ABBA or random."
+)
+@click.option("--vibration", help="Lowest and highest rms, m/s², as 0:1.")
+@click.option("--yaw", default="none", show_default=True, help="none or random.")
+@click.option("--samples-per-hold", "n_samples", type=int, help="Adds n_samples and sds.")
+def simulate_campaign_command(
+    out: Path,
+    truth_path: Path | None,
+    name: str | None,
+    sigma_unknown: bool,
+    robot_sigma_mgon: float,
+    interval: float,
+    no_time: bool,
+    temperature: str | None,
+    vibration: str | None,
+    **options: Any,
+) -> None:
+    """Simulate a campaign with effects, noise and gross errors of your choice.
+
+    `accelstudy effects` lists them. What is not given is drawn from the seed; the truth goes to
+    --truth and nowhere else.
+    """
+    from accelstudy.campaign.format import write_campaign
+    from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign, write_truth
+    from accelstudy.study.provenance import check_writable
+    from accelstudy.units import MGON
+
+    settings = CampaignSettings(
+        name=name or out.resolve().name,
+        sigma_known=not sigma_unknown,
+        sigma_angle=robot_sigma_mgon * MGON,
+        interval=None if no_time else interval,
+        temperature=_range("temperature", temperature),
+        vibration=_range("vibration", vibration),
+        **options,
+    )
+    campaign, truth = simulate_campaign(settings)
+    check_writable(out)
+    if truth_path is not None:
+        check_writable(truth_path.parent)
+    write_campaign(campaign, out, plausible=not settings.gross_errors)
+    if truth_path is not None:
+        write_truth(truth, truth_path)
+    click.echo(f"campaign: {out} ({campaign.n_positions} positions)")
+
+
+def _range(option: str, text: str | None) -> tuple[float, float] | None:
+    if text is None:
+        return None
+    try:
+        low, high = map(float, text.split(":"))
+    except ValueError:
+        raise InputError(f"{option}: expected two numbers, as 20:40, not {text!r}") from None
+    return low, high

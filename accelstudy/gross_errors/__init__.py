@@ -1,0 +1,17 @@
+"""Gross errors of a campaign, one small file each: what they do, to simulate them.
+
+To add one, write a module next to this file with a class under `register`.
+"""
+
+from accelstudy.gross_errors.base import (
+    GrossError,
+    get_gross_error,
+    gross_error_names,
+    register,
+)
+from accelstudy.registry import import_modules
+
+__all__ = ["GrossError", "get_gross_error", "gross_error_names", "register"]
+
+# A module registers its gross errors when it is imported.
+import_modules(__name__, __path__)

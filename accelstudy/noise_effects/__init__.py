@@ -1,0 +1,17 @@
+"""Ways in which noise is not white, Gaussian and of the sigma that it is said to have.
+
+To add one, write a module next to this file with a class under `register`.
+"""
+
+from accelstudy.noise_effects.base import (
+    NoiseEffect,
+    get_noise_effect,
+    noise_effect_names,
+    register,
+)
+from accelstudy.registry import import_modules
+
+__all__ = ["NoiseEffect", "get_noise_effect", "noise_effect_names", "register"]
+
+# A module registers its noise effects when it is imported.
+import_modules(__name__, __path__)

@@ -1,0 +1,36 @@
+"""Axis noise: the three axes are not equally noisy."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from accelstudy.effects import Hold
+from accelstudy.noise_effects.base import Array, NoiseEffect, register
+from accelstudy.registry import Hyper
+
+
+@register
+class AxisNoise(NoiseEffect):
+    """The noise of axis i has κ_i times the variance that it is said to have.
+
+    By default z has 1.5 times the sd of the others: the axis out of the plane of a MEMS chip is
+    the noisier one.
+    """
+
+    name = "axis_noise"
+    hypers = (
+        Hyper("kappa_x", "1", 1.0, above=0),
+        Hyper("kappa_y", "1", 1.0, above=0),
+        Hyper("kappa_z", "1", 2.25, above=0),
+    )
+    equation = "Var v_i = κ_i σ²"
+    typical = (2.25, 4.0)
+
+    def disturb(self, noise: Array, sigma: float, hold: Hold, rng: np.random.Generator) -> Array:
+        """Return √κ_i v_i."""
+        return self.within_hold * noise
+
+    @property
+    def within_hold(self) -> Array:
+        """The samples have it too: √κ_i."""
+        return np.sqrt([self.shape[f"kappa_{i}"] for i in "xyz"])

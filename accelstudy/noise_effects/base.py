@@ -1,0 +1,72 @@
+"""What a noise effect is, and the registry of noise effects.
+
+The noise of the position means is white, Gaussian and of one sigma on all axes. A noise effect is a
+way in which it is not: it turns the noise drawn so into another, or the readings into coarser ones.
+Several work one after the other. Everything is in m/s², of R sessions of n holds with three axes.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import ClassVar, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.effects import Hold
+from accelstudy.registry import Shaped, ShapedRegistry
+
+Array = NDArray[np.float64]
+
+
+class NoiseEffect(Shaped):
+    """One departure from white Gaussian noise of a known sigma; subclasses override what they do.
+
+    Attributes
+    ----------
+    equation : str, what becomes of the noise v or of the readings f, for people
+    typical : (float, float), usual size of a setting from good to cheap equipment, SI
+    """
+
+    kind = "noise effect"
+    equation: ClassVar[str]
+    typical: ClassVar[tuple[float, float]]
+
+    def disturb(self, noise: Array, sigma: float, hold: Hold, rng: np.random.Generator) -> Array:
+        """Return what becomes of the noise.
+
+        Parameters
+        ----------
+        noise : (R, n, 3) array, m/s²
+        sigma : float, m/s², nominal sd of a position mean
+        hold : Hold
+        rng : Generator, of what the effect draws beyond the noise
+        """
+        return noise
+
+    def read(self, forces: Array) -> Array:
+        """Return the readings that are recorded of forces (R, n, 3) with noise."""
+        return forces
+
+    @property
+    def within_hold(self) -> Array:
+        """Factors of the sd of the samples within a hold, (3,); what one sees of it there."""
+        return np.ones(3)
+
+
+_registry: ShapedRegistry[NoiseEffect] = ShapedRegistry(NoiseEffect.kind)
+NoiseEffectClass = TypeVar("NoiseEffectClass", bound=type[NoiseEffect])
+
+noise_effect_names = _registry.names
+
+
+@cache
+def get_noise_effect(spec: str) -> NoiseEffect:
+    """Return a noise effect by its name, with settings or not: ``heavy_tails(nu=3)``."""
+    return _registry.get(spec)
+
+
+def register(effect: NoiseEffectClass) -> NoiseEffectClass:
+    """Class decorator: enter a noise effect into the registry under its name."""
+    _registry.add(effect.name, effect())
+    return effect

@@ -1,0 +1,39 @@
+"""Coloured noise: noise that lasts longer than a hold."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from accelstudy.effects import Hold
+from accelstudy.noise_effects.base import Array, NoiseEffect, register
+from accelstudy.registry import Hyper
+
+
+@register
+class ColouredNoise(NoiseEffect):
+    """A first-order Gauss–Markov process beside the white noise (IEEE Std 952, annex C).
+
+    Each axis has a stationary process m of its own with the autocorrelation exp(−|Δt|/τ). `share`
+    is its share of the variance of a position mean: white noise keeps σ², so that the sum has
+    σ² / (1 − share). Samples within a hold do not show it.
+
+    A τ far below the time between holds makes it a random offset from hold to hold; a τ far above
+    the session makes it a constant, which the biases take up, and a random walk. Where the holds
+    have no time, τ counts holds.
+    """
+
+    name = "coloured_noise"
+    hypers = (Hyper("share", "1", 0.5, above=0, below=1), Hyper("tau", "s", 600.0, above=0))
+    equation = "v + m, ρ(m) = exp(−|Δt|/τ), Var m = share/(1 − share) σ²"
+    typical = (0.2, 0.8)
+
+    def disturb(self, noise: Array, sigma: float, hold: Hold, rng: np.random.Generator) -> Array:
+        """Return v + m, with m_k = φ_k m_(k−1) + √(1 − φ_k²) ε_k and φ_k = exp(−Δt_k/τ)."""
+        share, tau = self.shape["share"], self.shape["tau"]
+        time = np.arange(float(noise.shape[1])) if hold.time is None else hold.time
+        coloured = rng.standard_normal(noise.shape)
+        for k, phi in enumerate(np.exp(-np.diff(time) / tau), 1):
+            coloured[:, k] = phi * coloured[:, k - 1] + math.sqrt(1 - phi**2) * coloured[:, k]
+        return noise + sigma * math.sqrt(share / (1 - share)) * coloured

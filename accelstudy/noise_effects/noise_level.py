@@ -1,0 +1,30 @@
+"""Noise level: sigma is misspecified."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from accelstudy.effects import Hold
+from accelstudy.noise_effects.base import Array, NoiseEffect, register
+from accelstudy.registry import Hyper
+
+
+@register
+class NoiseLevel(NoiseEffect):
+    """All noise has κ times the variance that it is said to have."""
+
+    name = "noise_level"
+    hypers = (Hyper("kappa", "1", 2.25, above=0),)
+    equation = "Var v = κ σ²"
+    typical = (0.6, 4.0)
+
+    def disturb(self, noise: Array, sigma: float, hold: Hold, rng: np.random.Generator) -> Array:
+        """Return √κ v."""
+        return math.sqrt(self.shape["kappa"]) * noise
+
+    @property
+    def within_hold(self) -> Array:
+        """The samples have it too: √κ."""
+        return np.full(3, math.sqrt(self.shape["kappa"]))

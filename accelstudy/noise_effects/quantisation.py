@@ -1,0 +1,27 @@
+"""Quantisation: readings are multiples of the least significant bit."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from accelstudy.noise_effects.base import Array, NoiseEffect, register
+from accelstudy.registry import Hyper
+from accelstudy.units import STANDARD_GRAVITY
+
+
+@register
+class Quantisation(NoiseEffect):
+    """The position means are rounded to multiples of the LSB, after all noise.
+
+    So it is where means are recorded in counts, or where the noise of the samples is far below the
+    LSB; with more noise than that, averaging removes the rounding of the samples.
+    """
+
+    name = "quantisation"
+    hypers = (Hyper("lsb", "m/s^2", STANDARD_GRAVITY / 2048, above=0),)
+    equation = "LSB · round(f / LSB)"
+    typical = (STANDARD_GRAVITY / 16384, STANDARD_GRAVITY / 2048)
+
+    def read(self, forces: Array) -> Array:
+        """Return the nearest multiples of the LSB."""
+        return np.asarray(self.shape["lsb"] * np.round(forces / self.shape["lsb"]))

@@ -1,0 +1,162 @@
+"""Gross errors: what each does to a campaign, and what is refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from accelstudy.approaches import get_approach
+from accelstudy.campaign.fit import fit_campaign
+from accelstudy.campaign.format import read_campaign, write_campaign
+from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign
+from accelstudy.errors import InputError
+from accelstudy.gross_errors import get_gross_error, gross_error_names
+from accelstudy.gross_errors.axis_error import SIGNED_PERMUTATIONS
+from accelstudy.models import get_model
+from accelstudy.units import STANDARD_GRAVITY
+
+CLEAN, _ = simulate_campaign(CampaignSettings(n_samples=50, yaw="random"))
+BLIND = replace(CLEAN, angles=None, sigma_angle=None, yaw=None)
+
+
+def spoiled(spec, seed=1, campaign=CLEAN):
+    return get_gross_error(spec).apply(campaign, np.random.default_rng(seed))
+
+
+def drawn(spec, seed, campaign=CLEAN):
+    return get_gross_error(spec).drawn(campaign, np.random.default_rng(seed))
+
+
+def test_the_catalogue_is_complete():
+    assert set(gross_error_names()) == {
+        *("outlier_position", "row_order", "axis_error", "unit_error")
+    }
+
+
+@pytest.mark.parametrize("name", gross_error_names())
+def test_what_is_drawn_is_told_and_can_be_given(name):
+    error = drawn(name, 3)
+    again = get_gross_error(error.spec).apply(CLEAN, np.random.default_rng(99))
+    np.testing.assert_allclose(again.forces, spoiled(name, 3).forces, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(again.angles, spoiled(name, 3).angles, rtol=0, atol=1e-9)
+    assert len({drawn(name, seed).spec for seed in range(20)}) > 2
+    assert np.any(again.forces != CLEAN.forces) or np.any(again.angles != CLEAN.angles)
+
+
+@pytest.mark.parametrize("name", gross_error_names())
+def test_a_campaign_with_it_can_be_written_and_read(name, tmp_path):
+    for seed in range(4):
+        error = spoiled(name, seed)
+        write_campaign(error, tmp_path, plausible=False)
+        read = read_campaign(tmp_path, plausible=False)
+        np.testing.assert_allclose(read.forces, error.forces, rtol=1e-14)
+        np.testing.assert_allclose(read.angles, error.angles, rtol=1e-14, atol=1e-15)
+
+
+def test_an_outlier_is_in_one_position():
+    e = spoiled("outlier_position(position=7, y=0.3)").forces - CLEAN.forces
+    assert np.flatnonzero(e.any(axis=1)).tolist() == [6]
+    np.testing.assert_allclose(e[6], [0, 0.3, 0], atol=1e-14)
+    e = spoiled("outlier_position").forces - CLEAN.forces
+    assert np.count_nonzero(e.any(axis=1)) == 1
+    assert np.linalg.norm(e) == pytest.approx(0.1)
+
+
+def test_rows_of_the_forces_are_exchanged_and_nothing_else():
+    campaign = spoiled("row_order(first=2, second=5)")
+    order = [0, 4, 2, 3, 1, *range(5, 24)]
+    np.testing.assert_array_equal(campaign.forces, CLEAN.forces[order])
+    np.testing.assert_array_equal(campaign.sd, CLEAN.sd[order])
+    np.testing.assert_array_equal(campaign.angles, CLEAN.angles)
+    np.testing.assert_array_equal(campaign.time, CLEAN.time)
+
+
+def test_exchanged_rows_are_in_different_attitudes():
+    settings = CampaignSettings(scheme="faces-6", repeats=4)
+    campaign, _ = simulate_campaign(settings)
+    for seed in range(30):
+        changed = spoiled("row_order", seed, campaign).forces - campaign.forces
+        assert np.abs(changed).max() > 1
+
+
+def test_axes():
+    campaign = spoiled("axis_error(x=2, y=-1, z=3)")
+    x, y, z = CLEAN.forces.T
+    np.testing.assert_array_equal(campaign.forces, np.stack([y, -x, z], axis=1))
+    np.testing.assert_array_equal(campaign.sd, CLEAN.sd[:, [1, 0, 2]])
+    assert len(set(SIGNED_PERMUTATIONS)) == 48
+    assert SIGNED_PERMUTATIONS[0] == (1, 2, 3)
+    assert all(drawn("axis_error", seed).spec != "axis_error(x=1, y=2, z=3)" for seed in range(99))
+
+
+@pytest.mark.parametrize(
+    ("spec", "unit", "expected"),
+    [
+        ("unit_error(force=0.101971621297793)", "forces", lambda f: f / STANDARD_GRAVITY),
+        ("unit_error(angle=0.9)", "angles", lambda a: np.deg2rad(np.rad2deg(a) * 180 / 200)),
+        ("unit_error(angle=0.015707963267949)", "angles", lambda a: a * np.pi / 200),
+    ],
+)
+def test_units(spec, unit, expected):
+    campaign = spoiled(spec)
+    np.testing.assert_allclose(getattr(campaign, unit), expected(getattr(CLEAN, unit)), rtol=1e-12)
+    other = {"forces": "angles", "angles": "forces"}[unit]
+    np.testing.assert_array_equal(getattr(campaign, other), getattr(CLEAN, other))
+
+
+def test_unit_errors_that_are_drawn_are_those_that_plausibility_checks_know(tmp_path):
+    specs = {drawn("unit_error", seed).spec for seed in range(40)}
+    assert len(specs) == 3
+    for spec in specs:
+        with pytest.raises(InputError, match="look"):
+            write_campaign(spoiled(spec), tmp_path / "refused")
+        write_campaign(spoiled(spec), tmp_path / "written", plausible=False)
+        with pytest.raises(InputError, match="look"):
+            read_campaign(tmp_path / "written")
+    assert not (tmp_path / "refused").exists()
+    assert {drawn("unit_error", seed, BLIND).spec for seed in range(20)} == {
+        "unit_error(force=0.101971621298)"
+    }
+
+
+def test_other_checks_stay_without_plausibility(tmp_path):
+    broken = replace(CLEAN, forces=np.where(np.arange(3) == 1, np.nan, CLEAN.forces))
+    with pytest.raises(InputError, match="fy: position 1: nan is not finite"):
+        write_campaign(broken, tmp_path, plausible=False)
+
+
+def test_47_axis_errors_that_the_norm_of_gravity_does_not_see():
+    """An axis error only renames parameters there; the residuals are the same."""
+    nine, gravity = get_model("bias-scale-nonorthogonality"), get_approach("gravity")
+    usual = fit_campaign(BLIND, nine, gravity).adjustment.omega[0]
+    for x, y, z in SIGNED_PERMUTATIONS[1:]:
+        spec = f"axis_error(x={x}, y={y}, z={z})"
+        found = fit_campaign(spoiled(spec, campaign=BLIND), nine, gravity).adjustment.omega[0]
+        assert found == pytest.approx(usual, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("spec", "expected"),
+    [
+        ("axis_eror", "unknown gross error 'axis_eror'; did you mean 'axis_error'?"),
+        ("axis_error(x=1, y=1, z=3)", "must be 1, 2, 3 in some order, each with a sign"),
+        ("axis_error(x=2)", "must be 1, 2, 3 in some order"),
+        ("outlier_position(position=25)", "position=25 is no position of simulated; they are 1 to"),
+        ("row_order(first=2)", "give first and second, or neither"),
+        ("unit_error(force=0)", "force=0 must be a number above 0"),
+        ("unit_error(angle=nan)", "angle=nan must be a number above 0"),
+    ],
+)
+def test_what_is_wrong(spec, expected):
+    with pytest.raises(InputError) as error:
+        spoiled(spec)
+    assert expected in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_no_angles_no_unit_of_angles():
+    with pytest.raises(InputError, match="simulated has no angles"):
+        spoiled("unit_error(angle=0.9)", campaign=BLIND)
+    level = replace(CLEAN, forces=np.tile(CLEAN.forces[0], (24, 1)))
+    with pytest.raises(InputError, match="all positions are in the same attitude"):
+        spoiled("row_order", campaign=level)
