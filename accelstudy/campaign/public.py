@@ -99,7 +99,8 @@ def public_file(name: str, folder: str | Path) -> Path:
     InputError
         If the file cannot be downloaded, or is not the one that the registry knows.
     """
-    return fetch(_known(name), Path(folder), Path(folder) / name)
+    folder = Path(folder).expanduser()  # no shell has seen what stands in a configuration
+    return fetch(_known(name), folder, folder / name)
 
 
 def _known(name: str) -> PublicData:
