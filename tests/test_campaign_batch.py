@@ -392,13 +392,17 @@ def test_lint(tmp_path):
 # --- without Snakemake ---------------------------------------------------------------------------
 
 
-def test_a_gravity_of_its_own(tmp_path):
+@pytest.mark.parametrize(("gravity", "error"), [(9.80, None), (98.0, "does not fit the forces")])
+def test_a_gravity_of_its_own(tmp_path, gravity, error):
     write_campaign(simulated_campaign(TRUTH), tmp_path / "a")
-    content = {"gravity": {"value_mps2": 9.80, "sigma_mps2": 0.0}, "campaign": str(tmp_path / "a")}
+    content = {"gravity": {"value_mps2": gravity}, "campaign": str(tmp_path / "a")}
     (task,) = parse_batch({"batch": "b", "campaigns": [content]}).tasks()
-    assert run_task(task, tmp_path / "out") is None
-    result = json.loads((tmp_path / "out" / "calibration.json").read_text(encoding="utf-8"))
-    assert result["gravity_mps2"] == 9.80
+    found = run_task(task, tmp_path / "out")
+    if error is not None:
+        assert error in found
+    else:
+        path = tmp_path / "out" / "calibration.json"
+        assert json.loads(path.read_text(encoding="utf-8"))["gravity_mps2"] == gravity
 
 
 def test_all_failed(tmp_path):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -57,12 +56,8 @@ def run_task(task: Task, folder: str | Path, record: str | Path | None = None) -
 
 def _measured(task: Task, folder: Path, record: str | Path | None) -> Campaign:
     if task.settings is None:
-        campaign = read_campaign(task.source)
-        if task.gravity is None:
-            return campaign
-        return replace(
-            campaign, gravity=task.gravity.value_mps2, sigma_gravity=task.gravity.sigma_mps2
-        )
+        gravity = task.gravity
+        return read_campaign(task.source, {"gravity": gravity.model_dump()} if gravity else None)
     path = task.source if record is None else _recorded(record)
     return import_to(folder, path, task.settings)[0]
 

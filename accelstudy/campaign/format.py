@@ -28,7 +28,7 @@ from accelstudy.campaign.header import COLUMNS, COUNTING, HEADER, KNOWN, TABLES,
 from accelstudy.effects import Hold
 from accelstudy.errors import InputError
 from accelstudy.study.config.errors import first_error
-from accelstudy.study.config.layers import read_layer
+from accelstudy.study.config.layers import overlay, read_layer
 from accelstudy.study.tables import whole_file
 from accelstudy.units import MGON
 
@@ -103,8 +103,10 @@ class Campaign:
         )
 
 
-def read_campaign(folder: str | Path) -> Campaign:
+def read_campaign(folder: str | Path, given: Mapping[str, Any] | None = None) -> Campaign:
     """Read a campaign folder: `campaign.yaml` and `positions.csv` or `positions.parquet`.
+
+    What is `given` overlays the header key by key.
 
     With ``unit: g`` forces are multiples of standard gravity, 9.80665 m/s², whatever `gravity`
     says: the unit is the same everywhere, `gravity` is what holds at the place. For data scaled so
@@ -126,7 +128,8 @@ def read_campaign(folder: str | Path) -> Campaign:
             f"{folder}: no such folder; a campaign is a folder with {HEADER} and "
             f"{' or '.join(TABLES)}"
         )
-    header = _parse_header(read_layer(folder / HEADER), folder / HEADER)
+    content = overlay(read_layer(folder / HEADER), given or {})
+    header = _parse_header(content, folder / HEADER)
     found = [folder / name for name in TABLES if (folder / name).exists()]
     if len(found) != 1:
         wrong = "two tables of positions" if found else "no table of positions"
