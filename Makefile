@@ -1,5 +1,6 @@
 PYTHON ?= python3
 CORES ?= 2
+CAMPAIGNS ?= config/campaigns.yaml
 
 SHELL := bash
 ENV := .venv
@@ -16,11 +17,12 @@ export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: help env test smoke reproduce report lint lock clean
+.PHONY: help env test smoke reproduce report campaigns lint lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "%-12s%s\n", $$1, $$2 }' Makefile
-	@echo 'PYTHON=python3.12 chooses the interpreter of a new environment, CORES=8 the cores used.'
+	@echo 'PYTHON=python3.12 chooses the interpreter of a new environment, CORES=8 the cores used,'
+	@echo 'CAMPAIGNS=my.yaml the batch of `make campaigns`.'
 
 env: $(READY) ## make the environment, from locked versions, in .venv
 
@@ -36,12 +38,16 @@ reproduce: $(READY) ## reproduce the paper
 report: reproduce ## make results/paper/report.zip, to be opened in a browser
 	snakemake --cores $(CORES) --report results/paper/report.zip
 
+campaigns: $(READY) ## calibrate the campaigns of a batch, by default public ones
+	snakemake --cores $(CORES) --snakefile workflow/campaigns.smk --configfile $(CAMPAIGNS)
+
 lint: $(READY) ## check style, types and the workflow
 	ruff check
 	ruff format --check
 	mypy
 	snakefmt --check Snakefile workflow
 	snakemake --lint
+	snakemake --lint --snakefile workflow/campaigns.smk --configfile config/campaigns.yaml
 
 lock: $(READY) ## lock the newest versions that pyproject.toml allows
 	uv lock --upgrade --default-index https://pypi.org/simple

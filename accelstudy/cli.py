@@ -14,7 +14,7 @@ import pandas as pd
 
 from accelstudy import __version__
 from accelstudy.campaign.commands import COMMANDS
-from accelstudy.campaign.importing_cli import import_command
+from accelstudy.campaign.importing_cli import import_command, public_command
 from accelstudy.campaign.simulating_cli import simulate_campaign_command
 from accelstudy.errors import InputError
 
@@ -164,7 +164,7 @@ def claims(results: Path) -> None:
     click.echo(claims_markdown(read_table(results / "claims.parquet")), nl=False)
 
 
-for command in (import_command, simulate_campaign_command, *COMMANDS):
+for command in (import_command, public_command, simulate_campaign_command, *COMMANDS):
     main.add_command(command)
 
 if __name__ == "__main__":

@@ -7,8 +7,22 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
-from accelstudy.campaign.public import PublicData, fetch, public_data, public_file
+from accelstudy.campaign import public
+from accelstudy.campaign.format import read_campaign
+from accelstudy.campaign.importing import import_file
+from accelstudy.campaign.public import (
+    PublicData,
+    fetch,
+    import_settings,
+    next_attempt,
+    public_data,
+    public_file,
+    read_record,
+    record_public,
+)
+from accelstudy.cli import main
 from accelstudy.errors import InputError, UnknownNameError
 
 DATA = Path(os.environ.get("ACCELSTUDY_SHARED", Path(__file__).parents[2] / "shared")) / "data"
@@ -74,17 +88,68 @@ def test_the_registry_says_how_a_file_is_read(name):
     assert known.licence in ("MIT", "BSD-2-Clause")
     settings = known.settings
     if settings is not None:
-        assert {"fx", "fy", "fz"} <= {*settings.columns}
-        assert (settings.nominal is not None) == (settings.unit == "counts")
-        assert (settings.variable is not None) == (settings.format == "matlab")
+        assert {*settings.columns} == {"fx", "fy", "fz"}
+        assert (settings.scale is not None) == (settings.unit == "counts")
+        assert settings.means or settings.rate_hz is not None or settings.time is not None
 
 
-@pytest.mark.skipif(not DATA.is_dir(), reason=f"needs the public data in {DATA}")
+needs_data = pytest.mark.skipif(not DATA.is_dir(), reason=f"needs the public data in {DATA}")
+
+
+@needs_data
 @pytest.mark.parametrize("name", public_data())
 def test_the_registry_knows_the_files(name):
     path = public_file(name, DATA)
     assert path.is_relative_to(DATA)
     assert path.name == public_data()[name].file_name
+
+
+# As far as an independent detector of holds, and the authors, tell their number.
+N_POSITIONS = {
+    **{"xsens-mti": 38, "mpu9150-0": 23, "mpu9150-1": 23, "mpu9150-2": 23, "mpu6050": 10},
+    **{"innalabs-24": 24, "innalabs-31": 31, "innalabs-49": 49, "ferraris-annotated": 6},
+    **{"mpu6050-static": 1},
+}
+
+
+@needs_data
+@pytest.mark.parametrize("name", [name for name in public_data() if public_data()[name].settings])
+def test_the_registry_imports_the_files(name):
+    campaign, _ = import_file(public_file(name, DATA), import_settings(name))
+    assert campaign.name == name
+    assert campaign.n_positions == N_POSITIONS.get(name, campaign.n_positions)
+
+
+@needs_data
+def test_command(tmp_path):
+    arguments = ["public", "mpu6050", "--out", tmp_path / "out", "--folder", DATA]
+    result = CliRunner().invoke(main, list(map(str, arguments)))
+    assert result.exit_code == 0, result.output
+    assert "holds: 10" in result.output
+    assert read_campaign(tmp_path / "out").sensor == "MPU-6050"
+    assert (tmp_path / "out" / "segmentation.png").exists()
+
+
+def test_command_lists():
+    result = CliRunner().invoke(main, ["public"])
+    assert result.exit_code == 0
+    for name, entry in public_data().items():
+        assert f"{name}: {entry.description}\n    {entry.licence}, {entry.url}\n" in result.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["xsens"], "unknown public data 'xsens'; did you mean 'xsens-mti'?"),
+        (["ferraris-sections", "--out", "out"], "'ferraris-sections' hold no forces"),
+        (["xsens-mti"], "--out: give the folder of the campaign"),
+    ],
+)
+def test_command_refuses(arguments, message):
+    result = CliRunner().invoke(main, ["public", *arguments])
+    assert result.exit_code == 2
+    assert result.output.startswith("error: ")
+    assert message in result.output
 
 
 def test_an_unknown_name(tmp_path):
@@ -128,8 +193,10 @@ def test_a_broken_connection_keeps_what_has_come(tmp_path, server):
     with pytest.raises(InputError, match="try again"):
         fetch(broken, tmp_path, tmp_path)
     assert left(tmp_path) == ["file.log.part"]
+    # It has gone on, each time with half of what was missing, until a try brought nothing.
+    assert server.ranges[:2] == [None, f"bytes={len(CONTENT) // 2}-"]
+    assert server.ranges[-1] == f"bytes={len(CONTENT) - 1}-"
     assert fetch(data(f"{server.url}/ranges/file.log"), tmp_path, tmp_path).exists()
-    assert server.ranges == [None, f"bytes={len(CONTENT) // 2}-"]
 
 
 @pytest.mark.parametrize("part", [b"", b"wrong", b"too long" * len(CONTENT)])
@@ -148,3 +215,27 @@ def test_a_source_that_does_not_answer(tmp_path, server, where):
     url = f"{server.url}{where}/file.log" if where else (tmp_path / "none" / "file.log").as_uri()
     with pytest.raises(InputError, match=r"cannot be downloaded.*put the file file\.log below"):
         fetch(data(url), tmp_path, tmp_path)
+
+
+def test_a_record_asks_for_another_attempt_until_the_file_is_there(tmp_path, monkeypatch):
+    source = tmp_path / "source" / "file.log"
+    monkeypatch.setattr(public, "public_data", lambda: {"file": data(source.as_uri())})
+    path = tmp_path / "file.json"
+
+    def record():
+        record_public("file", tmp_path / "folder", path, next_attempt(path))
+        return read_record(path)
+
+    assert next_attempt(path) == 1
+    first = record()
+    assert first["file"] is None
+    assert "cannot be downloaded: No such file or directory; try again" in first["error"]
+    assert next_attempt(path) == 2
+    source.parent.mkdir()
+    source.write_bytes(CONTENT)
+    second = record()
+    assert second["error"] is None
+    assert Path(second["file"]).read_bytes() == CONTENT
+    assert second["attempt"] == next_attempt(path) == 2
+    Path(second["file"]).unlink()
+    assert next_attempt(path) == 3

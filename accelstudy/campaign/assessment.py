@@ -23,6 +23,12 @@ Array = NDArray[np.float64]
 MAX_TILT_GON = 50.0
 """Range of tilts for which the accuracy of leveling is stated."""
 
+BLIND = (
+    "Gravity alone cannot see a rotation of the sensor in its housing: tilts are relative to the "
+    "sensor's own axes."
+)
+"""What holds for every calibration without a robot."""
+
 
 @dataclass(frozen=True)
 class Assessment:
@@ -110,10 +116,7 @@ def verdict(assessment: Assessment) -> str:
             f"uncertainty of {limit}."
         )
     if not fit.approach.uses_angles:
-        words.append(
-            "Gravity alone cannot see a rotation of the sensor in its housing: tilts are relative "
-            "to the sensor's own axes."
-        )
+        words.append(BLIND)
     return " ".join(words)
 
 

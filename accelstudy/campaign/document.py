@@ -32,6 +32,8 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
         "n_positions": campaign.n_positions,
         "sigma_source": "a priori" if fit.trusts_sigma else "a posteriori",
         "sigma_position_mps2": number(fit.sigma_position),
+        "sigma_position_priori_mps2": number(campaign.sigma_force),
+        "sigma_position_posteriori_mps2": number(fit.sigma_position_posteriori),
         "parameters": [
             {
                 "name": parameter.name,

@@ -79,6 +79,12 @@ class CampaignFit:
         return campaign_noise(self.campaign).sigma_force * float(np.sqrt(self.variance_factor))
 
     @property
+    def sigma_position_posteriori(self) -> float:
+        """Noise of a position mean from the residuals, m/s²; NaN without redundancy."""
+        factor = float(self.adjustment.variance_posteriori[0])
+        return campaign_noise(self.campaign).sigma_force * float(np.sqrt(factor))
+
+    @property
     def covariance(self) -> Array:
         """Covariance matrix of the model's parameters to quote, (u, u), SI: likewise."""
         u = self.model.n_parameters

@@ -28,7 +28,7 @@ from accelstudy.campaign.header import COLUMNS, COUNTING, HEADER, KNOWN, TABLES,
 from accelstudy.effects import Hold
 from accelstudy.errors import InputError
 from accelstudy.study.config.errors import first_error
-from accelstudy.study.config.layers import read_layer
+from accelstudy.study.config.layers import overlay, read_layer
 from accelstudy.study.tables import whole_file
 from accelstudy.units import MGON
 
@@ -100,7 +100,9 @@ class Campaign:
         return hold.with_steps(self.forces)
 
 
-def read_campaign(folder: str | Path, plausible: bool = True) -> Campaign:
+def read_campaign(
+    folder: str | Path, given: Mapping[str, Any] | None = None, *, plausible: bool = True
+) -> Campaign:
     """Read a campaign folder: `campaign.yaml` and `positions.csv` or `positions.parquet`.
 
     With ``unit: g`` forces are multiples of standard gravity, 9.80665 m/s², whatever `gravity`
@@ -115,6 +117,8 @@ def read_campaign(folder: str | Path, plausible: bool = True) -> Campaign:
     Parameters
     ----------
     folder : path
+    given : mapping, optional
+        Overlays the header key by key.
     plausible : bool
         Whether to refuse forces that are not as large as gravity, and angles that fit them better
         in another unit. Who looks for such errors reads without.
@@ -130,7 +134,8 @@ def read_campaign(folder: str | Path, plausible: bool = True) -> Campaign:
             f"{folder}: no such folder; a campaign is a folder with {HEADER} and "
             f"{' or '.join(TABLES)}"
         )
-    header = _parse_header(read_layer(folder / HEADER), folder / HEADER)
+    content = overlay(read_layer(folder / HEADER), given or {})
+    header = _parse_header(content, folder / HEADER)
     found = [folder / name for name in TABLES if (folder / name).exists()]
     if len(found) != 1:
         wrong = "two tables of positions" if found else "no table of positions"

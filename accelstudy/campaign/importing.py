@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, StrictInt, StrictStr, ValidationError
 
 from accelstudy.campaign.allan import MeanAccuracy, accuracy_of_mean
-from accelstudy.campaign.format import Campaign
+from accelstudy.campaign.format import Campaign, write_campaign
 from accelstudy.campaign.holds import Holds, find_holds
 from accelstudy.campaign.log_files import open_source
 from accelstudy.campaign.logs import (
@@ -53,6 +53,7 @@ class GravitySettings(_Block):
 class ImportSettings(_Block):
     """How a log is to be read; the keys of a settings file."""
 
+    means: bool = Field(False, description="the file is a table of means already")
     name: str | None = Field(None, description="name of the campaign; that of the file if absent")
     sensor: str | None = Field(None, description="what was calibrated")
     columns: dict[str, Place] = Field(
@@ -203,7 +204,7 @@ def import_log(
         angle = across / settings.gravity.value_mps2 / MGON
         warnings.append(
             f"across gravity the means vary by {_mm(across)}, more than along it: the sensor turns "
-            f"by some {angle:.2g} mgon within holds"
+            f"by some {angle:.0f} mgon within holds"
         )
     if accuracy.slope is not None:
         warnings.append(
@@ -291,6 +292,31 @@ def import_means(
         warnings=warnings,
     )
     return campaign, ImportReport(len(forces), None, sigma, None, warnings)
+
+
+def import_file(
+    path: str | Path, settings: ImportSettings | None = None
+) -> tuple[Campaign, ImportReport]:
+    """Import a log or, if the settings say so, a table of means."""
+    settings = settings or ImportSettings()
+    return (import_means if settings.means else import_log)(path, settings)
+
+
+def import_to(
+    folder: str | Path, path: str | Path, settings: ImportSettings, figure: bool = True
+) -> tuple[Campaign, ImportReport]:
+    """Import a file and write the campaign to a folder.
+
+    With `figure`, segmentation.svg and .png there show the log with its holds, if it is a log.
+    """
+    campaign, report = import_file(path, settings)
+    write_campaign(campaign, folder)
+    if figure and report.holds is not None:
+        from accelstudy.campaign.segmentation_figure import render_segmentation
+
+        paths = (Path(folder) / f"segmentation.{kind}" for kind in ("svg", "png"))
+        render_segmentation(log_of(path, settings), report.holds, *paths)
+    return campaign, report
 
 
 def _campaign(

@@ -1,13 +1,16 @@
-"""The command that makes a campaign of a raw log."""
+"""The commands that make a campaign of a raw log, or of public data."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from accelstudy.errors import InputError
+
+if TYPE_CHECKING:
+    from accelstudy.campaign.importing import ImportSettings
 
 _PATH = click.Path(path_type=Path)
 
@@ -40,24 +43,50 @@ def import_command(
     LOG is text (CSV or columns), MATLAB or Parquet. Without --threshold the noise of the log
     itself says what is at rest; segmentation.png in the folder shows the outcome.
     """
-    from accelstudy.campaign.format import write_campaign
-    from accelstudy.campaign.importing import import_log, import_means, log_of, read_settings
+    from accelstudy.campaign.importing import read_settings
+
+    _import(log, read_settings(settings_path, _given(means=means or None, **options)), out, figure)
+
+
+@click.command("public")
+@click.argument("name", required=False)
+@click.option("--out", type=_PATH, help="Folder of the campaign.")
+@click.option(
+    "--folder",
+    type=_PATH,
+    default="resources/public",
+    show_default=True,
+    help="Where the file is, in any subfolder, or is downloaded to.",
+)
+def public_command(name: str | None, out: Path | None, folder: Path) -> None:
+    """Make a campaign of the public data NAME; without NAME, list what there is.
+
+    A download is checked by its sha256, and goes on where an earlier one broke off.
+    """
+    from accelstudy.campaign.public import import_settings, public_data, public_file
+
+    if name is None:
+        for known, entry in public_data().items():
+            click.echo(f"{known}: {entry.description}\n    {entry.licence}, {entry.url}")
+        return
+    settings = import_settings(name)
+    if out is None:
+        raise InputError("--out: give the folder of the campaign")
+    _import(public_file(name, folder), settings, out)
+
+
+def _import(log: Path, settings: ImportSettings, out: Path, figure: bool = True) -> None:
+    from accelstudy.campaign.importing import import_to
     from accelstudy.study.provenance import check_writable
 
-    settings = read_settings(settings_path, _given(**options))
     check_writable(out)
-    campaign, report = (import_means if means else import_log)(log, settings)
-    write_campaign(campaign, out)
+    _, report = import_to(out, log, settings, figure)
     for line in report.lines():
         click.echo(line)
     for warning in report.warnings:
         click.echo(f"warning: {warning}", err=True)
     if figure and report.holds is not None:
-        from accelstudy.campaign.segmentation_figure import render_segmentation
-
-        paths = out / "segmentation.svg", out / "segmentation.png"
-        render_segmentation(log_of(log, settings), report.holds, *paths)
-        click.echo(f"figure: {paths[1]}")
+        click.echo(f"figure: {out / 'segmentation.png'}")
     click.echo(f"campaign: {out}")
 
 
@@ -69,7 +98,7 @@ def _given(
     gravity: float | None,
     threshold: float | None,
     time: str | None,
-    **others: str | None,
+    **others: str | bool | None,
 ) -> dict[str, Any]:
     """Options that were given, as the settings name them."""
     content: dict[str, Any] = {

@@ -3,44 +3,29 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import shutil
 from collections.abc import Mapping
 from functools import cache
 from http.client import HTTPException
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any
 from urllib.error import HTTPError
 from urllib.parse import unquote, urlsplit
 from urllib.request import Request, urlopen
 
 from pydantic import Field, ValidationError
 
-from accelstudy.campaign.header import Nominal
+from accelstudy.campaign.importing import ImportSettings
 from accelstudy.errors import InputError, UnknownNameError
 from accelstudy.study.config.errors import first_error
 from accelstudy.study.config.layers import read_layer
 from accelstudy.study.config.schema import Block
-from accelstudy.study.config.types import Positive
+from accelstudy.study.tables import whole_file
 
 REGISTRY = Path(__file__).with_name("public_data.yaml")
 TIMEOUT = 30.0
 """s, that a server may be silent."""
-
-
-class ImportSettings(Block):
-    """How a file is read; the head of `public_data.yaml` explains the keys."""
-
-    content: Literal["samples", "means"]
-    format: Literal["text", "matlab"]
-    columns: list[str | None]
-    delimiter: str | None = None
-    skip_rows: Annotated[int, Field(ge=0)] = 0
-    variable: str | None = None
-    transposed: bool = False
-    unit: Literal["m/s^2", "g", "counts"]
-    nominal: Nominal | None = None
-    rate_hz: Positive | None = None
-    gravity_mps2: Positive
 
 
 class PublicData(Block):
@@ -80,6 +65,22 @@ def public_data() -> Mapping[str, PublicData]:
         raise InputError(f"{REGISTRY}: {first_error(error, _Registry)}") from None
 
 
+def import_settings(name: str) -> ImportSettings:
+    """How a public file is imported; the campaign is named as in the registry.
+
+    Raises
+    ------
+    UnknownNameError
+        If the registry has no such name.
+    InputError
+        If the file holds no forces.
+    """
+    settings = _known(name).settings
+    if settings is None:
+        raise InputError(f"the public data {name!r} hold no forces")
+    return settings.model_copy(update={"name": name})
+
+
 def public_file(name: str, folder: str | Path) -> Path:
     """Path of a public file, which is downloaded unless it is there already.
 
@@ -98,16 +99,54 @@ def public_file(name: str, folder: str | Path) -> Path:
     InputError
         If the file cannot be downloaded, or is not the one that the registry knows.
     """
+    folder = Path(folder).expanduser()  # no shell has seen what stands in a configuration
+    return fetch(_known(name), folder, folder / name)
+
+
+def _known(name: str) -> PublicData:
     known = public_data()
     if name not in known:
         raise UnknownNameError("public data", name, known)
-    return fetch(known[name], Path(folder), Path(folder) / name)
+    return known[name]
+
+
+def record_public(name: str, folder: str | Path, path: str | Path, attempt: int) -> None:
+    """Write to a JSON file where a public file is, or why it could not be had.
+
+    `attempt` is kept with it; see `next_attempt`.
+    """
+    record: dict[str, Any] = {"name": name, "file": None, "error": None, "attempt": attempt}
+    try:
+        record["file"] = str(public_file(name, folder))
+    except InputError as error:
+        record["error"] = str(error)
+    with whole_file(path) as temporary:
+        temporary.write_text(json.dumps(record, indent=2, ensure_ascii=False), encoding="utf-8")
+
+
+def read_record(path: str | Path) -> dict[str, Any]:
+    """Read what `record_public` wrote."""
+    return json.loads(Path(path).read_text(encoding="utf-8"))
+
+
+def next_attempt(path: str | Path) -> int:
+    """Number of the attempt to get a file that its record calls for, from 1.
+
+    It is that of the record as long as its file is there. As a parameter of a rule it makes
+    Snakemake try again what failed, and nothing else.
+    """
+    if not Path(path).exists():
+        return 1
+    record = read_record(path)
+    there = record["file"] is not None and Path(record["file"]).is_file()
+    return record["attempt"] + (0 if there else 1)
 
 
 def fetch(data: PublicData, searched: Path, target: Path) -> Path:
     """Find a file below the folder `searched`, or download it to the folder `target`.
 
-    What an interrupted download leaves, a `.part` file, is continued by the next one.
+    A download that breaks off goes on as long as each try brings something. What is left of it in
+    the end, a `.part` file, is continued by the next call.
 
     Raises
     ------
@@ -121,7 +160,7 @@ def fetch(data: PublicData, searched: Path, target: Path) -> Path:
         target.mkdir(parents=True, exist_ok=True)
         path = target / data.file_name
         part = path.with_name(f"{path.name}.part")
-        _download(data.url, part)
+        _download_with_retries(data.url, part)
         found = _sha256(part)
         if found != data.sha256:
             part.unlink()  # it cannot be continued to something right
@@ -131,16 +170,26 @@ def fetch(data: PublicData, searched: Path, target: Path) -> Path:
             )
         return part.replace(path)
     except (OSError, HTTPException) as error:
-        reason = getattr(error, "reason", None) or getattr(error, "strerror", None) or error
+        reason = getattr(error, "reason", None) or error
+        reason = getattr(reason, "strerror", None) or reason
         raise InputError(
             f"{data.url}: cannot be downloaded: {' '.join(str(reason).split())}; try again, or put "
             f"the file {data.file_name} below {searched}"
         ) from None
 
 
-def _download(url: str, part: Path) -> None:
-    """Download to `part`, after what it holds already."""
-    have = part.stat().st_size if part.exists() else 0
+def _download_with_retries(url: str, part: Path) -> None:
+    while True:
+        have = _size(part)
+        try:
+            return _download(url, part, have)
+        except (OSError, HTTPException):
+            if _size(part) <= have:
+                raise
+
+
+def _download(url: str, part: Path, have: int) -> None:
+    """Download to `part`, after the `have` bytes that it holds already."""
     request = Request(url, headers={"Range": f"bytes={have}-"} if have else {})
     try:
         with urlopen(request, timeout=TIMEOUT) as response:
@@ -158,6 +207,10 @@ def _download(url: str, part: Path) -> None:
         # Nothing comes after what is there: it is whole, or wrong, which its checksum will tell.
         if not (have and error.code == 416):
             raise
+
+
+def _size(path: Path) -> int:
+    return path.stat().st_size if path.exists() else 0
 
 
 def _sha256(path: Path) -> str:

@@ -18,6 +18,14 @@ def job(snakemake: Any) -> Iterator[tuple[StudyConfig, Mapping[str, Any]]]:
 
     Gives the study and the provenance of what the job writes (`config_hash` and `seed`).
     """
+    with logged(snakemake):
+        study = parse_study(snakemake.config)
+        yield study, {"config_hash": study.fingerprint, "seed": study.seed}
+
+
+@contextmanager
+def logged(snakemake: Any) -> Iterator[None]:
+    """Run the body of a script of any workflow."""
     logging.basicConfig(
         filename=snakemake.log[0],
         filemode="w",
@@ -25,8 +33,7 @@ def job(snakemake: Any) -> Iterator[tuple[StudyConfig, Mapping[str, Any]]]:
         format="%(asctime)s %(levelname)s %(message)s",
     )
     try:
-        study = parse_study(snakemake.config)
-        yield study, {"config_hash": study.fingerprint, "seed": study.seed}
+        yield
     except InputError as error:
         logging.error("%s", error)
         print(f"error: {error}", file=sys.stderr)

@@ -15,12 +15,18 @@ _MEASURED = ("campaign/", "adjustment/quality/")
 _FRONT = ("cli.py", "figures/", "study/claims", "study/report.py", "study/job.py", *_MEASURED)
 _TABLES = ("study/summary.py", "leveling_error.py", "closed_forms.py")
 _CONFIG = ("study/config/",)
+_STUDY = (
+    "study/claims",
+    *(f"study/{name}.py" for name in ("analysis", "cells", "simulate", "summary")),
+)
 _UNUSED = {
     "simulate": (*_FRONT, *_TABLES, "sensitivity.py", *_CONFIG),
     "summarise": (*_FRONT, "sensitivity.py", *_CONFIG),
     "sensitivity": (*_FRONT, *_TABLES),
     "claims": ("cli.py", "figures/", *_MEASURED),
     "figures": ("cli.py", "study/claims", *_MEASURED),
+    "campaign": ("cli.py", "campaign/overview", *_STUDY),
+    "overview": ("cli.py", "figures/", "adjustment/", *_STUDY),
 }
 
 

@@ -7,6 +7,7 @@ from difflib import get_close_matches
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
 
 
 def first_error(error: ValidationError, root: type[BaseModel]) -> str:
@@ -37,10 +38,14 @@ def _keys_beside(location: Sequence[str | int], root: type[BaseModel]) -> list[s
     """Keys that are known where an unknown one stands."""
     block = root
     for part in location[:-1]:
-        field = block.model_fields.get(str(part))
+        field = _keys(block).get(str(part))
         if field is not None:
             block = next(_blocks(field.annotation), block)
-    return list(block.model_fields)
+    return list(_keys(block))
+
+
+def _keys(block: type[BaseModel]) -> dict[str, FieldInfo]:
+    return {field.alias or name: field for name, field in block.model_fields.items()}
 
 
 def _blocks(annotation: Any) -> Iterator[type[BaseModel]]:

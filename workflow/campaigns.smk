@@ -1,0 +1,110 @@
+# Many campaigns, each calibrated by itself, and one overview of them:
+# snakemake --cores 2 --snakefile workflow/campaigns.smk --configfile config/campaigns.yaml
+from snakemake.exceptions import WorkflowError
+from snakemake.utils import min_version
+
+from accelstudy.campaign.batch_config import parse_batch
+from accelstudy.campaign.public import next_attempt
+from accelstudy.errors import InputError
+from accelstudy.study.config import read_layer
+from accelstudy.study.provenance import check_writable, code_hash
+
+min_version("9.10")
+
+
+# The environment of the Makefile is what counts; this is for executors that want a container.
+container: "docker://python:3.13-slim"
+
+
+try:
+    if not config:
+        raise InputError("no campaigns; name them with --configfile config/campaigns.yaml")
+    for path in workflow.configfiles:
+        read_layer(path)  # more strictly than Snakemake does
+    BATCH = parse_batch(config, ", ".join(map(str, workflow.configfiles)) or "config")
+    RESULTS = f"results/{BATCH.batch}"
+    check_writable(RESULTS)
+except InputError as error:
+    raise WorkflowError(str(error)) from None
+
+TASKS = {task.name: task for task in BATCH.tasks()}
+
+
+wildcard_constraints:
+    campaign=r"[^/]+",
+    public=r"[^/]+",
+
+
+def measured_files(wildcards):
+    """What a campaign is made of, as far as it is there; its absence is for the job to report."""
+    task = TASKS[wildcards.campaign]
+    if task.kind == "public":
+        return {"record": f"{RESULTS}/public/{task.source}.json"}
+    return {"files": task.files()}
+
+
+rule campaigns:
+    default_target: True
+    input:
+        f"{RESULTS}/campaigns.parquet",
+        f"{RESULTS}/parameters.parquet",
+        f"{RESULTS}/overview.html",
+
+
+# The file itself is no output, as Snakemake would delete it, whole or in part, before a second try.
+rule public:
+    output:
+        f"{RESULTS}/public/{{public}}.json",
+    log:
+        f"{RESULTS}/logs/public/{{public}}.log",
+    localrule: True
+    params:
+        folder=BATCH.public_folder,
+        attempt=lambda wildcards: next_attempt(f"{RESULTS}/public/{wildcards.public}.json"),
+    message:
+        "Get the public data {wildcards.public}"
+    script:
+        "scripts/public.py"
+
+
+rule calibrate:
+    input:
+        unpack(measured_files),
+    output:
+        directory(f"{RESULTS}/campaigns/{{campaign}}"),
+    log:
+        f"{RESULTS}/logs/campaigns/{{campaign}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/campaigns/{{campaign}}.tsv"
+    threads: 1
+    resources:
+        mem_mb=2000,
+    params:
+        task=lambda wildcards: TASKS[wildcards.campaign].model_dump(mode="json"),
+        code=code_hash("campaign"),
+    message:
+        "Calibrate {wildcards.campaign}"
+    script:
+        "scripts/calibrate.py"
+
+
+rule overview:
+    input:
+        expand(f"{RESULTS}/campaigns/{{campaign}}", campaign=TASKS),
+    output:
+        campaigns=f"{RESULTS}/campaigns.parquet",
+        parameters=f"{RESULTS}/parameters.parquet",
+        page=f"{RESULTS}/overview.html",
+    log:
+        f"{RESULTS}/logs/overview.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/overview.tsv"
+    threads: 1
+    resources:
+        mem_mb=2000,
+    params:
+        code=code_hash("overview"),
+    message:
+        "Summarise the campaigns"
+    script:
+        "scripts/overview.py"

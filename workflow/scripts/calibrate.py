@@ -1,0 +1,13 @@
+import logging
+
+from accelstudy.campaign.batch import run_task
+from accelstudy.campaign.batch_config import Task
+from accelstudy.study.job import logged
+
+with logged(snakemake):
+    error = run_task(
+        Task.model_validate(snakemake.params.task),
+        snakemake.output[0],
+        snakemake.input.get("record"),
+    )
+    logging.info("%s", error or "calibrated")

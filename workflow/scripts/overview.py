@@ -1,0 +1,18 @@
+from accelstudy.campaign.batch_config import parse_batch
+from accelstudy.campaign.overview import summarise_batch
+from accelstudy.study.job import logged
+
+with logged(snakemake):
+    batch = parse_batch(snakemake.config)
+    table = summarise_batch(
+        batch.batch,
+        snakemake.input,
+        **dict(snakemake.output.items()),
+        provenance={"config_hash": batch.fingerprint, "seed": None},
+    )
+    failed = table[table["status"] == "failed"]
+    for row in failed.itertuples():
+        print(f"not calibrated: {row.campaign}: {row.error}")
+    print(
+        f"{len(table) - len(failed)} of {len(table)} campaigns calibrated: {snakemake.output.page}"
+    )

@@ -1,0 +1,10 @@
+from accelstudy.campaign.public import record_public
+from accelstudy.study.job import logged
+
+with logged(snakemake):
+    record_public(
+        snakemake.wildcards.public,
+        snakemake.params.folder,
+        snakemake.output[0],
+        snakemake.params.attempt,
+    )
