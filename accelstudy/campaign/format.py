@@ -26,7 +26,7 @@ from accelstudy.campaign.checks import (
 )
 from accelstudy.campaign.header import COLUMNS, COUNTING, HEADER, KNOWN, TABLES, Header
 from accelstudy.effects import Hold
-from accelstudy.errors import InputError
+from accelstudy.errors import InputError, one_line
 from accelstudy.study.config.errors import first_error
 from accelstudy.study.config.layers import read_layer
 from accelstudy.study.tables import whole_file
@@ -198,7 +198,7 @@ def _read_csv(path: Path) -> tuple[Columns, list[str]]:
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}") from None
     except (csv.Error, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: not a whole CSV file in UTF-8 ({_one_line(error)})") from None
+        raise InputError(f"{path}: not a whole CSV file in UTF-8 ({one_line(error)})") from None
     if not lines:
         raise InputError(f"{path}: empty; expected a line of column names, position, fx, fy, fz …")
     names = [name.strip() for name in lines[0][1]]
@@ -229,7 +229,7 @@ def _read_parquet(path: Path) -> tuple[Columns, list[str]]:
     except InputError:
         raise
     except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError) as error:
-        raise InputError(f"{path}: not a whole Parquet file ({_one_line(error)})") from None
+        raise InputError(f"{path}: not a whole Parquet file ({one_line(error)})") from None
 
 
 def _ignored(path: Path, name: str) -> str:
@@ -301,7 +301,7 @@ def _numbers(columns: Columns, name: str, labels: Sequence[str], path: Path) -> 
                 raise ValueError
             numbers[i] = float(value)
         except (TypeError, ValueError, OverflowError):
-            shown = _one_line(repr(value), 60)
+            shown = one_line(repr(value), 60)
             raise InputError(f"{where}: {shown} is no number, such as -9.81") from None
         if not np.isfinite(numbers[i]):
             raise InputError(f"{where}: {value} is not finite; leave out a hold that has no mean")
@@ -342,8 +342,3 @@ def _columns_of(campaign: Campaign, header: Header) -> dict[str, list[Any]]:
             values = np.asarray(values, dtype=float) / scale + offset
         columns.update(zip(names, np.reshape(values, (-1, len(names))).T.tolist(), strict=True))
     return columns
-
-
-def _one_line(text: object, length: int = 100) -> str:
-    line = " ".join(str(text).split())
-    return line if len(line) <= length else f"{line[:length]} …"

@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 from scipy.io import loadmat
 
-from accelstudy.errors import InputError, UnknownNameError
+from accelstudy.errors import InputError, UnknownNameError, one_line
 
 Array = NDArray[np.float64]
 
@@ -179,7 +179,7 @@ class MatlabSource:
         except NotImplementedError:
             raise InputError(f"{path}: a MATLAB 7.3 (HDF5) file; save it with -v7") from None
         except Exception as error:  # SciPy's reader fails in many ways on a damaged file
-            raise InputError(f"{path}: not a whole MATLAB file ({_one_line(error)})") from None
+            raise InputError(f"{path}: not a whole MATLAB file ({one_line(error)})") from None
         arrays = {
             name: value
             for name, value in content.items()
@@ -217,7 +217,7 @@ class ParquetSource:
         try:
             schema = pq.read_schema(path)
         except (pa.ArrowException, OSError) as error:
-            raise InputError(f"{path}: not a whole Parquet file ({_one_line(error)})") from None
+            raise InputError(f"{path}: not a whole Parquet file ({one_line(error)})") from None
         self.names = [str(name) for name in schema.names]
         self._types = schema.types
 
@@ -237,9 +237,7 @@ class ParquetSource:
                             [c.cast(pa.float64(), safe=False).to_numpy(False) for c in columns]
                         )
         except (pa.ArrowException, OSError) as error:
-            raise InputError(
-                f"{self.path}: not a whole Parquet file ({_one_line(error)})"
-            ) from None
+            raise InputError(f"{self.path}: not a whole Parquet file ({one_line(error)})") from None
 
     def look_up(self, row: int, place: int) -> tuple[str, str]:
         """Where a value stands, and the value; see `Source`."""
@@ -284,7 +282,3 @@ def _numbers(column: pd.Series) -> Array:
     if pd.api.types.is_bool_dtype(column):
         return np.full(len(column), np.nan)
     return pd.to_numeric(column, errors="coerce").to_numpy(dtype=float, na_value=np.nan)
-
-
-def _one_line(error: Exception) -> str:
-    return (" ".join(str(error).split()) or type(error).__name__)[:120]
