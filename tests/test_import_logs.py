@@ -9,7 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from scipy.io import savemat
+from scipy.io import loadmat, savemat
 
 from accelstudy.campaign.holds import find_holds
 from accelstudy.campaign.logs import open_log
@@ -219,6 +219,40 @@ def test_bad_files(tmp_path):
     (tmp_path / "new.mat").write_bytes(b"\x89HDF\r\n")
     with pytest.raises(InputError, match="save it with -v7"):
         open_log(tmp_path / "new.mat")
+
+
+def test_a_matlab_file_that_does_not_fit(tmp_path, monkeypatch):
+    def full(*arguments, **options):
+        raise MemoryError
+
+    savemat(tmp_path / "log.mat", {"log": TABLE})
+    monkeypatch.setattr("accelstudy.campaign.log_files.loadmat", full)
+    with pytest.raises(InputError, match="too large, as a MATLAB file is held in memory"):
+        open_log(tmp_path / "log.mat", **BY_PLACE)
+
+
+def test_only_the_chosen_array_is_read(tmp_path, monkeypatch):
+    savemat(tmp_path / "log.mat", {"log": TABLE, "other": 1j * FORCES, "name": "x", "none": []})
+    with pytest.raises(InputError, match="which array"):
+        open_log(tmp_path / "log.mat", **BY_PLACE)
+    with pytest.raises(InputError, match="array other has complex numbers"):
+        open_log(tmp_path / "log.mat", variable="other", **BY_PLACE)
+    read = []
+
+    def load(path, variable_names):
+        read.extend(variable_names)
+        return loadmat(path, variable_names=variable_names)
+
+    monkeypatch.setattr("accelstudy.campaign.log_files.loadmat", load)
+    _, forces = everything(open_log(tmp_path / "log.mat", variable="log", **BY_PLACE))
+    np.testing.assert_array_equal(forces, FORCES)
+    assert read == ["log"]
+
+
+def test_a_line_without_end_is_not_read(tmp_path):
+    path = written(tmp_path, "1.5," * 20000)
+    with pytest.raises(InputError, match="no end of a line in 65536 characters"):
+        open_log(path, rate=1)
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
@@ -13,7 +14,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
-from scipy.io import loadmat
+from scipy.io import loadmat, whosmat
 
 from accelstudy.errors import InputError, UnknownNameError, one_line
 
@@ -24,6 +25,7 @@ CHUNK = 65536
 
 _PREVIEW = 65536  # characters of a text from which its layout is told
 _COMMENTS = "#%"
+_IS_NUMBER = re.compile("double|single|u?int[0-9]+")  # classes of MATLAB arrays
 _LAYOUTS = ((",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), (None, "."), (None, ","))
 
 
@@ -71,7 +73,9 @@ class TextSource:
             text = file.read(_PREVIEW)
             more = bool(file.read(1))
         lines = text.split("\n")
-        if more and len(lines) > 1:
+        if more and len(lines) == 1:  # it would be read as a whole
+            raise InputError(f"{path}: no end of a line in {_PREVIEW} characters; is it text?")
+        if more:
             lines.pop()  # it may be cut
         rows = [line for line in lines if _is_row(line)]
         if not rows:
@@ -170,39 +174,42 @@ class TextSource:
 
 
 class MatlabSource:
-    """An array of a MATLAB file, which is read as a whole."""
+    """An array of a MATLAB file, which is read as a whole: the format allows 2 GB at most."""
 
     def __init__(self, path: Path, variable: str | None = None) -> None:
         self.path = path
         try:
-            content = loadmat(path)
+            arrays = {
+                name: shape
+                for name, shape, kind in whosmat(path)
+                if _IS_NUMBER.fullmatch(kind) and len(shape) == 2 and all(shape)
+            }
+            if variable is not None and variable not in arrays:
+                raise UnknownNameError(f"array of {path}", variable, arrays)
+            if variable is None and len(arrays) != 1:
+                raise InputError(f"{path}: which array? There are {', '.join(arrays) or 'none'}")
+            name = next(iter(arrays)) if variable is None else variable
+            array = loadmat(path, variable_names=[name])[name]
+            if np.iscomplexobj(array):
+                raise InputError(f"{path}: array {name} has complex numbers")
+            # Few rows and many columns are a table that lies on its side.
+            self.values = array.T if array.shape[0] < array.shape[1] else array
+        except InputError:
+            raise
         except NotImplementedError:
             raise InputError(f"{path}: a MATLAB 7.3 (HDF5) file; save it with -v7") from None
+        except MemoryError:
+            raise InputError(
+                f"{path}: too large, as a MATLAB file is held in memory; save it as text or Parquet"
+            ) from None
         except Exception as error:  # SciPy's reader fails in many ways on a damaged file
             raise InputError(f"{path}: not a whole MATLAB file ({one_line(error)})") from None
-        arrays = {
-            name: value
-            for name, value in content.items()
-            if not name.startswith("__")
-            and isinstance(value, np.ndarray)
-            and value.dtype.kind in "iuf"
-            and value.ndim == 2
-            and value.size
-        }
-        if variable is not None and variable not in arrays:
-            raise UnknownNameError(f"array of {path}", variable, arrays)
-        if variable is None and len(arrays) != 1:
-            known = ", ".join(arrays) or "none"
-            raise InputError(f"{path}: which array? There are {known}")
-        array = arrays[variable] if variable is not None else next(iter(arrays.values()))
-        # Few rows and many columns are a table that lies on its side.
-        self.values = np.asarray(array.T if array.shape[0] < array.shape[1] else array, dtype=float)
         self.names = [str(i) for i in range(self.values.shape[1])]
 
     def read(self, places: Sequence[int], chunk_size: int) -> Iterator[Array]:
         """Rows of some columns; see `Source`."""
         for first in range(0, len(self.values), chunk_size):
-            yield self.values[first : first + chunk_size, list(places)]
+            yield self.values[first : first + chunk_size, list(places)].astype(float)
 
     def look_up(self, row: int, place: int) -> tuple[str, str]:
         """Where a value stands, and the value; see `Source`."""
