@@ -10,12 +10,6 @@ class InputError(ValueError):
     """Input that cannot be used; the message says where, what is wrong and what would be right."""
 
 
-def one_line(text: object, length: int = 100) -> str:
-    """Text, or what an error says, in one line that fits into a message."""
-    line = " ".join(str(text).split()) or type(text).__name__
-    return line if len(line) <= length else f"{line[:length]} …"
-
-
 class UnknownNameError(InputError):
     """A name that stands in no registry; the message lists the names that do."""
 

@@ -26,11 +26,12 @@ from accelstudy.campaign.checks import (
 )
 from accelstudy.campaign.header import COLUMNS, COUNTING, HEADER, KNOWN, TABLES, Header
 from accelstudy.effects import Hold
-from accelstudy.errors import InputError, one_line
+from accelstudy.errors import InputError
 from accelstudy.study.config.errors import first_error
 from accelstudy.study.config.layers import read_layer
 from accelstudy.study.tables import whole_file
 from accelstudy.units import MGON
+from accelstudy.wording import one_line
 
 Array = NDArray[np.float64]
 Columns = Mapping[str, Sequence[Any]]

@@ -16,7 +16,8 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 from scipy.io import loadmat, whosmat
 
-from accelstudy.errors import InputError, UnknownNameError, one_line
+from accelstudy.errors import InputError, UnknownNameError
+from accelstudy.wording import one_line
 
 Array = NDArray[np.float64]
 
