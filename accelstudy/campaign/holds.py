@@ -17,12 +17,7 @@ from numpy.typing import NDArray
 from accelstudy.campaign.allan import AllanDeviation, AllanSums
 from accelstudy.campaign.logs import AXES, Log
 from accelstudy.campaign.runs import runs_at_rest
-from accelstudy.campaign.threshold import (
-    Threshold,
-    choose_threshold,
-    given_threshold,
-    survey_log,
-)
+from accelstudy.campaign.threshold import Threshold, choose_threshold, given_threshold, survey_log
 from accelstudy.campaign.windows import samples_in
 from accelstudy.errors import InputError
 from accelstudy.wording import counted
