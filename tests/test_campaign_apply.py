@@ -170,6 +170,7 @@ def test_parquet_keeps_its_types(tmp_path):
         ("log.csv", "fx,fy,fz\n1,2,3,\n4,5,6,\n7,8,9,\n", "more values than there are names"),
         ("log.csv", "fx,fy,fz\n1,2,3\n4,5,6\n7,8,9,10\n", "no CSV table"),
         ("log.csv", "fx,fy,fx\n1,2,3\n", "three columns of fx, fy, fx.1"),
+        ("log.csv", '"fx\n",fy,fz\n1,2,3\n', "three columns of fx, fy, fz"),
         ("log.parquet", "fx,fy,fz\n1,2,3\n", "not a whole Parquet file"),
     ],
 )

@@ -209,6 +209,9 @@ def test_bad_files(tmp_path):
     frame.assign(fy="a").to_parquet(whole)
     with pytest.raises(InputError, match=r"column fy is .*string, not numbers"):
         everything(open_log(whole))
+    frame.rename(columns={"fx": "q\nx"}).to_parquet(whole)
+    with pytest.raises(InputError, match=r"which column is fx.*time, q x, fy, fz"):
+        open_log(whole)
     pq.write_table(pa.table({"time": pa.array([], pa.float64())}), whole)
     with pytest.raises(InputError, match="which column is fx"):
         open_log(whole)

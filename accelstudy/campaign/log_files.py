@@ -226,8 +226,8 @@ class ParquetSource:
             schema = pq.read_schema(path)
         except (pa.ArrowException, OSError) as error:
             raise InputError(f"{path}: not a whole Parquet file ({one_line(error)})") from None
-        self.names = [str(name) for name in schema.names]
-        self._types = schema.types
+        self._columns, self._types = schema.names, schema.types
+        self.names = [" ".join(name.split()) for name in schema.names]
 
     def read(self, places: Sequence[int], chunk_size: int) -> Iterator[Array]:
         """Rows of some columns; see `Source`."""
@@ -235,7 +235,7 @@ class ParquetSource:
             kind = self._types[place]
             if not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
                 raise InputError(f"{self.path}: column {self.names[place]} is {kind}, not numbers")
-        names = [self.names[place] for place in places]
+        names = [self._columns[place] for place in places]
         try:
             with pq.ParquetFile(self.path) as file:
                 for batch in file.iter_batches(chunk_size, columns=names):

@@ -17,6 +17,7 @@ from accelstudy.campaign.log_files import CHUNK
 from accelstudy.campaign.log_tables import chunk_writer, read_chunks
 from accelstudy.errors import InputError
 from accelstudy.units import GON, MGON
+from accelstudy.wording import listed
 
 Array = NDArray[np.float64]
 
@@ -50,7 +51,7 @@ def level_log(
     missing = [name for name in columns if name not in first.column_names]
     if missing or len(set(columns)) != 3:
         raise InputError(
-            f"{log}: --columns must name three columns of {', '.join(first.column_names)}"
+            f"{log}: --columns must name three columns of {listed(first.column_names)}"
         )
     scale, offset = raw_conversion(calibration.content)
     noise = calibration.content["sigma_position_mps2"] if sigma is None else sigma
@@ -58,7 +59,12 @@ def level_log(
     with chunk_writer(out) as write:
         for chunk in chain([first], chunks):
             forces = (_numbers(chunk, columns, row, log) - offset) * scale
-            write(_with(chunk, _leveled(calibration, forces, noise or 0.0)))
+            added = _leveled(calibration, forces, noise or 0.0)
+            if len(bad := np.flatnonzero(~np.isfinite(added["roll_gon"] + added["pitch_gon"]))):
+                raise InputError(
+                    f"{log}: row {row + bad[0] + 1}: the calibration makes no force of it"
+                )
+            write(_with(chunk, added))
             row += len(chunk)
 
 
@@ -69,15 +75,16 @@ def _numbers(chunk: pa.Table, columns: Sequence[str], row: int, log: str | Path)
     bad = np.flatnonzero(~np.isfinite(numbers).all(axis=1))
     if len(bad):
         raise InputError(
-            f"{log}: row {row + bad[0] + 1}: {','.join(columns)} must be three finite numbers"
+            f"{log}: row {row + bad[0] + 1}: {listed(columns)} must be three finite numbers"
         )
     return numbers
 
 
 def _leveled(calibration: Calibration, forces: Array, noise: float) -> dict[str, Array]:
     """What is added to readings (k, 3) in m/s²."""
-    corrected = calibration.correct(forces)
-    angles, sigmas = calibration.level(forces, noise)
+    with np.errstate(all="ignore"):  # what is not finite is found, or a sigma without a meaning
+        corrected = calibration.correct(forces)
+        angles, sigmas = calibration.level(forces, noise)
     added = {f"f{axis}_calibrated_mps2": corrected[:, i] for i, axis in enumerate("xyz")}
     for i, angle in enumerate(("roll", "pitch")):
         added[f"{angle}_gon"] = angles[:, i] / GON
