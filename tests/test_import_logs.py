@@ -103,6 +103,20 @@ def test_parquet(tmp_path):
     assert log.step == 0.25
 
 
+def test_a_group_of_rows_is_not_held_in_memory(tmp_path):
+    n = 400_000
+    forces = np.random.default_rng(1).normal(0, 5, (n, 3))
+    table = pa.table(dict(zip(("fx", "fy", "fz"), forces.T, strict=True)))
+    pq.write_table(table, tmp_path / "log.parquet", row_group_size=n, use_dictionary=False)
+    del table
+    before, held = pa.total_allocated_bytes(), []
+    for _, piece in open_log(tmp_path / "log.parquet", rate=100, chunk_size=1000).chunks():
+        held.append(pa.total_allocated_bytes() - before)
+        assert len(piece) == 1000
+    # A whole column is 3.2 MB, and a page of one 1 MB.
+    assert max(held) < 7e6 < forces.nbytes
+
+
 def test_units(tmp_path):
     path = written(tmp_path, lines())
     _, forces = everything(open_log(path, unit="g", **BY_PLACE))

@@ -25,6 +25,7 @@ CHUNK = 65536
 """Rows that are held in memory at a time."""
 
 _PREVIEW = 65536  # characters of a text from which its layout is told
+_BUFFER = 2**20  # bytes of a Parquet column
 _COMMENTS = "#%"
 _IS_NUMBER = re.compile("double|single|u?int[0-9]+")  # classes of MATLAB arrays
 _LAYOUTS = ((",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), (None, "."), (None, ","))
@@ -217,6 +218,11 @@ class MatlabSource:
         return f"row {row + 1}", f"{self.values[row, place]:g}"
 
 
+def open_parquet(path: Path) -> pq.ParquetFile:
+    """Open a file to be read page by page, as a group of rows may be all of it."""
+    return pq.ParquetFile(path, pre_buffer=False, buffer_size=_BUFFER)
+
+
 class ParquetSource:
     """Columns of a Parquet file."""
 
@@ -237,7 +243,7 @@ class ParquetSource:
                 raise InputError(f"{self.path}: column {self.names[place]} is {kind}, not numbers")
         names = [self._columns[place] for place in places]
         try:
-            with pq.ParquetFile(self.path) as file:
+            with open_parquet(self.path) as file:
                 for batch in file.iter_batches(chunk_size, columns=names):
                     if len(batch):
                         columns = [batch.column(name) for name in names]

@@ -16,7 +16,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from accelstudy.campaign.log_files import CHUNK
+from accelstudy.campaign.log_files import CHUNK, open_parquet
 from accelstudy.errors import InputError
 from accelstudy.study.tables import whole_file
 from accelstudy.wording import one_line
@@ -134,7 +134,7 @@ _NULLABLE = {
 
 def _parquet_chunks(path: Path, chunk_size: int) -> Iterator[pa.Table]:
     try:
-        with pq.ParquetFile(path) as file:
+        with open_parquet(path) as file:
             # What pandas keeps beside the columns, the labels of its rows, is none of the log.
             schema = file.schema_arrow.remove_metadata()
             names = [name for name in schema.names if not name.startswith("__index_level_")]
