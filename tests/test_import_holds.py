@@ -7,8 +7,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from accelstudy.campaign.holds import find_holds, windows
+from accelstudy.campaign.holds import find_holds
 from accelstudy.campaign.logs import open_log
+from accelstudy.campaign.windows import windows
 from accelstudy.errors import InputError
 
 SHARED = Path(os.environ.get("ACCELSTUDY_SHARED", Path(__file__).parents[2] / "shared"))

@@ -9,7 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from scipy.io import savemat
+from scipy.io import loadmat, savemat
 
 from accelstudy.campaign.holds import find_holds
 from accelstudy.campaign.logs import open_log
@@ -101,6 +101,20 @@ def test_parquet(tmp_path):
     np.testing.assert_array_equal(time, TIME)
     np.testing.assert_array_equal(forces, FORCES)
     assert log.step == 0.25
+
+
+def test_a_group_of_rows_is_not_held_in_memory(tmp_path):
+    n = 400_000
+    forces = np.random.default_rng(1).normal(0, 5, (n, 3))
+    table = pa.table(dict(zip(("fx", "fy", "fz"), forces.T, strict=True)))
+    pq.write_table(table, tmp_path / "log.parquet", row_group_size=n, use_dictionary=False)
+    del table
+    before, held = pa.total_allocated_bytes(), []
+    for _, piece in open_log(tmp_path / "log.parquet", rate=100, chunk_size=1000).chunks():
+        held.append(pa.total_allocated_bytes() - before)
+        assert len(piece) == 1000
+    # A whole column is 3.2 MB, and a page of one 1 MB.
+    assert max(held) < 7e6 < forces.nbytes
 
 
 def test_units(tmp_path):
@@ -209,6 +223,9 @@ def test_bad_files(tmp_path):
     frame.assign(fy="a").to_parquet(whole)
     with pytest.raises(InputError, match=r"column fy is .*string, not numbers"):
         everything(open_log(whole))
+    frame.rename(columns={"fx": "q\nx"}).to_parquet(whole)
+    with pytest.raises(InputError, match=r"which column is fx.*time, q x, fy, fz"):
+        open_log(whole)
     pq.write_table(pa.table({"time": pa.array([], pa.float64())}), whole)
     with pytest.raises(InputError, match="which column is fx"):
         open_log(whole)
@@ -219,6 +236,40 @@ def test_bad_files(tmp_path):
     (tmp_path / "new.mat").write_bytes(b"\x89HDF\r\n")
     with pytest.raises(InputError, match="save it with -v7"):
         open_log(tmp_path / "new.mat")
+
+
+def test_a_matlab_file_that_does_not_fit(tmp_path, monkeypatch):
+    def full(*arguments, **options):
+        raise MemoryError
+
+    savemat(tmp_path / "log.mat", {"log": TABLE})
+    monkeypatch.setattr("accelstudy.campaign.log_files.loadmat", full)
+    with pytest.raises(InputError, match="too large, as a MATLAB file is held in memory"):
+        open_log(tmp_path / "log.mat", **BY_PLACE)
+
+
+def test_only_the_chosen_array_is_read(tmp_path, monkeypatch):
+    savemat(tmp_path / "log.mat", {"log": TABLE, "other": 1j * FORCES, "name": "x", "none": []})
+    with pytest.raises(InputError, match="which array"):
+        open_log(tmp_path / "log.mat", **BY_PLACE)
+    with pytest.raises(InputError, match="array other has complex numbers"):
+        open_log(tmp_path / "log.mat", variable="other", **BY_PLACE)
+    read = []
+
+    def load(path, variable_names):
+        read.extend(variable_names)
+        return loadmat(path, variable_names=variable_names)
+
+    monkeypatch.setattr("accelstudy.campaign.log_files.loadmat", load)
+    _, forces = everything(open_log(tmp_path / "log.mat", variable="log", **BY_PLACE))
+    np.testing.assert_array_equal(forces, FORCES)
+    assert read == ["log"]
+
+
+def test_a_line_without_end_is_not_read(tmp_path):
+    path = written(tmp_path, "1.5," * 20000)
+    with pytest.raises(InputError, match="no end of a line in 65536 characters"):
+        open_log(path, rate=1)
 
 
 @contextmanager

@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
-import numpy as np
-import pandas as pd
 
 PATH = click.Path(path_type=Path)
 
@@ -75,52 +73,9 @@ def apply_command(
     The log is in the unit of the campaign. Adds the calibrated force, roll and pitch with sigmas.
     """
     from accelstudy.campaign.applying import read_calibration
-    from accelstudy.campaign.export import raw_conversion
-    from accelstudy.errors import InputError
-    from accelstudy.study.tables import whole_file
-    from accelstudy.units import GON, MGON
+    from accelstudy.campaign.log_leveling import level_log
 
-    read = read_calibration(calibration)
-    table = _read_log(log)
-    names = columns.split(",")
-    missing = [name for name in names if name not in table]
-    if missing or len(names) != 3:
-        raise InputError(
-            f"{log}: --columns must name three columns of {', '.join(map(str, table.columns))}"
-        )
-    values = table[names].apply(pd.to_numeric, errors="coerce").to_numpy(float)
-    bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
-    if len(bad):
-        raise InputError(f"{log}: row {bad[0] + 1}: {columns} must be three finite numbers")
-    scale, offset = raw_conversion(read.content)
-    forces = (values - offset) * scale
-    noise = read.content["sigma_position_mps2"] if sigma is None else sigma
-    angles, sigmas = read.level(forces, noise or 0.0)
-    corrected = read.correct(forces)
-    for i, axis in enumerate("xyz"):
-        table[f"f{axis}_calibrated_mps2"] = corrected[:, i]
-    for i, angle in enumerate(("roll", "pitch")):
-        table[f"{angle}_gon"] = angles[:, i] / GON
-        table[f"sigma_{angle}_mgon"] = sigmas[:, i] / MGON
-    with whole_file(out) as path:
-        if out.suffix == ".parquet":
-            table.to_parquet(path, index=False)
-        else:
-            table.to_csv(path, index=False)
-
-
-def _read_log(path: Path) -> pd.DataFrame:
-    from accelstudy.errors import InputError
-    from accelstudy.study.tables import read_table
-
-    if path.suffix == ".parquet":
-        return read_table(path)
-    try:
-        return pd.read_csv(path)
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}") from None
-    except (ValueError, pd.errors.ParserError) as error:
-        raise InputError(f"{path}: no CSV table: {' '.join(str(error).split())}") from None
+    level_log(read_calibration(calibration), log, out, columns.split(","), sigma)
 
 
 @click.command("export")

@@ -15,7 +15,7 @@ SUSPECT = "#D55E00"
 
 
 def residual_figure(fit: CampaignFit, positions: pd.DataFrame) -> Figure:
-    """|f_b| − g of each position and its held-out value, with the range of the quoted noise."""
+    """|f_b| − g of each position, with the range of the quoted noise."""
     figure = new_figure(FULL, 62)
     ax = figure.add_subplot()
     x, y = positions["position"], 1e3 * positions["norm_residual_mps2"]
@@ -48,7 +48,8 @@ def correlation_figure(fit: CampaignFit) -> Figure:
     for (i, j), value in np.ndenumerate(correlation):
         if i != j and abs(value) >= 0.1:
             colour = "white" if abs(value) > 0.6 else INK
-            ax.text(j, i, f"{value:.1f}", ha="center", va="center", fontsize=6, color=colour)
+            text = f"{value:.1f}".replace("-", "−")
+            ax.text(j, i, text, ha="center", va="center", fontsize=6, color=colour)
     figure.colorbar(image, label="correlation")
     return figure
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
@@ -17,23 +16,18 @@ import yaml
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from accelstudy.campaign.checks import (
-    check_angles,
-    check_column,
-    check_names,
-    check_norm,
-    check_robot,
-)
+from accelstudy.campaign.checks import check_angles, check_column, check_norm, check_robot
 from accelstudy.campaign.header import COLUMNS, COUNTING, HEADER, KNOWN, TABLES, Header
+from accelstudy.campaign.position_files import Columns, read_positions
 from accelstudy.effects import Hold
 from accelstudy.errors import InputError
 from accelstudy.study.config.errors import first_error
 from accelstudy.study.config.layers import overlay, read_layer
 from accelstudy.study.tables import whole_file
 from accelstudy.units import MGON
+from accelstudy.wording import one_line
 
 Array = NDArray[np.float64]
-Columns = Mapping[str, Sequence[Any]]
 
 
 @dataclass(frozen=True)
@@ -141,8 +135,7 @@ def read_campaign(
         wrong = "two tables of positions" if found else "no table of positions"
         raise InputError(f"{folder}: {wrong}; expected either {' or '.join(TABLES)}")
     (path,) = found
-    columns, warnings = _read_csv(path) if path.suffix == ".csv" else _read_parquet(path)
-    warnings = warnings + [_ignored(path, name) for name in columns if name not in KNOWN]
+    columns, warnings = read_positions(path)
     campaign = _parse_table(columns, header, path, plausible)
     return replace(campaign, warnings=tuple(warnings), source=folder)
 
@@ -201,55 +194,6 @@ def _parse_header(content: dict[str, Any], path: Path) -> Header:
         return Header.model_validate(content)
     except ValidationError as error:
         raise InputError(f"{path}: {first_error(error, Header)}") from None
-
-
-def _read_csv(path: Path) -> tuple[Columns, list[str]]:
-    """Columns of text, and what is odd about the file."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-        reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
-        lines = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}") from None
-    except (csv.Error, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: not a whole CSV file in UTF-8 ({_one_line(error)})") from None
-    if not lines:
-        raise InputError(f"{path}: empty; expected a line of column names, position, fx, fy, fz …")
-    names = [name.strip() for name in lines[0][1]]
-    if len(names) == 1 and (mark := next((m for m in ";\t" if m in names[0]), None)):
-        raise InputError(f"{path}: columns are separated by {mark!r}; a comma would be right")
-    for line, row in lines[1:]:
-        if len(row) != len(names):
-            raise InputError(
-                f"{path}: line {line}: {len(row)} values for {len(names)} columns; "
-                "is the file whole?"
-            )
-    check_names(names, path)
-    columns = {name: [row[i] for _, row in lines[1:]] for i, name in enumerate(names)}
-    # Half a number is a number too, so a cut in the last one shows only in the missing line end.
-    whole = text.endswith(("\n", "\r"))
-    odd = [] if whole else [f"{path}: the last line does not end; check that it is whole"]
-    return columns, odd
-
-
-def _read_parquet(path: Path) -> tuple[Columns, list[str]]:
-    """Columns of whatever Python makes of them; those that are not known are not looked at."""
-    try:
-        with pq.ParquetFile(path, page_checksum_verification=True) as file:
-            names = [str(name) for name in file.schema_arrow.names]
-            check_names(names, path)
-            table = file.read(columns=[name for name in names if name in KNOWN])
-        return {n: table[n].to_pylist() if n in KNOWN else () for n in names}, []
-    except InputError:
-        raise
-    except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError) as error:
-        raise InputError(f"{path}: not a whole Parquet file ({_one_line(error)})") from None
-
-
-def _ignored(path: Path, name: str) -> str:
-    near = get_close_matches(name, KNOWN, n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
-    return f"{path}: column {name!r} is not known and ignored{hint}"
 
 
 def _parse_table(columns: Columns, header: Header, path: Path, plausible: bool) -> Campaign:
@@ -317,7 +261,7 @@ def _numbers(columns: Columns, name: str, labels: Sequence[str], path: Path) -> 
                 raise ValueError
             numbers[i] = float(value)
         except (TypeError, ValueError, OverflowError):
-            shown = _one_line(repr(value), 60)
+            shown = one_line(repr(value), 60)
             raise InputError(f"{where}: {shown} is no number, such as -9.81") from None
         if not np.isfinite(numbers[i]):
             raise InputError(f"{where}: {value} is not finite; leave out a hold that has no mean")
@@ -358,8 +302,3 @@ def _columns_of(campaign: Campaign, header: Header) -> dict[str, list[Any]]:
             values = np.asarray(values, dtype=float) / scale + offset
         columns.update(zip(names, np.reshape(values, (-1, len(names))).T.tolist(), strict=True))
     return columns
-
-
-def _one_line(text: object, length: int = 100) -> str:
-    line = " ".join(str(text).split())
-    return line if len(line) <= length else f"{line[:length]} …"

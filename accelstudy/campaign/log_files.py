@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
@@ -13,9 +14,10 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
-from scipy.io import loadmat
+from scipy.io import loadmat, whosmat
 
 from accelstudy.errors import InputError, UnknownNameError
+from accelstudy.wording import one_line
 
 Array = NDArray[np.float64]
 
@@ -23,7 +25,9 @@ CHUNK = 65536
 """Rows that are held in memory at a time."""
 
 _PREVIEW = 65536  # characters of a text from which its layout is told
+_BUFFER = 2**20  # bytes of a Parquet column
 _COMMENTS = "#%"
+_IS_NUMBER = re.compile("double|single|u?int[0-9]+")  # classes of MATLAB arrays
 _LAYOUTS = ((",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), (None, "."), (None, ","))
 
 
@@ -71,7 +75,9 @@ class TextSource:
             text = file.read(_PREVIEW)
             more = bool(file.read(1))
         lines = text.split("\n")
-        if more and len(lines) > 1:
+        if more and len(lines) == 1:  # it would be read as a whole
+            raise InputError(f"{path}: no end of a line in {_PREVIEW} characters; is it text?")
+        if more:
             lines.pop()  # it may be cut
         rows = [line for line in lines if _is_row(line)]
         if not rows:
@@ -170,43 +176,51 @@ class TextSource:
 
 
 class MatlabSource:
-    """An array of a MATLAB file, which is read as a whole."""
+    """An array of a MATLAB file, which is read as a whole: the format allows 2 GB at most."""
 
     def __init__(self, path: Path, variable: str | None = None) -> None:
         self.path = path
         try:
-            content = loadmat(path)
+            arrays = {
+                name: shape
+                for name, shape, kind in whosmat(path)
+                if _IS_NUMBER.fullmatch(kind) and len(shape) == 2 and all(shape)
+            }
+            if variable is not None and variable not in arrays:
+                raise UnknownNameError(f"array of {path}", variable, arrays)
+            if variable is None and len(arrays) != 1:
+                raise InputError(f"{path}: which array? There are {', '.join(arrays) or 'none'}")
+            name = next(iter(arrays)) if variable is None else variable
+            array = loadmat(path, variable_names=[name])[name]
+            if np.iscomplexobj(array):
+                raise InputError(f"{path}: array {name} has complex numbers")
+            # Few rows and many columns are a table that lies on its side.
+            self.values = array.T if array.shape[0] < array.shape[1] else array
+        except InputError:
+            raise
         except NotImplementedError:
             raise InputError(f"{path}: a MATLAB 7.3 (HDF5) file; save it with -v7") from None
+        except MemoryError:
+            raise InputError(
+                f"{path}: too large, as a MATLAB file is held in memory; save it as text or Parquet"
+            ) from None
         except Exception as error:  # SciPy's reader fails in many ways on a damaged file
-            raise InputError(f"{path}: not a whole MATLAB file ({_one_line(error)})") from None
-        arrays = {
-            name: value
-            for name, value in content.items()
-            if not name.startswith("__")
-            and isinstance(value, np.ndarray)
-            and value.dtype.kind in "iuf"
-            and value.ndim == 2
-            and value.size
-        }
-        if variable is not None and variable not in arrays:
-            raise UnknownNameError(f"array of {path}", variable, arrays)
-        if variable is None and len(arrays) != 1:
-            known = ", ".join(arrays) or "none"
-            raise InputError(f"{path}: which array? There are {known}")
-        array = arrays[variable] if variable is not None else next(iter(arrays.values()))
-        # Few rows and many columns are a table that lies on its side.
-        self.values = np.asarray(array.T if array.shape[0] < array.shape[1] else array, dtype=float)
+            raise InputError(f"{path}: not a whole MATLAB file ({one_line(error)})") from None
         self.names = [str(i) for i in range(self.values.shape[1])]
 
     def read(self, places: Sequence[int], chunk_size: int) -> Iterator[Array]:
         """Rows of some columns; see `Source`."""
         for first in range(0, len(self.values), chunk_size):
-            yield self.values[first : first + chunk_size, list(places)]
+            yield self.values[first : first + chunk_size, list(places)].astype(float)
 
     def look_up(self, row: int, place: int) -> tuple[str, str]:
         """Where a value stands, and the value; see `Source`."""
         return f"row {row + 1}", f"{self.values[row, place]:g}"
+
+
+def open_parquet(path: Path) -> pq.ParquetFile:
+    """Open a file to be read page by page, as a group of rows may be all of it."""
+    return pq.ParquetFile(path, pre_buffer=False, buffer_size=_BUFFER)
 
 
 class ParquetSource:
@@ -217,9 +231,9 @@ class ParquetSource:
         try:
             schema = pq.read_schema(path)
         except (pa.ArrowException, OSError) as error:
-            raise InputError(f"{path}: not a whole Parquet file ({_one_line(error)})") from None
-        self.names = [str(name) for name in schema.names]
-        self._types = schema.types
+            raise InputError(f"{path}: not a whole Parquet file ({one_line(error)})") from None
+        self._columns, self._types = schema.names, schema.types
+        self.names = [" ".join(name.split()) for name in schema.names]
 
     def read(self, places: Sequence[int], chunk_size: int) -> Iterator[Array]:
         """Rows of some columns; see `Source`."""
@@ -227,9 +241,9 @@ class ParquetSource:
             kind = self._types[place]
             if not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
                 raise InputError(f"{self.path}: column {self.names[place]} is {kind}, not numbers")
-        names = [self.names[place] for place in places]
+        names = [self._columns[place] for place in places]
         try:
-            with pq.ParquetFile(self.path) as file:
+            with open_parquet(self.path) as file:
                 for batch in file.iter_batches(chunk_size, columns=names):
                     if len(batch):
                         columns = [batch.column(name) for name in names]
@@ -237,9 +251,7 @@ class ParquetSource:
                             [c.cast(pa.float64(), safe=False).to_numpy(False) for c in columns]
                         )
         except (pa.ArrowException, OSError) as error:
-            raise InputError(
-                f"{self.path}: not a whole Parquet file ({_one_line(error)})"
-            ) from None
+            raise InputError(f"{self.path}: not a whole Parquet file ({one_line(error)})") from None
 
     def look_up(self, row: int, place: int) -> tuple[str, str]:
         """Where a value stands, and the value; see `Source`."""
@@ -284,7 +296,3 @@ def _numbers(column: pd.Series) -> Array:
     if pd.api.types.is_bool_dtype(column):
         return np.full(len(column), np.nan)
     return pd.to_numeric(column, errors="coerce").to_numpy(dtype=float, na_value=np.nan)
-
-
-def _one_line(error: Exception) -> str:
-    return (" ".join(str(error).split()) or type(error).__name__)[:120]

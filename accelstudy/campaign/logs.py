@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from accelstudy.campaign.log_files import CHUNK, Source, open_source
 from accelstudy.errors import InputError, UnknownNameError
 from accelstudy.units import UNITS
+from accelstudy.wording import listed
 
 Array = NDArray[np.float64]
 Column = str | int
@@ -232,7 +233,7 @@ def locate(
     if needed and missing:
         raise InputError(
             f"{source.path}: which column is {missing[0]}? "
-            f"The columns are {_listed(source.names)}, counted from 0"
+            f"The columns are {listed(source.names)}, counted from 0"
         )
     if len(set(places.values())) < len(places):
         raise InputError(f"{source.path}: two of {', '.join(places)} name the same column")
@@ -251,12 +252,7 @@ def _place(source: Source, key: str, column: Column) -> int:
         raise InputError(
             f"{source.path}: {key}: no column {column}; there are {len(names)}, counted from 0"
         )
-    raise InputError(f"{source.path}: {key}: no column {column!r}; there are {_listed(names)}")
-
-
-def _listed(names: Sequence[str], most: int = 20) -> str:
-    shown = ", ".join(name if len(name) <= 30 else f"{name[:30]}…" for name in names[:most])
-    return shown + (", …" if len(names) > most else "")
+    raise InputError(f"{source.path}: {key}: no column {column!r}; there are {listed(names)}")
 
 
 def check_numbers(source: Source, places: Mapping[str, int], raw: Array, row: int = 0) -> None:

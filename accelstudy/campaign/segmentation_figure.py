@@ -13,10 +13,12 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
-from accelstudy.campaign.holds import Holds, windows
+from accelstudy.campaign.holds import Holds
 from accelstudy.campaign.logs import Log
+from accelstudy.campaign.windows import windows
 from accelstudy.figures.style import DPI, FULL, INK, STYLE, new_figure
 from accelstudy.study.tables import whole_file
+from accelstudy.wording import counted
 
 Array = NDArray[np.float64]
 
@@ -55,10 +57,9 @@ def draw_segmentation(log: Log, holds: Holds) -> Figure:
         below.yaxis.set_minor_locator(NullLocator())
         handles, labels = above.get_legend_handles_labels()
         lines, texts = below.get_legend_handles_labels()
-        count = f"{len(holds)} static hold" + ("" if len(holds) == 1 else "s")
         figure.legend(
             [*handles, Patch(color=_SHADE), *lines],
-            [*labels, count, *texts],
+            [*labels, counted(len(holds), "static hold"), *texts],
             loc="outside upper center",
             ncols=5,
         )

@@ -1,0 +1,81 @@
+"""The table of positions as it stands in its file: columns by their names, not yet checked."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from accelstudy.campaign.checks import check_names
+from accelstudy.campaign.header import KNOWN
+from accelstudy.errors import InputError
+from accelstudy.wording import one_line
+
+Columns = Mapping[str, Sequence[Any]]
+
+
+def read_positions(path: Path) -> tuple[Columns, list[str]]:
+    """Columns of a table, text of CSV and values of Parquet, and what is odd about the file.
+
+    Raises
+    ------
+    InputError
+        If the file is missing or not whole, or a column stands twice.
+    """
+    columns, odd = (_read_csv if path.suffix == ".csv" else _read_parquet)(path)
+    return columns, odd + [_ignored(path, name) for name in columns if name not in KNOWN]
+
+
+def _read_csv(path: Path) -> tuple[Columns, list[str]]:
+    """Columns of text, and what is odd about the file."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+        reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
+        lines = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from None
+    except (csv.Error, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: not a whole CSV file in UTF-8 ({one_line(error)})") from None
+    if not lines:
+        raise InputError(f"{path}: empty; expected a line of column names, position, fx, fy, fz …")
+    names = [name.strip() for name in lines[0][1]]
+    if len(names) == 1 and (mark := next((m for m in ";\t" if m in names[0]), None)):
+        raise InputError(f"{path}: columns are separated by {mark!r}; a comma would be right")
+    for line, row in lines[1:]:
+        if len(row) != len(names):
+            raise InputError(
+                f"{path}: line {line}: {len(row)} values for {len(names)} columns; "
+                "is the file whole?"
+            )
+    check_names(names, path)
+    columns = {name: [row[i] for _, row in lines[1:]] for i, name in enumerate(names)}
+    # Half a number is a number too, so a cut in the last one shows only in the missing line end.
+    whole = text.endswith(("\n", "\r"))
+    odd = [] if whole else [f"{path}: the last line does not end; check that it is whole"]
+    return columns, odd
+
+
+def _read_parquet(path: Path) -> tuple[Columns, list[str]]:
+    """Columns of whatever Python makes of them; those that are not known are not looked at."""
+    try:
+        with pq.ParquetFile(path, page_checksum_verification=True) as file:
+            names = [str(name) for name in file.schema_arrow.names]
+            check_names(names, path)
+            table = file.read(columns=[name for name in names if name in KNOWN])
+        return {n: table[n].to_pylist() if n in KNOWN else () for n in names}, []
+    except InputError:
+        raise
+    except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError) as error:
+        raise InputError(f"{path}: not a whole Parquet file ({one_line(error)})") from None
+
+
+def _ignored(path: Path, name: str) -> str:
+    near = get_close_matches(name, KNOWN, n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    return f"{path}: column {name!r} is not known and ignored{hint}"
