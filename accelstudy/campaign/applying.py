@@ -13,13 +13,13 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from accelstudy.campaign.header import Nominal, PerAxis
+from accelstudy.campaign.wording import one_line
 from accelstudy.errors import InputError
 from accelstudy.leveling import jacobian, roll_pitch
 from accelstudy.models import compose
 from accelstudy.sensor import SensorModel
 from accelstudy.study.config.errors import first_error
 from accelstudy.study.config.types import Finite, NotNegative, Number, Positive
-from accelstudy.wording import one_line
 
 Array = NDArray[np.float64]
 

@@ -19,13 +19,13 @@ from pydantic import ValidationError
 from accelstudy.campaign.checks import check_angles, check_column, check_norm, check_robot
 from accelstudy.campaign.header import COLUMNS, COUNTING, HEADER, KNOWN, TABLES, Header
 from accelstudy.campaign.position_files import Columns, read_positions
+from accelstudy.campaign.wording import one_line
 from accelstudy.effects import Hold
 from accelstudy.errors import InputError
 from accelstudy.study.config.errors import first_error
 from accelstudy.study.config.layers import overlay, read_layer
 from accelstudy.study.tables import whole_file
 from accelstudy.units import MGON
-from accelstudy.wording import one_line
 
 Array = NDArray[np.float64]
 

@@ -19,8 +19,8 @@ from accelstudy.campaign.logs import AXES, Log
 from accelstudy.campaign.runs import runs_at_rest
 from accelstudy.campaign.threshold import Threshold, choose_threshold, given_threshold, survey_log
 from accelstudy.campaign.windows import samples_in
+from accelstudy.campaign.wording import counted
 from accelstudy.errors import InputError
-from accelstudy.wording import counted
 
 Array = NDArray[np.float64]
 

@@ -16,8 +16,8 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 from scipy.io import loadmat, whosmat
 
+from accelstudy.campaign.wording import one_line
 from accelstudy.errors import InputError, UnknownNameError
-from accelstudy.wording import one_line
 
 Array = NDArray[np.float64]
 

@@ -15,9 +15,9 @@ from accelstudy.campaign.applying import Calibration
 from accelstudy.campaign.export import raw_conversion
 from accelstudy.campaign.log_files import CHUNK
 from accelstudy.campaign.log_tables import chunk_writer, read_chunks
+from accelstudy.campaign.wording import listed
 from accelstudy.errors import InputError
 from accelstudy.units import GON, MGON
-from accelstudy.wording import listed
 
 Array = NDArray[np.float64]
 

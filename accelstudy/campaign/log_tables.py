@@ -17,9 +17,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from accelstudy.campaign.log_files import CHUNK, open_parquet
+from accelstudy.campaign.wording import one_line
 from accelstudy.errors import InputError
 from accelstudy.study.tables import whole_file
-from accelstudy.wording import one_line
 
 
 def read_chunks(path: str | Path, chunk_size: int = CHUNK) -> Iterator[pa.Table]:

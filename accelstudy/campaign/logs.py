@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.campaign.log_files import CHUNK, Source, open_source
+from accelstudy.campaign.wording import listed
 from accelstudy.errors import InputError, UnknownNameError
 from accelstudy.units import UNITS
-from accelstudy.wording import listed
 
 Array = NDArray[np.float64]
 Column = str | int

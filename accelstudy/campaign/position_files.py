@@ -14,8 +14,8 @@ import pyarrow.parquet as pq
 
 from accelstudy.campaign.checks import check_names
 from accelstudy.campaign.header import KNOWN
+from accelstudy.campaign.wording import one_line
 from accelstudy.errors import InputError
-from accelstudy.wording import one_line
 
 Columns = Mapping[str, Sequence[Any]]
 

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from accelstudy.campaign.holds import Holds
 from accelstudy.campaign.logs import Log
 from accelstudy.campaign.windows import windows
+from accelstudy.campaign.wording import counted
 from accelstudy.figures.style import DPI, FULL, INK, STYLE, new_figure
 from accelstudy.study.tables import whole_file
-from accelstudy.wording import counted
 
 Array = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from accelstudy.campaign.logs import Log
 from accelstudy.campaign.windows import Windows, windows
+from accelstudy.campaign.wording import counted
 from accelstudy.errors import InputError
-from accelstudy.wording import counted
 
 Array = NDArray[np.float64]
 
