@@ -141,7 +141,9 @@ def cells(configs: tuple[Path, ...]) -> None:
 
     study = read_study(*configs)
     for cell in study_cells(study):
-        design = diagnose(cell.positions, cell.estimated_model, cell.conditions, cell.noise)
+        design = diagnose(
+            cell.positions, cell.estimated_model, cell.conditions, cell.noise, hold=cell.hold
+        )
         state = design.reason or f"r = {design.redundancy}, {cell.replicates} replicates"
         click.echo(f"{cell.name}: {state}")
 
