@@ -118,14 +118,13 @@ def models() -> None:
 
 @main.command()
 def effects() -> None:
-    """List effects, of which models are composed, with parameters and units."""
-    from accelstudy.effects import effect_names, get_effect
-    from accelstudy.units import display_unit
+    """List effects, noise effects and gross errors, with parameters and typical sizes.
 
-    for name in effect_names():
-        effect = get_effect(name)
-        parameters = ", ".join(f"{p.name} [{display_unit(p.unit)}]" for p in effect.parameters)
-        click.echo(f"{name}: {parameters}\n    {(effect.__doc__ or '').splitlines()[0]}")
+    Models are composed of effects; parameters are in the units shown, settings in SI.
+    """
+    from accelstudy.catalogue import catalogue
+
+    click.echo(catalogue())
 
 
 @main.command()
@@ -141,7 +140,9 @@ def cells(configs: tuple[Path, ...]) -> None:
 
     study = read_study(*configs)
     for cell in study_cells(study):
-        design = diagnose(cell.positions, cell.estimated_model, cell.conditions, cell.noise)
+        design = diagnose(
+            cell.positions, cell.estimated_model, cell.conditions, cell.noise, hold=cell.hold
+        )
         state = design.reason or f"r = {design.redundancy}, {cell.replicates} replicates"
         click.echo(f"{cell.name}: {state}")
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from accelstudy.adjustment import whitened_jacobian
 from accelstudy.approaches import Approach
 from accelstudy.effects import Hold
-from accelstudy.errors import InputError
+from accelstudy.hold_plan import HoldPlan
 from accelstudy.schemes import Scheme, get_scheme
 from accelstudy.sensor import SensorModel
 from accelstudy.simulation import Noise, session
@@ -22,6 +22,8 @@ SINGULAR = 1e-7
 """Singular values of the scaled design below this fraction of the largest count as zero."""
 ROUNDING = 1e-14
 """Columns of the design shorter than this fraction of the longest count as zero."""
+
+EVERYTHING_VARIES = HoldPlan(60.0, (0.0, 40.0), "random", (0.0, 1.0), "random")
 
 
 @dataclass(frozen=True)
@@ -126,7 +128,7 @@ def _design(
     noise: Noise,
     parameters: Array,
     gravity: float,
-    hold: Hold | None = None,
+    hold: Hold | None,
 ) -> Array:
     """Design matrix (conditions, u) with unit weights."""
     ideal = session(model, parameters, scheme.directions, gravity, hold)
@@ -134,12 +136,11 @@ def _design(
 
 
 def _is_blind(model: SensorModel, approach: Approach, noise: Noise, gravity: float) -> bool:
-    """Whether not even many positions all around determine the model."""
-    try:
-        ideal = np.zeros(model.n_parameters)
-        a = _design(get_scheme("fibonacci-60"), model, approach, noise, ideal, gravity)
-    except InputError:  # it depends on more than directions
-        return False
+    """Whether not even many positions all around, in all conditions, determine the model."""
+    ideal = np.zeros(model.n_parameters)
+    scheme = get_scheme("fibonacci-60")
+    hold = EVERYTHING_VARIES.hold(scheme.n_positions)
+    a = _design(scheme, model, approach, noise, ideal, gravity, hold)
     return _rank(a)[0] < a.shape[1]
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.effects import Hold
 from accelstudy.leveling import jacobian, roll_pitch
 from accelstudy.sensor import SensorModel
 from accelstudy.units import STANDARD_GRAVITY
@@ -51,11 +52,13 @@ def leveling_error(
     estimates: Array,
     f_b: Array,
     g: float = STANDARD_GRAVITY,
+    hold: Hold | None = None,
 ) -> LevelingError:
     """Propagate calibration errors to roll and pitch, without noise of the leveled reading.
 
     The mean calibration is propagated exactly and the scatter about it linearly; effects that the
-    estimated model lacks therefore count in full.
+    estimated model lacks therefore count in full. Effects of the rig, estimated or not, do not
+    count: the sensor has left it.
 
     Parameters
     ----------
@@ -64,13 +67,16 @@ def leveling_error(
     estimates : (R, u) array, SI, of the estimated model
     f_b : (k, 3) array, m/s², attitudes
     g : float, m/s²
+    hold : Hold, optional
+        What else is known of the attitudes, where effects depend on it.
     """
+    estimates = np.where(estimated.stays, estimates, 0.0)
     mean = estimates.mean(axis=0)
-    output = simulated.sense(f_b, truth, g)
-    corrected = estimated.correct(output, mean, g)
+    output = simulated.sense(f_b, np.where(simulated.stays, truth, 0.0), g, hold)
+    corrected = estimated.correct(output, mean, g, hold)
     offset = np.stack(roll_pitch(tuple(corrected.T)), -1) - np.stack(roll_pitch(tuple(f_b.T)), -1)
     offset = (offset + np.pi) % (2 * np.pi) - np.pi
-    slope = jacobian(corrected) @ estimated.correction_jacobian(output, mean, g)
+    slope = jacobian(corrected) @ estimated.correction_jacobian(output, mean, g, hold)
 
     # Mean over attitudes of (offset + slope δ)², as a quadratic form in δ.
     delta = estimates - mean

@@ -67,6 +67,11 @@ class SensorModel:
         """Names of all parameters."""
         return tuple(p.name for p in self.parameters)
 
+    @property
+    def stays(self) -> NDArray[np.bool_]:
+        """Which parameters, (u,), the sensor takes along when it leaves the rig."""
+        return np.array([e.part == "sensor" for e in self.effects for _ in e.parameters], bool)
+
     def vector(self, values: Mapping[str, float]) -> NDArray[np.float64]:
         """Parameter vector (u,) in SI from a mapping; what it does not name is zero."""
         return np.array([values.get(name, 0.0) for name in self.parameter_names], dtype=float)

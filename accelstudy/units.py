@@ -31,7 +31,24 @@ UNITS: dict[str, dict[str, float]] = {
         "mm/s^2": 1e-3,
         "m/s^2": 1.0,
         "mg": 1e-3 * STANDARD_GRAVITY,
+        "ug": 1e-6 * STANDARD_GRAVITY,
         "g": STANDARD_GRAVITY,
+    },
+    "m/s^2/K": {
+        "mm/s^2/K": 1e-3,
+        "m/s^2/K": 1.0,
+        "mg/K": 1e-3 * STANDARD_GRAVITY,
+    },
+    "1/K": {"ppm/K": 1e-6, "%/K": 1e-2, "1/K": 1.0},
+    "m/s^2/s": {
+        "mm/s^2/h": 1e-3 / 3600,
+        "m/s^2/s": 1.0,
+        "mg/h": 1e-3 * STANDARD_GRAVITY / 3600,
+    },
+    "s^2/m": {
+        "ug/g^2": 1e-6 / STANDARD_GRAVITY,
+        "s^2/m": 1.0,
+        "mg/g^2": 1e-3 / STANDARD_GRAVITY,
     },
 }
 """SI unit -> {unit that people use: its size in the SI unit}; the first is the one we show."""

@@ -12,9 +12,11 @@ from study_helpers import NINE, PROVENANCE, content, grid
 
 import accelstudy
 from accelstudy.cli import main
-from accelstudy.effects import effect_names
+from accelstudy.effects import effect_names, get_effect
 from accelstudy.errors import InputError
-from accelstudy.models import MODELS, PRESETS, get_model
+from accelstudy.gross_errors import gross_error_names
+from accelstudy.models import MODELS, PRESETS, compose, get_model
+from accelstudy.noise_effects import noise_effect_names
 from accelstudy.schemes import get_scheme, scheme_families, scheme_names
 from accelstudy.study.tables import write_table
 
@@ -107,12 +109,44 @@ def test_models():
     assert "s_x, s_y, s_z" in text
 
 
+def entries(text):
+    """Lines below each name of a catalogue, by heading and name."""
+    found = {}
+    for block in re.split(r"\n\n(?=\S)", text.strip()):
+        lines = block.splitlines()
+        if len(lines) == 1 and ":" not in lines[0]:
+            found[lines[0]] = current = {}
+            continue
+        for line in lines:
+            if not line.startswith(" "):
+                name, equation = line.split(": ", 1)
+                current[name] = [equation]
+            else:
+                current[name].append(line.strip())
+    return found
+
+
 def test_effects():
-    text = output("effects")
-    for name in effect_names():
-        assert re.search(rf"^{name}: \w+ \[.+\]", text, re.MULTILINE)
-    assert "bias: b_x [mm/s^2], b_y [mm/s^2], b_z [mm/s^2]" in text
-    assert "nonorthogonality: alpha_yz [mgon], alpha_zy [mgon], alpha_zx [mgon]" in text
+    found = entries(output("effects"))
+    effects = {**found["Effects of the sensor"], **found["Effects of the rig"]}
+    assert set(effects) == set(effect_names())
+    assert set(found["Noise effects"]) == set(noise_effect_names())
+    assert set(found["Gross errors"]) == set(gross_error_names())
+    for name, (equation, *lines) in effects.items():
+        effect = get_effect(name)
+        assert equation == effect.equation
+        assert ", ".join(p.name for p in effect.parameters) in lines[1]
+        assert any("needs the" in line for line in lines) == bool(
+            {"temperature", "time", "vibration"} & {*compose(name, (name,)).hold_columns}
+        )
+    assert "base_tilt" in found["Effects of the rig"]
+    assert "b_x, b_y, b_z [mm/s^2], typically 20 … 500" in effects["bias"]
+    assert "alpha_yz, alpha_zy, alpha_zx [mgon], typically" in effects["nonorthogonality"][2]
+    assert "s_T_x, s_T_y, s_T_z [ppm/K], typically 10 … 200" in effects["thermal_scale"]
+    assert "settings: tau=600 s" in effects["warm_up"]
+    assert "needs the temperature of each hold" in effects["thermal_bias"]
+    assert "nu typically 3 … 10" in found["Noise effects"]["heavy_tails"]
+    assert "settings: first drawn, second drawn" in found["Gross errors"]["row_order"]
 
 
 # --- a study -------------------------------------------------------------------------------------

@@ -29,6 +29,11 @@ def test_a_full_turn_is_400_gon():
         (1, "g", "m/s^2", 9.80665),
         (1, "mg", "m/s^2", 9.80665e-3),
         (50, "mm/s^2", "m/s^2", 0.05),
+        (1, "mg/K", "m/s^2/K", 9.80665e-3),
+        (3.6, "mm/s^2/h", "m/s^2/s", 1e-6),
+        (9.80665, "ug/g^2", "s^2/m", 1e-6),
+        (50, "ppm/K", "1/K", 5e-5),
+        (100, "ug", "m/s^2", 9.80665e-4),
         (7, "K", "K", 7),  # a unit that is shown as it is
     ],
 )
@@ -38,7 +43,7 @@ def test_conversions(value, given, unit, expected):
 
 @pytest.mark.parametrize(
     ("unit", "shown"),
-    [("rad", "mgon"), ("1", "ppm"), ("m/s^2", "mm/s^2"), ("m/s^2/K", "m/s^2/K")],
+    [("rad", "mgon"), ("1", "ppm"), ("m/s^2", "mm/s^2"), ("m/s^2/K", "mm/s^2/K"), ("s", "s")],
 )
 def test_units_that_people_read(unit, shown):
     assert display_unit(unit) == shown

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.format import Campaign
-from accelstudy.effects import Effect, Hold, get_effect
+from accelstudy.effects import Effect, get_effect
 from accelstudy.errors import InputError, UnknownNameError
 from accelstudy.gross_errors import GrossError, get_gross_error
+from accelstudy.hold_plan import PROVIDES, HoldPlan
 from accelstudy.models import compose, get_model
 from accelstudy.noise_effects import NoiseEffect, get_noise_effect
 from accelstudy.registry import Shaped
@@ -27,16 +28,10 @@ from accelstudy.units import MGON, STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
 
-STREAMS = ("sensor", "effects", "order", "temperature", "vibration", "yaw", "noise", "sd", "gross")
-"""What is drawn, each from a stream of its own, so that none changes another."""
+STREAMS = ("sensor", "effects", "order", "noise", "sd", "gross")
+"""What is drawn, each from a stream of its own, so that none changes another (nor the holds)."""
 
-CHOICES = {
-    "temperature_order": ("linear", "ABBA", "random"),
-    "yaw": ("none", "random"),
-    "order": ("scheme", "random"),
-}
-NEEDS = {"time": "interval", "temperature": "temperature", "vibration": "vibration"}
-"""Columns of the holds and the settings that provide them; the others are always there."""
+ORDERS = ("scheme", "random")
 
 
 @dataclass(frozen=True)
@@ -62,11 +57,7 @@ class CampaignSettings:
     sigma_known : bool, whether the campaign tells it
     sigma_angle : float, rad, of the robot's roll and pitch
     gravity : float, m/s²
-    interval : float, s between holds; None leaves out the time
-    temperature : (float, float), °C, from and to, optional
-    temperature_order : "linear", "ABBA" (in quarters of the session) or "random"
-    vibration : (float, float), m/s² rms, between which it is drawn for each hold, optional
-    yaw : "none" or "random"
+    interval, temperature, temperature_order, vibration, yaw : as in `HoldPlan`
     n_samples : int, samples per hold, optional; adds their sds
     """
 
@@ -94,24 +85,29 @@ class CampaignSettings:
     n_samples: int | None = None
 
     def __post_init__(self) -> None:
-        for key, known in CHOICES.items():
-            if getattr(self, key) not in known:
-                raise UnknownNameError(key, getattr(self, key), known)
+        if self.order not in ORDERS:
+            raise UnknownNameError("order", self.order, ORDERS)
         limits = {"seed": 0, "repeats": 1, "repeat_first": 0, "sigma_angle": 0, "n_samples": 2}
         for key, least in limits.items():
             value = getattr(self, key)
             if value is not None and not least <= value < math.inf:
                 raise InputError(f"{key}: must be {least} or more, not {value:g}")
-        for key in ("sigma", "gravity", "interval", "size"):
-            value = getattr(self, key)
-            if value is not None and not 0 < value < math.inf:
-                raise InputError(f"{key}: must be above 0, not {value:g}")
-        for key, lowest in (("temperature", -273.15), ("vibration", 0.0)):
-            pair = getattr(self, key)
-            if pair is not None and not all(lowest <= value < math.inf for value in pair):
-                raise InputError(
-                    f"{key}: must be two numbers of {lowest:g} or more, not {pair[0]:g}:{pair[1]:g}"
-                )
+        for key in ("sigma", "gravity", "size"):
+            if not 0 < getattr(self, key) < math.inf:
+                raise InputError(f"{key}: must be above 0, not {getattr(self, key):g}")
+        self.holds.hold(1)
+
+    @property
+    def holds(self) -> HoldPlan:
+        """Conditions of the holds."""
+        return HoldPlan(
+            self.interval,
+            self.temperature,
+            self.temperature_order,
+            self.vibration,
+            self.yaw,
+            self.seed,
+        )
 
 
 def simulate_campaign(settings: CampaignSettings) -> tuple[Campaign, dict[str, Any]]:
@@ -147,9 +143,13 @@ def simulate_campaign(settings: CampaignSettings) -> tuple[Campaign, dict[str, A
     noise_effects = [get_noise_effect(spec) for spec in settings.noise_effects]
 
     directions = _directions(settings, rng["order"])
-    hold = _hold(settings, len(directions), rng)
+    hold = settings.holds.hold(len(directions))
     for effect, _ in present:
-        _check_columns(effect, hold)
+        if column := settings.holds.missing(effect):
+            raise InputError(
+                f"{PROVIDES[column]}: missing; the effect {effect.name!r} needs the {column} of "
+                "each hold"
+            )
     ideal = session(
         model, np.concatenate([v for _, v in present]), directions, settings.gravity, hold
     )
@@ -226,36 +226,6 @@ def _directions(settings: CampaignSettings, rng: np.random.Generator) -> Array:
             f"not {settings.repeat_first}"
         )
     return np.concatenate([directions, directions[: settings.repeat_first]])
-
-
-def _hold(settings: CampaignSettings, n: int, rng: dict[str, np.random.Generator]) -> Hold:
-    """Columns that do not follow from the directions."""
-    temperature = None
-    if settings.temperature is not None:
-        low, high = settings.temperature
-        course = {
-            "linear": np.linspace(0, 1, n),
-            "ABBA": np.array([0.0, 1.0, 1.0, 0.0])[4 * np.arange(n) // n],
-            "random": rng["temperature"].uniform(0, 1, n),
-        }
-        temperature = low + (high - low) * course[settings.temperature_order]
-    return Hold(
-        time=None if settings.interval is None else settings.interval * np.arange(float(n)),
-        temperature=temperature,
-        vibration=None
-        if settings.vibration is None
-        else rng["vibration"].uniform(*settings.vibration, n),
-        yaw=rng["yaw"].uniform(-np.pi, np.pi, n) if settings.yaw == "random" else np.zeros(n),
-    )
-
-
-def _check_columns(effect: Effect, hold: Hold) -> None:
-    for column in compose(effect.spec, (effect.spec,)).hold_columns:
-        if column in NEEDS and getattr(hold, column) is None:
-            raise InputError(
-                f"{NEEDS[column]}: missing; the effect {effect.name!r} needs the {column} of each "
-                "hold"
-            )
 
 
 def _samples(

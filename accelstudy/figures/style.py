@@ -90,8 +90,6 @@ FAMILIES = {
     "nonlinearity": "#882255",
 }
 
-UNIT_LABELS = {"mm/s^2": "mm/s²", "m/s^2": "m/s²"}
-
 
 def approach_colour(approach: str) -> str:
     """Colour of an approach."""
@@ -151,7 +149,7 @@ def symbol(parameter: str) -> str:
 
 def unit_label(unit: str) -> str:
     """Return a unit as it is printed."""
-    return UNIT_LABELS.get(unit, unit)
+    return unit.replace("^2", "²").replace("ug", "µg")
 
 
 def in_order(groups: Iterable[str]) -> list[str]:

@@ -25,7 +25,7 @@ class NoiseEffect(Shaped):
     Attributes
     ----------
     equation : str, what becomes of the noise v or of the readings f, for people
-    typical : (float, float), usual size of a setting from good to cheap equipment, SI
+    typical : (float, float), usual range of the first setting, SI
     """
 
     kind = "noise effect"

@@ -5,13 +5,15 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import product
 from typing import Any
 
 import numpy as np
 
 from accelstudy.approaches import Approach, approach_names, get_approach
+from accelstudy.effects import Hold, get_effect
+from accelstudy.hold_plan import HoldPlan
 from accelstudy.models import compose, get_model
 from accelstudy.noise_effects import get_noise_effect
 from accelstudy.schemes import Scheme, get_scheme, scheme_names
@@ -41,6 +43,7 @@ class Cell:
     noise : Noise
     gravity : float, true local gravity, m/s²
     truth : dict of parameter name to true value, SI
+    holds : HoldPlan, conditions of the holds
     """
 
     name: str
@@ -53,6 +56,7 @@ class Cell:
     noise: Noise
     gravity: float
     truth: dict[str, float]
+    holds: HoldPlan
 
     @property
     def estimated_model(self) -> SensorModel:
@@ -76,6 +80,11 @@ class Cell:
         """The approach."""
         return get_approach(self.approach)
 
+    @property
+    def hold(self) -> Hold:
+        """What is known of the holds, without what follows from their attitudes."""
+        return self.holds.hold(self.positions.n_positions)
+
     def seed(self, seed: int, block: int) -> np.random.SeedSequence:
         """Seed of one block of replicates.
 
@@ -90,6 +99,9 @@ class Cell:
             # What a set-up does without is not part of it, so that new things leave old seeds be.
             {key: value for key, value in asdict(self.noise).items() if value != ()},
         ]
+        holds = replace(self.holds, seed=HoldPlan().seed)
+        if holds != HoldPlan():
+            identity.append(asdict(holds))
         digest = hashlib.sha256(json.dumps(identity).encode()).digest()
         words = np.frombuffer(digest, dtype="<u4").tolist()
         return np.random.SeedSequence([seed, *words], spawn_key=(block,))
@@ -106,9 +118,15 @@ class Cell:
                 **data,
                 "effects": tuple(data["effects"]),
                 "simulated_effects": tuple(data["simulated_effects"]),
-                "noise": Noise(**{**data["noise"], "effects": tuple(data["noise"]["effects"])}),
+                "noise": Noise(**_tuples(data["noise"])),
+                "holds": HoldPlan(**_tuples(data["holds"])),
             }
         )
+
+
+def _tuples(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Plain data with tuples for lists."""
+    return {k: tuple(v) if isinstance(v, list) else v for k, v in data.items()}
 
 
 def study_cells(study: StudyConfig) -> list[Cell]:
@@ -153,7 +171,9 @@ def _grid_cells(study: StudyConfig, grid: Grid) -> Iterable[Cell]:
         ]
         effects = tuple(e.spec for e in get_model(model, study.models).effects)
         simulated = (
-            effects if study.simulated_effects == ["model"] else tuple(study.simulated_effects)
+            effects
+            if study.simulated_effects == ["model"]
+            else tuple(get_effect(e).spec for e in study.simulated_effects)
         )
         yield Cell(
             name="/".join([model, scheme, approach, *changed]),
@@ -172,6 +192,7 @@ def _grid_cells(study: StudyConfig, grid: Grid) -> Iterable[Cell]:
             ),
             gravity=study.gravity_mps2,
             truth=study.truth(dict.fromkeys([*effects, *simulated])),
+            holds=study.hold_plan,
         )
 
 

@@ -59,7 +59,11 @@ def simulate_cell(cell: Cell, seed: int) -> CellResult:
     """
     simulated, estimated, approach = cell.simulated_model, cell.estimated_model, cell.conditions
     ideal = session(
-        simulated, simulated.vector(cell.truth), cell.positions.directions, cell.gravity
+        simulated,
+        simulated.vector(cell.truth),
+        cell.positions.directions,
+        cell.gravity,
+        cell.hold,
     )
     results = []
     for block, first in enumerate(range(0, cell.replicates, BLOCK)):
@@ -150,6 +154,7 @@ def simulate_batch(
                 cell.conditions,
                 cell.noise,
                 gravity=cell.gravity,
+                hold=cell.hold,
             )
             if not design.estimable:
                 log.info("%d/%d %s: %s", number, len(cells), cell.name, design.reason)

@@ -58,6 +58,7 @@ def summarise_batch(
             cell.noise,
             cell.estimated_model.vector(cell.truth),
             cell.gravity,
+            cell.hold,
         )
         fits = Fits.of(cell, found.get(cell.name))
         rows["cells"].append(_cell_row(cell, design, fits))
@@ -280,13 +281,15 @@ def _leveling_row(cell: Cell, fits: Fits, settings: Mapping[str, Any]) -> pd.Dat
     rms = q95 = np.full(2, np.nan)
     if len(fits.estimates):
         simulated, estimated = cell.simulated_model, cell.estimated_model
+        forces = cap_forces(settings["max_tilt_gon"] * GON, settings["attitudes"], cell.gravity)
         error = leveling_error(
             simulated,
             simulated.vector(cell.truth),
             estimated,
             fits.estimates[:, : estimated.n_parameters],
-            cap_forces(settings["max_tilt_gon"] * GON, settings["attitudes"], cell.gravity),
+            forces,
             cell.gravity,
+            cell.holds.use(forces, cell.positions.n_positions),
         )
         rms, q95 = error.rms, error.quantile(0.95)
     row = _labels(cell)

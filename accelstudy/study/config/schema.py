@@ -15,8 +15,9 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from accelstudy.approaches import approach_names, get_approach
 from accelstudy.design import diagnose
-from accelstudy.effects import get_effect
+from accelstudy.effects import Effect, get_effect
 from accelstudy.errors import InputError
+from accelstudy.hold_plan import HoldPlan
 from accelstudy.models import MODELS, PRESETS, get_model
 from accelstudy.noise_effects import get_noise_effect
 from accelstudy.schemes import get_scheme, scheme_names
@@ -37,6 +38,10 @@ from accelstudy.units import STANDARD_GRAVITY, to_si
 
 CLAIMED_EFFECTS = ("bias", "scale", "nonorthogonality")
 """Effects that the model of the paper's claims and figures has."""
+
+
+Ends = tuple[Finite, Finite]
+"""Two numbers, from and to."""
 
 
 class Block(BaseModel):
@@ -82,6 +87,28 @@ class NoiseConfig(Block):
         description="noise effects of the forces, e.g. heavy_tails(nu=3), in the order in which "
         "they work; the calibration does not know of them",
     )
+
+
+class HoldsConfig(Block):
+    """Conditions of the holds, on which some effects depend."""
+
+    interval_s: Positive | None = Field(None, description="time between holds")
+    temperature_degC: Ends | None = Field(None, description="temperatures from and to")
+    temperature_order: Literal["linear", "ABBA", "random"] = Field(
+        "linear", description="course of the temperature; ABBA: in quarters of the session"
+    )
+    vibration_mps2: Ends | None = Field(
+        None, description="rms of the vibration, drawn for each hold between these"
+    )
+    yaw: Literal["none", "random"] = Field("none", description="yaw of the robot: zero, or drawn")
+
+
+HOLD_KEYS = {
+    "time": "holds.interval_s",
+    "temperature": "holds.temperature_degC",
+    "vibration": "holds.vibration_mps2",
+}
+"""Columns of the holds and the keys that provide them."""
 
 
 class Quantity(Block):
@@ -153,8 +180,11 @@ class StudyConfig(Block):
     seed: Seed = Field(description="seed of all random numbers")
     gravity_mps2: Positive = Field(STANDARD_GRAVITY, description="true local gravity")
     noise: NoiseConfig = NoiseConfig()
+    holds: HoldsConfig = HoldsConfig()
     sensor: dict[str, Quantity] = Field(
-        default_factory=dict, description="true parameters of the simulated sensor, by effect"
+        default_factory=dict,
+        description="true parameters of the simulated sensor, by effect: its name, or its name "
+        "with settings",
     )
     simulated_effects: OneOrMore[str] = Field(
         default=["model"],
@@ -198,9 +228,15 @@ class StudyConfig(Block):
         if self.simulated_effects != ["model"]:
             with _at("simulated_effects"):
                 SensorModel.of("simulated", self.simulated_effects)
+        with _at("holds"):
+            plan = self.hold_plan
+        if self.simulated_effects != ["model"]:
+            _check_columns(plan, map(get_effect, self.simulated_effects))
         for index, grid in enumerate(self.grids):
             with _at(f"grids.{index}.models"):
-                self.model_names(grid.models)
+                names = self.model_names(grid.models)
+            for name in names:
+                _check_columns(plan, get_model(name, self.models).effects)
             with _at(f"grids.{index}.schemes"):
                 _known_schemes(grid.schemes)
             with _at(f"grids.{index}.approaches"):
@@ -228,6 +264,11 @@ class StudyConfig(Block):
                 )
         with _at("sensitivity.scheme"):
             scheme = get_scheme(settings.scheme)
+        if model.hold_columns:
+            raise ValueError(
+                f"sensitivity.model: {settings.model!r} depends on the {model.hold_columns[0]} of "
+                "each hold, and leveling is analysed without; choose another model"
+            )
         for name in ("roll_gon", "pitch_gon"):
             if self.paper and 0 not in getattr(settings, name):
                 raise ValueError(f"sensitivity.{name}: must contain 0, as paper: true looks there")
@@ -292,6 +333,19 @@ class StudyConfig(Block):
         return [get_model(name, self.models).name for name in names]
 
     @property
+    def hold_plan(self) -> HoldPlan:
+        """Conditions of the holds."""
+        holds = self.holds
+        return HoldPlan(
+            interval=holds.interval_s,
+            temperature=holds.temperature_degC,
+            temperature_order=holds.temperature_order,
+            vibration=holds.vibration_mps2,
+            yaw=holds.yaw,
+            seed=self.seed,
+        )
+
+    @property
     def sigma_force(self) -> float:
         """Default noise of a position's mean, m/s²."""
         return self.position_sigma(self.noise.sensor.sigma_mps2)
@@ -306,9 +360,10 @@ class StudyConfig(Block):
     def truth(self, effects: Iterable[str]) -> dict[str, float]:
         """Return the true parameters of the given effects in SI; those not configured are zero."""
         values: dict[str, float] = {}
-        for name in effects:
-            for i, parameter in enumerate(get_effect(name).parameters):
-                quantity = self.sensor.get(name)
+        given = {**self.sensor, **{get_effect(k).spec: v for k, v in self.sensor.items()}}
+        for effect in map(get_effect, effects):
+            quantity = given.get(effect.spec, given.get(effect.name))
+            for i, parameter in enumerate(effect.parameters):
                 values[parameter.name] = (
                     float(to_si(quantity.value[i], quantity.unit, parameter.unit))
                     if quantity
@@ -321,6 +376,15 @@ class StudyConfig(Block):
         """Hash of the whole configuration, defaults included."""
         text = json.dumps(self.model_dump(mode="json"), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _check_columns(plan: HoldPlan, effects: Iterable[Effect]) -> None:
+    for effect in effects:
+        if column := plan.missing(effect):
+            raise ValueError(
+                f"{HOLD_KEYS[column]}: missing; the effect {effect.name!r} needs the {column} of "
+                "each hold"
+            )
 
 
 class _at:

@@ -1,0 +1,123 @@
+"""Under what conditions the holds of a simulated session are made."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.effects import Effect, Hold
+from accelstudy.errors import InputError, UnknownNameError
+from accelstudy.leveling import roll_pitch
+from accelstudy.models import compose
+
+Array = NDArray[np.float64]
+
+CHOICES = {"temperature_order": ("linear", "ABBA", "random"), "yaw": ("none", "random")}
+LEAST = {"temperature": -273.15, "vibration": 0.0}
+PROVIDES = {"time": "interval", "temperature": "temperature", "vibration": "vibration"}
+"""Columns of the holds that are there only if the plan says so, and what of it does."""
+
+_STREAM = 1000
+"""Sets what is drawn here apart from all else that is drawn from the same seed."""
+
+
+@dataclass(frozen=True)
+class HoldPlan:
+    """Conditions of the holds.
+
+    Parameters
+    ----------
+    interval : float, s between holds; None leaves out the time
+    temperature : (float, float), °C, from and to, optional
+    temperature_order : "linear", "ABBA" (in quarters of the session) or "random"
+    vibration : (float, float), m/s² rms, between which it is drawn for each hold, optional
+    yaw : "none" (zero) or "random"
+    seed : int, of what is drawn
+    """
+
+    interval: float | None = None
+    temperature: tuple[float, float] | None = None
+    temperature_order: str = "linear"
+    vibration: tuple[float, float] | None = None
+    yaw: str = "none"
+    seed: int = 1
+
+    def __post_init__(self) -> None:
+        for key, known in CHOICES.items():
+            if getattr(self, key) not in known:
+                raise UnknownNameError(key, getattr(self, key), known)
+        if self.interval is not None and not 0 < self.interval < math.inf:
+            raise InputError(f"interval: must be above 0, not {self.interval:g}")
+        for key, least in LEAST.items():
+            pair = getattr(self, key)
+            if pair is not None and not all(least <= value < math.inf for value in pair):
+                raise InputError(
+                    f"{key}: must be two numbers of {least:g} or more, not {pair[0]:g}:{pair[1]:g}"
+                )
+
+    def missing(self, effect: Effect) -> str | None:
+        """Column that an effect needs and the plan does not provide; None if there is all."""
+        needed = compose(effect.spec, (effect.spec,)).hold_columns
+        return next(
+            (c for c, key in PROVIDES.items() if c in needed and getattr(self, key) is None), None
+        )
+
+    def hold(self, n: int) -> Hold:
+        """Return the holds of a session of n positions, without what follows from attitudes."""
+        course = {
+            "linear": np.linspace(0, 1, n),
+            "ABBA": np.array([0.0, 1.0, 1.0, 0.0])[4 * np.arange(n) // n],
+            "random": self._rng(0).uniform(0, 1, n),
+        }
+        return Hold(
+            time=None if self.interval is None else self.interval * np.arange(float(n)),
+            temperature=_between(self.temperature, course[self.temperature_order]),
+            vibration=_between(self.vibration, self._rng(1).uniform(0, 1, n)),
+            yaw=self._rng(2).uniform(-np.pi, np.pi, n) if self.yaw == "random" else np.zeros(n),
+        )
+
+    def use(self, forces: Array, n: int) -> Hold:
+        """Return conditions in which a sensor is used that was calibrated in n positions.
+
+        Parameters
+        ----------
+        forces : (k, 3) array, m/s², of the attitudes in which it is used
+        n : int
+
+        Returns
+        -------
+        Hold
+            The ranges of conditions are those of the calibration, and the attitudes are taken in
+            random order.
+        """
+        rng = self._rng(3)
+        k = len(forces)
+        session = None if self.interval is None else (0.0, self.interval * (n - 1))
+        roll, pitch = roll_pitch(tuple(forces.T))
+        time, temperature, vibration = (
+            _between(ends, rng.uniform(0, 1, k))
+            for ends in (session, self.temperature, self.vibration)
+        )
+        order = rng.permutation(k)
+        steps = Hold().with_steps(forces[order])
+        back = np.argsort(order)
+        return Hold(
+            time=time,
+            temperature=temperature,
+            vibration=vibration,
+            roll=roll,
+            pitch=pitch,
+            yaw=np.zeros(k),
+            **{name: steps.column(name)[back] for name in ("step_x", "step_y", "step_z")},
+        )
+
+    def _rng(self, stream: int) -> np.random.Generator:
+        return np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(_STREAM, stream)))
+
+
+def _between(ends: tuple[float, float] | None, part: Array) -> Array | None:
+    """Values between two ends; None without them."""
+    return None if ends is None else ends[0] + (ends[1] - ends[0]) * part
