@@ -34,8 +34,8 @@ NUMBERS = {
     **{"axis_nonperpendicularity": 1},
 }
 RIG = {
-    *("mounting_rotation", "gravity_error", "base_tilt", "encoder_offset", "encoder_scale"),
-    *("encoder_eccentricity", "axis_nonperpendicularity"),
+    *("gravity_error", "base_tilt", "encoder_offset", "encoder_scale", "encoder_eccentricity"),
+    "axis_nonperpendicularity",
 }
 EACH = pytest.mark.parametrize("name", [*NINE, *NUMBERS])
 
@@ -333,7 +333,7 @@ def test_a_wrong_gravity_is_a_common_scale(approach):
 
 
 def test_the_norm_of_gravity_is_blind_to_rotations_and_to_the_robot():
-    rotations = ("cross_axis_misalignment", *RIG)
+    rotations = ("cross_axis_misalignment", "mounting_rotation", *RIG)
     for name in rotations:
         assert design(name, approach=GRAVITY).rank == 9, name
     for name in NUMBERS:

@@ -232,6 +232,7 @@ class CalibrationProblem:
     def of(
         cls, model: SensorModel, approach: Approach, observed: Observations
     ) -> CalibrationProblem:
+        """Arrange what was observed."""
         forces = np.asarray(observed.forces, dtype=float)
         n = forces.shape[1]
         observations, sigmas = [forces], [np.broadcast_to(observed.sigma_force, (n, 3))]

@@ -1,12 +1,13 @@
 """Whether a named effect helps where it was neither chosen nor fitted: on held-out positions.
 
 Base model and extended model are fitted to some positions and predict the others. With r the
-misclosures of unit weight that the base model leaves there, A₂ their derivatives, C the cofactors of
-the base parameters and d = r − r' the correction that the extended model makes,
+misclosures of unit weight that the base model leaves there, A₂ their derivatives, C the cofactors
+of the base parameters and d = r − r' the correction that the extended model makes,
 
     z = dᵀr / √(dᵀ (I + A₂ C A₂ᵀ) d)
 
-is standard normal if the base model is complete, whatever effect was chosen on the fitted positions.
+is standard normal if the base model is complete, whatever effect was chosen on the fitted
+positions.
 """
 
 from __future__ import annotations
@@ -167,4 +168,4 @@ def _predict(
     lower = np.linalg.cholesky(np.einsum("nco,no,ndo->ncd", b, problem.cofactors, b))
     r = np.linalg.solve(lower, at.psi[:, 0].T[..., None]).ravel()
     a = np.linalg.solve(lower, np.moveaxis(at.jac_parameters[:, :, 0], -1, 0))
-    return r, a.reshape(len(r), -1)
+    return np.asarray(r), np.asarray(a.reshape(len(r), -1))

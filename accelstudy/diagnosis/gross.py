@@ -100,20 +100,19 @@ def _by_norm(campaign: Campaign) -> Recognised | None:
 def _axes(campaign: Campaign) -> list[tuple[str, Campaign]]:
     """Try the 48 signed permutations of the axes; return the best."""
     correlation = _expected(campaign).T @ campaign.forces
-    best, chosen = -np.inf, (np.arange(3), np.ones(3))
-    for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
-        value = sum(
-            s * correlation[i, o] for i, (o, s) in enumerate(zip(order, signs, strict=True))
-        )
-        if value > best:
-            best, chosen = value, (np.array(order), np.array(signs))
-    order, signs = chosen
+    best, order, signs = -np.inf, (0, 1, 2), (1.0, 1.0, 1.0)
+    for x, y, z in permutations(range(3)):
+        for a, b, c in product((1.0, -1.0), repeat=3):
+            value = a * correlation[0, x] + b * correlation[1, y] + c * correlation[2, z]
+            if value > best:
+                best, order, signs = value, (x, y, z), (a, b, c)
     words = ", ".join(
         f"{axis} is read as {'-' if s < 0 else ''}{'xyz'[o]}"
         for axis, o, s in zip("xyz", order, signs, strict=True)
     )
-    sd = None if campaign.sd is None else campaign.sd[:, order]
-    mended = replace(campaign, forces=campaign.forces[:, order] * signs, sd=sd)
+    columns = list(order)
+    sd = None if campaign.sd is None else campaign.sd[:, columns]
+    mended = replace(campaign, forces=campaign.forces[:, columns] * np.array(signs), sd=sd)
     return [(f"axes are swapped: {words}", mended)]
 
 

@@ -90,7 +90,7 @@ class Frame:
             residuals=Residuals.of(solution),
             ideal=ideal,
             forces=forces,
-            sensed=np.linalg.solve(t, forces.T).T,
+            sensed=np.asarray(np.linalg.solve(t, forces.T).T),
             angles=angles,
             hold=implied_hold(solution, angles),
         )
@@ -164,7 +164,7 @@ def cosines(a: Array, b: Array) -> Array:
 
 
 def implied_hold(solution: Solution, angles: Array) -> Hold:
-    """Complete the holds with what the approach implies: attitude, and yaw 0 where none is given."""
+    """Complete the holds with what is implied: the attitude, and yaw 0 where none is given."""
     hold = solution.observed.hold or Hold()
     yaw = np.zeros(len(angles)) if hold.yaw is None else hold.yaw
     return replace(hold, roll=angles[:, 0], pitch=angles[:, 1], yaw=yaw)

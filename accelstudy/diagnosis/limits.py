@@ -91,8 +91,8 @@ def upper_limits(setting: Setting, variance: float, named: Sequence[str]) -> lis
 def visibilities(setting: Setting, alpha: float = 0.001, power: float = POWER) -> list[Visibility]:
     """What a campaign can show of each effect that is not in its model.
 
-    The MDB is the size √(λ0 / dᵀd) of a single parameter whose test of level `alpha` has `power`; for
-    the minimal identifiable bias only what the nearest rival cannot imitate of d counts.
+    The MDB is the size √(λ0 / dᵀd) of a single parameter whose test of level `alpha` has `power`;
+    for the minimal identifiable bias only what the nearest rival cannot imitate of d counts.
     """
     root = np.sqrt(noncentrality(1, alpha, power))
     rows = []

@@ -1,13 +1,13 @@
 """Naming: how probable each hypothesis is, given that something is missing.
 
-For a hypothesis with an orthonormal basis Q (r, l) of its signature, Zellner's g-prior and an unknown
-noise level give the evidence in closed form (Liang et al. 2008, eq. 5 and 6),
+For a hypothesis with an orthonormal basis Q (r, l) of its signature, Zellner's g-prior and an
+unknown noise level give the evidence in closed form (Liang et al. 2008, eq. 5 and 6),
 
     log m = (r − l)/2 · log(1 + g) − r/2 · log(1 + g (1 − R²)),   R² = ‖Qᵀz‖²/‖z‖²,
 
-relative to that of white noise alone, with g at its most likely value. Shapes of an effect share its
-prior probability. Coloured noise is a hypothesis with a covariance matrix instead of a mean. So is
-"unknown": something in one of the groups of regressors that is none of the effects.
+relative to that of white noise alone, with g at its most likely value. Shapes of an effect share
+its prior probability. Coloured noise is a hypothesis with a covariance matrix instead of a mean;
+"unknown" is something in one of the groups of regressors that is none of the effects.
 """
 
 from __future__ import annotations

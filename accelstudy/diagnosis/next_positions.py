@@ -112,7 +112,7 @@ def _prediction(frame: Frame, hypothesis: Hypothesis, forces: Array, hold: Hold)
     """Correction of the base prediction of the output that a hypothesis makes, (k, 3), m/s²."""
     assert hypothesis.effect is not None
     g = frame.solution.gravity
-    angles = np.column_stack([hold.roll, hold.pitch])
+    angles = np.column_stack([hold.column("roll"), hold.column("pitch")])
     residuals = frame.residuals
     model = frame.solution.model
 

@@ -177,7 +177,7 @@ def resolution_test(forces: Array, sigma: float) -> NoiseTest:
     )
 
 
-def within_hold_test(z: Array, unit: float, sd: Array, n_samples: Array) -> NoiseTest:
+def within_hold_test(z: Array, unit: float, sd: Array, n_samples: NDArray[np.int_]) -> NoiseTest:
     """Whether the means scatter more than white noise within the holds explains.
 
     Parameters
@@ -185,7 +185,7 @@ def within_hold_test(z: Array, unit: float, sd: Array, n_samples: Array) -> Nois
     z : (r,) array of unit weight
     unit : float, m/s², σ of unit weight
     sd : (n, 3) array, m/s², of the samples within the holds
-    n_samples : (n,) array
+    n_samples : (n,) int array
     """
     white = float(np.mean(sd**2 / n_samples[:, None]))
     scatter = float(z @ z) / len(z) * unit**2

@@ -727,7 +727,7 @@ class _Run:
         n, c = self.campaign.n_positions, self.approach.n_conditions
         u = self.solution.design.shape[1]
         k = sum(h.dim for h, _, _ in chosen)
-        count = int(round(n * gaps.HELD_OUT))
+        count = round(n * gaps.HELD_OUT)
         needed = int(np.ceil((u + k + 3) / c))
         if n - count < needed:
             count = n - needed

@@ -1,9 +1,10 @@
 """Screening: which hypotheses explain more of the residuals than chance does.
 
 Each is tested by the share t = ‖Qᵀz‖²/‖z‖² of the residuals that its space takes up, which is
-Beta(l/2, (r − l)/2) if nothing is missing, whatever the noise level is (the F test). A candidate has
-many shapes and there are many candidates, so the smallest of all p-values is what counts; how small
-it becomes by chance is found by simulation of residuals without any effect, over the same shapes.
+Beta(l/2, (r − l)/2) if nothing is missing, whatever the noise level is (the F test). A candidate
+has many shapes and there are many candidates, so the smallest of all p-values is what counts; how
+small it becomes by chance is found by simulation of residuals without any effect, over the same
+shapes.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
 Array = NDArray[np.float64]
@@ -83,7 +84,7 @@ def screen(candidates: Mapping[str, Sequence[Array]], z: Array, null: Array) -> 
             smallest = np.minimum(smallest, p_of_share(shares, dim, r))
         number = _effective_number(smallest) if len(shapes) > 1 else 1.0
         single[name] = values
-        candidate[name] = _any_of(values.min(), number)
+        candidate[name] = float(_any_of(values.min(), number))
         by_chance.append(_any_of(smallest, number))
     number = _effective_number(np.min(by_chance, axis=0)) if by_chance else 1.0
     return Screening(
@@ -100,6 +101,6 @@ def _effective_number(smallest: Array) -> float:
     return float(np.log1p(-LEVEL) / np.log1p(-min(quantile, LEVEL)))
 
 
-def _any_of(p: Array | float, number: float) -> Array | float:
+def _any_of(p: ArrayLike, number: float) -> Array:
     """Probability that the smallest of independent p-values is below p."""
-    return -np.expm1(number * np.log1p(-np.minimum(p, 1 - 1e-16)))
+    return np.asarray(-np.expm1(number * np.log1p(-np.minimum(p, 1 - 1e-16))))
