@@ -24,6 +24,8 @@ USUAL_MISFIT = 0.15
 """Share of gravity by which a sensor may miss its robot before calibration."""
 CLEARLY = 4.0
 """How many times better an explanation must fit."""
+ENOUGH = 8
+"""Positions from which on an affine calibration says something of the others."""
 FORCE_UNITS = {
     "the forces are in g": STANDARD_GRAVITY,
     "the forces are in mg": 1e-3 * STANDARD_GRAVITY,
@@ -55,20 +57,15 @@ def recognise(campaign: Campaign, approach: Approach) -> Recognised | None:
     """Recognise a wrong unit, swapped axes or exchanged rows; None if all looks right."""
     if not approach.uses_angles or campaign.angles is None:
         return _by_norm(campaign)
-    if _misfit(campaign) < USUAL_MISFIT:
-        return _rows(campaign)
-    tried = [Recognised("axis_error", *mended) for mended in _axes(campaign)]
-    scaled = _by_norm(campaign)
-    if scaled is not None:
-        tried.append(scaled)
-    for reason, factor in ANGLE_UNITS.items():
-        yaw = None if campaign.yaw is None else campaign.yaw * factor
-        mended = replace(campaign, angles=campaign.angles * factor, yaw=yaw)
-        tried.append(Recognised("unit_error", reason, mended))
-    best = min(tried, key=lambda one: _misfit(one.mended))
-    if CLEARLY * _misfit(best.mended) < _misfit(campaign):
-        return best
-    return _rows(campaign)
+    if _misfit(campaign) >= USUAL_MISFIT:
+        tried = [_axes(campaign)]
+        scaled = _by_norm(campaign)
+        if scaled is not None:
+            tried.append(scaled)
+        best = min(tried, key=lambda one: _misfit(one.mended))
+        if CLEARLY * _misfit(best.mended) < _misfit(campaign):
+            return best
+    return _by_angles(campaign) or _rows(campaign)
 
 
 def _misfit(campaign: Campaign) -> float:
@@ -97,7 +94,7 @@ def _by_norm(campaign: Campaign) -> Recognised | None:
     return None
 
 
-def _axes(campaign: Campaign) -> list[tuple[str, Campaign]]:
+def _axes(campaign: Campaign) -> Recognised:
     """Try the 48 signed permutations of the axes; return the best."""
     correlation = _expected(campaign).T @ campaign.forces
     best, order, signs = -np.inf, (0, 1, 2), (1.0, 1.0, 1.0)
@@ -113,7 +110,27 @@ def _axes(campaign: Campaign) -> list[tuple[str, Campaign]]:
     columns = list(order)
     sd = None if campaign.sd is None else campaign.sd[:, columns]
     mended = replace(campaign, forces=campaign.forces[:, columns] * np.array(signs), sd=sd)
-    return [(f"axes are swapped: {words}", mended)]
+    return Recognised("axis_error", f"axes are swapped: {words}", mended)
+
+
+def _by_angles(campaign: Campaign) -> Recognised | None:
+    """Recognise a unit of the angles by how well any affine sensor could fit them."""
+    if campaign.n_positions < ENOUGH:
+        return None
+    for reason, factor in ANGLE_UNITS.items():
+        yaw = None if campaign.yaw is None else campaign.yaw * factor
+        mended = replace(campaign, angles=np.multiply(campaign.angles, factor), yaw=yaw)
+        if CLEARLY * _affine_misfit(mended) < _affine_misfit(campaign):
+            return Recognised("unit_error", reason, mended)
+    return None
+
+
+def _affine_misfit(campaign: Campaign) -> float:
+    """Rms difference that remains after an affine calibration, m/s²."""
+    design = np.column_stack([campaign.forces, np.ones(campaign.n_positions)])
+    expected = _expected(campaign)
+    solution = np.linalg.lstsq(design, expected, rcond=None)[0]
+    return float(np.sqrt(np.mean((design @ solution - expected) ** 2)))
 
 
 def _rows(campaign: Campaign) -> Recognised | None:
@@ -121,7 +138,7 @@ def _rows(campaign: Campaign) -> Recognised | None:
     expected = _expected(campaign)
     forces = campaign.forces
     design = np.column_stack([forces, np.ones(len(forces))])
-    if len(forces) < 8:
+    if len(forces) < ENOUGH:
         return None
     weights = np.ones(len(forces))
     for _ in range(50):  # least absolute deviations: a few wrong rows do not matter
@@ -130,13 +147,14 @@ def _rows(campaign: Campaign) -> Recognised | None:
         distance = np.linalg.norm(design @ solution - expected, axis=1)
         weights = 1 / np.maximum(distance, 1e-4 * campaign.gravity)
     cost = np.linalg.norm((design @ solution)[:, None] - expected[None], axis=2)
-    rows, belongs = linear_sum_assignment(cost**2)
+    # Repeated attitudes could be exchanged at will, so an exchange has to gain something.
+    usual = np.median(np.diag(cost))
+    charge = np.where(np.eye(len(forces), dtype=bool), 0.0, (CLEARLY * usual) ** 2)
+    rows, belongs = linear_sum_assignment(cost**2 + charge)
     moved = np.flatnonzero(belongs != rows)
     if not len(moved):
         return None
     before, after = cost[moved, moved], cost[moved, belongs[moved]]
-    usual = np.median(cost[rows, belongs])
-    # Repeated attitudes can be exchanged at will; only a clear gain shows an exchange.
     clear = (before > CLEARLY * after) & (before > 20 * usual) & (before > 0.01 * campaign.gravity)
     if not np.all(clear):
         return None

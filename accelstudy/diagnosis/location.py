@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.diagnosis.hypotheses import Hypothesis, Setting, orthonormal, span
+from accelstudy.diagnosis.repeats import clusters
 from accelstudy.diagnosis.signatures import signature
 from accelstudy.effects import get_effect
 from accelstudy.errors import InputError
@@ -30,8 +31,6 @@ ROBOT = (
     "axis_nonperpendicularity",
 )
 PREVIOUS = ("hysteresis", "settling")
-SAME_ATTITUDE = 0.01
-"""Positions closer than this (chord of unit vectors) repeat each other."""
 
 
 def groups(setting: Setting) -> dict[str, Array]:
@@ -92,17 +91,6 @@ def groups(setting: Setting) -> dict[str, Array]:
     if contrasts:
         add("repeat", per_axis(np.column_stack(contrasts)))
     return found
-
-
-def clusters(forces: Array) -> NDArray[np.int_]:
-    """Label positions by attitude; positions with the same label repeat each other."""
-    unit = forces / np.linalg.norm(forces, axis=1, keepdims=True)
-    labels = -np.ones(len(unit), dtype=int)
-    for i in range(len(unit)):
-        if labels[i] < 0:
-            near = np.linalg.norm(unit - unit[i], axis=1) < SAME_ATTITUDE
-            labels[near & (labels < 0)] = i
-    return labels
 
 
 def locate(

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from accelstudy.diagnosis.repeats import clusters
 from accelstudy.diagnosis.residuals import Residuals
 
 Array = NDArray[np.float64]
@@ -154,8 +155,10 @@ def resolution_test(forces: Array, sigma: float) -> NoiseTest:
     """Whether the readings of an axis are whole multiples of a resolution that matters.
 
     The Rayleigh power of the readings is searched over resolutions from σ to 30 σ; without
-    quantisation n times the power is a standard exponential variable at each.
+    quantisation n times the power is a standard exponential variable at each. Of repeated attitudes
+    one counts, since their readings are alike for another reason.
     """
+    forces = forces[np.unique(clusters(forces))]
     n = len(forces)
     best, where = 0.0, 0.0
     extent = float(np.max(np.ptp(forces, axis=0)))

@@ -58,6 +58,8 @@ LEVEL_ADEQUATE = 0.01
 """Family-wise level at which something is still missing beside a named effect."""
 SURE = 0.7
 """Posterior probability from which on a name is given."""
+PRIOR = {COLOUR: 3.0}
+"""Prior weights beside 1 for each class: all real noise has some colour."""
 RIVAL = 0.5
 """Canonical cosine from which on an effect is listed as a rival."""
 AXES_DIFFER = 0.01
@@ -356,7 +358,7 @@ class _Run:
         """Posterior probabilities given that something is missing; a class under its first name."""
         evidence = {best.name: self.evidence[best.name] for best, _ in self.classes}
         evidence |= {name: self.evidence[name] for name in (COLOUR, UNKNOWN)}
-        return posterior(evidence)
+        return posterior(evidence, PRIOR)
 
     def rivals(self, best: Hypothesis, members: Sequence[str]) -> tuple[tuple[str, float], ...]:
         """Other effects with similar signatures, nearest first."""
@@ -516,7 +518,7 @@ class _Run:
             return "unknown", [], self.setting, "no effect of the catalogue explains it"
         evidence = {str(i): pair.log_evidence for i, pair in enumerate(pairs)}
         evidence |= {name: self.evidence[name] for name in (COLOUR, UNKNOWN)}
-        probabilities = posterior(evidence)
+        probabilities = posterior(evidence, PRIOR)
         top = next(iter(probabilities))
         if top in (COLOUR, UNKNOWN):
             if top == COLOUR and probabilities[top] >= SURE:

@@ -47,7 +47,7 @@ class Screening:
     @property
     def strongest(self) -> str:
         """Candidate with the smallest p-value."""
-        return min(self.p_family, key=lambda name: self.p_family[name])
+        return min(self.p_family, key=lambda name: self.p_family[name], default="")
 
 
 def share(basis: Array, z: Array) -> Array:

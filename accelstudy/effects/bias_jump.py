@@ -18,7 +18,8 @@ class BiasJump(Effect):
 
     def output(self, f, p, g, hold, xp):
         """Return c where t > t_c."""
-        after = (1 + xp.sign(hold.time - self.shape["t"])) / 2
+        sign = xp.sign(hold.time - self.shape["t"])
+        after = (sign + xp.abs(sign)) / 2
         return tuple(c * after for c in p)
 
     def candidates(self, hold, f, g):

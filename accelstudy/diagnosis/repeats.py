@@ -1,0 +1,20 @@
+"""Which positions repeat each other."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+SAME_ATTITUDE = 0.01
+"""Positions closer than this (chord of unit vectors) repeat each other."""
+
+
+def clusters(forces: NDArray[np.float64]) -> NDArray[np.int_]:
+    """Label positions by attitude; positions with the same label repeat each other."""
+    unit = forces / np.linalg.norm(forces, axis=1, keepdims=True)
+    labels = -np.ones(len(unit), dtype=int)
+    for i in range(len(unit)):
+        if labels[i] < 0:
+            near = np.linalg.norm(unit - unit[i], axis=1) < SAME_ATTITUDE
+            labels[near & (labels < 0)] = i
+    return labels
