@@ -11,16 +11,24 @@ from accelstudy.errors import InputError
 
 # Files that a stage does not use, so that an edit of them does not run it again. What is not named
 # counts: a new file runs everything again rather than nothing.
-_MEASURED = ("campaign/", "adjustment/quality/")
-_FRONT = ("cli.py", "figures/", "study/claims", "study/report.py", "study/job.py", *_MEASURED)
+_MEASURED = ("campaign/", "gross_errors/", "adjustment/quality/")
+_COMMANDS = ("cli.py", "catalogue.py")
+_FRONT = (
+    *_COMMANDS,
+    "figures/",
+    "study/claims",
+    "study/report.py",
+    "study/job.py",
+    *_MEASURED,
+)
 _TABLES = ("study/summary.py", "leveling_error.py", "closed_forms.py")
 _CONFIG = ("study/config/",)
 _UNUSED = {
     "simulate": (*_FRONT, *_TABLES, "sensitivity.py", *_CONFIG),
     "summarise": (*_FRONT, "sensitivity.py", *_CONFIG),
     "sensitivity": (*_FRONT, *_TABLES),
-    "claims": ("cli.py", "figures/", *_MEASURED),
-    "figures": ("cli.py", "study/claims", *_MEASURED),
+    "claims": (*_COMMANDS, "figures/", *_MEASURED),
+    "figures": (*_COMMANDS, "study/claims", *_MEASURED),
 }
 
 
