@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from accelstudy.effects import effect_names
@@ -260,6 +261,41 @@ def test_effects_of_the_models_families_and_approaches_have_colours_of_their_own
     for name in set(effect_names()) - modelled:
         assert style.group_colour(name) == style.FAMILIES[style.family(name)]
     assert {style.family(name) for name in set(effect_names()) - modelled} == set(style.FAMILIES)
+
+
+# Machado, Oliveira & Fernandes (2009), linear RGB, severity 1.
+EYES = {
+    "normal": np.eye(3),
+    "protanopia": [
+        [0.152286, 1.052583, -0.204868],
+        [0.114503, 0.786281, 0.099216],
+        [-0.003882, -0.048116, 1.051998],
+    ],
+    "deuteranopia": [
+        [0.367322, 0.860646, -0.227968],
+        [0.280085, 0.672501, 0.047413],
+        [-0.011820, 0.042940, 0.968881],
+    ],
+}
+
+
+def seen(colour, eye):
+    """Colour as CIE L*a*b* to an eye (D65)."""
+    rgb = np.array(to_rgb(colour))
+    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    to_xyz = [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
+    x, y, z = np.cbrt(to_xyz @ np.clip(np.array(EYES[eye]) @ linear, 1e-3, 1) / [0.95, 1, 1.09])
+    return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
+
+
+@pytest.mark.parametrize("eye", EYES)
+def test_colours_of_families_keep_apart(eye):
+    """A difference of 2 can be seen side by side; far apart in a figure it takes some more."""
+    others = [colour for _, colour in style.GROUPS.values()]
+    others += [*style.APPROACH_COLOURS.values(), *style.FAMILIES.values()]
+    for colour in style.FAMILIES.values():
+        distances = [np.linalg.norm(seen(colour, eye) - seen(o, eye)) for o in others]
+        assert sorted(distances)[1] > 15, colour
 
 
 def test_parameters_of_one_colour_differ_in_line_and_marker():

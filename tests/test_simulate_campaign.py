@@ -235,4 +235,4 @@ def test_settings_are_checked_in_python_too():
     with pytest.raises(InputError, match="size: must be above 0"):
         CampaignSettings(size=-1)
     with pytest.raises(InputError, match="vibration: must be two numbers of 0 or more"):
-        CampaignSettings(vibration=(-1, 1))
+        simulate(vibration=(-1, 1))

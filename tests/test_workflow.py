@@ -240,6 +240,8 @@ SEVERAL = {*STAGES}
         ("schemes/mclaren.py", SEVERAL),
         ("adjustment/gauss_helmert.py", SEVERAL),
         ("simulation.py", SEVERAL),
+        ("noise_effects/base.py", SEVERAL),
+        ("hold_plan.py", SEVERAL),
         ("study/simulate.py", SEVERAL),
         ("leveling_error.py", {"summarise", "claims", "figures"}),
         ("closed_forms.py", {"summarise", "claims", "figures"}),
@@ -248,6 +250,8 @@ SEVERAL = {*STAGES}
         ("study/claims/base.py", {"claims"}),
         ("study/claims.html.j2", {"claims"}),
         ("cli.py", set()),
+        ("catalogue.py", set()),
+        ("gross_errors/base.py", set()),
     ],
 )
 def test_hash_of_the_code_that_a_stage_uses(name, stages, tmp_path, monkeypatch):

@@ -95,7 +95,6 @@ class CampaignSettings:
         for key in ("sigma", "gravity", "size"):
             if not 0 < getattr(self, key) < math.inf:
                 raise InputError(f"{key}: must be above 0, not {getattr(self, key):g}")
-        self.holds.hold(1)
 
     @property
     def holds(self) -> HoldPlan:

@@ -115,11 +115,11 @@ def _axes(campaign: Campaign) -> Recognised:
 
 def _by_angles(campaign: Campaign) -> Recognised | None:
     """Recognise a unit of the angles by how well any affine sensor could fit them."""
-    if campaign.n_positions < ENOUGH:
+    if campaign.angles is None or campaign.n_positions < ENOUGH:
         return None
     for reason, factor in ANGLE_UNITS.items():
         yaw = None if campaign.yaw is None else campaign.yaw * factor
-        mended = replace(campaign, angles=np.multiply(campaign.angles, factor), yaw=yaw)
+        mended = replace(campaign, angles=campaign.angles * factor, yaw=yaw)
         if CLEARLY * _affine_misfit(mended) < _affine_misfit(campaign):
             return Recognised("unit_error", reason, mended)
     return None

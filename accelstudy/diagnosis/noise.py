@@ -154,30 +154,28 @@ def tail_test(residuals: Residuals, null: Array) -> NoiseTest:
 def resolution_test(forces: Array, sigma: float) -> NoiseTest:
     """Whether the readings of an axis are whole multiples of a resolution that matters.
 
-    The Rayleigh power of the readings is searched over resolutions from σ to 30 σ; without
-    quantisation n times the power is a standard exponential variable at each. Of repeated attitudes
-    one counts, since their readings are alike for another reason.
+    The Rayleigh power of the readings is searched over resolutions q from σ to 30 σ; without
+    quantisation n times the power is a standard exponential variable at each. The attitudes may
+    form a grid themselves, but noise of σ about it leaves a power of exp(−(2π σ/q)²) at most, so
+    only more than that counts, and of repeated attitudes only one.
     """
     forces = forces[np.unique(clusters(forces))]
     n = len(forces)
     best, where = 0.0, 0.0
     extent = float(np.max(np.ptp(forces, axis=0)))
-    steps = min(int(2 * extent / sigma), 100_000)
-    frequencies = np.linspace(1 / (30 * sigma), 1 / sigma, max(steps, 2))
+    steps = max(2, min(int(2 * extent / sigma), 100_000))
+    frequencies = np.linspace(1 / (30 * sigma), 1 / sigma, steps)
     for column in forces.T:
         for block in np.array_split(frequencies, max(1, steps // 4096)):
             power = np.abs(np.exp(2j * np.pi * np.outer(block, column)).mean(axis=1)) ** 2
+            blurred = np.exp(-((2 * np.pi * sigma * block) ** 2))
+            power = np.where(power > (1 + blurred) / 2, power, 0.0)
             k = int(np.argmax(power))
             if power[k] > best:
                 best, where = float(power[k]), 1 / block[k]
-    p = -np.expm1(3 * len(frequencies) * np.log1p(-np.exp(-min(n * best, 700.0))))
-    return NoiseTest(
-        "quantisation",
-        n * best,
-        float(min(p, 1.0)),
-        (where,),
-        f"readings in steps of {1e3 * where:.2f} mm/s²",
-    )
+    p = -np.expm1(3 * steps * np.log1p(-np.exp(-min(n * best, 700.0)))) if best else 1.0
+    remark = f"readings in steps of {1e3 * where:.2f} mm/s²" if best else "no steps in the readings"
+    return NoiseTest("quantisation", n * best, float(min(p, 1.0)), (where,), remark)
 
 
 def within_hold_test(z: Array, unit: float, sd: Array, n_samples: NDArray[np.int_]) -> NoiseTest:

@@ -81,13 +81,13 @@ GROUPS = {
 }
 """Group of parameters (an effect, or what else varies): its label and its colour."""
 
-# Of Tol's muted colours. One cannot tell two dozen colours apart, so effects beyond the registered
-# models share the colour of their family.
+# One cannot tell two dozen colours apart, so effects beyond the registered models share the colour
+# of their family. These keep apart from all others with normal and with red-green blind eyes.
 FAMILIES = {
     "rig": "#332288",
-    "environment": "#CC6677",
-    "history": "#44AA99",
-    "nonlinearity": "#882255",
+    "environment": "#5C0A1E",
+    "history": "#66C2C2",
+    "nonlinearity": "#99CC66",
 }
 
 

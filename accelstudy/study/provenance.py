@@ -11,8 +11,16 @@ from accelstudy.errors import InputError
 
 # Files that a stage does not use, so that an edit of them does not run it again. What is not named
 # counts: a new file runs everything again rather than nothing.
-_MEASURED = ("campaign/", "adjustment/quality/")
-_FRONT = ("cli.py", "figures/", "study/claims", "study/report.py", "study/job.py", *_MEASURED)
+_MEASURED = ("campaign/", "gross_errors/", "adjustment/quality/")
+_COMMANDS = ("cli.py", "catalogue.py")
+_FRONT = (
+    *_COMMANDS,
+    "figures/",
+    "study/claims",
+    "study/report.py",
+    "study/job.py",
+    *_MEASURED,
+)
 _TABLES = ("study/summary.py", "leveling_error.py", "closed_forms.py")
 _CONFIG = ("study/config/",)
 _STUDY = (
@@ -23,10 +31,10 @@ _UNUSED = {
     "simulate": (*_FRONT, *_TABLES, "sensitivity.py", *_CONFIG),
     "summarise": (*_FRONT, "sensitivity.py", *_CONFIG),
     "sensitivity": (*_FRONT, *_TABLES),
-    "claims": ("cli.py", "figures/", *_MEASURED),
-    "figures": ("cli.py", "study/claims", *_MEASURED),
-    "campaign": ("cli.py", "campaign/overview", *_STUDY),
-    "overview": ("cli.py", "figures/", "adjustment/", *_STUDY),
+    "claims": (*_COMMANDS, "figures/", *_MEASURED),
+    "figures": (*_COMMANDS, "study/claims", *_MEASURED),
+    "campaign": (*_COMMANDS, "campaign/overview", *_STUDY),
+    "overview": (*_COMMANDS, "figures/", "adjustment/", *_STUDY),
 }
 
 
