@@ -54,7 +54,7 @@ LEVEL_EFFECTS = 0.025
 """Family-wise level of the tests of effects, bumped positions and groups of regressors."""
 LEVEL_NOISE = 0.015
 """Family-wise level of the tests of the noise; together they stay below 5 %."""
-LEVEL_ADEQUATE = 0.01
+LEVEL_ADEQUATE = 0.004
 """Family-wise level at which something is still missing beside a named effect."""
 SURE = 0.7
 """Posterior probability from which on a name is given."""
