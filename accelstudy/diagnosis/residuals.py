@@ -128,9 +128,12 @@ def ideal_residuals(solution: Solution) -> tuple[Residuals, Array]:
     adjusted = np.concatenate(values, axis=1).T[:, None]
     at = problem.conditions.linearise(x, adjusted, forces.T[:, None])
     b = np.moveaxis(at.jac_observations[:, :, 0], -1, 0)
-    whitening = np.linalg.cholesky(np.einsum("nco,no,ndo->ncd", b, solution.variances, b))
+    # With weights that the residuals suggest, an axis could drop out of sight.
+    variances = solution.variances.copy()
+    variances[:, :3] = variances[:, :3].mean()
+    whitening = np.linalg.cholesky(np.einsum("nco,no,ndo->ncd", b, variances, b))
     a = np.linalg.solve(whitening, np.moveaxis(at.jac_parameters[:, :, 0], -1, 0))
     design = np.concatenate([a.reshape(-1, a.shape[-1]), solution.prior[0]])
     return Residuals(
-        design, np.zeros(len(design)), whitening, b, np.sqrt(solution.variances)
+        design, np.zeros(len(design)), whitening, b, np.sqrt(variances)
     ), forces

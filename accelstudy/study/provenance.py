@@ -11,7 +11,7 @@ from accelstudy.errors import InputError
 
 # Files that a stage does not use, so that an edit of them does not run it again. What is not named
 # counts: a new file runs everything again rather than nothing.
-_MEASURED = ("campaign/", "gross_errors/", "adjustment/quality/")
+_MEASURED = ("campaign/", "diagnosis/", "gross_errors/", "adjustment/quality/")
 _COMMANDS = ("cli.py", "catalogue.py")
 _FRONT = (
     *_COMMANDS,
@@ -24,6 +24,7 @@ _FRONT = (
 _TABLES = ("study/summary.py", "leveling_error.py", "closed_forms.py")
 _CONFIG = ("study/config/",)
 _STUDY = (
+    "diagnosis/",
     "study/claims",
     *(f"study/{name}.py" for name in ("analysis", "cells", "simulate", "summary")),
 )
