@@ -16,6 +16,7 @@ from accelstudy import __version__
 from accelstudy.campaign.commands import COMMANDS
 from accelstudy.campaign.importing_cli import import_command, public_command
 from accelstudy.campaign.simulating_cli import simulate_campaign_command
+from accelstudy.diagnosis.command import diagnose_command
 from accelstudy.errors import InputError
 
 
@@ -165,7 +166,13 @@ def claims(results: Path) -> None:
     click.echo(claims_markdown(read_table(results / "claims.parquet")), nl=False)
 
 
-for command in (import_command, public_command, simulate_campaign_command, *COMMANDS):
+for command in (
+    import_command,
+    public_command,
+    simulate_campaign_command,
+    diagnose_command,
+    *COMMANDS,
+):
     main.add_command(command)
 
 if __name__ == "__main__":

@@ -1,0 +1,43 @@
+"""The command that diagnoses a campaign."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+_PATH = click.Path(path_type=Path)
+
+
+@click.command("diagnose")
+@click.argument("campaign", type=_PATH)
+@click.option("--out", type=_PATH, required=True, help="Folder to write to.")
+@click.option("--model", default="bias-scale-nonorthogonality", show_default=True)
+@click.option("--approach", help="gravity or robot.  [default: robot if the campaign has one]")
+@click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0))
+def diagnose_command(
+    campaign: Path, out: Path, model: str, approach: str | None, seed: int
+) -> None:
+    """Find what a sensor model lacks to explain a measured CAMPAIGN (a folder).
+
+    Tells missing effects, wrong noise and gross errors apart, adds what is missing to the model and
+    tests it on positions that were not used.
+    """
+    from accelstudy.approaches import get_approach
+    from accelstudy.campaign.format import read_campaign
+    from accelstudy.diagnosis.output import write_diagnosis
+    from accelstudy.diagnosis.pipeline import diagnose
+    from accelstudy.diagnosis.wording import verdict_lines
+    from accelstudy.models import get_model
+    from accelstudy.study.provenance import check_writable
+
+    chosen = get_model(model), None if approach is None else get_approach(approach)
+    check_writable(out)
+    measured = read_campaign(campaign, plausible=False)
+    for warning in measured.warnings:
+        click.echo(f"warning: {warning}", err=True)
+    diagnosis = diagnose(measured, *chosen, seed=seed)
+    write_diagnosis(diagnosis, out)
+    for line in verdict_lines(diagnosis):
+        click.echo(line)
+    click.echo(f"report: {out / 'report.html'}")

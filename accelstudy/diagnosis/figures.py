@@ -1,0 +1,204 @@
+"""Figures of a diagnosis: the gap, the evidence, the residuals, and where they live."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from accelstudy.diagnosis.naming import UNKNOWN
+from accelstudy.diagnosis.pipeline import LEVEL_EFFECTS, Diagnosis
+from accelstudy.diagnosis.positions import condition_sigma
+from accelstudy.diagnosis.wording import GROUPS, words
+from accelstudy.figures.style import FULL, INK, new_figure
+from accelstudy.study.report import number
+
+Array = NDArray[np.float64]
+
+BEFORE, AFTER, NOISE = "#D55E00", "#0072B2", "#E6E6E6"
+OTHER = "#999999"
+AXES = {"x": ("#0072B2", "o"), "y": ("#E69F00", "s"), "z": ("#009E73", "^"), "norm": (INK, "o")}
+"""Colour and marker of the components of a residual."""
+SHOWN = 12
+"""Candidates in the figure of the evidence; weaker ones would only make it long."""
+SMALLEST_P = 1e-12
+LARGE = 20
+"""Ratio of mean squares from which on bars are drawn on a logarithmic scale."""
+
+
+def diagnosis_figures(diagnosis: Diagnosis, positions: pd.DataFrame) -> dict[str, Figure]:
+    """All figures of a diagnosis by name; those of which there is nothing to show are left out.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    positions : DataFrame, of `positions_table`
+    """
+    drawn = {"evidence": evidence_figure(diagnosis)}
+    drawn["residuals"] = residual_figure(diagnosis, positions)
+    if diagnosis.gap.held_out is not None:
+        drawn["gap"] = gap_figure(diagnosis, positions)
+    if any(diagnosis.location.values()):
+        drawn["location"] = location_figure(diagnosis)
+    return drawn
+
+
+def gap_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
+    """Residuals of the held-out positions before and after, and their mean squares."""
+    gap = diagnosis.gap.held_out
+    assert gap is not None
+    figure = new_figure(FULL, 62)
+    ax, bars = figure.subplots(1, 2, width_ratios=[2.6, 1])
+    held = positions[positions["split"] == "held-out"]
+    before, after = (1e3 * held[f"predicted_{when}_mps2"] for when in ("before", "after"))
+    sigma = 1e3 * condition_sigma(diagnosis.base, diagnosis.unit_variance)
+    place = np.arange(len(held))
+    ax.axhspan(0, sigma, color=NOISE, label="noise alone (1 σ)")
+    ax.vlines(place, after, before, color=OTHER, linewidth=0.8)
+    ax.plot(place, before, "s", color=BEFORE, label="without the effect")
+    ax.plot(place, after, "o", color=AFTER, label="with the effect")
+    every = max(1, len(held) // 16)
+    ax.set_xticks(place[::every], held["position"][::every])
+    ax.set(xlabel="held-out position", ylabel="residual, rms / (mm/s²)")
+    ax.set_ylim(0, 1.05 * max(before.max(), after.max(), sigma))
+    ax.grid(axis="x", visible=False)
+    figure.legend(loc="outside upper left", ncols=3)
+
+    heights = {"without": gap.before, "with": gap.after, "right\nmodel": gap.floor}
+    drawn = bars.bar(list(heights), list(heights.values()), color=[BEFORE, AFTER, OTHER])
+    bars.bar_label(drawn, [number(value) for value in heights.values()], padding=1, fontsize=7.5)
+    bars.axhline(1, color=INK, linewidth=0.8, linestyle=":")
+    bars.set_ylabel("mean square / noise variance")
+    if max(heights.values()) > LARGE * min(heights.values()):
+        bars.set_yscale("log")
+    bars.margins(y=0.12)
+    bars.grid(axis="x", visible=False)
+    return figure
+
+
+def evidence_figure(diagnosis: Diagnosis) -> Figure:
+    """Family-wise p-value and posterior probability of each candidate."""
+    p_values = {
+        name: p for name, p in diagnosis.screening.p_family.items() if not name.startswith("group:")
+    }
+    # A class of equal effects has its probability under one name, the rest has none.
+    probabilities = diagnosis.probabilities
+
+    def rank(name: str) -> tuple[float, float, str]:
+        return max(p_values.get(name, 1.0), SMALLEST_P), -probabilities.get(name, 0.0), name
+
+    names = sorted({*p_values, *probabilities}, key=rank)
+    shown = [name for name in names if name != UNKNOWN][:SHOWN]
+    shown += [
+        n for n in names if n not in shown and (probabilities.get(n, 0) > 0.05 or n == UNKNOWN)
+    ]
+    found = {name for f in diagnosis.found for name in (f.name, *f.equivalence_class)}
+    colours = [AFTER if name in found else OTHER for name in shown]
+    place = np.arange(len(shown))[::-1]
+
+    figure = new_figure(FULL, 22 + 4.4 * len(shown))
+    left, right = figure.subplots(1, 2, sharey=True)
+    tested = [max(p_values.get(name, np.nan), SMALLEST_P) for name in shown]
+    smallest = float(np.nanmin(tested))
+    left.hlines(place, tested, 1, color=colours, linewidth=1.2)
+    left.scatter(tested, place, color=colours, s=18, zorder=3)
+    left.axvline(LEVEL_EFFECTS, color=BEFORE, linewidth=1, linestyle="--")
+    left.text(LEVEL_EFFECTS, 1.0, f"level {LEVEL_EFFECTS:g}", transform=left.get_xaxis_transform(),
+              color=BEFORE, ha="center", va="bottom", fontsize=7.5)  # fmt: skip
+    left.set_xscale("log")
+    left.set_xlim(2, min(0.3 * smallest, 1e-3))
+    left.set_xlabel("p-value, family-wise")
+    left.set_yticks(place, [words(name) for name in shown])
+    left.grid(axis="y", visible=False)
+    drawn = right.barh(place, [probabilities.get(n, 0.0) for n in shown], color=colours, height=0.6)
+    right.bar_label(drawn, [_percent(probabilities.get(n)) for n in shown], padding=2, fontsize=7.5)
+    right.set(xlim=(0, 1.12), xlabel="probability, if one thing is missing")
+    right.set_xticks([0, 0.25, 0.5, 0.75, 1])
+    right.grid(axis="y", visible=False)
+    return figure
+
+
+def _percent(probability: float | None) -> str:
+    if probability is None:
+        return ""
+    return "< 1 %" if probability < 0.01 else f"{100 * probability:.0f} %"
+
+
+def residual_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
+    """Residuals before and after against direction, time and temperature."""
+    panels = _panels(diagnosis, positions)
+    extended = diagnosis.final is not diagnosis.setting
+    rows = ("before", "after") if extended else ("before",)
+    figure = new_figure(FULL, 12 + 46 * len(rows))
+    grid = figure.subplots(len(rows), len(panels), sharey=True, sharex="col", squeeze=False)
+    sigma = 1e3 * condition_sigma(diagnosis.base, diagnosis.unit_variance)
+    names = [name for name in AXES if f"residual_{name}_before_mps2" in positions]
+    for when, line in zip(rows, grid, strict=True):
+        for (label, abscissa), ax in zip(panels.items(), line, strict=True):
+            ax.axhspan(-2 * sigma, 2 * sigma, color=NOISE)
+            ax.axhline(0, color=INK, linewidth=0.6)
+            for name in names:
+                _draw_component(ax, positions, name, when, abscissa(name), extended)
+            if when == rows[-1]:
+                ax.set_xlabel(label)
+        title = "base model" if when == "before" else "with what was found"
+        line[0].set_ylabel(f"{title}\nresidual / (mm/s²)")
+    handles, labels = grid[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper left", ncols=6)
+    return figure
+
+
+def _panels(
+    diagnosis: Diagnosis, positions: pd.DataFrame
+) -> dict[str, Callable[[str], NDArray[np.float64]]]:
+    """Abscissas of the panels by their labels, each a function of the component."""
+    frame = diagnosis.setting.frame
+    unit = frame.forces / frame.solution.gravity
+    panels: dict[str, Callable[[str], Array]] = {}
+    if "residual_norm_before_mps2" in positions:
+        for i, axis in enumerate("xyz"):
+            panels[f"$f_{axis}/g$"] = lambda _, i=i: unit[:, i]  # type: ignore[misc]
+    else:
+        panels["$f/g$ of the same axis"] = lambda axis: unit[:, "xyz".index(axis)]
+    for column, label, scale in (
+        ("time_s", "time / min", 60),
+        ("temperature_degC", "temperature / °C", 1),
+    ):
+        values = positions[column].to_numpy() / scale
+        if np.isfinite(values).all() and np.ptp(values) > 0:
+            panels[label] = lambda _, values=values: values  # type: ignore[misc]
+    return panels
+
+
+def _draw_component(
+    ax: Axes, positions: pd.DataFrame, name: str, when: str, x: Array, extended: bool
+) -> None:
+    colour, marker = AXES[name]
+    label = "|f| − g" if name == "norm" else f"${name}$"
+    values = 1e3 * positions[f"residual_{name}_{when}_mps2"]
+    ax.plot(x, values, marker, color=colour, markersize=3.2, label=label)
+    if when == "before" and extended:
+        explained = values - 1e3 * positions[f"residual_{name}_after_mps2"]
+        dash = BEFORE if name == "norm" else colour
+        ax.plot(x, explained, "_", color=dash, markersize=8, markeredgewidth=1.3,
+                label=f"{label}, explained")  # fmt: skip
+        left_out = positions["split"] == "left out"
+        ax.plot(x[left_out], values[left_out], "o", color=BEFORE, markersize=9,
+                markerfacecolor="none")  # fmt: skip
+
+
+def location_figure(diagnosis: Diagnosis) -> Figure:
+    """Share of the excess χ² that each group of regressors takes up."""
+    shares = sorted(diagnosis.location.items(), key=lambda item: item[1])
+    figure = new_figure(FULL * 0.62, 14 + 5.5 * len(shares))
+    ax = figure.add_subplot()
+    titles = [GROUPS.get(name, words(name)) for name, _ in shares]
+    drawn = ax.barh(titles, [100 * share for _, share in shares], color=AFTER, height=0.6)
+    ax.bar_label(drawn, fmt="{:.0f} %", padding=2, fontsize=7.5)
+    ax.set(xlim=(0, 112), xlabel="share of the excess χ² / %")
+    ax.grid(axis="y", visible=False)
+    return figure

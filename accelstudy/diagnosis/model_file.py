@@ -1,0 +1,94 @@
+"""The sensor that a diagnosis found, as a configuration of the Monte Carlo study: `model.yaml`."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+
+from accelstudy.campaign.format import Campaign
+from accelstudy.diagnosis.pipeline import Diagnosis
+from accelstudy.models import MODELS
+from accelstudy.sensor import SensorModel
+from accelstudy.units import MGON
+
+REPLICATES = 1000
+
+
+def study_overlay(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return a configuration that overlays `config/config.yaml`.
+
+    The simulated sensor has the effects that were found, with the estimates as true values, and the
+    noise that was found. It is calibrated with the base model and with the extended one, in as many
+    evenly spread positions as the campaign has.
+    """
+    d = diagnosis
+    solution = d.final.frame.solution
+    extended = d.extended
+    models = {m.name: [e.spec for e in m.effects] for m in (d.model, extended)}
+    noise: dict[str, Any] = {
+        "sensor": {"sigma_mps2": d.sigma_position, "per": "position"},
+        "gravity": {"sigma_mps2": d.campaign.sigma_gravity, "error_mps2": 0.0},
+    }
+    if d.campaign.sigma_angle is not None:
+        noise["robot"] = {"sigma_mgon": d.campaign.sigma_angle / MGON}
+    content = {
+        "study": study_name(d.campaign.name),
+        "gravity_mps2": solution.gravity,
+        "noise": noise,
+        "simulated_effects": [effect.spec for effect in extended.effects],
+        "sensor": _truth(extended, solution.parameters.tolist()),
+        "models": {name: effects for name, effects in models.items() if name not in MODELS},
+        "grids": [
+            {
+                "models": list(models),
+                "schemes": [f"fibonacci-{d.campaign.n_positions}"],
+                "approaches": [d.approach.name],
+                "replicates": REPLICATES,
+            }
+        ],
+        "presets": None,
+        "sensitivity": None,
+        "paper": False,
+    }
+    holds = study_holds(d.campaign, extended)
+    return {**content, "holds": holds} if holds else content
+
+
+def study_holds(campaign: Campaign, model: SensorModel) -> dict[str, Any]:
+    """Conditions of the holds on which the effects of a model depend, in the ranges of a campaign.
+
+    A course of the temperature that correlates with the order of the holds is taken as linear, any
+    other as random.
+    """
+    needed, holds = model.hold_columns, dict[str, Any]()
+    if "time" in needed and campaign.time is not None:
+        holds["interval_s"] = float(np.ptp(campaign.time) / (campaign.n_positions - 1))
+    if "temperature" in needed and campaign.temperature is not None:
+        t = campaign.temperature
+        trend = np.corrcoef(np.arange(len(t)), t)[0, 1] if np.ptp(t) > 0 else 0.0
+        low, high = float(t.min()), float(t.max())
+        holds["temperature_degC"] = [high, low] if trend < -0.5 else [low, high]
+        holds["temperature_order"] = "linear" if abs(trend) > 0.5 else "random"
+    if "vibration" in needed and campaign.vibration is not None:
+        holds["vibration_mps2"] = [float(campaign.vibration.min()), float(campaign.vibration.max())]
+    if "yaw" in needed and campaign.yaw is not None:
+        holds["yaw"] = "random" if np.ptp(campaign.yaw) > 0 else "none"
+    return holds
+
+
+def study_name(name: str) -> str:
+    """Return the name of a campaign as the name of a study: letters, digits, _ and - only."""
+    return re.sub(r"[^A-Za-z0-9_-]+", "-", name).strip("-_") or "campaign"
+
+
+def _truth(model: SensorModel, parameters: list[float]) -> dict[str, dict[str, Any]]:
+    """Estimates as true values, by effect, SI."""
+    truth, first = {}, 0
+    for effect in model.effects:
+        last = first + len(effect.parameters)
+        unit = effect.parameters[0].unit
+        truth[effect.spec] = {"value": parameters[first:last], "unit": unit}
+        first = last
+    return truth

@@ -1,0 +1,47 @@
+"""What a diagnosis writes: JSON, YAML, Parquet, figures and a page."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from accelstudy.diagnosis.document import diagnosis_document
+from accelstudy.diagnosis.model_file import study_overlay
+from accelstudy.diagnosis.pipeline import Diagnosis
+from accelstudy.diagnosis.positions import positions_table
+from accelstudy.study.tables import whole_file
+
+
+def write_diagnosis(
+    diagnosis: Diagnosis, folder: str | Path, report: bool = True
+) -> dict[str, Any]:
+    """Write diagnosis.json, positions.parquet, model.yaml and, if wanted, figures/ and report.html.
+
+    Each file is whole or not there; diagnosis.json comes last. Returns its content.
+    """
+    folder = Path(folder)
+    document = diagnosis_document(diagnosis)
+    positions = positions_table(diagnosis)
+    with whole_file(folder / "positions.parquet") as path:
+        positions.to_parquet(path, index=False)
+    with whole_file(folder / "model.yaml") as path:
+        text = yaml.safe_dump(study_overlay(diagnosis), sort_keys=False, allow_unicode=True)
+        path.write_text(MODEL_HEADER + text, encoding="utf-8")
+    if report:
+        # Drawing takes as long to import as all of the above to compute.
+        from accelstudy.diagnosis.report import write_report
+
+        write_report(diagnosis, document, positions, folder)
+    with whole_file(folder / "diagnosis.json") as path:
+        text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
+        path.write_text(text + "\n", encoding="utf-8")
+    return document
+
+
+MODEL_HEADER = """\
+# The sensor and the noise that were found, as a study of their own:
+# snakemake --cores 2 --configfile config/config.yaml THIS_FILE
+"""

@@ -1,0 +1,77 @@
+"""The page about a diagnosis, with its figures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import pandas as pd
+from jinja2 import Environment, PackageLoader
+
+from accelstudy.campaign.figures import svg
+from accelstudy.diagnosis import wording
+from accelstudy.diagnosis.figures import diagnosis_figures
+from accelstudy.diagnosis.pipeline import LEVEL_EFFECTS, LEVEL_NOISE, SURE, Diagnosis
+from accelstudy.effects import effect_names, get_effect
+from accelstudy.figures.style import STYLE
+from accelstudy.study.report import number
+from accelstudy.study.tables import whole_file
+
+DPI = 150
+
+
+def write_report(
+    diagnosis: Diagnosis, document: dict[str, Any], positions: pd.DataFrame, folder: Path
+) -> None:
+    """Write figures/ and report.html.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    document : dict, of `diagnosis_document`
+    positions : DataFrame, of `positions_table`
+    folder : Path
+    """
+    drawn = {}
+    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
+        for name, figure in diagnosis_figures(diagnosis, positions).items():
+            drawn[name] = svg(figure)
+            # Once laid out, the second drawing need not do it again.
+            figure.set_layout_engine("none")
+            with whole_file(folder / "figures" / f"{name}.svg") as path:
+                path.write_text(drawn[name], encoding="utf-8")
+            with whole_file(folder / "figures" / f"{name}.png") as path:
+                figure.savefig(path, format="png", dpi=DPI)
+    environment = Environment(
+        loader=PackageLoader("accelstudy", "diagnosis"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters.update(
+        number=number,
+        p=wording.probability,
+        p_value=wording.p_value,
+        words=wording.words,
+        listed=wording.listed,
+        described=wording.described,
+    )
+    page = environment.get_template("report.html.j2").render(
+        d=diagnosis,
+        doc=document,
+        headline=wording.headline(diagnosis),
+        lines=wording.verdict_lines(diagnosis)[1:],
+        confirmation=wording.confirmation(diagnosis),
+        equation=lambda effect: get_effect(effect["spec"]).equation,
+        is_effect=lambda name: name in effect_names(),
+        amount=wording.amount,
+        unit=wording.shown_unit,
+        estimate=wording.estimate,
+        figures=drawn,
+        level=LEVEL_EFFECTS,
+        level_noise=LEVEL_NOISE,
+        sure=SURE,
+    )
+    with whole_file(folder / "report.html") as path:
+        path.write_text(page, encoding="utf-8")

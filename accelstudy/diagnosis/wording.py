@@ -1,0 +1,181 @@
+"""A diagnosis in plain words."""
+
+from __future__ import annotations
+
+import math
+
+from accelstudy.diagnosis.gap import SIGNIFICANT
+from accelstudy.diagnosis.pipeline import Diagnosis, Named
+from accelstudy.effects import effect_names, get_effect
+from accelstudy.figures.style import unit_label
+from accelstudy.study.report import number
+from accelstudy.units import MGON, display_unit, to_display
+
+GROUPS = {
+    "direction": "with the direction of gravity",
+    "robot_angles": "with the angles of the robot",
+    "repeat": "between repeats of the same attitude",
+    "slow_time": "slowly with time",
+    "temperature": "with temperature",
+    "previous_position": "with the position before",
+    "single_position": "in one single position",
+}
+"""How a residual of each group of regressors varies."""
+
+HEADLINES = {
+    "no_effect": "Nothing that these data can show is missing from the model.",
+    "named": "The model lacks {names}.",
+    "unknown": "Something is missing from the model, and it has no name here.",
+    "noise_model": "The sensor model is adequate, its noise is not: {names}.",
+    "gross_error": "The data are not what they say: {names}.",
+}
+
+
+def words(name: str) -> str:
+    """Return a name of the catalogue as words."""
+    return name.replace("_", " ")
+
+
+def listed(items: list[str]) -> str:
+    """Join words: a, b and c."""
+    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
+
+
+def amount(value: float, unit: str) -> str:
+    """Show an SI value in the unit that people use, without the unit."""
+    return number(float(to_display(value, unit)))
+
+
+def estimate(value: float, sigma: float, unit: str) -> list[str]:
+    """Show an estimate and its sigma in the unit that people use, to two digits of the sigma."""
+    shown, spread = float(to_display(value, unit)), float(to_display(sigma, unit))
+    digits = max(0, 1 - math.floor(math.log10(spread))) if spread > 0 else 6
+    return [f"{x:.{digits}f}".replace("-", "−") for x in (shown, spread)]
+
+
+def shown_unit(unit: str) -> str:
+    """Return the unit that people use for an SI unit, as it is printed."""
+    return unit_label(display_unit(unit)).replace("^2", "²").replace("^3", "³")
+
+
+def probability(value: float | None) -> str:
+    """Show a p-value or a probability."""
+    if value is None:
+        return "–"
+    if value < 1e-12:
+        return "< 1e-12"
+    return f"{value:.2g}" if value < 0.995 else f"{value:.3g}"
+
+
+def p_value(value: float | None) -> str:
+    """Show a p-value with its sign of relation: p = 0.03."""
+    shown = probability(value)
+    return f"p {shown}" if shown.startswith("<") else f"p = {shown}"
+
+
+def headline(diagnosis: Diagnosis) -> str:
+    """Say the verdict in one sentence."""
+    found = diagnosis.found
+    if diagnosis.verdict == "gross_error":
+        found = tuple(f for f in found if not _is_effect(f))
+    names = [words(f.name) + ("" if f.position is None else f" {f.position}") for f in found] or [
+        ""
+    ]
+    return HEADLINES[diagnosis.verdict].format(names=listed(names))
+
+
+def verdict_lines(diagnosis: Diagnosis) -> list[str]:
+    """Say in a few sentences what was found; the first is the verdict."""
+    d = diagnosis
+    lines = [headline(d)]
+    if d.reason:
+        lines.append(_sentence(d.reason))
+    if d.recognised is not None:
+        lines.append("All else is said of the data as they would be without this error.")
+    if d.verdict == "no_effect":
+        lines.append(_agreement(d))
+    if d.verdict == "unknown":
+        lines.append(_where(d))
+    for named in filter(_is_effect, d.found):
+        lines.append(_effect_line(named))
+    if d.verdict == "gross_error" and any(f.position is not None for f in d.found):
+        lines.append(
+            "It disagrees with the other positions: it was moved, or had not settled. The final "
+            "parameters are those without it."
+        )
+    if d.gap.leveling is not None:
+        before, after = (number(value / MGON) for value in d.gap.leveling)
+        lines.append(
+            f"Tilt error of the calibrated sensor: {before} mgon without, {after} with it."
+        )
+    if d.verdict == "named":
+        lines.append(confirmation(d))
+    if d.setting.invisible:
+        lines.append(f"This campaign cannot see {listed([words(n) for n in d.setting.invisible])}.")
+    return lines
+
+
+def confirmation(diagnosis: Diagnosis) -> str:
+    """Say whether the named effect held on positions that were not used."""
+    gap = diagnosis.gap
+    if gap.held_out is None:
+        return f"Not confirmed on data that were not used: {gap.reason}."
+    tested = (
+        f"on {len(gap.held_out.held)} held-out positions (z = {number(gap.held_out.z)}, "
+        f"{SIGNIFICANT} needed)"
+    )
+    if gap.confirmed:
+        return f"Confirmed {tested}."
+    return f"Not confirmed {tested}" + (f": {gap.reason}." if gap.reason else ".")
+
+
+def _is_effect(named: Named) -> bool:
+    return bool(named.parameters)
+
+
+def _effect_line(named: Named) -> str:
+    equation = get_effect(named.spec).equation
+    values = ", ".join(
+        f"{name} = {' ± '.join(estimate(value, sigma or 0.0, unit))} {shown_unit(unit)}".rstrip()
+        for name, value, sigma, unit in named.parameters
+    )
+    same = [words(name) for name in named.equivalence_class if name != named.name]
+    alike = f" In these positions {listed(same)} would be the same." if same else ""
+    return f"{words(named.name).capitalize()}, {equation}: {values}.{alike}"
+
+
+def _agreement(d: Diagnosis) -> str:
+    test = d.global_test
+    smallest = p_value(d.screening.smallest)
+    if test is None:
+        return (
+            "The campaign does not give its noise, so that only patterns in the residuals could be "
+            f"tested, not their size; there is none ({smallest})."
+        )
+    return (
+        f"The residuals are as large as the noise says ({p_value(test.p_value)}), and have no "
+        f"pattern ({smallest})."
+    )
+
+
+def _where(d: Diagnosis) -> str:
+    ranked = sorted(d.location.items(), key=lambda item: -item[1])[:3]
+    shares = [
+        f"{100 * share:.0f} % {GROUPS.get(name, words(name))}"
+        for name, share in ranked
+        if share > 0
+    ]
+    if not shares:
+        return "Beside the noise level that is taken, nothing says where it lives."
+    return f"Of what the residuals have too much, {listed(shares)} (shares overlap)."
+
+
+def _sentence(text: str) -> str:
+    return f"{text[0].upper()}{text[1:]}" + ("" if text.endswith(".") else ".")
+
+
+def described(name: str) -> str:
+    """Return the first line of what the catalogue says of an effect; nothing for other names."""
+    if name not in effect_names():
+        return ""
+    return (get_effect(name).__doc__ or "").splitlines()[0]
