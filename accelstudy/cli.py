@@ -118,14 +118,44 @@ def models() -> None:
 
 
 @main.command()
-def effects() -> None:
-    """List effects, noise effects and gross errors, with parameters and typical sizes.
+@click.option("--campaign", type=click.Path(path_type=Path), help="Folder of a campaign.")
+@click.option("--scheme", help="Name of a scheme, instead of a campaign.")
+@click.option("--model", default="bias-scale-nonorthogonality", show_default=True)
+@click.option("--approach", help="gravity or robot.  [default: robot, if there is one]")
+def effects(campaign: Path | None, scheme: str | None, model: str, approach: str | None) -> None:
+    """List effects, noise effects and gross errors; or what a campaign can show of them.
 
-    Models are composed of effects; parameters are in the units shown, settings in SI.
+    Models are composed of effects; parameters are in the units shown, settings in SI. With a
+    campaign or a scheme: which effects it can show beside the model, how large they must be to be
+    detected and to be named, and with what they would be confused.
     """
-    from accelstudy.catalogue import catalogue
+    if campaign is None and scheme is None:
+        from accelstudy.catalogue import catalogue
 
-    click.echo(catalogue())
+        click.echo(catalogue())
+        return
+    if campaign is not None and scheme is not None:
+        raise InputError("effects: --campaign and --scheme exclude each other; give one of them")
+    from accelstudy.approaches import get_approach
+    from accelstudy.campaign.format import read_campaign
+    from accelstudy.diagnosis import visibility
+    from accelstudy.models import get_model
+    from accelstudy.schemes import get_scheme
+
+    chosen = get_model(model)
+    if campaign is not None:
+        named = None if approach is None else get_approach(approach)
+        setting = visibility.campaign_setting(read_campaign(campaign), chosen, named)
+    else:
+        setting = visibility.scheme_setting(
+            get_scheme(str(scheme)), chosen, get_approach(approach or "robot")
+        )
+    click.echo(visibility.visibility_table(setting).to_string(index=False))
+    click.echo(
+        "\nMDB: size of one parameter that a test at 0.1 % detects with a probability of 80 %;"
+        "\nMIB: size at which the effect can also be told from the one it is most like;"
+        "\nconfused with: the nearest effects and the cosine of their signatures, 1 for the same."
+    )
 
 
 @main.command()

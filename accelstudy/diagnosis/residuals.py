@@ -134,6 +134,4 @@ def ideal_residuals(solution: Solution) -> tuple[Residuals, Array]:
     whitening = np.linalg.cholesky(np.einsum("nco,no,ndo->ncd", b, variances, b))
     a = np.linalg.solve(whitening, np.moveaxis(at.jac_parameters[:, :, 0], -1, 0))
     design = np.concatenate([a.reshape(-1, a.shape[-1]), solution.prior[0]])
-    return Residuals(
-        design, np.zeros(len(design)), whitening, b, np.sqrt(variances)
-    ), forces
+    return Residuals(design, np.zeros(len(design)), whitening, b, np.sqrt(variances)), forces

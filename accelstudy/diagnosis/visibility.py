@@ -1,0 +1,73 @@
+"""What a campaign or a scheme can show of the effects of the catalogue, before any diagnosis."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from accelstudy.adjustment.quality import solve
+from accelstudy.approaches import Approach, get_approach
+from accelstudy.campaign.fit import fit_campaign
+from accelstudy.campaign.format import Campaign
+from accelstudy.diagnosis.hypotheses import Setting, setting_of
+from accelstudy.diagnosis.limits import visibilities
+from accelstudy.effects import get_effect
+from accelstudy.schemes import Scheme
+from accelstudy.sensor import SensorModel
+from accelstudy.simulation import Noise, session
+from accelstudy.units import display_unit, to_display
+
+
+def campaign_setting(
+    campaign: Campaign, model: SensorModel, approach: Approach | None = None
+) -> Setting:
+    """Return what a campaign can show beside a model, with its own noise.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    model : SensorModel
+    approach : Approach; by default robot-aided if the campaign has the robot's angles
+    """
+    if approach is None:
+        approach = get_approach("gravity" if campaign.angles is None else "robot")
+    fit = fit_campaign(campaign, model, approach)
+    return setting_of(solve(fit.model, fit.approach, fit.observed, fit.adjustment))
+
+
+def scheme_setting(
+    scheme: Scheme, model: SensorModel, approach: Approach, noise: Noise | None = None
+) -> Setting:
+    """Return what a scheme can show beside a model; nothing is known of times and temperatures.
+
+    Raises
+    ------
+    InputError
+        If the positions do not determine the model.
+    """
+    ideal = session(model, np.zeros(model.n_parameters), scheme.directions)
+    observed = ideal.observations(noise or Noise())
+    return setting_of(solve(model, approach, observed))
+
+
+def visibility_table(setting: Setting) -> pd.DataFrame:
+    """Table for people: one row per effect that is not in the model, in the units shown."""
+    rows = []
+    for row in visibilities(setting):
+
+        def shown(size: float, unit: str = row.unit) -> str:
+            return f"{float(to_display(size, unit)):.3g}" if np.isfinite(size) else "–"
+
+        rows.append(
+            {
+                "effect": row.name,
+                "part": get_effect(row.name).part,
+                "status": row.status,
+                "MDB": shown(row.mdb),
+                "MIB": shown(row.mib),
+                "unit": display_unit(row.unit) if row.status == "visible" else "",
+                "confused with": row.reason
+                or ", ".join(f"{name} {cosine:.2f}" for name, cosine in row.confused),
+            }
+        )
+    return pd.DataFrame(rows)
