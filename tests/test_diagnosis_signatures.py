@@ -1,0 +1,140 @@
+"""Signatures of effects: derivatives of the observations, and what a design shows of them."""
+
+import numpy as np
+import pytest
+from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, design, shuffled, some_holds
+
+from accelstudy.diagnosis.hypotheses import cosines, same_space
+from accelstudy.diagnosis.limits import signature_columns
+from accelstudy.diagnosis.signatures import signature
+from accelstudy.effects import effect_names, get_effect
+from accelstudy.sensor import SensorModel
+from accelstudy.simulation import Noise, session
+
+USUAL = [effect.name for effect in NINE.effects]
+OTHERS = [name for name in effect_names() if name not in USUAL]
+EACH = pytest.mark.parametrize("name", effect_names())
+
+
+def full_session(model=NINE, parameters=None, scheme="mclaren-24"):
+    directions = shuffled(scheme)
+    hold = some_holds(len(directions))
+    if parameters is None:
+        parameters = np.zeros(model.n_parameters)
+    return session(model, parameters, directions, G, hold)
+
+
+FULL = full_session()
+
+
+@pytest.fixture(scope="module")
+def robot():
+    """All columns, in varied yaw."""
+    directions = shuffled("fibonacci-30")
+    return design(directions, ROBOT, some_holds(len(directions)))
+
+
+@pytest.fixture(scope="module")
+def gravity():
+    directions = shuffled("fibonacci-30")
+    return design(directions, GRAVITY, some_holds(len(directions)))
+
+
+def alike(setting, one, other):
+    return any(same_space(a, b) for a in setting.candidates[one] for b in setting.candidates[other])
+
+
+def inside(setting, small, large):
+    """Smallest cosine between a space and the one that should contain it."""
+    (a,), (b,) = setting.candidates[small], setting.candidates[large]
+    return cosines(a.ideal, b.ideal)[-1]
+
+
+# --- derivatives ---------------------------------------------------------------------------------
+
+
+@EACH
+def test_a_signature_is_the_derivative_of_what_is_observed(name):
+    """Finite differences of a sensor that has the model's effects and this one.
+
+    The knee of the saturation and the signs of the forces stay on one side of a small step.
+    """
+    effect = get_effect(name)
+    others = tuple(e for e in NINE.effects if e.name != name)
+    model = SensorModel("both", (*others, effect))
+    first = sum(len(e.parameters) for e in others)
+    k = len(effect.parameters)
+    # Effects act on the force along the sensitive axes, at an ideal sensor that of the body.
+    shown = signature(effect, FULL.f_b, FULL.angles, G, FULL.hold)
+    assert shown.force.shape == (len(FULL.f_b), 3, k)
+    step = 1e-6 * effect.typical[0]
+    for j in range(k):
+        change = np.zeros(model.n_parameters)
+        change[first + j] = step
+        force = (
+            model.sense(FULL.f_b, change, G, FULL.hold)
+            - model.sense(FULL.f_b, -change, G, FULL.hold)
+        ) / (2 * step)
+        reading = (
+            model.reading_errors(FULL.angles, change, FULL.hold)
+            - model.reading_errors(FULL.angles, -change, FULL.hold)
+        ) / (2 * step)
+        rounding = 1e-14 * G / step
+        assert np.abs(force).max() + np.abs(reading).max() > 100 * rounding
+        np.testing.assert_allclose(shown.force[..., j], force, rtol=1e-6, atol=rounding)
+        np.testing.assert_allclose(shown.angles[..., j], reading, rtol=1e-6, atol=rounding)
+
+
+@EACH
+def test_a_signature_is_linear_in_the_parameters(name):
+    effect = get_effect(name)
+    directions = np.random.default_rng(1).standard_normal((len(effect.parameters), 2))
+    shown = signature(effect, FULL.f_b, FULL.angles, G, FULL.hold)
+    model = SensorModel("one", (effect,))
+    reduced = shown.reduced(directions)
+    p = effect.typical[0] * 1e-3 * directions[:, 1]
+    if any(np.any(np.array(effect.axes(tuple(np.eye(len(p))[0]), np), dtype=float)) for _ in [0]):
+        return_to = np.array(effect.axes(tuple(p), np), dtype=float)
+        expected = FULL.f_b @ (np.linalg.inv(np.eye(3) + return_to).T - np.eye(3))
+        tolerance = {"rtol": 1e-3, "atol": 1e-4 * np.abs(expected).max()}
+    else:
+        expected = model.sense(FULL.f_b, p, G, FULL.hold) - FULL.f_b
+        tolerance = {"rtol": 1e-9, "atol": 1e-14 * G}
+    found = reduced.force[..., 1] * effect.typical[0] * 1e-3
+    np.testing.assert_allclose(found, expected, **tolerance)
+
+
+@pytest.mark.parametrize("approach", [ROBOT, GRAVITY], ids=lambda a: a.name)
+@pytest.mark.parametrize("name", OTHERS)
+def test_what_an_effect_leaves_in_the_residuals(name, approach):
+    """z of an adjustment of data with a small effect, in which no noise was drawn."""
+    effect = get_effect(name)
+    directions = shuffled("fibonacci-30")
+    hold = some_holds(len(directions))
+    setting = design(directions, approach, hold)
+    if name in setting.invisible:
+        pytest.skip("invisible, which is tested below") if False else None
+        columns = np.zeros((setting.frame.residuals.redundancy, len(effect.parameters)))
+    else:
+        (h, *_) = [h for h in setting.candidates[name]]
+        effect = h.effect
+        columns = signature_columns(setting.frame, h)
+    model = SensorModel("with", (*NINE.effects, effect))
+    rng = np.random.default_rng(5)
+    p = 1e-3 * effect.typical[0] * rng.choice([-1.0, 1.0], len(effect.parameters))
+    truth = np.concatenate([np.zeros(NINE.n_parameters), p])
+    observed = session(model, truth, directions, G, hold).observations(Noise())
+    # The sensitivity to previous positions is that of the sensor's own readings.
+    from accelstudy.adjustment.quality import solve
+    from accelstudy.diagnosis.residuals import Residuals
+
+    left = Residuals.of(solve(NINE, approach, observed))
+    fitted = left.basis @ left.z
+    expected = setting.frame.residuals.basis @ (columns @ p)
+    scale = np.linalg.norm(
+        setting.frame.residuals.whitened(
+            signature(effect, setting.frame.forces, setting.frame.angles, G, setting.frame.hold)
+        )
+        @ p
+    )
+    assert np.linalg.norm(fitted - expected) < 2e-3 * scale + 1e-9
