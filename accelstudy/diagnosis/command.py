@@ -15,8 +15,15 @@ _PATH = click.Path(path_type=Path)
 @click.option("--model", default="bias-scale-nonorthogonality", show_default=True)
 @click.option("--approach", help="gravity or robot.  [default: robot if the campaign has one]")
 @click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0))
+@click.option(
+    "--replicates",
+    default=1000,
+    show_default=True,
+    type=click.IntRange(min=100),
+    help="Sessions simulated with the old and with the new model.",
+)
 def diagnose_command(
-    campaign: Path, out: Path, model: str, approach: str | None, seed: int
+    campaign: Path, out: Path, model: str, approach: str | None, seed: int, replicates: int
 ) -> None:
     """Find what a sensor model lacks to explain a measured CAMPAIGN (a folder).
 
@@ -25,6 +32,7 @@ def diagnose_command(
     """
     from accelstudy.approaches import get_approach
     from accelstudy.campaign.format import read_campaign
+    from accelstudy.diagnosis.loop import close_loop
     from accelstudy.diagnosis.output import write_diagnosis
     from accelstudy.diagnosis.pipeline import diagnose
     from accelstudy.diagnosis.wording import verdict_lines
@@ -37,7 +45,7 @@ def diagnose_command(
     for warning in measured.warnings:
         click.echo(f"warning: {warning}", err=True)
     diagnosis = diagnose(measured, *chosen, seed=seed)
-    write_diagnosis(diagnosis, out)
+    write_diagnosis(diagnosis, out, loop=close_loop(diagnosis, replicates, seed))
     for line in verdict_lines(diagnosis):
         click.echo(line)
     click.echo(f"report: {out / 'report.html'}")

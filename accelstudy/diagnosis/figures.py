@@ -8,14 +8,18 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from accelstudy.diagnosis.loop import CASES, Loop
 from accelstudy.diagnosis.naming import UNKNOWN
 from accelstudy.diagnosis.pipeline import LEVEL_EFFECTS, Diagnosis
 from accelstudy.diagnosis.positions import condition_sigma
 from accelstudy.diagnosis.wording import GROUPS, words
-from accelstudy.figures.style import FULL, INK, new_figure
+from accelstudy.figures.style import FULL, INK, log_ticks, new_figure
 from accelstudy.study.report import number
+from accelstudy.units import MGON
 
 Array = NDArray[np.float64]
 
@@ -23,20 +27,26 @@ BEFORE, AFTER, NOISE = "#D55E00", "#0072B2", "#E6E6E6"
 OTHER = "#999999"
 AXES = {"x": ("#0072B2", "o"), "y": ("#E69F00", "s"), "z": ("#009E73", "^"), "norm": (INK, "o")}
 """Colour and marker of the components of a residual."""
+SIMULATION_COLOURS = {"old": "#999999", "new": "#56B4E9"}
 SHOWN = 12
 """Candidates in the figure of the evidence; weaker ones would only make it long."""
 SMALLEST_P = 1e-12
+DIFFERENT = 5
+"""Ratio of variances or tilt errors from which on an axis is logarithmic."""
 LARGE = 20
 """Ratio of mean squares from which on bars are drawn on a logarithmic scale."""
 
 
-def diagnosis_figures(diagnosis: Diagnosis, positions: pd.DataFrame) -> dict[str, Figure]:
+def diagnosis_figures(
+    diagnosis: Diagnosis, positions: pd.DataFrame, loop: Loop | None = None
+) -> dict[str, Figure]:
     """All figures of a diagnosis by name; those of which there is nothing to show are left out.
 
     Parameters
     ----------
     diagnosis : Diagnosis
     positions : DataFrame, of `positions_table`
+    loop : Loop, optional
     """
     drawn = {"evidence": evidence_figure(diagnosis)}
     drawn["residuals"] = residual_figure(diagnosis, positions)
@@ -44,6 +54,8 @@ def diagnosis_figures(diagnosis: Diagnosis, positions: pd.DataFrame) -> dict[str
         drawn["gap"] = gap_figure(diagnosis, positions)
     if any(diagnosis.location.values()):
         drawn["location"] = location_figure(diagnosis)
+    if loop is not None:
+        drawn["loop"] = loop_figure(loop)
     return drawn
 
 
@@ -202,3 +214,68 @@ def location_figure(diagnosis: Diagnosis) -> Figure:
     ax.set(xlim=(0, 112), xlabel="share of the excess χ² / %")
     ax.grid(axis="y", visible=False)
     return figure
+
+
+def loop_figure(loop: Loop) -> Figure:
+    """Measured variances of unit weight among the simulated ones, and what the tilt error is."""
+    figure = new_figure(FULL, 62)
+    base, extended, tilt = figure.subplots(1, 3, width_ratios=[1.5, 1, 1.3])
+    _draw_variances(base, loop, "base", ("old", "new"))
+    _draw_variances(extended, loop, "extended", ("new",))
+    base.set_ylabel("frequency of simulated sessions")
+    handles = [
+        Patch(color=SIMULATION_COLOURS["old"], label="old simulation"),
+        Patch(color=SIMULATION_COLOURS["new"], label="new simulation"),
+        Line2D([], [], color=INK, linestyle="--", label="measurement"),
+    ]
+    figure.legend(handles=handles, loc="outside upper left", ncols=3)
+
+    titles = (
+        "promised by the\nold simulation",
+        "base calibration\nin truth",
+        "extended\ncalibration",
+    )
+    colours = (SIMULATION_COLOURS["old"], BEFORE, AFTER)
+    place = np.arange(len(CASES))[::-1]
+    ends = []
+    for case, y, colour in zip(CASES, place, colours, strict=True):
+        values = loop.case(*case)["tilt_error_rad"] / MGON
+        rms = loop.tilt(*case) / MGON
+        low, high = np.quantile(values, [0.025, 0.975])
+        ends += [float(low), float(high)]
+        tilt.hlines(y, low, high, color=colour, linewidth=5, alpha=0.4)
+        tilt.plot(rms, y, "o", color=colour, markersize=6)
+        tilt.annotate(number(rms), (rms, y), xytext=(0, 7), textcoords="offset points",
+                      ha="center", fontsize=7.5)  # fmt: skip
+    tilt.set_yticks(place, titles)
+    tilt.set_ylim(-0.5, len(CASES) - 0.3)
+    tilt.set_xlabel("tilt error / mgon")
+    tilt.grid(axis="y", visible=False)
+    _scale(tilt, min(ends), max(ends))
+    return figure
+
+
+def _draw_variances(ax: Axes, loop: Loop, calibration: str, simulations: tuple[str, ...]) -> None:
+    measured = loop.measured[calibration]
+    values = {s: loop.case(s, calibration)["sigma0_squared"].to_numpy() for s in simulations}
+    everything = np.concatenate([[measured], *values.values()])
+    low, high = float(everything.min()), float(everything.max())
+    bins = np.geomspace(low, high, 50) if high > DIFFERENT * low else np.linspace(low, high, 30)
+    for simulation, drawn in values.items():
+        counts, _ = np.histogram(drawn, bins)
+        # To the same height, or a narrow distribution would hide a wide one.
+        ax.stairs(counts / counts.max(), bins, fill=True, color=SIMULATION_COLOURS[simulation])
+    ax.axvline(measured, color=INK, linewidth=1.2, linestyle="--")
+    _scale(ax, low, high)
+    ax.set_yticks([])
+    ax.set_xlabel("variance of unit weight")
+    ax.set_title(f"{calibration} calibration")
+    ax.grid(axis="x", visible=False)
+
+
+def _scale(ax: Axes, low: float, high: float) -> None:
+    """Make the abscissa logarithmic where the values differ much."""
+    if high > DIFFERENT * low:
+        ax.set_xscale("log")
+        ax.set_xlim(0.7 * low, 1.4 * high)
+        log_ticks(ax.xaxis, low, high)

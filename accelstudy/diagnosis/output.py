@@ -9,6 +9,7 @@ from typing import Any
 import yaml
 
 from accelstudy.diagnosis.document import diagnosis_document
+from accelstudy.diagnosis.loop import Loop
 from accelstudy.diagnosis.model_file import study_overlay
 from accelstudy.diagnosis.pipeline import Diagnosis
 from accelstudy.diagnosis.positions import positions_table
@@ -16,14 +17,28 @@ from accelstudy.study.tables import whole_file
 
 
 def write_diagnosis(
-    diagnosis: Diagnosis, folder: str | Path, report: bool = True
+    diagnosis: Diagnosis, folder: str | Path, report: bool = True, loop: Loop | None = None
 ) -> dict[str, Any]:
-    """Write diagnosis.json, positions.parquet, model.yaml and, if wanted, figures/ and report.html.
+    """Write what a diagnosis found; each file is whole or not there, diagnosis.json comes last.
 
-    Each file is whole or not there; diagnosis.json comes last. Returns its content.
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    folder : path, made if it is not there
+    report : bool, whether to write figures/ and report.html beside the files for programs
+    loop : Loop, optional, simulations with the old and with the new model
+
+    Returns
+    -------
+    dict
+        The content of diagnosis.json.
     """
     folder = Path(folder)
     document = diagnosis_document(diagnosis)
+    if loop is not None:
+        document["loop"] = loop.document
+        with whole_file(folder / "loop.parquet") as path:
+            loop.sessions.to_parquet(path, index=False)
     positions = positions_table(diagnosis)
     with whole_file(folder / "positions.parquet") as path:
         positions.to_parquet(path, index=False)
@@ -34,7 +49,7 @@ def write_diagnosis(
         # Drawing takes as long to import as all of the above to compute.
         from accelstudy.diagnosis.report import write_report
 
-        write_report(diagnosis, document, positions, folder)
+        write_report(diagnosis, document, positions, loop, folder)
     with whole_file(folder / "diagnosis.json") as path:
         text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
         path.write_text(text + "\n", encoding="utf-8")

@@ -38,10 +38,7 @@ def positions_table(diagnosis: Diagnosis) -> pd.DataFrame:
     d = diagnosis
     campaign, solution = d.campaign, d.final.frame.solution
     n = campaign.n_positions
-    kept = np.ones(n, dtype=bool)
-    kept[np.isin(campaign.positions, [f.position for f in d.found if f.position is not None])] = (
-        False
-    )
+    kept = kept_positions(d)
     held = np.zeros(n, dtype=bool)
     if d.gap.held_out is not None:
         held[list(d.gap.held_out.held)] = True
@@ -80,6 +77,12 @@ def positions_table(diagnosis: Diagnosis) -> pd.DataFrame:
             values[held] = _predicted(model, d.approach, d.base.observed, held, fitted)
         table[f"predicted_{when}_mps2"] = values
     return pd.DataFrame(table)
+
+
+def kept_positions(diagnosis: Diagnosis) -> NDArray[np.bool_]:
+    """Which positions, (n,), the final fit uses: all but those that were found to be bumped."""
+    bumped = [found.position for found in diagnosis.found if found.position is not None]
+    return ~np.isin(diagnosis.campaign.positions, bumped)
 
 
 def condition_sigma(solution: Solution, variance: float) -> float:

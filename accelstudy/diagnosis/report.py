@@ -12,6 +12,7 @@ from jinja2 import Environment, PackageLoader
 from accelstudy.campaign.figures import svg
 from accelstudy.diagnosis import wording
 from accelstudy.diagnosis.figures import diagnosis_figures
+from accelstudy.diagnosis.loop import Loop
 from accelstudy.diagnosis.pipeline import LEVEL_EFFECTS, LEVEL_NOISE, SURE, Diagnosis
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.figures.style import STYLE
@@ -22,7 +23,11 @@ DPI = 150
 
 
 def write_report(
-    diagnosis: Diagnosis, document: dict[str, Any], positions: pd.DataFrame, folder: Path
+    diagnosis: Diagnosis,
+    document: dict[str, Any],
+    positions: pd.DataFrame,
+    loop: Loop | None,
+    folder: Path,
 ) -> None:
     """Write figures/ and report.html.
 
@@ -31,11 +36,12 @@ def write_report(
     diagnosis : Diagnosis
     document : dict, of `diagnosis_document`
     positions : DataFrame, of `positions_table`
+    loop : Loop, optional
     folder : Path
     """
     drawn = {}
     with mpl.rc_context(STYLE):  # type: ignore[arg-type]
-        for name, figure in diagnosis_figures(diagnosis, positions).items():
+        for name, figure in diagnosis_figures(diagnosis, positions, loop).items():
             drawn[name] = svg(figure)
             # Once laid out, the second drawing need not do it again.
             figure.set_layout_engine("none")

@@ -55,7 +55,7 @@ def estimate(value: float, sigma: float, unit: str) -> list[str]:
 
 def shown_unit(unit: str) -> str:
     """Return the unit that people use for an SI unit, as it is printed."""
-    return unit_label(display_unit(unit)).replace("^2", "²").replace("^3", "³")
+    return unit_label(display_unit(unit))
 
 
 def probability(value: float | None) -> str:

@@ -1,0 +1,180 @@
+"""Closing the loop: whether a simulation with the named effect contains the measurement.
+
+Sessions of the campaign's own positions, holds and noise are simulated with the base model as it
+was fitted (the old simulation) and with the extended one (the new simulation), and calibrated. The
+variance of unit weight of the measurement has to be one of those of the right simulation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from accelstudy.adjustment import Adjustment, Observations, calibrate
+from accelstudy.adjustment.quality import Solution
+from accelstudy.diagnosis.pipeline import Diagnosis
+from accelstudy.diagnosis.positions import kept_positions
+from accelstudy.diagnosis.tilt import ATTITUDES, MAX_TILT
+from accelstudy.effects import Hold
+from accelstudy.leveling import roll_pitch
+from accelstudy.leveling_error import cap_forces, leveling_error
+from accelstudy.sensor import SensorModel
+from accelstudy.simulation import Noise, session
+from accelstudy.units import MGON
+
+Array = NDArray[np.float64]
+
+REPLICATES = 1000
+CASES = (("old", "base"), ("new", "base"), ("new", "extended"))
+"""Simulations and the calibrations that are made of them."""
+
+
+@dataclass(frozen=True)
+class Loop:
+    """Simulated sessions beside the measured one.
+
+    Attributes
+    ----------
+    sessions : DataFrame, one row per simulated and calibrated session: simulation ("old", "new"),
+        calibration ("base", "extended"), replicate, sigma0_squared, tilt_error_rad (rms of roll and
+        pitch that the calibration leaves of the simulated sensor) and converged
+    measured : dict of calibration to the variance of unit weight of the measurement
+    """
+
+    sessions: pd.DataFrame
+    measured: dict[str, float]
+
+    def case(self, simulation: str, calibration: str) -> pd.DataFrame:
+        """Sessions of one simulation and one calibration that converged."""
+        s = self.sessions
+        chosen = (s["simulation"] == simulation) & (s["calibration"] == calibration)
+        return s[chosen & s["converged"]]
+
+    def interval(self, simulation: str, calibration: str) -> tuple[float, float]:
+        """Where the central 95 % of the simulated variances of unit weight lie."""
+        values = self.case(simulation, calibration)["sigma0_squared"]
+        low, high = np.quantile(values, [0.025, 0.975])
+        return float(low), float(high)
+
+    def contains(self, simulation: str, calibration: str) -> bool:
+        """Whether the measured variance of unit weight lies there."""
+        low, high = self.interval(simulation, calibration)
+        return low <= self.measured[calibration] <= high
+
+    def tilt(self, simulation: str, calibration: str) -> float:
+        """Tilt error, rms over the sessions, rad."""
+        values = self.case(simulation, calibration)["tilt_error_rad"]
+        return float(np.sqrt(np.mean(values**2)))
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """Plain data for `diagnosis.json`."""
+        return {
+            "replicates": int(self.sessions["replicate"].max()) + 1,
+            "measured_sigma0_squared": dict(self.measured),
+            "cases": [
+                {
+                    "simulation": simulation,
+                    "calibration": calibration,
+                    "sigma0_squared_central95": list(self.interval(simulation, calibration)),
+                    "contains_measurement": self.contains(simulation, calibration),
+                    "tilt_rms_mgon": self.tilt(simulation, calibration) / MGON,
+                }
+                for simulation, calibration in CASES
+            ],
+        }
+
+
+def close_loop(diagnosis: Diagnosis, replicates: int = REPLICATES, seed: int = 1) -> Loop | None:
+    """Simulate the campaign with the base and with the extended model, and calibrate.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    replicates : int, sessions of each simulation
+    seed : int
+
+    Returns
+    -------
+    Loop; None if the diagnosis did not extend the model, so that there is nothing to compare.
+    """
+    d = diagnosis
+    if d.extended is d.model:
+        return None
+    fits = {"base": d.base, "extended": d.final.frame.solution}
+    kept = np.flatnonzero(kept_positions(d))
+    noise = Noise(
+        sigma_force=d.sigma_position,
+        sigma_angle=d.campaign.sigma_angle or 0.0,
+        sigma_gravity=d.campaign.sigma_gravity,
+    )
+    # The measurement is weighted like the simulations, or the variances could not be compared.
+    taken = replace(d.base.observed.take(kept), sigma_force=noise.sigma_force)
+    measured = {
+        name: float(_calibrated(fit, taken).variance_posteriori[0]) for name, fit in fits.items()
+    }
+    drawn = {}
+    for stream, (simulation, calibration) in enumerate((("old", "base"), ("new", "extended"))):
+        fit = fits[calibration]
+        p = fit.parameters[: fit.model.n_parameters]
+        f_b = fit.model.correct(d.campaign.forces, p, fit.gravity, d.setting.frame.hold)
+        directions = -f_b / np.linalg.norm(f_b, axis=1, keepdims=True)
+        ideal = session(fit.model, p, directions, fit.gravity, d.setting.frame.hold)
+        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(stream,)))
+        drawn[simulation] = fit, p, ideal.draw(noise, replicates, rng).take(kept)
+
+    tables = []
+    for simulation, calibration in CASES:
+        simulated, truth, observed = drawn[simulation]
+        estimated = fits[calibration]
+        result = _calibrated(estimated, observed)
+        errors = _tilt_errors(
+            simulated.model,
+            truth,
+            estimated.model,
+            result.parameters[result.converged, : estimated.model.n_parameters],
+            simulated.gravity,
+            d.setting.frame.hold,
+        )
+        tilt = np.full(replicates, np.nan)
+        tilt[result.converged] = errors
+        tables.append(
+            pd.DataFrame(
+                {
+                    "simulation": simulation,
+                    "calibration": calibration,
+                    "replicate": np.arange(replicates),
+                    "sigma0_squared": result.variance_posteriori,
+                    "tilt_error_rad": tilt,
+                    "converged": result.converged,
+                }
+            )
+        )
+    return Loop(pd.concat(tables, ignore_index=True), measured)
+
+
+def _calibrated(fit: Solution, observed: Observations) -> Adjustment:
+    """Calibrate sessions with the model of a fit, from its estimates on."""
+    initial = fit.parameters[: fit.model.n_parameters]
+    return calibrate(fit.model, fit.approach, replace(observed, initial=initial))
+
+
+def _tilt_errors(
+    simulated: SensorModel,
+    truth: Array,
+    estimated: SensorModel,
+    estimates: Array,
+    g: float,
+    hold: Hold,
+) -> Array:
+    """Rms of roll and pitch that each calibration leaves, in the holds of the campaign, rad."""
+    f_b = cap_forces(MAX_TILT, ATTITUDES, g)
+    roll, pitch = roll_pitch(tuple(f_b.T))
+    n = len(np.asarray(hold.roll))
+    used = replace(hold.take(np.arange(ATTITUDES) % n), roll=roll, pitch=pitch)
+    error = leveling_error(simulated, truth, estimated, estimates, f_b, g, used)
+    return np.sqrt(np.mean(error.per_replicate**2, axis=1))
