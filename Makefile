@@ -17,10 +17,10 @@ export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: help env test smoke reproduce report campaigns lint lock clean
+.PHONY: help env test smoke reproduce report campaigns diagnose-example lint lock clean
 
 help: ## list the targets
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "%-12s%s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-18s%s\n", $$1, $$2 }' Makefile
 	@echo 'PYTHON=python3.12 chooses the interpreter of a new environment, CORES=8 the cores used,'
 	@echo 'CAMPAIGNS=my.yaml the batch of `make campaigns`.'
 
@@ -41,6 +41,10 @@ report: reproduce ## make results/paper/report.zip, to be opened in a browser
 campaigns: $(READY) ## calibrate the campaigns of a batch, by default public ones
 	snakemake --cores $(CORES) --snakefile workflow/campaigns.smk --configfile $(CAMPAIGNS)
 
+diagnose-example: $(READY) ## simulate a campaign with a hidden effect, find it, and study what was found
+	snakemake --cores $(CORES) --snakefile workflow/diagnose.smk --configfile config/diagnose-example.yaml
+	snakemake --cores $(CORES) --configfile config/config.yaml results/diagnose-example/diagnosis/model.yaml
+
 lint: $(READY) ## check style, types and the workflow
 	ruff check
 	ruff format --check
@@ -48,6 +52,7 @@ lint: $(READY) ## check style, types and the workflow
 	snakefmt --check Snakefile workflow
 	snakemake --lint
 	snakemake --lint --snakefile workflow/campaigns.smk --configfile config/campaigns.yaml
+	snakemake --lint --snakefile workflow/diagnose.smk --configfile config/diagnose-example.yaml
 
 lock: $(READY) ## lock the newest versions that pyproject.toml allows
 	uv lock --upgrade --default-index https://pypi.org/simple

@@ -20,7 +20,7 @@ def test_the_example_runs():
 
 def test_make_targets_and_files_exist():
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
-    targets = set(re.findall(r"(?:^    |`)make ([a-z]+)", README, re.M)) - {"help"}
+    targets = set(re.findall(r"(?:^    |`)make ([a-z-]+)", README, re.M)) - {"help"}
     assert {"reproduce", "test", "smoke"} <= targets
     for target in targets:
         assert re.search(rf"^{target}:", makefile, re.M), target

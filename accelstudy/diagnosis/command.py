@@ -30,22 +30,12 @@ def diagnose_command(
     Tells missing effects, wrong noise and gross errors apart, adds what is missing to the model and
     tests it on positions that were not used.
     """
-    from accelstudy.approaches import get_approach
-    from accelstudy.campaign.format import read_campaign
-    from accelstudy.diagnosis.loop import close_loop
-    from accelstudy.diagnosis.output import write_diagnosis
-    from accelstudy.diagnosis.pipeline import diagnose
+    from accelstudy.diagnosis.output import diagnose_folder
     from accelstudy.diagnosis.wording import verdict_lines
-    from accelstudy.models import get_model
-    from accelstudy.study.provenance import check_writable
 
-    chosen = get_model(model), None if approach is None else get_approach(approach)
-    check_writable(out)
-    measured = read_campaign(campaign, plausible=False)
-    for warning in measured.warnings:
+    diagnosis = diagnose_folder(campaign, out, model, approach, seed, replicates)
+    for warning in diagnosis.campaign.warnings:
         click.echo(f"warning: {warning}", err=True)
-    diagnosis = diagnose(measured, *chosen, seed=seed)
-    write_diagnosis(diagnosis, out, loop=close_loop(diagnosis, replicates, seed))
     for line in verdict_lines(diagnosis):
         click.echo(line)
     click.echo(f"report: {out / 'report.html'}")

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
 from accelstudy.diagnosis.loop import CASES, Loop
@@ -123,6 +124,7 @@ def evidence_figure(diagnosis: Diagnosis) -> Figure:
               color=BEFORE, ha="center", va="bottom", fontsize=7.5)  # fmt: skip
     left.set_xscale("log")
     left.set_xlim(2, min(0.3 * smallest, 1e-3))
+    left.xaxis.set_minor_locator(NullLocator())
     left.set_xlabel("p-value, family-wise")
     left.set_yticks(place, [words(name) for name in shown])
     left.grid(axis="y", visible=False)

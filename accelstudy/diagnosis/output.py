@@ -8,12 +8,47 @@ from typing import Any
 
 import yaml
 
+from accelstudy.approaches import get_approach
+from accelstudy.campaign.format import read_campaign
 from accelstudy.diagnosis.document import diagnosis_document
-from accelstudy.diagnosis.loop import Loop
+from accelstudy.diagnosis.loop import REPLICATES, Loop, close_loop
 from accelstudy.diagnosis.model_file import study_overlay
-from accelstudy.diagnosis.pipeline import Diagnosis
+from accelstudy.diagnosis.pipeline import Diagnosis, diagnose
 from accelstudy.diagnosis.positions import positions_table
+from accelstudy.models import get_model
+from accelstudy.study.provenance import check_writable
 from accelstudy.study.tables import whole_file
+
+
+def diagnose_folder(
+    campaign: str | Path,
+    out: str | Path,
+    model: str = "bias-scale-nonorthogonality",
+    approach: str | None = None,
+    seed: int = 1,
+    replicates: int = REPLICATES,
+) -> Diagnosis:
+    """Diagnose a campaign folder, close the loop, and write all of it.
+
+    Parameters
+    ----------
+    campaign, out : paths of folders
+    model, approach : str, names; robot-aided by default if the campaign has a robot
+    seed : int
+    replicates : int, sessions simulated with the old and with the new model
+
+    Raises
+    ------
+    InputError
+        If the input cannot be used; nothing is written then.
+    """
+    chosen = get_model(model), None if approach is None else get_approach(approach)
+    check_writable(out)
+    # A unit or an axis that is wrong is for the diagnosis to find, not for the reader to refuse.
+    measured = read_campaign(campaign, plausible=False)
+    diagnosis = diagnose(measured, *chosen, seed=seed)
+    write_diagnosis(diagnosis, out, loop=close_loop(diagnosis, replicates, seed))
+    return diagnosis
 
 
 def write_diagnosis(

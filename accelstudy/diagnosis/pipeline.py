@@ -640,6 +640,13 @@ class _Run:
     # --- what else is said ----------------------------------------------------------------------
 
     def location(self, variance: float) -> dict[str, float]:
+        """Shares of the excess χ² above the given noise or, without it, the least that is left."""
+        if self.sigma_known:
+            variance = 1.0
+        else:
+            total, r = float(self.z @ self.z), len(self.z)
+            left = [(1 - float(share(q, self.z))) / (r - q.shape[1]) for q in self.groups.values()]
+            variance = min([variance, *(total * part for part in left)])
         outliers = list(self.setting.candidates.get(OUTLIER, ()))
         return locate(self.groups, outliers, self.z, self.null, variance)
 

@@ -24,7 +24,6 @@ _FRONT = (
 _TABLES = ("study/summary.py", "leveling_error.py", "closed_forms.py")
 _CONFIG = ("study/config/",)
 _STUDY = (
-    "diagnosis/",
     "study/claims",
     *(f"study/{name}.py" for name in ("analysis", "cells", "simulate", "summary")),
 )
@@ -34,8 +33,9 @@ _UNUSED = {
     "sensitivity": (*_FRONT, *_TABLES),
     "claims": (*_COMMANDS, "figures/", *_MEASURED),
     "figures": (*_COMMANDS, "study/claims", *_MEASURED),
-    "campaign": (*_COMMANDS, "campaign/overview", *_STUDY),
-    "overview": (*_COMMANDS, "figures/", "adjustment/", *_STUDY),
+    "campaign": (*_COMMANDS, "campaign/overview", "diagnosis/", *_STUDY),
+    "diagnosis": (*_COMMANDS, "campaign/overview", *_STUDY),
+    "overview": (*_COMMANDS, "figures/", "adjustment/", "diagnosis/", *_STUDY),
 }
 
 

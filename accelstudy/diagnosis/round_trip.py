@@ -1,0 +1,65 @@
+"""A round trip: a campaign with hidden effects that is simulated and diagnosed.
+
+`workflow/diagnose.smk` runs it, and `config/diagnose-example.yaml` is an example.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
+
+from accelstudy.approaches import get_approach
+from accelstudy.campaign.format import write_campaign
+from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign, write_truth
+from accelstudy.errors import InputError, UnknownNameError
+from accelstudy.models import get_model
+from accelstudy.study.config.errors import first_error
+from accelstudy.study.config.schema import Block
+from accelstudy.study.config.types import Count, Seed
+
+
+def _known_settings(value: Any) -> Any:
+    known = [field.name for field in fields(CampaignSettings)]
+    for name in value if isinstance(value, Mapping) else ():
+        if name not in known:
+            raise UnknownNameError("setting", name, known)
+    return value
+
+
+Settings = Annotated[CampaignSettings, BeforeValidator(_known_settings)]
+
+
+class RoundTrip(Block):
+    """A simulated campaign and its diagnosis; results go to ``results/<name of the campaign>``."""
+
+    campaign: Settings = Field(description="settings of the simulated campaign, SI")
+    model: str = Field("bias-scale-nonorthogonality", description="model that is diagnosed")
+    approach: str | None = Field(None, description="robot if the campaign has one, by default")
+    seed: Seed = Field(1, description="of the diagnosis")
+    replicates: Count = Field(1000, description="sessions simulated with either model")
+
+    @model_validator(mode="after")
+    def _names_exist(self) -> RoundTrip:
+        get_model(self.model)
+        if self.approach is not None:
+            get_approach(self.approach)
+        return self
+
+
+def parse_round_trip(content: Mapping[str, Any], source: str = "config") -> RoundTrip:
+    """Check a configuration; raise `InputError` with one line that names the source and the key."""
+    try:
+        return RoundTrip.model_validate(content)
+    except ValidationError as error:
+        raise InputError(f"{source}: {first_error(error, RoundTrip)}") from None
+
+
+def write_simulated(settings: CampaignSettings, folder: str | Path, truth: str | Path) -> None:
+    """Simulate a campaign and write it, and its truth apart from it."""
+    campaign, known = simulate_campaign(settings)
+    write_campaign(campaign, folder, plausible=not settings.gross_errors)
+    write_truth(known, truth)

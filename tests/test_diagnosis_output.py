@@ -1,0 +1,245 @@
+"""What a diagnosis writes: files, their content, the page for every verdict, and the loop."""
+
+import hashlib
+import json
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from click.testing import CliRunner
+from test_workflow import ROOT
+
+from accelstudy.campaign.format import write_campaign
+from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign
+from accelstudy.cli import main
+from accelstudy.diagnosis.loop import close_loop
+from accelstudy.diagnosis.output import diagnose_folder, write_diagnosis
+from accelstudy.diagnosis.pipeline import diagnose
+from accelstudy.diagnosis.round_trip import parse_round_trip
+from accelstudy.errors import InputError
+from accelstudy.models import get_model
+from accelstudy.study.config import read_study
+from accelstudy.study.report import number
+
+NINE = get_model("bias-scale-nonorthogonality")
+THERMAL = "thermal_bias: 0.003, -0.002, 0.001"
+CASES = {
+    "named": {
+        "effects": (THERMAL,),
+        "temperature": (20.0, 40.0),
+        "temperature_order": "ABBA",
+        "order": "random",
+    },
+    "gravity": {"effects": ("quadratic_scale: 0.003, 0.004, -0.003",), "approach": "gravity"},
+    "no_effect": {},
+    "unknown": {
+        "effects": (THERMAL, "hysteresis: 0.03, 0.02, 0.03", "cubic_scale: 0.006, 0.005, 0.006"),
+        "temperature": (20.0, 40.0),
+        "temperature_order": "random",
+    },
+    "noise_model": {"noise_effects": ("noise_level(kappa=4)",)},
+    "gross_error": {"gross_errors": ("row_order(first=3, second=9)",)},
+}
+HEADLINES = {
+    "named": "The model lacks thermal bias.",
+    "gravity": "The model lacks",
+    "no_effect": "Nothing that these data can show",
+    "unknown": "it has no name here",
+    "noise_model": "its noise is not",
+    "gross_error": "The data are not what they say",
+}
+
+
+def run(*arguments):
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+def simulated(case, folder):
+    settings = {"scheme": "fibonacci-36", "seed": 5, **CASES[case]}
+    campaign, _ = simulate_campaign(CampaignSettings(name=case, **settings))
+    write_campaign(campaign, folder, plausible=False)
+    return campaign
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """Diagnoses of all cases, each made once."""
+    root, made = tmp_path_factory.mktemp("diagnoses"), {}
+
+    def get(case):
+        if case not in made:
+            simulated(case, root / case)
+            out = root / f"{case}-out"
+            result = run("diagnose", root / case, "--out", out, "--replicates", 300)
+            assert result.exit_code == 0, result.output
+            content = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
+            made[case] = out, content, result.output
+        return made[case]
+
+    return get
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_every_verdict_is_written_and_told(written, case):
+    out, content, printed = written(case)
+    assert content["verdict"] == ("named" if case == "gravity" else case)
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert HEADLINES[case] in printed
+    assert HEADLINES[case] in page
+    drawn = {path.stem for path in (out / "figures").glob("*.svg")}
+    assert {"evidence", "residuals"} <= drawn
+    assert page.count("<svg") == len(drawn)
+    assert all((out / f"figures/{name}.png").stat().st_size > 1000 for name in drawn)
+    text = re.sub(r"<(svg|style).*?</\1>", "", page, flags=re.DOTALL)
+    assert not re.search(r"\b(nan|None|inf|Undefined)\b|src=|href=", text)
+    assert not list(out.rglob("*.part"))
+    if case in ("named", "gravity"):
+        assert {"gap", "loop", "location"} <= drawn
+        assert "on data that were not used?" in page
+    if case == "gravity":
+        assert "mounting rotation" in page.split("What can this campaign not see?")[1]
+
+
+def test_json_keeps_the_contract(written):
+    _, content, _ = written("named")
+    assert content["schema_version"] == 1
+    assert set(content["global_test"]) == {"statistic", "dof", "p_value", "sigma"}
+    assert {"sigma_mps2", "sigma_source", "tests"} <= set(content["noise"])
+    (effect,) = content["effects"]
+    assert effect["name"] == "thermal_bias"
+    assert "thermal_bias" in effect["equivalence_class"]
+    assert [set(p) for p in effect["parameters"]] == [{"name", "value", "sigma", "unit"}] * 3
+    errors = [
+        (p["value"] - truth) / p["sigma"]
+        for p, truth in zip(effect["parameters"], (0.003, -0.002, 0.001), strict=True)
+    ]
+    assert np.abs(errors).max() < 4.5
+    assert all(0 <= share <= 1 for share in content["location"].values())
+    gap = content["gap"]
+    assert isinstance(gap["confirmed"], bool)
+    assert set(gap["held_out_mse"]) == {"before", "after", "floor", "reduction_ci95"}
+    assert {"name", "parameter", "value", "unit"} == set(content["upper_limits"][0])
+    assert isinstance(content["invisible_effects"], list)
+
+
+def test_positions_say_what_was_held_out(written):
+    out, content, _ = written("named")
+    positions = pd.read_parquet(out / "positions.parquet")
+    held = positions["split"] == "held-out"
+    assert positions.loc[held, "position"].tolist() == content["gap"]["held_out_positions"]
+    predicted = positions[["predicted_before_mps2", "predicted_after_mps2"]]
+    assert predicted[held].notna().all().all()
+    assert predicted[~held].isna().all().all()
+    before, after = np.sqrt((predicted[held] ** 2).mean())
+    assert after < before
+    assert positions["test_before"].max() > positions["test_after"].max()
+    assert {"residual_x_before_mps2", "residual_z_after_mps2", "temperature_degC"} <= set(positions)
+
+
+def test_a_bumped_position_is_left_out(tmp_path):
+    campaign = simulated("no_effect", tmp_path / "c")
+    campaign.forces[7] += (0.05, -0.04, 0.06)
+    diagnosis = diagnose(campaign, NINE)
+    content = write_diagnosis(diagnosis, tmp_path / "out", report=False)
+    assert content["effects"][0]["position"] == 8
+    positions = pd.read_parquet(tmp_path / "out/positions.parquet")
+    assert positions.loc[positions["split"] == "left out", "position"].tolist() == [8]
+    assert np.flatnonzero(positions["residual_x_after_mps2"].isna()).tolist() == [7]
+    assert not (tmp_path / "out/report.html").exists()
+
+
+@pytest.mark.parametrize("case", ["named", "gravity", "noise_model"])
+def test_the_model_is_a_study(written, case):
+    out, content, _ = written(case)
+    study = read_study(ROOT / "config/config.yaml", out / "model.yaml")
+    assert study.study == case
+    assert study.sigma_force == pytest.approx(content["noise"]["sigma_mps2"])
+    truth = study.truth(study.simulated_effects)
+    for parameter in [p for e in content["effects"] for p in e.get("parameters", [])]:
+        assert truth[parameter["name"]] == pytest.approx(parameter["value"])
+    assert len(study.grids[0].models) == (2 if case != "noise_model" else 1)
+
+
+def test_same_seed_same_files(written, tmp_path):
+    out, _, _ = written("named")
+    diagnose_folder(out.parent / "named", tmp_path / "again", replicates=300)
+    for path in sorted(out.rglob("*.*")):
+        if path.is_file() and path.suffix != ".parquet":
+            again = tmp_path / "again" / path.relative_to(out)
+            digests = [hashlib.sha256(p.read_bytes()).hexdigest() for p in (path, again)]
+            assert digests[0] == digests[1], path.name
+    for name in ("positions", "loop"):
+        tables = [pd.read_parquet(f / f"{name}.parquet") for f in (out, tmp_path / "again")]
+        pd.testing.assert_frame_equal(*tables)
+
+
+def test_the_old_simulation_lacks_the_measurement(written, tmp_path):
+    campaign = simulated("named", tmp_path / "c")
+    diagnosis = diagnose(campaign, NINE)
+    loop = close_loop(diagnosis, 400, seed=3)
+    assert not loop.contains("old", "base")
+    assert loop.contains("new", "base")
+    assert loop.measured["base"] == pytest.approx(diagnosis.gap.before)
+    assert loop.measured["extended"] == pytest.approx(diagnosis.gap.after, rel=0.05)
+    for case in (("old", "base"), ("new", "extended")):
+        values = loop.case(*case)["sigma0_squared"]
+        assert values.mean() == pytest.approx(1, abs=5 * values.std() / np.sqrt(len(values)))
+    before, after = diagnosis.gap.leveling
+    assert loop.tilt("new", "base") == pytest.approx(before, rel=0.05)
+    assert loop.tilt("new", "extended") == pytest.approx(after, rel=0.1)
+    assert loop.tilt("old", "base") < 0.5 * before
+    again = close_loop(diagnosis, 400, seed=3)
+    pd.testing.assert_frame_equal(again.sessions, loop.sessions)
+    out, content, _ = written("named")
+    shown = number(content["loop"]["cases"][0]["tilt_rms_mgon"])
+    assert f"promises a tilt error of {shown} mgon" in (out / "report.html").read_text("utf-8")
+
+
+def test_nothing_to_compare_without_an_effect(tmp_path):
+    assert close_loop(diagnose(simulated("no_effect", tmp_path / "c"), NINE)) is None
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["nowhere"], "nowhere"),
+        (["c", "--model", "bias-scal"], "did you mean 'bias-scale'"),
+        (["c", "--approach", "robots"], "did you mean 'robot'"),
+    ],
+)
+def test_bad_input_is_one_line(arguments, words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    simulated("no_effect", tmp_path / "c")
+    result = run("diagnose", *arguments, "--out", "out")
+    assert result.exit_code == 2
+    assert words in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_failure_leaves_no_answer(tmp_path, monkeypatch):
+    campaign = simulated("no_effect", tmp_path / "c")
+    diagnosis = diagnose(campaign, NINE)
+    monkeypatch.setattr("accelstudy.diagnosis.report.svg", lambda figure: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        write_diagnosis(diagnosis, tmp_path / "out")
+    assert not (tmp_path / "out/diagnosis.json").exists()
+    assert not list((tmp_path / "out").rglob("*.part"))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"modle": 1}, "did you mean 'model'"),
+        ({"model": "nine"}, "unknown model 'nine'"),
+        ({"campaign": {"schem": "rings-24"}}, "did you mean 'scheme'"),
+        ({"campaign": {"sigma": -1}}, "sigma: must be above 0"),
+    ],
+)
+def test_the_example_is_checked(change, words):
+    content = yaml.safe_load((ROOT / "config/diagnose-example.yaml").read_text(encoding="utf-8"))
+    assert parse_round_trip(content).campaign.name == "diagnose-example"
+    with pytest.raises(InputError, match=words):
+        parse_round_trip({**content, **change})

@@ -1,0 +1,81 @@
+# A campaign with hidden effects: simulated, diagnosed, and simulated with what was found:
+# snakemake --cores 2 --snakefile workflow/diagnose.smk --configfile config/diagnose-example.yaml
+from dataclasses import asdict
+
+from snakemake.exceptions import WorkflowError
+from snakemake.utils import min_version
+
+from accelstudy.diagnosis.round_trip import parse_round_trip
+from accelstudy.errors import InputError
+from accelstudy.study.config import read_layer
+from accelstudy.study.provenance import check_writable, code_hash
+
+min_version("9.10")
+
+
+# The environment of the Makefile is what counts; this is for executors that want a container.
+container: "docker://python:3.13-slim"
+
+
+try:
+    if not config:
+        raise InputError("no campaign; give it with --configfile config/diagnose-example.yaml")
+    for path in workflow.configfiles:
+        read_layer(path)  # more strictly than Snakemake does
+    TRIP = parse_round_trip(config, ", ".join(map(str, workflow.configfiles)) or "config")
+    RESULTS = f"results/{TRIP.campaign.name}"
+    check_writable(RESULTS)
+except InputError as error:
+    raise WorkflowError(str(error)) from None
+
+
+rule round_trip:
+    default_target: True
+    input:
+        f"{RESULTS}/diagnosis",
+
+
+rule simulate_campaign:
+    output:
+        campaign=directory(f"{RESULTS}/campaign"),
+        truth=f"{RESULTS}/truth.yaml",
+    log:
+        f"{RESULTS}/logs/simulate_campaign.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/simulate_campaign.tsv"
+    threads: 1
+    resources:
+        mem_mb=2000,
+    params:
+        settings=asdict(TRIP.campaign),
+        code=code_hash("diagnosis"),
+    message:
+        "Simulate the campaign"
+    script:
+        "scripts/simulate_campaign.py"
+
+
+rule diagnose:
+    input:
+        rules.simulate_campaign.output.campaign,
+    output:
+        directory(f"{RESULTS}/diagnosis"),
+    log:
+        f"{RESULTS}/logs/diagnose.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/diagnose.tsv"
+    threads: 1
+    resources:
+        mem_mb=2000,
+    params:
+        settings={
+            "model": TRIP.model,
+            "approach": TRIP.approach,
+            "seed": TRIP.seed,
+            "replicates": TRIP.replicates,
+        },
+        code=code_hash("diagnosis"),
+    message:
+        "Diagnose the campaign"
+    script:
+        "scripts/diagnose.py"

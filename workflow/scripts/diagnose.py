@@ -1,0 +1,11 @@
+import logging
+
+from accelstudy.diagnosis.output import diagnose_folder
+from accelstudy.diagnosis.wording import verdict_lines
+from accelstudy.study.job import logged
+
+with logged(snakemake):
+    diagnosis = diagnose_folder(
+        snakemake.input[0], snakemake.output[0], **snakemake.params.settings
+    )
+    logging.info("%s", " ".join(verdict_lines(diagnosis)))

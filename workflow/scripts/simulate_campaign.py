@@ -1,0 +1,10 @@
+from accelstudy.campaign.simulating import CampaignSettings
+from accelstudy.diagnosis.round_trip import write_simulated
+from accelstudy.study.job import logged
+
+with logged(snakemake):
+    write_simulated(
+        CampaignSettings(**snakemake.params.settings),
+        snakemake.output.campaign,
+        snakemake.output.truth,
+    )
