@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from types import SimpleNamespace
 from typing import Any
 
@@ -77,9 +77,14 @@ class SensorModel:
         return np.array([values.get(name, 0.0) for name in self.parameter_names], dtype=float)
 
     @cached_property
+    def settings(self) -> NDArray[np.float64]:
+        """Numbers that shape the effects, (s,), effect after effect."""
+        return np.array([v for effect in self.effects for v in effect.shape.values()], dtype=float)
+
+    @property
     def trace(self) -> SensorTrace:
         """The model in symbols, and the functions generated from it."""
-        return SensorTrace(self)
+        return trace_of(tuple(type(effect) for effect in self.effects))
 
     @cached_property
     def hold_columns(self) -> tuple[str, ...]:
@@ -108,7 +113,7 @@ class SensorModel:
         -------
         f_s : (..., n, 3) array, m/s²
         """
-        return self.trace.apply(self.trace.sense, f_b, parameters, g, hold)
+        return self._apply(self.trace.sense, f_b, parameters, g, hold)
 
     def correct(
         self,
@@ -123,7 +128,7 @@ class SensorModel:
         does not converge (effects as large as the signal) the result is NaN.
         """
         f_a = self.sensitive_force(f_s, parameters, g, hold)
-        return self.trace.apply(self.trace.body, f_a, parameters, g, hold)
+        return self._apply(self.trace.body, f_a, parameters, g, hold)
 
     def correction_jacobian(
         self,
@@ -136,7 +141,7 @@ class SensorModel:
         f_a = np.moveaxis(self.sensitive_force(f_s, parameters, g, hold), -1, 0)
         x = np.moveaxis(np.asarray(parameters, dtype=float), -1, 0)
         jacobian = self.trace.evaluate(
-            self.trace.body_jacobian, f_a, f_a, x, np.asarray(g, dtype=float), hold
+            self.trace.body_jacobian, f_a, f_a, x, self.settings, np.asarray(g, dtype=float), hold
         )
         return np.moveaxis(jacobian, (0, 1), (-2, -1))
 
@@ -154,7 +159,7 @@ class SensorModel:
         step = np.zeros_like(f_a)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             for _ in range(25):
-                step = self.trace.apply(self.trace.newton_step, f_a, parameters, g, hold, f_s)
+                step = self._apply(self.trace.newton_step, f_a, parameters, g, hold, f_s)
                 f_a = f_a + step
                 if not np.any(np.abs(step) > 1e-14 * STANDARD_GRAVITY):
                     break
@@ -162,7 +167,7 @@ class SensorModel:
 
     def axes_matrix(self, parameters: ArrayLike) -> NDArray[np.float64]:
         """Return T, (3, 3), which turns forces in the sensitive axes into the body frame."""
-        return self.trace.apply(self.trace.body, np.eye(3), parameters, STANDARD_GRAVITY, None).T
+        return self._apply(self.trace.body, np.eye(3), parameters, STANDARD_GRAVITY, None).T
 
     def reading_errors(
         self, angles: ArrayLike, parameters: ArrayLike, hold: Hold | None = None
@@ -182,88 +187,20 @@ class SensorModel:
         -------
         (n, 2) array, rad
         """
-        trace = self.trace
         angles = np.asarray(angles, dtype=float)
         errors = np.zeros_like(angles)
         for _ in range(10):  # each gains as many digits as the relative errors are small
-            reading = np.concatenate([angles + errors, np.zeros((len(angles), 1))], axis=1)
-            errors = trace.apply(trace.reading, reading, parameters, STANDARD_GRAVITY, hold)
+            errors = self.errors_of_reading(angles + errors, parameters, hold)
         return errors
 
-
-class SensorTrace:
-    """A sensor model evaluated with symbols.
-
-    Attributes
-    ----------
-    force, output, p, g, hold : the symbols of a force, of the output, of the parameters, of gravity
-        and of the columns of `Hold`
-    t_matrix : Matrix (3, 3), T
-    h : list of 3 expressions, f_s as a function of f_a
-    """
-
-    def __init__(self, model: SensorModel) -> None:
-        self.force = symbols("f_x", "f_y", "f_z")
-        self.output = symbols("l_x", "l_y", "l_z")
-        self.p = symbols(*model.parameter_names)
-        (self.g,) = symbols("g")
-        self.hold = dict(
-            zip(Hold.columns(), symbols(*(f"hold_{c}" for c in Hold.columns())), strict=True)
-        )
-        hold = SimpleNamespace(**self.hold)
-
-        self.t_matrix = sp.eye(3)
-        self.h = list(self.force)
-        self._readings = []
-        self._hold = hold
-        position = 0
-        for effect in model.effects:
-            p = self.p[position : position + len(effect.parameters)]
-            position += len(p)
-            self.t_matrix += sp.Matrix(effect.axes(p, symbolic))
-            added = effect.output(self.force, p, self.g, hold, symbolic)
-            self.h = [a + b for a, b in zip(self.h, added, strict=True)]
-            self._readings.append((effect, p))
-
-    def reading_errors(self, angles: tuple[Any, Any]) -> tuple[Any, Any]:
-        """Sum of what the effects add to the robot's reading of roll and pitch."""
-        total: tuple[Any, Any] = (sp.S.Zero, sp.S.Zero)
-        for effect, p in self._readings:
-            added = effect.reading(angles, p, self._hold, symbolic)
-            total = (total[0] + added[0], total[1] + added[1])
-        return total
-
-    @property
-    def arguments(self) -> tuple[sp.Symbol, ...]:
-        """Symbols in the order in which generated functions take them."""
-        return (*self.force, *self.output, *self.p, self.g, *self.hold.values())
-
-    def evaluate(
-        self,
-        function: TracedFunction,
-        force: NDArray[np.float64],
-        output: NDArray[np.float64],
-        parameters: NDArray[np.float64],
-        g: NDArray[np.float64],
-        hold: Hold | None,
-        *more: NDArray[np.float64],
+    def errors_of_reading(
+        self, reading: NDArray[np.float64], parameters: ArrayLike, hold: Hold | None = None
     ) -> NDArray[np.float64]:
-        """Call a generated function, components first.
+        """Return the errors (n, 2) of a reading (n, 2) of roll and pitch; see `reading_errors`."""
+        padded = np.pad(reading, ((0, 0), (0, 1)))
+        return self._apply(self.trace.reading, padded, parameters, STANDARD_GRAVITY, hold)
 
-        force, output : (3, ..., n); parameters : (u, ...); g : (...); more : (..., n), arguments
-        of the function beyond `arguments`. Returns (rows, columns, ..., n).
-        """
-        hold = hold or Hold()
-        columns = [
-            hold.column(name) if str(symbol) in function.used else 0.0
-            for name, symbol in self.hold.items()
-        ]
-        shape = np.broadcast_shapes(force.shape[1:], (*parameters.shape[1:], 1), (*g.shape, 1))
-        return function(
-            shape, *force, *output, *parameters[..., None], g[..., None], *columns, *more
-        )
-
-    def apply(
+    def _apply(
         self,
         function: TracedFunction,
         force: ArrayLike,
@@ -272,13 +209,84 @@ class SensorTrace:
         hold: Hold | None,
         output: ArrayLike | None = None,
     ) -> NDArray[np.float64]:
-        """Call a generated function of vectors, components last: (..., n, 3) in and out."""
+        """Call a function of the trace, of vectors, components last: (..., n, 3) in and out."""
         force = np.moveaxis(np.asarray(force, dtype=float), -1, 0)
         output = force if output is None else np.moveaxis(np.asarray(output, dtype=float), -1, 0)
         parameters = np.moveaxis(np.asarray(parameters, dtype=float), -1, 0)
         g = np.asarray(g, dtype=float)
-        result = self.evaluate(function, force, output, parameters, g, hold)
+        result = self.trace.evaluate(function, force, output, parameters, self.settings, g, hold)
         return np.moveaxis(result[:, 0], 0, -1)
+
+
+class SensorTrace:
+    """A composition of kinds of effects evaluated with symbols, those of their settings included.
+
+    Attributes
+    ----------
+    force, output, p, settings, g, hold : the symbols of a force, of the output, of the parameters,
+        of the numbers that shape the effects, of gravity and of the columns of `Hold`
+    t_matrix : Matrix (3, 3), T
+    h : list of 3 expressions, f_s as a function of f_a
+    """
+
+    def __init__(self, kinds: tuple[type[Effect], ...]) -> None:
+        self.force = symbols("f_x", "f_y", "f_z")
+        self.output = symbols("l_x", "l_y", "l_z")
+        (self.g,) = symbols("g")
+        self.hold = dict(
+            zip(Hold.columns(), symbols(*(f"hold_{c}" for c in Hold.columns())), strict=True)
+        )
+        self._hold = SimpleNamespace(**self.hold)
+        effects = [_in_symbols(kind) for kind in kinds]
+        parameters = [symbols(*(q.name for q in effect.parameters)) for effect in effects]
+        self._effects = list(zip(effects, parameters, strict=True))
+        self.p = tuple(symbol for own in parameters for symbol in own)
+        self.settings = tuple(symbol for effect in effects for symbol in effect.shape.values())
+
+        self.t_matrix = sp.eye(3)
+        self.h = list(self.force)
+        for effect, p in self._effects:
+            self.t_matrix += sp.Matrix(effect.axes(p, symbolic))
+            added = effect.output(self.force, p, self.g, self._hold, symbolic)
+            self.h = [a + b for a, b in zip(self.h, added, strict=True)]
+
+    def reading_errors(self, angles: tuple[Any, Any]) -> tuple[Any, Any]:
+        """Sum of what the effects add to the robot's reading of roll and pitch."""
+        total: tuple[Any, Any] = (sp.S.Zero, sp.S.Zero)
+        for effect, p in self._effects:
+            added = effect.reading(angles, p, self._hold, symbolic)
+            total = (total[0] + added[0], total[1] + added[1])
+        return total
+
+    @property
+    def arguments(self) -> tuple[sp.Symbol, ...]:
+        """Symbols in the order in which generated functions take them."""
+        return (*self.force, *self.output, *self.p, *self.settings, self.g, *self.hold.values())
+
+    def evaluate(
+        self,
+        function: TracedFunction,
+        force: NDArray[np.float64],
+        output: NDArray[np.float64],
+        parameters: NDArray[np.float64],
+        settings: NDArray[np.float64],
+        g: NDArray[np.float64],
+        hold: Hold | None,
+        *more: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """Call a generated function, components first.
+
+        force, output : (3, ..., n); parameters : (u, ...); settings : (s,); g : (...); more :
+        (..., n), arguments of the function beyond `arguments`. Returns (rows, columns, ..., n).
+        """
+        hold = hold or Hold()
+        columns = [
+            hold.column(name) if str(symbol) in function.used else 0.0
+            for name, symbol in self.hold.items()
+        ]
+        shape = np.broadcast_shapes(force.shape[1:], (*parameters.shape[1:], 1), (*g.shape, 1))
+        x = (*parameters[..., None], *settings)
+        return function(shape, *force, *output, *x, g[..., None], *columns, *more)
 
     @cached_property
     def sense(self) -> TracedFunction:
@@ -323,3 +331,18 @@ class SensorTrace:
     def body(self) -> TracedFunction:
         """f_b of f_a."""
         return TracedFunction(self.arguments, self.t_matrix * sp.Matrix(self.force))
+
+
+@cache
+def trace_of(kinds: tuple[type[Effect], ...]) -> SensorTrace:
+    """Return the trace of effects of some kinds; it takes a fraction of a second, so once."""
+    return SensorTrace(kinds)
+
+
+def _in_symbols(kind: type[Effect]) -> Effect:
+    """Effect of a kind whose settings are symbols."""
+    effect = kind()
+    names = tuple(effect.shape)
+    values = symbols(*(f"{effect.name}_{name}" for name in names))
+    effect.shape = dict(zip(names, values, strict=True))
+    return effect

@@ -92,16 +92,18 @@ def test_derivatives_against_finite_differences(name, approach, estimates_gravit
     a = np.stack([central(lambda x: psi(x, l), x, i) for i in range(len(x))], axis=1)
     b = np.stack([central(lambda l: psi(x, l), l, i) for i in range(l.shape[1])], axis=1)
 
-    equations = CalibrationEquations(model, approach, estimates_gravity)
+    equations = CalibrationEquations(model.trace, approach, estimates_gravity)
     f_a = model.correct(l[:, :3], truth) @ np.linalg.inv(model.axes_matrix(truth)).T
-    at = equations.at(G, ideal.hold).linearise(x[:, None], l.T[:, None], f_a.T[:, None])
+    at = equations.at(model.settings, G, ideal.hold).linearise(
+        x[:, None], l.T[:, None], f_a.T[:, None]
+    )
     np.testing.assert_allclose(at.psi[:, 0], psi(x, l), rtol=0, atol=1e-13 * G)
     np.testing.assert_allclose(at.jac_parameters[:, :, 0], a, rtol=0, atol=1e-6)
     np.testing.assert_allclose(at.jac_observations[:, :, 0], b, rtol=0, atol=1e-6)
 
 
 def test_parameters_of_the_equations_end_with_gravity():
-    names = [str(p) for p in CalibrationEquations(NINE, ROBOT, True).parameters]
+    names = [str(p) for p in CalibrationEquations(NINE.trace, ROBOT, True).parameters]
     assert names == [*NINE.parameter_names, "g"]
 
 

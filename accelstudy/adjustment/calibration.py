@@ -13,7 +13,7 @@ quantity of the adjustment) and improved by one Newton step in each; it is exact
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cache, cached_property
 
 import numpy as np
 import sympy as sp
@@ -23,7 +23,7 @@ from accelstudy.adjustment.gauss_helmert import Adjustment, Linearisation, adjus
 from accelstudy.approaches import Approach
 from accelstudy.effects import Hold
 from accelstudy.errors import InputError
-from accelstudy.sensor import SensorModel
+from accelstudy.sensor import SensorModel, SensorTrace
 from accelstudy.tracing import TracedFunction, derivative, symbolic, symbols
 from accelstudy.units import STANDARD_GRAVITY
 
@@ -82,22 +82,20 @@ class Observations:
 
 
 class CalibrationEquations:
-    """Condition equations of a sensor model and an approach.
+    """Condition equations of a traced sensor model and an approach.
 
     Parameters
     ----------
-    model : SensorModel
+    trace : SensorTrace
     approach : Approach
     estimates_gravity : bool
         Whether g is the last of the parameters, or fixed.
     """
 
-    def __init__(self, model: SensorModel, approach: Approach, estimates_gravity: bool) -> None:
-        self.model = model
+    def __init__(self, trace: SensorTrace, approach: Approach, estimates_gravity: bool) -> None:
+        self.trace = trace
         self.approach = approach
         self.estimates_gravity = estimates_gravity
-        trace = model.trace
-        self.trace = trace
         self.angles = symbols("phi_r", "theta_r") if approach.uses_angles else ()
         self.parameters = (*trace.p, trace.g) if estimates_gravity else trace.p
         self.observations = (*trace.output, *self.angles)
@@ -120,16 +118,17 @@ class CalibrationEquations:
         expressions = sp.Matrix.hstack(psi, a, b).subs(at, simultaneous=True)
         return TracedFunction((*trace.arguments, *self.angles), expressions)
 
-    def at(self, gravity: ArrayLike, hold: Hold | None) -> CalibrationConditions:
-        """Return the conditions for a given gravity (float, where fixed) and given holds."""
-        return CalibrationConditions(self, gravity, hold)
+    def at(self, settings: Array, gravity: ArrayLike, hold: Hold | None) -> CalibrationConditions:
+        """Return the conditions for settings (s,), gravity (float, where fixed) and holds."""
+        return CalibrationConditions(self, settings, gravity, hold)
 
 
 @dataclass(frozen=True)
 class CalibrationConditions:
-    """`CalibrationEquations` at known gravity and holds, as the adjustment takes them."""
+    """`CalibrationEquations` with all that is known, as the adjustment takes them."""
 
     equations: CalibrationEquations
+    settings: Array
     gravity: ArrayLike
     hold: Hold | None
 
@@ -140,18 +139,19 @@ class CalibrationConditions:
         if eq.estimates_gravity:
             x, g = parameters[:-1], parameters[-1]
         forces, angles = adjusted[:3], adjusted[3:]
-        f_a = latent + trace.evaluate(trace.newton_step, latent, forces, x, g, self.hold)[:, 0]
-        values = trace.evaluate(eq.linear, f_a, forces, x, g, self.hold, *angles)
+        known = (x, self.settings, g, self.hold)
+        f_a = latent + trace.evaluate(trace.newton_step, latent, forces, *known)[:, 0]
+        values = trace.evaluate(eq.linear, f_a, forces, *known, *angles)
         u = len(parameters)
         return Linearisation(values[:, 0], values[:, 1 : 1 + u], values[:, 1 + u :], f_a)
 
 
-@lru_cache(maxsize=256)
+@cache
 def equations_of(
-    model: SensorModel, approach: Approach, estimates_gravity: bool
+    trace: SensorTrace, approach: Approach, estimates_gravity: bool
 ) -> CalibrationEquations:
-    """Return the traced condition equations; tracing takes a fraction of a second, so once."""
-    return CalibrationEquations(model, approach, estimates_gravity)
+    """Return the condition equations; to generate them takes a fraction of a second, so once."""
+    return CalibrationEquations(trace, approach, estimates_gravity)
 
 
 def calibrate(model: SensorModel, approach: Approach, observed: Observations) -> Adjustment:
@@ -243,7 +243,7 @@ class CalibrationProblem:
             sigmas.append(np.broadcast_to(observed.sigma_angle, (n, 2)))
 
         with_gravity = observed.sigma_gravity > 0
-        equations = equations_of(model, approach, with_gravity)
+        equations = equations_of(model.trace, approach, with_gravity)
         initial = np.zeros((len(forces), len(equations.parameters)))
         weights = np.zeros(len(equations.parameters))
         if observed.initial is not None:
@@ -258,7 +258,7 @@ class CalibrationProblem:
                 "or sigma_gravity > 0"
             )
         return cls(
-            conditions=equations.at(fixed, observed.hold),
+            conditions=equations.at(model.settings, fixed, observed.hold),
             observations=np.concatenate(observations, axis=-1),
             cofactors=np.concatenate(sigmas, axis=-1) ** 2,
             initial=initial,

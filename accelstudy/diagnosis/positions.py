@@ -14,7 +14,7 @@ from accelstudy.approaches import Approach
 from accelstudy.diagnosis.pipeline import Diagnosis
 from accelstudy.errors import InputError
 from accelstudy.sensor import SensorModel
-from accelstudy.units import GON, STANDARD_GRAVITY
+from accelstudy.units import GON
 
 Array = NDArray[np.float64]
 
@@ -118,8 +118,6 @@ def _predicted(
     f_b = model.correct(rest.forces[0], p, g, rest.hold)
     angles = np.zeros((len(f_b), 2))
     if approach.uses_angles and rest.angles is not None:
-        reading = np.pad(rest.angles[0], ((0, 0), (0, 1)))
-        errors = model.trace.apply(model.trace.reading, reading, p, STANDARD_GRAVITY, rest.hold)
-        angles = rest.angles[0] - errors
+        angles = rest.angles[0] - model.errors_of_reading(rest.angles[0], p, rest.hold)
     psi = np.array(approach.conditions(tuple(f_b.T), (angles[:, 0], angles[:, 1]), g, np))
     return np.sqrt(np.mean(psi**2, axis=0))
