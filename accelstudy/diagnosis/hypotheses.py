@@ -229,4 +229,10 @@ def outlier_hypotheses(residuals: Residuals) -> Iterable[Hypothesis]:
 
 def same_space(a: Hypothesis, b: Hypothesis) -> bool:
     """Whether two hypotheses cannot be told apart in these positions."""
-    return a.dim == b.dim and bool(cosines(a.ideal, b.ideal)[-1] > ALIKE)
+    if a.dim != b.dim:
+        return False
+    cross = a.ideal.T @ b.ideal
+    # The squares of the cosines sum to that of the entries: most pairs need no decomposition.
+    if float(np.vdot(cross, cross)) <= a.dim * ALIKE**2:
+        return False
+    return bool(cosines(a.ideal, b.ideal)[-1] > ALIKE)

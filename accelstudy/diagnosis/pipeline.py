@@ -526,11 +526,13 @@ class _Run:
             return "unknown", [], self.setting, "no effect or pair of effects explains it"
         pair = pairs[int(top)]
         # Pairs whose members mean the same are one.
-        members = [self.members(h) for h in pair.best]
+        seen = {h.spec: h for other in pairs for h in other.best}
+        alike = {spec: self.members(h) for spec, h in seen.items()}
+        members = [alike[h.spec] for h in pair.best]
         sure = sum(
             probabilities[str(i)]
             for i, other in enumerate(pairs)
-            if {self.members(h) for h in other.best} == set(members)
+            if {alike[h.spec] for h in other.best} == set(members)
         )
         if sure < SURE:
             return (
@@ -587,11 +589,17 @@ class _Run:
             axes,
             noises.colour_test(residuals, null),
             noises.tail_test(residuals, null),
-            noises.resolution_test(campaign.forces, sigma),
+            self.resolution,
         ]
         if campaign.sd is not None and campaign.n_samples is not None:
             tests.append(noises.within_hold_test(z, sigma, campaign.sd, campaign.n_samples))
         return tuple(tests)
+
+    @cached_property
+    def resolution(self) -> NoiseTest:
+        """Whether the readings are coarse, beside the noise of the base fit."""
+        sigma = float(np.mean(self.setting.frame.residuals.sigmas[:, :3]))
+        return noises.resolution_test(self.campaign.forces, sigma)
 
     def worst_noise(self, tests: Sequence[NoiseTest]) -> NoiseTest | None:
         """Return what is wrong with the noise, the most specific finding first."""
