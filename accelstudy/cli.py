@@ -204,6 +204,3 @@ for command in (
     *COMMANDS,
 ):
     main.add_command(command)
-
-if __name__ == "__main__":
-    main()

@@ -223,7 +223,7 @@ def test_a_defect_is_not_taken_for_bad_input(monkeypatch):
 
 def test_as_a_program():
     run = subprocess.run(
-        [sys.executable, "-m", "accelstudy.cli", "scheme", "nothing"],
+        [sys.executable, "-m", "accelstudy", "scheme", "nothing"],
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert run.returncode == 2

@@ -222,7 +222,7 @@ def test_bad_input_is_one_line(arguments, words, tmp_path, monkeypatch):
 def test_a_failure_leaves_no_answer(tmp_path, monkeypatch):
     campaign = simulated("no_effect", tmp_path / "c")
     diagnosis = diagnose(campaign, NINE)
-    monkeypatch.setattr("accelstudy.diagnosis.report.svg", lambda figure: 1 / 0)
+    monkeypatch.setattr("accelstudy.diagnosis.report.save_all", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         write_diagnosis(diagnosis, tmp_path / "out")
     assert not (tmp_path / "out/diagnosis.json").exists()

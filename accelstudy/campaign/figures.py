@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
@@ -52,11 +50,3 @@ def correlation_figure(fit: CampaignFit) -> Figure:
             ax.text(j, i, text, ha="center", va="center", fontsize=6, color=colour)
     figure.colorbar(image, label="correlation")
     return figure
-
-
-def svg(figure: Figure) -> str:
-    """Figure as an SVG element that can stand in a page."""
-    buffer = io.StringIO()
-    figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-    text = buffer.getvalue()
-    return text[text.index("<svg") :]

@@ -11,8 +11,9 @@ from jinja2 import Environment, PackageLoader
 
 from accelstudy.campaign.assessment import assess, positions_table, quality_document
 from accelstudy.campaign.document import calibration_document
-from accelstudy.campaign.figures import correlation_figure, residual_figure, svg
+from accelstudy.campaign.figures import correlation_figure, residual_figure
 from accelstudy.campaign.fit import CampaignFit
+from accelstudy.figures.saving import save_all
 from accelstudy.figures.style import STYLE, unit_label
 from accelstudy.study.report import number
 from accelstudy.study.tables import whole_file
@@ -33,12 +34,7 @@ def write_calibration(fit: CampaignFit, folder: str | Path) -> dict[str, Any]:
             "residuals": residual_figure(fit, positions),
             "correlations": correlation_figure(fit),
         }
-        drawn = {name: svg(figure) for name, figure in figures.items()}
-        for name, figure in figures.items():
-            with whole_file(folder / "figures" / f"{name}.svg") as path:
-                path.write_text(drawn[name], encoding="utf-8")
-            with whole_file(folder / "figures" / f"{name}.png") as path:
-                figure.savefig(path, format="png", dpi=200)
+    drawn = save_all(figures, folder / "figures")
     with whole_file(folder / "positions.parquet") as path:
         positions.to_parquet(path, index=False)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -17,8 +16,8 @@ from accelstudy.campaign.holds import Holds
 from accelstudy.campaign.logs import Log
 from accelstudy.campaign.windows import windows
 from accelstudy.campaign.wording import counted
+from accelstudy.figures.saving import save
 from accelstudy.figures.style import DPI, FULL, INK, STYLE, new_figure
-from accelstudy.study.tables import whole_file
 
 Array = NDArray[np.float64]
 
@@ -69,16 +68,7 @@ def draw_segmentation(log: Log, holds: Holds) -> Figure:
 
 def render_segmentation(log: Log, holds: Holds, svg_path: str | Path, png_path: str | Path) -> None:
     """Draw the segmentation and write it as SVG and PNG, each whole or not at all."""
-    figure = draw_segmentation(log, holds)
-    metadata: dict[str, dict[str, Any]] = {
-        "svg": {"Date": None, "Creator": None, "Title": "Static holds"},
-        "png": {"Software": None, "Title": "Static holds"},
-    }
-    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
-        for kind, path in (("svg", svg_path), ("png", png_path)):
-            with whole_file(path) as temporary:
-                figure.savefig(temporary, format=kind, dpi=DPI, metadata=metadata[kind])
-            figure.set_layout_engine("none")  # laid out once, alike in both
+    save(draw_segmentation(log, holds), svg_path, png_path, "Static holds", DPI)
 
 
 def _envelope(log: Log, holds: Holds) -> tuple[Array, Array, Array]:

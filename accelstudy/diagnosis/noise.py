@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import special
 
 from accelstudy.diagnosis.repeats import clusters
 from accelstudy.diagnosis.residuals import Residuals
@@ -50,7 +50,7 @@ def force_residuals(residuals: Residuals, errors: Array) -> Array:
 def level_test(z: Array, variance: float = 1.0) -> NoiseTest:
     """Whether the residuals are as large as sigma says, two-sided (the global test)."""
     omega, r = float(z @ z) / variance, len(z)
-    p = 2 * min(stats.chi2.cdf(omega, r), stats.chi2.sf(omega, r))
+    p = 2 * min(special.chdtr(r, omega), special.chdtrc(r, omega))
     factor = omega / r
     size = "larger" if factor > 1 else "smaller"
     return NoiseTest(
@@ -195,7 +195,7 @@ def within_hold_test(z: Array, unit: float, sd: Array, n_samples: NDArray[np.int
     return NoiseTest(
         "coloured_noise",
         ratio,
-        float(stats.f.sf(ratio, len(z), max(freedom, 1.0))),
+        float(special.fdtrc(len(z), max(freedom, 1.0), ratio)),
         (float(np.sqrt(white)),),
         f"white noise within the holds explains {1e3 * np.sqrt(white):.2f} of "
         f"{1e3 * np.sqrt(scatter):.2f} mm/s² of a position mean",

@@ -9,17 +9,15 @@ import matplotlib as mpl
 import pandas as pd
 from jinja2 import Environment, PackageLoader
 
-from accelstudy.campaign.figures import svg
 from accelstudy.diagnosis import wording
 from accelstudy.diagnosis.figures import diagnosis_figures
 from accelstudy.diagnosis.loop import Loop
 from accelstudy.diagnosis.pipeline import LEVEL_EFFECTS, LEVEL_NOISE, SURE, Diagnosis
 from accelstudy.effects import effect_names, get_effect
+from accelstudy.figures.saving import save_all
 from accelstudy.figures.style import STYLE
 from accelstudy.study.report import number
 from accelstudy.study.tables import whole_file
-
-DPI = 150
 
 
 def write_report(
@@ -39,16 +37,9 @@ def write_report(
     loop : Loop, optional
     folder : Path
     """
-    drawn = {}
     with mpl.rc_context(STYLE):  # type: ignore[arg-type]
-        for name, figure in diagnosis_figures(diagnosis, positions, loop).items():
-            drawn[name] = svg(figure)
-            # Once laid out, the second drawing need not do it again.
-            figure.set_layout_engine("none")
-            with whole_file(folder / "figures" / f"{name}.svg") as path:
-                path.write_text(drawn[name], encoding="utf-8")
-            with whole_file(folder / "figures" / f"{name}.png") as path:
-                figure.savefig(path, format="png", dpi=DPI)
+        figures = diagnosis_figures(diagnosis, positions, loop)
+    drawn = save_all(figures, folder / "figures")
     environment = Environment(
         loader=PackageLoader("accelstudy", "diagnosis"),
         autoescape=True,

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from scipy import stats
+from scipy import special
 
 from accelstudy.figures.registry import Tables, figure
 from accelstudy.figures.style import (
@@ -25,7 +25,7 @@ from accelstudy.figures.style import (
 )
 from accelstudy.study.config import StudyConfig
 
-Z95 = float(stats.norm.ppf(0.975))
+Z95 = float(special.ndtri(0.975))
 BAND = "#DDDDDD"
 GAP = 0.25
 """Between two groups of parameters, which are 1 wide each."""

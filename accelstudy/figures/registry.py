@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import matplotlib as mpl
 import pandas as pd
 from matplotlib.figure import Figure
 
+from accelstudy.figures.saving import save
 from accelstudy.figures.style import DPI, STYLE
 from accelstudy.registry import Registry
 from accelstudy.study.config import StudyConfig
-from accelstudy.study.tables import whole_file
 
 Tables = Mapping[str, pd.DataFrame]
 Draw = Callable[[Tables, StudyConfig], Figure]
@@ -103,13 +102,4 @@ def render(
 
     The same tables give the same bytes. Parameters as in `draw`.
     """
-    drawn = draw(name, tables, study)
-    metadata: dict[str, dict[str, Any]] = {
-        "svg": {"Date": None, "Creator": None, "Title": get_figure(name).title},
-        "png": {"Software": None, "Title": get_figure(name).title},
-    }
-    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
-        for kind, path in (("svg", svg_path), ("png", png_path)):
-            with whole_file(path) as temporary:
-                drawn.savefig(temporary, format=kind, dpi=DPI, metadata=metadata[kind])
-            drawn.set_layout_engine("none")  # laid out once, alike in both
+    save(draw(name, tables, study), svg_path, png_path, get_figure(name).title, DPI)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import special
 
 from accelstudy.adjustment.calibration import Observations
 from accelstudy.adjustment.quality.solution import Solution, solve
@@ -79,8 +79,8 @@ def position_tests(solution: Solution) -> PositionTests:
         rest = np.where(r > q, np.maximum(omega - statistic, 0.0) / (r - q), np.nan)
         studentised = statistic / q / rest
         tau = np.sqrt(statistic / q / (omega / r if r > 0 else np.nan))
-        p_known = np.where(q > 0, stats.chi2.sf(statistic, q), np.nan)
-        p_unknown = stats.f.sf(studentised, q, r - q)
+        p_known = np.where(q > 0, special.chdtrc(q, statistic), np.nan)
+        p_unknown = special.fdtrc(q, r - q, studentised)
     return PositionTests(
         gross_errors=np.einsum("nbc,ncd,nd->nb", solution.whitening, root, normalised),
         dof=q,

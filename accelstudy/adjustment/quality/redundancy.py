@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize, stats
+from scipy import special
 
 from accelstudy.adjustment.quality.solution import Solution
 from accelstudy.effects import Hold
@@ -67,8 +67,7 @@ class Reliability:
 
 def noncentrality(dof: int, alpha: float = 0.001, power: float = 0.8) -> float:
     """λ0 at which a χ² test of level `alpha` has `power`; 17.075 by default for one dof."""
-    critical = stats.chi2.isf(alpha, dof)
-    return float(optimize.brentq(lambda x: stats.ncx2.sf(critical, dof, x) - power, 1e-6, 1e3))
+    return float(special.chndtrinc(special.chdtri(dof, alpha), dof, 1 - power))
 
 
 def reliability(

@@ -1,0 +1,17 @@
+"""The command `accelstudy`, also as ``python -m accelstudy``."""
+
+import gc
+
+
+def run() -> None:
+    """Run the command line."""
+    # Imports and figures make a million objects that stay. To look for garbage among them again
+    # and again takes a tenth of the time of a command.
+    gc.set_threshold(100_000, 50, 50)
+    from accelstudy.cli import main
+
+    main(prog_name="accelstudy")
+
+
+if __name__ == "__main__":
+    run()

@@ -1,0 +1,59 @@
+"""Figures as files and as parts of pages."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from pathlib import Path
+
+import matplotlib as mpl
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+from accelstudy.figures.style import STYLE
+from accelstudy.study.tables import whole_file
+
+PAGE_DPI = 150
+"""Of the figures of a page, which shows them as SVG."""
+
+
+def save(figure: Figure, svg_path: str | Path, png_path: str | Path, title: str, dpi: int) -> str:
+    """Write a figure as SVG and PNG, each whole or not at all.
+
+    The same figure gives the same bytes. The canvases are called themselves, since
+    `Figure.savefig` would draw each twice.
+
+    Parameters
+    ----------
+    figure : Figure
+    svg_path, png_path : str or Path
+    title : str, for the metadata
+    dpi : int, of the PNG
+
+    Returns
+    -------
+    str, the figure as an SVG element that can stand in a page
+    """
+    buffer = io.StringIO()
+    metadata = {"Date": None, "Creator": None, "Title": title}
+    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
+        FigureCanvasSVG(figure).print_svg(buffer, metadata=metadata)  # type: ignore[no-untyped-call]
+        figure.set_layout_engine("none")  # laid out once, alike in both
+        figure.set_dpi(dpi)
+        with whole_file(png_path) as path:
+            FigureCanvasAgg(figure).print_png(  # type: ignore[no-untyped-call]
+                path, metadata={"Software": None, "Title": title}
+            )
+    text = buffer.getvalue()
+    with whole_file(svg_path) as path:
+        path.write_text(text, encoding="utf-8")
+    return text[text.index("<svg") :]
+
+
+def save_all(figures: Mapping[str, Figure], folder: Path) -> dict[str, str]:
+    """Write the figures of a page under their names; returns them as SVG elements."""
+    return {
+        name: save(figure, folder / f"{name}.svg", folder / f"{name}.png", name, PAGE_DPI)
+        for name, figure in figures.items()
+    }
