@@ -51,6 +51,19 @@ class Hypothesis:
         """Number of parameters that show."""
         return self.basis.shape[1]
 
+    @property
+    def smooth(self) -> str | None:
+        """Name of the setting with which the effect changes smoothly, if it has one."""
+        hypers = () if self.effect is None else self.effect.hypers
+        return next((hyper.name for hyper in hypers if hyper.smooth), None)
+
+    @property
+    def value(self) -> float:
+        """Value of the smooth setting."""
+        assert self.effect is not None
+        assert self.smooth is not None
+        return self.effect.shape[self.smooth]
+
 
 @dataclass(frozen=True)
 class Frame:

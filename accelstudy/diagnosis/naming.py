@@ -17,6 +17,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.diagnosis.hypotheses import Hypothesis
 from accelstudy.diagnosis.noise import colour_kernels
 from accelstudy.diagnosis.residuals import Residuals
 from accelstudy.diagnosis.screening import share
@@ -41,10 +42,17 @@ def shapes_evidence(shapes: Sequence[Array], z: Array) -> Array:
     return np.array([float(log_evidence(share(q, z), q.shape[1], len(z))) for q in shapes])
 
 
-def mean_evidence(logs: Array) -> float:
-    """Log of the mean evidence of equally probable shapes."""
+def mean_evidence(logs: Array, weights: Array | None = None) -> float:
+    """Log of the mean evidence of shapes, equally probable if no weights say otherwise."""
     top = float(np.max(logs))
-    return top + float(np.log(np.mean(np.exp(logs - top))))
+    return top + float(np.log(np.average(np.exp(logs - top), weights=weights)))
+
+
+def widths(shapes: Sequence[Hypothesis]) -> Array | None:
+    """Weights of the trapezoidal rule over the logarithm of a smooth setting, (s,)."""
+    if shapes[0].smooth is None or len(shapes) < 2:
+        return None
+    return np.asarray(np.gradient(np.log([h.value for h in shapes])))
 
 
 def colour_evidence(residuals: Residuals) -> float:

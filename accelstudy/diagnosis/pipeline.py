@@ -9,6 +9,7 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from accelstudy.adjustment.quality import GlobalTest, Solution, global_test, solve
 from accelstudy.approaches import Approach, get_approach
@@ -37,6 +38,7 @@ from accelstudy.diagnosis.naming import (
     mean_evidence,
     posterior,
     shapes_evidence,
+    widths,
 )
 from accelstudy.diagnosis.next_positions import NextPosition, next_positions
 from accelstudy.diagnosis.noise import NoiseTest
@@ -289,8 +291,8 @@ class _Run:
     def evidence(self) -> dict[str, float]:
         """Log evidence of all single hypotheses."""
         evidence = {
-            name: mean_evidence(shapes_evidence([h.basis for h in shapes], self.z))
-            for name, shapes in self.setting.candidates.items()
+            name: mean_evidence(shapes_evidence([h.basis for h in shapes], self.z), widths(shapes))
+            for name, shapes in self.shapes.items()
         }
         evidence[COLOUR] = colour_evidence(self.setting.frame.residuals)
         evidence[UNKNOWN] = self.unknown_evidence
@@ -322,36 +324,34 @@ class _Run:
         return classes
 
     def best_shape(self, name: str) -> Hypothesis:
-        """Shape of a candidate that explains most, refined where it is smooth."""
-        shapes = self.setting.candidates[name]
-        best = int(np.argmax([float(share(h.basis, self.z)) for h in shapes]))
-        return self.refined(shapes, best)
+        """Shape of a candidate that explains most."""
+        return max(self.shapes[name], key=lambda h: float(share(h.basis, self.z)))
 
-    def refined(self, shapes: Sequence[Hypothesis], best: int) -> Hypothesis:
-        """Search between the neighbours of the best shape."""
-        effect = shapes[best].effect
-        if effect is None or not effect.hypers or not effect.hypers[0].smooth or len(shapes) < 2:
-            return shapes[best]
-        (hyper,) = effect.hypers
-        values = [h.effect.shape[hyper.name] for h in shapes if h.effect is not None]
-        low, high = values[max(best - 1, 0)], values[min(best + 1, len(values) - 1)]
-        chosen = shapes[best]
+    @cached_property
+    def shapes(self) -> dict[str, Sequence[Hypothesis]]:
+        """Shapes of each candidate, close together about the best one of a smooth effect."""
+        return {name: self.refined(shapes) for name, shapes in self.setting.candidates.items()}
+
+    def refined(self, shapes: Sequence[Hypothesis]) -> Sequence[Hypothesis]:
+        """Add shapes between the neighbours of the best one, and again between those."""
+        if shapes[0].smooth is None or len(shapes) < 2:
+            return shapes
+        fine = list(shapes)
         for _ in range(3):
-            values = list(np.geomspace(low, high, 7))
-            for value in values[1:-1]:
-                shape = type(effect)(**{hyper.name: float(f"{value:.5g}")})
-                tried = self.setting.hypothesis(shape)
-                if (
-                    tried is not None
-                    and tried.dim == chosen.dim
-                    and share(tried.basis, self.z) > share(chosen.basis, self.z)
-                ):
-                    chosen = tried
-            assert chosen.effect is not None
-            ratio = (high / low) ** (1 / 6)
-            center = chosen.effect.shape[hyper.name]
-            low, high = center / ratio, center * ratio
-        return chosen
+            best = int(np.argmax([float(share(h.basis, self.z)) for h in fine]))
+            low, high = (fine[k].value for k in (max(best - 1, 0), min(best + 1, len(fine) - 1)))
+            tried = (self.shaped(fine[best], value) for value in np.geomspace(low, high, 7)[1:-1])
+            fine += [h for h in tried if h is not None]
+            fine.sort(key=lambda h: h.value)
+        return fine
+
+    def shaped(self, hypothesis: Hypothesis, value: float) -> Hypothesis | None:
+        """Return a smooth effect with another value of its setting; None if it shows less."""
+        assert hypothesis.effect is not None
+        assert hypothesis.smooth is not None
+        effect = type(hypothesis.effect)(**{hypothesis.smooth: float(f"{value:.6g}")})
+        shaped = self.setting.hypothesis(effect)
+        return shaped if shaped is not None and shaped.dim == hypothesis.dim else None
 
     @cached_property
     def probabilities(self) -> dict[str, float]:
@@ -383,26 +383,57 @@ class _Run:
         name = "-".join([self.model.name, *(h.name for h in chosen if h.effect is not None)])
         return compose(name, (*base, *specs))
 
-    def extend(self, chosen: Sequence[Hypothesis]) -> Solution | None:
-        """Refit rigorously with effects added and bumped positions left out."""
+    def refit(self, chosen: Sequence[Hypothesis]) -> Solution | None:
+        """Fit rigorously with effects added and bumped positions left out."""
         model = self.extended_model(chosen)
-        observed = self.first.observed
-        if observed.initial is not None:
-            start = dict(zip(self.model.parameter_names, observed.initial, strict=True))
-            observed = replace(observed, initial=model.vector(start))
+        # From an ideal sensor the iterations may not reach a large effect.
+        start = dict(zip(self.model.parameter_names, self.first.parameters, strict=False))
+        observed = replace(self.first.observed, initial=model.vector(start))
         bumped = [position_of(h) for h in chosen if h.effect is None]
         if bumped:
             observed = observed.take(np.setdiff1d(np.arange(self.campaign.n_positions), bumped))
         try:
             solution = solve(model, self.approach, observed)
-            if solution.redundancy <= 0:
-                return None
-            # Axes that seemed unequal because of the effect are equal now.
-            residuals = Residuals.of(solution)
-            null = self.null[:, : residuals.redundancy]
-            return self.weighted(solution, noises.axis_test(residuals, null))
         except (InputError, np.linalg.LinAlgError):
             return None
+        return solution if solution.redundancy > 0 else None
+
+    def sharpened(self, chosen: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Search the settings of smooth effects by refits: a large effect is not of first order."""
+        sharp = list(chosen)
+        for k, start in enumerate(chosen):
+            if start.smooth is None:
+                continue
+            values = [h.value for h in self.setting.candidates[start.name]]
+            low = max((v for v in values if v < start.value), default=start.value)
+            high = min((v for v in values if v > start.value), default=start.value)
+
+            def omega(log: float, k: int = k, start: Hypothesis = start) -> float:
+                shaped = self.shaped(start, np.exp(log))
+                if shaped is None:
+                    return self.first.omega
+                trial = self.refit([*sharp[:k], shaped, *sharp[k + 1 :]])
+                return self.first.omega if trial is None else trial.omega
+
+            found = minimize_scalar(
+                omega, bounds=np.log([low, high]), method="bounded", options={"xatol": 1e-4}
+            )
+            shaped = self.shaped(start, np.exp(found.x))
+            if shaped is not None and found.fun < omega(np.log(start.value)):
+                sharp[k] = shaped
+        return sharp
+
+    def extend(self, chosen: Sequence[Hypothesis]) -> Solution | None:
+        """Refit; axes that seemed unequal because of the effect are equal now."""
+        solution = self.refit(chosen)
+        if solution is None:
+            return None
+        residuals = Residuals.of(solution)
+        null = self.null[:, : residuals.redundancy]
+        try:
+            return self.weighted(solution, noises.axis_test(residuals, null))
+        except (InputError, np.linalg.LinAlgError):
+            return solution
 
     def extend_best(
         self, chosen: Sequence[tuple[Hypothesis, tuple[str, ...]]]
@@ -417,7 +448,8 @@ class _Run:
             else [best]
             for best, members in chosen
         ]
-        refits = [(list(one), self.extend(one)) for one in product(*alternatives)]
+        sharp = [self.sharpened(one) for one in product(*alternatives)]
+        refits = [(one, self.extend(one)) for one in sharp]
         solved = [(one, solution) for one, solution in refits if solution is not None]
         return min(solved, key=lambda item: item[1].omega, default=None)
 
@@ -544,23 +576,17 @@ class _Run:
                     f"{sure:.2f} only"
                 ),
             )
-        refined = [self.refine_known(h) for h in pair.best]
-        refit = self.extend_best(list(zip(refined, members, strict=True)))
+        refit = self.extend_best(list(zip(pair.best, members, strict=True)))
         if refit is None:
             return "unknown", [], self.setting, "the refit with two effects has no solution"
-        refined, solution = refit
+        best, solution = refit
         adequate, setting = self.adequate(solution)
         if not adequate:
             return "unknown", [], self.setting, "two effects of the catalogue are not enough"
-        found = [(h, m, sure) for h, m in zip(refined, members, strict=True)]
+        found = [(h, m, sure) for h, m in zip(best, members, strict=True)]
         found.sort(key=lambda item: item[0].effect is not None)
         verdict = "gross_error" if found[0][0].effect is None else "named"
         return verdict, found, setting, ""
-
-    def refine_known(self, hypothesis: Hypothesis) -> Hypothesis:
-        """Refine the shape that was found for a member of a pair."""
-        shapes = self.setting.candidates[hypothesis.name]
-        return self.refined(shapes, [h.spec for h in shapes].index(hypothesis.spec))
 
     def members(self, hypothesis: Hypothesis) -> tuple[str, ...]:
         """Names that mean the same as a hypothesis in this campaign."""
@@ -613,7 +639,7 @@ class _Run:
         ]  # fmt: skip
         limit = LEVEL_NOISE / max(len(counted), 1)
         found = [t for t in counted if t.p_value < limit]
-        order = ["quantisation", "axis_noise", COLOUR, "heavy_tails", LEVEL]
+        order = ["quantisation", COLOUR, "axis_noise", "heavy_tails", LEVEL]
         return min(found, key=lambda t: order.index(t.name), default=None)
 
     def judge_noise(self, worst: NoiseTest) -> tuple[str, str]:
