@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from accelstudy.diagnosis.loop import CASES, Loop
 from accelstudy.diagnosis.naming import UNKNOWN
-from accelstudy.diagnosis.pipeline import LEVEL_EFFECTS, Diagnosis
+from accelstudy.diagnosis.pipeline import Diagnosis
 from accelstudy.diagnosis.positions import condition_sigma
+from accelstudy.diagnosis.search import LEVEL_EFFECTS
 from accelstudy.diagnosis.wording import GROUPS, words
 from accelstudy.figures.style import FULL, INK, log_ticks, new_figure
 from accelstudy.study.report import number

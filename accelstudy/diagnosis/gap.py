@@ -17,11 +17,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.adjustment import Observations, calibrate
+from accelstudy.adjustment import Observations
 from accelstudy.adjustment.calibration import CalibrationProblem
-from accelstudy.approaches import Approach
+from accelstudy.adjustment.quality import Solution
 from accelstudy.effects import Hold
-from accelstudy.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
@@ -44,6 +43,7 @@ class HeldOutGap:
     reduction_ci95 : (float, float), of before − after, over resampled positions
     z : float
     held : tuple of int, indices of the held-out positions
+    misses : (tuple, tuple) of float, m/s², rms misclosure of each of them by either model
     """
 
     before: float
@@ -52,6 +52,7 @@ class HeldOutGap:
     reduction_ci95: tuple[float, float]
     z: float
     held: tuple[int, ...]
+    misses: tuple[tuple[float, ...], tuple[float, ...]]
 
     @property
     def significant(self) -> bool:
@@ -92,80 +93,80 @@ def split_positions(
 
 
 def held_out_gap(
-    base: SensorModel,
-    extended: SensorModel,
-    approach: Approach,
-    observed: Observations,
-    fitted: NDArray[np.int_],
+    base: Solution,
+    extended: Solution,
+    rest: Observations,
     held: NDArray[np.int_],
     variance: float | None,
     rng: np.random.Generator,
-) -> HeldOutGap | None:
-    """Fit both models to some positions and predict the others.
+) -> HeldOutGap:
+    """Predict positions by fits of two models to others.
 
     Parameters
     ----------
-    base, extended : SensorModel
-    approach : Approach
-    observed : Observations, of all positions
-    fitted, held : indices of positions
+    base, extended : Solution, of the same positions
+    rest : Observations, of the others
+    held : indices of the others, for the record
     variance : float, of unit weight; None takes that of the extended fit
     rng : Generator, for the resampling
-
-    Returns
-    -------
-    HeldOutGap, or None if a model cannot be fitted to these positions.
     """
-    part, rest = observed.take(fitted), observed.take(held)
-    results = []
-    for model in (base, extended):
-        initial = None
-        if observed.initial is not None:
-            start = dict(zip(base.parameter_names, observed.initial, strict=True))
-            initial = model.vector(start)
-        result = calibrate(model, approach, replace(part, initial=initial))
-        if not result.converged[0] or result.redundancy <= 0:
-            return None
-        results.append((model, result))
     if variance is None:
-        variance = float(results[1][1].variance_posteriori[0])
-    predictions = [
-        _predict(model, approach, rest, result.parameters[0]) for model, result in results
-    ]
-    (r, a), (r_after, a_after) = predictions
-    n_conditions = approach.n_conditions
-    c, c_after = (result.cofactors[0] for _, result in results)
-    d = r - r_after
-    size = float(d @ d + (d @ a) @ c @ (a.T @ d))
-    before, after = (x.reshape(-1, n_conditions) ** 2 / variance for x in (r, r_after))
-    gain = np.sum(before - after, axis=1) / n_conditions
+        variance = extended.omega / extended.redundancy
+    first, second = (_Prediction.of(solution, rest) for solution in (base, extended))
+    d = first.white - second.white
+    slope = d @ first.slope
+    size = float(d @ d + slope @ base.cofactors @ slope)
+    before, after = (p.white.reshape(len(held), -1) ** 2 / variance for p in (first, second))
+    gain = np.mean(before - after, axis=1)
     chosen = rng.integers(len(gain), size=(RESAMPLES, len(gain)))
     low, high = np.quantile(gain[chosen].mean(axis=1), [0.025, 0.975])
+    spread = np.einsum("mu,uv,mv->", second.slope, extended.cofactors, second.slope)
     return HeldOutGap(
         before=float(before.mean()),
         after=float(after.mean()),
-        floor=float(1 + np.einsum("mu,uv,mv->", a_after, c_after, a_after) / len(r)),
+        floor=float(1 + spread / len(d)),
         reduction_ci95=(float(low), float(high)),
-        z=float(d @ r / np.sqrt(size * variance)) if size > 0 else 0.0,
+        z=float(d @ first.white / np.sqrt(size * variance)) if size > 0 else 0.0,
         held=tuple(int(i) for i in held),
+        misses=(first.misses, second.misses),
     )
 
 
-def _predict(
-    model: SensorModel, approach: Approach, observed: Observations, parameters: Array
-) -> tuple[Array, Array]:
-    """Misclosures of unit weight of unused positions, and their derivatives."""
-    problem = CalibrationProblem.of(model, approach, replace(observed, initial=None))
-    p = parameters[: model.n_parameters]
-    g = float(parameters[-1]) if problem.weights.any() else float(np.ravel(observed.gravity)[0])
-    f_a = model.sensitive_force(observed.forces, p, g, observed.hold)
-    at = problem.conditions.linearise(
-        parameters[:, None],
-        np.moveaxis(problem.observations, -1, 0),
-        np.moveaxis(f_a, -1, 0),
-    )
-    b = np.moveaxis(at.jac_observations[:, :, 0], -1, 0)
-    lower = np.linalg.cholesky(np.einsum("nco,no,ndo->ncd", b, problem.cofactors, b))
-    r = np.linalg.solve(lower, at.psi[:, 0].T[..., None]).ravel()
-    a = np.linalg.solve(lower, np.moveaxis(at.jac_parameters[:, :, 0], -1, 0))
-    return np.asarray(r), np.asarray(a.reshape(len(r), -1))
+@dataclass(frozen=True)
+class _Prediction:
+    """What a fit leaves in unused positions.
+
+    Attributes
+    ----------
+    white : (m,) array, misclosures of unit weight
+    slope : (m, u) array, their derivatives by the parameters
+    misses : tuple of float, m/s², rms misclosure of each position
+    """
+
+    white: Array
+    slope: Array
+    misses: tuple[float, ...]
+
+    @classmethod
+    def of(cls, fit: Solution, observed: Observations) -> _Prediction:
+        """Predict by a fit."""
+        model = fit.model
+        problem = CalibrationProblem.of(model, fit.approach, replace(observed, initial=None))
+        p = fit.parameters[: model.n_parameters]
+        f_a = model.sensitive_force(observed.forces, p, fit.gravity, observed.hold)
+        at = problem.conditions.linearise(
+            fit.parameters[:, None],
+            np.moveaxis(problem.observations, -1, 0),
+            np.moveaxis(f_a, -1, 0),
+        )
+        b = np.moveaxis(at.jac_observations[:, :, 0], -1, 0)
+        psi = at.psi[:, 0].T
+        lower = np.linalg.cholesky(np.einsum("nco,no,ndo->ncd", b, problem.cofactors, b))
+        white: Array = np.linalg.solve(lower, psi[..., None])
+        slope: Array = np.linalg.solve(lower, np.moveaxis(at.jac_parameters[:, :, 0], -1, 0))
+        misses = np.sqrt(np.mean(psi**2, axis=1))
+        return cls(
+            white=white.ravel(),
+            slope=slope.reshape(white.size, -1),
+            misses=tuple(float(miss) for miss in misses),
+        )

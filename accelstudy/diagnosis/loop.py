@@ -18,10 +18,9 @@ from accelstudy.adjustment import Adjustment, Observations, calibrate
 from accelstudy.adjustment.quality import Solution
 from accelstudy.diagnosis.pipeline import Diagnosis
 from accelstudy.diagnosis.positions import kept_positions
-from accelstudy.diagnosis.tilt import ATTITUDES, MAX_TILT
+from accelstudy.diagnosis.tilt import in_use
 from accelstudy.effects import Hold
-from accelstudy.leveling import roll_pitch
-from accelstudy.leveling_error import cap_forces, leveling_error
+from accelstudy.leveling_error import leveling_error
 from accelstudy.sensor import SensorModel
 from accelstudy.simulation import Noise, session
 from accelstudy.units import MGON
@@ -172,9 +171,6 @@ def _tilt_errors(
     hold: Hold,
 ) -> Array:
     """Rms of roll and pitch that each calibration leaves, in the holds of the campaign, rad."""
-    f_b = cap_forces(MAX_TILT, ATTITUDES, g)
-    roll, pitch = roll_pitch(tuple(f_b.T))
-    n = len(np.asarray(hold.roll))
-    used = replace(hold.take(np.arange(ATTITUDES) % n), roll=roll, pitch=pitch)
+    f_b, used = in_use(hold, g)
     error = leveling_error(simulated, truth, estimated, estimates, f_b, g, used)
     return np.sqrt(np.mean(error.per_replicate**2, axis=1))

@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from accelstudy.adjustment import Observations, calibrate
 from accelstudy.adjustment.quality import Solution, position_tests
-from accelstudy.approaches import Approach
 from accelstudy.diagnosis.pipeline import Diagnosis
-from accelstudy.errors import InputError
-from accelstudy.sensor import SensorModel
 from accelstudy.units import GON
 
 Array = NDArray[np.float64]
@@ -70,12 +64,9 @@ def positions_table(diagnosis: Diagnosis) -> pd.DataFrame:
         known = d.unit_variance == 1
         table[f"test_{when}"] = _placed(tests.w / np.sqrt(d.unit_variance), rows)
         table[f"p_{when}"] = _placed(tests.p_known if known else tests.p_unknown, rows)
-    predictions = (d.model, d.base), (d.extended, solution)
-    for when, (model, fitted) in zip(("before", "after"), predictions, strict=True):
-        values = np.full(n, np.nan)
-        if held.any():
-            values[held] = _predicted(model, d.approach, d.base.observed, held, fitted)
-        table[f"predicted_{when}_mps2"] = values
+    missed = ((), ()) if d.gap.held_out is None else d.gap.held_out.misses
+    for when, values in zip(("before", "after"), missed, strict=True):
+        table[f"predicted_{when}_mps2"] = _placed(np.array(values), held)
     return pd.DataFrame(table)
 
 
@@ -95,29 +86,3 @@ def _placed(values: Array, rows: NDArray[np.bool_]) -> Array:
     placed = np.full(len(rows), np.nan)
     placed[rows] = values
     return placed
-
-
-def _predicted(
-    model: SensorModel,
-    approach: Approach,
-    observed: Observations,
-    held: NDArray[np.bool_],
-    fitted: Solution,
-) -> Array:
-    """Rms residual of each held-out position by a fit to the others; NaN if there is none."""
-    initial = fitted.parameters[: model.n_parameters]
-    part = replace(observed, initial=initial).take(np.flatnonzero(~held))
-    rest = observed.take(np.flatnonzero(held))
-    try:
-        result = calibrate(model, approach, part)
-    except InputError:
-        return np.full(np.count_nonzero(held), np.nan)
-    p = result.parameters[0, : model.n_parameters]
-    estimates_gravity = observed.sigma_gravity > 0
-    g = result.parameters[0, -1] if estimates_gravity else float(np.ravel(observed.gravity)[0])
-    f_b = model.correct(rest.forces[0], p, g, rest.hold)
-    angles = np.zeros((len(f_b), 2))
-    if approach.uses_angles and rest.angles is not None:
-        angles = rest.angles[0] - model.errors_of_reading(rest.angles[0], p, rest.hold)
-    psi = np.array(approach.conditions(tuple(f_b.T), (angles[:, 0], angles[:, 1]), g, np))
-    return np.sqrt(np.mean(psi**2, axis=0))

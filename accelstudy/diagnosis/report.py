@@ -12,7 +12,8 @@ from jinja2 import Environment, PackageLoader
 from accelstudy.diagnosis import wording
 from accelstudy.diagnosis.figures import diagnosis_figures
 from accelstudy.diagnosis.loop import Loop
-from accelstudy.diagnosis.pipeline import LEVEL_EFFECTS, LEVEL_NOISE, SURE, Diagnosis
+from accelstudy.diagnosis.pipeline import LEVEL_NOISE, Diagnosis
+from accelstudy.diagnosis.search import LEVEL_EFFECTS, SURE
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.figures.saving import save_all
 from accelstudy.figures.style import STYLE

@@ -19,6 +19,20 @@ MAX_TILT = 50 * GON
 ATTITUDES = 200
 
 
+def in_use(hold: Hold, g: float) -> tuple[Array, Hold]:
+    """Specific forces (n, 3) of all tilts up to 50 gon, and holds like those of a campaign.
+
+    Parameters
+    ----------
+    hold : Hold, of the campaign, with the attitudes
+    g : float, m/s²
+    """
+    f_b = cap_forces(MAX_TILT, ATTITUDES, g)
+    roll, pitch = roll_pitch(tuple(f_b.T))
+    turns = np.arange(ATTITUDES) % len(hold.column("roll"))
+    return f_b, replace(hold.take(turns), roll=roll, pitch=pitch)
+
+
 def leveling_rms(
     base: Solution, extended: Solution, hold: Hold, variance: float
 ) -> tuple[float, float]:
@@ -35,30 +49,23 @@ def leveling_rms(
     variance : float, of unit weight
     """
     g = extended.gravity
-    f_b = cap_forces(MAX_TILT, ATTITUDES, g)
-    roll, pitch = roll_pitch(tuple(f_b.T))
-    n = base.observed.forces.shape[1]
-    used = replace(hold.take(np.arange(ATTITUDES) % n), roll=roll, pitch=pitch)
-    truth = extended.parameters[: extended.model.n_parameters].copy()
-    in_use = np.array(
-        [effect.part == "sensor" for effect in extended.model.effects for _ in effect.parameters]
-    )
-    truth[~in_use] = 0.0
+    f_b, used = in_use(hold, g)
+    angles = np.column_stack([used.column("roll"), used.column("pitch")])
+    stays = extended.model.stays
+    truth = np.where(stays, extended.parameters[: len(stays)], 0.0)
     output = extended.model.sense(f_b, truth, g, used)
 
     squares = []
     for solution in (base, extended):
         model = solution.model
-        p = solution.parameters[: model.n_parameters].copy()
-        stays = np.ones(len(p), dtype=bool)
-        if solution is extended:
-            p, stays = truth, in_use
+        kept = model.stays
+        p = np.where(kept, solution.parameters[: len(kept)], 0.0)
         corrected = model.correct(output, p, g, used)
-        offset = np.column_stack(roll_pitch(tuple(corrected.T))) - np.column_stack([roll, pitch])
+        offset = np.column_stack(roll_pitch(tuple(corrected.T))) - angles
         offset = (offset + np.pi) % (2 * np.pi) - np.pi
         slope = jacobian(corrected) @ model.correction_jacobian(output, p, g, used)
-        slope = slope[..., stays]
-        cofactors = solution.cofactors[: len(p), : len(p)][np.ix_(stays, stays)]
+        slope = slope[..., kept]
+        cofactors = solution.cofactors[: len(p), : len(p)][np.ix_(kept, kept)]
         formal = variance * np.einsum("kau,uv,kav->ka", slope, cofactors, slope)
         squares.append(float(np.mean(offset**2 + formal)))
     return float(np.sqrt(squares[0])), float(np.sqrt(squares[1]))
