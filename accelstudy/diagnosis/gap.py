@@ -162,8 +162,9 @@ class _Prediction:
         b = np.moveaxis(at.jac_observations[:, :, 0], -1, 0)
         psi = at.psi[:, 0].T
         lower = np.linalg.cholesky(np.einsum("nco,no,ndo->ncd", b, problem.cofactors, b))
-        white: Array = np.linalg.solve(lower, psi[..., None])
-        slope: Array = np.linalg.solve(lower, np.moveaxis(at.jac_parameters[:, :, 0], -1, 0))
+        white = np.asarray(np.linalg.solve(lower, psi[..., None]), dtype=float)
+        by_parameters = np.moveaxis(at.jac_parameters[:, :, 0], -1, 0)
+        slope = np.asarray(np.linalg.solve(lower, by_parameters), dtype=float)
         misses = np.sqrt(np.mean(psi**2, axis=1))
         return cls(
             white=white.ravel(),
