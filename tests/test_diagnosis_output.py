@@ -18,6 +18,7 @@ from accelstudy.diagnosis.loop import close_loop
 from accelstudy.diagnosis.output import diagnose_folder, write_diagnosis
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.round_trip import parse_round_trip
+from accelstudy.diagnosis.wording import headline, p_value
 from accelstudy.errors import InputError
 from accelstudy.models import get_model
 from accelstudy.study.config import read_study
@@ -100,6 +101,43 @@ def test_every_verdict_is_written_and_told(written, case):
         assert "on data that were not used?" in page
     if case == "gravity":
         assert "mounting rotation" in page.split("What can this campaign not see?")[1]
+
+
+def test_the_page_tells_its_story_in_order(written):
+    out, _, _ = written("named")
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert re.findall("<h2>(.*?)</h2>", page) == [
+        "Is there a gap between simulation and measurement?",
+        "Where does it live?",
+        "What is it called?",
+        "How sure is that, and what else could it be?",
+        "Is the noise what it is taken for?",
+        "What is it worth?",
+        "Did the gap shrink on data that were not used?",
+        "Does the simulation now look like the measurement?",
+        "What can this campaign not see?",
+        "What to measure next",
+    ]
+
+
+def test_the_headline_names_all_that_would_be_the_same():
+    settings = CampaignSettings(scheme="fibonacci-36", effects=("mounting_rotation",))
+    found = headline(diagnose(simulate_campaign(settings)[0], NINE))
+    assert "mounting rotation" in found
+    assert " or " in found
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [
+        (0.032, "p = 0.032"),
+        (4.31e-6, "p = 4.3 · 10⁻⁶"),
+        (1e-15, "p < 10⁻¹²"),
+        (0.9999, "p > 0.999"),
+    ],
+)
+def test_p_values_in_words(value, shown):
+    assert p_value(value) == shown
 
 
 def test_json_keeps_the_contract(written):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -10,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import NullLocator
+from matplotlib.ticker import MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
 from accelstudy.diagnosis.loop import CASES, Loop
@@ -35,6 +36,10 @@ SHOWN = 12
 SMALLEST_P = 1e-12
 DIFFERENT = 5
 """Ratio of variances or tilt errors from which on an axis is logarithmic."""
+FEW = 4
+"""Number of different values up to which the components of a residual stand side by side."""
+ABREAST = 0.03
+"""Distance of the components there, as a part of the range."""
 LARGE = 20
 """Ratio of mean squares from which on bars are drawn on a logarithmic scale."""
 
@@ -126,44 +131,55 @@ def evidence_figure(diagnosis: Diagnosis) -> Figure:
     left.set_xscale("log")
     left.set_xlim(2, min(0.3 * smallest, 1e-3))
     left.xaxis.set_minor_locator(NullLocator())
-    left.set_xlabel("p-value, family-wise")
+    left.set_xlabel("p-value, all candidates counted")
     left.set_yticks(place, [words(name) for name in shown])
     left.grid(axis="y", visible=False)
-    drawn = right.barh(place, [probabilities.get(n, 0.0) for n in shown], color=colours, height=0.6)
+    percent = [100 * probabilities.get(name, 0.0) for name in shown]
+    drawn = right.barh(place, percent, color=colours, height=0.6)
     right.bar_label(drawn, [_percent(probabilities.get(n)) for n in shown], padding=2, fontsize=7.5)
-    right.set(xlim=(0, 1.12), xlabel="probability, if one thing is missing")
-    right.set_xticks([0, 0.25, 0.5, 0.75, 1])
+    right.set(xlim=(0, 115), xlabel="probability, if one thing is missing / %")
+    right.set_xticks([0, 25, 50, 75, 100])
     right.grid(axis="y", visible=False)
     return figure
 
 
 def _percent(probability: float | None) -> str:
     if probability is None:
-        return ""
-    return "< 1 %" if probability < 0.01 else f"{100 * probability:.0f} %"
+        return "shared"
+    if probability < 0.01:
+        return "< 1 %"
+    return "> 99 %" if probability > 0.99 else f"{100 * probability:.0f} %"
 
 
 def residual_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
     """Residuals before and after against direction, time and temperature."""
     panels = _panels(diagnosis, positions)
-    extended = diagnosis.final is not diagnosis.setting
-    rows = ("before", "after") if extended else ("before",)
+    refitted = diagnosis.final is not diagnosis.setting
+    explained = diagnosis.extended is not diagnosis.model
+    rows = ("before", "after") if refitted else ("before",)
     figure = new_figure(FULL, 12 + 46 * len(rows))
-    grid = figure.subplots(len(rows), len(panels), sharey=True, sharex="col", squeeze=False)
-    sigma = 1e3 * condition_sigma(diagnosis.base, diagnosis.unit_variance)
+    # The scale of a bumped position would hide all others.
+    sharey: Literal["all", "row"] = "all" if explained else "row"
+    grid = figure.subplots(len(rows), len(panels), sharey=sharey, sharex="col", squeeze=False)
+    # What is too large beside the noise that was stated has to look so.
+    variance = 1.0 if diagnosis.sigma_known else diagnosis.unit_variance
+    sigma = 1e3 * condition_sigma(diagnosis.base, variance)
     names = [name for name in AXES if f"residual_{name}_before_mps2" in positions]
     for when, line in zip(rows, grid, strict=True):
         for (label, abscissa), ax in zip(panels.items(), line, strict=True):
             ax.axhspan(-2 * sigma, 2 * sigma, color=NOISE)
             ax.axhline(0, color=INK, linewidth=0.6)
             for name in names:
-                _draw_component(ax, positions, name, when, abscissa(name), extended)
+                _draw_component(ax, positions, name, when, abscissa(name), explained)
+            ax.margins(y=0.08)
+            ax.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
             if when == rows[-1]:
                 ax.set_xlabel(label)
         title = "base model" if when == "before" else "with what was found"
         line[0].set_ylabel(f"{title}\nresidual / (mm/s²)")
     handles, labels = grid[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper left", ncols=6)
+    once = dict(zip(labels, handles, strict=True))
+    figure.legend(once.values(), once.keys(), loc="outside upper left", ncols=7)
     return figure
 
 
@@ -185,25 +201,33 @@ def _panels(
     ):
         values = positions[column].to_numpy() / scale
         if np.isfinite(values).all() and np.ptp(values) > 0:
-            panels[label] = lambda _, values=values: values  # type: ignore[misc]
+            panels[label] = lambda name, values=values: _abreast(values, name)  # type: ignore[misc]
     return panels
 
 
+def _abreast(values: Array, name: str) -> Array:
+    """Move the components apart where there are so few values that they would hide each other."""
+    if len(np.unique(values)) > FEW or name == "norm":
+        return values
+    return values + ABREAST * np.ptp(values) * ("xyz".index(name) - 1)
+
+
 def _draw_component(
-    ax: Axes, positions: pd.DataFrame, name: str, when: str, x: Array, extended: bool
+    ax: Axes, positions: pd.DataFrame, name: str, when: str, x: Array, explained: bool
 ) -> None:
     colour, marker = AXES[name]
     label = "|f| − g" if name == "norm" else f"${name}$"
     values = 1e3 * positions[f"residual_{name}_{when}_mps2"]
     ax.plot(x, values, marker, color=colour, markersize=3.2, label=label)
-    if when == "before" and extended:
-        explained = values - 1e3 * positions[f"residual_{name}_after_mps2"]
+    if when == "before" and explained:
+        part = values - 1e3 * positions[f"residual_{name}_after_mps2"]
         dash = BEFORE if name == "norm" else colour
-        ax.plot(x, explained, "_", color=dash, markersize=8, markeredgewidth=1.3,
+        ax.plot(x, part, "_", color=dash, markersize=8, markeredgewidth=1.3,
                 label=f"{label}, explained")  # fmt: skip
-        left_out = positions["split"] == "left out"
+    left_out = positions["split"] == "left out"
+    if when == "before" and left_out.any():
         ax.plot(x[left_out], values[left_out], "o", color=BEFORE, markersize=9,
-                markerfacecolor="none")  # fmt: skip
+                markerfacecolor="none", label="left out")  # fmt: skip
 
 
 def location_figure(diagnosis: Diagnosis) -> Figure:
@@ -225,7 +249,7 @@ def loop_figure(loop: Loop) -> Figure:
     base, extended, tilt = figure.subplots(1, 3, width_ratios=[1.5, 1, 1.3])
     _draw_variances(base, loop, "base", ("old", "new"))
     _draw_variances(extended, loop, "extended", ("new",))
-    base.set_ylabel("frequency of simulated sessions")
+    base.set_ylabel("simulated sessions")
     handles = [
         Patch(color=SIMULATION_COLOURS["old"], label="old simulation"),
         Patch(color=SIMULATION_COLOURS["new"], label="new simulation"),
@@ -234,9 +258,9 @@ def loop_figure(loop: Loop) -> Figure:
     figure.legend(handles=handles, loc="outside upper left", ncols=3)
 
     titles = (
-        "promised by the\nold simulation",
-        "base calibration\nin truth",
-        "extended\ncalibration",
+        "base calibration,\nold simulation",
+        "base calibration,\nnew simulation",
+        "extended calibration,\nnew simulation",
     )
     colours = (SIMULATION_COLOURS["old"], BEFORE, AFTER)
     place = np.arange(len(CASES))[::-1]

@@ -104,7 +104,7 @@ def _axes(campaign: Campaign) -> Recognised:
             if value > best:
                 best, order, signs = value, (x, y, z), (a, b, c)
     words = ", ".join(
-        f"{axis} is read as {'-' if s < 0 else ''}{'xyz'[o]}"
+        f"{axis} is read as {'−' if s < 0 else ''}{'xyz'[o]}"
         for axis, o, s in zip("xyz", order, signs, strict=True)
     )
     columns = list(order)

@@ -61,6 +61,7 @@ def write_report(
         headline=wording.headline(diagnosis),
         lines=wording.verdict_lines(diagnosis)[1:],
         confirmation=wording.confirmation(diagnosis),
+        advice=wording.advice(diagnosis),
         equation=lambda effect: get_effect(effect["spec"]).equation,
         is_effect=lambda name: name in effect_names(),
         amount=wording.amount,

@@ -31,6 +31,9 @@ HEADLINES = {
 }
 
 
+SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
 def words(name: str) -> str:
     """Return a name of the catalogue as words."""
     return name.replace("_", " ")
@@ -63,14 +66,19 @@ def probability(value: float | None) -> str:
     if value is None:
         return "–"
     if value < 1e-12:
-        return "< 1e-12"
+        return "< 10⁻¹²"
+    if value < 1e-3:
+        digits, exponent = f"{value:.1e}".split("e")
+        return f"{digits} · 10{str(int(exponent)).translate(SUPERSCRIPT)}"
+    if value > 0.9995:
+        return "> 0.999"
     return f"{value:.2g}" if value < 0.995 else f"{value:.3g}"
 
 
 def p_value(value: float | None) -> str:
     """Show a p-value with its sign of relation: p = 0.03."""
     shown = probability(value)
-    return f"p {shown}" if shown.startswith("<") else f"p = {shown}"
+    return f"p {shown}" if shown[0] in "<>" else f"p = {shown}"
 
 
 def headline(diagnosis: Diagnosis) -> str:
@@ -78,10 +86,15 @@ def headline(diagnosis: Diagnosis) -> str:
     found = diagnosis.found
     if diagnosis.verdict == "gross_error":
         found = tuple(f for f in found if not _is_effect(f))
-    names = [words(f.name) + ("" if f.position is None else f" {f.position}") for f in found] or [
-        ""
-    ]
-    return HEADLINES[diagnosis.verdict].format(names=listed(names))
+    return HEADLINES[diagnosis.verdict].format(names=listed([_title(f) for f in found] or [""]))
+
+
+def _title(named: Named) -> str:
+    """Name what was found, with all that would be the same, or with its position."""
+    if named.position is not None:
+        return f"{words(named.name)} {named.position}"
+    same = [name for name in named.equivalence_class if name != named.name]
+    return " or ".join(words(name) for name in (named.name, *same))
 
 
 def verdict_lines(diagnosis: Diagnosis) -> list[str]:
@@ -106,12 +119,30 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
     if d.gap.leveling is not None:
         before, after = (number(value / MGON) for value in d.gap.leveling)
         lines.append(
-            f"Tilt error of the calibrated sensor: {before} mgon without, {after} with it."
+            f"Tilt error of the calibrated sensor: {before} mgon if the model lacks it, "
+            f"{after} mgon if not."
         )
     if d.verdict == "named":
         lines.append(confirmation(d))
     if d.setting.invisible:
-        lines.append(f"This campaign cannot see {listed([words(n) for n in d.setting.invisible])}.")
+        lines.append(
+            f"This campaign cannot see {listed([words(n) for n in d.setting.invisible])}, however "
+            "large."
+        )
+    return lines
+
+
+def advice(diagnosis: Diagnosis) -> list[str]:
+    """Say what, beside further positions, would show more."""
+    d = diagnosis
+    hidden = [words(name) for name in d.setting.invisible if name != "gravity_error"]
+    lines = []
+    if hidden and not d.approach.uses_angles:
+        lines.append(f"The angles of a robot in each position could show {listed(hidden)}.")
+    if "gravity_error" in d.setting.invisible:
+        lines.append("No position shows an error of g; it takes another measurement of gravity.")
+    if "repeat" not in d.location and (d.verdict == "noise_model" or not d.sigma_known):
+        lines.append("Repeated attitudes would show the noise from hold to hold without any model.")
     return lines
 
 
