@@ -235,6 +235,16 @@ def test_the_old_simulation_lacks_the_measurement(written, tmp_path):
     assert f"promises a tilt error of {shown} mgon" in (out / "report.html").read_text("utf-8")
 
 
+def test_positions_that_are_just_enough_to_calibrate_show_nothing(tmp_path):
+    settings = CampaignSettings(scheme="d-optimal-10", approach="gravity")
+    diagnosis = diagnose(simulate_campaign(settings)[0], NINE)
+    assert diagnosis.base.redundancy == 1
+    write_diagnosis(diagnosis, tmp_path)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Too few positions to show whether anything is missing" in page
+    assert {path.stem for path in (tmp_path / "figures").glob("*.svg")} == {"residuals"}
+
+
 def test_nothing_to_compare_without_an_effect(tmp_path):
     assert close_loop(diagnose(simulated("no_effect", tmp_path / "c"), NINE)) is None
 

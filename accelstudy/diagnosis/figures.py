@@ -55,8 +55,9 @@ def diagnosis_figures(
     positions : DataFrame, of `positions_table`
     loop : Loop, optional
     """
-    drawn = {"evidence": evidence_figure(diagnosis)}
-    drawn["residuals"] = residual_figure(diagnosis, positions)
+    drawn = {"residuals": residual_figure(diagnosis, positions)}
+    if diagnosis.screening.p_family:
+        drawn["evidence"] = evidence_figure(diagnosis)
     if diagnosis.gap.held_out is not None:
         drawn["gap"] = gap_figure(diagnosis, positions)
     if any(diagnosis.location.values()):

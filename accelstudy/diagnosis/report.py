@@ -53,6 +53,7 @@ def write_report(
         p_value=wording.p_value,
         words=wording.words,
         listed=wording.listed,
+        sentence=wording.sentence,
         described=wording.described,
     )
     page = environment.get_template("report.html.j2").render(

@@ -83,6 +83,8 @@ def p_value(value: float | None) -> str:
 
 def headline(diagnosis: Diagnosis) -> str:
     """Say the verdict in one sentence."""
+    if diagnosis.verdict == "no_effect" and not diagnosis.screening.p_family:
+        return "Too few positions to show whether anything is missing from the model."
     found = diagnosis.found
     if diagnosis.verdict == "gross_error":
         found = tuple(f for f in found if not _is_effect(f))
@@ -102,7 +104,7 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
     d = diagnosis
     lines = [headline(d)]
     if d.reason:
-        lines.append(_sentence(d.reason))
+        lines.append(sentence(d.reason))
     if d.recognised is not None:
         lines.append("All else is said of the data as they would be without this error.")
     if d.verdict == "no_effect":
@@ -177,15 +179,18 @@ def _effect_line(named: Named) -> str:
 
 def _agreement(d: Diagnosis) -> str:
     test = d.global_test
-    smallest = p_value(d.screening.smallest)
+    if d.screening.p_family:
+        pattern = f"no pattern ({p_value(d.screening.smallest)})"
+    else:
+        pattern = f"too little redundancy ({d.base.redundancy}) to show a pattern"
     if test is None:
         return (
             "The campaign does not give its noise, so that only patterns in the residuals could be "
-            f"tested, not their size; there is none ({smallest})."
+            f"tested, not their size; they have {pattern}."
         )
     return (
-        f"The residuals are as large as the noise says ({p_value(test.p_value)}), and have no "
-        f"pattern ({smallest})."
+        f"The residuals are as large as the noise says ({p_value(test.p_value)}), and have "
+        f"{pattern}."
     )
 
 
@@ -201,8 +206,9 @@ def _where(d: Diagnosis) -> str:
     return f"Of what the residuals have too much, {listed(shares)} (shares overlap)."
 
 
-def _sentence(text: str) -> str:
-    return f"{text[0].upper()}{text[1:]}" + ("" if text.endswith(".") else ".")
+def sentence(text: str) -> str:
+    """Make a sentence of a reason, with names of the catalogue as words."""
+    return f"{text[0].upper()}{words(text[1:])}" + ("" if text.endswith(".") else ".")
 
 
 def described(name: str) -> str:
