@@ -60,7 +60,10 @@ def diagnosis_figures(
         drawn["evidence"] = evidence_figure(diagnosis)
     if diagnosis.gap.held_out is not None:
         drawn["gap"] = gap_figure(diagnosis, positions)
-    if any(diagnosis.location.values()):
+    # Without sigma, the residuals of noise have no size that would be too much.
+    if any(diagnosis.location.values()) and (
+        diagnosis.sigma_known or diagnosis.verdict != "noise_model"
+    ):
         drawn["location"] = location_figure(diagnosis)
     if loop is not None:
         drawn["loop"] = loop_figure(loop)
@@ -75,7 +78,7 @@ def gap_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
     ax, bars = figure.subplots(1, 2, width_ratios=[2.6, 1])
     held = positions[positions["split"] == "held-out"]
     before, after = (1e3 * held[f"predicted_{when}_mps2"] for when in ("before", "after"))
-    sigma = 1e3 * condition_sigma(diagnosis.base, diagnosis.unit_variance)
+    sigma = 1e3 * condition_sigma(diagnosis.final.frame.solution, diagnosis.unit_variance)
     place = np.arange(len(held))
     ax.axhspan(0, sigma, color=NOISE, label="noise alone (1 σ)")
     ax.vlines(place, after, before, color=OTHER, linewidth=0.8)
@@ -162,9 +165,12 @@ def residual_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
     # The scale of a bumped position would hide all others.
     sharey: Literal["all", "row"] = "all" if explained else "row"
     grid = figure.subplots(len(rows), len(panels), sharey=sharey, sharex="col", squeeze=False)
+    # Labels of narrow panels must not meet.
+    ticks = 3 if len(panels) > 2 else 5
     # What is too large beside the noise that was stated has to look so.
-    variance = 1.0 if diagnosis.sigma_known else diagnosis.unit_variance
-    sigma = 1e3 * condition_sigma(diagnosis.base, variance)
+    gap = diagnosis.gap
+    posteriori = gap.before if gap.after is None else gap.after
+    sigma = 1e3 * condition_sigma(diagnosis.base, 1.0 if diagnosis.sigma_known else posteriori)
     names = [name for name in AXES if f"residual_{name}_before_mps2" in positions]
     for when, line in zip(rows, grid, strict=True):
         for (label, abscissa), ax in zip(panels.items(), line, strict=True):
@@ -173,7 +179,7 @@ def residual_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
             for name in names:
                 _draw_component(ax, positions, name, when, abscissa(name), explained)
             ax.margins(y=0.08)
-            ax.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+            ax.xaxis.set_major_locator(MaxNLocator(ticks, steps=[1, 2, 5, 10]))
             if when == rows[-1]:
                 ax.set_xlabel(label)
         title = "base model" if when == "before" else "with what was found"

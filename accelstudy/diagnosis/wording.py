@@ -67,7 +67,7 @@ def probability(value: float | None) -> str:
         return "–"
     if value < 1e-12:
         return "< 10⁻¹²"
-    if value < 1e-3:
+    if value < 9.5e-4:
         digits, exponent = f"{value:.1e}".split("e")
         return f"{digits} · 10{str(int(exponent)).translate(SUPERSCRIPT)}"
     if value > 0.9995:
