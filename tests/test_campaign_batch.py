@@ -20,7 +20,7 @@ from accelstudy.campaign.batch import run_task
 from accelstudy.campaign.batch_config import Task, parse_batch, read_batch
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.overview import CAMPAIGN_COLUMNS, PARAMETER_COLUMNS, summarise_batch
-from accelstudy.campaign.public import public_data
+from accelstudy.campaign.public import public_data, record_public
 from accelstudy.errors import InputError
 from accelstudy.study.provenance import code_hash
 from accelstudy.study.tables import read_origin, read_table
@@ -54,11 +54,15 @@ def succeed(*arguments, **options):
     return result.stdout
 
 
-def planned(folder, config, environment=ENVIRONMENT):
-    """Rules that a dry run would run, with the number of jobs."""
-    text = succeed(folder, config, "--dry-run", environment=environment)
-    counts = re.findall(r"^(\w+) +(\d+)$", text.split("Reasons:")[0], re.MULTILINE)
+def jobs(text):
+    """Rules that a run has run, with the number of jobs."""
+    counts = re.findall(r"^(\w+) +(\d+)$", text.split("Select jobs")[0], re.MULTILINE)
     return {rule: int(n) for rule, n in counts if rule not in ("campaigns", "total")}
+
+
+def calibrated(text):
+    """Campaigns that a run has calibrated."""
+    return set(re.findall(r"^Job \d+: Calibrate (\S+)$", text, re.MULTILINE))
 
 
 def write_log(folder):
@@ -97,11 +101,6 @@ def made(tmp_path_factory):
     write_log(folder)
     (folder / "printed.txt").write_text(succeed(folder, BATCH), encoding="utf-8")
     return folder
-
-
-@pytest.fixture
-def copy(made, tmp_path):
-    return Path(shutil.copytree(made, tmp_path / "copy"))
 
 
 # --- a batch -------------------------------------------------------------------------------------
@@ -208,31 +207,43 @@ def test_a_second_run_does_nothing(made):
     assert {path: path.stat().st_mtime_ns for path in results.rglob("*")} == before
 
 
-def test_a_mended_campaign_alone_runs_again(copy):
-    shutil.copyfile(copy / "campaigns/plain/positions.csv", copy / "campaigns/spoilt/positions.csv")
-    assert planned(copy, BATCH) == {"calibrate": 1, "overview": 1}
-    text = succeed(copy, BATCH)
-    one_line(text, "5 of 5 campaigns calibrated")
-    table = read_table(copy / "results/bench/campaigns.parquet").set_index("campaign")
-    assert table.loc["spoilt", "sigma0"] == table.loc["plain", "sigma0"]
+@pytest.fixture(scope="module")
+def changed(made, tmp_path_factory):
+    """The batch, run again with one campaign mended, one spoilt, one more, and one log changed."""
+    folder = Path(shutil.copytree(made, tmp_path_factory.mktemp("changed") / "copy"))
+    campaigns = folder / "campaigns"
+    shutil.copytree(campaigns / "plain", campaigns / "another one")
+    shutil.copyfile(campaigns / "plain/positions.csv", campaigns / "spoilt/positions.csv")
+    (campaigns / "plain/campaign.yaml").unlink()
+    entries = [*BATCH["campaigns"][:3], {**BATCH["campaigns"][3], "model": "bias-scale"}]
+    text = succeed(folder, {**BATCH, "campaigns": entries})
+    return folder / "results" / "bench", text
 
 
-def test_a_campaign_that_got_worse_leaves_nothing_old(copy):
-    (copy / "campaigns/plain/campaign.yaml").unlink()
-    assert planned(copy, BATCH) == {"calibrate": 1, "overview": 1}
-    text = succeed(copy, BATCH)
+def test_only_what_changed_runs_again(changed):
+    _, text = changed
+    assert calibrated(text) == {"another-one", "plain", "session", "spoilt"}
+    assert jobs(text) == {"calibrate": 4, "overview": 1}
+    one_line(text, "5 of 6 campaigns calibrated")
+
+
+def test_a_mended_campaign_is_good(changed, made):
+    before, after = (
+        read_table(results / "campaigns.parquet").set_index("campaign")
+        for results in (made / "results" / "bench", changed[0])
+    )
+    assert after.loc["spoilt", "sigma0"] == before.loc["plain", "sigma0"]
+
+
+def test_a_campaign_that_got_worse_leaves_nothing_old(changed):
+    results, text = changed
     one_line(text, "not calibrated: plain: campaigns/plain/campaign.yaml: No such file")
-    remaining = {path.name for path in (copy / "results/bench/campaigns/plain").iterdir()}
+    remaining = {path.name for path in (results / "campaigns/plain").iterdir()}
     assert remaining <= {"status.json", ".snakemake_timestamp"}
 
 
-def test_one_more_and_one_changed(copy):
-    shutil.copytree(copy / "campaigns" / "plain", copy / "campaigns" / "another one")
-    entries = [*BATCH["campaigns"][:3], {**BATCH["campaigns"][3], "model": "bias-scale"}]
-    config = {**BATCH, "campaigns": entries}
-    assert planned(copy, config) == {"calibrate": 2, "overview": 1}
-    succeed(copy, config)
-    table = read_table(copy / "results/bench/campaigns.parquet").set_index("campaign")
+def test_one_more_and_one_changed(changed):
+    table = read_table(changed[0] / "campaigns.parquet").set_index("campaign")
     assert table.loc["another-one", "status"] == "ok"
     assert table.loc["session", "redundancy"] == 8
 
@@ -269,36 +280,42 @@ def test_what_cannot_be_downloaded_is_reported_and_tried_again(tmp_path):
     entry = {"description": "a log", "url": log.as_uri(), "sha256": digest, "licence": "MIT"}
     registry.write_text(yaml.safe_dump({"bench-log": {**entry, "import": {"rate_hz": 100}}}))
     write_campaign(simulated_campaign(TRUTH), tmp_path / "good")
-    config = {"batch": "b", "campaigns": [{"public": "bench-log"}, {"campaign": "good"}]}
+    entries = [{"public": "bench-log"}, {"campaign": "good"}]
+    config = {"batch": "b", "public_folder": "downloads", "campaigns": entries}
 
     text = succeed(tmp_path, config, environment=environment)
     one_line(text, f"not calibrated: bench-log: {log.as_uri()}: cannot be downloaded: No such file")
     one_line(text, "1 of 2 campaigns calibrated")
-    again = {"public": 1, "calibrate": 1, "overview": 1}
-    assert planned(tmp_path, config, environment) == again
-    one_line(succeed(tmp_path, config, environment=environment), "1 of 2 campaigns calibrated")
+    text = succeed(tmp_path, config, environment=environment)
+    assert jobs(text) == {"public": 1, "calibrate": 1, "overview": 1}
+    one_line(text, "1 of 2 campaigns calibrated")
 
     away.rename(log)
     one_line(succeed(tmp_path, config, environment=environment), "2 of 2 campaigns calibrated")
-    assert (tmp_path / "resources" / "public" / "bench-log" / "log.parquet").is_file()
-    assert "Nothing to be done" in succeed(tmp_path, config, environment=environment)
+    assert (tmp_path / "downloads" / "bench-log" / "log.parquet").is_file()
     log.unlink()  # what is there is not got again
-    assert planned(tmp_path, config, environment) == {}
+    assert "Nothing to be done" in succeed(tmp_path, config, environment=environment)
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason=f"needs the public data in {DATA}")
-def test_public_data_from_a_folder_that_has_them(tmp_path):
+def test_public_data_from_a_folder_that_has_them(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     entries = [{"public": name} for name in ("mpu9150-0", "innalabs-24", "ferraris-annotated")]
-    config = {"batch": "public", "public_folder": str(DATA), "campaigns": entries}
-    text = succeed(tmp_path, config)
-    one_line(text, "not calibrated: ferraris-annotated: 6 positions do not determine the model")
-    table = read_table(tmp_path / "results/public/campaigns.parquet").set_index("campaign")
+    batch = parse_batch({"batch": "public", "public_folder": str(DATA), "campaigns": entries})
+    for task in batch.tasks():
+        record_public(task.source, batch.public_folder, f"{task.name}.json", 1)
+    errors = {task.name: run_task(task, task.name, f"{task.name}.json") for task in batch.tasks()}
+    assert errors["ferraris-annotated"].startswith("6 positions do not determine the model")
+    paths = [Path(name) for name in ("campaigns.parquet", "parameters.parquet", "overview.html")]
+    summarise_batch("public", [Path(e) for e in errors], *paths, {"config_hash": "0", "seed": None})
+    table = read_table(paths[0]).set_index("campaign")
+    assert table["status"].tolist() == ["ok", "ok", "failed"]
     assert table.loc["innalabs-24", "rms_norm_residual_mps2"] == pytest.approx(
         0.4256e-3 * 9.80665, rel=1e-3
     )
     assert table.loc["mpu9150-0", "rms_norm_residual_mps2"] == pytest.approx(2.1e-3, rel=0.1)
     assert table.loc["mpu9150-0", "accepted"]
-    assert not (tmp_path / "resources").exists()
+    assert not Path("resources").exists()
 
 
 # --- configuration -------------------------------------------------------------------------------
@@ -309,6 +326,9 @@ def test_the_bundled_batch():
     sources = [task.source for task in batch.tasks()]
     assert set(sources) <= {*public_data()}
     assert len(set(sources)) >= 5
+    assert parse_batch({"batch": "b", "campaigns": [{"campaign": "a"}]}).public_folder == (
+        "resources/public"
+    )
 
 
 def test_settings_of_public_data_can_be_overlaid():
