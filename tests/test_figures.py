@@ -319,6 +319,19 @@ def test_colours_are_the_same_in_every_figure(tables, paper):
         assert colours[group] == style.group_colour(group)
 
 
+@pytest.mark.parametrize(
+    ("model", "title"),
+    [
+        ("bias-scale-nonorthogonality", "9: + non-orthogonality"),
+        ("bias-scale-nonorthogonality-thermal_bias", "9 + thermal bias"),
+        ("bias-scale-base_tilt-hysteresis", "6 + base tilt + hysteresis"),
+        ("mine", "mine"),
+    ],
+)
+def test_titles_of_models_are_short(model, title):
+    assert style.model_title(model) == title
+
+
 def test_an_unknown_figure_is_an_input_error_that_names_a_near_one():
     with pytest.raises(InputError, match="figure-2"):
         get_figure("figure-22")

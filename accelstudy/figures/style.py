@@ -159,8 +159,14 @@ def in_order(groups: Iterable[str]) -> list[str]:
 
 
 def model_title(model: str) -> str:
-    """Short title of a model."""
-    return TITLES.get(model, model)
+    """Short title of a model; one that extends a known one is named by what it adds."""
+    if model in TITLES:
+        return TITLES[model]
+    known = max((name for name in TITLES if model.startswith(f"{name}-")), key=len, default=None)
+    if known is None:
+        return model
+    parameters, added = TITLES[known].split(":")[0], model.removeprefix(f"{known}-")
+    return f"{parameters} + {added.replace('-', ' + ').replace('_', ' ')}"
 
 
 def new_figure(width: float, height_mm: float) -> Figure:
@@ -192,7 +198,8 @@ def spread(places: NDArray[np.float64], apart: float) -> list[int]:
 
 def say_empty(ax: Axes, text: str = "no estimable cell") -> None:
     """Write into axes why nothing is drawn there."""
-    ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", color="#777777")
+    ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", color="#777777",
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 2})  # fmt: skip
 
 
 def approach_handles(approaches: Iterable[str], **options: Any) -> list[Line2D]:
