@@ -27,7 +27,7 @@ help: ## list the targets
 env: $(READY) ## make the environment, from locked versions, in .venv
 
 test: lint ## check and test the package, with coverage
-	pytest --cov
+	pytest --cov --numprocesses $(CORES) --dist loadfile
 
 smoke: $(READY) ## run the whole workflow on a small configuration
 	snakemake --cores $(CORES) --configfile config/smoke.yaml
