@@ -57,7 +57,7 @@ def level_test(z: Array, variance: float = 1.0) -> NoiseTest:
         omega,
         float(min(p, 1.0)),
         (factor,),
-        f"the residuals are {np.sqrt(max(factor, 1 / factor)):.2f} times {size} than sigma says",
+        f"the residuals are {np.sqrt(max(factor, 1 / factor)):.3g} times {size} than sigma says",
     )
 
 
