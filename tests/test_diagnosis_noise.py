@@ -91,7 +91,7 @@ def test_white_noise_within_the_holds_explains_white_noise(white, approach):
     assert_uniform(np.array(p))
 
 
-@pytest.mark.parametrize("scheme", ["mclaren-24", "faces-edges-corners-26"])
+@pytest.mark.parametrize("scheme", ["mclaren-24", "rings-24", "faces-edges-corners-26"])
 def test_readings_without_steps_have_none(scheme):
     """The search is a bound (Bonferroni); attitudes on a grid of their own are no steps either."""
     drawn = draw(6, scheme, noise=Noise(sigma_force=0.02), replicates=RUNS)

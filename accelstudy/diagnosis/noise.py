@@ -18,6 +18,10 @@ from accelstudy.diagnosis.residuals import Residuals
 Array = NDArray[np.float64]
 
 
+GRID = 1e-5
+"""Probability with which noise on a grid of attitudes passes for steps, at each resolution."""
+
+
 @dataclass(frozen=True)
 class NoiseTest:
     """One test of the stochastic model.
@@ -160,9 +164,9 @@ def resolution_test(forces: Array, sigma: float) -> NoiseTest:
 
     The Rayleigh power of the readings is searched over resolutions q from σ to 30 σ, of which the
     readings span four at least; without quantisation n times the power is a standard exponential
-    variable at each. The attitudes may form a grid themselves, but noise of σ about it leaves a
-    power of exp(−(2π σ/q)²) at most, so only more than that counts, and of repeated attitudes only
-    one.
+    variable at each. The attitudes may form a grid themselves, but with noise of σ about it
+    −n log(power) is (2π σ/q)² χ² with n − 1 degrees of freedom at least, so only a power that this
+    does not reach counts, and of repeated attitudes only one.
     """
     forces = forces[np.unique(clusters(forces))]
     n = len(forces)
@@ -171,11 +175,12 @@ def resolution_test(forces: Array, sigma: float) -> NoiseTest:
     steps = max(2, min(int(2 * extent / sigma), 100_000))
     lowest = max(1 / 30, 4 * sigma / extent) if extent > 0 else 1.0
     frequencies = np.linspace(min(lowest, 1.0), 1.0, steps) / sigma
+    least = 2 * special.gammaincinv((n - 1) / 2, GRID) / n if n > 1 else 0.0
+    usual = np.exp(-((2 * np.pi * sigma * frequencies) ** 2) * least)
     for column in forces.T if lowest < 1 else ():
         blocks = np.array_split(frequencies, max(1, steps // 4096))
         power = np.concatenate([_rayleigh(column, block) for block in blocks])
-        blurred = np.exp(-((2 * np.pi * sigma * frequencies) ** 2))
-        power = np.where(power > (1 + blurred) / 2, power, 0.0)
+        power = np.where(power > np.maximum(usual, 0.5), power, 0.0)
         k = int(np.argmax(power))
         if power[k] > best:
             best, where = float(power[k]), _step(column, frequencies[max(k - 1, 0) : k + 2])
