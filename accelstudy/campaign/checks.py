@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.campaign.header import COLUMNS, COUNTING, HEADER, LEAST, Header
+from accelstudy.campaign.header import COLUMNS, COUNTING, HEADER, LEAST, MOST, Header
 from accelstudy.errors import InputError
 from accelstudy.leveling import specific_force
 from accelstudy.units import GON, STANDARD_GRAVITY, to_si
@@ -40,6 +40,8 @@ def check_column(
     if attribute in LEAST:
         least = LEAST[attribute]
         complain_of(values < least, f"is too small; it must be {least} or more")
+    if attribute not in (*COUNTING, "forces"):
+        complain_of(abs(values) > MOST, f"is beyond anything measured; expected less than {MOST:g}")
     behind = np.diff(values, prepend=-np.inf)
     if attribute == "positions":
         text = "follows no smaller number; number the holds 1, 2, 3 … in order of acquisition"
@@ -62,6 +64,16 @@ def check_robot(given: Mapping[str, Array], header: Header, path: Path) -> None:
         raise InputError(f"{key}: missing, but {path.name} has {roll} and {pitch}")
     if header.robot is not None and "angles" not in given:
         raise InputError(f"{key}: is given, but {path.name} has no {roll} and {pitch}")
+
+
+def check_size(raw: Array, forces: Array, header: Header, path: Path) -> None:
+    """Check that forces in whatever unit are numbers that can be calculated with."""
+    norm, given = (float(np.median(np.linalg.norm(array, axis=1))) for array in (forces, raw))
+    if not (norm > 1 / MOST and np.max(abs(forces)) < MOST):
+        raise InputError(
+            f"{path}: fx, fy, fz: their norm is about {given:.3g} {header.unit}, which no unit "
+            f"makes gravity, {header.gravity.value_mps2:g} m/s^2; correct the columns"
+        )
 
 
 def check_norm(raw: Array, forces: Array, header: Header, path: Path) -> None:

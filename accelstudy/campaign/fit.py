@@ -16,11 +16,15 @@ from accelstudy.errors import InputError
 from accelstudy.schemes import Scheme
 from accelstudy.sensor import SensorModel
 from accelstudy.simulation import Noise
+from accelstudy.units import MGON
 
 Array = NDArray[np.float64]
 
 ALPHA = 0.05
 """Level of the tests."""
+
+LEAST_RATIO = 1e-6
+"""Noise of the forces beside that of the robot's angles below which double precision ends."""
 
 UNIT_SIGMA = 1e-3
 """m/s², stands for an unknown sigma; only sigmas a posteriori mean anything then."""
@@ -149,6 +153,12 @@ def fit_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> 
             "pitch_robot_gon"
         )
     noise = campaign_noise(campaign)
+    least = LEAST_RATIO * campaign.gravity * noise.sigma_angle if approach.uses_angles else 0.0
+    if noise.sigma_force < least:
+        raise InputError(
+            f"{campaign.name}: sensor_noise.sigma_mps2: {noise.sigma_force:g} is too small beside "
+            f"robot.angle_sigma_mgon: {noise.sigma_angle / MGON:g}; expected {least:.2g} or more"
+        )
     start = initial_values(model, campaign.forces, campaign.gravity)
     rough = model.correct(campaign.forces, start, campaign.gravity, campaign.hold)
     design = diagnose(

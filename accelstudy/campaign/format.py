@@ -16,7 +16,13 @@ import yaml
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from accelstudy.campaign.checks import check_angles, check_column, check_norm, check_robot
+from accelstudy.campaign.checks import (
+    check_angles,
+    check_column,
+    check_norm,
+    check_robot,
+    check_size,
+)
 from accelstudy.campaign.header import COLUMNS, COUNTING, HEADER, KNOWN, TABLES, Header
 from accelstudy.campaign.position_files import Columns, read_positions
 from accelstudy.campaign.wording import one_line
@@ -215,8 +221,8 @@ def _parse_table(columns: Columns, header: Header, path: Path, plausible: bool) 
         for attribute, array in given.items():
             scale, offset = header.to_si(attribute)
             values[attribute] = (array - offset) * scale
-        if plausible:
-            check_norm(given["forces"], values["forces"], header, path)
+        check = check_norm if plausible else check_size
+        check(given["forces"], values["forces"], header, path)
         if header.robot is not None:
             if plausible:
                 check_angles(given["angles"], values["forces"], header.gravity.value_mps2, path)

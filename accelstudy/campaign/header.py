@@ -32,6 +32,8 @@ COLUMNS = {
 KNOWN = tuple(name for names in COLUMNS.values() for name in names)
 COUNTING = ("positions", "n_samples")
 LEAST = {"positions": 1, "n_samples": 1, "sd": 0, "temperature": -273.15, "vibration": 0}
+MOST = 1e12
+"""Beyond anything that is measured, in any unit; squares and cubes of less stay finite."""
 
 
 def _not_zero(value: float) -> float:
@@ -51,17 +53,18 @@ class Nominal(Block):
 
 
 class _Gravity(Block):
-    value_mps2: Positive
-    sigma_mps2: NotNegative = 0.0
+    value_mps2: Annotated[Positive, Field(ge=1e-3, le=1e3)]
+    sigma_mps2: Annotated[NotNegative, Field(le=1e3)] = 0.0
 
 
 class _SensorNoise(Block):
-    # Forces are always observed, and an observation without noise has no finite weight.
-    sigma_mps2: Positive
+    # Forces are always observed, and an observation without noise has no finite weight; the best
+    # gravimeters resolve 1e-9 m/s².
+    sigma_mps2: Annotated[Positive, Field(ge=1e-9, le=MOST)]
 
 
 class _Robot(Block):
-    angle_sigma_mgon: NotNegative
+    angle_sigma_mgon: Annotated[NotNegative, Field(le=MOST)]
 
 
 class Header(Block):

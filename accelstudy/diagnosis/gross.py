@@ -15,6 +15,7 @@ from scipy.optimize import linear_sum_assignment
 
 from accelstudy.approaches import Approach
 from accelstudy.campaign.format import Campaign
+from accelstudy.errors import InputError
 from accelstudy.leveling import specific_force
 from accelstudy.units import GON, STANDARD_GRAVITY, to_si
 
@@ -54,7 +55,23 @@ class Recognised:
 
 
 def recognise(campaign: Campaign, approach: Approach) -> Recognised | None:
-    """Recognise a wrong unit, swapped axes or exchanged rows; None if all looks right."""
+    """Recognise a wrong unit, swapped axes or exchanged rows; None if all looks right.
+
+    Raises
+    ------
+    InputError
+        If the forces are nowhere near gravity and no unit explains it.
+    """
+    found = _recognised(campaign, approach)
+    if found is None and not _near_gravity(campaign):
+        raise InputError(
+            f"{campaign.name}: fx, fy, fz: their norm is about {_norm(campaign):.3g} m/s^2, "
+            f"nowhere near gravity, {campaign.gravity:g} m/s^2, in no unit; correct the columns"
+        )
+    return found
+
+
+def _recognised(campaign: Campaign, approach: Approach) -> Recognised | None:
     if not approach.uses_angles or campaign.angles is None:
         return _by_norm(campaign)
     if _misfit(campaign) >= USUAL_MISFIT:
@@ -80,13 +97,21 @@ def _expected(campaign: Campaign) -> Array:
     return np.column_stack(specific_force(roll, pitch, campaign.gravity))
 
 
+def _norm(campaign: Campaign) -> float:
+    return float(np.median(np.linalg.norm(campaign.forces, axis=1)))
+
+
+def _near_gravity(campaign: Campaign) -> bool:
+    """Whether forces are as large as gravity but for what a bad sensor does."""
+    return 0.5 < _norm(campaign) / campaign.gravity < 2
+
+
 def _by_norm(campaign: Campaign) -> Recognised | None:
     """Recognise a unit of the forces by their norm."""
-    norm = float(np.median(np.linalg.norm(campaign.forces, axis=1)))
-    if 0.5 < norm / campaign.gravity < 2:
+    if _near_gravity(campaign):
         return None
     for reason, factor in FORCE_UNITS.items():
-        if 0.8 < norm * factor / campaign.gravity < 1.25:
+        if 0.8 < _norm(campaign) * factor / campaign.gravity < 1.25:
             sd = None if campaign.sd is None else campaign.sd * factor
             return Recognised(
                 "unit_error", reason, replace(campaign, forces=campaign.forces * factor, sd=sd)

@@ -6,7 +6,6 @@ simulation of white, equal, Gaussian noise in the same adjustment.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +16,10 @@ from accelstudy.diagnosis.repeats import clusters
 from accelstudy.diagnosis.residuals import Residuals
 
 Array = NDArray[np.float64]
+
+
+GRID = 1e-5
+"""Probability with which noise on a grid of attitudes passes for steps, at each resolution."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +61,7 @@ def level_test(z: Array, variance: float = 1.0) -> NoiseTest:
         omega,
         float(min(p, 1.0)),
         (factor,),
-        f"the residuals are {np.sqrt(max(factor, 1 / factor)):.2f} times {size} than sigma says",
+        f"the residuals are {np.sqrt(max(factor, 1 / factor)):.3g} times {size} than sigma says",
     )
 
 
@@ -86,13 +89,18 @@ def axis_test(residuals: Residuals, null: Array) -> NoiseTest:
 
 
 def axis_factors(residuals: Residuals) -> Array:
-    """Variance factors of the three axes (MINQUE with equal a-priori weights), (3,), at least 0."""
+    """Variance factors of the three axes (MINQUE with equal a-priori weights), (3,), at least 0.
+
+    The noise of the axes has the covariance Σ κ_a G_a G_aᵀ in z, and what is left to I is that of
+    the robot's angles.
+    """
     n, c = residuals.whitening.shape[:2]
     basis = residuals.basis[: n * c].reshape(n, c, -1)
-    # Columns Nᵀ L⁻¹ B σ of one axis: the noise of the axes has the covariance Σ κ_a G_a G_aᵀ in z.
+    # G_a, (r, n): columns Nᵀ L⁻¹ B σ of one axis.
     g = [np.einsum("ncr,nc->rn", basis, residuals.force_noise[..., a]) for a in range(3)]
-    right = np.array([np.sum((residuals.z @ part) ** 2) for part in g])
     left = np.array([[np.sum((a.T @ b) ** 2) for b in g] for a in g])
+    angles = np.array([np.sum(part**2) for part in g]) - left.sum(axis=1)
+    right = np.array([np.sum((residuals.z @ part) ** 2) for part in g]) - angles
     return np.maximum(np.linalg.lstsq(left, right, rcond=1e-9)[0], 0.0)
 
 
@@ -154,32 +162,54 @@ def tail_test(residuals: Residuals, null: Array) -> NoiseTest:
 def resolution_test(forces: Array, sigma: float) -> NoiseTest:
     """Whether the readings of an axis are whole multiples of a resolution that matters.
 
-    The Rayleigh power of the readings is searched over resolutions q from σ to 30 σ; without
-    quantisation n times the power is a standard exponential variable at each. The attitudes may
-    form a grid themselves, but noise of σ about it leaves a power of exp(−(2π σ/q)²) at most, so
-    only more than that counts, and of repeated attitudes only one.
+    The Rayleigh power of the readings is searched over resolutions q from σ to 30 σ, of which the
+    readings span four at least; without quantisation n times the power is a standard exponential
+    variable at each. The attitudes may form a grid themselves, but with noise of σ about it
+    −n log(power) is (2π σ/q)² χ² with n − 1 degrees of freedom at least, so only a power that this
+    does not reach counts, and of repeated attitudes only one.
     """
     forces = forces[np.unique(clusters(forces))]
     n = len(forces)
     best, where = 0.0, 0.0
     extent = float(np.max(np.ptp(forces, axis=0)))
     steps = max(2, min(int(2 * extent / sigma), 100_000))
-    frequencies = np.linspace(1 / (30 * sigma), 1 / sigma, steps)
-    for column in forces.T:
-        for block in np.array_split(frequencies, max(1, steps // 4096)):
-            power = np.abs(np.exp(2j * np.pi * np.outer(block, column)).mean(axis=1)) ** 2
-            blurred = np.exp(-((2 * np.pi * sigma * block) ** 2))
-            power = np.where(power > (1 + blurred) / 2, power, 0.0)
-            k = int(np.argmax(power))
-            if power[k] > best:
-                best, where = float(power[k]), 1 / block[k]
+    lowest = max(1 / 30, 4 * sigma / extent) if extent > 0 else 1.0
+    frequencies = np.linspace(min(lowest, 1.0), 1.0, steps) / sigma
+    least = 2 * special.gammaincinv((n - 1) / 2, GRID) / n if n > 1 else 0.0
+    usual = np.exp(-((2 * np.pi * sigma * frequencies) ** 2) * least)
+    for column in forces.T if lowest < 1 else ():
+        blocks = np.array_split(frequencies, max(1, steps // 4096))
+        power = np.concatenate([_rayleigh(column, block) for block in blocks])
+        power = np.where(power > np.maximum(usual, 0.5), power, 0.0)
+        k = int(np.argmax(power))
+        if power[k] > best:
+            best, where = float(power[k]), _step(column, frequencies[max(k - 1, 0) : k + 2])
     p = -np.expm1(3 * steps * np.log1p(-np.exp(-min(n * best, 700.0)))) if best else 1.0
     remark = f"readings in steps of {1e3 * where:.2f} mm/s²" if best else "no steps in the readings"
     return NoiseTest("quantisation", n * best, float(min(p, 1.0)), (where,), remark)
 
 
+def _rayleigh(values: Array, frequencies: Array) -> Array:
+    """Rayleigh power of values at frequencies, in [0, 1]."""
+    return np.asarray(np.abs(np.exp(2j * np.pi * np.outer(frequencies, values)).mean(axis=1)) ** 2)
+
+
+def _step(values: Array, around: Array) -> float:
+    """Largest step of which values are multiples, given frequencies around a peak of the power.
+
+    Multiples of q are multiples of q/2, q/3, … too, so that the peak may be any of these.
+    """
+    near = np.linspace(around[0], around[-1], 201)
+    peak = near[np.argmax(_rayleigh(values, near))]
+    divisors = np.arange(1, 31)
+    power = _rayleigh(values, peak / divisors)
+    return float(divisors[power > 0.99 * power[0]].max() / peak)
+
+
 def within_hold_test(z: Array, unit: float, sd: Array, n_samples: NDArray[np.int_]) -> NoiseTest:
     """Whether the means scatter more than white noise within the holds explains.
+
+    Holds of one sample do not show their noise, nor do samples that are all the same.
 
     Parameters
     ----------
@@ -188,23 +218,23 @@ def within_hold_test(z: Array, unit: float, sd: Array, n_samples: NDArray[np.int
     sd : (n, 3) array, m/s², of the samples within the holds
     n_samples : (n,) int array
     """
-    white = float(np.mean(sd**2 / n_samples[:, None]))
+    several = n_samples > 1
+    sd, n_samples = sd[several], n_samples[several]
     scatter = float(z @ z) / len(z) * unit**2
+    if not sd.any():
+        remark = "the holds say nothing of the noise within them"
+        return NoiseTest("coloured_noise", 0.0, 1.0, (0.0,), remark)
+    white = float(np.mean(sd**2 / n_samples[:, None]))
     freedom = 3 * float(np.sum(n_samples - 1))
-    ratio = scatter / white if white > 0 else np.inf
+    ratio = scatter / white
     return NoiseTest(
         "coloured_noise",
         ratio,
-        float(special.fdtrc(len(z), max(freedom, 1.0), ratio)),
+        float(special.fdtrc(len(z), freedom, ratio)),
         (float(np.sqrt(white)),),
         f"white noise within the holds explains {1e3 * np.sqrt(white):.2f} of "
         f"{1e3 * np.sqrt(scatter):.2f} mm/s² of a position mean",
     )
-
-
-def holm_smallest(tests: Sequence[NoiseTest]) -> float:
-    """Family-wise p-value of the strongest of several tests (Bonferroni)."""
-    return min(1.0, len(tests) * min((t.p_value for t in tests), default=1.0))
 
 
 def _upper(usual: Array, value: float) -> float:
