@@ -126,7 +126,7 @@ def evidence_figure(diagnosis: Diagnosis) -> Figure:
     figure = new_figure(FULL, 22 + 4.4 * len(shown))
     left, right = figure.subplots(1, 2, sharey=True)
     tested = [max(p_values.get(name, np.nan), SMALLEST_P) for name in shown]
-    smallest = float(np.nanmin(tested))
+    smallest = float(np.nanmin([*tested, 1.0]))
     left.hlines(place, tested, 1, color=colours, linewidth=1.2)
     left.scatter(tested, place, color=colours, s=18, zorder=3)
     left.axvline(LEVEL_EFFECTS, color=BEFORE, linewidth=1, linestyle="--")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import GlobalTest, Solution, global_test, solve
 from accelstudy.approaches import Approach, get_approach
-from accelstudy.campaign.fit import fit_campaign
+from accelstudy.campaign.fit import LEAST_RATIO, fit_campaign
 from accelstudy.campaign.format import Campaign
 from accelstudy.diagnosis import gap as gaps
 from accelstudy.diagnosis import noise as noises
@@ -23,7 +23,15 @@ from accelstudy.diagnosis.naming import COLOUR, LEVEL, known_level_evidence
 from accelstudy.diagnosis.next_positions import NextPosition, next_positions
 from accelstudy.diagnosis.noise import NoiseTest
 from accelstudy.diagnosis.screening import SIMULATIONS, Screening, share
-from accelstudy.diagnosis.search import LEVEL_EFFECTS, SURE, Choice, Finding, Search, position_of
+from accelstudy.diagnosis.search import (
+    LACK_OF_FIT,
+    LEVEL_EFFECTS,
+    SURE,
+    Choice,
+    Finding,
+    Search,
+    position_of,
+)
 from accelstudy.diagnosis.tilt import leveling_rms
 from accelstudy.errors import InputError
 from accelstudy.sensor import SensorModel
@@ -200,7 +208,8 @@ class _Run:
                     "be tested; more positions are needed"
                 )
             if not self.sigma_known:
-                campaign = replace(campaign, sigma_force=max(fit.sigma_position, 1e-9))
+                least = max(1e-9, LEAST_RATIO * campaign.gravity * (campaign.sigma_angle or 0.0))
+                campaign = replace(campaign, sigma_force=max(fit.sigma_position, least))
         return solve(fit.model, fit.approach, fit.observed, fit.adjustment)
 
     @cached_property
@@ -237,7 +246,7 @@ class _Run:
             noise_tests=tests,
             screening=search.screening,
             probabilities=search.probabilities,
-            location=self.location(variance),
+            location=self.location(finding, variance),
             gap=self.gap(finding, variance),
             upper_limits=tuple(upper_limits(final, variance, names)),
             next_positions=self.next_positions(finding),
@@ -249,6 +258,9 @@ class _Run:
     def finding(self) -> tuple[Finding, tuple[NoiseTest, ...]]:
         """Find what is missing: effects first, then the noise, by the tests of it."""
         search = self.search
+        if search.exact:
+            reason = "the campaign is its own model: what is left are rounding errors"
+            return Finding("no_effect", search.setting, reason), ()
         if search.screening.smallest < LEVEL_EFFECTS:
             finding = search.find()
             return finding, self.noise_tests(finding.setting)
@@ -284,8 +296,11 @@ class _Run:
     @cached_property
     def resolution(self) -> NoiseTest:
         """Whether the readings are coarse, beside the noise of the base fit."""
+        z = self.search.z
         sigma = float(np.mean(self.search.setting.frame.residuals.sigmas[:, :3]))
-        return noises.resolution_test(self.campaign.forces, sigma)
+        # A sigma far too large would take the attitudes for steps.
+        noise = sigma * min(1.0, float(np.sqrt(np.mean(z**2))))
+        return noises.resolution_test(self.campaign.forces, noise)
 
     def worst_noise(self, tests: Sequence[NoiseTest]) -> NoiseTest | None:
         """Return what is wrong with the noise, the most specific finding first."""
@@ -305,6 +320,12 @@ class _Run:
     def judge_noise(self, worst: NoiseTest) -> Finding:
         """Judge a finding about the noise, when no effect was significant."""
         setting = self.search.setting
+        lack_of_fit = self.search.screening.p_candidate.get(LACK_OF_FIT, 1.0)
+        if lack_of_fit < LEVEL_NOISE and worst.name != "quantisation":
+            return self.search.nothing(
+                "repeated positions agree better with each other than with the model, so it is not "
+                "the noise"
+            )
         if worst.name != LEVEL or worst.estimate[0] < 1:
             return Finding("noise_model", setting, worst.remark)
         # Larger residuals may be an effect that the sigma-free tests could not see.
@@ -334,12 +355,16 @@ class _Run:
 
     # --- what else is said ----------------------------------------------------------------------
 
-    def location(self, variance: float) -> dict[str, float]:
-        """Shares of the excess χ² above the given noise or, without it, the least that is left."""
+    def location(self, finding: Finding, variance: float) -> dict[str, float]:
+        """Shares of the excess χ² above the given noise or, without it, above what is left.
+
+        That is the noise after what was found or, if something unknown is missing, the least that
+        any group of regressors leaves.
+        """
         z, groups = self.search.z, self.search.groups
         if self.sigma_known:
             variance = 1.0
-        else:
+        elif finding.verdict == "unknown":
             total, r = float(z @ z), len(z)
             left = [(1 - float(share(q, z))) / (r - q.shape[1]) for q in groups.values()]
             variance = min([variance, *(total * part for part in left)])

@@ -89,9 +89,9 @@ class Residuals:
 
         Angles count as the forces by which they would show.
         """
-        force = signature.force / self.sigmas[:, :3, None]
-        turned = g * signature.angles / np.mean(self.sigmas[:, :3])
-        return np.sqrt(np.sum(force**2, axis=(0, 1)) + np.sum(turned**2, axis=(0, 1)))
+        unit = np.sqrt(np.mean(np.sum(self.whitening**2, axis=2)))
+        force, turned = signature.force, g * signature.angles
+        return np.sqrt(np.sum(force**2, axis=(0, 1)) + np.sum(turned**2, axis=(0, 1))) / unit
 
     def rows(self, change: Array) -> Array:
         """Scale changes of the conditions, (n, c, k), to unit weight, (m, k)."""

@@ -52,7 +52,16 @@ PRIOR = {COLOUR: 3.0}
 """Prior weights beside 1 for each class: all real noise has some colour."""
 RIVAL = 0.5
 """Canonical cosine from which on an effect is listed as a rival."""
+ROUNDING = 1e-10
+"""Residuals below this share of gravity are rounding errors, and no measurement."""
 AXES_DIFFER = 0.01
+"""Level at which axes are weighted by their noise."""
+LEAST = 0.05
+"""Smallest variance of an axis beside the mean of all: no axis is taken to be without noise."""
+WEIGHTINGS = 4
+"""The variances of the axes are estimated anew in each weighting, and settle."""
+LACK_OF_FIT = "group:lack_of_fit"
+"""Everything but the differences of repeated positions, which are noise alone (pure error)."""
 
 
 @dataclass(frozen=True)
@@ -117,6 +126,12 @@ class Search:
         """Whether the axes differ in noise, by the base fit."""
         return noises.axis_test(Residuals.of(self.first), self.null)
 
+    @property
+    def exact(self) -> bool:
+        """Whether the campaign is its own model."""
+        rms = float(np.sqrt(np.mean(self.first.misclosures**2)))
+        return rms < ROUNDING * self.first.gravity
+
     @cached_property
     def solution(self) -> Solution:
         """The base fit, with the axes weighted by their noise if it clearly differs."""
@@ -124,14 +139,17 @@ class Search:
 
     def weighted(self, solution: Solution, axes: NoiseTest) -> Solution:
         """Fit again with unequal axes, if they are."""
-        if axes.p_value >= AXES_DIFFER:
+        if axes.p_value >= AXES_DIFFER or self.exact:
             return solution
-        factors = np.maximum(axes.estimate, 0.05)
-        factors = factors / np.mean(factors)
-        sigma = np.sqrt(factors) * np.mean(np.sqrt(solution.variances[:, :3]))
-        n = len(solution.variances)
-        observed = replace(solution.observed, sigma_force=np.broadcast_to(sigma, (n, 3)))
-        return solve(solution.model, self.first.approach, observed)
+        n, mean = len(solution.variances), np.mean(np.sqrt(solution.variances[:, :3]))
+        ratios, factors = np.ones(3), np.asarray(axes.estimate)
+        for _ in range(WEIGHTINGS):
+            ratios = np.maximum(ratios * factors / np.mean(ratios * factors), LEAST)
+            sigma = mean * np.sqrt(ratios) / np.mean(np.sqrt(ratios))
+            observed = replace(solution.observed, sigma_force=np.broadcast_to(sigma, (n, 3)))
+            solution = solve(solution.model, self.first.approach, observed)
+            factors = noises.axis_factors(Residuals.of(solution))
+        return solution
 
     @cached_property
     def setting(self) -> Setting:
@@ -162,6 +180,8 @@ class Search:
             name: [h.basis for h in shapes] for name, shapes in setting.candidates.items()
         }
         bases |= {f"group:{name}": [basis] for name, basis in groups.items()}
+        if "repeat" in groups:
+            bases[LACK_OF_FIT] = [complement(groups["repeat"])]
         return screen(bases, z, self.null[:, : len(z)])
 
     # --- naming ---------------------------------------------------------------------------------
@@ -187,7 +207,10 @@ class Search:
     def unknown_evidence(self) -> float:
         """Log evidence of something in one of the groups that is none of the effects."""
         r = len(self.z)
-        logs = [float(log_evidence(share(q, self.z), q.shape[1], r)) for q in self.groups.values()]
+        spaces = list(self.groups.values())
+        if "repeat" in self.groups:
+            spaces.append(complement(self.groups["repeat"]))
+        logs = [float(log_evidence(share(q, self.z), q.shape[1], r)) for q in spaces]
         return mean_evidence(np.array(logs)) if logs else 0.0
 
     @cached_property
@@ -374,14 +397,19 @@ class Search:
         pairs = best_pairs(self.setting.all, self.z)
         if not pairs:
             return self.nothing("no effect of the catalogue explains it")
+        # All pairs together are as probable beforehand as all single effects together.
+        prior = dict.fromkeys(map(str, range(len(pairs))), len(self.classes) / len(pairs))
         evidence = {str(i): pair.log_evidence for i, pair in enumerate(pairs)}
+        evidence |= {best.name: self.evidence[best.name] for best, _ in self.classes}
         evidence |= {name: self.evidence[name] for name in (COLOUR, UNKNOWN)}
-        probabilities = posterior(evidence, PRIOR)
+        probabilities = posterior(evidence, PRIOR | prior)
         top = next(iter(probabilities))
         if top == COLOUR and probabilities[top] >= SURE:
             return self.nothing("successive holds are alike", "noise_model")
         if top in (COLOUR, UNKNOWN):
             return self.nothing("no effect or pair of effects explains it")
+        if top in self.evidence:
+            return self.nothing(f"{top} is most probable, but does not explain all of it")
         pair = pairs[int(top)]
         # Pairs whose members mean the same are one.
         seen = {h.spec: h for other in pairs for h in other.best}
@@ -431,6 +459,11 @@ class Search:
             return max(self.evidence_of_effects, key=self.evidence_of_effects.__getitem__) in wanted
         pairs = best_pairs(self.setting.all, self.z)
         return bool(pairs) and set(pairs[0].names) <= wanted
+
+
+def complement(basis: Array) -> Array:
+    """Orthonormal basis of all that is orthogonal to an orthonormal basis (r, l)."""
+    return np.linalg.qr(basis, mode="complete")[0][:, basis.shape[1] :]
 
 
 def position_of(hypothesis: Hypothesis) -> int:
