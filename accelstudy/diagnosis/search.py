@@ -375,6 +375,7 @@ class Search:
         sure = self.probabilities[top]
         if top == COLOUR and sure >= SURE:
             return self.nothing("successive holds are alike", "noise_model")
+        alone = ""
         if top not in (COLOUR, UNKNOWN):
             best, members = next(item for item in self.classes if item[0].name == top)
             refit = self.extend_best([(best, members)])
@@ -390,7 +391,10 @@ class Search:
                         f"{top} explains it with a probability of {sure:.2f} only, and {second} "
                         f"with {self.probabilities[second]:.2f}"
                     )
-        return self.find_pair()
+            elif sure >= SURE:
+                alone = f"{top} explains most of it, but a model with it has no solution"
+        finding = self.find_pair()
+        return replace(finding, reason=alone or finding.reason)
 
     def find_pair(self) -> Finding:
         """Search all pairs, once no single effect is enough."""
