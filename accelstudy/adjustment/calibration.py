@@ -1,19 +1,23 @@
 """The calibration of an accelerometer as a Gauss–Helmert adjustment.
 
-The condition equations are those of an approach, applied to the specific force f_b that belongs to
-the adjusted output of the sensor. They are made from the definitions of the effects and of the
-approach alone: with f_s = h(f_a, x) and f_b = T(x) f_a,
+The condition equations are made from the definitions of the effects and of the approach alone. With
+f_s = h(f_a, x) and f_b = T(x) f_a, an approach that says something of f_b has the conditions
+ψ(f_b) = 0 for the f_b that belongs to the adjusted output, and
 
     ∂f_a/∂f_s = H⁻¹,  ∂f_a/∂x = −H⁻¹ ∂h/∂x,   H = ∂h/∂f_a,
 
 and the chain rule give A and B. The force f_a is carried through the iterations (the `latent`
 quantity of the adjustment) and improved by one Newton step in each; it is exact when they end.
+
+An approach that tells the force has f_a = T⁻¹ f_b(φ, θ, g) and the same conditions in the output of
+the sensor, ψ = f_s − h(f_a, x). That needs no inverse of h, which a saturated sensor has not.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
+from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -24,7 +28,7 @@ from accelstudy.approaches import Approach
 from accelstudy.effects import Hold
 from accelstudy.errors import InputError
 from accelstudy.sensor import SensorModel, SensorTrace
-from accelstudy.tracing import TracedFunction, derivative, symbolic, symbols
+from accelstudy.tracing import TracedFunction, derivative, inverse, symbolic, symbols
 from accelstudy.units import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
@@ -101,22 +105,50 @@ class CalibrationEquations:
         self.observations = (*trace.output, *self.angles)
 
     @cached_property
-    def linear(self) -> TracedFunction:
-        """[ψ | A | B] as a function of f_a, x and the robot's readings, generated."""
-        trace = self.trace
-        errors = trace.reading_errors(self.angles) if self.angles else ()
-        attitude = tuple(a - e for a, e in zip(self.angles, errors, strict=True))
-        force = symbols("f_b_x", "f_b_y", "f_b_z")
-        psi = sp.Matrix(self.approach.conditions(force, attitude, trace.g, symbolic))
+    def attitude(self) -> tuple[Any, ...]:
+        """Roll and pitch without what the effects add to the robot's reading."""
+        errors = self.trace.reading_errors(self.angles) if self.angles else ()
+        return tuple(a - e for a, e in zip(self.angles, errors, strict=True))
 
+    @cached_property
+    def told(self) -> sp.Matrix | None:
+        """Force in the body frame that the approach tells, as a function of the readings."""
+        force = self.approach.force(self.attitude, self.trace.g, symbolic) if self.angles else None
+        return None if force is None else sp.Matrix(force)
+
+    @cached_property
+    def sensitive(self) -> TracedFunction:
+        """f_a of the force that the approach tells, generated."""
+        assert self.told is not None
+        f_a = inverse(self.trace.t_matrix) * self.told
+        return TracedFunction((*self.trace.arguments, *self.angles), f_a)
+
+    @cached_property
+    def linear(self) -> TracedFunction:
+        """[ψ | A | B] as a function of f_a, f_s, x and the robot's readings, generated."""
+        expressions = self._in_body() if self.told is None else self._in_output(self.told)
+        return TracedFunction((*self.trace.arguments, *self.angles), expressions)
+
+    def _in_body(self) -> sp.Matrix:
+        trace = self.trace
+        force = symbols("f_b_x", "f_b_y", "f_b_z")
+        psi = sp.Matrix(self.approach.conditions(force, self.attitude, trace.g, symbolic))
         by_force = derivative(psi, force)
         a = by_force * trace.body_by(self.parameters) + derivative(psi, self.parameters)
         b = by_force * trace.body_by_output
         if self.angles:
             b = sp.Matrix.hstack(b, derivative(psi, self.angles))
         at = dict(zip(force, trace.t_matrix * sp.Matrix(trace.force), strict=True))
-        expressions = sp.Matrix.hstack(psi, a, b).subs(at, simultaneous=True)
-        return TracedFunction((*trace.arguments, *self.angles), expressions)
+        return sp.Matrix.hstack(psi, a, b).subs(at, simultaneous=True)
+
+    def _in_output(self, told: sp.Matrix) -> sp.Matrix:
+        trace, h = self.trace, sp.Matrix(self.trace.h)
+        by_force = derivative(h, trace.force) * inverse(trace.t_matrix)
+        turned = derivative(trace.t_matrix * sp.Matrix(trace.force), self.parameters)
+        by_told = by_force * (derivative(told, self.parameters) - turned)
+        a = -(derivative(h, self.parameters) + by_told)
+        b = sp.Matrix.hstack(sp.eye(3), -by_force * derivative(told, self.angles))
+        return sp.Matrix.hstack(sp.Matrix(trace.output) - h, a, b)
 
     def at(self, settings: Array, gravity: ArrayLike, hold: Hold | None) -> CalibrationConditions:
         """Return the conditions for settings (s,), gravity (float, where fixed) and holds."""
@@ -140,7 +172,10 @@ class CalibrationConditions:
             x, g = parameters[:-1], parameters[-1]
         forces, angles = adjusted[:3], adjusted[3:]
         known = (x, self.settings, g, self.hold)
-        f_a = latent + trace.evaluate(trace.newton_step, latent, forces, *known)[:, 0]
+        if eq.told is not None:
+            f_a = trace.evaluate(eq.sensitive, forces, forces, *known, *angles)[:, 0]
+        else:
+            f_a = latent + trace.evaluate(trace.newton_step, latent, forces, *known)[:, 0]
         values = trace.evaluate(eq.linear, f_a, forces, *known, *angles)
         u = len(parameters)
         return Linearisation(values[:, 0], values[:, 1 : 1 + u], values[:, 1 + u :], f_a)

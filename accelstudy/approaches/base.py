@@ -24,11 +24,18 @@ class Approach:
     n_conditions: ClassVar[int]
     uses_angles: ClassVar[bool]
 
+    def force(self, angles: tuple[Number, Number], g: Number, xp: Any) -> Vector | None:
+        """Return the specific force in the body frame, if the angles tell it."""
+        return None
+
     def conditions(
         self, f: Vector, angles: tuple[Number, Number], g: Number, xp: Any
     ) -> tuple[Number, ...]:
         """Return ψ for the specific force `f` in the body frame; zero when all is consistent."""
-        raise NotImplementedError
+        told = self.force(angles, g, xp)
+        if told is None:
+            raise NotImplementedError
+        return tuple(a - b for a, b in zip(f, told, strict=True))
 
 
 _registry: Registry[Approach] = Registry("approach")

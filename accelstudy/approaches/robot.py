@@ -6,7 +6,7 @@ from accelstudy.leveling import specific_force
 
 @register
 class Robot(Approach):
-    """Three conditions per position, f_b − f(φ_r, θ_r, g) = 0.
+    """Three conditions per position, f_b = f(φ_r, θ_r, g).
 
     They hold exactly where the three of Thalmann & Neuner (2018, eq. 10, with the sign of f_y
     corrected) hold, so the adjustment is the same; but in components they need no wrapping of roll
@@ -17,8 +17,6 @@ class Robot(Approach):
     n_conditions = 3
     uses_angles = True
 
-    def conditions(self, f, angles, g, xp):
-        """Return f_b − f(φ_r, θ_r, g)."""
-        return tuple(
-            a - b for a, b in zip(f, specific_force(angles[0], angles[1], g, xp), strict=True)
-        )
+    def force(self, angles, g, xp):
+        """Return f(φ_r, θ_r, g)."""
+        return specific_force(angles[0], angles[1], g, xp)

@@ -21,8 +21,8 @@ def positions_table(diagnosis: Diagnosis) -> pd.DataFrame:
     position, time_s, roll_gon, pitch_gon, temperature_degC : what was measured; NaN if it was not
     split : "fit", "held-out", or "left out" of the final fit as bumped
     residual_*_before_mps2, residual_*_after_mps2 : what the readings lack of the conditions, by the
-        base fit and by the final one: the three components of f_b less the force in the robot's
-        attitude, or the norm less gravity
+        base fit and by the final one: the output less that in the robot's attitude, or the norm
+        of f_b less gravity
     test_before, test_after : root of the test statistic of a gross error in the position, over the
         noise level that the diagnosis takes; signed where the position has one condition
     p_before, p_after : p-values of these tests, of each position by itself

@@ -29,8 +29,8 @@ class HeldOut:
 
     Attributes
     ----------
-    misclosures : (n, c) array, m/s², |f_b| − g, or f_b less the force in the robot's attitude; NaN
-        where the others do not determine the parameters
+    misclosures : (n, c) array, m/s², |f_b| − g, or the output less that in the robot's attitude;
+        NaN where the others do not determine the parameters
     cofactors : (n, c, c) array, (m/s²)², covariance matrices a priori of the misclosures
     angles : (n, 2) array, rad, calibrated roll and pitch less the robot's; None without a robot.
         NaN in roll where the x axis is nearly vertical
@@ -85,12 +85,14 @@ def held_out(model: SensorModel, approach: Approach, observed: Observations) -> 
     )
     misclosures = -result.parameters[:, u:]
     angles = None
-    if approach.uses_angles:
+    if observed.angles is not None and approach.uses_angles:
         x = result.parameters[:, : model.n_parameters]
         g = result.parameters[:, u - 1] if problem.weights.any() else problem.conditions.gravity
         each = np.arange(n)
         f_b = model.correct(observed.forces[0], x, g, observed.hold)[each, each]
-        angles = _attitude_error(f_b, f_b - misclosures)
+        readings = observed.angles[0]
+        attitude = readings - model.errors_of_reading(readings, x, observed.hold)
+        angles = _attitude_error(f_b, attitude[each, each])
     return HeldOut(misclosures, result.cofactors[:, u:, u:], angles)
 
 
@@ -119,9 +121,9 @@ class _WithoutOne:
         )
 
 
-def _attitude_error(f: Array, reference: Array) -> Array:
-    """Roll and pitch of `f` less those of `reference`, (n, 2), roll wrapped into ±π."""
-    (roll, pitch), (roll_0, pitch_0) = roll_pitch(tuple(f.T)), roll_pitch(tuple(reference.T))
-    roll = (roll - roll_0 + np.pi) % (2 * np.pi) - np.pi
-    roll = np.where(np.cos(pitch_0) < NEAR_POLE, np.nan, roll)
-    return np.stack([roll, pitch - pitch_0], axis=-1)
+def _attitude_error(f: Array, angles: Array) -> Array:
+    """Roll and pitch of `f` less the given ones, (n, 2), roll wrapped into ±π."""
+    roll, pitch = roll_pitch(tuple(f.T))
+    roll = (roll - angles[:, 0] + np.pi) % (2 * np.pi) - np.pi
+    roll = np.where(np.cos(angles[:, 1]) < NEAR_POLE, np.nan, roll)
+    return np.stack([roll, pitch - angles[:, 1]], axis=-1)
