@@ -147,6 +147,35 @@ def test_a_large_hidden_effect_is_named_and_confirmed(spec):
             assert abs(value - true[name]) < 5 * sigma
 
 
+@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("tau", [100, 600, 1200])
+def test_a_warm_up_far_above_the_noise_needs_no_second_effect(tau, seed):
+    """However large it is, and though no time constant of the grid fits it."""
+    effect = f"warm_up(tau={tau}): 0.1, -0.15, 0.2"
+    found = diagnose(campaign(seed, effects=(effect,), temperature_order="linear")[0], NINE)
+    assert names(found) == ["warm_up"]
+    value = float(found.found[0].spec.split("=")[1].rstrip(")"))
+    assert value == pytest.approx(tau, rel=0.1)
+
+
+@pytest.mark.parametrize("knee", [9.2, 9.4, 9.6])
+def test_hard_clipping_is_named(knee):
+    """An output that does not change has no inverse; at the highest knee one axis never clips."""
+    measured, _ = campaign(1, effects=(f"saturation(knee={knee}): 1, 1, 1",))
+    found = diagnose(measured, NINE)
+    assert found.verdict == "named"
+    assert names(found) == ["saturation"]
+    assert found.gap.confirmed
+    assert all(name.startswith("k_sat_") for name, *_ in found.found[0].parameters)
+
+
+def test_hard_clipping_without_a_robot_has_no_solution_and_no_other_name():
+    measured, _ = campaign(1, effects=("saturation(knee=9.4): 1, 1, 1",), approach="gravity")
+    found = diagnose(measured, NINE)
+    assert found.verdict == "unknown"
+    assert found.reason.startswith("saturation explains most of it")
+
+
 def test_two_hidden_effects_are_named_both():
     measured, _ = campaign(5, effects=("base_tilt", "hysteresis"))
     found = diagnose(measured, NINE)

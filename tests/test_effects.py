@@ -392,3 +392,16 @@ def test_columns_that_effects_need():
 def test_a_column_that_is_absent_is_named():
     with pytest.raises(InputError, match="needs the column 'temperature' of each position"):
         session(model_of("thermal_bias"), np.ones(12), SCHEME.directions)
+
+
+def test_an_effect_with_some_of_its_parameters():
+    """The others are zero, in arrays and in generated code; all of them are the effect itself."""
+    whole = get_effect("saturation(knee=9)")
+    part = whole.only((0, 2))
+    assert [p.name for p in part.parameters] == ["k_sat_x", "k_sat_z"]
+    assert part.spec == whole.spec
+    assert type(whole.only((0, 1, 2))) is type(whole)
+    assert type(whole.only((0, 2))) is type(part)
+    forces = 9.8 * np.array([[1, 0, 0], [0, 1, 0], [0, 0, -1], [0.6, 0.8, 0]])
+    expected = SensorModel("whole", (whole,)).sense(forces, [0.1, 0.0, 0.3])
+    np.testing.assert_array_equal(SensorModel("part", (part,)).sense(forces, [0.1, 0.3]), expected)

@@ -52,6 +52,14 @@ class Hypothesis:
         return self.basis.shape[1]
 
     @property
+    def shown(self) -> Effect | None:
+        """Return the effect without parameters that no position shows."""
+        kept = tuple(np.flatnonzero(np.any(self.directions != 0, axis=1)).tolist())
+        if self.effect is None or len(kept) != self.dim:
+            return self.effect
+        return self.effect.only(kept)
+
+    @property
     def smooth(self) -> str | None:
         """Name of the setting with which the effect changes smoothly, if it has one."""
         hypers = () if self.effect is None else self.effect.hypers

@@ -9,6 +9,7 @@ import numpy as np
 
 from accelstudy.campaign.format import Campaign
 from accelstudy.diagnosis.pipeline import Diagnosis
+from accelstudy.effects import get_effect
 from accelstudy.models import MODELS
 from accelstudy.sensor import SensorModel
 from accelstudy.units import MGON
@@ -85,10 +86,10 @@ def study_name(name: str) -> str:
 
 def _truth(model: SensorModel, parameters: list[float]) -> dict[str, dict[str, Any]]:
     """Estimates as true values, by effect, SI."""
-    truth, first = {}, 0
-    for effect in model.effects:
-        last = first + len(effect.parameters)
-        unit = effect.parameters[0].unit
-        truth[effect.spec] = {"value": parameters[first:last], "unit": unit}
-        first = last
+    values = dict(zip(model.parameter_names, parameters, strict=False))  # gravity may follow
+    truth = {}
+    for spec in (effect.spec for effect in model.effects):
+        own = get_effect(spec).parameters
+        # What no position shows is not in the model.
+        truth[spec] = {"value": [values.get(p.name, 0.0) for p in own], "unit": own[0].unit}
     return truth

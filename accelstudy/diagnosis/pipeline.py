@@ -385,7 +385,7 @@ class _Run:
         found = []
         for choice in finding.chosen:
             best, p = choice.best, search.screening.p_family[choice.best.name]
-            if best.effect is None:
+            if best.shown is None:
                 label = int(self.campaign.positions[position_of(best)])
                 found.append(
                     Named(OUTLIER, OUTLIER, (OUTLIER,), p, choice.probability, position=label)
@@ -398,7 +398,7 @@ class _Run:
                     float(sigma[columns[q.name]]),
                     q.unit,
                 )
-                for q in best.effect.parameters
+                for q in best.shown.parameters
             )
             found.append(
                 Named(

@@ -37,7 +37,6 @@ from accelstudy.diagnosis.pairs import best_pairs
 from accelstudy.diagnosis.residuals import Residuals
 from accelstudy.diagnosis.screening import SIMULATIONS, Screening, screen, share
 from accelstudy.errors import InputError
-from accelstudy.models import compose
 from accelstudy.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -285,12 +284,11 @@ class Search:
 
     def extended_model(self, chosen: Sequence[Hypothesis]) -> SensorModel:
         """The base model with the effects of hypotheses added."""
-        specs = [h.spec for h in chosen if h.effect is not None]
-        if not specs:
+        effects = [h.shown for h in chosen if h.shown is not None]
+        if not effects:
             return self.model
-        base = tuple(effect.spec for effect in self.model.effects)
-        name = "-".join([self.model.name, *(h.name for h in chosen if h.effect is not None)])
-        return compose(name, (*base, *specs))
+        name = "-".join([self.model.name, *(effect.name for effect in effects)])
+        return SensorModel(name, (*self.model.effects, *effects))
 
     def refit(self, chosen: Sequence[Hypothesis]) -> Solution | None:
         """Fit rigorously with effects added and bumped positions left out."""
@@ -305,6 +303,12 @@ class Search:
             solution = solve(model, self.first.approach, observed)
         except (InputError, np.linalg.LinAlgError):
             return None
+        if not self.first.approach.uses_angles:
+            # Readings without a force that belongs to them have no attitude either.
+            p = solution.parameters[: model.n_parameters]
+            f_b = model.correct(observed.forces[0], p, solution.gravity, observed.hold)
+            if np.isnan(f_b).any():
+                return None
         return solution if solution.redundancy > 0 else None
 
     def sharpened(self, chosen: Sequence[Hypothesis]) -> list[Hypothesis]:

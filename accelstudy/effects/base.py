@@ -135,6 +135,10 @@ class Effect(Shaped):
         """Shapes of the effect that are worth a search in given holds with forces f (n, 3)."""
         return (self,)
 
+    def only(self, kept: tuple[int, ...]) -> Effect:
+        """Return the effect with some of its parameters; the others are zero."""
+        return _part(type(self), kept)(**self.shape)  # type: ignore[arg-type]
+
     def axes(self, p: tuple[Number, ...], xp: Any) -> Matrix:
         """Add to the matrix T of the sensitive axes."""
         return ZERO_MATRIX
@@ -148,6 +152,25 @@ class Effect(Shaped):
     ) -> tuple[Number, Number]:
         """Add to the robot's reading of roll and pitch, in rad."""
         return (0, 0)
+
+
+@cache
+def _part(kind: type[Effect], kept: tuple[int, ...]) -> type[Effect]:
+    """Kind of effect with some of its parameters."""
+    if kept == tuple(range(len(kind.parameters))):
+        return kind
+
+    def full(p: tuple[Number, ...]) -> tuple[Number, ...]:
+        values = dict(zip(kept, p, strict=True))
+        return tuple(values.get(i, 0) for i in range(len(kind.parameters)))
+
+    content = {
+        "parameters": tuple(kind.parameters[i] for i in kept),
+        "axes": lambda self, p, xp: kind.axes(self, full(p), xp),
+        "output": lambda self, f, p, g, hold, xp: kind.output(self, f, full(p), g, hold, xp),
+        "reading": lambda self, angles, p, hold, xp: kind.reading(self, angles, full(p), hold, xp),
+    }
+    return type(kind.__name__, (kind,), content)
 
 
 _registry: ShapedRegistry[Effect] = ShapedRegistry("effect")

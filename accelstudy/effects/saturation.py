@@ -29,4 +29,5 @@ class Saturation(Effect):
 
     def candidates(self, hold, f, g):
         """Return knees that some, but not most, of the forces exceed."""
-        return tuple(Saturation(knee=float(f"{part * g:.4g}")) for part in np.arange(0.5, 1, 0.05))
+        parts = (*np.arange(0.5, 0.96, 0.05), 0.97, 0.98, 0.99)
+        return tuple(Saturation(knee=float(f"{part * g:.4g}")) for part in parts)
