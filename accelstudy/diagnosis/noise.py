@@ -127,7 +127,7 @@ def colour_test(residuals: Residuals, null: Array) -> NoiseTest:
         statistic,
         _upper(np.max((usual - mean) / scale, axis=-1), statistic),
         (successive,),
-        f"residuals of successive holds are correlated by {successive:.2f}",
+        f"residuals of successive holds are correlated by {successive:.2f}".replace("-", "−"),
     )
 
 

@@ -50,8 +50,8 @@ class Named:
     ----------
     name, spec : str; of a bumped position `spec` is the name
     equivalence_class : tuple of str, names that mean the same in this campaign
-    p_value : float, family-wise
-    posterior : float
+    p_value : float, family-wise; None of a gross error that is recognised by its size
+    posterior : float; None of what is no rival of the others
     rivals : tuple of (name, cosine)
     parameters : tuple of (name, value, sigma, unit), SI
     position : int, of a bumped position
@@ -60,8 +60,8 @@ class Named:
     name: str
     spec: str
     equivalence_class: tuple[str, ...]
-    p_value: float
-    posterior: float
+    p_value: float | None
+    posterior: float | None
     rivals: tuple[tuple[str, float], ...] = ()
     parameters: tuple[tuple[str, float, float | None, str], ...] = ()
     position: int | None = None
@@ -227,7 +227,7 @@ class _Run:
         if self.recognised is not None:
             verdict, reason = "gross_error", self.recognised.reason
             name = self.recognised.name
-            found = (Named(name, name, (name,), 0.0, 1.0), *found)
+            found = (Named(name, name, (name,), None, None), *found)
         final, variance = finding.setting, self.unit_variance(finding.setting)
         names = [choice.best.name for choice in finding.chosen]
         return Diagnosis(
@@ -378,7 +378,7 @@ class _Run:
             worst = self.worst_noise(tests)
             name = COLOUR if worst is None else worst.name
             p = search.screening.smallest if worst is None else worst.p_value
-            return (Named(name, name, (name,), p, search.probabilities.get(name, 1.0)),)
+            return (Named(name, name, (name,), p, search.probabilities.get(name)),)
         solution = finding.setting.frame.solution
         sigma = np.sqrt(np.diag(solution.cofactors) * self.unit_variance(finding.setting))
         columns = {name: i for i, name in enumerate(solution.model.parameter_names)}
