@@ -65,18 +65,19 @@ def signature_columns(frame: Frame, hypothesis: Hypothesis) -> Array:
 def upper_limits(setting: Setting, variance: float, named: Sequence[str]) -> list[UpperLimit]:
     """95 % limits |p̂| + 1.96 σ of the parameters of all effects that were not found.
 
-    Each effect is estimated beside the parameters of the model, in the shape that fits best; given
-    is the parameter that is known worst. Effects of which a combination of parameters does not show
-    have no limit.
+    Each effect is estimated beside the parameters of the model, in the shape that fits best of
+    those in which all its parameters show; given is the parameter that is known worst. Effects of
+    which a combination of parameters shows in no shape have no limit.
     """
     limits = []
     for name, shapes in setting.candidates.items():
         if name == OUTLIER or name in named:
             continue
-        best = max(shapes, key=lambda h: float(np.sum((setting.frame.residuals.z @ h.basis) ** 2)))
-        assert best.effect is not None
-        if best.dim < len(best.effect.parameters):
+        whole = [h for h in shapes if h.dim == len(get_effect(name).parameters)]
+        if not whole:
             continue
+        best = max(whole, key=lambda h: float(np.sum((setting.frame.residuals.z @ h.basis) ** 2)))
+        assert best.effect is not None
         columns = signature_columns(setting.frame, best)
         inverse = np.linalg.pinv(columns)
         values = inverse @ setting.frame.residuals.z
@@ -92,17 +93,22 @@ def visibilities(setting: Setting, alpha: float = 0.001, power: float = POWER) -
     """What a campaign can show of each effect that is not in its model.
 
     The MDB is the size √(λ0 / dᵀd) of a single parameter whose test of level `alpha` has `power`;
-    for the minimal identifiable bias only what the nearest rival cannot imitate of d counts.
+    for the minimal identifiable bias only what the nearest rival cannot imitate of d counts. An
+    effect with a setting is taken in the shape that is hardest to see or, where a shape can be as
+    faint as one likes (a smooth setting), with the setting that it has by default.
     """
     root = np.sqrt(noncentrality(1, alpha, power))
     rows = []
     for name, shapes in setting.candidates.items():
         if name == OUTLIER:
             continue
-        # The shape that is hardest to see is what can be promised.
         columns = [signature_columns(setting.frame, h) for h in shapes]
         sizes = [np.linalg.norm(c, axis=0) for c in columns]
-        hardest = int(np.argmin([s.min() for s in sizes]))
+        if shapes[0].smooth is None:
+            hardest = int(np.argmin([s.min() for s in sizes]))
+        else:
+            usual = get_effect(name).shape[shapes[0].smooth]
+            hardest = int(np.argmin([abs(h.value - usual) for h in shapes]))
         best = shapes[hardest]
         near = _nearest(setting, best)
         rivals = [
