@@ -183,6 +183,23 @@ def test_two_hidden_effects_are_named_both():
     assert set(names(found)) == {"base_tilt", "hysteresis"}
 
 
+@pytest.mark.parametrize("approach", ["robot", "gravity"])
+def test_what_an_effect_does_to_the_other_parameters_is_predicted(approach):
+    """Far more than the noise does, so that the truth is only found with the effect."""
+    measured, truth = campaign(11, effects=("hysteresis",), size=3, approach=approach)
+    found = diagnose(measured, NINE)
+    assert [change.parameter for change in found.changes] == list(NINE.parameter_names)
+    for change in found.changes:
+        second_order = 0.03 * abs(change.estimated) + 0.2 * change.sigma
+        assert abs(change.predicted - change.estimated) < second_order
+
+    true = [p["value"] for effect in truth["sensor"] for p in effect["parameters"]]
+    sigma = np.sqrt(np.diag(found.final.frame.solution.cofactors)[:9])
+    before, after = ([getattr(c, when) for c in found.changes] for when in ("before", "after"))
+    assert np.max(np.abs(np.subtract(after, true) / sigma)) < 4
+    assert np.max(np.abs(np.subtract(before, true) / sigma)) > 10
+
+
 def test_gravity_alone_is_blind_and_says_so():
     measured, _ = campaign(3, approach="gravity", effects=("mounting_rotation",))
     found = diagnose(measured, NINE)

@@ -58,6 +58,18 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
         "effects": [_effect(named) for named in d.found],
         "location": {name: number(share) for name, share in d.location.items()},
         "gap": _gap(d),
+        "parameter_changes": [
+            {
+                "parameter": change.parameter,
+                "unit": change.unit,
+                "before": number(change.before),
+                "after": number(change.after),
+                "predicted": number(change.predicted),
+                "estimated": number(change.estimated),
+                "sigma": number(change.sigma),
+            }
+            for change in d.changes
+        ],
         "invisible_effects": list(d.setting.invisible),
         "untestable_effects": list(d.setting.untestable),
         "untestable_reasons": dict(d.setting.untestable),

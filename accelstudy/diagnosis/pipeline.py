@@ -15,6 +15,7 @@ from accelstudy.campaign.fit import LEAST_RATIO, fit_campaign
 from accelstudy.campaign.format import Campaign
 from accelstudy.diagnosis import gap as gaps
 from accelstudy.diagnosis import noise as noises
+from accelstudy.diagnosis.changes import Change, parameter_changes
 from accelstudy.diagnosis.gross import Recognised, recognise
 from accelstudy.diagnosis.hypotheses import OUTLIER, Setting
 from accelstudy.diagnosis.limits import UpperLimit, upper_limits
@@ -101,6 +102,7 @@ class Diagnosis:
     probabilities : dict of name to posterior probability, given that something is missing
     location : dict of group to share of the excess χ²
     gap : Gap
+    changes : tuple of Change, of the parameters of the base model by effects that were added
     upper_limits : tuple of UpperLimit, of the effects that were not found
     next_positions : tuple of NextPosition, that would separate what is left best
     simulations : int, of residuals without any effect
@@ -125,6 +127,7 @@ class Diagnosis:
     probabilities: Mapping[str, float]
     location: Mapping[str, float]
     gap: Gap
+    changes: tuple[Change, ...]
     upper_limits: tuple[UpperLimit, ...]
     next_positions: tuple[NextPosition, ...]
     simulations: int
@@ -248,6 +251,7 @@ class _Run:
             probabilities=search.probabilities,
             location=self.location(finding, variance),
             gap=self.gap(finding, variance),
+            changes=self.changes(finding, variance),
             upper_limits=tuple(upper_limits(final, variance, names)),
             next_positions=self.next_positions(finding),
             simulations=SIMULATIONS,
@@ -426,6 +430,15 @@ class _Run:
         held_out, reason = self.held_out(finding.chosen, variance if self.sigma_known else None)
         confirmed = held_out is not None and held_out.significant and not reason
         return Gap(before, after, held_out, leveling, confirmed, reason)
+
+    def changes(self, finding: Finding, variance: float) -> tuple[Change, ...]:
+        """Compare what added effects should change of the other parameters with what they do."""
+        effects = [choice.best.shown for choice in finding.chosen]
+        added = [effect for effect in effects if effect is not None]
+        if not added or len(added) < len(effects):
+            return ()
+        final, frame = finding.setting.frame.solution, self.search.setting.frame
+        return parameter_changes(self.first, final, frame, added, variance)
 
     def next_positions(self, finding: Finding) -> tuple[NextPosition, ...]:
         """Positions that tell the two most probable explanations apart, if both are near."""
