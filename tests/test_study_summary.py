@@ -241,8 +241,8 @@ def assert_flagged(tables, cell, failed):
 
 
 def test_absurd_noise_is_flagged(tmp_path):
-    tables = run_study(tmp_path, grids=[grid(sensor_sigma_mps2=30, approaches="robot")])
-    cell = f"{MCLAREN}/robot/sensor_sigma_mps2=30"
+    tables = run_study(tmp_path, grids=[grid(sensor_sigma_mps2=3, approaches="gravity")])
+    cell = f"{MCLAREN}/gravity/sensor_sigma_mps2=3"
     failed = int((~tables["estimates"]["converged"]).sum()) // 9
     assert 0 < failed < 60
     assert_flagged(tables, cell, failed)
