@@ -11,7 +11,6 @@ from itertools import permutations, product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from accelstudy.approaches import Approach
 from accelstudy.campaign.format import Campaign
@@ -175,7 +174,12 @@ def _rows(campaign: Campaign) -> Recognised | None:
     # Repeated attitudes could be exchanged at will, so an exchange has to gain something.
     usual = np.median(np.diag(cost))
     charge = np.where(np.eye(len(forces), dtype=bool), 0.0, (CLEARLY * usual) ** 2)
-    rows, belongs = linear_sum_assignment(cost**2 + charge)
+    total, rows = cost**2 + charge, np.arange(len(forces))
+    if np.array_equal(np.argmin(total, axis=1), rows):
+        return None
+    from scipy.optimize import linear_sum_assignment  # slow to import, and seldom needed
+
+    belongs = linear_sum_assignment(total)[1]
     moved = np.flatnonzero(belongs != rows)
     if not len(moved):
         return None

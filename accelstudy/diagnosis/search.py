@@ -9,7 +9,6 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from accelstudy.adjustment.quality import Solution, solve
 from accelstudy.diagnosis import noise as noises
@@ -317,6 +316,8 @@ class Search:
         for k, start in enumerate(chosen):
             if start.smooth is None:
                 continue
+            from scipy.optimize import minimize_scalar  # slow to import, and seldom needed
+
             values = [h.value for h in self.setting.candidates[start.name]]
             low = max((v for v in values if v < start.value), default=start.value)
             high = min((v for v in values if v > start.value), default=start.value)

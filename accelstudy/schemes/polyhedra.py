@@ -3,7 +3,6 @@
 from itertools import product
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from accelstudy.schemes.registry import Array, register
 
@@ -29,6 +28,8 @@ def generic(directions: Array) -> Array:
     Aligned with the axes, orbits of the octahedral and icosahedral groups leave cubic terms
     singular under the gravity norm; and a vertex on the x axis has no roll.
     """
+    from scipy.spatial.transform import Rotation  # slow to import, and seldom needed
+
     turned: Array = Rotation.from_euler("xyz", [15, 25, 35], degrees=True).apply(directions)
     return turned
 

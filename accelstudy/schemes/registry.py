@@ -12,7 +12,6 @@ from typing import Literal, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from accelstudy.errors import InputError
 
@@ -96,6 +95,8 @@ class Scheme:
         Scheme
             The same positions in another orientation, named "<name>-rotated".
         """
+        from scipy.spatial.transform import Rotation  # slow to import, and seldom needed
+
         matrix = Rotation.from_euler("xyz", euler_xyz).as_matrix()
         return replace(self, name=f"{self.name}-rotated", directions=self.directions @ matrix.T)
 
