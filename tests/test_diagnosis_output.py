@@ -33,6 +33,7 @@ CASES = {
         "temperature_order": "ABBA",
         "order": "random",
     },
+    "clipped": {"effects": ("saturation(knee=9.3): 1, 1, 1",), "seed": 3},
     "gravity": {"effects": ("quadratic_scale: 0.003, 0.004, -0.003",), "approach": "gravity"},
     "no_effect": {},
     "unknown": {
@@ -45,6 +46,7 @@ CASES = {
 }
 HEADLINES = {
     "named": "The model lacks thermal bias.",
+    "clipped": "The model lacks saturation.",
     "gravity": "The model lacks",
     "no_effect": "Nothing that these data can show",
     "unknown": "it has no name here",
@@ -85,7 +87,7 @@ def written(tmp_path_factory):
 @pytest.mark.parametrize("case", CASES)
 def test_every_verdict_is_written_and_told(written, case):
     out, content, printed = written(case)
-    assert content["verdict"] == ("named" if case == "gravity" else case)
+    assert content["verdict"] == ("named" if case in ("gravity", "clipped") else case)
     page = (out / "report.html").read_text(encoding="utf-8")
     assert HEADLINES[case] in printed
     assert HEADLINES[case] in page
@@ -99,6 +101,8 @@ def test_every_verdict_is_written_and_told(written, case):
     if case in ("named", "gravity"):
         assert {"gap", "loop", "location"} <= drawn
         assert "on data that were not used?" in page
+    if case == "clipped":  # readings without an inverse cannot be simulated again
+        assert "loop" not in drawn
     if case == "gravity":
         assert "mounting rotation" in page.split("What can this campaign not see?")[1]
 

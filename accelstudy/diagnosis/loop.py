@@ -99,10 +99,11 @@ def close_loop(diagnosis: Diagnosis, replicates: int = REPLICATES, seed: int = 1
 
     Returns
     -------
-    Loop; None if the diagnosis did not extend the model, so that there is nothing to compare.
+    Loop; None if the diagnosis did not extend the model, so that there is nothing to compare, or if
+    readings of the extended sensor, which clips, have no tilt.
     """
     d = diagnosis
-    if d.extended is d.model:
+    if d.extended is d.model or d.gap.leveling is None:
         return None
     fits = {"base": d.base, "extended": d.final.frame.solution}
     kept = np.flatnonzero(kept_positions(d))
@@ -121,6 +122,8 @@ def close_loop(diagnosis: Diagnosis, replicates: int = REPLICATES, seed: int = 1
         fit = fits[calibration]
         p = fit.parameters[: fit.model.n_parameters]
         f_b = fit.model.correct(d.campaign.forces, p, fit.gravity, d.setting.frame.hold)
+        if np.isnan(f_b).any():
+            return None
         directions = -f_b / np.linalg.norm(f_b, axis=1, keepdims=True)
         ideal = session(fit.model, p, directions, fit.gravity, d.setting.frame.hold)
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(stream,)))
@@ -139,6 +142,8 @@ def close_loop(diagnosis: Diagnosis, replicates: int = REPLICATES, seed: int = 1
             simulated.gravity,
             d.setting.frame.hold,
         )
+        if np.isnan(errors).any():
+            return None
         tilt = np.full(replicates, np.nan)
         tilt[result.converged] = errors
         tables.append(

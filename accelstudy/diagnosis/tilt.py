@@ -35,8 +35,10 @@ def in_use(hold: Hold, g: float) -> tuple[Array, Hold]:
 
 def leveling_rms(
     base: Solution, extended: Solution, hold: Hold, variance: float
-) -> tuple[float, float]:
+) -> tuple[float, float] | None:
     """Rms of roll and pitch, rad, that either calibration leaves if the extended model is right.
+
+    None if readings of the extended sensor, which clips, have no tilt.
 
     It is taken over all tilts up to 50 gon and over the temperatures, times and changes of position
     of the campaign. The noise of the leveled reading itself is not in it, and neither is what
@@ -68,4 +70,6 @@ def leveling_rms(
         cofactors = solution.cofactors[: len(p), : len(p)][np.ix_(kept, kept)]
         formal = variance * np.einsum("kau,uv,kav->ka", slope, cofactors, slope)
         squares.append(float(np.mean(offset**2 + formal)))
+    if not np.all(np.isfinite(squares)):
+        return None
     return float(np.sqrt(squares[0])), float(np.sqrt(squares[1]))
