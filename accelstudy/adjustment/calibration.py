@@ -240,13 +240,7 @@ def whitened_jacobian(
     problem = CalibrationProblem.of(model, approach, observed)
     x = problem.initial[:1].copy()
     x[0, : model.n_parameters] = parameters
-    forces = problem.observations[:1, :, :3]
-    f_a = model.sensitive_force(forces, x[:, : model.n_parameters], observed.gravity, observed.hold)
-    at = problem.conditions.linearise(
-        x.T,
-        np.moveaxis(problem.observations[:1], -1, 0),
-        np.moveaxis(f_a, -1, 0),
-    )
+    at = problem.linearised(x[0], problem.observations[0])
     white = whitened_design(at, problem.cofactors.T)
     rows = np.moveaxis(white[:, :, 0], 1, -1).reshape(-1, x.shape[1])
     weighted = np.flatnonzero(problem.weights)
@@ -257,6 +251,7 @@ def whitened_jacobian(
 class CalibrationProblem:
     """Observed sessions in the form in which `adjust` takes them."""
 
+    model: SensorModel
     conditions: CalibrationConditions
     observations: Array
     cofactors: Array
@@ -293,9 +288,21 @@ class CalibrationProblem:
                 "or sigma_gravity > 0"
             )
         return cls(
+            model=model,
             conditions=equations.at(model.settings, fixed, observed.hold),
             observations=np.concatenate(observations, axis=-1),
             cofactors=np.concatenate(sigmas, axis=-1) ** 2,
             initial=initial,
             weights=weights,
+        )
+
+    def linearised(self, parameters: Array, adjusted: Array) -> Linearisation:
+        """Linearise one session at parameters (u',) and observations (n, o)."""
+        forces, latent = adjusted[:, :3], adjusted[:, :3]
+        if self.conditions.equations.told is None:
+            p = parameters[: self.model.n_parameters]
+            g = parameters[-1] if self.weights.any() else self.conditions.gravity
+            latent = self.model.sensitive_force(forces, p, g, self.conditions.hold)
+        return self.conditions.linearise(
+            parameters[:, None], adjusted.T[:, None], latent.T[:, None]
         )

@@ -132,6 +132,11 @@ def campaign_noise(campaign: Campaign) -> Noise:
     )
 
 
+def least_sigma(campaign: Campaign, approach: Approach) -> float:
+    """Smallest noise of a force, m/s², whose weight is regular beside that of the angles."""
+    return LEAST_RATIO * campaign.gravity * (campaign.sigma_angle or 0.0) * approach.uses_angles
+
+
 def fit_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> CampaignFit:
     """Calibrate a campaign.
 
@@ -153,7 +158,7 @@ def fit_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> 
             "pitch_robot_gon"
         )
     noise = campaign_noise(campaign)
-    least = LEAST_RATIO * campaign.gravity * noise.sigma_angle if approach.uses_angles else 0.0
+    least = least_sigma(campaign, approach)
     if noise.sigma_force < least:
         raise InputError(
             f"{campaign.name}: sensor_noise.sigma_mps2: {noise.sigma_force:g} is too small beside "

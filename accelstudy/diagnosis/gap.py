@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment import Observations
 from accelstudy.adjustment.calibration import CalibrationProblem
-from accelstudy.adjustment.quality import Solution
+from accelstudy.adjustment.quality import Solution, whitening_of
 from accelstudy.effects import Hold
 
 Array = NDArray[np.float64]
@@ -150,18 +150,11 @@ class _Prediction:
     @classmethod
     def of(cls, fit: Solution, observed: Observations) -> _Prediction:
         """Predict by a fit."""
-        model = fit.model
-        problem = CalibrationProblem.of(model, fit.approach, replace(observed, initial=None))
-        p = fit.parameters[: model.n_parameters]
-        f_a = model.sensitive_force(observed.forces, p, fit.gravity, observed.hold)
-        at = problem.conditions.linearise(
-            fit.parameters[:, None],
-            np.moveaxis(problem.observations, -1, 0),
-            np.moveaxis(f_a, -1, 0),
-        )
+        problem = CalibrationProblem.of(fit.model, fit.approach, replace(observed, initial=None))
+        at = problem.linearised(fit.parameters, problem.observations[0])
         b = np.moveaxis(at.jac_observations[:, :, 0], -1, 0)
         psi = at.psi[:, 0].T
-        lower = np.linalg.cholesky(np.einsum("nco,no,ndo->ncd", b, problem.cofactors, b))
+        lower = whitening_of(b, problem.cofactors)
         white = np.asarray(np.linalg.solve(lower, psi[..., None]), dtype=float)
         by_parameters = np.moveaxis(at.jac_parameters[:, :, 0], -1, 0)
         slope = np.asarray(np.linalg.solve(lower, by_parameters), dtype=float)

@@ -157,6 +157,20 @@ class Setting:
         return self.frame.hypothesis(effect)
 
     @property
+    def bases(self) -> dict[str, list[Array]]:
+        """Bases of all shapes of each candidate."""
+        return {name: [h.basis for h in shapes] for name, shapes in self.candidates.items()}
+
+    def nearest(self, hypothesis: Hypothesis) -> tuple[tuple[str, float], ...]:
+        """Other effects and their largest canonical cosines, nearest first."""
+        near = {
+            name: max(float(cosines(hypothesis.ideal, h.ideal)[0]) for h in shapes)
+            for name, shapes in self.candidates.items()
+            if name not in (OUTLIER, hypothesis.name)
+        }
+        return tuple(sorted(near.items(), key=lambda item: -item[1]))
+
+    @property
     def all(self) -> list[Hypothesis]:
         """All shapes of all candidates."""
         return [h for shapes in self.candidates.values() for h in shapes]

@@ -110,7 +110,7 @@ def visibilities(setting: Setting, alpha: float = 0.001, power: float = POWER) -
             usual = get_effect(name).shape[shapes[0].smooth]
             hardest = int(np.argmin([abs(h.value - usual) for h in shapes]))
         best = shapes[hardest]
-        near = _nearest(setting, best)
+        near = setting.nearest(best)
         rivals = [
             max(setting.candidates[other], key=lambda h: float(cosines(best.ideal, h.ideal)[0]))
             for other, cosine in near
@@ -145,13 +145,3 @@ def visibilities(setting: Setting, alpha: float = 0.001, power: float = POWER) -
 def _size(root: float, signature_norms: Array) -> float:
     smallest = float(np.min(signature_norms))
     return root / smallest if smallest > 1e-9 * np.max(signature_norms, initial=1e-300) else np.inf
-
-
-def _nearest(setting: Setting, hypothesis: Hypothesis) -> tuple[tuple[str, float], ...]:
-    """Other effects and their largest canonical cosines, nearest first."""
-    near = {
-        name: max(float(cosines(hypothesis.ideal, h.ideal)[0]) for h in shapes)
-        for name, shapes in setting.candidates.items()
-        if name not in (OUTLIER, hypothesis.name)
-    }
-    return tuple(sorted(near.items(), key=lambda item: -item[1]))

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from accelstudy.adjustment.quality import global_test
 from accelstudy.diagnosis.repeats import clusters
 from accelstudy.diagnosis.residuals import Residuals
 
@@ -53,13 +54,14 @@ def force_residuals(residuals: Residuals, errors: Array) -> Array:
 def level_test(z: Array, variance: float = 1.0) -> NoiseTest:
     """Whether the residuals are as large as sigma says, two-sided (the global test)."""
     omega, r = float(z @ z) / variance, len(z)
-    p = 2 * min(special.chdtr(r, omega), special.chdtrc(r, omega))
+    test = global_test(omega, r)
+    assert test is not None
     factor = omega / r
     size = "larger" if factor > 1 else "smaller"
     return NoiseTest(
         "noise_level",
         omega,
-        float(min(p, 1.0)),
+        min(test.p_value, 1.0),
         (factor,),
         f"the residuals are {np.sqrt(max(factor, 1 / factor)):.3g} times {size} than sigma says",
     )

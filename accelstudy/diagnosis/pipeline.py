@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import GlobalTest, Solution, global_test, solve
 from accelstudy.approaches import Approach, get_approach
-from accelstudy.campaign.fit import LEAST_RATIO, fit_campaign
+from accelstudy.campaign.fit import fit_campaign, least_sigma
 from accelstudy.campaign.format import Campaign
 from accelstudy.diagnosis import gap as gaps
 from accelstudy.diagnosis import noise as noises
@@ -211,7 +211,7 @@ class _Run:
                     "be tested; more positions are needed"
                 )
             if not self.sigma_known:
-                least = max(1e-9, LEAST_RATIO * campaign.gravity * (campaign.sigma_angle or 0.0))
+                least = max(1e-9, least_sigma(campaign, self.approach))
                 campaign = replace(campaign, sigma_force=max(fit.sigma_position, least))
         return solve(fit.model, fit.approach, fit.observed, fit.adjustment)
 
@@ -324,7 +324,7 @@ class _Run:
     def judge_noise(self, worst: NoiseTest) -> Finding:
         """Judge a finding about the noise, when no effect was significant."""
         setting = self.search.setting
-        lack_of_fit = self.search.screening.p_candidate.get(LACK_OF_FIT, 1.0)
+        lack_of_fit = self.search.screening.p_candidate.get(f"group:{LACK_OF_FIT}", 1.0)
         if lack_of_fit < LEVEL_NOISE and worst.name != "quantisation":
             return self.search.nothing(
                 "repeated positions agree better with each other than with the model, so it is not "
@@ -333,10 +333,7 @@ class _Run:
         if worst.name != LEVEL or worst.estimate[0] < 1:
             return Finding("noise_model", setting, worst.remark)
         # Larger residuals may be an effect that the sigma-free tests could not see.
-        level, best, name = known_level_evidence(
-            {name: [h.basis for h in shapes] for name, shapes in setting.candidates.items()},
-            self.search.z,
-        )
+        level, best, name = known_level_evidence(setting.bases, self.search.z)
         probability = 1 / (1 + np.exp(best - level))
         if probability >= SURE:
             return Finding("noise_model", setting, worst.remark)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.calibration import CalibrationProblem
-from accelstudy.adjustment.quality import Solution
+from accelstudy.adjustment.quality import Solution, whitening_of
 from accelstudy.diagnosis.signatures import Signature
 from accelstudy.leveling import roll_pitch, specific_force
 
@@ -121,17 +121,16 @@ def ideal_residuals(solution: Solution) -> tuple[Residuals, Array]:
         forces = g * forces / np.linalg.norm(forces, axis=1, keepdims=True)
         angles = np.column_stack(roll_pitch(tuple(forces.T)))
     problem = CalibrationProblem.of(model, approach, observed)
-    x = np.zeros((problem.initial.shape[1], 1))
+    x = np.zeros(problem.initial.shape[1])
     if problem.weights.any():
         x[-1] = g
     values = [forces, angles] if approach.uses_angles else [forces]
-    adjusted = np.concatenate(values, axis=1).T[:, None]
-    at = problem.conditions.linearise(x, adjusted, forces.T[:, None])
+    at = problem.linearised(x, np.concatenate(values, axis=1))
     b = np.moveaxis(at.jac_observations[:, :, 0], -1, 0)
     # With weights that the residuals suggest, an axis could drop out of sight.
     variances = solution.variances.copy()
     variances[:, :3] = variances[:, :3].mean()
-    whitening = np.linalg.cholesky(np.einsum("nco,no,ndo->ncd", b, variances, b))
+    whitening = whitening_of(b, variances)
     a = np.linalg.solve(whitening, np.moveaxis(at.jac_parameters[:, :, 0], -1, 0))
     design = np.concatenate([a.reshape(-1, a.shape[-1]), solution.prior[0]])
     return Residuals(design, np.zeros(len(design)), whitening, b, np.sqrt(variances)), forces

@@ -16,7 +16,6 @@ from accelstudy.diagnosis.hypotheses import (
     OUTLIER,
     Hypothesis,
     Setting,
-    cosines,
     same_space,
     setting_of,
 )
@@ -58,7 +57,7 @@ LEAST = 0.05
 """Smallest variance of an axis beside the mean of all: no axis is taken to be without noise."""
 WEIGHTINGS = 4
 """The variances of the axes are estimated anew in each weighting, and settle."""
-LACK_OF_FIT = "group:lack_of_fit"
+LACK_OF_FIT = "lack_of_fit"
 """Everything but the differences of repeated positions, which are noise alone (pure error)."""
 
 
@@ -174,13 +173,8 @@ class Search:
     def screened(self, setting: Setting, groups: Mapping[str, Array]) -> Screening:
         """Test all candidates and groups of regressors of a fit."""
         z = setting.frame.residuals.z
-        bases: dict[str, Sequence[Array]] = {
-            name: [h.basis for h in shapes] for name, shapes in setting.candidates.items()
-        }
-        bases |= {f"group:{name}": [basis] for name, basis in groups.items()}
-        if "repeat" in groups:
-            bases[LACK_OF_FIT] = [complement(groups["repeat"])]
-        return screen(bases, z, self.null[:, : len(z)])
+        spaces = {f"group:{name}": [basis] for name, basis in spaces_of(groups).items()}
+        return screen({**setting.bases, **spaces}, z, self.null[:, : len(z)])
 
     # --- naming ---------------------------------------------------------------------------------
 
@@ -205,9 +199,7 @@ class Search:
     def unknown_evidence(self) -> float:
         """Log evidence of something in one of the groups that is none of the effects."""
         r = len(self.z)
-        spaces = list(self.groups.values())
-        if "repeat" in self.groups:
-            spaces.append(complement(self.groups["repeat"]))
+        spaces = spaces_of(self.groups).values()
         logs = [float(log_evidence(share(q, self.z), q.shape[1], r)) for q in spaces]
         return mean_evidence(np.array(logs)) if logs else 0.0
 
@@ -271,13 +263,11 @@ class Search:
         """Other effects with similar signatures, nearest first."""
         if best.effect is None:
             return ()
-        near = {
-            name: max(float(cosines(best.ideal, h.ideal)[0]) for h in shapes)
-            for name, shapes in self.setting.candidates.items()
-            if name != OUTLIER and name not in members
-        }
-        ranked = sorted(near.items(), key=lambda item: -item[1])
-        return tuple((name, cosine) for name, cosine in ranked if cosine >= RIVAL)
+        return tuple(
+            (name, cosine)
+            for name, cosine in self.setting.nearest(best)
+            if cosine >= RIVAL and name not in members
+        )
 
     # --- extending the model --------------------------------------------------------------------
 
@@ -470,9 +460,13 @@ class Search:
         return bool(pairs) and set(pairs[0].names) <= wanted
 
 
-def complement(basis: Array) -> Array:
-    """Orthonormal basis of all that is orthogonal to an orthonormal basis (r, l)."""
-    return np.linalg.qr(basis, mode="complete")[0][:, basis.shape[1] :]
+def spaces_of(groups: Mapping[str, Array]) -> dict[str, Array]:
+    """Orthonormal bases of the groups and, beside repeats, of the lack of fit."""
+    if "repeat" not in groups:
+        return dict(groups)
+    repeat = groups["repeat"]
+    rest = np.linalg.qr(repeat, mode="complete")[0][:, repeat.shape[1] :]
+    return {**groups, LACK_OF_FIT: rest}
 
 
 def position_of(hypothesis: Hypothesis) -> int:

@@ -20,7 +20,7 @@ from accelstudy.adjustment.quality.redundancy import (
     redundancy_numbers,
     reliability,
 )
-from accelstudy.adjustment.quality.solution import Solution, solve
+from accelstudy.adjustment.quality.solution import Solution, solve, whitening_of
 from accelstudy.adjustment.quality.whole_model import GlobalTest, global_test
 
 __all__ = [
@@ -43,4 +43,5 @@ __all__ = [
     "solve",
     "suspects",
     "variance_components",
+    "whitening_of",
 ]

@@ -75,8 +75,7 @@ class Solution:
     @cached_property
     def whitening(self) -> Array:
         """L of each position, (n, c, c)."""
-        b = self.jac_observations
-        return np.linalg.cholesky(np.einsum("nco,no,ndo->ncd", b, self.variances, b))
+        return whitening_of(self.jac_observations, self.variances)
 
     @cached_property
     def design(self) -> Array:
@@ -112,6 +111,11 @@ class Solution:
         return vectors * scale[:, None], np.count_nonzero(seen, axis=1)
 
 
+def whitening_of(b: Array, variances: Array) -> Array:
+    """L of each position, (n, c, c), with B Q Bᵀ = L Lᵀ; B (n, c, o), variances (n, o)."""
+    return np.linalg.cholesky(np.einsum("nco,no,ndo->ncd", b, variances, b))
+
+
 def solve(
     model: SensorModel,
     approach: Approach,
@@ -139,11 +143,8 @@ def solve(
 
     problem = CalibrationProblem.of(model, approach, observed)
     x, v = result.parameters[0], result.residuals[0]
-    p = x[: model.n_parameters]
     gravity = float(x[-1]) if problem.weights.any() else float(np.ravel(observed.gravity)[0])
-    adjusted = problem.observations[0] + v
-    f_a = model.sensitive_force(adjusted[:, :3], p, gravity, observed.hold)
-    at = problem.conditions.linearise(x[:, None], adjusted.T[:, None], f_a.T[:, None])
+    at = problem.linearised(x, problem.observations[0] + v)
     b = np.moveaxis(at.jac_observations[:, :, 0], -1, 0)
     root_weight = np.sqrt(problem.weights)
     seen = problem.weights > 0
