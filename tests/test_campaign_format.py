@@ -13,6 +13,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from accelstudy.campaign.format import Campaign, read_campaign, write_campaign
+from accelstudy.campaign.layout import LogLayout
 from accelstudy.errors import InputError
 from accelstudy.leveling import specific_force
 from accelstudy.units import GON, MGON, STANDARD_GRAVITY
@@ -38,6 +39,10 @@ def campaign(**changes):
         sigma_angle=3.2 * MGON,
         n_samples=np.full(n, 200),
         sd=np.full((n, 3), 0.03),
+        slope=noise / 100,
+        sd_slope=np.full((n, 3), 1e-4),
+        full_range=20.0,
+        log=LogLayout(columns={"fx": 0, "fy": "b", "fz": 2}, rate_hz=100, frame="flu"),
         time=10.0 * np.arange(n),
         temperature=np.linspace(-5, 30, n),
         vibration=np.full(n, 0.001),
@@ -69,6 +74,35 @@ def assert_same(read, written):
             assert one == pytest.approx(other, rel=1e-12), field.name
         else:
             assert one == other, field.name
+
+
+def test_holds_that_are_left_out_stay_in_the_file_and_in_the_history(tmp_path):
+    every = campaign()
+    reasons = {3: "moved", 8: "bumped"}
+    write_campaign(every.without({8: "bumped"}).without({3: "moved"}), tmp_path)
+    assert len((tmp_path / "positions.csv").read_text().splitlines()) == 1 + every.n_positions
+    read = read_campaign(tmp_path)
+    assert read.positions.tolist() == [1, 2, 4, 5, 6, 7]
+    assert read.reasons == reasons
+    assert read.exclusions[0] == {"position": 3, "reason": "moved"}
+    assert_same(read.whole, every)
+    kept = read.positions - 1
+    for name in ("step_x", "temperature", "yaw", "roll"):
+        np.testing.assert_allclose(
+            getattr(read.hold, name), getattr(every.hold, name)[kept], atol=1e-12
+        )
+
+
+@pytest.mark.parametrize(
+    ("reasons", "message"),
+    [
+        ({9: "moved"}, "excluded: there is no position 9"),
+        (dict.fromkeys(range(1, 9), "moved"), "excluded: no position is left"),
+    ],
+)
+def test_what_cannot_be_left_out(reasons, message):
+    with pytest.raises(InputError, match=message):
+        campaign().without(reasons)
 
 
 def floats(low, high):
@@ -103,6 +137,9 @@ def campaigns(draw):
         yaw=rng.normal(size=n) if robot else None,
         n_samples=maybe(rng.integers(1, 10**6, n)),
         sd=maybe(rng.uniform(0, 1, (n, 3))),
+        slope=maybe(rng.normal(0, 1e-3, (n, 3))),
+        sd_slope=maybe(rng.uniform(0, 1e-3, (n, 3))),
+        full_range=maybe(draw(floats(20, 200))),
         time=maybe(np.cumsum(rng.uniform(0, 60, n))),
         temperature=maybe(rng.uniform(-40, 85, n)),
         vibration=maybe(rng.uniform(0, 1, n)),
@@ -131,7 +168,15 @@ def test_files_are_those_of_the_format(tmp_path):
         "unit": "m/s^2",
         "gravity": {"value_mps2": 9.81, "sigma_mps2": 1e-5},
         "sensor_noise": {"sigma_mps2": 0.002},
+        "range_mps2": 20.0,
         "robot": {"angle_sigma_mgon": pytest.approx(3.2)},
+        "log": {
+            "columns": {"fx": 0, "fy": "b", "fz": 2},
+            "time_unit": "s",
+            "rate_hz": 100.0,
+            "unit": "m/s^2",
+            "frame": "flu",
+        },
     }
     header, *rows = (tmp_path / "new" / "folder" / "positions.csv").read_text().splitlines()
     assert header.split(",")[:5] == ["position", "time_s", "fx", "fy", "fz"]

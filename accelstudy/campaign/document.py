@@ -58,6 +58,8 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
         "iterations": int(adjustment.iterations[0]),
         "rms_norm_residual_mps2": fit.rms_norm_residual,
         "affine": _affine(fit),
+        "excluded": campaign.exclusions,
+        "log": None if campaign.log is None else campaign.log.model_dump(exclude_none=True),
         "warnings": list(campaign.warnings),
     }
 

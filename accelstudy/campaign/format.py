@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Literal
@@ -25,79 +25,17 @@ from accelstudy.campaign.checks import (
 )
 from accelstudy.campaign.header import COLUMNS, COUNTING, HEADER, KNOWN, TABLES, Header
 from accelstudy.campaign.position_files import Columns, read_positions
+from accelstudy.campaign.session import Campaign
 from accelstudy.campaign.wording import one_line
-from accelstudy.effects import Hold
 from accelstudy.errors import InputError
 from accelstudy.study.config.errors import first_error
 from accelstudy.study.config.layers import overlay, read_layer
 from accelstudy.study.tables import whole_file
 from accelstudy.units import MGON
 
+__all__ = ["Campaign", "read_campaign", "write_campaign"]
+
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Campaign:
-    """One calibration session of one sensor, in SI; n static holds in order of acquisition.
-
-    Attributes
-    ----------
-    name : str
-    positions : (n,) int array, the column `position`
-    forces : (n, 3) array, m/s², mean specific force of the holds in sensor axes
-    gravity, sigma_gravity : float, m/s²
-    unit : str, of the file ("m/s^2", "g" or "counts")
-    sensor : str, optional
-    sigma_force : float, m/s², a-priori sd of a position mean; None if unknown
-    angles : (n, 2) array, rad, robot's roll and pitch; None without a robot
-    sigma_angle : float, rad; None without a robot
-    n_samples : (n,) int array, optional
-    sd : (n, 3) array, m/s², optional, sd of the samples within the holds
-    time, temperature, vibration, yaw : (n,) arrays in s, °C, m/s², rad, optional
-    nominal_scale, nominal_offset : (3,) arrays with unit "counts", f = (raw − offset) · scale
-    warnings : tuple of str, what was ignored when the campaign was read
-    source : Path, folder from which it was read, optional
-    """
-
-    name: str
-    positions: NDArray[np.int_]
-    forces: Array
-    gravity: float
-    sigma_gravity: float = 0.0
-    unit: str = "m/s^2"
-    sensor: str | None = None
-    sigma_force: float | None = None
-    angles: Array | None = None
-    sigma_angle: float | None = None
-    n_samples: NDArray[np.int_] | None = None
-    sd: Array | None = None
-    time: Array | None = None
-    temperature: Array | None = None
-    vibration: Array | None = None
-    yaw: Array | None = None
-    nominal_scale: Array | None = None
-    nominal_offset: Array | None = None
-    warnings: tuple[str, ...] = field(default=())
-    source: Path | None = None
-
-    @property
-    def n_positions(self) -> int:
-        """Number of static holds."""
-        return len(self.forces)
-
-    @property
-    def hold(self) -> Hold:
-        """What is known of the holds besides the forces, as the effects take it."""
-        roll, pitch = (None, None) if self.angles is None else self.angles.T
-        hold = Hold(
-            temperature=self.temperature,
-            time=self.time,
-            vibration=self.vibration,
-            roll=roll,
-            pitch=pitch,
-            yaw=self.yaw,
-        )
-        return hold.with_steps(self.forces)
 
 
 def read_campaign(
@@ -174,7 +112,7 @@ def write_campaign(
     folder = Path(folder)
     path = folder / f"positions.{table}"
     header = _parse_header(_content_of(campaign), folder / HEADER)
-    columns = _columns_of(campaign, header)
+    columns = _columns_of(campaign.whole, header)
     _parse_table(columns, header, path, plausible)
     try:
         with whole_file(path) as temporary:
@@ -231,7 +169,7 @@ def _parse_table(columns: Columns, header: Header, path: Path, plausible: bool) 
         if attribute in values:
             values[attribute] = values[attribute].astype(np.int64)
     nominal, noise, robot = header.nominal, header.sensor_noise, header.robot
-    return Campaign(
+    campaign = Campaign(
         name=header.name,
         sensor=header.sensor,
         unit=header.unit,
@@ -241,8 +179,15 @@ def _parse_table(columns: Columns, header: Header, path: Path, plausible: bool) 
         sigma_angle=None if robot is None else robot.angle_sigma_mgon * MGON,
         nominal_scale=None if nominal is None else np.array(nominal.scale),
         nominal_offset=None if nominal is None else np.array(nominal.offset),
+        full_range=header.range_mps2,
+        log=header.log,
         **values,
     )
+    reasons = {entry.position: entry.reason for entry in header.excluded or ()}
+    try:
+        return campaign.without(reasons)
+    except InputError as error:
+        raise InputError(f"{path.with_name(HEADER)}: {error}") from None
 
 
 def _numbers(columns: Columns, name: str, labels: Sequence[str], path: Path) -> Array:
@@ -288,6 +233,12 @@ def _content_of(campaign: Campaign) -> dict[str, Any]:
         content["nominal"] = {k: np.asarray(v).tolist() for k, v in nominal.items()}
     if campaign.sigma_force is not None:
         content["sensor_noise"] = {"sigma_mps2": campaign.sigma_force}
+    if campaign.full_range is not None:
+        content["range_mps2"] = campaign.full_range
+    if campaign.reasons:
+        content["excluded"] = campaign.exclusions
+    if campaign.log is not None:
+        content["log"] = campaign.log.model_dump(exclude_none=True)
     if campaign.sigma_angle is not None:
         content["robot"] = {"angle_sigma_mgon": campaign.sigma_angle / MGON}
     return content

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, model_validator
 
+from accelstudy.campaign.layout import LogLayout
 from accelstudy.study.config.schema import Block
 from accelstudy.study.config.types import Finite, NotNegative, Number, Positive
 from accelstudy.units import GON, to_si
@@ -23,6 +24,8 @@ COLUMNS = {
     "forces": ("fx", "fy", "fz"),
     "n_samples": ("n_samples",),
     "sd": ("sd_fx", "sd_fy", "sd_fz"),
+    "slope": ("slope_fx", "slope_fy", "slope_fz"),
+    "sd_slope": ("sd_slope_fx", "sd_slope_fy", "sd_slope_fz"),
     "temperature": ("temperature_degC",),
     "angles": ("roll_robot_gon", "pitch_robot_gon"),
     "yaw": ("yaw_robot_gon",),
@@ -31,7 +34,14 @@ COLUMNS = {
 """Attributes of a campaign and the columns that make them up, all of them or none."""
 KNOWN = tuple(name for names in COLUMNS.values() for name in names)
 COUNTING = ("positions", "n_samples")
-LEAST = {"positions": 1, "n_samples": 1, "sd": 0, "temperature": -273.15, "vibration": 0}
+LEAST = {
+    "positions": 1,
+    "n_samples": 1,
+    "sd": 0,
+    "sd_slope": 0,
+    "temperature": -273.15,
+    "vibration": 0,
+}
 MOST = 1e12
 """Beyond anything that is measured, in any unit; squares and cubes of less stay finite."""
 
@@ -67,6 +77,13 @@ class _Robot(Block):
     angle_sigma_mgon: Annotated[NotNegative, Field(le=MOST)]
 
 
+class Exclusion(Block):
+    """A hold that is left out of every fit."""
+
+    position: Annotated[int, Field(ge=1), Number]
+    reason: Annotated[str, Field(min_length=1)]
+
+
 class Header(Block):
     """What stands in `campaign.yaml`."""
 
@@ -77,7 +94,10 @@ class Header(Block):
     nominal: Nominal | None = None
     gravity: _Gravity
     sensor_noise: _SensorNoise | None = None
+    range_mps2: Annotated[Positive, Field(le=MOST)] | None = None
+    excluded: Annotated[list[Exclusion], Field(min_length=1)] | None = None
     robot: _Robot | None = None
+    log: LogLayout | None = None
 
     @model_validator(mode="after")
     def _nominal_with_counts(self) -> Self:
@@ -92,9 +112,11 @@ class Header(Block):
         zero, one = np.zeros(1), np.ones(1)
         if attribute in ("angles", "yaw"):
             return GON * one, zero
-        if attribute not in ("forces", "sd"):
+        if attribute not in ("forces", "sd", "slope", "sd_slope"):
             return one, zero
         if self.nominal is None:
             return to_si(one, self.unit, "m/s^2"), zero
         scale, offset = np.array(self.nominal.scale), np.array(self.nominal.offset)
-        return (scale, offset) if attribute == "forces" else (np.abs(scale), zero)
+        if attribute == "forces":
+            return scale, offset
+        return (scale if attribute == "slope" else np.abs(scale)), zero
