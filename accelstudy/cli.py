@@ -9,8 +9,6 @@ import json
 from pathlib import Path
 
 import click
-import numpy as np
-import pandas as pd
 
 from accelstudy import __version__
 from accelstudy.campaign.commands import COMMANDS
@@ -18,6 +16,8 @@ from accelstudy.campaign.importing_cli import import_command, public_command
 from accelstudy.campaign.simulating_cli import simulate_campaign_command
 from accelstudy.diagnosis.command import diagnose_command
 from accelstudy.errors import InputError
+from accelstudy.options import ANGLE_UNIT, angle_unit_option
+from accelstudy.units import angles_in
 
 
 class Commands(click.Group):
@@ -34,28 +34,43 @@ class Commands(click.Group):
 
 @click.group(cls=Commands)
 @click.version_option(__version__, package_name="accelstudy")
-def main() -> None:
+@click.option(
+    "--angle-unit",
+    metavar="[gon|deg]",
+    type=ANGLE_UNIT,
+    default="gon",
+    show_default=True,
+    envvar="ACCELSTUDY_ANGLE_UNIT",
+    show_envvar=True,
+    help="Unit in which commands, pages and figures show angles, gon or deg.",
+)
+@click.pass_context
+def main(ctx: click.Context, angle_unit: str) -> None:
     """Monte Carlo study of accelerometer calibration for leveling.
 
     `snakemake --cores 2` runs the study; these commands show what it can be made of, and calibrate
     measured data with the same adjustment.
     """
+    ctx.with_resource(angles_in(angle_unit))
 
 
 @main.command()
 @click.option("--model", default="bias-scale-nonorthogonality", show_default=True)
 @click.option("--approach", default="gravity", show_default=True)
 @click.argument("names", nargs=-1)
+@angle_unit_option
 def schemes(model: str, approach: str, names: tuple[str, ...]) -> None:
     """List position schemes and what they determine with a model and an approach.
 
     NAMES chooses schemes (fibonacci-60, random-20-7, ...); all named ones by default.
     """
+    import pandas as pd
+
     from accelstudy.approaches import get_approach
     from accelstudy.design import diagnose
     from accelstudy.models import get_model
     from accelstudy.schemes import get_scheme, scheme_families, scheme_names
-    from accelstudy.units import GON
+    from accelstudy.units import angle_note, attitude_unit, to_attitude
 
     chosen_model, chosen_approach = get_model(model), get_approach(approach)
     rows = []
@@ -71,7 +86,7 @@ def schemes(model: str, approach: str, names: tuple[str, ...]) -> None:
                 "condition": f"{design.condition:.1f}" if design.estimable else "-",
                 "r": design.redundancy,
                 "m": f"{design.fourth_moment:.4f}",
-                "pole/gon": f"{design.pole_distance / GON:.1f}",
+                f"pole/{attitude_unit()}": f"{to_attitude(design.pole_distance):.1f}",
                 "not estimable": ", ".join(design.not_estimable),
             }
         )
@@ -79,25 +94,30 @@ def schemes(model: str, approach: str, names: tuple[str, ...]) -> None:
     click.echo(pd.DataFrame(rows).to_string(index=False))
     click.echo(
         "\nrank and condition: of the scaled design at the ideal sensor; r: conditions - unknowns;"
-        "\nm: mean of x²y²; pole: distance to the x axis, where roll is undefined."
+        "\nm: mean of x²y²; pole: distance to the x axis, where roll is undefined;"
+        f"\n{angle_note()}"
         f"\nFamilies: {', '.join(scheme_families())}."
     )
 
 
 @main.command()
 @click.argument("name")
+@angle_unit_option
 def scheme(name: str) -> None:
     """Print the directions of a scheme (gravity in the body frame), with its source."""
+    import numpy as np
+    import pandas as pd
+
     from accelstudy.leveling import roll_pitch
     from accelstudy.schemes import get_scheme
-    from accelstudy.units import GON
+    from accelstudy.units import attitude_unit, to_attitude
 
     chosen = get_scheme(name)
     click.echo(f"# {chosen.title} ({chosen.status}): {chosen.source}")
-    roll, pitch = roll_pitch(tuple(-chosen.directions.T))
-    table = np.column_stack([chosen.directions, roll / GON, pitch / GON])
+    attitudes = to_attitude(np.transpose(roll_pitch(tuple(-chosen.directions.T))))
+    columns = ["x", "y", "z", *(f"{angle}_{attitude_unit()}" for angle in ("roll", "pitch"))]
     click.echo(
-        pd.DataFrame(table, columns=["x", "y", "z", "roll_gon", "pitch_gon"]).to_csv(
+        pd.DataFrame(np.hstack([chosen.directions, attitudes]), columns=columns).to_csv(
             index_label="position", float_format="%.6f"
         ),
         nl=False,
@@ -122,6 +142,7 @@ def models() -> None:
 @click.option("--scheme", help="Name of a scheme, instead of a campaign.")
 @click.option("--model", default="bias-scale-nonorthogonality", show_default=True)
 @click.option("--approach", help="gravity or robot.  [default: robot, if there is one]")
+@angle_unit_option
 def effects(campaign: Path | None, scheme: str | None, model: str, approach: str | None) -> None:
     """List effects, noise effects and gross errors; or what a campaign can show of them.
 
@@ -129,10 +150,12 @@ def effects(campaign: Path | None, scheme: str | None, model: str, approach: str
     campaign or a scheme: which effects it can show beside the model, how large they must be to be
     detected and to be named, and with what they would be confused.
     """
+    from accelstudy.units import angle_note
+
     if campaign is None and scheme is None:
         from accelstudy.catalogue import catalogue
 
-        click.echo(catalogue())
+        click.echo(f"{catalogue()}\n\n{angle_note()}")
         return
     if campaign is not None and scheme is not None:
         raise InputError("effects: --campaign and --scheme exclude each other; give one of them")
@@ -155,6 +178,7 @@ def effects(campaign: Path | None, scheme: str | None, model: str, approach: str
         "\nMDB: size of one parameter that a test at 0.1 % detects with a probability of 80 %;"
         "\nMIB: size at which the effect can also be told from the one it is most like;"
         "\nconfused with: the nearest effects and the cosine of their signatures, 1 for the same."
+        f"\n{angle_note()}"
     )
 
 

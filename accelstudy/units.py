@@ -5,6 +5,10 @@ This is the only place where conversion factors stand.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -23,6 +27,7 @@ UNITS: dict[str, dict[str, float]] = {
         "gon": GON,
         "rad": 1.0,
         "mrad": 1e-3,
+        "mdeg": 1e-3 * np.pi / 180.0,
         "deg": np.pi / 180.0,
         "arcsec": np.pi / 648000.0,
     },
@@ -51,17 +56,72 @@ UNITS: dict[str, dict[str, float]] = {
         "mg/g^2": 1e-3 / STANDARD_GRAVITY,
     },
 }
-"""SI unit -> {unit that people use: its size in the SI unit}; the first is the one we show."""
+"""SI unit -> {unit that people use: its size in the SI unit}; the first is the one we record."""
+
+ANGLE_UNITS = {"gon": "mgon", "deg": "mdeg"}
+"""Units in which angles can be shown: that of an attitude -> that of a small angle."""
+_angle_unit: ContextVar[str] = ContextVar("angle_unit", default="gon")
+
+
+@contextmanager
+def angles_in(unit: str | None) -> Iterator[None]:
+    """Show angles in gon or deg within a ``with`` block; None leaves what holds outside it.
+
+    Only what people look at changes: files keep their units.
+
+    Raises
+    ------
+    UnknownNameError
+        If `unit` is neither gon nor deg.
+    """
+    if unit is not None and unit not in ANGLE_UNITS:
+        raise UnknownNameError("angle unit", unit, ANGLE_UNITS)
+    token = _angle_unit.set(unit or _angle_unit.get())
+    try:
+        yield
+    finally:
+        _angle_unit.reset(token)
+
+
+def attitude_unit() -> str:
+    """Unit in which attitudes are shown, gon or deg; small ones have that of `display_unit`."""
+    return _angle_unit.get()
+
+
+def to_attitude(angle: ArrayLike) -> NDArray[np.float64]:
+    """Convert an angle from rad into the unit in which attitudes are shown."""
+    return np.asarray(angle, dtype=float) / UNITS["rad"][attitude_unit()]
+
+
+def angle_note() -> str:
+    """Sentence that introduces the unit of angles where it is first used."""
+    if attitude_unit() == "gon":
+        return "100 gon = 90°, 1 mgon = 0.0009°."
+    return "90° = 100 gon, 1 mdeg = 0.001°."
+
+
+def recorded_unit(unit: str) -> str:
+    """Unit in which files hold a quantity of the SI `unit`; that itself if none is better."""
+    return next(iter(UNITS.get(unit, {unit: 1.0})))
+
+
+def to_recorded(value: ArrayLike, unit: str) -> NDArray[np.float64]:
+    """Convert `value` from the SI `unit` into the unit of files."""
+    return _converted(value, unit, recorded_unit(unit))
 
 
 def display_unit(unit: str) -> str:
-    """Unit in which a quantity of the SI `unit` is shown; the SI unit itself if none is better."""
-    return next(iter(UNITS.get(unit, {unit: 1.0})))
+    """Unit in which people see a quantity of the SI `unit`: that of files, angles as chosen."""
+    return ANGLE_UNITS[attitude_unit()] if unit == "rad" else recorded_unit(unit)
 
 
 def to_display(value: ArrayLike, unit: str) -> NDArray[np.float64]:
     """Convert `value` from the SI `unit` into the unit shown to people."""
-    return np.asarray(value, dtype=float) / UNITS.get(unit, {}).get(display_unit(unit), 1.0)
+    return _converted(value, unit, display_unit(unit))
+
+
+def _converted(value: ArrayLike, unit: str, wanted: str) -> NDArray[np.float64]:
+    return np.asarray(value, dtype=float) / UNITS.get(unit, {}).get(wanted, 1.0)
 
 
 def to_si(value: ArrayLike, given: str, unit: str) -> NDArray[np.float64]:

@@ -8,7 +8,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from accelstudy.errors import UnknownNameError
-from accelstudy.units import GON, MGON, UNITS, display_unit, to_display, to_si
+from accelstudy.units import (
+    GON,
+    MGON,
+    UNITS,
+    angle_note,
+    angles_in,
+    attitude_unit,
+    display_unit,
+    recorded_unit,
+    to_attitude,
+    to_display,
+    to_recorded,
+    to_si,
+)
 
 
 def test_a_full_turn_is_400_gon():
@@ -53,6 +66,37 @@ def test_units_that_people_read(unit, shown):
 def test_what_is_shown_can_be_read_back(unit, value):
     back = to_si(to_display(value, unit), display_unit(unit), unit)
     assert back == pytest.approx(value, rel=1e-14)
+    assert to_si(to_recorded(value, unit), recorded_unit(unit), unit) == pytest.approx(
+        value, rel=1e-14
+    )
+
+
+def test_angles_in_degrees_are_for_people_only():
+    with angles_in("deg"):
+        assert (attitude_unit(), display_unit("rad")) == ("deg", "mdeg")
+        assert to_attitude(math.pi / 4) == pytest.approx(45, rel=1e-15)
+        assert to_display(math.pi / 180, "rad") == pytest.approx(1000, rel=1e-15)
+        assert recorded_unit("rad") == "mgon"
+        assert to_recorded(math.pi / 200, "rad") == pytest.approx(1000, rel=1e-15)
+        assert display_unit("1") == "ppm"
+        assert "1 mdeg" in angle_note()
+        with angles_in(None):
+            assert attitude_unit() == "deg"
+        with angles_in("gon"):
+            assert to_attitude(math.pi / 2) == pytest.approx(100, rel=1e-15)
+    assert (attitude_unit(), display_unit("rad")) == ("gon", "mgon")
+    assert "100 gon = 90°" in angle_note()
+
+
+def test_the_unit_of_angles_is_as_before_when_a_command_fails():
+    with pytest.raises(ZeroDivisionError), angles_in("deg"):
+        _ = 1 / 0
+    assert attitude_unit() == "gon"
+
+
+def test_an_unknown_angle_unit_is_named():
+    with pytest.raises(UnknownNameError, match="unknown angle unit 'grad'"), angles_in("grad"):
+        pass
 
 
 def test_arrays_are_converted():

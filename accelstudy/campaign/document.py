@@ -8,7 +8,7 @@ import numpy as np
 
 from accelstudy.campaign.fit import CampaignFit
 from accelstudy.campaign.gauges import GAUGES, affine_form, in_gauge
-from accelstudy.units import display_unit, to_display
+from accelstudy.units import recorded_unit, to_recorded
 
 
 def calibration_document(fit: CampaignFit) -> dict[str, Any]:
@@ -43,9 +43,9 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
                 "sigma_posteriori": number(adjustment.sigma_posteriori[0, i]),
                 "unit": parameter.unit,
                 "shown": {
-                    "value": float(to_display(fit.parameters[i], parameter.unit)),
-                    "sigma": number(to_display(sigma[i], parameter.unit)),
-                    "unit": display_unit(parameter.unit),
+                    "value": float(to_recorded(fit.parameters[i], parameter.unit)),
+                    "sigma": number(to_recorded(sigma[i], parameter.unit)),
+                    "unit": recorded_unit(parameter.unit),
                 },
             }
             for i, parameter in enumerate(fit.model.parameters)

@@ -19,7 +19,7 @@ from accelstudy.leveling_error import cap_forces, leveling_error
 from accelstudy.study.cells import Cell
 from accelstudy.study.simulate import parameter_units
 from accelstudy.study.tables import TABLES, read_table, write_table
-from accelstudy.units import GON, MGON, display_unit, to_display
+from accelstudy.units import GON, MGON, recorded_unit, to_recorded
 
 Array = NDArray[np.float64]
 
@@ -181,8 +181,8 @@ def _summary_rows(cell: Cell, design: Design, fits: Fits) -> pd.DataFrame:
             {
                 **_labels(cell),
                 "parameter": name,
-                "unit": display_unit(unit),
-                **{key: float(to_display(value, unit)) for key, value in in_si.items()},
+                "unit": recorded_unit(unit),
+                **{key: float(to_recorded(value, unit)) for key, value in in_si.items()},
                 **_ratio(fits.sigma_posteriori[:, i], fits.errors[:, i]),
                 **_coverage(fits, i),
                 "n_replicates": fits.simulated,

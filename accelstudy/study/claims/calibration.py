@@ -9,7 +9,7 @@ import numpy as np
 from accelstudy.effects import get_effect
 from accelstudy.study.claims.base import Array, Claim, Evidence, SchemeClaim, verdict
 from accelstudy.study.summary import Fits
-from accelstudy.units import display_unit, to_display
+from accelstudy.units import recorded_unit, to_recorded
 
 EFFECTS = {"bias": "bias", "scale": "scale", "nonorthogonality": "misalignment"}
 """Effect -> the paper's word for it."""
@@ -69,13 +69,13 @@ def _bias_claim(evidence: Evidence) -> Claim:
 def _poorly_determined_claim(evidence: Evidence, effect: str, statement: str) -> Claim:
     sigma, error, truth = _mean_sigma(evidence, effect)
     unit = get_effect(effect).parameters[0].unit
-    ours, half = (float(to_display(value.mean(), unit)) for value in (sigma, 1.96 * error))
+    ours, half = (float(to_recorded(value.mean(), unit)) for value in (sigma, 1.96 * error))
     share = sigma.mean() / truth.min()
     return Claim(
         f"{effect}-determinable",
         "4.2",
         statement,
-        display_unit(unit),
+        recorded_unit(unit),
         np.nan,
         ours,
         ours - half,

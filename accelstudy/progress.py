@@ -1,0 +1,109 @@
+"""What a command tells while it works: bars on a terminal for what takes long, and lines.
+
+A function reports by `track` and `stage`, wherever it stands. Nothing is shown unless a command
+asks for it by `feedback`, so that the package is silent when it is used from Python.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sized
+from contextlib import ExitStack, contextmanager
+from contextvars import ContextVar
+from functools import partial
+from threading import Timer
+from typing import TYPE_CHECKING, TypeVar
+
+import click
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+DELAY = 2.0
+"""Seconds that work takes before it gets a bar."""
+
+Item = TypeVar("Item")
+_quiet: ContextVar[bool] = ContextVar("quiet", default=False)
+_wanted: ContextVar[bool] = ContextVar("wanted", default=False)
+_bars: ContextVar[Progress | None] = ContextVar("bars", default=None)
+
+
+@contextmanager
+def feedback(quiet: bool = False) -> Iterator[None]:
+    """Show within a ``with`` block what `track`, `stage` and `say` report, unless `quiet`."""
+    tokens = _quiet.set(quiet), _wanted.set(not quiet and sys.stderr.isatty())
+    try:
+        yield
+    finally:
+        _quiet.reset(tokens[0])
+        _wanted.reset(tokens[1])
+
+
+def say(text: str) -> None:
+    """Print a line about what was done, unless the command is quiet."""
+    if not _quiet.get():
+        click.echo(text)
+
+
+@contextmanager
+def stage(what: str, total: float | None = None) -> Iterator[Callable[[float], None]]:
+    """Show `what` is being done within a ``with`` block; stages may lie within each other.
+
+    Parameters
+    ----------
+    what : str
+        Such as "null simulation".
+    total : float, optional
+        How much there is to do; the stage yields a function that is told each part done.
+    """
+    if not _wanted.get():
+        yield lambda done: None
+        return
+    with ExitStack() as stack:
+        bars = _bars.get() or stack.enter_context(_drawn())
+        task = bars.add_task(what, total=total)
+        stack.callback(bars.remove_task, task)
+        yield partial(bars.advance, task)
+
+
+def track(items: Iterable[Item], what: str, total: float | None = None) -> Iterator[Item]:
+    """Yield `items` and show how many of them (of `total`, by default their number) are done."""
+    if total is None and isinstance(items, Sized):
+        total = len(items)
+    with stage(what, total) as advance:
+        for item in items:
+            yield item
+            advance(1)
+
+
+@contextmanager
+def _drawn() -> Iterator[Progress]:
+    """Bars that appear after a while and vanish at the end, on standard error."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    bars = Progress(
+        SpinnerColumn(),
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TimeElapsedColumn(),
+        console=Console(stderr=True),
+        refresh_per_second=5,
+        transient=True,
+        redirect_stdout=False,
+        redirect_stderr=False,
+    )
+    start = Timer(DELAY, bars.start)
+    start.daemon = True
+    if bars.console.is_interactive:  # a dumb terminal cannot take back what it shows
+        start.start()
+    token = _bars.set(bars)
+    try:
+        yield bars
+    finally:
+        _bars.reset(token)
+        start.cancel()
+        if start.ident is not None:
+            start.join()
+        if bars.live.is_started:
+            bars.stop()
