@@ -63,7 +63,8 @@ def _gross_error(error: GrossError) -> Iterator[str]:
 
 def _head(item: Shaped, equation: str) -> Iterator[str]:
     yield f"{item.name}: {equation}"
-    yield f"{INDENT}{(item.__doc__ or '').splitlines()[0]}"
+    if item.summary:
+        yield f"{INDENT}{item.summary}"
 
 
 def _settings(item: Shaped) -> Iterator[str]:

@@ -100,6 +100,11 @@ class Shaped:
         self.shape = {**{hyper.name: hyper.default for hyper in self.hypers}, **shape}
 
     @property
+    def summary(self) -> str:
+        """First line of what the class says of itself; empty if it says nothing."""
+        return next(iter((type(self).__doc__ or "").strip().splitlines()), "")
+
+    @property
     def spec(self) -> str:
         """Name with its settings, those left open excepted: ``warm_up(tau=300)``."""
         fixed = [f"{k}={v:.12g}" for k, v in self.shape.items() if not math.isnan(v)]
@@ -126,11 +131,14 @@ class ShapedRegistry(Registry[ShapedItem]):
         if match is None:
             return super().get(spec)
         item = super().get(match[1])
-        shape = {}
+        shape: dict[str, float] = {}
         for part in filter(None, map(str.strip, match[2].split(","))):
             key, _, value = part.partition("=")
+            key = key.strip()
+            if key in shape:
+                raise InputError(f"{self.kind} {spec!r}: {key} is given twice")
             try:
-                shape[key.strip()] = float(value)
+                shape[key] = float(value)
             except ValueError:
                 raise InputError(
                     f"{self.kind} {spec!r}: {part!r} is no setting; expected name=number"

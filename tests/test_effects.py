@@ -399,7 +399,8 @@ def test_an_effect_with_some_of_its_parameters():
     whole = get_effect("saturation(knee=9)")
     part = whole.only((0, 2))
     assert [p.name for p in part.parameters] == ["k_sat_x", "k_sat_z"]
-    assert part.spec == whole.spec
+    assert part.spec == f"{whole.spec}[k_sat_x, k_sat_z]"
+    assert type(get_effect(part.spec)) is type(part)
     assert type(whole.only((0, 1, 2))) is type(whole)
     assert type(whole.only((0, 2))) is type(part)
     forces = 9.8 * np.array([[1, 0, 0], [0, 1, 0], [0, 0, -1], [0.6, 0.8, 0]])

@@ -9,8 +9,7 @@ import numpy as np
 
 from accelstudy.campaign.format import Campaign
 from accelstudy.diagnosis.pipeline import Diagnosis
-from accelstudy.effects import get_effect
-from accelstudy.models import MODELS
+from accelstudy.models import composition_name
 from accelstudy.sensor import SensorModel
 from accelstudy.units import MGON
 
@@ -27,7 +26,13 @@ def study_overlay(diagnosis: Diagnosis) -> dict[str, Any]:
     d = diagnosis
     solution = d.final.frame.solution
     extended = d.extended
-    models = {m.name: [e.spec for e in m.effects] for m in (d.model, extended)}
+    effects = [effect.spec for effect in extended.effects]
+    models = [composition_name(d.model.effects)]
+    own: dict[str, list[str]] = {}
+    if extended is not d.model:
+        # One model of the file's own, which is thus the one that it stands for.
+        added = [e.name for e in extended.effects[len(d.model.effects) :]]
+        own = {"-".join([study_name(models[0]), *added]): effects}
     noise: dict[str, Any] = {
         "sensor": {"sigma_mps2": d.sigma_position, "per": "position"},
         "gravity": {"sigma_mps2": d.campaign.sigma_gravity, "error_mps2": 0.0},
@@ -38,12 +43,12 @@ def study_overlay(diagnosis: Diagnosis) -> dict[str, Any]:
         "study": study_name(d.campaign.name),
         "gravity_mps2": solution.gravity,
         "noise": noise,
-        "simulated_effects": [effect.spec for effect in extended.effects],
+        "simulated_effects": effects,
         "sensor": _truth(extended, solution.parameters.tolist()),
-        "models": {name: effects for name, effects in models.items() if name not in MODELS},
+        "models": own,
         "grids": [
             {
-                "models": list(models),
+                "models": [*models, *own],
                 "schemes": [f"fibonacci-{d.campaign.n_positions}"],
                 "approaches": [d.approach.name],
                 "replicates": REPLICATES,
@@ -87,9 +92,10 @@ def study_name(name: str) -> str:
 def _truth(model: SensorModel, parameters: list[float]) -> dict[str, dict[str, Any]]:
     """Estimates as true values, by effect, SI."""
     values = dict(zip(model.parameter_names, parameters, strict=False))  # gravity may follow
-    truth = {}
-    for spec in (effect.spec for effect in model.effects):
-        own = get_effect(spec).parameters
-        # What no position shows is not in the model.
-        truth[spec] = {"value": [values.get(p.name, 0.0) for p in own], "unit": own[0].unit}
-    return truth
+    return {
+        effect.spec: {
+            "value": [values[p.name] for p in effect.parameters],
+            "unit": effect.parameters[0].unit,
+        }
+        for effect in model.effects
+    }

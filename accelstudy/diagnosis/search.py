@@ -35,6 +35,7 @@ from accelstudy.diagnosis.pairs import best_pairs
 from accelstudy.diagnosis.residuals import Residuals
 from accelstudy.diagnosis.screening import SIMULATIONS, Screening, screen, share
 from accelstudy.errors import InputError
+from accelstudy.models import composition_name
 from accelstudy.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -276,12 +277,15 @@ class Search:
         effects = [h.shown for h in chosen if h.shown is not None]
         if not effects:
             return self.model
-        name = "-".join([self.model.name, *(effect.name for effect in effects)])
-        return SensorModel(name, (*self.model.effects, *effects))
+        together = (*self.model.effects, *effects)
+        return SensorModel(composition_name(together), together)
 
     def refit(self, chosen: Sequence[Hypothesis]) -> Solution | None:
         """Fit rigorously with effects added and bumped positions left out."""
-        model = self.extended_model(chosen)
+        try:
+            model = self.extended_model(chosen)
+        except InputError:  # two effects whose parameters have the same names
+            return None
         # From an ideal sensor the iterations may not reach a large effect.
         start = dict(zip(self.model.parameter_names, self.first.parameters, strict=False))
         observed = replace(self.first.observed, initial=model.vector(start))

@@ -215,4 +215,4 @@ def described(name: str) -> str:
     """Return the first line of what the catalogue says of an effect; nothing for other names."""
     if name not in effect_names():
         return ""
-    return (get_effect(name).__doc__ or "").splitlines()[0]
+    return get_effect(name).summary

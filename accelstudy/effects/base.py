@@ -13,6 +13,7 @@ serves NumPy arrays, symbols to differentiate, and generated code.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache
@@ -21,7 +22,7 @@ from typing import Any, ClassVar, Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.errors import InputError
+from accelstudy.errors import InputError, UnknownNameError
 from accelstudy.registry import Shaped, ShapedRegistry
 
 AXES = ("x", "y", "z")
@@ -120,16 +121,37 @@ class Effect(Shaped):
     name : str, canonical
     parameters : tuple of Parameter
     hypers : tuple of Hyper, numbers that shape the effect
-    equation : str, what is added, for people
-    typical : (float, float), usual size of a parameter from good to cheap equipment, SI
+    equation : str, what is added, for people; by default as the methods have it
+    typical : (float, float), usual size of a parameter from good to cheap equipment, SI; by default
+        what changes a reading by 0.1 to 1 thousandth of g
     part : what has the effect, the "sensor" or the "rig" that turns it
+    partial : bool, whether some of its parameters are left out
     """
 
     kind = "effect"
     parameters: ClassVar[tuple[Parameter, ...]]
-    equation: ClassVar[str]
-    typical: ClassVar[tuple[float, float]]
     part: ClassVar[Literal["sensor", "rig"]] = "sensor"
+    partial: ClassVar[bool] = False
+
+    @property
+    def equation(self) -> str:
+        """What the effect adds, for people."""
+        from accelstudy.effects.defaults import equation_of  # needs this class
+
+        return equation_of(self)
+
+    @property
+    def typical(self) -> tuple[float, float]:
+        """Usual size of a parameter from good to cheap equipment, SI."""
+        from accelstudy.effects.defaults import typical_of  # needs this class
+
+        return typical_of(self)
+
+    @property
+    def spec(self) -> str:
+        """Name with its settings and, if it has not all of its parameters, with those it has."""
+        kept = f"[{', '.join(p.name for p in self.parameters)}]" if self.partial else ""
+        return super().spec + kept
 
     def candidates(self, hold: Hold, f: NDArray[np.float64], g: float) -> Sequence[Effect]:
         """Shapes of the effect that are worth a search in given holds with forces f (n, 3)."""
@@ -165,6 +187,8 @@ def _part(kind: type[Effect], kept: tuple[int, ...]) -> type[Effect]:
         return tuple(values.get(i, 0) for i in range(len(kind.parameters)))
 
     content = {
+        "__doc__": kind.__doc__,
+        "partial": True,
         "parameters": tuple(kind.parameters[i] for i in kept),
         "axes": lambda self, p, xp: kind.axes(self, full(p), xp),
         "output": lambda self, f, p, g, hold, xp: kind.output(self, f, full(p), g, hold, xp),
@@ -183,14 +207,26 @@ effect_names = _registry.names
 def get_effect(spec: str) -> Effect:
     """Return an effect by its name, or by its name and settings: ``warm_up(tau=300)``.
 
+    The names of some of its parameters in brackets leave out the others, which are zero:
+    ``saturation(knee=9.5)[k_sat_z]``.
+
     Raises
     ------
     UnknownNameError
-        If there is no such effect or setting.
+        If there is no such effect, setting or parameter.
     InputError
         If the settings cannot be read.
     """
-    return _registry.get(spec)
+    match = re.fullmatch(r"([^\[\]]*)\[([^\[\]]*)\]\s*", str(spec))
+    if match is None:
+        return _registry.get(spec)
+    effect = _registry.get(match[1].strip())
+    names = [parameter.name for parameter in effect.parameters]
+    wanted = [name.strip() for name in match[2].split(",")]
+    for name in wanted:
+        if name not in names:
+            raise UnknownNameError(f"parameter of the effect {effect.name!r}", name, names)
+    return effect.only(tuple(i for i, name in enumerate(names) if name in wanted))
 
 
 def register(effect: EffectClass) -> EffectClass:

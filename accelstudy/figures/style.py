@@ -162,11 +162,16 @@ def model_title(model: str) -> str:
     """Short title of a model; one that extends a known one is named by what it adds."""
     if model in TITLES:
         return TITLES[model]
-    known = max((name for name in TITLES if model.startswith(f"{name}-")), key=len, default=None)
+    known = max(
+        (name for name in TITLES if model.startswith((f"{name}-", f"{name}+"))),
+        key=len,
+        default=None,
+    )
     if known is None:
-        return model
-    parameters, added = TITLES[known].split(":")[0], model.removeprefix(f"{known}-")
-    return f"{parameters} + {added.replace('-', ' + ').replace('_', ' ')}"
+        return model.replace("+", " + ").replace("_", " ") if "+" in model else model
+    parameters, added = TITLES[known].split(":")[0], model.removeprefix(known)[1:]
+    parts = added.split("+") if "(" in added or "+" in added else added.split("-")
+    return " + ".join([parameters, *(part.replace("_", " ") for part in parts)])
 
 
 def new_figure(width: float, height_mm: float) -> Figure:

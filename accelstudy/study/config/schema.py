@@ -362,10 +362,13 @@ class StudyConfig(Block):
         values: dict[str, float] = {}
         given = {**self.sensor, **{get_effect(k).spec: v for k, v in self.sensor.items()}}
         for effect in map(get_effect, effects):
-            quantity = given.get(effect.spec, given.get(effect.name))
-            for i, parameter in enumerate(effect.parameters):
-                values[parameter.name] = (
-                    float(to_si(quantity.value[i], quantity.unit, parameter.unit))
+            key = effect.spec if effect.spec in given else effect.name
+            quantity = given.get(key)
+            # A value may be that of the whole effect, of which the model has a part.
+            known = [parameter.name for parameter in get_effect(key).parameters]
+            for name, unit in ((p.name, p.unit) for p in effect.parameters):
+                values[name] = (
+                    float(to_si(quantity.value[known.index(name)], quantity.unit, unit))
                     if quantity
                     else 0.0
                 )

@@ -1,0 +1,91 @@
+"""What is said of an effect that does not say it itself: its formula and how large it may be."""
+
+from __future__ import annotations
+
+import re
+from itertools import product
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from accelstudy.effects.base import AXES, Effect, Hold, Matrix
+from accelstudy.tracing import symbolic, symbols
+from accelstudy.units import STANDARD_GRAVITY
+
+USUAL = (1e-4, 1e-3)
+"""Parts of g by which an effect of usual size changes a reading."""
+
+Texts = list[str]
+
+
+def formulas(effect: Effect) -> dict[str, Texts | list[Texts]]:
+    """Write what an effect adds, with its settings as numbers, as text that a program can evaluate.
+
+    Returns
+    -------
+    dict
+        "output" (3), "axes" (3 × 3) and "reading" (2), as far as they are not zero, of f_x, f_y,
+        f_z (m/s², along the sensitive axes), g, the parameters and the columns of `Hold`.
+    """
+    output, axes, reading = _expressions(effect)
+    found: dict[str, Texts | list[Texts]] = {}
+    if any(part != 0 for part in output):
+        found["output"] = [_text(part) for part in output]
+    if any(part != 0 for row in axes for part in row):
+        found["axes"] = [[_text(part) for part in row] for row in axes]
+    if any(part != 0 for part in reading):
+        found["reading"] = [_text(part) for part in reading]
+    return found
+
+
+def equation_of(effect: Effect) -> str:
+    """Write what an effect adds, for people: one formula if all axes have the same."""
+    output, axes, reading = _expressions(effect)
+    texts = [_text(part) for part in (*output, *(a for row in axes for a in row), *reading) if part]
+    if len(texts) == len(AXES):
+        alike = {re.sub(rf"_{i}\b", "_i", text) for i, text in zip(AXES, texts, strict=True)}
+        texts = list(alike) if len(alike) == 1 else texts
+    return ", ".join(t.replace("**2", "²").replace("**3", "³").replace("*", " ") for t in texts)
+
+
+def typical_of(effect: Effect) -> tuple[float, float]:
+    """Return sizes of a parameter with which an effect changes readings by `USUAL`, SI."""
+    g, some = STANDARD_GRAVITY, 0.5
+    forces = g * np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
+    f, n = tuple(forces.T), np.ones(len(forces))
+    hold = Hold(
+        temperature=30.0 * n, time=600.0 * n, vibration=n,
+        roll=some * n, pitch=some * n, yaw=some * n, step_x=g * n, step_y=g * n, step_z=g * n,
+    )  # fmt: skip
+    reach = 0.0
+    for p in np.eye(len(effect.parameters)):
+        added = [
+            *effect.output(f, tuple(p), g, hold, np),
+            *np.asarray(effect.axes(tuple(p), np), dtype=float) @ forces.T,
+            *(g * np.asarray(e) for e in effect.reading((some * n, some * n), tuple(p), hold, np)),
+        ]
+        reach = max(reach, *(float(np.max(np.abs(part))) for part in added))
+    low, high = (part * g / reach if 0 < reach < np.inf else part for part in USUAL)
+    return low, high
+
+
+def _expressions(effect: Effect) -> tuple[tuple[Any, ...], Matrix, tuple[Any, Any]]:
+    """Evaluate an effect with symbols, but with its settings as the numbers they are."""
+    numbered = type(effect)()
+    numbered.shape = {
+        name: sp.Integer(int(value)) if float(value).is_integer() else sp.Float(value)
+        for name, value in effect.shape.items()
+    }
+    p = symbols(*(parameter.name for parameter in effect.parameters))
+    f, (g,) = symbols(*(f"f_{axis}" for axis in AXES)), symbols("g")
+    known = Hold(**dict(zip(Hold.columns(), symbols(*Hold.columns()), strict=True)))
+    return (
+        numbered.output(f, p, g, known, symbolic),
+        numbered.axes(p, symbolic),
+        numbered.reading((known.roll, known.pitch), p, known, symbolic),
+    )
+
+
+def _text(expression: Any) -> str:
+    return sp.sstr(sp.sympify(expression), full_prec=False)
