@@ -7,7 +7,22 @@ from collections.abc import Iterable
 
 
 class InputError(ValueError):
-    """Input that cannot be used; the message says where, what is wrong and what would be right."""
+    """Input that cannot be used; the message says where, what is wrong and what would be right.
+
+    What a file says may stand in the message. So nothing in it steers a terminal.
+    """
+
+    def __init__(self, message: str) -> None:
+        super().__init__(printable(message))
+
+
+def printable(text: str) -> str:
+    """Text in which characters that nobody sees, but that a terminal obeys, are spelled out."""
+    if text.isprintable():
+        return text
+    return "".join(
+        c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text
+    )
 
 
 class UnknownNameError(InputError):

@@ -1,5 +1,7 @@
 """Readers of raw logs: every layout gives the same numbers, and bad input one clear line."""
 
+import gzip
+import time
 from contextlib import contextmanager
 
 import numpy as np
@@ -270,6 +272,63 @@ def test_a_line_without_end_is_not_read(tmp_path):
     path = written(tmp_path, "1.5," * 20000)
     with pytest.raises(InputError, match="no end of a line in 65536 characters"):
         open_log(path, rate=1)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "\n".join(" ".join(["word"] * (i % 200)) for i in range(400)),
+        "\n".join(f"{i},{'a,' * (i % 300)}" for i in range(500)),
+        '"1"\n' * 5000,
+        ",".join(['"1.5"'] * 5000),
+    ],
+)
+def test_no_table_takes_no_time(tmp_path, text):
+    start = time.process_time()
+    with pytest.raises(InputError):
+        open_log(written(tmp_path, text), rate=1)
+    assert time.process_time() - start < 2
+
+
+def test_quoted_numbers(tmp_path):
+    text = lines(before=["t,fx,fy,fz"]).replace(",", '","').replace("\n", '"\n"')
+    moments, forces = everything(open_log(written(tmp_path, f'"{text[:-1]}')))
+    np.testing.assert_array_equal(moments, TIME)
+    np.testing.assert_array_equal(forces, FORCES)
+    with pytest.raises(InputError, match="a quotation mark opens and never closes"):
+        everything(open_log(written(tmp_path, f'"{text[:-3]}')))
+
+
+def test_gzip(tmp_path):
+    packed = gzip.compress(lines(before=["t,fx,fy,fz"]).encode())
+    path = tmp_path / "log.csv.gz"
+    path.write_bytes(packed)
+    np.testing.assert_array_equal(everything(open_log(path))[1], FORCES)
+    path.write_bytes(packed[:-20])
+    with pytest.raises(InputError, match="not a whole gzip file"):
+        everything(open_log(path))
+    path = tmp_path / "log.parquet.gz"
+    path.write_bytes(packed)
+    with pytest.raises(InputError, match="unpack it first"):
+        open_log(path)
+
+
+def test_two_parquet_columns_of_one_name(tmp_path):
+    arrays = [pa.array(column) for column in (*TABLE.T, FORCES[:, 0])]
+    path = tmp_path / "log.parquet"
+    pq.write_table(pa.Table.from_arrays(arrays, ["t", "fx", "fy", "fz", "fx"]), path)
+    with pytest.raises(InputError, match="which column is fx"):
+        everything(open_log(path))
+    with pytest.raises(InputError, match="there are several columns 'fx'"):
+        everything(open_log(path, **BY_PLACE))
+
+
+def test_a_header_does_not_steer_the_terminal(tmp_path):
+    path = written(tmp_path, lines(before=["t,\x1b[2J\x1b[31mfx,\u202ef,fz"]))
+    with pytest.raises(InputError) as caught:
+        open_log(path)
+    assert str(caught.value).isprintable()
+    assert r"\x1b[31mfx" in str(caught.value)
 
 
 @contextmanager

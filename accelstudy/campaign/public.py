@@ -199,9 +199,10 @@ def _download(url: str, part: Path, have: int) -> None:
                 start = file.tell()
                 shutil.copyfileobj(response, file)
                 came = file.tell() - start
-            expected = response.headers.get("Content-Length")
-            # The end of a broken connection looks like the end of the file.
-            if expected is not None and came < int(expected):
+            # The end of a broken connection looks like the end of the file. Only a server that
+            # says how much there is can be held to it.
+            expected = response.headers.get("Content-Length", "").strip()
+            if expected.isascii() and expected.isdigit() and came < int(expected[:18]):
                 raise OSError(f"the connection broke after {came} of {expected} bytes")
     except HTTPError as error:
         # Nothing comes after what is there: it is whole, or wrong, which its checksum will tell.
