@@ -150,7 +150,10 @@ def _rank(a: Array) -> tuple[int, float, NDArray[np.bool_]]:
     longest = length.max() or 1.0
     # A column of rounding errors is no direction, and would be one at unit length.
     scaled = a / np.where(length > ROUNDING * longest, length, longest)
-    _, values, vt = np.linalg.svd(scaled, full_matrices=True)
+    # The whole null space is wanted, also of a design with fewer rows than columns; R of a QR
+    # decomposition has it too, without a matrix of all conditions by all conditions.
+    triangle = np.linalg.qr(scaled, mode="r") if len(scaled) > len(length) else scaled
+    _, values, vt = np.linalg.svd(triangle, full_matrices=True)
     rank = int(np.count_nonzero(values > SINGULAR * values[0]))
     complete = rank == a.shape[1]
     condition = float(values[0] / values[-1]) if complete else np.inf

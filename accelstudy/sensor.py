@@ -196,8 +196,8 @@ class SensorModel:
     def errors_of_reading(
         self, reading: NDArray[np.float64], parameters: ArrayLike, hold: Hold | None = None
     ) -> NDArray[np.float64]:
-        """Return the errors (n, 2) of a reading (n, 2) of roll and pitch; see `reading_errors`."""
-        padded = np.pad(reading, ((0, 0), (0, 1)))
+        """Return the errors (..., n, 2) of a reading (..., n, 2); see `reading_errors`."""
+        padded = np.concatenate([reading, np.zeros_like(reading[..., :1])], axis=-1)
         return self._apply(self.trace.reading, padded, parameters, STANDARD_GRAVITY, hold)
 
     def _apply(

@@ -23,7 +23,13 @@ import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
-from accelstudy.adjustment.gauss_helmert import Adjustment, Linearisation, adjust, whitened_design
+from accelstudy.adjustment.gauss_helmert import (
+    Adjustment,
+    Linearisation,
+    adjust,
+    joined,
+    whitened_design,
+)
 from accelstudy.approaches import Approach
 from accelstudy.effects import Hold
 from accelstudy.errors import InputError
@@ -32,6 +38,9 @@ from accelstudy.tracing import TracedFunction, derivative, inverse, symbolic, sy
 from accelstudy.units import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
+
+AT_ONCE = 100_000
+"""Positions, of all sessions together, that are adjusted at once; more would only take memory."""
 
 
 @dataclass(frozen=True)
@@ -74,15 +83,19 @@ class Observations:
             hold=None if self.hold is None else self.hold.take(positions),
         )
 
-    def first(self, replicates: int) -> Observations:
-        """Return the first `replicates` sessions; all if there are fewer."""
+    def sessions(self, chosen: slice) -> Observations:
+        """Return some of the sessions."""
         angles, gravity = self.angles, np.asarray(self.gravity)
         return replace(
             self,
-            forces=self.forces[:replicates],
-            angles=None if angles is None else angles[:replicates],
-            gravity=gravity[:replicates] if gravity.ndim else gravity,
+            forces=self.forces[chosen],
+            angles=None if angles is None else angles[chosen],
+            gravity=gravity[chosen] if gravity.ndim else gravity,
         )
+
+    def first(self, replicates: int) -> Observations:
+        """Return the first `replicates` sessions; all if there are fewer."""
+        return self.sessions(slice(replicates))
 
 
 class CalibrationEquations:
@@ -211,7 +224,18 @@ def calibrate(model: SensorModel, approach: Approach, observed: Observations) ->
         If the approach needs angles that were not observed, a column that is absent, or there are
         fewer conditions than unknowns.
     """
-    problem = CalibrationProblem.of(model, approach, observed)
+    count, n = observed.forces.shape[:2]
+    size = max(1, AT_ONCE // n)
+    if count <= size:
+        return _calibrated(CalibrationProblem.of(model, approach, observed))
+    parts = []
+    for start in range(0, count, size):
+        part = observed.sessions(slice(start, start + size))
+        parts.append(_calibrated(CalibrationProblem.of(model, approach, part)))
+    return joined(parts)
+
+
+def _calibrated(problem: CalibrationProblem) -> Adjustment:
     return adjust(
         problem.conditions,
         problem.observations,

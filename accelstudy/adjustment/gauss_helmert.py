@@ -12,8 +12,8 @@ convergence, so its result does not depend on what else is in the batch.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -131,6 +131,17 @@ class Adjustment:
     def sigma_posteriori(self) -> Array:
         """Standard deviations a posteriori, (R, u)."""
         return np.sqrt(np.diagonal(self.covariance_posteriori, axis1=1, axis2=2))
+
+
+def joined(parts: Sequence[Adjustment]) -> Adjustment:
+    """Join adjustments of replicates of one problem."""
+    names = [field.name for field in fields(Adjustment)]
+    arrays: dict[str, Any] = {
+        name: np.concatenate([getattr(part, name) for part in parts])
+        for name in names
+        if name not in ("redundancy", "variance_priori")
+    }
+    return replace(parts[0], **arrays)
 
 
 def adjust(

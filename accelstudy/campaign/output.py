@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import pandas as pd
 from jinja2 import Environment, PackageLoader
 
 from accelstudy.campaign.assessment import assess, positions_table, quality_document
@@ -17,6 +18,9 @@ from accelstudy.figures.saving import save_all
 from accelstudy.figures.style import STYLE, unit_label
 from accelstudy.study.report import number
 from accelstudy.study.tables import whole_file
+
+LISTED = 200
+"""Positions up to which the page lists all of them; of more, those that fit worst."""
 
 
 def write_calibration(fit: CampaignFit, folder: str | Path) -> dict[str, Any]:
@@ -43,7 +47,7 @@ def write_calibration(fit: CampaignFit, folder: str | Path) -> dict[str, Any]:
     page = environment.get_template("report.html.j2").render(
         doc=document,
         quality=quality,
-        positions=positions.to_dict("records"),
+        positions=_listed(positions).to_dict("records"),
         shown=_shown,
         **drawn,
     )
@@ -54,6 +58,12 @@ def write_calibration(fit: CampaignFit, folder: str | Path) -> dict[str, Any]:
         text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
         path.write_text(text + "\n", encoding="utf-8")
     return content
+
+
+def _listed(positions: pd.DataFrame) -> pd.DataFrame:
+    """Return the positions that a page lists, in their order: all, or the least probable ones."""
+    worst = positions.sort_values(["suspect", "p_value"], ascending=[False, True], kind="stable")
+    return worst.head(LISTED).sort_index()
 
 
 def _shown(parameter: dict[str, Any], value: float | None) -> str:

@@ -7,15 +7,20 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from accelstudy.figures.style import STYLE
 from accelstudy.study.tables import whole_file
 
 PAGE_DPI = 150
 """Of the figures of a page, which shows them as SVG."""
+MANY = 1000
+"""Points or lines of one artist from which on it is drawn as an image inside of the SVG."""
 
 
 def save(figure: Figure, svg_path: str | Path, png_path: str | Path, title: str, dpi: int) -> str:
@@ -53,7 +58,19 @@ def save(figure: Figure, svg_path: str | Path, png_path: str | Path, title: str,
 
 def save_all(figures: Mapping[str, Figure], folder: Path) -> dict[str, str]:
     """Write the figures of a page under their names; returns them as SVG elements."""
+    for figure in figures.values():
+        _simplify(figure)
     return {
         name: save(figure, folder / f"{name}.svg", folder / f"{name}.png", name, PAGE_DPI)
         for name, figure in figures.items()
     }
+
+
+def _simplify(figure: Figure) -> None:
+    """Draw artists of very many points as images, or a page would have many megabytes."""
+    lines = [line for line in figure.findobj(Line2D) if np.size(line.get_xdata()) > MANY]
+    collections = [one for one in figure.findobj(LineCollection) if len(one.get_paths()) > MANY]
+    for artist in (*lines, *collections):
+        artist.set_rasterized(True)
+    if lines or collections:
+        figure.set_dpi(PAGE_DPI)

@@ -20,7 +20,12 @@ from accelstudy.adjustment.quality.redundancy import (
     redundancy_numbers,
     reliability,
 )
-from accelstudy.adjustment.quality.solution import Solution, solve, whitening_of
+from accelstudy.adjustment.quality.solution import (
+    Solution,
+    column_basis,
+    solve,
+    whitening_of,
+)
 from accelstudy.adjustment.quality.whole_model import GlobalTest, global_test
 
 __all__ = [
@@ -32,6 +37,7 @@ __all__ = [
     "Solution",
     "Suspect",
     "VarianceComponents",
+    "column_basis",
     "global_test",
     "held_out",
     "holm",

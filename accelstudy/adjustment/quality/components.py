@@ -98,34 +98,50 @@ def variance_components(
 
 
 def _estimate(solution: Solution, groups: Array, factors: Array) -> VarianceComponents | None:
-    """Estimate the factors with the derivatives of one solution; None if S is singular."""
-    n, c, u = solution.jac_parameters.shape
+    """Estimate the factors with the derivatives of one solution; None if S is singular.
+
+    All matrices of conditions by conditions have blocks of one position each but for what A adds,
+    so that traces of products are sums over positions and products of (u, u) matrices:
+    with G = (Aᵀ M⁻¹ A)⁻¹ and T_i = Aᵀ M⁻¹ M_i M⁻¹ A,
+
+        tr(W M_i W M_j) = tr(M⁻¹ M_i M⁻¹ M_j) − 2 tr(G Aᵀ M⁻¹ M_i M⁻¹ M_j M⁻¹ A) + tr(G T_i G T_j).
+
+    Observed gravity is a row of weight 1 in A, w and M, which keeps its weight.
+    """
     b = solution.jac_observations
     rows, errors = solution.prior
-    a = np.concatenate([solution.jac_parameters.reshape(n * c, u), rows])
-    w = np.concatenate([solution.misclosures.ravel(), errors])
-    m = np.zeros((2, len(w), len(w)))
-    for matrix, q in zip(m, groups, strict=True):
-        position = np.einsum("nco,no,ndo->ncd", b, q, b)
-        for i, block in enumerate(position):
-            matrix[i * c : (i + 1) * c, i * c : (i + 1) * c] = block
-    known = np.diag(np.arange(len(w)) >= n * c).astype(float)  # observed gravity keeps its weight
-    a = a / np.linalg.norm(a, axis=0)
+    m = np.einsum("nco,ino,ndo->incd", b, groups, b)
+    design = np.concatenate([solution.jac_parameters.reshape(-1, rows.shape[1]), rows])
+    length = np.linalg.norm(design, axis=0)
+    a, rows = solution.jac_parameters / length, rows / length
+    w = solution.misclosures
+    known = rows.T @ rows
 
     for _ in range(MAX_STEPS):
-        inverse = np.linalg.inv(known + np.tensordot(factors, m, 1))
+        inverse = np.linalg.inv(np.tensordot(factors, m, 1))
         weighted = inverse @ a
-        projected = inverse - weighted @ np.linalg.solve(a.T @ weighted, weighted.T)
-        wm = projected @ m
-        s = np.einsum("iab,jba->ij", wm, wm)
-        pw = projected @ w
-        share = np.einsum("a,iab,b->i", pw, m, pw)
-        trace = np.einsum("iaa->i", wm)
-        length = np.sqrt(np.diag(s))
-        if not np.all(length > 0) or np.linalg.cond(s / np.outer(length, length)) > 1e10:
+        g = np.linalg.inv(_normal(a, weighted) + known)
+        # W w, by position; what is left at observed gravity has no part in the components.
+        x = g @ (np.einsum("ncu,nc->u", weighted, w) + rows.T @ errors)
+        pw = np.einsum("ncd,nd->nc", inverse, w) - weighted @ x
+
+        mk = m @ inverse  # M_i M⁻¹
+        mka = m @ weighted  # M_i M⁻¹ A
+        t = np.stack([_normal(weighted, part) for part in mka])
+        gt = g @ t
+        both = np.array([[_normal(one, inverse @ other) for other in mka] for one in mka])
+        s = (
+            np.einsum("incd,jndc->ij", mk, mk)
+            - 2 * np.einsum("uv,ijvu->ij", g, both)
+            + np.einsum("iuv,jvu->ij", gt, gt)
+        )
+        share = np.einsum("nc,incd,nd->i", pw, m, pw)
+        trace = np.einsum("incc->i", mk) - np.einsum("iuu->i", gt)
+        size = np.sqrt(np.diag(s))
+        if not np.all(size > 0) or np.linalg.cond(s / np.outer(size, size)) > 1e10:
             return None
         covariance = 2 * np.linalg.inv(s)
-        target = np.linalg.solve(s, share - np.einsum("iab,ba->i", wm, projected @ known))
+        target = np.linalg.solve(s, share - np.einsum("iuv,vu->i", gt, g @ known))
         if np.any(target <= 0):
             # Förstner's step alone would creep towards zero where that is the solution.
             target = factors * np.minimum(share / trace, np.where(target <= 0, 0.5, np.inf))
@@ -135,3 +151,9 @@ def _estimate(solution: Solution, groups: Array, factors: Array) -> VarianceComp
         if np.all(np.abs(step) <= STEP * sigma):
             return VarianceComponents(factors, sigma, factors * trace, True)
     return VarianceComponents(factors, sigma, factors * trace, False)
+
+
+def _normal(left: Array, right: Array) -> Array:
+    """Σ leftᵀ right over positions, (u, v), of (n, c, u) and (n, c, v)."""
+    flat = left.reshape(-1, left.shape[-1]).T
+    return np.asarray(flat @ right.reshape(-1, right.shape[-1]))

@@ -13,6 +13,7 @@ from accelstudy.adjustment.gauss_helmert import (
     Linearisation,
     adjust,
 )
+from accelstudy.adjustment.quality.solution import Solution, solve
 from accelstudy.approaches import Approach
 from accelstudy.leveling import roll_pitch
 from accelstudy.sensor import SensorModel
@@ -21,6 +22,9 @@ Array = NDArray[np.float64]
 
 NEAR_POLE = 0.1
 """Cosine of pitch below which an error of roll says nothing of the tilt."""
+REFITTED = 200
+"""Positions up to which each is left out by an adjustment of its own. Among more, one changes the
+parameters so little that the derivatives at the solution of all tell by how much."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +76,26 @@ def held_out(model: SensorModel, approach: Approach, observed: Observations) -> 
     n, c, u = observed.forces.shape[1], approach.n_conditions, len(problem.weights)
     if n * c + np.count_nonzero(problem.weights) - u < c:
         return None
+    if n > REFITTED:
+        x, misclosures, cofactors = _derived(solve(model, approach, observed))
+    else:
+        x, misclosures, cofactors = _refitted(problem, c)
+    angles = None
+    if observed.angles is not None and approach.uses_angles:
+        p = x[:, : model.n_parameters]
+        g = x[:, -1] if problem.weights.any() else np.full(n, problem.conditions.gravity)
+        # Each position with parameters of its own: sessions of one position.
+        hold = None if observed.hold is None else observed.hold.take(np.arange(n)[:, None])
+        f_b = model.correct(observed.forces[0][:, None], p, g, hold)[:, 0]
+        readings = observed.angles[0]
+        attitude = readings - model.errors_of_reading(readings[:, None], p, hold)[:, 0]
+        angles = _attitude_error(f_b, attitude)
+    return HeldOut(misclosures, cofactors, angles)
+
+
+def _refitted(problem: CalibrationProblem, c: int) -> tuple[Array, Array, Array]:
+    """Parameters (n, u), misclosures (n, c) and their cofactors, each without one position."""
+    n, u = problem.observations.shape[1], len(problem.weights)
     forces = np.repeat(np.moveaxis(problem.observations[..., :3], -1, 0), n, axis=1)
     initial = np.repeat(np.pad(problem.initial, ((0, 0), (0, c))), n, axis=0)
     result = adjust(
@@ -83,17 +107,23 @@ def held_out(model: SensorModel, approach: Approach, observed: Observations) -> 
         parameter_weights=np.pad(problem.weights, (0, c)),
         latent=np.concatenate([forces, np.eye(n)[None]]),
     )
-    misclosures = -result.parameters[:, u:]
-    angles = None
-    if observed.angles is not None and approach.uses_angles:
-        x = result.parameters[:, : model.n_parameters]
-        g = result.parameters[:, u - 1] if problem.weights.any() else problem.conditions.gravity
-        each = np.arange(n)
-        f_b = model.correct(observed.forces[0], x, g, observed.hold)[each, each]
-        readings = observed.angles[0]
-        attitude = readings - model.errors_of_reading(readings, x, observed.hold)
-        angles = _attitude_error(f_b, attitude[each, each])
-    return HeldOut(misclosures, result.cofactors[:, u:, u:], angles)
+    return result.parameters[:, :u], -result.parameters[:, u:], result.cofactors[:, u:, u:]
+
+
+def _derived(solution: Solution) -> tuple[Array, Array, Array]:
+    """Likewise, by the derivatives at the solution of all positions: dx = Q_xx Ãᵀ R_ii⁻¹ e_i."""
+    n, c = solution.misclosures.shape
+    root, rank = solution.root
+    root = np.where((rank == c)[:, None, None], root, np.nan)
+    scaled = root @ np.swapaxes(root, 1, 2) @ solution.errors[: n * c].reshape(n, c, 1)
+    design = solution.design[: n * c].reshape(n, c, -1)
+    steps = (np.swapaxes(design, 1, 2) @ scaled)[..., 0] @ solution.cofactors
+    scatter = solution.whitening @ root
+    return (
+        solution.parameters + steps,
+        (solution.whitening @ scaled)[..., 0],
+        scatter @ np.swapaxes(scatter, 1, 2),
+    )
 
 
 @dataclass(frozen=True)

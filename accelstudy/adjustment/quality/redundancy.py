@@ -41,7 +41,7 @@ def redundancy_numbers(solution: Solution) -> Redundancy:
     return Redundancy(
         observations=shares,
         positions=np.einsum("ncc->n", solution.blocks),
-        gravity=float(solution.projector[-1, -1]) if len(solution.prior[1]) else None,
+        gravity=float(1 - np.sum(solution.basis[-1] ** 2)) if len(solution.prior[1]) else None,
     )
 
 
@@ -98,8 +98,11 @@ def reliability(
     a = solution.design[: n * c].reshape(n, c, -1)
     on_parameters = solution.cofactors @ np.swapaxes(a, 1, 2) @ root
     slope = _leveling_slope(solution, max_tilt, attitudes)
-    on_leveling = np.einsum("kau,nuc->nakc", slope, on_parameters[:, : slope.shape[-1]])
-    largest = np.linalg.svd(on_leveling, compute_uv=False)[..., 0] / np.sqrt(attitudes)
+    # The largest singular value of the changes of all attitudes, by their sum of squares.
+    squares = np.einsum("kau,kav->auv", slope, slope) / attitudes
+    on_level = on_parameters[:, None, : slope.shape[-1]]
+    on_leveling = np.swapaxes(on_level, 2, 3) @ squares @ on_level
+    largest = np.sqrt(np.maximum(np.linalg.eigvalsh(on_leveling)[..., -1], 0.0))
 
     def scaled(values: NDArray[np.floating]) -> Array:
         return np.where((rank == c)[:, None], np.sqrt(lambda0) * values, np.inf)

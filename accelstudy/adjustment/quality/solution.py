@@ -3,11 +3,12 @@
 All of it follows from the adjustment linearised at its solution, A dx + B v + w = 0. Scaled to unit
 weight with B Q Bᵀ = L Lᵀ, the misclosures are e = L⁻¹ w = R ε with the projector
 
-    R = I − Ã (Ãᵀ Ã)⁻¹ Ãᵀ,   Ã = L⁻¹ A,   ε ~ N(0, σ0² I),
+    R = I − Ã (Ãᵀ Ã)⁻¹ Ãᵀ = I − U Uᵀ,   Ã = L⁻¹ A,   ε ~ N(0, σ0² I),
 
-so that eᵀe = Ω and tr R = r. A gross error shifts the conditions of its position by ∇ and e by
-R L⁻¹ ∇. In the gravity-based approach one condition covers the three forces of a position, which no
-test can tell apart: here positions are tested, not single observations.
+with an orthonormal basis U of the columns of Ã, so that eᵀe = Ω and tr R = r. R is never formed:
+what is needed of it are its blocks on the diagonal. A gross error shifts the conditions of its
+position by ∇ and e by R L⁻¹ ∇. In the gravity-based approach one condition covers the three forces
+of a position, which no test can tell apart: here positions are tested, not single observations.
 
 Sources: Baarda (1968), A testing procedure for use in geodetic networks; Pope (1976), The
 statistics of residuals and the detection of outliers; Koch (1999), Parameter estimation and
@@ -90,17 +91,16 @@ class Solution:
         return np.concatenate([e.ravel(), self.prior[1]])
 
     @cached_property
-    def projector(self) -> Array:
-        """R, (n c + k, n c + k)."""
-        a = self.design
-        basis, _ = np.linalg.qr(a / np.linalg.norm(a, axis=0))
-        return np.eye(len(a)) - basis @ basis.T
+    def basis(self) -> Array:
+        """Orthonormal basis U of the columns of Ã, (n c + k, u); R = I − U Uᵀ."""
+        return column_basis(self.design)
 
     @cached_property
     def blocks(self) -> Array:
         """R of each position, (n, c, c)."""
         n, c = self.misclosures.shape
-        return np.einsum("icid->icd", self.projector[: n * c, : n * c].reshape(n, c, n, c))
+        part = self.basis[: n * c].reshape(n, c, -1)
+        return np.eye(c) - part @ np.swapaxes(part, 1, 2)
 
     @cached_property
     def root(self) -> tuple[Array, NDArray[np.int_]]:
@@ -109,6 +109,11 @@ class Solution:
         seen = values > CONTROLLED
         scale = np.where(seen, 1 / np.sqrt(np.where(seen, values, 1.0)), 0.0)
         return vectors * scale[:, None], np.count_nonzero(seen, axis=1)
+
+
+def column_basis(design: Array) -> Array:
+    """Orthonormal basis of the columns of a design (m, u) of full rank, (m, u)."""
+    return np.asarray(np.linalg.qr(design / np.linalg.norm(design, axis=0))[0])
 
 
 def whitening_of(b: Array, variances: Array) -> Array:
