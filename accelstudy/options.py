@@ -41,6 +41,12 @@ class Name(click.ParamType):  # type: ignore[type-arg]  # generic from click 8.5
 
 ANGLE_UNIT = Name("angle unit", lambda: ANGLE_UNITS)
 
+force_option = click.option(
+    "--force",
+    is_flag=True,
+    help="Replace files of the same names, where there are any; never an input.",
+)
+
 
 def angle_unit_option(command: Command) -> Command:
     """Add --angle-unit to a command that shows angles."""

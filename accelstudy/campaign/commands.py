@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from accelstudy.options import force_option
+
 PATH = click.Path(path_type=Path)
 
 
@@ -14,21 +16,22 @@ PATH = click.Path(path_type=Path)
 @click.option("--model", default="bias-scale-nonorthogonality", show_default=True)
 @click.option("--approach", default="gravity", show_default=True)
 @click.option("--out", type=PATH, required=True, help="folder to write to")
-def calibrate_command(campaign: Path, model: str, approach: str, out: Path) -> None:
+@force_option
+def calibrate_command(campaign: Path, model: str, approach: str, out: Path, force: bool) -> None:
     """Calibrate a measured CAMPAIGN (a folder) and report on it."""
     from accelstudy.approaches import get_approach
     from accelstudy.campaign.fit import fit_campaign
     from accelstudy.campaign.format import read_campaign
     from accelstudy.campaign.output import write_calibration
     from accelstudy.models import get_model
-    from accelstudy.study.provenance import check_writable
+    from accelstudy.outputs import CALIBRATION, result_folder
 
     chosen = get_model(model), get_approach(approach)
-    check_writable(out)
-    measured = read_campaign(campaign)
+    with result_folder(out, CALIBRATION, [campaign], force) as folder:
+        measured = read_campaign(campaign)
+        content = write_calibration(fit_campaign(measured, *chosen), folder)
     for warning in measured.warnings:
         click.echo(f"warning: {warning}", err=True)
-    content = write_calibration(fit_campaign(measured, *chosen), out)
     for entry in content["parameters"]:
         shown = entry["shown"]
         sigma = "unknown" if shown["sigma"] is None else f"{shown['sigma']:.4f}"
@@ -65,8 +68,9 @@ def check_sigmas_command(
 @click.option("--out", type=PATH, required=True, help="CSV or Parquet file to write")
 @click.option("--columns", default="fx,fy,fz", show_default=True, help="names of the three columns")
 @click.option("--sigma", type=float, help="noise of a reading, m/s²; that of a position by default")
+@force_option
 def apply_command(
-    calibration: Path, log: Path, out: Path, columns: str, sigma: float | None
+    calibration: Path, log: Path, out: Path, columns: str, sigma: float | None, force: bool
 ) -> None:
     """Apply a CALIBRATION (calibration.json) to a LOG (CSV or Parquet) and level with it.
 
@@ -74,8 +78,10 @@ def apply_command(
     """
     from accelstudy.campaign.applying import read_calibration
     from accelstudy.campaign.log_leveling import level_log
+    from accelstudy.outputs import new_file
 
-    level_log(read_calibration(calibration), log, out, columns.split(","), sigma)
+    with new_file(out, [calibration, log], force) as path:
+        level_log(read_calibration(calibration), log, path, columns.split(","), sigma)
 
 
 @click.command("export")

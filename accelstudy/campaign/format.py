@@ -28,9 +28,9 @@ from accelstudy.campaign.position_files import Columns, read_positions
 from accelstudy.campaign.session import Campaign
 from accelstudy.campaign.wording import one_line
 from accelstudy.errors import InputError
+from accelstudy.outputs import whole_file
 from accelstudy.study.config.errors import first_error
 from accelstudy.study.config.layers import overlay, read_layer
-from accelstudy.study.tables import whole_file
 from accelstudy.units import MGON
 
 __all__ = ["Campaign", "read_campaign", "write_campaign"]

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from accelstudy.errors import InputError
+from accelstudy.options import force_option
 
 if TYPE_CHECKING:
-    from accelstudy.campaign.importing import ImportSettings
+    from accelstudy.campaign.importing import ImportReport
 
 _PATH = click.Path(path_type=Path)
 
@@ -30,12 +31,14 @@ _PATH = click.Path(path_type=Path)
 @click.option("--threshold", type=float, help="sd of a window at rest, m/s², instead of chosen.")
 @click.option("--means", is_flag=True, help="LOG is a table of means already.")
 @click.option("--figure/--no-figure", default=True, help="Draw the log with its holds.")
+@force_option
 def import_command(
     log: Path,
     out: Path,
     settings_path: Path | None,
     means: bool,
     figure: bool,
+    force: bool,
     **options: Any,
 ) -> None:
     """Make a campaign of a raw LOG: find its static holds and how well their means are known.
@@ -43,9 +46,14 @@ def import_command(
     LOG is text (CSV or columns), MATLAB or Parquet. Without --threshold the noise of the log
     itself says what is at rest; segmentation.png in the folder shows the outcome.
     """
-    from accelstudy.campaign.importing import read_settings
+    from accelstudy.campaign.importing import import_to, read_settings
+    from accelstudy.outputs import CAMPAIGN, result_folder
 
-    _import(log, read_settings(settings_path, _given(means=means or None, **options)), out, figure)
+    settings = read_settings(settings_path, _given(means=means or None, **options))
+    inputs = [log, *([] if settings_path is None else [settings_path])]
+    with result_folder(out, CAMPAIGN, inputs, force) as campaign:
+        _, report = import_to(campaign, log, settings, figure)
+    _show(report, out, figure)
 
 
 @click.command("public")
@@ -58,12 +66,15 @@ def import_command(
     show_default=True,
     help="Where the file is, in any subfolder, or is downloaded to.",
 )
-def public_command(name: str | None, out: Path | None, folder: Path) -> None:
+@force_option
+def public_command(name: str | None, out: Path | None, folder: Path, force: bool) -> None:
     """Make a campaign of the public data NAME; without NAME, list what there is.
 
     A download is checked by its sha256, and goes on where an earlier one broke off.
     """
+    from accelstudy.campaign.importing import import_to
     from accelstudy.campaign.public import import_settings, public_data, public_file
+    from accelstudy.outputs import CAMPAIGN, result_folder
 
     if name is None:
         for known, entry in public_data().items():
@@ -72,15 +83,12 @@ def public_command(name: str | None, out: Path | None, folder: Path) -> None:
     settings = import_settings(name)
     if out is None:
         raise InputError("--out: give the folder of the campaign")
-    _import(public_file(name, folder), settings, out)
+    with result_folder(out, CAMPAIGN, [folder], force) as campaign:
+        _, report = import_to(campaign, public_file(name, folder), settings)
+    _show(report, out)
 
 
-def _import(log: Path, settings: ImportSettings, out: Path, figure: bool = True) -> None:
-    from accelstudy.campaign.importing import import_to
-    from accelstudy.study.provenance import check_writable
-
-    check_writable(out)
-    _, report = import_to(out, log, settings, figure)
+def _show(report: ImportReport, out: Path, figure: bool = True) -> None:
     for line in report.lines():
         click.echo(line)
     for warning in report.warnings:

@@ -19,7 +19,7 @@ import pyarrow.parquet as pq
 from accelstudy.campaign.log_files import CHUNK, open_parquet
 from accelstudy.campaign.wording import one_line
 from accelstudy.errors import InputError
-from accelstudy.study.tables import whole_file
+from accelstudy.outputs import whole_file
 
 
 def read_chunks(path: str | Path, chunk_size: int = CHUNK) -> Iterator[pa.Table]:

@@ -16,8 +16,8 @@ from accelstudy.campaign.figures import correlation_figure, residual_figure
 from accelstudy.campaign.fit import CampaignFit
 from accelstudy.figures.saving import save_all
 from accelstudy.figures.style import STYLE, unit_label
+from accelstudy.outputs import whole_file
 from accelstudy.study.report import number
-from accelstudy.study.tables import whole_file
 
 LISTED = 200
 """Positions up to which the page lists all of them; of more, those that fit worst."""

@@ -13,8 +13,9 @@ from jinja2 import Environment, PackageLoader
 
 from accelstudy.campaign.assessment import BLIND
 from accelstudy.campaign.batch import STATUS
+from accelstudy.outputs import whole_file
 from accelstudy.study.report import number
-from accelstudy.study.tables import whole_file, write_table
+from accelstudy.study.tables import write_table
 from accelstudy.units import MGON
 
 CAMPAIGN_COLUMNS = {

@@ -18,10 +18,10 @@ from pydantic import Field, ValidationError
 
 from accelstudy.campaign.importing import ImportSettings
 from accelstudy.errors import InputError, UnknownNameError
+from accelstudy.outputs import whole_file
 from accelstudy.study.config.errors import first_error
 from accelstudy.study.config.layers import read_layer
 from accelstudy.study.config.schema import Block
-from accelstudy.study.tables import whole_file
 
 REGISTRY = Path(__file__).with_name("public_data.yaml")
 TIMEOUT = 30.0

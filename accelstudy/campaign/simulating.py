@@ -20,10 +20,10 @@ from accelstudy.gross_errors import GrossError, get_gross_error
 from accelstudy.hold_plan import PROVIDES, HoldPlan
 from accelstudy.models import compose, get_model
 from accelstudy.noise_effects import NoiseEffect, get_noise_effect
+from accelstudy.outputs import whole_file
 from accelstudy.registry import Shaped
 from accelstudy.schemes import get_scheme
 from accelstudy.simulation import Noise, session
-from accelstudy.study.tables import whole_file
 from accelstudy.units import MGON, STANDARD_GRAVITY
 
 Array = NDArray[np.float64]

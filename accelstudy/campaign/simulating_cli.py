@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
 import click
 
 from accelstudy.errors import InputError
+from accelstudy.options import force_option
 
 _PATH = click.Path(path_type=Path)
 
@@ -44,6 +46,7 @@ _PATH = click.Path(path_type=Path)
 @click.option("--vibration", help="Lowest and highest rms, m/s², as 0:1.")
 @click.option("--yaw", default="none", show_default=True, help="none or random.")
 @click.option("--samples-per-hold", "n_samples", type=int, help="Adds n_samples and sds.")
+@force_option
 def simulate_campaign_command(
     out: Path,
     truth_path: Path | None,
@@ -54,6 +57,7 @@ def simulate_campaign_command(
     no_time: bool,
     temperature: str | None,
     vibration: str | None,
+    force: bool,
     **options: Any,
 ) -> None:
     """Simulate a campaign with effects, noise and gross errors of your choice.
@@ -63,7 +67,7 @@ def simulate_campaign_command(
     """
     from accelstudy.campaign.format import write_campaign
     from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign, write_truth
-    from accelstudy.study.provenance import check_writable
+    from accelstudy.outputs import CAMPAIGN, new_file, result_folder
     from accelstudy.units import MGON
 
     settings = CampaignSettings(
@@ -75,13 +79,15 @@ def simulate_campaign_command(
         vibration=_range("vibration", vibration),
         **options,
     )
-    campaign, truth = simulate_campaign(settings)
-    check_writable(out)
-    if truth_path is not None:
-        check_writable(truth_path.parent)
-    write_campaign(campaign, out, plausible=not settings.gross_errors)
-    if truth_path is not None:
-        write_truth(truth, truth_path)
+    # The truth enters first and is moved last: it may be meant for a folder that is made here.
+    with (
+        nullcontext() if truth_path is None else new_file(truth_path, force=force) as truth_file,
+        result_folder(out, CAMPAIGN, force=force) as folder,
+    ):
+        campaign, truth = simulate_campaign(settings)
+        write_campaign(campaign, folder, plausible=not settings.gross_errors)
+        if truth_file is not None:
+            write_truth(truth, truth_file)
     click.echo(f"campaign: {out} ({campaign.n_positions} positions)")
 
 

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from accelstudy.options import force_option
+
 _PATH = click.Path(path_type=Path)
 
 
@@ -22,8 +24,15 @@ _PATH = click.Path(path_type=Path)
     type=click.IntRange(min=100),
     help="Sessions simulated with the old and with the new model.",
 )
+@force_option
 def diagnose_command(
-    campaign: Path, out: Path, model: str, approach: str | None, seed: int, replicates: int
+    campaign: Path,
+    out: Path,
+    model: str,
+    approach: str | None,
+    seed: int,
+    replicates: int,
+    force: bool,
 ) -> None:
     """Find what a sensor model lacks to explain a measured CAMPAIGN (a folder).
 
@@ -33,7 +42,7 @@ def diagnose_command(
     from accelstudy.diagnosis.output import diagnose_folder
     from accelstudy.diagnosis.wording import verdict_lines
 
-    diagnosis = diagnose_folder(campaign, out, model, approach, seed, replicates)
+    diagnosis = diagnose_folder(campaign, out, model, approach, seed, replicates, force)
     for warning in diagnosis.campaign.warnings:
         click.echo(f"warning: {warning}", err=True)
     for line in verdict_lines(diagnosis):

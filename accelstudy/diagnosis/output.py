@@ -16,8 +16,7 @@ from accelstudy.diagnosis.model_file import study_overlay
 from accelstudy.diagnosis.pipeline import Diagnosis, diagnose
 from accelstudy.diagnosis.positions import positions_table
 from accelstudy.models import get_model
-from accelstudy.study.provenance import check_writable
-from accelstudy.study.tables import whole_file
+from accelstudy.outputs import DIAGNOSIS, result_folder, whole_file
 
 
 def diagnose_folder(
@@ -27,6 +26,7 @@ def diagnose_folder(
     approach: str | None = None,
     seed: int = 1,
     replicates: int = REPLICATES,
+    force: bool = False,
 ) -> Diagnosis:
     """Diagnose a campaign folder, close the loop, and write all of it.
 
@@ -36,18 +36,19 @@ def diagnose_folder(
     model, approach : str, names; robot-aided by default if the campaign has a robot
     seed : int
     replicates : int, sessions simulated with the old and with the new model
+    force : bool, as in `accelstudy.outputs.result_folder`
 
     Raises
     ------
     InputError
-        If the input cannot be used; nothing is written then.
+        If the input cannot be used, or `out` not be written; nothing is written then.
     """
     chosen = get_model(model), None if approach is None else get_approach(approach)
-    check_writable(out)
-    # A unit or an axis that is wrong is for the diagnosis to find, not for the reader to refuse.
-    measured = read_campaign(campaign, plausible=False)
-    diagnosis = diagnose(measured, *chosen, seed=seed)
-    write_diagnosis(diagnosis, out, loop=close_loop(diagnosis, replicates, seed))
+    with result_folder(out, DIAGNOSIS, [campaign], force) as folder:
+        # A unit or an axis that is wrong is for the diagnosis to find, not for the reader.
+        measured = read_campaign(campaign, plausible=False)
+        diagnosis = diagnose(measured, *chosen, seed=seed)
+        write_diagnosis(diagnosis, folder, loop=close_loop(diagnosis, replicates, seed))
     return diagnosis
 
 

@@ -17,8 +17,8 @@ from accelstudy.diagnosis.search import LEVEL_EFFECTS, SURE
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.figures.saving import save_all
 from accelstudy.figures.style import STYLE
+from accelstudy.outputs import whole_file
 from accelstudy.study.report import number
-from accelstudy.study.tables import whole_file
 
 
 def write_report(

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from accelstudy.figures.style import STYLE
-from accelstudy.study.tables import whole_file
+from accelstudy.outputs import whole_file
 
 PAGE_DPI = 150
 """Of the figures of a page, which shows them as SVG."""

@@ -10,10 +10,11 @@ import numpy as np
 
 from accelstudy.errors import InputError
 from accelstudy.models import get_model
+from accelstudy.outputs import whole_file
 from accelstudy.sensitivity import leveling_sensitivity
 from accelstudy.study.cells import study_cells
 from accelstudy.study.config import StudyConfig
-from accelstudy.study.tables import read_estimates, read_table, whole_file, write_table
+from accelstudy.study.tables import read_estimates, read_table, write_table
 from accelstudy.units import to_si
 
 

@@ -16,6 +16,7 @@ import pyarrow.parquet as pq
 
 from accelstudy import __version__
 from accelstudy.errors import InputError
+from accelstudy.outputs import whole_file
 
 METADATA_KEY = b"accelstudy"
 
@@ -50,22 +51,6 @@ def origin(provenance: Mapping[str, Any]) -> dict[str, Any]:
         "version": __version__,
         "commit": git_commit(),
     }
-
-
-@contextmanager
-def whole_file(path: str | Path) -> Iterator[Path]:
-    """Give a temporary name beside `path`, and rename it only if all went well.
-
-    The name is always the same, so that what a killed job leaves is overwritten by the next one.
-    """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.part")
-    try:
-        yield temporary
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 @contextmanager

@@ -9,5 +9,6 @@ with logged(snakemake):
         Task.model_validate(snakemake.params.task),
         snakemake.output[0],
         snakemake.input.get("record"),
+        snakemake.log[0],
     )
     logging.info("%s", error or "calibrated")
