@@ -16,12 +16,52 @@ from accelstudy.campaign.importing_cli import import_command, public_command
 from accelstudy.campaign.simulating_cli import simulate_campaign_command
 from accelstudy.diagnosis.command import diagnose_command
 from accelstudy.errors import InputError
-from accelstudy.options import ANGLE_UNIT, angle_unit_option
+from accelstudy.options import (
+    ANGLE_UNIT,
+    PATH,
+    SCHEME,
+    angle_unit_option,
+    approach_option,
+    example,
+    model_option,
+)
 from accelstudy.units import angles_in
+
+SECTIONS = {
+    "Campaigns, measured or simulated": (
+        "import",
+        "public",
+        "simulate-campaign",
+        "calibrate",
+        "diagnose",
+        "check-sigmas",
+        "apply",
+        "export",
+    ),
+    "What there is to choose from": ("models", "effects", "schemes", "scheme"),
+    "Studies": ("cells", "claims", "config-schema"),
+}
+"""Commands in the order of use."""
 
 
 class Commands(click.Group):
-    """Commands that end bad input with one line and exit status 2."""
+    """Commands in sections, that end bad input with one line and exit status 2."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names of all commands, in the order of use."""
+        return [name for names in SECTIONS.values() for name in names]
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the sections of the help."""
+        width = max(map(len, self.commands))
+        for title, names in SECTIONS.items():
+            with formatter.section(title):
+                formatter.write_dl(
+                    [
+                        (name.ljust(width), self.commands[name].get_short_help_str(74 - width))
+                        for name in names
+                    ]
+                )
 
     def invoke(self, ctx: click.Context) -> object:
         """Run the chosen command."""
@@ -54,13 +94,13 @@ def main(ctx: click.Context, angle_unit: str) -> None:
     ctx.with_resource(angles_in(angle_unit))
 
 
-@main.command()
-@click.option("--model", default="bias-scale-nonorthogonality", show_default=True)
-@click.option("--approach", default="gravity", show_default=True)
-@click.argument("names", nargs=-1)
+@main.command(epilog=example("accelstudy schemes --approach robot fibonacci-24 mclaren-24"))
+@model_option
+@approach_option("gravity")
+@click.argument("names", nargs=-1, type=SCHEME)
 @angle_unit_option
 def schemes(model: str, approach: str, names: tuple[str, ...]) -> None:
-    """List position schemes and what they determine with a model and an approach.
+    """List position schemes and what they can determine.
 
     NAMES chooses schemes (fibonacci-60, random-20-7, ...); all named ones by default.
     """
@@ -100,11 +140,14 @@ def schemes(model: str, approach: str, names: tuple[str, ...]) -> None:
     )
 
 
-@main.command()
-@click.argument("name")
+@main.command(epilog=example("accelstudy scheme fibonacci-24"))
+@click.argument("name", type=SCHEME)
 @angle_unit_option
 def scheme(name: str) -> None:
-    """Print the directions of a scheme (gravity in the body frame), with its source."""
+    """Print the directions of a scheme, with its source.
+
+    They are those of gravity in the body frame, as a CSV table.
+    """
     import numpy as np
     import pandas as pd
 
@@ -124,9 +167,9 @@ def scheme(name: str) -> None:
     )
 
 
-@main.command()
+@main.command(epilog=example("accelstudy models"))
 def models() -> None:
-    """List sensor models and their parameters, and the presets of the paper's Table 1."""
+    """List sensor models, and the presets of Table 1."""
     from accelstudy.models import MODELS, PRESETS, get_model
 
     for name in MODELS:
@@ -137,14 +180,14 @@ def models() -> None:
         click.echo(f"  {preset.source:28s} {preset.model} in {preset.scheme}")
 
 
-@main.command()
-@click.option("--campaign", type=click.Path(path_type=Path), help="Folder of a campaign.")
-@click.option("--scheme", help="Name of a scheme, instead of a campaign.")
-@click.option("--model", default="bias-scale-nonorthogonality", show_default=True)
-@click.option("--approach", help="gravity or robot.  [default: robot, if there is one]")
+@main.command(epilog=example("accelstudy effects", "accelstudy effects --campaign my-campaign"))
+@click.option("--campaign", type=PATH, help="Folder of a campaign.")
+@click.option("--scheme", type=SCHEME, help="Name of a scheme, instead of a campaign.")
+@model_option
+@approach_option(None)
 @angle_unit_option
 def effects(campaign: Path | None, scheme: str | None, model: str, approach: str | None) -> None:
-    """List effects, noise effects and gross errors; or what a campaign can show of them.
+    """List all effects, or what a campaign can show of them.
 
     Models are composed of effects; parameters are in the units shown, settings in SI. With a
     campaign or a scheme: which effects it can show beside the model, how large they must be to be
@@ -182,10 +225,10 @@ def effects(campaign: Path | None, scheme: str | None, model: str, approach: str
     )
 
 
-@main.command()
-@click.argument("configs", nargs=-1, required=True, type=click.Path(path_type=Path))
+@main.command(epilog=example("accelstudy cells config/config.yaml config/sweeps/positions.yaml"))
+@click.argument("configs", nargs=-1, required=True, type=PATH)
 def cells(configs: tuple[Path, ...]) -> None:
-    """List the cells of a study, and which of them cannot be estimated.
+    """List the cells of a study, and which cannot be estimated.
 
     CONFIGS are YAML files; later ones overlay earlier ones, as with --configfile.
     """
@@ -202,18 +245,24 @@ def cells(configs: tuple[Path, ...]) -> None:
         click.echo(f"{cell.name}: {state}")
 
 
-@main.command()
+@main.command(epilog=example("accelstudy config-schema"))
 def config_schema() -> None:
-    """Print the JSON schema of configurations, kept in workflow/schemas/config.schema.json."""
+    """Print the JSON schema of configurations.
+
+    It is kept in workflow/schemas/config.schema.json.
+    """
     from accelstudy.study.config import config_schema as schema
 
     click.echo(json.dumps(schema(), indent=2, ensure_ascii=False))
 
 
-@main.command()
-@click.argument("results", type=click.Path(path_type=Path))
+@main.command(epilog=example("accelstudy claims results/paper"))
+@click.argument("results", type=PATH)
 def claims(results: Path) -> None:
-    """Print the verdicts on the paper's claims, from a folder of results, as Markdown."""
+    """Print the verdicts on the paper's claims as Markdown.
+
+    RESULTS is the folder of a study, such as results/paper.
+    """
     from accelstudy.study.report import claims_markdown
     from accelstudy.study.tables import read_table
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from functools import wraps
+from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -11,35 +12,65 @@ import click
 from click.shell_completion import CompletionItem
 
 from accelstudy.progress import feedback
-from accelstudy.units import ANGLE_UNITS, angles_in
+from accelstudy.units import angles_in
 
 PATH = click.Path(path_type=Path)
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 
 class Name(click.ParamType):  # type: ignore[type-arg]  # generic from click 8.5 on
-    """A name that the shell completes; whether there is such a thing, the registry says.
+    """A name that the shell completes; whether there is such a thing, its registry says.
 
     Parameters
     ----------
     what : str
         What is named.
-    known : callable
-        Gives the names that there are; called when the shell asks only.
+    module, names : str
+        Where the names are: a collection, or a function that returns one. It is imported when the
+        shell asks, and not to run a command.
     """
 
-    def __init__(self, what: str, known: Callable[[], Iterable[str]]) -> None:
+    def __init__(self, what: str, module: str, names: str) -> None:
         self.name = what
-        self.known = known
+        self.module, self.names = module, names
 
     def shell_complete(
         self, ctx: click.Context, param: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
         """Names that begin with what was typed."""
-        return [CompletionItem(name) for name in self.known() if name.startswith(incomplete)]
+        names = getattr(import_module(self.module), self.names)
+        known = names() if callable(names) else names
+        return [CompletionItem(name) for name in known if name.startswith(incomplete)]
 
 
-ANGLE_UNIT = Name("angle unit", lambda: ANGLE_UNITS)
+ANGLE_UNIT = Name("angle unit", "accelstudy.units", "ANGLE_UNITS")
+APPROACH = Name("approach", "accelstudy.approaches", "approach_names")
+EFFECT = Name("effect", "accelstudy.effects", "effect_names")
+GROSS_ERROR = Name("gross error", "accelstudy.gross_errors", "gross_error_names")
+MODEL = Name("model", "accelstudy.models", "MODELS")
+NOISE_EFFECT = Name("noise effect", "accelstudy.noise_effects", "noise_effect_names")
+SCHEME = Name("scheme", "accelstudy.schemes", "scheme_names")
+
+model_option = click.option(
+    "--model",
+    type=MODEL,
+    default="bias-scale-nonorthogonality",
+    show_default=True,
+    help="Sensor model; `accelstudy models` lists them.",
+)
+
+
+def approach_option(default: str | None) -> Callable[[Command], Command]:
+    """Add --approach; without a default the command takes the robot if the campaign has one."""
+    words = "" if default else "  [default: robot, if the campaign has its angles]"
+    return click.option(
+        "--approach",
+        type=APPROACH,
+        default=default,
+        show_default=bool(default),
+        help=f"One of gravity and robot, which has the robot's angles, too.{words}",
+    )
+
 
 force_option = click.option(
     "--force",
@@ -55,7 +86,7 @@ def angle_unit_option(command: Command) -> Command:
         "--angle-unit",
         type=ANGLE_UNIT,
         metavar="[gon|deg]",
-        help="Unit of angles, gon or deg.  [default: gon, or ACCELSTUDY_ANGLE_UNIT]",
+        help="Unit of the angles that are shown.  [default: gon, or ACCELSTUDY_ANGLE_UNIT]",
     )
     @wraps(command)
     def within(*args: Any, angle_unit: str | None, **kwargs: Any) -> Any:
@@ -75,3 +106,8 @@ def quiet_option(command: Command) -> Command:
             return command(*args, **kwargs)
 
     return within  # type: ignore[return-value]
+
+
+def example(*commands: str) -> str:
+    """Epilog of a help text: commands that run as they stand, one after the other."""
+    return "\n".join(["\b", "Example:", *(f"  {command}" for command in commands)])

@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 
+import click
 import pandas as pd
 import pytest
 import yaml
@@ -38,9 +39,45 @@ def test_version():
 
 def test_help_names_every_command():
     text = output("--help")
-    for name in main.commands:
+    assert "..." not in text.partition("Campaigns")[2]  # what each does fits into its line
+    for name, command in main.commands.items():
         assert re.search(rf"^  {name} ", text, re.MULTILINE)
         assert "Usage:" in output(name, "--help")
+        for option in command.params:
+            if isinstance(option, click.Option):
+                assert re.match(r"[A-Z'].*[.\]]$", option.help or ""), (name, option.name)
+
+
+def completed(words, shell="bash"):
+    """What the shell offers for the last of `words`."""
+    *_, last = words = ["accelstudy", *words]
+    environment = {"_ACCELSTUDY_COMPLETE": f"{shell}_complete", "COMP_WORDS": " ".join(words)}
+    number = last if shell == "fish" else str(len(words) - 1)
+    result = CliRunner().invoke(
+        main, env={**environment, "COMP_CWORD": number}, prog_name="accelstudy"
+    )
+    return [line.split(",", 1)[-1].split("\t")[0] for line in result.stdout.splitlines()]
+
+
+def test_the_shell_completes_commands_and_names():
+    assert completed(["cali"]) == completed(["cali"], "fish") == ["calibrate"]
+    assert completed(["calibrate", "--ang"]) == ["--angle-unit"]
+    assert completed(["calibrate", "--angle-unit", "d"]) == ["deg"]
+    assert completed(["calibrate", "--model", "bias-scale"]) == [*MODELS]
+    assert completed(["schemes", "--approach", "r"]) == ["robot"]
+    assert completed(["scheme", "mcl"]) == ["mclaren-24"]
+    assert completed(["simulate-campaign", "--effect", "warm"]) == ["warm_up"]
+    assert completed(["simulate-campaign", "--noise-effect", "heavy"]) == ["heavy_tails"]
+    assert completed(["simulate-campaign", "--gross", "row"]) == ["row_order"]
+
+
+def test_help_imports_nothing_that_takes_long():
+    code = (
+        "import sys\nfrom accelstudy.cli import main\nmain(['--help'], standalone_mode=False)\n"
+        "print([m for m in ('scipy', 'pandas', 'sympy', 'matplotlib') if m in sys.modules])"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.splitlines()[-1] == "[]"
 
 
 # --- schemes -------------------------------------------------------------------------------------

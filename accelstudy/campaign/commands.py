@@ -6,25 +6,35 @@ from pathlib import Path
 
 import click
 
-from accelstudy.options import force_option
+from accelstudy.options import (
+    PATH,
+    angle_unit_option,
+    approach_option,
+    example,
+    force_option,
+    model_option,
+    quiet_option,
+)
+from accelstudy.progress import say
 
-PATH = click.Path(path_type=Path)
 
-
-@click.command("calibrate")
+@click.command("calibrate", epilog=example("accelstudy calibrate my-campaign --out calibrated"))
 @click.argument("campaign", type=PATH)
-@click.option("--model", default="bias-scale-nonorthogonality", show_default=True)
-@click.option("--approach", default="gravity", show_default=True)
-@click.option("--out", type=PATH, required=True, help="folder to write to")
+@click.option("--out", type=PATH, required=True, help="Folder to write to.")
+@model_option
+@approach_option("gravity")
 @force_option
+@angle_unit_option
+@quiet_option
 def calibrate_command(campaign: Path, model: str, approach: str, out: Path, force: bool) -> None:
-    """Calibrate a measured CAMPAIGN (a folder) and report on it."""
+    """Calibrate a CAMPAIGN (a folder) and report on it."""
     from accelstudy.approaches import get_approach
     from accelstudy.campaign.fit import fit_campaign
     from accelstudy.campaign.format import read_campaign
     from accelstudy.campaign.output import write_calibration
     from accelstudy.models import get_model
     from accelstudy.outputs import CALIBRATION, result_folder
+    from accelstudy.units import display_unit, to_display
 
     chosen = get_model(model), get_approach(approach)
     with result_folder(out, CALIBRATION, [campaign], force) as folder:
@@ -33,23 +43,44 @@ def calibrate_command(campaign: Path, model: str, approach: str, out: Path, forc
     for warning in measured.warnings:
         click.echo(f"warning: {warning}", err=True)
     for entry in content["parameters"]:
-        shown = entry["shown"]
-        sigma = "unknown" if shown["sigma"] is None else f"{shown['sigma']:.4f}"
-        click.echo(f"{entry['name']:>9} = {shown['value']:12.4f} ± {sigma} {shown['unit']}")
-    click.echo(content["quality"]["verdict"])
-    click.echo(f"report: {out / 'report.html'}")
+        unit = entry["unit"]
+        known = entry["sigma"] is not None
+        sigma = f"{to_display(entry['sigma'], unit):.4f}" if known else "unknown"
+        value = f"{to_display(entry['value'], unit):12.4f}"
+        say(f"{entry['name']:>9} = {value} ± {sigma} {display_unit(unit)}")
+    say(content["quality"]["verdict"])
+    say(f"report: {out / 'report.html'}")
 
 
-@click.command("check-sigmas")
+@click.command(
+    "check-sigmas", epilog=example("accelstudy check-sigmas my-campaign --replicates 500")
+)
 @click.argument("campaign", type=PATH)
-@click.option("--model", default="bias-scale-nonorthogonality", show_default=True)
-@click.option("--approach", default="gravity", show_default=True)
-@click.option("--replicates", default=2000, show_default=True, type=click.IntRange(min=2))
-@click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0))
+@model_option
+@approach_option("gravity")
+@click.option(
+    "--replicates",
+    default=2000,
+    show_default=True,
+    type=click.IntRange(min=2),
+    help="Simulated campaigns.",
+)
+@click.option(
+    "--seed",
+    default=1,
+    show_default=True,
+    type=click.IntRange(min=0),
+    help="Of all random numbers.",
+)
+@angle_unit_option
+@quiet_option
 def check_sigmas_command(
     campaign: Path, model: str, approach: str, replicates: int, seed: int
 ) -> None:
-    """Check by simulation the sigmas that the calibration of a CAMPAIGN claims."""
+    """Check the sigmas of a calibration by simulation.
+
+    CAMPAIGN is the folder of the campaign that is calibrated.
+    """
     from accelstudy.approaches import get_approach
     from accelstudy.campaign.fit import fit_campaign
     from accelstudy.campaign.format import read_campaign
@@ -59,22 +90,32 @@ def check_sigmas_command(
     fit = fit_campaign(read_campaign(campaign), get_model(model), get_approach(approach))
     table = check_sigmas(fit, replicates, seed)
     click.echo(table.to_string(index=False, float_format=lambda value: f"{value:.4g}"))
-    click.echo("sigma: as the adjustment claims it; ratio: sigma / sd_empirical.")
+    say("sigma: as the adjustment claims it; ratio: sigma / sd_empirical.")
 
 
-@click.command("apply")
+@click.command(
+    "apply",
+    epilog=example("accelstudy apply calibrated/calibration.json log.csv --out leveled.csv"),
+)
 @click.argument("calibration", type=PATH)
 @click.argument("log", type=PATH)
-@click.option("--out", type=PATH, required=True, help="CSV or Parquet file to write")
-@click.option("--columns", default="fx,fy,fz", show_default=True, help="names of the three columns")
-@click.option("--sigma", type=float, help="noise of a reading, m/s²; that of a position by default")
+@click.option("--out", type=PATH, required=True, help="CSV or Parquet file to write.")
+@click.option(
+    "--columns", default="fx,fy,fz", show_default=True, help="Names of the three columns."
+)
+@click.option(
+    "--sigma", type=float, help="Noise of a reading, m/s².  [default: that of a position]"
+)
 @force_option
+@angle_unit_option
+@quiet_option
 def apply_command(
     calibration: Path, log: Path, out: Path, columns: str, sigma: float | None, force: bool
 ) -> None:
-    """Apply a CALIBRATION (calibration.json) to a LOG (CSV or Parquet) and level with it.
+    """Apply a CALIBRATION to a LOG and level with it.
 
-    The log is in the unit of the campaign. Adds the calibrated force, roll and pitch with sigmas.
+    CALIBRATION is a calibration.json, LOG is CSV or Parquet in the unit of the campaign. Adds the
+    calibrated force, roll and pitch with sigmas.
     """
     from accelstudy.campaign.applying import read_calibration
     from accelstudy.campaign.log_leveling import level_log
@@ -84,11 +125,14 @@ def apply_command(
         level_log(read_calibration(calibration), log, path, columns.split(","), sigma)
 
 
-@click.command("export")
+@click.command("export", epilog=example("accelstudy export calibrated/calibration.json --form c"))
 @click.argument("calibration", type=PATH)
-@click.option("--form", default="json", show_default=True, help="json, yaml, c or matrix")
+@click.option("--form", default="json", show_default=True, help="One of json, yaml, c and matrix.")
 def export_command(calibration: Path, form: str) -> None:
-    """Print a CALIBRATION (calibration.json) in a form that a device or program takes."""
+    """Print a CALIBRATION in a form that a device takes.
+
+    CALIBRATION is a calibration.json.
+    """
     from accelstudy.campaign.applying import read_calibration
     from accelstudy.campaign.export import export
 

@@ -8,30 +8,35 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from accelstudy.errors import InputError
-from accelstudy.options import force_option
+from accelstudy.options import PATH, example, force_option, quiet_option
+from accelstudy.progress import say
 
 if TYPE_CHECKING:
     from accelstudy.campaign.importing import ImportReport
 
-_PATH = click.Path(path_type=Path)
 
-
-@click.command("import")
-@click.argument("log", type=_PATH)
-@click.option("--out", type=_PATH, required=True, help="Folder of the campaign.")
-@click.option("--settings", "settings_path", type=_PATH, help="YAML file; options overlay it.")
+@click.command(
+    "import",
+    epilog=example(
+        "accelstudy import log.csv --out my-campaign --rate 100 --columns fx=0,fy=1,fz=2"
+    ),
+)
+@click.argument("log", type=PATH)
+@click.option("--out", type=PATH, required=True, help="Folder of the campaign.")
+@click.option("--settings", "settings_path", type=PATH, help="YAML file; options overlay it.")
 @click.option("--name", help="Name of the campaign.  [default: that of the file]")
 @click.option("--columns", help="Names or places from 0, as fx=1,fy=2,fz=3.")
 @click.option("--time", help="Column of time, by name or place.")
 @click.option("--rate", type=float, help="Samples per second, without a column of time.")
-@click.option("--unit", help="m/s^2, g or counts.  [default: m/s^2]")
+@click.option("--unit", help="One of m/s^2, g and counts.  [default: m/s^2]")
 @click.option("--scale", help="With counts: m/s² per count, one number or three.")
 @click.option("--offset", help="With counts: reading at 0 m/s², one number or three.")
 @click.option("--gravity", type=float, help="Local gravity, m/s².  [default: 9.80665]")
-@click.option("--threshold", type=float, help="sd of a window at rest, m/s², instead of chosen.")
+@click.option("--threshold", type=float, help="Sd of a window at rest, m/s², instead of chosen.")
 @click.option("--means", is_flag=True, help="LOG is a table of means already.")
 @click.option("--figure/--no-figure", default=True, help="Draw the log with its holds.")
 @force_option
+@quiet_option
 def import_command(
     log: Path,
     out: Path,
@@ -41,7 +46,7 @@ def import_command(
     force: bool,
     **options: Any,
 ) -> None:
-    """Make a campaign of a raw LOG: find its static holds and how well their means are known.
+    """Make a campaign of a raw LOG: find its static holds.
 
     LOG is text (CSV or columns), MATLAB or Parquet. Without --threshold the noise of the log
     itself says what is at rest; segmentation.png in the folder shows the outcome.
@@ -56,21 +61,25 @@ def import_command(
     _show(report, out, figure)
 
 
-@click.command("public")
+@click.command(
+    "public", epilog=example("accelstudy public", "accelstudy public xsens-mti --out xsens")
+)
 @click.argument("name", required=False)
-@click.option("--out", type=_PATH, help="Folder of the campaign.")
+@click.option("--out", type=PATH, help="Folder of the campaign.")
 @click.option(
     "--folder",
-    type=_PATH,
+    type=PATH,
     default="resources/public",
     show_default=True,
     help="Where the file is, in any subfolder, or is downloaded to.",
 )
 @force_option
+@quiet_option
 def public_command(name: str | None, out: Path | None, folder: Path, force: bool) -> None:
-    """Make a campaign of the public data NAME; without NAME, list what there is.
+    """Make a campaign of public data, or list what there is.
 
-    A download is checked by its sha256, and goes on where an earlier one broke off.
+    NAME is that of the data; without it they are listed. A download is checked by its sha256, and
+    goes on where an earlier one broke off.
     """
     from accelstudy.campaign.importing import import_to
     from accelstudy.campaign.public import import_settings, public_data, public_file
@@ -90,12 +99,12 @@ def public_command(name: str | None, out: Path | None, folder: Path, force: bool
 
 def _show(report: ImportReport, out: Path, figure: bool = True) -> None:
     for line in report.lines():
-        click.echo(line)
+        say(line)
     for warning in report.warnings:
         click.echo(f"warning: {warning}", err=True)
     if figure and report.holds is not None:
-        click.echo(f"figure: {out / 'segmentation.png'}")
-    click.echo(f"campaign: {out}")
+        say(f"figure: {out / 'segmentation.png'}")
+    say(f"campaign: {out}")
 
 
 def _given(

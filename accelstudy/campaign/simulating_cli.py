@@ -9,44 +9,84 @@ from typing import Any
 import click
 
 from accelstudy.errors import InputError
-from accelstudy.options import force_option
+from accelstudy.options import (
+    EFFECT,
+    GROSS_ERROR,
+    NOISE_EFFECT,
+    PATH,
+    SCHEME,
+    approach_option,
+    example,
+    force_option,
+    model_option,
+    quiet_option,
+)
+from accelstudy.progress import say
 
-_PATH = click.Path(path_type=Path)
 
-
-@click.command("simulate-campaign")
-@click.option("--out", type=_PATH, required=True, help="Folder of the campaign.")
-@click.option("--truth", "truth_path", type=_PATH, help="YAML file for the truth, apart from it.")
+@click.command(
+    "simulate-campaign",
+    epilog=example(
+        'accelstudy simulate-campaign --out blind --truth truth.yaml --effect "warm_up(tau=400)"'
+    ),
+)
+@click.option("--out", type=PATH, required=True, help="Folder of the campaign.")
+@click.option("--truth", "truth_path", type=PATH, help="YAML file for the truth, apart from it.")
 @click.option("--name", help="Name of the campaign.  [default: that of the folder]")
 @click.option("--seed", default=1, show_default=True, help="Of all random numbers.")
-@click.option("--scheme", default="mclaren-24", show_default=True)
+@click.option(
+    "--scheme",
+    type=SCHEME,
+    default="mclaren-24",
+    show_default=True,
+    help="Positions; `accelstudy schemes` lists them.",
+)
 @click.option("--repeats", default=1, show_default=True, help="How often the whole scheme.")
 @click.option("--repeat-first", default=0, show_default=True, help="First holds, at the end again.")
 @click.option("--order", default="scheme", show_default=True, help="Of holds: scheme or random.")
-@click.option("--approach", default="robot", show_default=True, help="robot or gravity.")
-@click.option("--model", default="bias-scale-nonorthogonality", show_default=True)
+@approach_option("robot")
+@model_option
 @click.option(
     "--effect",
     "effects",
+    type=EFFECT,
     multiple=True,
     help="Beyond the model: 'warm_up(tau=400)' or 'thermal_bias: 0.004, -0.002, 0.001' (SI).",
 )
 @click.option("--size", default=1.0, show_default=True, help="Factor of effects' typical sizes.")
-@click.option("--noise-effect", "noise_effects", multiple=True, help="As 'heavy_tails(nu=3)'.")
-@click.option("--gross", "gross_errors", multiple=True, help="As 'row_order(first=3, second=4)'.")
+@click.option(
+    "--noise-effect",
+    "noise_effects",
+    type=NOISE_EFFECT,
+    multiple=True,
+    help="As 'heavy_tails(nu=3)'.",
+)
+@click.option(
+    "--gross",
+    "gross_errors",
+    type=GROSS_ERROR,
+    multiple=True,
+    help="As 'row_order(first=3, second=4)'.",
+)
 @click.option("--sigma", default=0.002, show_default=True, help="Noise of a position mean, m/s².")
 @click.option("--sigma-unknown", is_flag=True, help="Leave it out of the header.")
-@click.option("--robot-sigma-mgon", default=3.2, show_default=True)
+@click.option(
+    "--robot-sigma-mgon", default=3.2, show_default=True, help="Noise of the robot's angles, mgon."
+)
 @click.option("--interval", default=60.0, show_default=True, help="Seconds between holds.")
 @click.option("--no-time", is_flag=True, help="Leave out the time of the holds.")
 @click.option("--temperature", help="From and to, °C, as 20:40.")
 @click.option(
-    "--temperature-order", default="linear", show_default=True, help="linear, ABBA or random."
+    "--temperature-order",
+    default="linear",
+    show_default=True,
+    help="As linear, ABBA or random.",
 )
 @click.option("--vibration", help="Lowest and highest rms, m/s², as 0:1.")
-@click.option("--yaw", default="none", show_default=True, help="none or random.")
+@click.option("--yaw", default="none", show_default=True, help="Of the holds: none or random.")
 @click.option("--samples-per-hold", "n_samples", type=int, help="Adds n_samples and sds.")
 @force_option
+@quiet_option
 def simulate_campaign_command(
     out: Path,
     truth_path: Path | None,
@@ -60,10 +100,10 @@ def simulate_campaign_command(
     force: bool,
     **options: Any,
 ) -> None:
-    """Simulate a campaign with effects, noise and gross errors of your choice.
+    """Simulate a campaign with effects of your choice.
 
-    `accelstudy effects` lists them. What is not given is drawn from the seed; the truth goes to
-    --truth and nowhere else.
+    It can have noise effects and gross errors, too: `accelstudy effects` lists them. What is not
+    given is drawn from the seed; the truth goes to --truth and nowhere else.
     """
     from accelstudy.campaign.format import write_campaign
     from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign, write_truth
@@ -88,7 +128,7 @@ def simulate_campaign_command(
         write_campaign(campaign, folder, plausible=not settings.gross_errors)
         if truth_file is not None:
             write_truth(truth, truth_file)
-    click.echo(f"campaign: {out} ({campaign.n_positions} positions)")
+    say(f"campaign: {out} ({campaign.n_positions} positions)")
 
 
 def _range(option: str, text: str | None) -> tuple[float, float] | None:

@@ -6,17 +6,30 @@ from pathlib import Path
 
 import click
 
-from accelstudy.options import force_option
+from accelstudy.options import (
+    PATH,
+    angle_unit_option,
+    approach_option,
+    example,
+    force_option,
+    model_option,
+    quiet_option,
+)
+from accelstudy.progress import say
 
-_PATH = click.Path(path_type=Path)
 
-
-@click.command("diagnose")
-@click.argument("campaign", type=_PATH)
-@click.option("--out", type=_PATH, required=True, help="Folder to write to.")
-@click.option("--model", default="bias-scale-nonorthogonality", show_default=True)
-@click.option("--approach", help="gravity or robot.  [default: robot if the campaign has one]")
-@click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0))
+@click.command("diagnose", epilog=example("accelstudy diagnose my-campaign --out diagnosed"))
+@click.argument("campaign", type=PATH)
+@click.option("--out", type=PATH, required=True, help="Folder to write to.")
+@model_option
+@approach_option(None)
+@click.option(
+    "--seed",
+    default=1,
+    show_default=True,
+    type=click.IntRange(min=0),
+    help="Of all random numbers.",
+)
 @click.option(
     "--replicates",
     default=1000,
@@ -25,6 +38,8 @@ _PATH = click.Path(path_type=Path)
     help="Sessions simulated with the old and with the new model.",
 )
 @force_option
+@angle_unit_option
+@quiet_option
 def diagnose_command(
     campaign: Path,
     out: Path,
@@ -34,10 +49,10 @@ def diagnose_command(
     replicates: int,
     force: bool,
 ) -> None:
-    """Find what a sensor model lacks to explain a measured CAMPAIGN (a folder).
+    """Find what a sensor model lacks to explain a CAMPAIGN.
 
-    Tells missing effects, wrong noise and gross errors apart, adds what is missing to the model and
-    tests it on positions that were not used.
+    CAMPAIGN is a folder. Tells missing effects, wrong noise and gross errors apart, adds what is
+    missing to the model and tests it on positions that were not used.
     """
     from accelstudy.diagnosis.output import diagnose_folder
     from accelstudy.diagnosis.wording import verdict_lines
@@ -46,5 +61,5 @@ def diagnose_command(
     for warning in diagnosis.campaign.warnings:
         click.echo(f"warning: {warning}", err=True)
     for line in verdict_lines(diagnosis):
-        click.echo(line)
-    click.echo(f"report: {out / 'report.html'}")
+        say(line)
+    say(f"report: {out / 'report.html'}")
