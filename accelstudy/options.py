@@ -56,7 +56,7 @@ model_option = click.option(
     type=MODEL,
     default="bias-scale-nonorthogonality",
     show_default=True,
-    help="Sensor model; `accelstudy models` lists them.",
+    help="A name that `accelstudy models` lists, a composition, or the path of a model.yaml.",
 )
 
 
