@@ -18,11 +18,12 @@ from accelstudy.diagnosis.loop import close_loop
 from accelstudy.diagnosis.output import diagnose_folder, write_diagnosis
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.round_trip import parse_round_trip
-from accelstudy.diagnosis.wording import headline, p_value
+from accelstudy.diagnosis.wording import headline
 from accelstudy.errors import InputError
 from accelstudy.models import get_model
 from accelstudy.study.config import read_study
 from accelstudy.study.report import number
+from accelstudy.wording import p_value
 
 NINE = get_model("bias-scale-nonorthogonality")
 THERMAL = "thermal_bias: 0.003, -0.002, 0.001"
@@ -271,13 +272,17 @@ def test_bad_input_is_one_line(arguments, words, tmp_path, monkeypatch):
     assert not (tmp_path / "out").exists()
 
 
-def test_a_failure_leaves_no_answer(tmp_path, monkeypatch):
+def test_a_figure_that_fails_takes_nothing_with_it(tmp_path, monkeypatch, capsys):
     campaign = simulated("no_effect", tmp_path / "c")
     diagnosis = diagnose(campaign, NINE)
-    monkeypatch.setattr("accelstudy.diagnosis.report.save_all", lambda *_: 1 / 0)
-    with pytest.raises(ZeroDivisionError):
-        write_diagnosis(diagnosis, tmp_path / "out")
-    assert not (tmp_path / "out/diagnosis.json").exists()
+    monkeypatch.setattr("accelstudy.diagnosis.figures.evidence_figure", lambda *_: 1 / 0)
+    write_diagnosis(diagnosis, tmp_path / "out")
+    said = "The figure 'evidence' could not be drawn (ZeroDivisionError: division by zero)."
+    assert capsys.readouterr().err == f"warning: {said}\n"
+    page = (tmp_path / "out/report.html").read_text(encoding="utf-8")
+    assert said in page.replace("&#x27;", "'")
+    assert page.count("<svg") == 1
+    assert (tmp_path / "out/diagnosis.json").exists()
     assert not list((tmp_path / "out").rglob("*.part"))
 
 

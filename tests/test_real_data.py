@@ -15,7 +15,6 @@ from accelstudy.diagnosis.pipeline import Diagnosis, diagnose
 from accelstudy.diagnosis.wording import (
     GROUPS,
     amount,
-    probability,
     shown_unit,
     verdict_lines,
     words,
@@ -24,6 +23,7 @@ from accelstudy.effects import get_effect
 from accelstudy.errors import InputError
 from accelstudy.models import get_model
 from accelstudy.study.report import number
+from accelstudy.wording import probability
 
 DATA = Path(os.environ.get("ACCELSTUDY_SHARED", Path(__file__).parents[2] / "shared")) / "data"
 PAGE = (Path(__file__).parents[1] / "docs" / "real-data.md").read_text(encoding="utf-8")

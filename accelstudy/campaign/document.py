@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import numpy as np
 
+from accelstudy.campaign.assessment import MAX_TILT_GON, Assessment
 from accelstudy.campaign.fit import CampaignFit
 from accelstudy.campaign.gauges import GAUGES, affine_form, in_gauge
-from accelstudy.units import recorded_unit, to_recorded
+from accelstudy.campaign.verdict import state, verdict, warnings
+from accelstudy.units import MGON, recorded_unit, to_recorded
 
 
 def calibration_document(fit: CampaignFit) -> dict[str, Any]:
@@ -52,15 +55,67 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
         ],
         "covariance": _numbers(covariance),
         "correlation": _numbers(correlation),
-        "condition": fit.design.condition,
+        "condition": number(fit.design.condition),
         "redundancy": adjustment.redundancy,
         "variance_of_unit_weight": number(adjustment.variance_posteriori[0]),
         "iterations": int(adjustment.iterations[0]),
-        "rms_norm_residual_mps2": fit.rms_norm_residual,
+        "rms_norm_residual_mps2": number(fit.rms_norm_residual),
         "affine": _affine(fit),
         "excluded": campaign.exclusions,
         "log": None if campaign.log is None else campaign.log.model_dump(exclude_none=True),
         "warnings": list(campaign.warnings),
+    }
+
+
+def quality_document(assessment: Assessment) -> dict[str, Any]:
+    """Quality in plain data, for `calibration.json`."""
+    held, test = assessment.held_out, assessment.fit.global_test
+    components = assessment.components
+    gross, parameters = assessment.gross_error, assessment.tilt_parameters / MGON
+    angles = None if held is None else held.rms_angles
+    positions = assessment.fit.campaign.positions
+    return {
+        "state": state(assessment),
+        "plausible": not warnings(assessment),
+        "warnings": warnings(assessment),
+        "gross_error": None if gross is None else {"name": gross.name, "reason": gross.reason},
+        "verdict": verdict(assessment),
+        "global_test": None
+        if test is None
+        else {
+            "statistic": test.statistic,
+            "dof": test.dof,
+            "p_value": test.p_value,
+            "accepted": test.accepted,
+            "remark": test.remark,
+        },
+        "suspects": [
+            {"position": int(positions[s.position]), "p_value": number(s.p_value)}
+            for s in assessment.suspects
+        ],
+        "held_out": None
+        if held is None
+        else {
+            "n_predicted": held.n_predicted,
+            "rms_mps2": number(held.rms),
+            "rms_roll_mgon": None if angles is None else number(angles[0] / MGON),
+            "rms_pitch_mgon": None if angles is None else number(angles[1] / MGON),
+        },
+        "variance_components": None
+        if components is None
+        else {
+            "accelerometer": number(components.factors[0]),
+            "robot": number(components.factors[1]),
+            "sigma": [number(sigma) for sigma in components.sigma],
+            "converged": components.converged,
+        },
+        "tilt_rms_mgon": {
+            "roll": number(assessment.tilt[0] / MGON),
+            "pitch": number(assessment.tilt[1] / MGON),
+            "parameters_roll": number(parameters[0]),
+            "parameters_pitch": number(parameters[1]),
+            "max_tilt_gon": MAX_TILT_GON,
+        },
     }
 
 
@@ -90,3 +145,16 @@ def _numbers(matrix: np.ndarray) -> list[list[float | None]]:
 def number(value: Any) -> float | None:
     """Number for JSON, which knows no NaN."""
     return None if value is None or not np.isfinite(value) else float(value)
+
+
+def json_text(content: Any) -> str:
+    """JSON for a file; what is no finite number is null, or the file could not be read again."""
+    return json.dumps(_known(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _known(content: Any) -> Any:
+    if isinstance(content, dict):
+        return {key: _known(value) for key, value in content.items()}
+    if isinstance(content, (list, tuple)):
+        return [_known(value) for value in content]
+    return number(content) if isinstance(content, float) else content

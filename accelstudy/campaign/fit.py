@@ -20,9 +20,6 @@ from accelstudy.units import MGON
 
 Array = NDArray[np.float64]
 
-ALPHA = 0.05
-"""Level of the tests."""
-
 LEAST_RATIO = 1e-6
 """Noise of the forces beside that of the robot's angles below which double precision ends."""
 
@@ -64,7 +61,7 @@ class CampaignFit:
         """Test of the whole model; None where sigma is unknown or there is no redundancy."""
         if not self.sigma_known:
             return None
-        return global_test(float(self.adjustment.omega[0]), self.adjustment.redundancy, ALPHA)
+        return global_test(float(self.adjustment.omega[0]), self.adjustment.redundancy)
 
     @property
     def trusts_sigma(self) -> bool:

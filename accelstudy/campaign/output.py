@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import pandas as pd
 from jinja2 import Environment, PackageLoader
 
-from accelstudy.campaign.assessment import assess, positions_table, quality_document
-from accelstudy.campaign.document import calibration_document
+from accelstudy.campaign.assessment import assess, positions_table
+from accelstudy.campaign.document import calibration_document, json_text, quality_document
 from accelstudy.campaign.figures import correlation_figure, residual_figure
 from accelstudy.campaign.fit import CampaignFit
 from accelstudy.figures.saving import save_all
-from accelstudy.figures.style import STYLE, unit_label
+from accelstudy.figures.style import unit_label
 from accelstudy.outputs import whole_file
 from accelstudy.study.report import number
 
@@ -33,12 +31,13 @@ def write_calibration(fit: CampaignFit, folder: str | Path) -> dict[str, Any]:
     document = calibration_document(fit)
     quality = quality_document(assessment)
     positions = positions_table(assessment)
-    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
-        figures = {
-            "residuals": residual_figure(fit, positions),
-            "correlations": correlation_figure(fit),
-        }
-    drawn = save_all(figures, folder / "figures")
+    drawn = save_all(
+        {
+            "residuals": lambda: residual_figure(fit, positions),
+            "correlations": lambda: correlation_figure(fit),
+        },
+        folder / "figures",
+    )
     with whole_file(folder / "positions.parquet") as path:
         positions.to_parquet(path, index=False)
 
@@ -55,8 +54,7 @@ def write_calibration(fit: CampaignFit, folder: str | Path) -> dict[str, Any]:
         path.write_text(page, encoding="utf-8")
     content = {**document, "quality": quality}
     with whole_file(folder / "calibration.json") as path:
-        text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
-        path.write_text(text + "\n", encoding="utf-8")
+        path.write_text(json_text(content), encoding="utf-8")
     return content
 
 

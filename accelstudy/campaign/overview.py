@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 from jinja2 import Environment, PackageLoader
 
-from accelstudy.campaign.assessment import BLIND
 from accelstudy.campaign.batch import STATUS
+from accelstudy.campaign.verdict import BLIND
 from accelstudy.outputs import whole_file
 from accelstudy.study.report import number
 from accelstudy.study.tables import write_table

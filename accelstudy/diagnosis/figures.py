@@ -46,8 +46,8 @@ LARGE = 20
 
 def diagnosis_figures(
     diagnosis: Diagnosis, positions: pd.DataFrame, loop: Loop | None = None
-) -> dict[str, Figure]:
-    """All figures of a diagnosis by name; those of which there is nothing to show are left out.
+) -> dict[str, Callable[[], Figure]]:
+    """What draws each figure of a diagnosis; those of which there is nothing to show are left out.
 
     Parameters
     ----------
@@ -55,19 +55,18 @@ def diagnosis_figures(
     positions : DataFrame, of `positions_table`
     loop : Loop, optional
     """
-    drawn = {"residuals": residual_figure(diagnosis, positions)}
-    if diagnosis.screening.p_family:
-        drawn["evidence"] = evidence_figure(diagnosis)
-    if diagnosis.gap.held_out is not None:
-        drawn["gap"] = gap_figure(diagnosis, positions)
+    d = diagnosis
+    figures: dict[str, Callable[[], Figure]] = {"residuals": lambda: residual_figure(d, positions)}
+    if d.screening.p_family:
+        figures["evidence"] = lambda: evidence_figure(d)
+    if d.gap.held_out is not None:
+        figures["gap"] = lambda: gap_figure(d, positions)
     # Without sigma, the residuals of noise have no size that would be too much.
-    if any(diagnosis.location.values()) and (
-        diagnosis.sigma_known or diagnosis.verdict != "noise_model"
-    ):
-        drawn["location"] = location_figure(diagnosis)
+    if any(d.location.values()) and (d.sigma_known or d.verdict != "noise_model"):
+        figures["location"] = lambda: location_figure(d)
     if loop is not None:
-        drawn["loop"] = loop_figure(loop)
-    return drawn
+        figures["loop"] = lambda: loop_figure(loop)
+    return figures
 
 
 def gap_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:

@@ -51,7 +51,7 @@ class Loop:
         """Sessions of one simulation and one calibration that converged."""
         s = self.sessions
         chosen = (s["simulation"] == simulation) & (s["calibration"] == calibration)
-        return s[chosen & s["converged"]]
+        return s[chosen & s["converged"] & np.isfinite(s["sigma0_squared"])]
 
     def interval(self, simulation: str, calibration: str) -> tuple[float, float]:
         """Where the central 95 % of the simulated variances of unit weight lie."""
@@ -99,8 +99,9 @@ def close_loop(diagnosis: Diagnosis, replicates: int = REPLICATES, seed: int = 1
 
     Returns
     -------
-    Loop; None if the diagnosis did not extend the model, so that there is nothing to compare, or if
-    readings of the extended sensor, which clips, have no tilt.
+    Loop; None if the diagnosis did not extend the model, so that there is nothing to compare, if
+    readings of the extended sensor, which clips, have no tilt, or if the measurement or all
+    simulated sessions of a kind have no solution.
     """
     d = diagnosis
     if d.extended is d.model or d.gap.leveling is None:
@@ -117,6 +118,8 @@ def close_loop(diagnosis: Diagnosis, replicates: int = REPLICATES, seed: int = 1
     measured = {
         name: float(_calibrated(fit, taken).variance_posteriori[0]) for name, fit in fits.items()
     }
+    if not np.isfinite(list(measured.values())).all():
+        return None
     drawn = {}
     for stream, (simulation, calibration) in enumerate((("old", "base"), ("new", "extended"))):
         fit = fits[calibration]
@@ -158,7 +161,8 @@ def close_loop(diagnosis: Diagnosis, replicates: int = REPLICATES, seed: int = 1
                 }
             )
         )
-    return Loop(pd.concat(tables, ignore_index=True), measured)
+    loop = Loop(pd.concat(tables, ignore_index=True), measured)
+    return loop if all(len(loop.case(*case)) for case in CASES) else None
 
 
 def _calibrated(fit: Solution, observed: Observations) -> Adjustment:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from accelstudy.approaches import get_approach
+from accelstudy.campaign.document import json_text
 from accelstudy.campaign.format import read_campaign
 from accelstudy.diagnosis.document import diagnosis_document
 from accelstudy.diagnosis.loop import REPLICATES, Loop, close_loop
@@ -87,8 +87,7 @@ def write_diagnosis(
 
         write_report(diagnosis, document, positions, loop, folder)
     with whole_file(folder / "diagnosis.json") as path:
-        text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
-        path.write_text(text + "\n", encoding="utf-8")
+        path.write_text(json_text(document), encoding="utf-8")
     return document
 
 

@@ -16,7 +16,6 @@ from accelstudy.campaign.format import Campaign
 from accelstudy.diagnosis import gap as gaps
 from accelstudy.diagnosis import noise as noises
 from accelstudy.diagnosis.changes import Change, parameter_changes
-from accelstudy.diagnosis.gross import Recognised, recognise
 from accelstudy.diagnosis.hypotheses import OUTLIER, Setting
 from accelstudy.diagnosis.limits import UpperLimit, upper_limits
 from accelstudy.diagnosis.location import locate
@@ -35,6 +34,7 @@ from accelstudy.diagnosis.search import (
 )
 from accelstudy.diagnosis.tilt import leveling_rms
 from accelstudy.errors import InputError
+from accelstudy.gross_errors.recognition import Recognised, recognise
 from accelstudy.sensor import SensorModel
 
 Array = NDArray[np.float64]

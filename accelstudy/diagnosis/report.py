@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import pandas as pd
 from jinja2 import Environment, PackageLoader
 
@@ -16,9 +15,9 @@ from accelstudy.diagnosis.pipeline import LEVEL_NOISE, Diagnosis
 from accelstudy.diagnosis.search import LEVEL_EFFECTS, SURE
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.figures.saving import save_all
-from accelstudy.figures.style import STYLE
 from accelstudy.outputs import whole_file
 from accelstudy.study.report import number
+from accelstudy.wording import joined, p_value, probability
 
 
 def write_report(
@@ -38,9 +37,7 @@ def write_report(
     loop : Loop, optional
     folder : Path
     """
-    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
-        figures = diagnosis_figures(diagnosis, positions, loop)
-    drawn = save_all(figures, folder / "figures")
+    drawn = save_all(diagnosis_figures(diagnosis, positions, loop), folder / "figures")
     environment = Environment(
         loader=PackageLoader("accelstudy", "diagnosis"),
         autoescape=True,
@@ -49,10 +46,10 @@ def write_report(
     )
     environment.filters.update(
         number=number,
-        p=wording.probability,
-        p_value=wording.p_value,
+        p=probability,
+        p_value=p_value,
         words=wording.words,
-        listed=wording.listed,
+        joined=joined,
         sentence=wording.sentence,
         described=wording.described,
     )

@@ -10,6 +10,7 @@ from accelstudy.effects import effect_names, get_effect
 from accelstudy.figures.style import unit_label
 from accelstudy.study.report import number
 from accelstudy.units import MGON, display_unit, to_display
+from accelstudy.wording import joined, p_value
 
 GROUPS = {
     "direction": "with the direction of gravity",
@@ -31,17 +32,9 @@ HEADLINES = {
 }
 
 
-SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-
-
 def words(name: str) -> str:
     """Return a name of the catalogue as words."""
     return name.replace("_", " ")
-
-
-def listed(items: list[str]) -> str:
-    """Join words: a, b and c."""
-    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
 
 
 def amount(value: float, unit: str) -> str:
@@ -61,26 +54,6 @@ def shown_unit(unit: str) -> str:
     return unit_label(display_unit(unit))
 
 
-def probability(value: float | None) -> str:
-    """Show a p-value or a probability."""
-    if value is None:
-        return "–"
-    if value < 1e-12:
-        return "< 10⁻¹²"
-    if value < 9.5e-4:
-        digits, exponent = f"{value:.1e}".split("e")
-        return f"{digits} · 10{str(int(exponent)).translate(SUPERSCRIPT)}"
-    if value > 0.9995:
-        return "> 0.999"
-    return f"{value:.2g}" if value < 0.995 else f"{value:.3g}"
-
-
-def p_value(value: float | None) -> str:
-    """Show a p-value with its sign of relation: p = 0.03."""
-    shown = probability(value)
-    return f"p {shown}" if shown[0] in "<>" else f"p = {shown}"
-
-
 def headline(diagnosis: Diagnosis) -> str:
     """Say the verdict in one sentence."""
     if diagnosis.verdict == "no_effect" and not diagnosis.screening.p_family:
@@ -88,7 +61,7 @@ def headline(diagnosis: Diagnosis) -> str:
     found = diagnosis.found
     if diagnosis.verdict == "gross_error":
         found = tuple(f for f in found if not _is_effect(f))
-    return HEADLINES[diagnosis.verdict].format(names=listed([_title(f) for f in found] or [""]))
+    return HEADLINES[diagnosis.verdict].format(names=joined([_title(f) for f in found] or [""]))
 
 
 def _title(named: Named) -> str:
@@ -128,7 +101,7 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
         lines.append(confirmation(d))
     if d.setting.invisible:
         lines.append(
-            f"This campaign cannot see {listed([words(n) for n in d.setting.invisible])}, however "
+            f"This campaign cannot see {joined([words(n) for n in d.setting.invisible])}, however "
             "large."
         )
     return lines
@@ -140,7 +113,7 @@ def advice(diagnosis: Diagnosis) -> list[str]:
     hidden = [words(name) for name in d.setting.invisible if name != "gravity_error"]
     lines = []
     if hidden and not d.approach.uses_angles:
-        lines.append(f"The angles of a robot in each position could show {listed(hidden)}.")
+        lines.append(f"The angles of a robot in each position could show {joined(hidden)}.")
     if "gravity_error" in d.setting.invisible:
         lines.append("No position shows an error of g; it takes another measurement of gravity.")
     if "repeat" not in d.location and (d.verdict == "noise_model" or not d.sigma_known):
@@ -173,7 +146,7 @@ def _effect_line(named: Named) -> str:
         for name, value, sigma, unit in named.parameters
     )
     same = [words(name) for name in named.equivalence_class if name != named.name]
-    alike = f" In these positions {listed(same)} would be the same." if same else ""
+    alike = f" In these positions {joined(same)} would be the same." if same else ""
     return f"{words(named.name).capitalize()}, {equation}: {values}.{alike}"
 
 
@@ -203,7 +176,7 @@ def _where(d: Diagnosis) -> str:
     ]
     if not shares:
         return "Beside the noise level that is taken, nothing says where it lives."
-    return f"Of what the residuals have too much, {listed(shares)} (shares overlap)."
+    return f"Of what the residuals have too much, {joined(shares)} (shares overlap)."
 
 
 def sentence(text: str) -> str:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import html
 import io
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
+import click
 import matplotlib as mpl
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -56,14 +58,37 @@ def save(figure: Figure, svg_path: str | Path, png_path: str | Path, title: str,
     return text[text.index("<svg") :]
 
 
-def save_all(figures: Mapping[str, Figure], folder: Path) -> dict[str, str]:
-    """Write the figures of a page under their names; returns them as SVG elements."""
-    for figure in figures.values():
-        _simplify(figure)
-    return {
-        name: save(figure, folder / f"{name}.svg", folder / f"{name}.png", name, PAGE_DPI)
-        for name, figure in figures.items()
-    }
+def save_all(figures: Mapping[str, Callable[[], Figure]], folder: Path) -> dict[str, str]:
+    """Draw the figures of a page and write them under their names; returns elements for the page.
+
+    A figure that fails takes nothing else with it: a line on the page and a warning on stderr say
+    so, with the error.
+
+    Parameters
+    ----------
+    figures : mapping of name to a function that draws the figure
+    folder : Path
+    """
+    elements = {}
+    for name, draw in figures.items():
+        try:
+            with mpl.rc_context(STYLE):  # type: ignore[arg-type]
+                figure = draw()
+            _simplify(figure)
+            svg, png = folder / f"{name}.svg", folder / f"{name}.png"
+            elements[name] = save(figure, svg, png, name, PAGE_DPI)
+        except Exception as error:
+            said = failure(f"The figure {name!r} could not be drawn", error)
+            elements[name] = f'<p class="failed">{html.escape(said)}</p>'
+    return elements
+
+
+def failure(what: str, error: Exception) -> str:
+    """Say what failed and by which error, and warn of it on stderr."""
+    reason = " ".join(str(error).split())[:200]
+    said = f"{what} ({type(error).__name__}: {reason})."
+    click.echo(f"warning: {said}", err=True)
+    return said
 
 
 def _simplify(figure: Figure) -> None:

@@ -10,6 +10,8 @@ from scipy import special
 
 Array = NDArray[np.float64]
 
+REFUTED = 0.01
+"""Level at which residuals refute a stated sigma, in every command and on every page."""
 NO_POWER = 2
 """Up to this redundancy the global test finds next to nothing."""
 
@@ -35,7 +37,7 @@ class GlobalTest:
 
 
 def global_test(
-    omega: float, redundancy: int, alpha: float = 0.05, variance: float = 1.0
+    omega: float, redundancy: int, alpha: float = REFUTED, variance: float = 1.0
 ) -> GlobalTest | None:
     """Test Ω against its distribution; None without redundancy, where there is nothing to test.
 

@@ -130,11 +130,13 @@ def _axes(campaign: Campaign) -> Recognised:
     words = ", ".join(
         f"{axis} is read as {'−' if s < 0 else ''}{'xyz'[o]}"
         for axis, o, s in zip("xyz", order, signs, strict=True)
+        if (axis, s) != ("xyz"[o], 1.0)
     )
+    wrong = "have the wrong sign" if order == (0, 1, 2) else "are swapped"
     columns = list(order)
     sd = None if campaign.sd is None else campaign.sd[:, columns]
     mended = replace(campaign, forces=campaign.forces[:, columns] * np.array(signs), sd=sd)
-    return Recognised("axis_error", f"axes are swapped: {words}", mended)
+    return Recognised("axis_error", f"axes {wrong}: {words}", mended)
 
 
 def _by_angles(campaign: Campaign) -> Recognised | None:

@@ -1,0 +1,154 @@
+"""What is said of a calibration: one of four states, in plain words, and what to do next."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+import numpy as np
+
+from accelstudy.campaign.assessment import MAX_TILT_GON, Assessment
+from accelstudy.campaign.fit import CampaignFit
+from accelstudy.plausibility import implausible_parameters, implausible_tilt
+from accelstudy.units import MGON
+from accelstudy.wording import joined, p_value
+
+ACCEPTED, REJECTED = "accepted", "rejected"
+UNCHECKED, IMPLAUSIBLE = "cannot tell", "implausible"
+
+BLIND = (
+    "Gravity alone cannot see a rotation of the sensor in its housing: tilts are relative to the "
+    "sensor's own axes."
+)
+"""What holds for every calibration without a robot."""
+
+
+def state(assessment: Assessment) -> str:
+    """Say in a word what becomes of a calibration; the first that holds.
+
+    `IMPLAUSIBLE` if no sensor has such parameters or the data look grossly wrong, `REJECTED` if
+    the residuals refute the stated noise, `UNCHECKED` if nothing could have refuted it, else
+    `ACCEPTED`.
+    """
+    test = assessment.fit.global_test
+    if warnings(assessment):
+        return IMPLAUSIBLE
+    if test is not None and not test.accepted:
+        return REJECTED
+    return UNCHECKED if test is None or test.remark else ACCEPTED
+
+
+def warnings(assessment: Assessment) -> list[str]:
+    """Say what of a calibration can only be a gross error; nothing of a plausible one."""
+    fit = assessment.fit
+    said = implausible_parameters(fit.model.effects, fit.parameters)
+    said += implausible_tilt(*assessment.tilt)
+    if assessment.gross_error is not None:
+        said.append(assessment.gross_error.reason)
+    return said
+
+
+def verdict(assessment: Assessment) -> str:
+    """Say whether the calibration is good, for what, and what limits it."""
+    fit = assessment.fit
+    words = [*_implausible(assessment), _consistency(fit)]
+    if assessment.suspects:
+        named = [str(fit.campaign.positions[s.position]) for s in assessment.suspects]
+        what = "position" if len(named) == 1 else "positions"
+        words.append(
+            f"In conflict with the others, to be checked or repeated: {what} {joined(named)}."
+        )
+    judged = state(assessment)
+    if judged != IMPLAUSIBLE and np.isfinite(assessment.tilt).all():
+        words.append(_tilt(assessment))
+    if judged in (REJECTED, IMPLAUSIBLE):
+        words.append("`accelstudy diagnose` looks for the cause.")
+    if not fit.approach.uses_angles:
+        words.append(BLIND)
+    return " ".join(words)
+
+
+def next_steps(assessment: Assessment, campaign: str | Path = "CAMPAIGN") -> list[tuple[str, str]]:
+    """Say what to do next, most urgent first: what for, and the command.
+
+    Parameters
+    ----------
+    assessment : Assessment
+    campaign : path of the campaign's folder
+    """
+    fit = assessment.fit
+    parts = ["accelstudy", "diagnose", str(campaign), "--model", fit.model.name]
+    if fit.campaign.angles is not None:
+        parts += ["--approach", fit.approach.name]
+    diagnose = shlex.join([*parts, "--out", f"{fit.campaign.name}-diagnosis"])
+    use = "accelstudy apply calibration.json LOG --out leveled.csv"
+    if state(assessment) in (REJECTED, IMPLAUSIBLE):
+        return [("Find what is wrong or missing", diagnose)]
+    return [
+        ("Level a log with this calibration", use),
+        ("See whether the residuals have a pattern that the model lacks", diagnose),
+    ]
+
+
+def _implausible(assessment: Assessment) -> list[str]:
+    said = warnings(assessment)
+    if not said:
+        return []
+    found, gross = said, assessment.gross_error
+    words = []
+    if gross is not None:
+        found = said[:-1]
+        what = gross.name.replace("_", " ")
+        words.append(f"This looks like a gross error ({what}): {gross.reason}.")
+    if found:
+        cause = "" if gross is not None else " A wrong unit, sign, axis or row is the usual cause."
+        words.append(f"No sensor is like this: {joined(found)}.{cause}")
+    return words
+
+
+def _tilt(assessment: Assessment) -> str:
+    shares = assessment.tilt_shares
+    limit = max(shares, key=lambda name: float(shares[name].max())).replace("_", " ")
+    where = f"rms up to {MAX_TILT_GON:.0f} gon of tilt, noise of a reading apart"
+    alone, whole = (
+        f"{roll:.1f} mgon in roll and {pitch:.1f} mgon in pitch"
+        for roll, pitch in (assessment.tilt_parameters / MGON, assessment.tilt / MGON)
+    )
+    if alone == whole:
+        return (
+            f"The calibration leaves a tilt error of {alone} ({where}), limited by the uncertainty "
+            f"of {limit}."
+        )
+    return (
+        f"The calibration leaves a tilt error of {whole} ({where}) if what the residuals have too "
+        "much is an effect that the model lacks, since readings in use have it as well. The "
+        f"uncertainty of the parameters alone would leave {alone}."
+    )
+
+
+def _consistency(fit: CampaignFit) -> str:
+    r, test = fit.adjustment.redundancy, fit.global_test
+    if r == 0:
+        return "There is no redundancy: the positions determine the model and nothing checks it."
+    if test is None:
+        return (
+            "The noise of a position is estimated from the residuals, "
+            f"{1e3 * fit.sigma_position:.2f} mm/s² with r = {r}; without an a-priori sigma nothing "
+            "says whether the model is complete."
+        )
+    if test.accepted and test.remark:
+        return f"With r = {r} the test of the model has next to no power."
+    ratio = float(np.sqrt(test.statistic / test.dof))
+    p = p_value(test.p_value)
+    if test.accepted:
+        return f"The residuals agree with the stated noise (σ̂0 = {ratio:.2f}, {p})."
+    if ratio > 1:
+        return (
+            f"The residuals are {ratio:.1f} times as large as the stated noise allows "
+            f"({p}): it is understated, or an effect is missing. Sigmas are "
+            "those of the residuals."
+        )
+    return (
+        f"The residuals are only {ratio:.2g} times the stated noise ({p}): "
+        "it is overstated. Sigmas are those of the residuals."
+    )

@@ -1,0 +1,73 @@
+"""What a sensor can have, and what can only be a gross error: bounds of parameters and of tilt.
+
+A fit knows no bounds: an axis with the wrong sign is fitted perfectly by a scale of −2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.effects import Effect, get_effect
+from accelstudy.study.report import number
+from accelstudy.units import MGON, STANDARD_GRAVITY, display_unit, to_display
+
+Array = NDArray[np.float64]
+
+FACTOR = 20.0
+"""Times the typical size of cheap equipment, beyond which a parameter is not believed."""
+LARGEST = {"scale": 0.5, "base_tilt": 0.1, "encoder_offset": 0.1}
+"""Effects with a bound of their own, SI. Beyond a half, a scale is a unit, a range or a sign; how a
+rig stands and where its circles begin is up to who set it up, not to its quality."""
+
+
+def largest(effect: Effect) -> float:
+    """Largest size of a parameter of an effect that is believed, SI; infinite if nothing is known.
+
+    It is `FACTOR` times the size that the catalogue calls typical of cheap equipment.
+    """
+    if effect.name in LARGEST:
+        return LARGEST[effect.name]
+    typical = getattr(effect, "typical", None)
+    return np.inf if typical is None else FACTOR * float(typical[1])
+
+
+def largest_tilt() -> float:
+    """Tilt error, rad, from which on a calibration is useless: a cheap sensor has it without."""
+    return float(get_effect("bias").typical[1]) / STANDARD_GRAVITY
+
+
+def implausible_parameters(effects: Sequence[Effect], parameters: Array) -> list[str]:
+    """Say of each parameter that no sensor has how large it is, and what would be believed.
+
+    Parameters
+    ----------
+    effects : sequence of Effect, of the model
+    parameters : (u,) array, SI, in the order of the effects
+    """
+    values = iter(np.asarray(parameters, dtype=float))
+    found = []
+    for effect in effects:
+        bound = largest(effect)
+        for parameter in effect.parameters:
+            value = next(values)
+            if not abs(value) <= bound:
+                shown, most = (number(float(to_display(v, parameter.unit))) for v in (value, bound))
+                unit = display_unit(parameter.unit)
+                found.append(
+                    f"{parameter.name} = {shown} {unit}; ± {most} is the most that is believed"
+                )
+    return found
+
+
+def implausible_tilt(roll: float, pitch: float) -> list[str]:
+    """Say that a tilt error is useless, rad; nothing of one that is not, or is not known."""
+    worst, bound = np.fmax(roll, pitch), largest_tilt()
+    if not worst > bound:
+        return []
+    return [
+        f"a tilt error of {number(worst / MGON)} mgon is left, where a cheap sensor without any "
+        f"calibration has {number(bound / MGON)}"
+    ]
