@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from accelstudy.effects import Effect, get_effect
 from accelstudy.study.report import number
-from accelstudy.units import MGON, STANDARD_GRAVITY, display_unit, to_display
+from accelstudy.units import STANDARD_GRAVITY, display_unit, to_display
 
 Array = NDArray[np.float64]
 
@@ -64,10 +64,10 @@ def implausible_parameters(effects: Sequence[Effect], parameters: Array) -> list
 
 def implausible_tilt(roll: float, pitch: float) -> list[str]:
     """Say that a tilt error is useless, rad; nothing of one that is not, or is not known."""
-    worst, bound = np.fmax(roll, pitch), largest_tilt()
-    if not worst > bound:
+    if not np.fmax(roll, pitch) > largest_tilt():
         return []
+    worst, most = to_display([np.fmax(roll, pitch), largest_tilt()], "rad")
     return [
-        f"a tilt error of {number(worst / MGON)} mgon is left, where a cheap sensor without any "
-        f"calibration has {number(bound / MGON)}"
+        f"a tilt error of {number(float(worst))} {display_unit('rad')} is left, where a cheap "
+        f"sensor without any calibration has {number(float(most))}"
     ]

@@ -9,6 +9,7 @@ from scipy.stats import chi2, kstest
 
 from accelstudy.adjustment import calibrate
 from accelstudy.adjustment.quality import global_test
+from accelstudy.adjustment.quality.whole_model import REFUTED
 
 
 @BOTH
@@ -18,7 +19,7 @@ def test_the_global_test_is_two_sided_and_uniform(approach):
     p = [t.p_value for t in tests]
     assert kstest(p, "uniform").pvalue > 1e-4
     assert np.mean([not t.accepted for t in tests]) == pytest.approx(
-        0.05, abs=STANDARD_ERRORS * math.sqrt(0.05 * 0.95 / 2000)
+        REFUTED, abs=STANDARD_ERRORS * math.sqrt(REFUTED * (1 - REFUTED) / 2000)
     )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from accelstudy.campaign.assessment import MAX_TILT_GON, Assessment
 from accelstudy.campaign.fit import CampaignFit
 from accelstudy.plausibility import implausible_parameters, implausible_tilt
-from accelstudy.units import MGON
+from accelstudy.units import GON, attitude_unit, display_unit, to_attitude, to_display
 from accelstudy.wording import joined, p_value
 
 ACCEPTED, REJECTED = "accepted", "rejected"
@@ -109,10 +109,13 @@ def _implausible(assessment: Assessment) -> list[str]:
 def _tilt(assessment: Assessment) -> str:
     shares = assessment.tilt_shares
     limit = max(shares, key=lambda name: float(shares[name].max())).replace("_", " ")
-    where = f"rms up to {MAX_TILT_GON:.0f} gon of tilt, noise of a reading apart"
+    most, unit = to_attitude(MAX_TILT_GON * GON), display_unit("rad")
+    where = f"rms up to {most:.0f} {attitude_unit()} of tilt, noise of a reading apart"
     alone, whole = (
-        f"{roll:.1f} mgon in roll and {pitch:.1f} mgon in pitch"
-        for roll, pitch in (assessment.tilt_parameters / MGON, assessment.tilt / MGON)
+        f"{roll:.1f} {unit} in roll and {pitch:.1f} {unit} in pitch"
+        for roll, pitch in (
+            to_display(tilt, "rad") for tilt in (assessment.tilt_parameters, assessment.tilt)
+        )
     )
     if alone == whole:
         return (
