@@ -150,7 +150,7 @@ def test_what_is_not_there_is_one_line(arguments, tmp_path, monkeypatch):
 
 
 def test_what_no_sensor_can_have_is_not_called_good(tmp_path):
-    """Two axes negated fit perfectly, with scales of −2; exchanged rows leave no tilt to speak of."""
+    """Two axes negated fit perfectly, with scales of −2."""
     for error, words in {
         "axis_error(x=1,y=-2,z=-3)": "axes have the wrong sign: y is read as −y, z is read as −z",
         "axis_error(x=2,y=1,z=3)": "axes are swapped: x is read as y, y is read as x",
