@@ -108,11 +108,13 @@ def schemes(model: str, approach: str, names: tuple[str, ...]) -> None:
 
     from accelstudy.approaches import get_approach
     from accelstudy.design import diagnose
+    from accelstudy.hold_plan import check_needs_no_plan
     from accelstudy.models import get_model
     from accelstudy.schemes import get_scheme, scheme_families, scheme_names
     from accelstudy.units import angle_note, attitude_unit, to_attitude
 
     chosen_model, chosen_approach = get_model(model), get_approach(approach)
+    check_needs_no_plan(chosen_model)
     rows = []
     for name in names or scheme_names():
         scheme = get_scheme(name)
@@ -130,7 +132,7 @@ def schemes(model: str, approach: str, names: tuple[str, ...]) -> None:
                 "not estimable": ", ".join(design.not_estimable),
             }
         )
-    click.echo(f"model {model}, approach {approach}\n")
+    click.echo(f"model {chosen_model.name}, approach {approach}\n")
     click.echo(pd.DataFrame(rows).to_string(index=False))
     click.echo(
         "\nrank and condition: of the scaled design at the ideal sensor; r: conditions - unknowns;"

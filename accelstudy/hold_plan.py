@@ -12,6 +12,7 @@ from accelstudy.effects import Effect, Hold
 from accelstudy.errors import InputError, UnknownNameError
 from accelstudy.leveling import roll_pitch
 from accelstudy.models import compose
+from accelstudy.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
@@ -116,6 +117,16 @@ class HoldPlan:
 
     def _rng(self, stream: int) -> np.random.Generator:
         return np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(_STREAM, stream)))
+
+
+def check_needs_no_plan(model: SensorModel) -> None:
+    """Raise `InputError` if positions alone, those of a scheme, do not feed a model."""
+    for effect in model.effects:
+        if column := HoldPlan().missing(effect):
+            raise InputError(
+                f"the effect {effect.name!r} of the model needs the {column} of each position, "
+                "which a scheme does not tell; take a campaign"
+            )
 
 
 def _between(ends: tuple[float, float] | None, part: Array) -> Array | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,21 @@ def cap_forces(max_tilt: float, attitudes: int, g: float = STANDARD_GRAVITY) -> 
     azimuth = np.pi * (1 + np.sqrt(5)) * i
     radius = np.sqrt(1 - z * z)
     return -g * np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), z], axis=-1)
+
+
+def holds_in_use(hold: Hold, n: int, f_b: Array) -> Hold:
+    """Return conditions like those of a calibration, in attitudes in which the sensor is used.
+
+    Parameters
+    ----------
+    hold : Hold, of the n positions of the calibration
+    n : int
+    f_b : (k, 3) array, m/s², of the attitudes
+    """
+    roll, pitch = roll_pitch(tuple(f_b.T))
+    used = hold.take(np.arange(len(f_b)) % n)
+    yaw = np.zeros(len(f_b)) if used.yaw is None else used.yaw
+    return replace(used, roll=roll, pitch=pitch, yaw=yaw)
 
 
 @dataclass(frozen=True)

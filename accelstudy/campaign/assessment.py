@@ -15,7 +15,7 @@ from accelstudy.approaches import get_approach
 from accelstudy.campaign.fit import CampaignFit, campaign_noise
 from accelstudy.gross_errors.recognition import Recognised, recognise
 from accelstudy.leveling import jacobian
-from accelstudy.leveling_error import cap_forces
+from accelstudy.leveling_error import cap_forces, holds_in_use
 from accelstudy.units import GON, MGON
 
 Array = NDArray[np.float64]
@@ -106,11 +106,16 @@ def tilt_missing(fit: CampaignFit) -> Array:
 def tilt_shares(fit: CampaignFit) -> dict[str, Array]:
     """Tilt error from the uncertainty of each effect's parameters, and of "all", (2,), rad.
 
-    Rms of roll and of pitch over tilts up to `MAX_TILT_GON`, without the noise of a reading.
+    Rms of roll and of pitch over tilts up to `MAX_TILT_GON`, at the temperatures and times of the
+    campaign where effects depend on them, without the noise of a reading. Effects of the rig, which
+    the sensor has left, have no share.
     """
-    f_b = cap_forces(MAX_TILT_GON * GON, ATTITUDES, fit.gravity)
-    output = fit.model.sense(f_b, fit.parameters, fit.gravity)
-    slope = jacobian(f_b) @ fit.model.correction_jacobian(output, fit.parameters, fit.gravity)
+    model, campaign, g = fit.model, fit.campaign, fit.gravity
+    f_b = cap_forces(MAX_TILT_GON * GON, ATTITUDES, g)
+    hold = holds_in_use(campaign.hold, campaign.n_positions, f_b)
+    p = np.where(model.stays, fit.parameters, 0.0)
+    output = model.sense(f_b, p, g, hold)
+    slope = jacobian(f_b) @ model.correction_jacobian(output, p, g, hold) * model.stays
     covariance = fit.covariance
 
     def rms(columns: slice) -> Array:
@@ -118,9 +123,10 @@ def tilt_shares(fit: CampaignFit) -> dict[str, Array]:
         return np.sqrt(np.einsum("kau,uw,kaw->a", part, block, part) / len(f_b))
 
     shares, first = {"all": rms(slice(None))}, 0
-    for effect in fit.model.effects:
+    for effect in model.effects:
         last = first + len(effect.parameters)
-        shares[effect.name] = rms(slice(first, last))
+        if effect.part == "sensor":
+            shares[effect.name] = rms(slice(first, last))
         first = last
     return shares
 

@@ -23,6 +23,7 @@ from accelstudy.models import get_model
 from accelstudy.study.config.errors import first_error
 from accelstudy.study.config.layers import overlay, read_layer
 from accelstudy.study.config.schema import Block
+from accelstudy.study.config.types import ModelName
 
 KINDS = ("campaign", "log", "public")
 
@@ -37,7 +38,7 @@ class Entry(Block):
     log: str | None = Field(None, description="raw log or table of means, or a pattern of files")
     public: str | None = Field(None, description="name of public data, see `accelstudy public`")
     name: Name | None = Field(None, description="name of the results; that of the source if absent")
-    model: str | None = Field(None, description="model, if not that of the batch")
+    model: ModelName | None = Field(None, description="model, if not that of the batch")
     approach: str | None = Field(None, description="approach, if not that of the batch")
     gravity: GravitySettings | None = Field(None, description="instead of the campaign's own")
     settings: ImportSettings | None = Field(
@@ -99,7 +100,7 @@ class BatchConfig(Block):
     """Campaigns that are calibrated and summarised together."""
 
     batch: Name = Field(description="name; results go to results/<batch>/")
-    model: str = Field("bias-scale-nonorthogonality", description="model of all campaigns")
+    model: ModelName = Field("bias-scale-nonorthogonality", description="model of all campaigns")
     approach: str = Field("gravity", description="approach of all campaigns")
     public_folder: str = Field(
         "resources/public",

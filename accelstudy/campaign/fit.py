@@ -11,8 +11,10 @@ from accelstudy.adjustment import Adjustment, Observations, calibrate
 from accelstudy.adjustment.quality import GlobalTest, global_test
 from accelstudy.approaches import Approach
 from accelstudy.campaign.format import Campaign
+from accelstudy.campaign.header import COLUMNS
 from accelstudy.design import Design, diagnose
 from accelstudy.errors import InputError
+from accelstudy.models import compose
 from accelstudy.schemes import Scheme
 from accelstudy.sensor import SensorModel
 from accelstudy.simulation import Noise
@@ -134,6 +136,20 @@ def least_sigma(campaign: Campaign, approach: Approach) -> float:
     return LEAST_RATIO * campaign.gravity * (campaign.sigma_angle or 0.0) * approach.uses_angles
 
 
+def check_columns(campaign: Campaign, model: SensorModel) -> None:
+    """Raise `InputError` if a campaign lacks a column that an effect of the model needs."""
+    hold = campaign.hold
+    for effect in model.effects:
+        for column in compose(effect.spec, (effect.spec,)).hold_columns:
+            if getattr(hold, column) is None:
+                attribute = "angles" if column in ("roll", "pitch") else column
+                names = " and ".join(COLUMNS[attribute])
+                raise InputError(
+                    f"{campaign.name}: the effect {effect.name!r} of the model needs the {column} "
+                    f"of each position; the campaign has no {names}"
+                )
+
+
 def fit_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> CampaignFit:
     """Calibrate a campaign.
 
@@ -154,6 +170,7 @@ def fit_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> 
             f"{campaign.name}: approach {approach.name!r} needs the columns roll_robot_gon and "
             "pitch_robot_gon"
         )
+    check_columns(campaign, model)
     noise = campaign_noise(campaign)
     least = least_sigma(campaign, approach)
     if noise.sigma_force < least:

@@ -9,9 +9,13 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
+import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
-from accelstudy.sensor import SensorModel
+from accelstudy.effects import Effect
+from accelstudy.models import compose
+from accelstudy.sensor import SensorModel, trace_of
+from accelstudy.tracing import derivative
 from accelstudy.units import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
@@ -35,19 +39,45 @@ def in_gauge(matrix: ArrayLike, gauge: Gauge) -> Array:
     return np.asarray((vectors * np.sqrt(values)) @ vectors.T)
 
 
+def not_affine(model: SensorModel) -> tuple[str, ...]:
+    """Names of the effects that no matrix can hold.
+
+    They are those of the sensor whose output is not linear in the force, or depends on more.
+    """
+    return tuple(
+        effect.name
+        for effect in model.effects
+        if effect.part == "sensor" and not _is_affine(type(effect))
+    )
+
+
+def _is_affine(kind: type[Effect]) -> bool:
+    trace = trace_of((kind,))
+    slopes = derivative(trace.h, trace.force).free_symbols
+    used = set().union(*(sp.sympify(part).free_symbols for part in trace.h))
+    return not (slopes & {*trace.force, trace.g} or used & set(trace.hold.values()))
+
+
 def affine_form(model: SensorModel, parameters: ArrayLike) -> tuple[Array, Array] | None:
     """K (3, 3) and b (3,) of f_b = K (f_s − b), or None if the model is not affine.
+
+    What the rig has is left out: it is no part of the sensor.
 
     Parameters
     ----------
     model : SensorModel
     parameters : (u,) array, SI
     """
+    if not_affine(model):
+        return None
+    own = [effect.spec for effect in model.effects if effect.part == "sensor"]
+    parameters = np.asarray(parameters, dtype=float)[..., model.stays]
+    model = compose(model.name, tuple(own))
     g = STANDARD_GRAVITY
-    probes = g * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3), np.ones((1, 3))])
+    probes = g * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
     corrected = model.correct(probes, parameters)
+    if not np.isfinite(corrected).all():
+        return None
     matrix = ((corrected[1:4] - corrected[4:7]) / (2 * g)).T
     constant = corrected[0]
-    if not np.allclose(probes @ matrix.T + constant, corrected, rtol=0, atol=1e-9 * g):
-        return None
     return matrix, -np.linalg.solve(matrix, constant)

@@ -32,7 +32,7 @@ def study_overlay(diagnosis: Diagnosis) -> dict[str, Any]:
     if extended is not d.model:
         # One model of the file's own, which is thus the one that it stands for.
         added = [e.name for e in extended.effects[len(d.model.effects) :]]
-        own = {"-".join([study_name(models[0]), *added]): effects}
+        own = {"-".join([study_name(models[0]), *added]): list(effects)}
     noise: dict[str, Any] = {
         "sensor": {"sigma_mps2": d.sigma_position, "per": "position"},
         "gravity": {"sigma_mps2": d.campaign.sigma_gravity, "error_mps2": 0.0},

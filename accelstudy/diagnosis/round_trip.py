@@ -19,7 +19,7 @@ from accelstudy.errors import InputError, UnknownNameError
 from accelstudy.models import get_model
 from accelstudy.study.config.errors import first_error
 from accelstudy.study.config.schema import Block
-from accelstudy.study.config.types import Count, Seed
+from accelstudy.study.config.types import Count, ModelName, Seed
 
 
 def _known_settings(value: Any) -> Any:
@@ -37,7 +37,7 @@ class RoundTrip(Block):
     """A simulated campaign and its diagnosis; results go to ``results/<name of the campaign>``."""
 
     campaign: Settings = Field(description="settings of the simulated campaign, SI")
-    model: str = Field("bias-scale-nonorthogonality", description="model that is diagnosed")
+    model: ModelName = Field("bias-scale-nonorthogonality", description="model that is diagnosed")
     approach: str | None = Field(None, description="robot if the campaign has one, by default")
     seed: Seed = Field(1, description="of the diagnosis")
     replicates: Count = Field(1000, description="sessions simulated with either model")

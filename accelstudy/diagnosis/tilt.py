@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import Solution
 from accelstudy.effects import Hold
 from accelstudy.leveling import jacobian, roll_pitch
-from accelstudy.leveling_error import cap_forces
+from accelstudy.leveling_error import cap_forces, holds_in_use
 from accelstudy.units import GON
 
 Array = NDArray[np.float64]
@@ -28,9 +26,7 @@ def in_use(hold: Hold, g: float) -> tuple[Array, Hold]:
     g : float, m/s²
     """
     f_b = cap_forces(MAX_TILT, ATTITUDES, g)
-    roll, pitch = roll_pitch(tuple(f_b.T))
-    turns = np.arange(ATTITUDES) % len(hold.column("roll"))
-    return f_b, replace(hold.take(turns), roll=roll, pitch=pitch)
+    return f_b, holds_in_use(hold, len(hold.column("roll")), f_b)
 
 
 def leveling_rms(

@@ -12,6 +12,7 @@ from accelstudy.campaign.format import Campaign
 from accelstudy.diagnosis.hypotheses import Setting, setting_of
 from accelstudy.diagnosis.limits import visibilities
 from accelstudy.effects import get_effect
+from accelstudy.hold_plan import check_needs_no_plan
 from accelstudy.schemes import Scheme
 from accelstudy.sensor import SensorModel
 from accelstudy.simulation import Noise, session
@@ -43,8 +44,9 @@ def scheme_setting(
     Raises
     ------
     InputError
-        If the positions do not determine the model.
+        If the positions do not determine the model, or it needs to know more of them.
     """
+    check_needs_no_plan(model)
     ideal = session(model, np.zeros(model.n_parameters), scheme.directions)
     observed = ideal.observations(noise or Noise())
     return setting_of(solve(model, approach, observed))

@@ -26,6 +26,7 @@ from accelstudy.simulation import Noise, sigma_of_mean
 from accelstudy.study.config.types import (
     Count,
     Finite,
+    ModelName,
     NotNegative,
     OneOrMore,
     Pitch,
@@ -121,7 +122,10 @@ class Quantity(Block):
 class Grid(Block):
     """Cells: every combination of what is listed. A single value may stand for a list of one."""
 
-    models: OneOrMore[str] = Field(description="names of models, or all")
+    models: OneOrMore[ModelName] = Field(
+        description="models: names, compositions as bias-scale+warm_up(tau=300), YAML files with a "
+        "model; or all"
+    )
     schemes: OneOrMore[str] = Field(description="names of schemes, or all")
     approaches: OneOrMore[str] = Field(
         default=["gravity", "robot"], description="names of approaches, or all"
@@ -164,7 +168,7 @@ class SensitivityConfig(Block):
     resamples: Count = Field(100, description="bootstrap resamples for confidence intervals")
     roll_gon: OneOrMore[Finite] = Field(description="rolls of the grid")
     pitch_gon: OneOrMore[Pitch] = Field(description="pitches of the grid")
-    model: str = Field("bias-scale-nonorthogonality", description="model of figures 5 and 6")
+    model: ModelName = Field("bias-scale-nonorthogonality", description="model of figures 5 and 6")
     scheme: str = Field("mclaren-24", description="scheme whose calibration gives the sds")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Any, TypeVar
 
 from pydantic import AfterValidator, BeforeValidator, Field, GetCoreSchemaHandler
@@ -21,6 +22,15 @@ def _power_of_two(value: int) -> int:
     return value
 
 
+def _model_name(text: str) -> str:
+    from accelstudy.models import get_model  # slow to import, and most numbers need no model
+
+    # A plain name may be that of a model of the study's own, which is known later.
+    return text if re.fullmatch(r"[\w-]+", text) else get_model(text).name
+
+
+ModelName = Annotated[str, AfterValidator(_model_name)]
+"""A model by its name; a composition and a file have the name that their effects give them."""
 Number = BeforeValidator(_no_truth_value)
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False), Number]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False), Number]
