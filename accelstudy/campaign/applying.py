@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -13,7 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from accelstudy.campaign.header import Nominal, PerAxis
+from accelstudy.campaign.layout import LogLayout
 from accelstudy.campaign.wording import one_line
+from accelstudy.effects import Hold
 from accelstudy.errors import InputError
 from accelstudy.leveling import jacobian, roll_pitch
 from accelstudy.models import compose
@@ -26,7 +29,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Calibration:
-    """A calibration, as `calibration.json` holds it.
+    """A calibration as the sensor takes it along, without what belongs to the rig.
 
     Attributes
     ----------
@@ -35,6 +38,8 @@ class Calibration:
     covariance : (u, u) array, SI
     gravity : float, m/s²
     content : mapping, what is used of the file
+    log : LogLayout, how the log was read that the campaign was made of; None if there was none
+    ranges : mapping, what the calibration saw, see `accelstudy.campaign.ranges`
     """
 
     model: SensorModel
@@ -42,34 +47,97 @@ class Calibration:
     covariance: Array
     gravity: float
     content: Mapping[str, Any]
+    log: LogLayout | None = None
+    ranges: Mapping[str, list[float]] = field(default_factory=dict)
 
-    def correct(self, forces: ArrayLike) -> Array:
-        """Calibrated specific force (n, 3) of readings (n, 3), m/s²."""
-        return self.model.correct(forces, self.parameters, self.gravity)
+    @cached_property
+    def needs(self) -> tuple[tuple[str, str], ...]:
+        """Effects that need more than a force, each with one of the columns of `Hold`."""
+        if not self.model.hold_columns:
+            return ()
+        return tuple(
+            (effect.name, column)
+            for effect in self.model.effects
+            for column in compose(effect.spec, (effect.spec,)).hold_columns
+        )
 
-    def level(self, forces: ArrayLike, sigma_force: float) -> tuple[Array, Array]:
+    @property
+    def drifts(self) -> tuple[str, ...]:
+        """Effects that drift with the session, and are kept as they were at its end."""
+        return tuple(effect.name for effect in self.model.effects if effect.drifts)
+
+    def correct(self, forces: ArrayLike, hold: Hold | None = None) -> Array:
+        """Calibrated specific force of readings.
+
+        Parameters
+        ----------
+        forces : (n, 3) array, m/s², readings
+        hold : Hold, what else is known of them, as far as the effects need it
+
+        Returns
+        -------
+        (n, 3) array, m/s²; NaN where no force makes such a reading
+        """
+        forces, _ = self._as_continued(np.asarray(forces, dtype=float), hold)
+        return self.model.correct(forces, self.parameters, self.gravity, hold)
+
+    def level(
+        self, forces: ArrayLike, sigma_force: float, hold: Hold | None = None
+    ) -> tuple[Array, Array]:
         """Roll and pitch with standard deviations.
 
         Parameters
         ----------
         forces : (n, 3) array, m/s², readings
         sigma_force : float, m/s², noise of a reading, per axis
+        hold : Hold, as in `correct`
 
         Returns
         -------
         angles, sigma : (n, 2) arrays, rad; sigma holds the noise of the reading and the
         uncertainty of the calibration
         """
-        forces = np.asarray(forces, dtype=float)
-        corrected = self.correct(forces)
+        forces, share = self._as_continued(np.asarray(forces, dtype=float), hold)
+        corrected = self.model.correct(forces, self.parameters, self.gravity, hold)
         slope = jacobian(corrected)
         # A reading's noise reaches the corrected force by ∂f_b/∂f_s, which is close to I.
         by_parameters = slope @ self.model.correction_jacobian(
-            forces, self.parameters, self.gravity
+            forces, self.parameters, self.gravity, hold
         )
-        variance = np.einsum("nau,uw,naw->na", by_parameters, self.covariance, by_parameters)
+        by_parameters *= share
+        variance = np.sum((by_parameters @ self.covariance) * by_parameters, axis=-1)
         variance += sigma_force**2 * np.sum(slope**2, axis=-1)
         return np.stack(roll_pitch(tuple(corrected.T)), axis=-1), np.sqrt(variance)
+
+    def _as_continued(self, forces: Array, hold: Hold | None) -> tuple[Array, Array]:
+        """Readings as they would be if drifts had continued, for the model that has it so.
+
+        A drift is known in its session only. Beyond, the sensor keeps what it had at the end.
+
+        Returns
+        -------
+        forces : (n, 3) array, m/s²
+        share : (n, 1, u) array, of the derivative by a parameter with a drift that continues
+        """
+        share = np.ones((len(forces), 1, self.model.n_parameters))
+        if hold is None or "time_s" not in self.ranges or not self.drifts:
+            return forces, share
+        time = hold.column("time")
+        kept = np.clip(time, 0.0, self.ranges["time_s"][1])
+        first = 0
+        for effect in self.model.effects:
+            own = slice(first, first := first + len(effect.parameters))
+            if effect.drifts:
+                f, p = tuple(forces.T), tuple(self.parameters[own])
+                then, end = (
+                    np.stack(effect.output(f, p, self.gravity, Hold(time=t), np), axis=-1)
+                    for t in (time, kept)
+                )
+                forces = forces + (then - end)
+                share[:, 0, own] = np.divide(kept, time, out=np.ones_like(time), where=time != 0)[
+                    :, None
+                ]
+        return forces, share
 
 
 class _Shown(BaseModel):
@@ -110,6 +178,9 @@ class _Document(BaseModel):
     parameters: list[_Parameter]
     covariance: list[list[Finite | None]]
     affine: _Affine | None
+    log: LogLayout | None = None
+    range_mps2: Positive | None = None
+    ranges: dict[str, Annotated[list[Finite], Field(min_length=2, max_length=2)]] = {}
 
     @model_validator(mode="after")
     def _whole(self) -> Self:
@@ -142,11 +213,22 @@ def read_calibration(path: str | Path) -> Calibration:
     except (ValueError, OverflowError) as error:
         reason = one_line(error)
     else:
-        return Calibration(
-            model=compose(document.model, tuple(document.effects)),
-            parameters=np.array([entry.value for entry in document.parameters]),
-            covariance=np.array(document.covariance, dtype=float),  # None becomes NaN
-            gravity=document.gravity_mps2,
-            content=document.model_dump(),
-        )
+        return _calibration(document)
     raise InputError(f"{path}: not a calibration.json of accelstudy: {reason}")
+
+
+def _calibration(document: _Document) -> Calibration:
+    whole = compose(document.model, tuple(document.effects))
+    # What the rig had is estimated beside the sensor, and stays with the rig.
+    own = [effect.spec for effect in whole.effects if effect.part == "sensor"]
+    stays = np.flatnonzero(whole.stays)
+    covariance = np.array(document.covariance, dtype=float)  # None becomes NaN
+    return Calibration(
+        model=compose(document.model, tuple(own)),
+        parameters=np.array([entry.value for entry in document.parameters])[stays],
+        covariance=covariance[np.ix_(stays, stays)],
+        gravity=document.gravity_mps2,
+        content=document.model_dump(),
+        log=document.log,
+        ranges=document.ranges,
+    )

@@ -10,6 +10,7 @@ import numpy as np
 from accelstudy.campaign.assessment import MAX_TILT_GON, Assessment
 from accelstudy.campaign.fit import CampaignFit
 from accelstudy.campaign.gauges import GAUGES, affine_form, in_gauge
+from accelstudy.campaign.ranges import ranges_of
 from accelstudy.campaign.verdict import state, verdict, warnings
 from accelstudy.units import MGON, recorded_unit, to_recorded
 
@@ -62,6 +63,8 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
         "rms_norm_residual_mps2": number(fit.rms_norm_residual),
         "affine": _affine(fit),
         "excluded": campaign.exclusions,
+        "range_mps2": campaign.full_range,
+        "ranges": ranges_of(fit),
         "log": None if campaign.log is None else campaign.log.model_dump(exclude_none=True),
         "warnings": list(campaign.warnings),
     }

@@ -120,7 +120,7 @@ def _given(
     """Options that were given, as the settings name them."""
     content: dict[str, Any] = {
         **others,
-        "columns": None if columns is None else _columns(columns),
+        "columns": None if columns is None else parse_columns(columns),
         "scale": None if scale is None else _numbers("--scale", scale),
         "offset": None if offset is None else _numbers("--offset", offset),
         "rate_hz": rate,
@@ -131,7 +131,8 @@ def _given(
     return {key: value for key, value in content.items() if value is not None}
 
 
-def _columns(text: str) -> dict[str, str]:
+def parse_columns(text: str) -> dict[str, str]:
+    """Columns as an option gives them: fx=1,fy=2,fz=3."""
     pairs = [part.split("=", 1) for part in text.split(",")]
     if any(len(pair) != 2 for pair in pairs):
         raise InputError(f"--columns: expected fx=1,fy=2,fz=3 or names, not {text!r}")

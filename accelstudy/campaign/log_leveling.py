@@ -2,101 +2,119 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import chain
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 from numpy.typing import NDArray
 
 from accelstudy.campaign.applying import Calibration
-from accelstudy.campaign.export import raw_conversion
+from accelstudy.campaign.log_account import Account, clipped
 from accelstudy.campaign.log_files import CHUNK
-from accelstudy.campaign.log_tables import chunk_writer, read_chunks
-from accelstudy.campaign.wording import listed
-from accelstudy.errors import InputError
+from accelstudy.campaign.log_reading import readings_of
+from accelstudy.campaign.log_tables import chunk_writer
+from accelstudy.campaign.logs import AXES
+from accelstudy.effects import Hold
+from accelstudy.frames import Frame
+from accelstudy.progress import track
 from accelstudy.units import GON, MGON
 
 Array = NDArray[np.float64]
+
+DECIMALS = 9
+"""Decimals of what is added, in its unit: far below any noise, and half as long as a double."""
+
+
+@dataclass(frozen=True)
+class Leveled:
+    """What became of a log.
+
+    Attributes
+    ----------
+    rows : int
+    empty : int, rows of which no force could be made
+    warnings : tuple of str
+    """
+
+    rows: int
+    empty: int
+    warnings: tuple[str, ...]
 
 
 def level_log(
     calibration: Calibration,
     log: str | Path,
     out: str | Path,
-    columns: Sequence[str] = ("fx", "fy", "fz"),
+    given: Mapping[str, Any] | None = None,
     sigma: float | None = None,
+    start: float | None = None,
     chunk_size: int = CHUNK,
-) -> None:
+) -> Leveled:
     """Write a log with calibrated forces, roll and pitch and their standard deviations.
+
+    Forces and angles are in the axes of the log. A row of which no force can be made, as a reading
+    is missing or the calibration has no answer, gets empty cells.
 
     Parameters
     ----------
     calibration : Calibration
-    log : CSV or Parquet file, in the unit of the campaign
+    log : file with the raw log; see `readings_of`
     out : CSV or Parquet file; whole or not there
-    columns : names of the three columns of the log
+    given : mapping, optional
+        How to read the log; see `readings_of`.
     sigma : float, m/s², noise of a reading; that of a position of the campaign if omitted
+    start : float, s, from the start of the calibration session to the first row; 0 if omitted
     chunk_size : int, rows held in memory at a time
 
     Raises
     ------
     InputError
-        If the log cannot be read, lacks a column, or has something else than numbers there.
+        If the log cannot be read, lacks what an effect of the calibration needs, or is so far from
+        gravity in most rows that it must be in another unit.
     """
-    chunks = read_chunks(log, chunk_size)
-    first = next(chunks)  # before anything is written
-    missing = [name for name in columns if name not in first.column_names]
-    if missing or len(set(columns)) != 3:
-        raise InputError(
-            f"{log}: --columns must name three columns of {listed(first.column_names)}"
-        )
-    scale, offset = raw_conversion(calibration.content)
+    readings = readings_of(log, calibration, given, start or 0.0)
     noise = calibration.content["sigma_position_mps2"] if sigma is None else sigma
-    row = 0
+    account = Account(calibration, readings)
     with chunk_writer(out) as write:
-        for chunk in chain([first], chunks):
-            forces = (_numbers(chunk, columns, row, log) - offset) * scale
-            added = _leveled(calibration, forces, noise or 0.0)
-            if len(bad := np.flatnonzero(~np.isfinite(added["roll_gon"] + added["pitch_gon"]))):
-                raise InputError(
-                    f"{log}: row {row + bad[0] + 1}: the calibration makes no force of it"
-                )
-            write(_with(chunk, added))
-            row += len(chunk)
+        chunks = readings.chunks(chunk_size, typed=Path(out).suffix == ".parquet")
+        for table, forces, hold in track(chunks, "leveling"):
+            corrected, added = _leveled(calibration, readings.frame, forces, hold, noise or 0.0)
+            account.take(forces, corrected, hold)
+            write(_with(table, added))
+        account.close()
+    assumed = account.assumptions() if start is None else ()
+    return Leveled(account.rows, account.empty, (*assumed, *account.warnings()))
 
 
-def _numbers(chunk: pa.Table, columns: Sequence[str], row: int, log: str | Path) -> Array:
-    """Columns of a chunk that begins at `row`, (k, 3)."""
-    values = chunk.select(columns).to_pandas().apply(pd.to_numeric, errors="coerce")
-    numbers = values.to_numpy(float, na_value=np.nan)
-    bad = np.flatnonzero(~np.isfinite(numbers).all(axis=1))
-    if len(bad):
-        raise InputError(
-            f"{log}: row {row + bad[0] + 1}: {listed(columns)} must be three finite numbers"
-        )
-    return numbers
-
-
-def _leveled(calibration: Calibration, forces: Array, noise: float) -> dict[str, Array]:
-    """What is added to readings (k, 3) in m/s²."""
-    with np.errstate(all="ignore"):  # what is not finite is found, or a sigma without a meaning
-        corrected = calibration.correct(forces)
-        angles, sigmas = calibration.level(forces, noise)
-    added = {f"f{axis}_calibrated_mps2": corrected[:, i] for i, axis in enumerate("xyz")}
+def _leveled(
+    calibration: Calibration, frame: Frame, forces: Array, hold: Hold, noise: float
+) -> tuple[Array, dict[str, Array]]:
+    """Calibrated forces in frd of readings (k, 3), m/s², and what is added to their rows."""
+    with np.errstate(all="ignore"):  # what is not finite is counted, or a sigma without a meaning
+        corrected = calibration.correct(forces, hold)
+        angles, sigmas = calibration.level(forces, noise, hold)
+    lost = ~np.isfinite(corrected + angles[:, :1]).all(axis=1)
+    lost |= clipped(calibration, forces).any(axis=1)
+    corrected[lost] = np.nan
+    shown = frame.from_frd(corrected)
+    added = {f"{axis}_calibrated_mps2": shown[:, i] for i, axis in enumerate(AXES)}
     for i, angle in enumerate(("roll", "pitch")):
-        added[f"{angle}_gon"] = angles[:, i] / GON
+        added[f"{angle}_gon"] = frame.signs[i] * angles[:, i] / GON
         added[f"sigma_{angle}_mgon"] = sigmas[:, i] / MGON
-    return added
+    for name, values in added.items():
+        added[name] = np.where(lost | ~np.isfinite(values), np.nan, np.round(values, DECIMALS))
+    return corrected, added
 
 
 def _with(table: pa.Table, added: dict[str, Array]) -> pa.Table:
     """Table with columns added; those that it had by these names are replaced."""
     for name, values in added.items():
+        column = pa.array(values, from_pandas=True)  # NaN becomes null
         if name in table.column_names:
-            table = table.set_column(table.column_names.index(name), name, pa.array(values))
+            table = table.set_column(table.column_names.index(name), name, column)
         else:
-            table = table.append_column(name, pa.array(values))
+            table = table.append_column(name, column)
     return table

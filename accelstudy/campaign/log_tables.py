@@ -1,42 +1,164 @@
-"""Tables of any columns, CSV or Parquet, read and written a chunk of rows at a time.
+"""Logs with all their columns as they stand, read and written a chunk of rows at a time.
 
-What a column is (whole numbers, numbers, text, ...) must not depend on where a chunk ends, so it is
-found out before the first chunk is given.
+The cells of a text stay text, so that what is written again is what was there, and no type depends
+on where a chunk ends. Parquet has types; those of a text's columns are found out for it beforehand.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import csv
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
+from itertools import islice
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
-from accelstudy.campaign.log_files import CHUNK, open_parquet
+from accelstudy.campaign.log_files import (
+    CHUNK,
+    MatlabSource,
+    ParquetSource,
+    Source,
+    TextSource,
+    open_parquet,
+)
 from accelstudy.campaign.wording import one_line
 from accelstudy.errors import InputError
 from accelstudy.outputs import whole_file
 
+Array = NDArray[np.float64]
 
-def read_chunks(path: str | Path, chunk_size: int = CHUNK) -> Iterator[pa.Table]:
-    """Rows of a CSV or Parquet file, all chunks with the same schema; at least one, maybe empty.
+_DECIMAL_COMMA = r"^(\s*[+-]?[0-9]*),([0-9]+([eE][+-]?[0-9]+)?\s*)$"
+
+
+def read_chunks(source: Source, chunk_size: int = CHUNK, typed: bool = False) -> Iterator[pa.Table]:
+    """Rows of a log, all its columns in their order, all chunks with the same schema.
+
+    A row of a text that has not as many cells as the others has none: nobody knows which of them
+    are right.
 
     Parameters
     ----------
-    path : file; .parquet, anything else is CSV with a line of names
+    source : Source
     chunk_size : int, rows held in memory at a time
+    typed : bool, whether columns of a text are numbers where all of them is; reads it twice
 
     Raises
     ------
     InputError
-        If the file is missing or is no whole table.
+        If the file turns out not to be whole.
     """
-    path = Path(path)
-    return (_parquet_chunks if path.suffix == ".parquet" else _csv_chunks)(path, chunk_size)
+    names = column_names(source)
+    if isinstance(source, TextSource):
+        read = partial(_text_chunks, source, names, chunk_size)
+        return _with_types(read) if typed else read()
+    if isinstance(source, ParquetSource):
+        return _parquet_chunks(source, names, chunk_size)
+    assert isinstance(source, MatlabSource)
+    values = source.values
+    starts = range(0, len(values), chunk_size)
+    return (pa.table(list(values[i : i + chunk_size].T), names=names) for i in starts)
+
+
+def column_names(source: Source) -> list[str]:
+    """Names of the columns, all different: `column_0` … of a log without names."""
+    bare = source.names == [str(i) for i in range(len(source.names))]
+    names: list[str] = []
+    for name in source.names:
+        name = f"column_{name}" if bare else name
+        same = sum(other == name for other in source.names[: len(names)])
+        names.append(f"{name}.{same}" if same and not bare else name)
+    return names
+
+
+def numbers(column: pa.ChunkedArray) -> Array:
+    """Numbers of a column, NaN where there is none."""
+    if not pa.types.is_string(column.type):
+        if not (pa.types.is_integer(column.type) or pa.types.is_floating(column.type)):
+            return np.full(len(column), np.nan)
+        return column.cast(pa.float64(), safe=False).to_numpy()
+    try:
+        # Arrow reads any number in full precision, but stops at what is none.
+        return _cast(column, pa.float64()).to_numpy()
+    except pa.ArrowInvalid:
+        return pd.to_numeric(column.to_pandas(), errors="coerce").to_numpy(float, na_value=np.nan)
+
+
+def _holds(column: pa.ChunkedArray, kind: pa.DataType) -> bool:
+    """Whether all of a text can be of a kind, with all its digits."""
+    try:
+        _cast(column, kind)
+    except pa.ArrowInvalid:
+        return False
+    whole = pc.match_substring_regex(column, r"^\s*[+-]?[0-9]{16,}\s*$")
+    return pa.types.is_integer(kind) or not pc.any(whole).as_py()
+
+
+def _cast(column: pa.ChunkedArray, kind: pa.DataType) -> pa.ChunkedArray:
+    text = pc.utf8_trim_whitespace(column)
+    return pc.if_else(pc.equal(text, ""), None, text).cast(kind)
+
+
+# --- Reading -------------------------------------------------------------------------------------
+
+
+def _text_chunks(source: TextSource, names: list[str], chunk_size: int) -> Iterator[pa.Table]:
+    schema = pa.schema([(name, pa.string()) for name in names])
+    rows = _cells(source)
+    while chunk := list(islice(rows, chunk_size)):
+        columns = [pa.array(column, pa.string()) for column in zip(*chunk, strict=True)]
+        if source.decimal == ",":
+            columns = [pc.replace_substring_regex(c, _DECIMAL_COMMA, r"\1.\2") for c in columns]
+        yield pa.Table.from_arrays(columns, schema=schema)
+
+
+def _with_types(read: Callable[[], Iterable[pa.Table]]) -> Iterator[pa.Table]:
+    possible: dict[str, list[pa.DataType]] = {}
+    for table in read():
+        for name in table.column_names:
+            kinds = possible.setdefault(name, [pa.int64(), pa.float64()])
+            while kinds and not _holds(table[name], kinds[0]):
+                kinds.pop(0)
+    for table in read():
+        for i, (name, kinds) in enumerate(possible.items()):
+            if kinds:
+                table = table.set_column(i, name, _cast(table[name], kinds[0]))
+        yield table
+
+
+def _cells(source: TextSource) -> Iterator[Sequence[str | None]]:
+    lines = (line for _, line in source.rows())
+    if source.delimiter is None:
+        rows: Iterable[list[str]] = (line.split() for line in lines)
+    else:
+        rows = csv.reader(lines, delimiter=source.delimiter, skipinitialspace=True)
+    width, none = source.width, [None] * source.width
+    try:
+        for row in rows:
+            yield row if len(row) == width else none
+    except csv.Error as error:
+        raise InputError(f"{source.path}: no table: {one_line(error)}") from None
+
+
+def _parquet_chunks(source: ParquetSource, names: list[str], chunk_size: int) -> Iterator[pa.Table]:
+    try:
+        with open_parquet(source.path) as file:
+            # What pandas keeps beside the columns, the labels of its rows, is none of the log.
+            kept = [name for name in names if not name.startswith("__index_level_")]
+            for batch in file.iter_batches(chunk_size):
+                table = pa.Table.from_batches([batch]).replace_schema_metadata(None)
+                yield table.rename_columns(names).select(kept)
+    except (pa.ArrowException, OSError) as error:
+        raise InputError(f"{source.path}: not a whole Parquet file ({one_line(error)})") from None
+
+
+# --- Writing -------------------------------------------------------------------------------------
 
 
 @contextmanager
@@ -57,96 +179,37 @@ def chunk_writer(path: str | Path) -> Iterator[Callable[[pa.Table], None]]:
                 with temporary.open("w", encoding="utf-8", newline="") as file:
 
                     def write(table: pa.Table) -> None:
-                        _as_text(table).to_csv(file, index=False, header=not file.tell())
+                        if not file.tell():
+                            csv.writer(file, lineterminator="\n").writerow(table.column_names)
+                        file.write("".join(_lines(table)))
 
                     yield write
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
 
 
-# --- CSV -----------------------------------------------------------------------------------------
+def _lines(table: pa.Table) -> list[str]:
+    """Lines of CSV, put together by columns, which is an order faster than by rows."""
+    cells = [_text(name, table[name]) for name in table.column_names]
+    lines = pc.binary_join_element_wise(*cells, ",", null_handling="replace", null_replacement="")
+    return pc.binary_join_element_wise(lines, "", "\n").to_pylist()
 
 
-def _csv_chunks(path: Path, chunk_size: int) -> Iterator[pa.Table]:
-    schema = _csv_schema(path, chunk_size)
-    # pandas' own type of text keeps an empty cell apart, which str(...) would make "nan".
-    kinds = {f.name: "str" if f.type == pa.string() else f.type.to_pandas_dtype() for f in schema}
-    for chunk in _csv_frames(path, chunk_size, dtype=kinds):
-        table = pa.Table.from_pandas(chunk, schema=schema, preserve_index=False)
-        yield table.replace_schema_metadata(None)
-
-
-def _csv_schema(path: Path, chunk_size: int) -> pa.Schema:
-    """Types that hold the columns as a whole, each chunk of which may look like another."""
-    found: dict[str, set[np.dtype[Any]]] = {}
-    for chunk in _csv_frames(path, chunk_size):
-        for name in chunk:
-            column = chunk[name]
-            numeric = pd.api.types.is_bool_dtype(column) or pd.api.types.is_numeric_dtype(column)
-            kind = np.dtype(str(column.dtype)) if numeric and len(column) else np.dtype(object)
-            found.setdefault(str(name), set()).add(kind)
-    return pa.schema([(name, _common(kinds)) for name, kinds in found.items()])
-
-
-def _common(kinds: set[np.dtype[Any]]) -> pa.DataType:
-    if kinds == {np.dtype(bool)}:
-        return pa.bool_()
-    # Numbers beyond int64 are text here, as beside others they would lose digits.
-    if all(kind.kind in "if" for kind in kinds):
-        return pa.from_numpy_dtype(np.result_type(*kinds))
-    return pa.string()
-
-
-def _csv_frames(path: Path, chunk_size: int, **options: Any) -> Iterator[pd.DataFrame]:
+def _text(name: str, column: pa.ChunkedArray) -> pa.ChunkedArray:
+    """Column as cells of CSV; null where there is nothing, a NaN included."""
+    if pa.types.is_floating(column.type):
+        return pc.if_else(pc.is_nan(column), None, column).cast(pa.string())
     try:
-        with pd.read_csv(path, chunksize=chunk_size, low_memory=False, **options) as reader:
-            for chunk in reader:
-                if not isinstance(chunk.index, pd.RangeIndex):
-                    # pandas would take the first value for a label and shift the others.
-                    raise InputError(f"{path}: lines have more values than there are names")
-                yield chunk
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}") from None
-    except InputError:
-        raise
-    except (ValueError, pd.errors.ParserError) as error:
-        raise InputError(f"{path}: no CSV table: {one_line(error)}") from None
-
-
-def _as_text(table: pa.Table) -> pd.DataFrame:
-    """Frame whose text does not depend on what else is in the chunk."""
-    for i, field in enumerate(table.schema):
-        if pa.types.is_timestamp(field.type):
-            # pandas would show as many digits as the chunk needs.
-            table = table.set_column(i, field.name, table.column(i).cast(pa.string()))
-    return table.to_pandas(types_mapper=_NULLABLE.get)
-
-
-# A whole number beside an empty cell would become 1.0, though only in chunks with such a cell.
-_NULLABLE = {
-    pa.from_numpy_dtype(np.dtype(name.lower())): pd.api.types.pandas_dtype(name)
-    for name in ("Int8", "Int16", "Int32", "Int64", "UInt8", "UInt16", "UInt32", "UInt64")
-}
-
-
-# --- Parquet -------------------------------------------------------------------------------------
-
-
-def _parquet_chunks(path: Path, chunk_size: int) -> Iterator[pa.Table]:
-    try:
-        with open_parquet(path) as file:
-            # What pandas keeps beside the columns, the labels of its rows, is none of the log.
-            schema = file.schema_arrow.remove_metadata()
-            names = [name for name in schema.names if not name.startswith("__index_level_")]
-            if twice := next((name for name in names if names.count(name) > 1), None):
-                raise InputError(f"{path}: {twice!r}: the column stands twice")
-            yield schema.empty_table().select(names)
-            for batch in file.iter_batches(chunk_size, columns=names):
-                yield pa.Table.from_batches([batch]).replace_schema_metadata(None)
-    except OSError as error:
-        raise InputError(f"{path}: {one_line(error.strerror or error)}") from None
-    except pa.ArrowException as error:
-        raise InputError(f"{path}: not a whole Parquet file ({one_line(error)})") from None
+        text = column.cast(pa.string())
+    except (pa.ArrowInvalid, pa.ArrowNotImplementedError):
+        raise InputError(
+            f"column {name!r} is {one_line(column.type)}, which no text holds; write .parquet"
+        ) from None
+    special = pc.match_substring_regex(text, '[",\r\n]')
+    if not pc.any(special).as_py():
+        return text
+    quoted = pc.binary_join_element_wise("", pc.replace_substring(text, '"', '""'), "", '"')
+    return pc.if_else(special, quoted, text)
 
 
 @contextmanager

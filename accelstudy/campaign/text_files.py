@@ -139,7 +139,7 @@ class TextSource:
 
     def rows(self) -> Iterator[tuple[int, str]]:
         """Lines of data with their numbers, counted from 1."""
-        with self._open() as file:
+        with self._readable(), self._open() as file:
             for number, line in enumerate(file, 1):
                 if number > self.first and line.strip() and line.lstrip()[0] != self.comment:
                     yield number, line.rstrip("\n")

@@ -126,11 +126,13 @@ class Effect(Shaped):
         what changes a reading by 0.1 to 1 thousandth of g
     part : what has the effect, the "sensor" or the "rig" that turns it
     partial : bool, whether some of its parameters are left out
+    drifts : bool, whether it grows in proportion to time, and is known in its session only
     """
 
     kind = "effect"
     parameters: ClassVar[tuple[Parameter, ...]]
     part: ClassVar[Literal["sensor", "rig"]] = "sensor"
+    drifts: ClassVar[bool] = False
     partial: ClassVar[bool] = False
 
     @property

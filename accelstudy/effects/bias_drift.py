@@ -11,6 +11,7 @@ class BiasDrift(Effect):
     parameters = per_axis("d", "m/s^2/s", "d_%")
     equation = "d_i t"
     typical = (0.3e-6, 3e-6)
+    drifts = True
 
     def output(self, f, p, g, hold, xp):
         """Return d t."""

@@ -1,0 +1,147 @@
+"""What is learned of a log while it is leveled: what stays empty, lies far off or is assumed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.campaign.applying import Calibration
+from accelstudy.campaign.log_reading import Readings
+from accelstudy.campaign.ranges import Watch
+from accelstudy.campaign.wording import counted, listed
+from accelstudy.effects import Hold
+from accelstudy.errors import InputError
+from accelstudy.units import UNITS, display_unit, to_display
+
+Array = NDArray[np.float64]
+
+CLIPPED = 0.999
+"""Part of the sensor's range from which on a reading is none: a count less than all is the end."""
+
+
+def clipped(calibration: Calibration, forces: Array) -> NDArray[np.bool_]:
+    """Which readings (k, 3), m/s², are at the end of the sensor's range."""
+    full = calibration.content.get("range_mps2")
+    return np.abs(forces) >= CLIPPED * (np.inf if full is None else full)
+
+
+class Account:
+    """Takes in a log chunk by chunk.
+
+    Attributes
+    ----------
+    rows : int, so far
+    empty : int, rows of which no force could be made
+    """
+
+    def __init__(self, calibration: Calibration, readings: Readings) -> None:
+        self._calibration, self._readings = calibration, readings
+        self._watch = Watch(calibration.ranges)
+        self._norms = np.empty(0)
+        self._usable = self._far = self._first_empty = self._after = 0
+        self.rows = self.empty = 0
+
+    def take(self, forces: Array, corrected: Array, hold: Hold) -> None:
+        """Take in readings and calibrated forces (k, 3), m/s² in frd, and their conditions.
+
+        Raises
+        ------
+        InputError
+            If all of the first chunk is nowhere near gravity: the rest need not be read then.
+        """
+        lost = np.isnan(corrected[:, 0])
+        if lost.any() and not self.empty:
+            self._first_empty = self.rows + int(np.argmax(lost))
+        self.rows += len(lost)
+        self.empty += int(lost.sum())
+        norms = np.linalg.norm(forces, axis=1)
+        norms = norms[np.isfinite(norms)]
+        # Sensors are wrong by some tenths at worst; one that moves has other forces for moments.
+        gravity = self._calibration.gravity
+        self._far += int(np.sum((norms < gravity / 2) | (norms > gravity * 2)))
+        if not self._usable and len(norms):
+            self._norms = norms
+            if self._far == len(norms):
+                raise self._wrong_unit()
+        self._usable += len(norms)
+        if self._calibration.drifts and hold.time is not None:
+            self._after += int(np.sum(hold.time > self._session_end))
+        self._watch.look_at(corrected, hold)
+
+    def close(self) -> None:
+        """Raise `InputError` if nothing of the log is of use, or most of it far from gravity."""
+        if not self._usable:
+            path = self._readings.source.path
+            raise InputError(f"{path}: no row has three numbers; the first: {self._reason(0)}")
+        if 2 * self._far > self._usable:
+            raise self._wrong_unit()
+
+    def assumptions(self) -> Iterator[str]:
+        """What is taken for granted as long as nobody says when the log was started."""
+        timed = [effect for effect, column in self._calibration.needs if column == "time"]
+        if timed:
+            yield (
+                f"{listed(timed)}: the first row is taken for the start of the calibration "
+                "session; if it is not, give the seconds between them by --start"
+            )
+
+    def warnings(self) -> Iterator[str]:
+        """What a user should know of the log."""
+        of_all = f"of {counted(self.rows, 'row')}"
+        if self.empty:
+            first = self._reason(self._first_empty)
+            yield f"{self.empty} {of_all} have no calibrated force, their cells are empty; {first}"
+        if self._after:
+            yield (
+                f"{listed(self._calibration.drifts)}: kept as it was at the end of the calibration "
+                f"session, at {self._session_end:.0f} s, in {self._after} {of_all} that come later"
+            )
+        moved = dict.fromkeys(e for e, c in self._calibration.needs if c.startswith("step_"))
+        for name in moved:
+            yield f"{name} is not corrected ({self._sizes(name)}): a log has no position before"
+        yield from self._watch.warnings(self.rows)
+
+    @property
+    def _session_end(self) -> float:
+        return self._calibration.ranges.get("time_s", [0.0, np.inf])[1]
+
+    def _sizes(self, name: str) -> str:
+        model = self._calibration.model
+        values = dict(zip(model.parameter_names, self._calibration.parameters, strict=True))
+        (effect,) = (effect for effect in model.effects if effect.name == name)
+        return ", ".join(
+            f"{p.name} = {float(to_display(values[p.name], p.unit)):.3g} {display_unit(p.unit)}"
+            for p in effect.parameters
+        )
+
+    def _reason(self, row: int) -> str:
+        """Why a row has no calibrated force, with the place where it stands."""
+        source, places = self._readings.source, self._readings.places
+        where = f"row {row + 1}"
+        for key, place in places.items():
+            where, found = source.look_up(row, place)
+            try:
+                if np.isfinite(float(found.strip("'").replace(",", "."))):
+                    continue
+            except ValueError:
+                pass
+            return f"{where}, column {source.names[place]} ({key}): {found}"
+        full = self._calibration.content.get("range_mps2")
+        end = "" if full is None else f", or it is at the end of the range, ± {full:.4g} m/s²"
+        return f"{where}: the calibration has no force for such a reading{end}"
+
+    def _wrong_unit(self) -> InputError:
+        path, gravity = self._readings.source.path, self._calibration.gravity
+        norm = float(np.median(self._norms))
+        factor = abs(float(self._readings.scale[0]))
+        near = [
+            f"; it looks like {unit}, give --unit {unit}"
+            for unit in ("m/s^2", "g")
+            if gravity / 2 < norm / factor * UNITS["m/s^2"][unit] < gravity * 2
+        ]
+        return InputError(
+            f"{path}: the norm of the readings is about {norm:.3g} m/s², nowhere near gravity, "
+            f"{gravity:.3g} m/s²" + "".join(near or ["; give the --unit or the --columns of it"])
+        )

@@ -1,0 +1,186 @@
+"""How a log is read that a calibration is applied to, and what its effects need of each row."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from accelstudy.campaign.applying import Calibration
+from accelstudy.campaign.export import raw_conversion
+from accelstudy.campaign.layout import LogLayout
+from accelstudy.campaign.log_files import CHUNK, Source, open_source
+from accelstudy.campaign.log_tables import column_names, numbers, read_chunks
+from accelstudy.campaign.logs import AXES, TIME_UNITS, conversion, locate
+from accelstudy.effects import Hold
+from accelstudy.errors import InputError
+from accelstudy.frames import Frame
+from accelstudy.study.config.errors import first_error
+
+Array = NDArray[np.float64]
+
+OPTIONS = {"time": "--time or --rate", "temperature": "--temperature", "vibration": "--vibration"}
+"""Conditions that a log can tell, and the options that say where it does."""
+
+
+@dataclass(frozen=True)
+class Readings:
+    """A log as a calibration takes it.
+
+    Attributes
+    ----------
+    source : Source
+    places : mapping of fx, fy, fz, time, temperature and vibration to columns, as far as known
+    rate : float, 1/s, if it tells the time
+    time_factor : float, s per unit of the column of time
+    start : float, s, from the start of the calibration session to the first row
+    scale, offset : (3,), f = (raw − offset) · scale, in the axes of the log
+    frame : Frame, the axes of the log
+    """
+
+    source: Source
+    places: Mapping[str, int]
+    rate: float | None
+    time_factor: float
+    start: float
+    scale: Array
+    offset: Array
+    frame: Frame
+
+    def chunks(
+        self, chunk_size: int = CHUNK, typed: bool = False
+    ) -> Iterator[tuple[pa.Table, Array, Hold]]:
+        """Rows as they stand, their forces (k, 3) in m/s² in frd, and their conditions.
+
+        See `read_chunks` for `typed`.
+        """
+        names, row, first = column_names(self.source), 0, np.nan
+        for table in read_chunks(self.source, chunk_size, typed):
+            values = {key: numbers(table[names[place]]) for key, place in self.places.items()}
+            forces = np.column_stack([values[axis] for axis in AXES])
+            time = values.get("time")
+            if self.rate is not None:
+                time = self.start + np.arange(row, row + len(table)) / self.rate
+            elif time is not None:
+                if np.isnan(first):
+                    first = next(iter(time[np.isfinite(time)]), np.nan)
+                time = self.start + (time - first) * self.time_factor
+            # A log does not tell the position before: effects that need it add nothing.
+            still = np.zeros(len(table))
+            hold = Hold(
+                time=time,
+                temperature=values.get("temperature"),
+                vibration=values.get("vibration"),
+                step_x=still,
+                step_y=still,
+                step_z=still,
+            )
+            yield table, self.frame.to_frd((forces - self.offset) * self.scale), hold
+            row += len(table)
+
+
+def readings_of(
+    log: str | Path,
+    calibration: Calibration,
+    given: Mapping[str, Any] | None = None,
+    start: float = 0.0,
+) -> Readings:
+    """Open a log, read as the one that the campaign was made of unless it is told otherwise.
+
+    Parameters
+    ----------
+    log : file, of any kind that `open_source` reads
+    calibration : Calibration
+    given : mapping, optional
+        Keys of `LogLayout`, and columns of temperature and vibration. Columns of the forces replace
+        all that are known from the campaign; so does a column of time, or a rate.
+    start : float, s, from the start of the calibration session to the first row
+
+    Returns
+    -------
+    Readings
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, lacks a column, or does not tell what an effect needs.
+    """
+    given = dict(given or {})
+    layout = _layout(calibration, given)
+    source = open_source(log, layout.variable)
+    try:
+        places = _places(source, layout, calibration, {*given, *given.get("columns", {})})
+    except InputError as error:
+        if calibration.log is None or "columns" in given:
+            raise
+        raise InputError(
+            f"{error}; looked for as in the log of the campaign, --columns and --time say otherwise"
+        ) from None
+    for effect, condition in calibration.needs:
+        known = condition in places or (condition == "time" and layout.rate_hz is not None)
+        if condition in OPTIONS and not known:
+            raise InputError(
+                f"{log}: the effect {effect} needs the {condition} of each row; "
+                f"{OPTIONS[condition]} says it"
+            )
+    scale, offset = _conversion(calibration, layout, given.get("unit"))
+    factor = TIME_UNITS[layout.time_unit]
+    return Readings(source, places, layout.rate_hz, factor, start, scale, offset, layout.axes)
+
+
+def _layout(calibration: Calibration, given: Mapping[str, Any]) -> LogLayout:
+    """Layout of the campaign's log, overlaid with what is given."""
+    known = {} if calibration.log is None else calibration.log.model_dump(exclude_none=True)
+    if given.keys() & {"time", "rate_hz"}:
+        known = {key: value for key, value in known.items() if key not in ("time", "rate_hz")}
+    columns = {
+        **given.get("columns", known.get("columns", {})),
+        **{key: given[key] for key in ("temperature", "vibration") if key in given},
+    }
+    others = {k: v for k, v in given.items() if k in LogLayout.model_fields}
+    try:
+        return LogLayout.model_validate({**known, **others, "columns": columns})
+    except ValidationError as error:
+        raise InputError(f"options: {first_error(error, LogLayout)}") from None
+
+
+def _places(
+    source: Source, layout: LogLayout, calibration: Calibration, given: set[str]
+) -> dict[str, int]:
+    """Columns of the log; one that no effect needs may be missing, unless it was asked for."""
+    columns = dict(layout.columns)
+    if layout.time is not None:
+        columns["time"] = layout.time
+    needed = {condition for _, condition in calibration.needs}
+    if layout.rate_hz is not None:
+        columns.pop("time", None)
+        needed.discard("time")
+    places = locate(source, {k: v for k, v in columns.items() if k not in OPTIONS}, AXES)
+    for key in OPTIONS:
+        if key in needed or (key in columns and key != "time"):
+            wanted = {key: columns[key]} if key in columns else {}
+            try:
+                places |= locate(source, wanted, (key,), needed=False)
+            except InputError:
+                if key in needed or key in given:
+                    raise
+    return places
+
+
+def _conversion(
+    calibration: Calibration, layout: LogLayout, unit: str | None
+) -> tuple[Array, Array]:
+    """Scale and offset (3,) of the readings, in the axes of the log."""
+    if calibration.log is None and unit in (None, calibration.content["unit"]):
+        return raw_conversion(calibration.content)
+    if layout.unit != "counts":
+        return conversion(layout.unit, None, None)
+    if layout.scale is None:
+        raise InputError("--unit counts: the calibration has no nominal scale of counts")
+    return conversion("counts", layout.scale, layout.offset)
