@@ -25,7 +25,7 @@ from accelstudy.options import (
     example,
     model_option,
 )
-from accelstudy.units import angles_in
+from accelstudy.units import ANGLE_UNIT_VARIABLE, angles_in
 
 SECTIONS = {
     "Campaigns, measured or simulated": (
@@ -80,7 +80,7 @@ class Commands(click.Group):
     type=ANGLE_UNIT,
     default="gon",
     show_default=True,
-    envvar="ACCELSTUDY_ANGLE_UNIT",
+    envvar=ANGLE_UNIT_VARIABLE,
     show_envvar=True,
     help="Unit in which commands, pages and figures show angles, gon or deg.",
 )
@@ -137,7 +137,7 @@ def schemes(model: str, approach: str, names: tuple[str, ...]) -> None:
     click.echo(
         "\nrank and condition: of the scaled design at the ideal sensor; r: conditions - unknowns;"
         "\nm: mean of x²y²; pole: distance to the x axis, where roll is undefined;"
-        f"\n{angle_note()}"
+        f"\n{angle_note()}."
         f"\nFamilies: {', '.join(scheme_families())}."
     )
 
@@ -200,7 +200,7 @@ def effects(campaign: Path | None, scheme: str | None, model: str, approach: str
     if campaign is None and scheme is None:
         from accelstudy.catalogue import catalogue
 
-        click.echo(f"{catalogue()}\n\n{angle_note()}")
+        click.echo(f"{catalogue()}\n\n{angle_note()}.")
         return
     if campaign is not None and scheme is not None:
         raise InputError("effects: --campaign and --scheme exclude each other; give one of them")
@@ -223,7 +223,7 @@ def effects(campaign: Path | None, scheme: str | None, model: str, approach: str
         "\nMDB: size of one parameter that a test at 0.1 % detects with a probability of 80 %;"
         "\nMIB: size at which the effect can also be told from the one it is most like;"
         "\nconfused with: the nearest effects and the cosine of their signatures, 1 for the same."
-        f"\n{angle_note()}"
+        f"\n{angle_note()}."
     )
 
 

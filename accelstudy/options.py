@@ -12,7 +12,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from accelstudy.progress import feedback
-from accelstudy.units import angles_in
+from accelstudy.units import ANGLE_UNIT_VARIABLE, angles_in
 
 PATH = click.Path(path_type=Path)
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -86,7 +86,7 @@ def angle_unit_option(command: Command) -> Command:
         "--angle-unit",
         type=ANGLE_UNIT,
         metavar="[gon|deg]",
-        help="Unit of the angles that are shown.  [default: gon, or ACCELSTUDY_ANGLE_UNIT]",
+        help=f"Unit of the angles that are shown.  [default: gon, or {ANGLE_UNIT_VARIABLE}]",
     )
     @wraps(command)
     def within(*args: Any, angle_unit: str | None, **kwargs: Any) -> Any:

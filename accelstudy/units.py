@@ -60,6 +60,8 @@ UNITS: dict[str, dict[str, float]] = {
 
 ANGLE_UNITS = {"gon": "mgon", "deg": "mdeg"}
 """Units in which angles can be shown: that of an attitude -> that of a small angle."""
+ANGLE_UNIT_VARIABLE = "ACCELSTUDY_ANGLE_UNIT"
+"""Environment variable with the user's choice of them, which commands and workflows heed."""
 _angle_unit: ContextVar[str] = ContextVar("angle_unit", default="gon")
 
 
@@ -94,10 +96,10 @@ def to_attitude(angle: ArrayLike) -> NDArray[np.float64]:
 
 
 def angle_note() -> str:
-    """Sentence that introduces the unit of angles where it is first used."""
+    """Explain the unit of angles, where it is first used."""
     if attitude_unit() == "gon":
-        return "100 gon = 90°, 1 mgon = 0.0009°."
-    return "90° = 100 gon, 1 mdeg = 0.001°."
+        return "100 gon = 90°, 1 mgon = 0.0009°"
+    return "90° = 100 gon, 1 mdeg = 0.001°"
 
 
 def recorded_unit(unit: str) -> str:

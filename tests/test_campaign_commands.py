@@ -1,6 +1,7 @@
 """Measured data from the command line: calibrate, apply, export, check-sigmas."""
 
 import json
+import re
 
 import numpy as np
 import pandas as pd
@@ -46,6 +47,33 @@ def test_calibrate_writes_everything(campaign, tmp_path, approach):
     for name in ("residuals", "correlations"):
         assert (tmp_path / f"out/figures/{name}.png").stat().st_size > 1000
     assert not list((tmp_path / "out").rglob("*.part"))
+
+
+def test_degrees_on_the_page_and_gon_in_the_file(campaign, tmp_path):
+    found = {}
+    for unit, small in (("gon", "mgon"), ("deg", "mdeg")):
+        out = tmp_path / unit
+        result = run(
+            *("calibrate", campaign, "--approach", "robot", "--out", out, "--angle-unit", unit)
+        )
+        assert result.exit_code == 0, result.output
+        page = (out / "report.html").read_text(encoding="utf-8").partition("</style>")[2]
+        for text in (result.stdout, page.partition("1 mdeg = 0.001°")[2] or page):
+            assert small in text
+            assert not ({"mgon", "mdeg"} - {small}) & set(re.findall(r"m(?:gon|deg)", text))
+        found[unit] = json.loads((out / "calibration.json").read_text(encoding="utf-8"))
+        found[unit]["quality"].pop("verdict")
+    assert found["deg"] == found["gon"]
+    shown = re.search(r"alpha_zx = +([\d.-]+) ± ([\d.]+) mdeg", result.stdout)
+    (alpha,) = (p for p in found["deg"]["parameters"] if p["name"] == "alpha_zx")
+    assert float(shown[1]) == pytest.approx(1e3 * np.degrees(alpha["value"]), abs=1e-4)
+    assert float(shown[2]) == pytest.approx(1e3 * np.degrees(alpha["sigma"]), abs=1e-4)
+
+
+def test_quiet(campaign, tmp_path):
+    result = run("calibrate", campaign, "--out", tmp_path / "out", "--quiet")
+    assert (result.exit_code, result.output) == (0, "")
+    assert (tmp_path / "out/report.html").exists()
 
 
 def test_a_bumped_position_is_named(tmp_path):

@@ -23,6 +23,7 @@ from accelstudy.errors import InputError
 from accelstudy.models import get_model
 from accelstudy.study.config import read_study
 from accelstudy.study.report import number
+from accelstudy.units import MGON, angles_in
 from accelstudy.wording import p_value
 
 NINE = get_model("bias-scale-nonorthogonality")
@@ -238,6 +239,15 @@ def test_the_old_simulation_lacks_the_measurement(written, tmp_path):
     out, content, _ = written("named")
     shown = number(content["loop"]["cases"][0]["tilt_rms_mgon"])
     assert f"promises a tilt error of {shown} mgon" in (out / "report.html").read_text("utf-8")
+
+    with angles_in("deg"):
+        document = write_diagnosis(diagnosis, tmp_path / "deg", loop=loop)
+    assert document["gap"]["leveling_rms_mgon"]["before"] == pytest.approx(before / MGON)
+    page = (tmp_path / "deg/report.html").read_text("utf-8").partition("90° = 100 gon")[2]
+    promised = document["loop"]["cases"][0]["tilt_rms_mgon"]
+    assert f"promises a tilt error of {number(0.9 * promised)} mdeg" in page
+    assert "tilt error / mdeg" in page
+    assert re.findall(r"(?:[^.\w]|m)gon", page) == []
 
 
 def test_positions_that_are_just_enough_to_calibrate_show_nothing(tmp_path):

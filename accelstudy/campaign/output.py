@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from jinja2 import Environment, PackageLoader
 
 from accelstudy.campaign.assessment import assess, positions_table
 from accelstudy.campaign.document import calibration_document, json_text, quality_document
@@ -15,7 +14,9 @@ from accelstudy.campaign.fit import CampaignFit
 from accelstudy.figures.saving import save_all
 from accelstudy.figures.style import unit_label
 from accelstudy.outputs import whole_file
+from accelstudy.pages import page_environment
 from accelstudy.study.report import number
+from accelstudy.units import display_unit, to_display
 
 LISTED = 200
 """Positions up to which the page lists all of them; of more, those that fit worst."""
@@ -41,8 +42,8 @@ def write_calibration(fit: CampaignFit, folder: str | Path) -> dict[str, Any]:
     with whole_file(folder / "positions.parquet") as path:
         positions.to_parquet(path, index=False)
 
-    environment = Environment(loader=PackageLoader("accelstudy", "campaign"), autoescape=True)
-    environment.filters.update(number=number, unit=unit_label)
+    environment = page_environment("campaign")
+    environment.filters.update(unit=lambda unit: unit_label(display_unit(unit)))
     page = environment.get_template("report.html.j2").render(
         doc=document,
         quality=quality,
@@ -66,6 +67,4 @@ def _listed(positions: pd.DataFrame) -> pd.DataFrame:
 
 def _shown(parameter: dict[str, Any], value: float | None) -> str:
     """Show an SI value of a parameter in the unit of the table."""
-    if value is None or parameter["sigma"] is None:
-        return "–"
-    return number(value * parameter["shown"]["sigma"] / parameter["sigma"])
+    return "–" if value is None else number(to_display(value, parameter["unit"]).item())

@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from jinja2 import Environment, PackageLoader
 
 from accelstudy.campaign.batch import STATUS
 from accelstudy.campaign.verdict import BLIND
 from accelstudy.outputs import whole_file
+from accelstudy.pages import page_environment
 from accelstudy.study.report import number
 from accelstudy.study.tables import write_table
-from accelstudy.units import MGON
+from accelstudy.units import MGON, UNITS, display_unit
 
 CAMPAIGN_COLUMNS = {
     "campaign": "string",
@@ -155,9 +155,7 @@ def _page(batch: str, table: pd.DataFrame, links: list[dict[str, str | None]]) -
         {**{k: None if pd.isna(v) else v for k, v in row.items()}, **link}
         for row, link in zip(table.to_dict("records"), links, strict=True)
     ]
-    environment = Environment(
-        loader=PackageLoader("accelstudy", "campaign"), autoescape=True, trim_blocks=True
-    )
+    environment = page_environment("campaign", trim_blocks=True)
     environment.filters.update(shown=_shown, p_value=_p_value)
     return environment.get_template("overview.html.j2").render(
         batch=batch,
@@ -165,7 +163,7 @@ def _page(batch: str, table: pd.DataFrame, links: list[dict[str, str | None]]) -
         calibrated=[row for row in rows if row["status"] == "ok"],
         robot=table["held_out_roll_rad"].notna().any(),
         blind=BLIND,
-        mgon=MGON,
+        small_angle=UNITS["rad"][display_unit("rad")],
     )
 
 

@@ -22,7 +22,7 @@ from accelstudy.diagnosis.search import LEVEL_EFFECTS
 from accelstudy.diagnosis.wording import GROUPS, words
 from accelstudy.figures.style import FULL, INK, log_ticks, new_figure
 from accelstudy.study.report import number
-from accelstudy.units import MGON
+from accelstudy.units import display_unit, to_display
 
 Array = NDArray[np.float64]
 
@@ -272,8 +272,8 @@ def loop_figure(loop: Loop) -> Figure:
     place = np.arange(len(CASES))[::-1]
     ends = []
     for case, y, colour in zip(CASES, place, colours, strict=True):
-        values = loop.case(*case)["tilt_error_rad"] / MGON
-        rms = loop.tilt(*case) / MGON
+        values = to_display(loop.case(*case)["tilt_error_rad"], "rad")
+        rms = to_display(loop.tilt(*case), "rad").item()
         low, high = np.quantile(values, [0.025, 0.975])
         ends += [float(low), float(high)]
         tilt.hlines(y, low, high, color=colour, linewidth=5, alpha=0.4)
@@ -282,7 +282,7 @@ def loop_figure(loop: Loop) -> Figure:
                       ha="center", fontsize=7.5)  # fmt: skip
     tilt.set_yticks(place, titles)
     tilt.set_ylim(-0.5, len(CASES) - 0.3)
-    tilt.set_xlabel("tilt error / mgon")
+    tilt.set_xlabel(f"tilt error / {display_unit('rad')}")
     tilt.grid(axis="y", visible=False)
     _scale(tilt, min(ends), max(ends))
     return figure

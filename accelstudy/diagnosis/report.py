@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from jinja2 import Environment, PackageLoader
 
 from accelstudy.diagnosis import wording
 from accelstudy.diagnosis.figures import diagnosis_figures
@@ -16,7 +15,7 @@ from accelstudy.diagnosis.search import LEVEL_EFFECTS, SURE
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.figures.saving import save_all
 from accelstudy.outputs import whole_file
-from accelstudy.study.report import number
+from accelstudy.pages import page_environment
 from accelstudy.wording import joined, p_value, probability
 
 
@@ -38,14 +37,8 @@ def write_report(
     folder : Path
     """
     drawn = save_all(diagnosis_figures(diagnosis, positions, loop), folder / "figures")
-    environment = Environment(
-        loader=PackageLoader("accelstudy", "diagnosis"),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    environment = page_environment("diagnosis", trim_blocks=True, lstrip_blocks=True)
     environment.filters.update(
-        number=number,
         p=probability,
         p_value=p_value,
         words=wording.words,

@@ -9,7 +9,7 @@ from accelstudy.diagnosis.pipeline import Diagnosis, Named
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.figures.style import unit_label
 from accelstudy.study.report import number
-from accelstudy.units import MGON, display_unit, to_display
+from accelstudy.units import display_unit, to_display
 from accelstudy.wording import joined, p_value
 
 GROUPS = {
@@ -92,10 +92,11 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
             "parameters are those without it."
         )
     if d.gap.leveling is not None:
-        before, after = (number(value / MGON) for value in d.gap.leveling)
+        before, after = (amount(value, "rad") for value in d.gap.leveling)
+        unit = display_unit("rad")
         lines.append(
-            f"Tilt error of the calibrated sensor: {before} mgon if the model lacks it, "
-            f"{after} mgon if not."
+            f"Tilt error of the calibrated sensor: {before} {unit} if the model lacks it, "
+            f"{after} {unit} if not."
         )
     if d.verdict == "named":
         lines.append(confirmation(d))

@@ -1,10 +1,12 @@
 import logging
+import os
 
 from accelstudy.diagnosis.output import diagnose_folder
 from accelstudy.diagnosis.wording import verdict_lines
 from accelstudy.study.job import logged
+from accelstudy.units import ANGLE_UNIT_VARIABLE, angles_in
 
-with logged(snakemake):
+with logged(snakemake), angles_in(os.environ.get(ANGLE_UNIT_VARIABLE)):
     diagnosis = diagnose_folder(
         snakemake.input[0], snakemake.output[0], **snakemake.params.settings
     )

@@ -1,8 +1,11 @@
+import os
+
 from accelstudy.campaign.batch_config import parse_batch
 from accelstudy.campaign.overview import summarise_batch
 from accelstudy.study.job import logged
+from accelstudy.units import ANGLE_UNIT_VARIABLE, angles_in
 
-with logged(snakemake):
+with logged(snakemake), angles_in(os.environ.get(ANGLE_UNIT_VARIABLE)):
     batch = parse_batch(snakemake.config)
     table = summarise_batch(
         batch.batch,
