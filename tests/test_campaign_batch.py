@@ -273,6 +273,7 @@ def test_what_cannot_be_downloaded_is_reported_and_tried_again(tmp_path):
     """A copy of the package that has a registry of its own, of a file on this machine."""
     package = Path(shutil.copytree(accelstudy.__path__[0], tmp_path / "package" / "accelstudy"))
     environment = {**ENVIRONMENT, "PYTHONPATH": str(package.parent)}
+    environment["ACCELSTUDY_ANGLE_UNIT"] = "deg"
     registry = package / "campaign" / "public_data.yaml"
     log = write_log(tmp_path / "source")
     away = log.rename(tmp_path / "away.parquet")
@@ -293,6 +294,10 @@ def test_what_cannot_be_downloaded_is_reported_and_tried_again(tmp_path):
     away.rename(log)
     one_line(succeed(tmp_path, config, environment=environment), "2 of 2 campaigns calibrated")
     assert (tmp_path / "downloads" / "bench-log" / "log.parquet").is_file()
+    for path in ("overview.html", "campaigns/good/report.html"):
+        page = (tmp_path / "results/b" / path).read_text(encoding="utf-8")
+        assert "mdeg" in page
+        assert "mgon" not in page
     log.unlink()  # what is there is not got again
     assert "Nothing to be done" in succeed(tmp_path, config, environment=environment)
 
