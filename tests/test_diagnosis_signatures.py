@@ -5,7 +5,7 @@ import pytest
 from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, design, shuffled, some_holds
 
 from accelstudy.diagnosis.hypotheses import cosines, same_space
-from accelstudy.diagnosis.limits import signature_columns
+from accelstudy.diagnosis.limits import signature_columns, upper_limits, visibilities
 from accelstudy.diagnosis.signatures import signature
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.sensor import SensorModel
@@ -138,3 +138,30 @@ def test_what_an_effect_leaves_in_the_residuals(name, approach):
         @ p
     )
     assert np.linalg.norm(fitted - expected) < 2e-3 * scale + 1e-9
+
+
+# --- what can be seen ----------------------------------------------------------------------------
+
+
+def test_an_effect_is_judged_in_the_settings_that_a_diagnosis_tries():
+    """A jump before the last holds, which point the same way, hardly shows; one in the middle does.
+
+    What is excluded by the residuals and what they would show go together.
+    """
+    directions = shuffled("fibonacci-30")
+    directions[-3:] = [[0, 0, 1], [0, 0.01, 1], [0.01, 0, 1]]
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    setting = design(directions, GRAVITY, some_holds(30), seed=1)
+    rows = {row.name: row for row in visibilities(setting)}
+    jump = rows["bias_jump"]
+    tried = [h.effect.spec for h in setting.candidates["bias_jump"]]
+    assert {jump.easiest.spec, jump.hardest.spec} <= set(tried)
+    assert 600 < jump.easiest.shape["t"] < 1200 < jump.hardest.shape["t"]
+    assert jump.hardest_mdb > 5 * jump.mdb
+    limits = {limit.name: limit.value for limit in upper_limits(setting, 1.0, ())}
+    for name in ("bias_jump", "warm_up", "saturation"):
+        assert rows[name].mdb < 3 * limits[name], name
+    for row in rows.values():
+        if row.status == "visible" and len(setting.candidates[row.name]) == 1:
+            assert row.mdb == row.hardest_mdb, row.name
+    assert rows["bias_drift"].easiest.shape == {}

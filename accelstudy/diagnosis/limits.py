@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from accelstudy.adjustment.quality import noncentrality
 from accelstudy.diagnosis.hypotheses import ALIKE, OUTLIER, Frame, Hypothesis, Setting, cosines
 from accelstudy.diagnosis.signatures import signature
-from accelstudy.effects import get_effect
+from accelstudy.effects import Effect, get_effect
 
 Array = NDArray[np.float64]
 
@@ -42,6 +42,9 @@ class Visibility:
     mib : float, size at which the effect can also be told from the nearest other one, likewise
     unit : str, SI unit of the parameters
     confused : tuple of (name, cosine), the nearest other effects
+    easiest : Effect, in the shape that all this is said of; None if it is not visible
+    hardest : Effect, in the shape that is hardest to see of those that a diagnosis tries
+    hardest_mdb : float, its MDB
     """
 
     name: str
@@ -51,6 +54,9 @@ class Visibility:
     mib: float = np.inf
     unit: str = ""
     confused: tuple[tuple[str, float], ...] = ()
+    easiest: Effect | None = None
+    hardest: Effect | None = None
+    hardest_mdb: float = np.inf
 
 
 def signature_columns(frame: Frame, hypothesis: Hypothesis) -> Array:
@@ -60,6 +66,11 @@ def signature_columns(frame: Frame, hypothesis: Hypothesis) -> Array:
         hypothesis.effect, frame.sensed, frame.angles, frame.solution.gravity, frame.hold
     )
     return frame.residuals.project(frame.residuals.whitened(shown))
+
+
+def whole_shapes(shapes: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Shapes of an effect in which all its parameters show."""
+    return [h for h in shapes if h.effect is not None and h.dim == len(h.effect.parameters)]
 
 
 def upper_limits(setting: Setting, variance: float, named: Sequence[str]) -> list[UpperLimit]:
@@ -73,7 +84,7 @@ def upper_limits(setting: Setting, variance: float, named: Sequence[str]) -> lis
     for name, shapes in setting.candidates.items():
         if name == OUTLIER or name in named:
             continue
-        whole = [h for h in shapes if h.dim == len(get_effect(name).parameters)]
+        whole = whole_shapes(shapes)
         if not whole:
             continue
         best = max(whole, key=lambda h: float(np.sum((setting.frame.residuals.z @ h.basis) ** 2)))
@@ -94,41 +105,43 @@ def visibilities(setting: Setting, alpha: float = 0.001, power: float = POWER) -
 
     The MDB is the size √(λ0 / dᵀd) of a single parameter whose test of level `alpha` has `power`;
     for the minimal identifiable bias only what the nearest rival cannot imitate of d counts. An
-    effect with a setting is taken in the shape that is hardest to see or, where a shape can be as
-    faint as one likes (a smooth setting), with the setting that it has by default.
+    effect with a setting is taken in the shape that shows best of those that a diagnosis tries, and
+    in which all its parameters show if there is one; as a jump may happen at any time, the shape
+    that shows worst is given, too.
     """
     root = np.sqrt(noncentrality(1, alpha, power))
     rows = []
     for name, shapes in setting.candidates.items():
         if name == OUTLIER:
             continue
-        columns = [signature_columns(setting.frame, h) for h in shapes]
+        judged = whole_shapes(shapes) or shapes
+        columns = [signature_columns(setting.frame, h) for h in judged]
         sizes = [np.linalg.norm(c, axis=0) for c in columns]
-        if shapes[0].smooth is None:
-            hardest = int(np.argmin([s.min() for s in sizes]))
-        else:
-            usual = get_effect(name).shape[shapes[0].smooth]
-            hardest = int(np.argmin([abs(h.value - usual) for h in shapes]))
-        best = shapes[hardest]
+        mdbs = [_size(root, s) for s in sizes]
+        easiest, hardest = int(np.argmin(mdbs)), int(np.argmax(mdbs))
+        best = judged[easiest]
         near = setting.nearest(best)
         rivals = [
             max(setting.candidates[other], key=lambda h: float(cosines(best.ideal, h.ideal)[0]))
             for other, cosine in near
             if cosine <= ALIKE
         ]
-        left = sizes[hardest]
+        left = sizes[easiest]
         for rival in rivals:
-            rest = columns[hardest] - rival.basis @ (rival.basis.T @ columns[hardest])
+            rest = columns[easiest] - rival.basis @ (rival.basis.T @ columns[easiest])
             left = np.minimum(left, np.linalg.norm(rest, axis=0))
         assert best.effect is not None
         rows.append(
             Visibility(
                 name=name,
                 status="visible",
-                mdb=_size(root, sizes[hardest]),
+                mdb=mdbs[easiest],
                 mib=_size(root, left),
                 unit=best.effect.parameters[0].unit,
                 confused=near[:3],
+                easiest=best.effect,
+                hardest=judged[hardest].effect,
+                hardest_mdb=mdbs[hardest],
             )
         )
     rows += [

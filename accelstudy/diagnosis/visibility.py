@@ -11,11 +11,12 @@ from accelstudy.campaign.fit import fit_campaign
 from accelstudy.campaign.format import Campaign
 from accelstudy.diagnosis.hypotheses import Setting, setting_of
 from accelstudy.diagnosis.limits import visibilities
-from accelstudy.effects import get_effect
+from accelstudy.effects import Effect, get_effect
 from accelstudy.hold_plan import check_needs_no_plan
 from accelstudy.schemes import Scheme
 from accelstudy.sensor import SensorModel
 from accelstudy.simulation import Noise, session
+from accelstudy.study.report import number
 from accelstudy.units import display_unit, to_display
 
 
@@ -57,9 +58,10 @@ def visibility_table(setting: Setting) -> pd.DataFrame:
     rows = []
     for row in visibilities(setting):
 
-        def shown(size: float, unit: str = row.unit) -> str:
-            return f"{float(to_display(size, unit)):.3g}" if np.isfinite(size) else "–"
+        def shown(size: float, unit: str = row.unit, seen: bool = row.status == "visible") -> str:
+            return number(float(to_display(size, unit))) if seen else "–"
 
+        worst = _settings(row.hardest)
         rows.append(
             {
                 "effect": row.name,
@@ -68,8 +70,18 @@ def visibility_table(setting: Setting) -> pd.DataFrame:
                 "MDB": shown(row.mdb),
                 "MIB": shown(row.mib),
                 "unit": display_unit(row.unit) if row.status == "visible" else "",
+                "with": _settings(row.easiest),
+                "worst MDB": f"{shown(row.hardest_mdb)} with {worst}" if worst else "",
                 "confused with": row.reason
                 or ", ".join(f"{name} {cosine:.2f}" for name, cosine in row.confused),
             }
         )
     return pd.DataFrame(rows)
+
+
+def _settings(effect: Effect | None) -> str:
+    """Settings of an effect as it is written, with their units: ``t=290 s``."""
+    if effect is None:
+        return ""
+    units = {hyper.name: "" if hyper.unit == "1" else f" {hyper.unit}" for hyper in effect.hypers}
+    return ", ".join(f"{name}={value:.4g}{units[name]}" for name, value in effect.shape.items())
