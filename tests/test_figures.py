@@ -20,6 +20,7 @@ from accelstudy.figures import (
     style,
     total_effects,
 )
+from accelstudy.figures.factors import FACTORS
 from accelstudy.models import MODELS
 from accelstudy.study.analysis import analyse_sensitivity
 from accelstudy.study.cells import study_cells
@@ -53,12 +54,6 @@ PAPER = {
         "pitch_gon": [-25, 0, 25],
     },
     "paper": True,
-}
-SWEEPS = {
-    "sensor": {"sensor_sigma_mps2": [0.001, 0.002]},
-    "robot": {"robot_sigma_mgon": [0, 3.2, 10]},
-    "gravity": {"gravity_error_mps2": [-0.01, 0, 0.01], "gravity_sigma_mps2": [0, 0.001]},
-    "positions": {"schemes": ["fibonacci-12", "fibonacci-24"]},
 }
 
 
@@ -98,13 +93,6 @@ def tables(paper, tmp_path_factory) -> dict[str, pd.DataFrame]:
     return run(paper, tmp_path_factory.mktemp("paper"))
 
 
-def sweep_study(name: str) -> StudyConfig:
-    grid = {"models": NINE, "schemes": "mclaren-24", "replicates": 5, **SWEEPS[name]}
-    return parse_study(
-        {"study": name, "seed": 1, "sensor": SENSOR, "grids": [grid], "leveling": {"attitudes": 5}}
-    )
-
-
 def paint(drawn: Figure) -> None:
     """Draw everything, without the time that a good layout takes."""
     drawn.set_layout_engine("none")
@@ -122,6 +110,7 @@ def texts(drawn: Figure) -> list[str]:
 
 
 ALL = figure_names(parse_study(PAPER))
+SWEEPS = [f"sweep-{factor.name}" for factor in FACTORS]
 
 
 def test_a_paper_study_has_the_figures_of_the_paper_and_of_every_study():
@@ -130,20 +119,17 @@ def test_a_paper_study_has_the_figures_of_the_paper_and_of_every_study():
     assert sorted(ALL) == sorted(expected)
 
 
-def test_other_studies_have_the_figures_that_fit_them():
-    assert figure_names(sweep_study("sensor")) == ("closed-forms", "sweep")
-    assert figure_names(sweep_study("positions")) == ("closed-forms", "leveling-overview", "sweep")
-
-
-@pytest.mark.parametrize("name", [*ALL, "sweep"])
+@pytest.mark.parametrize("name", [*ALL, *SWEEPS])
 def test_every_figure_has_a_caption_and_a_title(name):
-    assert len((CAPTIONS / f"{name}.rst").read_text(encoding="utf-8").split()) > 20
+    caption = CAPTIONS / f"{get_figure(name).caption}.rst"
+    assert len(caption.read_text(encoding="utf-8").split()) > 20
     assert get_figure(name).title
     assert get_figure(name).category
 
 
 def test_every_caption_has_a_figure():
-    assert {path.stem for path in CAPTIONS.glob("*.rst")} == {*ALL, "sweep"}
+    captions = {get_figure(name).caption for name in (*ALL, *SWEEPS)}
+    assert {path.stem for path in CAPTIONS.glob("*.rst")} == captions
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -163,14 +149,6 @@ def test_labels_have_units(name, tables, paper):
         unit in text for text in quantities for unit in ("mgon", "gon", "ppm", "mm/s²", "share")
     )
     assert not any("m/s^2" in text for text in quantities)
-
-
-@pytest.mark.parametrize("name", SWEEPS)
-def test_sweeps_draw(name, tmp_path):
-    study = sweep_study(name)
-    found = run(study, tmp_path)
-    for each in figure_names(study):
-        paint(draw(each, found, study))
 
 
 def test_figure_2_shows_the_closed_form(paper):

@@ -6,6 +6,7 @@ To add one, write a module next to this file with a function under `figure`.
 from accelstudy.figures.registry import (
     FigureEntry,
     Tables,
+    caption,
     draw,
     figure,
     figure_names,
@@ -18,6 +19,7 @@ from accelstudy.registry import import_modules
 __all__ = [
     "FigureEntry",
     "Tables",
+    "caption",
     "draw",
     "figure",
     "figure_names",

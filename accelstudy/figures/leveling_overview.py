@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.patches import Patch, Rectangle
 
+from accelstudy.figures.factors import NOISES, varies
 from accelstudy.figures.registry import Tables, figure
 from accelstudy.figures.style import (
     FULL,
@@ -22,7 +23,6 @@ from accelstudy.figures.style import (
     new_figure,
     say_empty,
 )
-from accelstudy.figures.sweep import swept_noises
 from accelstudy.schemes import get_scheme
 from accelstudy.study.config import StudyConfig
 
@@ -41,7 +41,7 @@ NOT_ESTIMABLE: Style = {
     title="Tilt error that each calibration leaves",
     category="Study",
     tables=("cells", "leveling"),
-    when=lambda study: not swept_noises(study),
+    when=lambda study: not any(varies(study, noise) for noise in NOISES),
 )
 def tilt_errors(tables: Tables, study: StudyConfig) -> Figure:
     """Matrices of scheme × model, one for each angle and approach, with the rms in mgon."""

@@ -36,6 +36,7 @@ GAP = 0.25
     title="Monte Carlo against closed forms and linear theory",
     category="Study",
     tables=("summary",),
+    angles=False,
 )
 def monte_carlo_against_theory(tables: Tables, study: StudyConfig) -> Figure:
     """Ratios of the empirical to the expected sd: where a closed form exists, and all others."""

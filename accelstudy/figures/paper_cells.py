@@ -148,6 +148,7 @@ def _draw_range(ax: Axes, at: float, values: NDArray[np.float64], colour: str) -
     title="Figure 8: correlations of the parameters of the two calibrations",
     category="Paper",
     tables=("correlations",),
+    angles=False,
     when=lambda study: study.paper,
 )
 def correlations(tables: Tables, study: StudyConfig) -> Figure:

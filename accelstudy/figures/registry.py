@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +16,7 @@ from accelstudy.figures.saving import save
 from accelstudy.figures.style import DPI, STYLE
 from accelstudy.registry import Registry
 from accelstudy.study.config import StudyConfig
+from accelstudy.units import angle_note, angles_in
 
 Tables = Mapping[str, pd.DataFrame]
 Draw = Callable[[Tables, StudyConfig], Figure]
@@ -31,6 +34,9 @@ class FigureEntry:
     name, title, category : str
     tables : tuple of str, those of `TABLES` that it draws
     when : callable, whether a study has this figure
+    caption : str, name of the caption; figures of one kind share one
+    note : callable, what the caption says of this study beside that
+    angles : bool, whether it shows angles, whose unit the caption then explains
     draw : callable, takes the tables and the study
     """
 
@@ -39,6 +45,9 @@ class FigureEntry:
     category: str
     tables: tuple[str, ...]
     when: Callable[[StudyConfig], bool]
+    caption: str
+    note: Callable[[StudyConfig], str]
+    angles: bool
     draw: Draw
 
 
@@ -53,6 +62,9 @@ def figure(
     category: str,
     tables: tuple[str, ...] = (),
     when: Callable[[StudyConfig], bool] = lambda study: True,
+    caption: str | None = None,
+    note: Callable[[StudyConfig], str] = lambda study: "",
+    angles: bool = True,
 ) -> Callable[[Draw], Draw]:
     """Register the decorated function as a figure; the arguments are those of `FigureEntry`.
 
@@ -66,7 +78,10 @@ def figure(
         raise ValueError(f"figure {name!r}: no such tables: {', '.join(sorted(unknown))}")
 
     def decorate(function: Draw) -> Draw:
-        _registry.add(name, FigureEntry(name, title, category, tables, when, function))
+        entry = FigureEntry(
+            name, title, category, tables, when, caption or name, note, angles, function
+        )
+        _registry.add(name, entry)
         return function
 
     return decorate
@@ -91,8 +106,28 @@ def draw(name: str, tables: Tables, study: StudyConfig) -> Figure:
     tables : mapping of table name to table, at least those of `figure_tables`
     study : StudyConfig
     """
-    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
+    with mpl.rc_context(STYLE), _angles_of(study):  # type: ignore[arg-type]
         return get_figure(name).draw(tables, study)
+
+
+def caption(name: str, text: str, study: StudyConfig) -> str:
+    """Complete the caption of a figure by what it says of this study and by the unit of angles.
+
+    Parameters
+    ----------
+    name : str
+    text : str, what the caption says of the figure in every study
+    study : StudyConfig
+    """
+    entry = get_figure(name)
+    with _angles_of(study):
+        parts = [text.strip(), entry.note(study), angle_note() if entry.angles else ""]
+    return " ".join(filter(None, parts)) + "\n"
+
+
+def _angles_of(study: StudyConfig) -> AbstractContextManager[None]:
+    """Show angles in the unit of the study or, where it names none, of the user."""
+    return angles_in(study.angle_unit or os.environ.get("ACCELSTUDY_ANGLE_UNIT"))
 
 
 def render(

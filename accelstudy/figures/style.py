@@ -11,11 +11,13 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.textpath import TextPath
 from matplotlib.ticker import Locator, LogLocator, MaxNLocator, NullLocator
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.effects import Parameter, effect_names, get_effect
 from accelstudy.models import TITLES, compose
+from accelstudy.units import display_unit, recorded_unit, to_display, to_si
 
 MM = 1 / 25.4
 """One millimetre in inches."""
@@ -152,6 +154,13 @@ def unit_label(unit: str) -> str:
     return unit.replace("^2", "²").replace("ug", "µg")
 
 
+def shown(values: ArrayLike, unit: str) -> tuple[NDArray[np.float64], str]:
+    """Convert values in the unit of a table into what people see; the values and their unit."""
+    if unit != recorded_unit("rad"):
+        return np.asarray(values, dtype=float), unit_label(unit)
+    return to_display(to_si(values, unit, "rad"), "rad"), display_unit("rad")
+
+
 def in_order(groups: Iterable[str]) -> list[str]:
     """Groups in the order of `GROUPS`, those that are not in it last."""
     found = set(groups)
@@ -199,6 +208,14 @@ def spread(places: NDArray[np.float64], apart: float) -> list[int]:
         if not chosen or place - places[chosen[-1]] >= apart:
             chosen.append(i)
     return chosen
+
+
+def legend_columns(labels: Iterable[str], width_mm: float = 170.0) -> int:
+    """Columns of a legend that fit a figure's width, for the longest of its labels."""
+    size = STYLE["legend.fontsize"]
+    longest = max(TextPath((0, 0), label, size=size).get_extents().width for label in labels)
+    # Handle and spaces take about as much as seven letters m.
+    return max(1, int(width_mm / (longest * 25.4 / 72 + 7 * size * 25.4 / 72)))
 
 
 def say_empty(ax: Axes, text: str = "no estimable cell") -> None:

@@ -3,7 +3,7 @@ from pathlib import Path
 from snakemake.exceptions import WorkflowError
 
 from accelstudy.errors import InputError
-from accelstudy.figures import figure_names, figure_tables, get_figure
+from accelstudy.figures import caption, figure_names, figure_tables, get_figure
 from accelstudy.study.cells import batches, study_cells
 from accelstudy.study.config import parse_study, read_layer
 from accelstudy.study.provenance import check_writable, code_hash
@@ -51,7 +51,9 @@ def estimates_of(choose):
 
 def figure_caption(wildcards):
     """Text below the figure in the report."""
-    return (CAPTIONS / f"{wildcards.figure}.rst").read_text(encoding="utf-8")
+    name = wildcards.figure
+    text = (CAPTIONS / f"{get_figure(name).caption}.rst").read_text(encoding="utf-8")
+    return caption(name, text, STUDY)
 
 
 def figure_inputs(wildcards):

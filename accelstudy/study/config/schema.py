@@ -202,6 +202,11 @@ class StudyConfig(Block):
     presets: Presets | None = Field(None, description="Table 1 of the paper")
     leveling: LevelingConfig = LevelingConfig()
     sensitivity: SensitivityConfig | None = Field(None, description="figures 4 to 6")
+    angle_unit: Literal["gon", "deg"] | None = Field(
+        None,
+        description="unit of angles in figures, gon or deg; without it the environment variable "
+        "ACCELSTUDY_ANGLE_UNIT says, else gon. Tables keep their units",
+    )
     paper: bool = Field(
         False,
         description="draw the paper's figures and judge its claims; needs `sensitivity`, and the "
@@ -380,8 +385,8 @@ class StudyConfig(Block):
 
     @property
     def fingerprint(self) -> str:
-        """Hash of the whole configuration, defaults included."""
-        text = json.dumps(self.model_dump(mode="json"), sort_keys=True)
+        """Hash of all that numbers depend on, defaults included."""
+        text = json.dumps(self.model_dump(mode="json", exclude={"angle_unit"}), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
