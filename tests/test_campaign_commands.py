@@ -123,6 +123,12 @@ def test_apply_levels_a_log(campaign, tmp_path):
     roll = np.arctan2(-f_b[:, 1], -f_b[:, 2]) * 200 / np.pi
     assert np.all(np.abs(level["roll_gon"] - roll) < 5e-3 * level["sigma_roll_mgon"])
     assert (level["sigma_pitch_mgon"] > 12.9).all()
+    degrees = tmp_path / "degrees.csv"
+    result = run("--angle-unit", "deg", "apply", calibration, log, "--out", degrees)
+    assert result.exit_code == 0, result.output
+    level = level.rename(columns=lambda name: name.replace("gon", "deg"))
+    turned = level * np.where(level.columns.str.contains("deg"), 0.9, 1.0)
+    pd.testing.assert_frame_equal(pd.read_csv(degrees), turned, atol=1e-5)
 
 
 def test_a_bad_log_is_one_line(campaign, tmp_path):

@@ -118,6 +118,7 @@ def check_sigmas_command(
     help="Noise of a reading, m/s².  [default: that of the mean of a position]",
 )
 @force_option
+@angle_unit_option
 @quiet_option
 def apply_command(
     calibration: Path,

@@ -20,7 +20,7 @@ from accelstudy.campaign.logs import AXES
 from accelstudy.effects import Hold
 from accelstudy.frames import Frame
 from accelstudy.progress import track
-from accelstudy.units import GON, MGON
+from accelstudy.units import attitude_unit, display_unit, to_attitude, to_display
 
 Array = NDArray[np.float64]
 
@@ -102,8 +102,8 @@ def _leveled(
     shown = frame.from_frd(corrected)
     added = {f"{axis}_calibrated_mps2": shown[:, i] for i, axis in enumerate(AXES)}
     for i, angle in enumerate(("roll", "pitch")):
-        added[f"{angle}_gon"] = frame.signs[i] * angles[:, i] / GON
-        added[f"sigma_{angle}_mgon"] = sigmas[:, i] / MGON
+        added[f"{angle}_{attitude_unit()}"] = frame.signs[i] * to_attitude(angles[:, i])
+        added[f"sigma_{angle}_{display_unit('rad')}"] = to_display(sigmas[:, i], "rad")
     for name, values in added.items():
         added[name] = np.where(lost | ~np.isfinite(values), np.nan, np.round(values, DECIMALS))
     return corrected, added
