@@ -19,7 +19,12 @@ import accelstudy
 from accelstudy.campaign.batch import run_task
 from accelstudy.campaign.batch_config import Task, parse_batch, read_batch
 from accelstudy.campaign.format import write_campaign
-from accelstudy.campaign.overview import CAMPAIGN_COLUMNS, PARAMETER_COLUMNS, summarise_batch
+from accelstudy.campaign.overview import (
+    CAMPAIGN_COLUMNS,
+    PARAMETER_COLUMNS,
+    counts,
+    summarise_batch,
+)
 from accelstudy.campaign.public import public_data, record_public
 from accelstudy.errors import InputError
 from accelstudy.study.provenance import code_hash
@@ -180,6 +185,30 @@ def test_the_overview(made):
         assert (results / link).is_file()
     assert "held out<br>roll, pitch" in page
     assert not re.search(r"\b(nan|None|NA)\b", page.split("</style>")[1])
+
+
+def test_a_calibration_that_no_sensor_has_is_not_among_the_calibrated(made, tmp_path):
+    """One of 103 400 mgon of tilt error was counted as calibrated."""
+    folders = [tmp_path / name for name in ("plain", "spoilt", "aided")]
+    for folder in folders:
+        shutil.copytree(made / "results/bench/campaigns" / folder.name, folder)
+    for folder, state in ((folders[0], "rejected"), (folders[2], "implausible")):
+        path = folder / "calibration.json"
+        content = json.loads(path.read_text(encoding="utf-8"))
+        content["quality"] |= {"state": state, "verdict": f"Why it is {state}."}
+        path.write_text(json.dumps(content), encoding="utf-8")
+    outputs = [tmp_path / name for name in ("c.parquet", "p.parquet", "overview.html")]
+    table = summarise_batch("doubt", folders, *outputs, {"config_hash": "", "seed": None})
+    assert counts(table) == "2 of 3 campaigns calibrated, 1 of them implausible"
+    page = outputs[2].read_text(encoding="utf-8")
+    assert "3 campaigns: 1 calibrated, 1 implausible, 1 not calibrated." in re.sub(
+        "</?span[^>]*>", "", page
+    )
+    before, after = page.split("<h2>Calibrated</h2>")
+    assert "Why it is implausible." in before
+    assert 'href="aided/report.html"' in before
+    assert "aided" not in after
+    assert 'plain</a> <span class="bad">rejected</span>' in after
 
 
 def test_origin(made, monkeypatch):

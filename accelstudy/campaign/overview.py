@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from accelstudy.adjustment.quality.whole_model import REFUTED
 from accelstudy.campaign.batch import STATUS
-from accelstudy.campaign.verdict import BLIND
+from accelstudy.campaign.verdict import BLIND, IMPLAUSIBLE, REJECTED
 from accelstudy.outputs import whole_file
 from accelstudy.pages import page_environment
 from accelstudy.study.report import number
@@ -36,6 +37,7 @@ CAMPAIGN_COLUMNS = {
     "sigma0": "float64",
     "p_value": "float64",
     "accepted": "boolean",
+    "state": "string",
     "suspects": "string",
     "rms_norm_residual_mps2": "float64",
     "held_out_mps2": "float64",
@@ -100,6 +102,13 @@ def summarise_batch(
     return table
 
 
+def counts(table: pd.DataFrame) -> str:
+    """How many campaigns of a table were calibrated, and how many of these believably."""
+    calibrated, implausible = (table["status"] == "ok").sum(), (table["state"] == IMPLAUSIBLE).sum()
+    doubt = f", {implausible} of them implausible" if implausible else ""
+    return f"{calibrated} of {len(table)} campaigns calibrated{doubt}"
+
+
 def _read(path: Path) -> dict[str, Any]:
     return json.loads(path.read_text(encoding="utf-8"))
 
@@ -125,6 +134,7 @@ def _row(status: Mapping[str, Any], content: Mapping[str, Any] | None) -> dict[s
         "sigma0": posteriori / priori if known else None,
         "p_value": test.get("p_value"),
         "accepted": test.get("accepted"),
+        "state": quality["state"],
         "suspects": ", ".join(suspects),
         "held_out_mps2": held.get("rms_mps2"),
         "held_out_roll_rad": _rad(held.get("rms_roll_mgon")),
@@ -160,7 +170,10 @@ def _page(batch: str, table: pd.DataFrame, links: list[dict[str, str | None]]) -
     return environment.get_template("overview.html.j2").render(
         batch=batch,
         failed=[row for row in rows if row["status"] != "ok"],
-        calibrated=[row for row in rows if row["status"] == "ok"],
+        implausible=[row for row in rows if row["state"] == IMPLAUSIBLE],
+        calibrated=[row for row in rows if row["status"] == "ok" and row["state"] != IMPLAUSIBLE],
+        rejected=REJECTED,
+        level=REFUTED,
         robot=table["held_out_roll_rad"].notna().any(),
         blind=BLIND,
         small_angle=UNITS["rad"][display_unit("rad")],

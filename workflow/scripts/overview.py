@@ -1,7 +1,7 @@
 import os
 
 from accelstudy.campaign.batch_config import parse_batch
-from accelstudy.campaign.overview import summarise_batch
+from accelstudy.campaign.overview import counts, summarise_batch
 from accelstudy.study.job import logged
 from accelstudy.units import ANGLE_UNIT_VARIABLE, angles_in
 
@@ -16,6 +16,4 @@ with logged(snakemake), angles_in(os.environ.get(ANGLE_UNIT_VARIABLE)):
     failed = table[table["status"] == "failed"]
     for row in failed.itertuples():
         print(f"not calibrated: {row.campaign}: {row.error}")
-    print(
-        f"{len(table) - len(failed)} of {len(table)} campaigns calibrated: {snakemake.output.page}"
-    )
+    print(f"{counts(table)}: {snakemake.output.page}")
