@@ -2,16 +2,21 @@
 
 import json
 
+import numpy as np
 import pytest
 import yaml
 from click.testing import CliRunner
 from study_helpers import content, grid
 
 from accelstudy.campaign.batch_config import parse_batch
+from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign
 from accelstudy.cli import main
+from accelstudy.diagnosis.calibration import diagnosed_calibration
+from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.round_trip import parse_round_trip
 from accelstudy.errors import InputError
 from accelstudy.figures.style import model_title
+from accelstudy.models import get_model
 from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study
 
@@ -131,3 +136,98 @@ def test_batches_and_the_round_trip_take_a_composition():
         parse_batch({"batch": "b", "model": f"{NINE}+thermal", "campaigns": [{"campaign": "c"}]})
     trip = parse_round_trip({"campaign": {"name": "t"}, "model": "bias+scale"})
     assert trip.model == "bias-scale"
+
+
+# --- what a diagnosis found, used the next day ----------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def diagnosed(made):
+    """Folder of the diagnosis of the campaign, which lacks both effects."""
+    run("diagnose", made / "c", "--out", made / "d", "--replicates", "100")
+    return made / "d"
+
+
+def test_a_diagnosis_writes_the_calibration_of_what_it_found(made, diagnosed):
+    found = parameters(diagnosed / "calibration.json")
+    run("calibrate", made / "c", "--model", diagnosed / "model.yaml", "--approach", "robot",
+        "--out", made / "again")  # fmt: skip
+    again = parameters(made / "again/calibration.json")
+    assert list(found) == list(again)
+    for name, (value, sigma) in found.items():
+        assert again[name][0] == pytest.approx(value, abs=1e-6 * sigma)
+        assert again[name][1] == pytest.approx(sigma)
+    documents = [
+        json.loads((made / folder / "calibration.json").read_text(encoding="utf-8"))
+        for folder in ("d", "again")
+    ]
+    assert {"b_T_z", "w_z"} < set(found)
+    assert documents[0]["model"] == documents[1]["model"]
+    assert documents[0].keys() == documents[1].keys()
+    assert documents[0]["quality"].keys() == documents[1]["quality"].keys()
+    effects = json.loads((diagnosed / "diagnosis.json").read_text(encoding="utf-8"))["effects"]
+    for entry in (p for effect in effects for p in effect["parameters"]):
+        assert found[entry["name"]] == pytest.approx((entry["value"], entry["sigma"]))
+    table = run("check-sigmas", made / "c", "--model", diagnosed / "model.yaml", "--approach",
+                "robot", "--replicates", "40")  # fmt: skip
+    shown = next(line.split() for line in table.splitlines() if "b_T_x" in line)
+    assert float(shown[2]) == pytest.approx(1e3 * found["b_T_x"][0], rel=1e-3)
+    page = (diagnosed / "report.html").read_text(encoding="utf-8")
+    assert "accelstudy apply calibration.json LOG" in page
+    assert "accelstudy calibrate CAMPAIGN --model model.yaml --approach robot" in page
+
+
+def calibration_of(**settings):
+    campaign, _ = simulate_campaign(CampaignSettings(scheme="fibonacci-30", **settings))
+    diagnosis = diagnose(campaign, get_model(NINE))
+    return campaign, diagnosis, diagnosed_calibration(diagnosis)
+
+
+@pytest.fixture(scope="module")
+def whole():
+    """Calibration of a campaign without a gross error."""
+    return calibration_of()[2]
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        ("axis_error(x=-2, y=1, z=3)", "axes are swapped: x is read as y, y is read as −x"),
+        ("unit_error(force=0.1019716212978)", "the forces are in g"),
+        ("unit_error(angle=0.9)", "the robot's angles are in degrees"),
+    ],
+)
+def test_a_calibration_of_mended_data_says_so(error, words, whole):
+    assert whole["mended"] is None
+    campaign, diagnosis, content = calibration_of(gross_errors=(error,))
+    assert (content["mended"]["reason"], whole["warnings"]) == (words, [])
+    assert words in content["warnings"][0]
+    for ours, right in zip(content["parameters"], whole["parameters"], strict=True):
+        assert ours["value"] == pytest.approx(right["value"], abs=1e-6)
+    matrix = np.eye(3) if "angle" in error else content["mended"]["matrix"]
+    np.testing.assert_allclose(campaign.forces @ np.transpose(matrix), diagnosis.campaign.forces)
+    assert (content["mended"]["matrix"] is None) == ("angle" in error)
+
+
+def test_a_calibration_without_a_bumped_position():
+    gross = ("outlier_position(position=21, x=0.1)",)
+    _, diagnosis, content = calibration_of(gross_errors=gross)
+    assert [hold["position"] for hold in content["excluded"]] == [21]
+    assert content["n_positions"] == 29
+    truth = diagnosis.final.frame.solution.parameters
+    np.testing.assert_allclose([p["value"] for p in content["parameters"]], truth, atol=1e-12)
+    assert content["quality"]["global_test"]["accepted"]
+
+
+def test_a_calibration_with_the_noise_that_was_found():
+    _, diagnosis, content = calibration_of(noise_effects=("noise_level(kappa=3)",))
+    assert diagnosis.verdict == "noise_model"
+    assert content["sigma_source"] == "a posteriori"
+    assert content["sigma_position_mps2"] == pytest.approx(diagnosis.sigma_position)
+    _, diagnosis, content = calibration_of(
+        noise_effects=("axis_noise(kappa_x=1, kappa_y=1, kappa_z=4)",)
+    )
+    assert content["sigma_position_mps2"] == pytest.approx(diagnosis.sigma_position)
+    assert np.mean(content["sigma_position_axes_mps2"]) == pytest.approx(diagnosis.sigma_position)
+    assert content["sigma_position_axes_mps2"][2] > 2 * content["sigma_position_axes_mps2"][0]
+    assert "weighted by their noise" in content["warnings"][0]

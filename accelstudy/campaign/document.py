@@ -62,6 +62,7 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
         "iterations": int(adjustment.iterations[0]),
         "rms_norm_residual_mps2": number(fit.rms_norm_residual),
         "affine": _affine(fit),
+        "mended": None,
         "excluded": campaign.exclusions,
         "range_mps2": campaign.full_range,
         "ranges": ranges_of(fit),

@@ -39,6 +39,8 @@ class CampaignFit:
     observed : Observations, R = 1
     adjustment : Adjustment, R = 1
     design : Design, of the campaign's own positions
+    unit_variance : float, variance of unit weight to quote, where somebody has judged the noise by
+        more than this fit; by default its global test does
     """
 
     campaign: Campaign
@@ -47,6 +49,7 @@ class CampaignFit:
     observed: Observations
     adjustment: Adjustment
     design: Design
+    unit_variance: float | None = None
 
     @property
     def sigma_known(self) -> bool:
@@ -68,24 +71,33 @@ class CampaignFit:
     @property
     def trusts_sigma(self) -> bool:
         """Whether the a-priori noise is quoted: it is given, and the residuals do not refute it."""
+        if self.unit_variance is not None:
+            return self.sigma_known and self.unit_variance == 1
         test = self.global_test
         return self.sigma_known and (test is None or test.accepted)
 
     @property
     def variance_factor(self) -> float:
         """Variance of unit weight to quote: 1 if a-priori noise is trusted, else a posteriori."""
+        if self.unit_variance is not None:
+            return self.unit_variance
         return 1.0 if self.trusts_sigma else float(self.adjustment.variance_posteriori[0])
 
     @property
     def sigma_position(self) -> float:
         """Noise of a position mean, m/s², a priori or a posteriori likewise."""
-        return campaign_noise(self.campaign).sigma_force * float(np.sqrt(self.variance_factor))
+        return self._sigma_taken * float(np.sqrt(self.variance_factor))
 
     @property
     def sigma_position_posteriori(self) -> float:
         """Noise of a position mean from the residuals, m/s²; NaN without redundancy."""
         factor = float(self.adjustment.variance_posteriori[0])
-        return campaign_noise(self.campaign).sigma_force * float(np.sqrt(factor))
+        return self._sigma_taken * float(np.sqrt(factor))
+
+    @property
+    def _sigma_taken(self) -> float:
+        """Noise of a position mean of unit weight, m/s²."""
+        return float(np.mean(np.asarray(self.observed.sigma_force)))
 
     @property
     def covariance(self) -> Array:
@@ -178,16 +190,7 @@ def fit_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> 
             f"{campaign.name}: sensor_noise.sigma_mps2: {noise.sigma_force:g} is too small beside "
             f"robot.angle_sigma_mgon: {noise.sigma_angle / MGON:g}; expected {least:.2g} or more"
         )
-    start = initial_values(model, campaign.forces, campaign.gravity)
-    rough = model.correct(campaign.forces, start, campaign.gravity, campaign.hold)
-    design = diagnose(
-        Scheme(campaign.name, campaign.name, -rough, "exact", f"campaign {campaign.name}"),
-        model,
-        approach,
-        noise,
-        gravity=campaign.gravity,
-        hold=campaign.hold,
-    )
+    design = campaign_design(campaign, model, approach)
     if not design.estimable:
         raise InputError(
             f"{campaign.name}: {campaign.n_positions} positions do not determine the model "
@@ -201,7 +204,7 @@ def fit_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> 
         gravity=campaign.gravity,
         sigma_gravity=campaign.sigma_gravity,
         hold=campaign.hold,
-        initial=start,
+        initial=initial_values(model, campaign.forces, campaign.gravity),
     )
     adjustment = calibrate(model, approach, observed)
     if not adjustment.converged[0]:
@@ -210,6 +213,20 @@ def fit_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> 
             "a gross error in the data or a wrong unit is the usual cause"
         )
     return CampaignFit(campaign, model, approach, observed, adjustment, design)
+
+
+def campaign_design(campaign: Campaign, model: SensorModel, approach: Approach) -> Design:
+    """Say what the positions of a campaign determine."""
+    start = initial_values(model, campaign.forces, campaign.gravity)
+    rough = model.correct(campaign.forces, start, campaign.gravity, campaign.hold)
+    return diagnose(
+        Scheme(campaign.name, campaign.name, -rough, "exact", f"campaign {campaign.name}"),
+        model,
+        approach,
+        campaign_noise(campaign),
+        gravity=campaign.gravity,
+        hold=campaign.hold,
+    )
 
 
 def initial_values(model: SensorModel, forces: Array, gravity: float) -> Array:

@@ -60,6 +60,10 @@ def diagnose_command(
     diagnosis = diagnose_folder(campaign, out, model, approach, seed, replicates, force)
     for warning in diagnosis.campaign.warnings:
         click.echo(f"warning: {warning}", err=True)
+    if diagnosis.recognised is not None:
+        click.echo(
+            f"warning: calibration.json is of mended data: {diagnosis.recognised.reason}", err=True
+        )
     for line in verdict_lines(diagnosis):
         say(line)
     say(f"report: {out / 'report.html'}")

@@ -5,16 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.document import json_text
 from accelstudy.campaign.format import read_campaign
+from accelstudy.diagnosis.calibration import diagnosed_calibration
 from accelstudy.diagnosis.document import diagnosis_document
 from accelstudy.diagnosis.loop import REPLICATES, Loop, close_loop
 from accelstudy.diagnosis.model_file import study_overlay
 from accelstudy.diagnosis.pipeline import Diagnosis, diagnose
 from accelstudy.diagnosis.positions import positions_table
+from accelstudy.errors import InputError
 from accelstudy.models import get_model
 from accelstudy.outputs import DIAGNOSIS, result_folder, whole_file
 
@@ -78,6 +81,10 @@ def write_diagnosis(
     positions = positions_table(diagnosis)
     with whole_file(folder / "positions.parquet") as path:
         positions.to_parquet(path, index=False)
+    calibration = _calibration(diagnosis, document)
+    if calibration is not None:
+        with whole_file(folder / "calibration.json") as path:
+            path.write_text(json_text(calibration), encoding="utf-8")
     with whole_file(folder / "model.yaml") as path:
         text = yaml.safe_dump(study_overlay(diagnosis), sort_keys=False, allow_unicode=True)
         path.write_text(MODEL_HEADER + text, encoding="utf-8")
@@ -85,10 +92,21 @@ def write_diagnosis(
         # Drawing takes as long to import as all of the above to compute.
         from accelstudy.diagnosis.report import write_report
 
-        write_report(diagnosis, document, positions, loop, folder)
+        write_report(diagnosis, document, positions, loop, folder, calibration)
     with whole_file(folder / "diagnosis.json") as path:
         path.write_text(json_text(document), encoding="utf-8")
     return document
+
+
+def _calibration(diagnosis: Diagnosis, document: dict[str, Any]) -> dict[str, Any] | None:
+    """Content of calibration.json; None, with the reason in the document, if there is none."""
+    try:
+        content = diagnosed_calibration(diagnosis)
+    except (InputError, np.linalg.LinAlgError) as error:
+        document["calibration"] = {"file": None, "reason": str(error)}
+        return None
+    document["calibration"] = {"file": "calibration.json", "mended": content["mended"]}
+    return content
 
 
 MODEL_HEADER = """\

@@ -7,6 +7,7 @@ from typing import Any
 
 import pandas as pd
 
+from accelstudy.campaign.gauges import not_affine
 from accelstudy.diagnosis import wording
 from accelstudy.diagnosis.figures import diagnosis_figures
 from accelstudy.diagnosis.loop import Loop
@@ -25,6 +26,7 @@ def write_report(
     positions: pd.DataFrame,
     loop: Loop | None,
     folder: Path,
+    calibration: dict[str, Any] | None = None,
 ) -> None:
     """Write figures/ and report.html.
 
@@ -35,6 +37,7 @@ def write_report(
     positions : DataFrame, of `positions_table`
     loop : Loop, optional
     folder : Path
+    calibration : dict, of `diagnosed_calibration`, optional
     """
     drawn = save_all(diagnosis_figures(diagnosis, positions, loop), folder / "figures")
     environment = page_environment("diagnosis", trim_blocks=True, lstrip_blocks=True)
@@ -59,6 +62,8 @@ def write_report(
         unit=wording.shown_unit,
         estimate=wording.estimate,
         figures=drawn,
+        calibration=calibration,
+        tells=not_affine(diagnosis.extended),
         level=LEVEL_EFFECTS,
         level_noise=LEVEL_NOISE,
         sure=SURE,

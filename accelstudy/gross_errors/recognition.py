@@ -46,11 +46,13 @@ class Recognised:
     name : str, "unit_error", "axis_error" or "row_order"
     reason : str, what is wrong, in words
     mended : Campaign, as it would have been right
+    conversion : (3, 3) array, turns forces as they were read into mended ones, where it is not I
     """
 
     name: str
     reason: str
     mended: Campaign
+    conversion: Array | None = None
 
 
 def recognise(campaign: Campaign, approach: Approach) -> Recognised | None:
@@ -112,9 +114,8 @@ def _by_norm(campaign: Campaign) -> Recognised | None:
     for reason, factor in FORCE_UNITS.items():
         if 0.8 < _norm(campaign) * factor / campaign.gravity < 1.25:
             sd = None if campaign.sd is None else campaign.sd * factor
-            return Recognised(
-                "unit_error", reason, replace(campaign, forces=campaign.forces * factor, sd=sd)
-            )
+            mended = replace(campaign, forces=campaign.forces * factor, sd=sd)
+            return Recognised("unit_error", reason, mended, factor * np.eye(3))
     return None
 
 
@@ -136,7 +137,9 @@ def _axes(campaign: Campaign) -> Recognised:
     columns = list(order)
     sd = None if campaign.sd is None else campaign.sd[:, columns]
     mended = replace(campaign, forces=campaign.forces[:, columns] * np.array(signs), sd=sd)
-    return Recognised("axis_error", f"axes {wrong}: {words}", mended)
+    conversion = np.zeros((3, 3))
+    conversion[range(3), columns] = signs
+    return Recognised("axis_error", f"axes {wrong}: {words}", mended, conversion)
 
 
 def _by_angles(campaign: Campaign) -> Recognised | None:
