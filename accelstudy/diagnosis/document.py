@@ -56,6 +56,7 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
         },
         "posterior": {name: number(p) for name, p in d.probabilities.items()},
         "effects": [_effect(named) for named in d.found],
+        "suspects": [{"position": label, "p_value": number(p)} for label, p in d.suspects],
         "location": {name: number(share) for name, share in d.location.items()},
         "gap": _gap(d),
         "parameter_changes": [

@@ -9,8 +9,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.adjustment.quality import GlobalTest, Solution, global_test, solve
+from accelstudy.adjustment.quality import GlobalTest, Solution, global_test, solve, suspects
+from accelstudy.adjustment.quality.whole_model import REFUTED
 from accelstudy.approaches import Approach, get_approach
+from accelstudy.campaign.assessment import SUSPECT
 from accelstudy.campaign.fit import fit_campaign, least_sigma
 from accelstudy.campaign.format import Campaign
 from accelstudy.diagnosis import gap as gaps
@@ -22,6 +24,7 @@ from accelstudy.diagnosis.location import locate
 from accelstudy.diagnosis.naming import COLOUR, LEVEL, known_level_evidence
 from accelstudy.diagnosis.next_positions import NextPosition, next_positions
 from accelstudy.diagnosis.noise import NoiseTest
+from accelstudy.diagnosis.residuals import Residuals
 from accelstudy.diagnosis.screening import SIMULATIONS, Screening, share
 from accelstudy.diagnosis.search import (
     LACK_OF_FIT,
@@ -40,7 +43,8 @@ from accelstudy.sensor import SensorModel
 Array = NDArray[np.float64]
 
 LEVEL_NOISE = 0.015
-"""Family-wise level of the tests of the noise; together they stay below 5 %."""
+"""Family-wise level of the tests of the noise beside that of its level, which has `REFUTED`; with
+`LEVEL_EFFECTS` they stay below 5 %."""
 
 
 @dataclass(frozen=True)
@@ -107,6 +111,7 @@ class Diagnosis:
     next_positions : tuple of NextPosition, that would separate what is left best
     simulations : int, of residuals without any effect
     recognised : Recognised or None, a gross error of unit, axes or order
+    suspects : tuple of (label, p-value), positions that the calibration marks, on their own
     reason : str, why the verdict is what it is
     """
 
@@ -132,6 +137,7 @@ class Diagnosis:
     next_positions: tuple[NextPosition, ...]
     simulations: int
     recognised: Recognised | None
+    suspects: tuple[tuple[int, float], ...]
     reason: str
 
     @property
@@ -256,6 +262,7 @@ class _Run:
             next_positions=self.next_positions(finding),
             simulations=SIMULATIONS,
             recognised=self.recognised,
+            suspects=self.suspects,
             reason=reason,
         )
 
@@ -284,7 +291,7 @@ class _Run:
         sigma = float(np.mean(residuals.sigmas[:, :3]))
         tests = []
         if self.sigma_known:
-            tests.append(noises.level_test(z))
+            tests.append(self.level(setting))
         base = setting is self.search.setting
         axes = self.search.axes if base else noises.axis_test(residuals, null)
         tests += [
@@ -296,6 +303,12 @@ class _Run:
         if campaign.sd is not None and campaign.n_samples is not None:
             tests.append(noises.within_hold_test(z, sigma, campaign.sd, campaign.n_samples))
         return tuple(tests)
+
+    def level(self, setting: Setting) -> NoiseTest:
+        """Test the level of the noise; of the base fit as the calibration does, by its own Ω."""
+        if setting is self.search.setting:
+            return noises.level_test(Residuals.of(self.first).z)
+        return noises.level_test(setting.frame.residuals.z)
 
     @cached_property
     def resolution(self) -> NoiseTest:
@@ -314,10 +327,10 @@ class _Run:
             for t in tests
             # A sigma that the residuals confirm knows of what varies from hold to hold.
             if not (t.remark.startswith("white noise within") and self.sigma_known
-                    and level is not None and level.p_value > LEVEL_NOISE)
+                    and level is not None and level.p_value >= REFUTED)
         ]  # fmt: skip
-        limit = LEVEL_NOISE / max(len(counted), 1)
-        found = [t for t in counted if t.p_value < limit]
+        others = LEVEL_NOISE / max(len(counted) - (level is not None), 1)
+        found = [t for t in counted if t.p_value < (REFUTED if t is level else others)]
         order = ["quantisation", COLOUR, "axis_noise", "heavy_tails", LEVEL]
         return min(found, key=lambda t: order.index(t.name), default=None)
 
@@ -325,7 +338,7 @@ class _Run:
         """Judge a finding about the noise, when no effect was significant."""
         setting = self.search.setting
         lack_of_fit = self.search.screening.p_candidate.get(f"group:{LACK_OF_FIT}", 1.0)
-        if lack_of_fit < LEVEL_NOISE and worst.name != "quantisation":
+        if lack_of_fit < REFUTED and worst.name != "quantisation":
             return self.search.nothing(
                 "repeated positions agree better with each other than with the model, so it is not "
                 "the noise"
@@ -346,13 +359,23 @@ class _Run:
         """Variance of unit weight: 1 if sigma is known and not refuted, else a posteriori."""
         z = final.frame.residuals.z
         posteriori = float(z @ z) / len(z)
-        if self.sigma_known and noises.level_test(z).p_value >= LEVEL_NOISE:
+        if self.sigma_known and self.level(final).p_value >= REFUTED:
             return 1.0
         return posteriori
 
     def sigma_source(self, final: Setting) -> str:
         """Where the noise level comes from."""
         return "a-priori" if self.sigma_known and self.unit_variance(final) == 1 else "residuals"
+
+    @property
+    def suspects(self) -> tuple[tuple[int, float], ...]:
+        """Positions that a calibration by the base model marks, and their p-values."""
+        if self.search.exact:
+            return ()
+        trusted = self.sigma_known and self.level(self.search.setting).p_value >= REFUTED
+        first = self.first
+        found = suspects(first.model, first.approach, first.observed, SUSPECT, trusted)
+        return tuple((int(self.campaign.positions[s.position]), s.p_value) for s in found)
 
     # --- what else is said ----------------------------------------------------------------------
 

@@ -82,6 +82,9 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
         lines.append("All else is said of the data as they would be without this error.")
     if d.verdict == "no_effect":
         lines.append(_agreement(d))
+    else:
+        lines += _refuted(d)
+    lines += _suspects(d)
     if d.verdict == "unknown":
         lines.append(_where(d))
     for named in filter(_is_effect, d.found):
@@ -162,10 +165,38 @@ def _agreement(d: Diagnosis) -> str:
             "The campaign does not give its noise, so that only patterns in the residuals could be "
             f"tested, not their size; they have {pattern}."
         )
+    if not test.accepted:  # the campaign is its own model
+        return f"The residuals are far smaller than the stated noise, and have {pattern}."
     return (
         f"The residuals are as large as the noise says ({p_value(test.p_value)}), and have "
         f"{pattern}."
     )
+
+
+def _refuted(d: Diagnosis) -> list[str]:
+    """Say by how much the stated noise is refuted, as the calibration does."""
+    test = d.global_test
+    if test is None or test.accepted or d.reason.startswith("the residuals are "):
+        return []
+    ratio = math.sqrt(test.statistic / test.dof)
+    much = f"{ratio:.1f} times as large as" if ratio > 1 else f"only {ratio:.2g} times"
+    return [
+        f"With the base model the residuals are {much} the stated noise ({p_value(test.p_value)})."
+    ]
+
+
+def _suspects(d: Diagnosis) -> list[str]:
+    """Say which positions a calibration marks, where the verdict is not about them."""
+    found = {named.position for named in d.found}
+    labels = [str(label) for label, _ in d.suspects if label not in found]
+    if not labels:
+        return []
+    what = f"position{'' if len(labels) == 1 else 's'} {joined(labels)}"
+    said = f"A calibration with the base model marks {what} as in conflict with the others"
+    if d.verdict in ("no_effect", "noise_model"):
+        smallest = min(p for label, p in d.suspects if label not in found)
+        return [f"{said} ({p_value(smallest)}); among all that is tested here it is no finding."]
+    return [f"{said}."]
 
 
 def _where(d: Diagnosis) -> str:
