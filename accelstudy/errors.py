@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import reprlib
 from collections.abc import Iterable
 
 
@@ -25,11 +26,24 @@ def printable(text: str) -> str:
     )
 
 
+_BRIEF = reprlib.Repr()
+_BRIEF.maxlevel, _BRIEF.maxstring, _BRIEF.maxother, _BRIEF.maxlong = 3, 60, 60, 60
+
+
+def shown(value: object) -> str:
+    """Show a value in a message as Python writes it, but briefly, however much it holds."""
+    try:
+        text = _BRIEF.repr(value)
+    except ValueError:  # Python writes no integer of more than 4300 digits
+        text = "a huge number"
+    return text if len(text) <= 80 else f"{text[:80]} …"
+
+
 class UnknownNameError(InputError):
     """A name that stands in no registry; the message lists the names that do."""
 
     def __init__(self, kind: str, name: object, known: Iterable[str]) -> None:
         known = tuple(known)
-        near = difflib.get_close_matches(str(name), known, n=1)
+        near = difflib.get_close_matches(name[:100] if isinstance(name, str) else "", known, n=1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
-        super().__init__(f"unknown {kind} {name!r}{hint} (known: {', '.join(known)})")
+        super().__init__(f"unknown {kind} {shown(name)}{hint} (known: {', '.join(known)})")

@@ -1,5 +1,7 @@
 # Many campaigns, each calibrated by itself, and one overview of them:
 # snakemake --cores 2 --snakefile workflow/campaigns.smk --configfile config/campaigns.yaml
+from pathlib import Path
+
 from snakemake.exceptions import WorkflowError
 from snakemake.utils import min_version
 
@@ -40,7 +42,13 @@ def measured_files(wildcards):
     task = TASKS[wildcards.campaign]
     if task.kind == "public":
         return {"record": f"{RESULTS}/public/{task.source}.json"}
-    return {"files": task.files()}
+    return {"files": [path for path in task.files() if "{" not in path]}
+
+
+def braced_files(wildcards):
+    """Times of files with a brace in their names, which as inputs Snakemake would take for wildcards."""
+    paths = TASKS[wildcards.campaign].files()
+    return {path: Path(path).stat().st_mtime_ns for path in paths if "{" in path}
 
 
 rule campaigns:
@@ -81,6 +89,7 @@ rule calibrate:
         mem_mb=2000,
     params:
         task=lambda wildcards: TASKS[wildcards.campaign].model_dump(mode="json"),
+        braced=braced_files,
         code=code_hash("campaign"),
     message:
         "Calibrate {wildcards.campaign}"

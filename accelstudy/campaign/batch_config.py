@@ -10,7 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
@@ -20,15 +20,15 @@ from accelstudy.campaign.importing import GravitySettings, ImportSettings
 from accelstudy.campaign.public import import_settings
 from accelstudy.errors import InputError
 from accelstudy.models import get_model
+from accelstudy.names import check_path_name
 from accelstudy.study.config.errors import first_error
 from accelstudy.study.config.layers import overlay, read_layer
 from accelstudy.study.config.schema import Block
-from accelstudy.study.config.types import ModelName
+from accelstudy.study.config.types import ModelName, PathName
 
 KINDS = ("campaign", "log", "public")
 
 Kind = Literal["campaign", "log", "public"]
-Name = Annotated[str, Field(pattern=r"^\w[\w.-]*$")]
 
 
 class Entry(Block):
@@ -37,7 +37,7 @@ class Entry(Block):
     campaign: str | None = Field(None, description="folder of a campaign, or a pattern of folders")
     log: str | None = Field(None, description="raw log or table of means, or a pattern of files")
     public: str | None = Field(None, description="name of public data, see `accelstudy public`")
-    name: Name | None = Field(None, description="name of the results; that of the source if absent")
+    name: PathName | None = Field(None, description="of the results; that of the source if absent")
     model: ModelName | None = Field(None, description="model, if not that of the batch")
     approach: str | None = Field(None, description="approach, if not that of the batch")
     gravity: GravitySettings | None = Field(None, description="instead of the campaign's own")
@@ -99,7 +99,7 @@ class Task(Block):
 class BatchConfig(Block):
     """Campaigns that are calibrated and summarised together."""
 
-    batch: Name = Field(description="name; results go to results/<batch>/")
+    batch: PathName = Field(description="name; results go to results/<batch>/")
     model: ModelName = Field("bias-scale-nonorthogonality", description="model of all campaigns")
     approach: str = Field("gravity", description="approach of all campaigns")
     public_folder: str = Field(
@@ -202,7 +202,11 @@ def _is_pattern(entry: Entry) -> bool:
 def _name_of(kind: Kind, source: str) -> str:
     path = Path(os.path.abspath(source))
     name = source if kind == "public" else path.stem if kind == "log" else path.name
-    return re.sub(r"[^\w.-]+", "-", name).lstrip(".-") or "campaign"
+    name = re.sub(r"[^\w.-]+", "-", name).lstrip(".-") or "campaign"
+    try:
+        return check_path_name(name)
+    except InputError as error:
+        raise InputError(f"campaigns: {source}: {error}; give it a `name`") from None
 
 
 def _settings(entry: Entry, source: str) -> ImportSettings | None:

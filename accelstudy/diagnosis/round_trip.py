@@ -17,6 +17,7 @@ from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign, write_truth
 from accelstudy.errors import InputError, UnknownNameError
 from accelstudy.models import get_model
+from accelstudy.names import check_path_name
 from accelstudy.study.config.errors import first_error
 from accelstudy.study.config.schema import Block
 from accelstudy.study.config.types import Count, ModelName, Seed
@@ -44,6 +45,10 @@ class RoundTrip(Block):
 
     @model_validator(mode="after")
     def _names_exist(self) -> RoundTrip:
+        try:
+            check_path_name(self.campaign.name)
+        except InputError as error:
+            raise ValueError(f"campaign.name: {error}") from None
         get_model(self.model)
         if self.approach is not None:
             get_approach(self.approach)

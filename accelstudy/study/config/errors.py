@@ -9,29 +9,26 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
+from accelstudy.errors import shown
+
 
 def first_error(error: ValidationError, root: type[BaseModel]) -> str:
     """Say in one line which key of a `root` is wrong, and what would be right."""
     first, *others = error.errors()
-    key = ".".join(str(part) for part in first["loc"])
+    key = ".".join(str(part)[:100] for part in first["loc"])
     if first["type"] == "extra_forbidden":
         text = f"{key}: unknown key"
         siblings = _keys_beside(first["loc"], root)
-        near = get_close_matches(str(first["loc"][-1]), siblings, n=1)
+        near = get_close_matches(str(first["loc"][-1])[:100], siblings, n=1)
         text += f"; did you mean {near[0]!r}?" if near else ""
         text += f" (known: {', '.join(siblings)})"
     elif first["type"] == "value_error":
         text = ": ".join(filter(None, [key, str(first["ctx"]["error"])]))
     else:
-        shown = "" if first["type"] == "missing" else f", not {_short(first['input'])}"
-        text = f"{key}: {first['msg'][0].lower()}{first['msg'][1:]}{shown}"
+        value = "" if first["type"] == "missing" else f", not {shown(first['input'])}"
+        text = f"{key}: {first['msg'][0].lower()}{first['msg'][1:]}{value}"
     more = f" (and {len(others)} more)" if others else ""
     return " ".join(f"{text}{more}".split())
-
-
-def _short(value: Any, length: int = 60) -> str:
-    text = repr(value)
-    return text if len(text) <= length else f"{text[:length]} …"
 
 
 def _keys_beside(location: Sequence[str | int], root: type[BaseModel]) -> list[str]:

@@ -10,6 +10,9 @@ import yaml
 
 from accelstudy.errors import InputError
 
+LARGEST = 100_000
+"""Values of a file once its aliases are written out; without aliases it may have more."""
+
 
 def read_layer(path: str | Path) -> dict[str, Any]:
     """Read one YAML file.
@@ -17,10 +20,11 @@ def read_layer(path: str | Path) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If it cannot be read, is not valid YAML, names a key twice, or is no mapping.
+        If it cannot be read, is not valid YAML, names a key twice, is no mapping, or means much
+        more than it says by aliases of aliases.
     """
     try:
-        layer = yaml.load(Path(path).read_text(encoding="utf-8"), _Loader)
+        layer = _load(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}") from None
     except RecursionError:
@@ -36,6 +40,42 @@ def read_layer(path: str | Path) -> dict[str, Any]:
     if not isinstance(layer, dict):
         raise InputError(f"{path}: not a mapping of keys to values")
     return layer
+
+
+def _load(text: str) -> Any:
+    loader = _Loader(text)
+    try:
+        node = loader.get_single_node()
+        if node is None:
+            return None
+        _check_size(node)
+        return loader.construct_document(node)
+    finally:
+        loader.dispose()
+
+
+def _check_size(root: yaml.Node) -> None:
+    """Refuse aliases that make a small file large (`LARGEST`), or a value a part of itself."""
+    sizes: dict[int, int | None] = {}
+
+    def size(node: yaml.Node) -> int:
+        if id(node) in sizes:
+            known = sizes[id(node)]
+            if known is None:
+                raise yaml.YAMLError(f"line {node.start_mark.line + 1}: a value holds itself")
+            return known
+        sizes[id(node)] = None
+        parts: list[yaml.Node] = []
+        if isinstance(node, yaml.CollectionNode):
+            mapping = isinstance(node, yaml.MappingNode)
+            parts = [part for pair in node.value for part in pair] if mapping else node.value
+        total = 1 + sum(size(part) for part in parts)
+        sizes[id(node)] = total
+        return total
+
+    # Without aliases it is as large as the file, which is no surprise.
+    if size(root) > max(LARGEST, 2 * len(sizes)):
+        raise yaml.YAMLError(f"with its aliases written out it has more than {LARGEST} values")
 
 
 def overlay(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:

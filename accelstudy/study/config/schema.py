@@ -19,6 +19,7 @@ from accelstudy.effects import Effect, get_effect
 from accelstudy.errors import InputError
 from accelstudy.hold_plan import HoldPlan
 from accelstudy.models import MODELS, PRESETS, get_model
+from accelstudy.names import LONGEST
 from accelstudy.noise_effects import get_noise_effect
 from accelstudy.schemes import get_scheme, scheme_names
 from accelstudy.sensor import SensorModel
@@ -178,7 +179,7 @@ _NAME = "[A-Za-z0-9][A-Za-z0-9_-]*"
 class StudyConfig(Block):
     """A study."""
 
-    study: Annotated[str, Field(pattern=f"^{_NAME}$")] = Field(
+    study: Annotated[str, Field(pattern=f"^{_NAME}$", max_length=LONGEST)] = Field(
         description="name; results go to results/<study>/"
     )
     seed: Seed = Field(description="seed of all random numbers")
@@ -219,8 +220,11 @@ class StudyConfig(Block):
             with _at(f"models.{name}"):
                 if name in MODELS:
                     raise InputError("is the name of a registered model; choose another")
-                if name == "all" or not re.fullmatch(_NAME, name):
-                    raise InputError("is no name: use letters, digits, _ and -, and not `all`")
+                if name == "all" or not re.fullmatch(_NAME, name) or len(name) > LONGEST:
+                    raise InputError(
+                        "is no name: use letters, digits, _ and -, "
+                        f"at most {LONGEST} of them, and not `all`"
+                    )
                 SensorModel.of(name, effects)
         for name, quantity in self.sensor.items():
             with _at(f"sensor.{name}"):

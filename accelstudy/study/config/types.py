@@ -9,6 +9,10 @@ from pydantic import AfterValidator, BeforeValidator, Field, GetCoreSchemaHandle
 from pydantic import GetJsonSchemaHandler as JsonHandler
 from pydantic_core import core_schema
 
+from accelstudy import bounds
+from accelstudy.bounds import Range
+from accelstudy.names import check_path_name
+
 
 def _no_truth_value(value: Any) -> Any:
     if isinstance(value, bool):
@@ -31,15 +35,38 @@ def _model_name(text: str) -> str:
 
 ModelName = Annotated[str, AfterValidator(_model_name)]
 """A model by its name; a composition and a file have the name that their effects give them."""
+PathName = Annotated[str, AfterValidator(check_path_name)]
 Number = BeforeValidator(_no_truth_value)
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False), Number]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False), Number]
 Finite = Annotated[float, Field(allow_inf_nan=False), Number]
 Tilt = Annotated[float, Field(gt=0, lt=100), Number]
 Pitch = Annotated[float, Field(gt=-100, lt=100), Number]
-Count = Annotated[int, Field(gt=0), Number]
-Seed = Annotated[int, Field(ge=0), Number]
-PowerOfTwo = Annotated[int, Field(ge=2), Number, AfterValidator(_power_of_two)]
+
+
+def _within(range_: Range) -> tuple[Any, ...]:
+    """What makes a number of a type one within a range, in the schema too."""
+    ends = {"minimum": 0 if range_.zero else range_.least, "maximum": range_.most}
+    finite = Field(json_schema_extra=dict(ends))
+    return Number, AfterValidator(range_.check), finite
+
+
+Gravity = Annotated[float, *_within(bounds.GRAVITY)]
+GravityError = Annotated[float, *_within(bounds.GRAVITY_ERROR)]
+SigmaForce = Annotated[float, *_within(bounds.SIGMA_FORCE)]
+SigmaGravity = Annotated[float, *_within(bounds.SIGMA_GRAVITY)]
+SigmaAngle = Annotated[float, *_within(bounds.SIGMA_ANGLE)]
+Angle = Annotated[float, *_within(bounds.ANGLE)]
+Temperature = Annotated[float, *_within(bounds.TEMPERATURE)]
+Vibration = Annotated[float, *_within(bounds.VIBRATION)]
+Interval = Annotated[float, *_within(bounds.INTERVAL)]
+Duration = Annotated[float, *_within(bounds.DURATION)]
+Rate = Annotated[float, *_within(bounds.RATE)]
+Replicates = Annotated[int, *_within(bounds.REPLICATES)]
+Attitudes = Annotated[int, *_within(bounds.ATTITUDES)]
+BaseSamples = Annotated[int, *_within(bounds.BASE_SAMPLES), AfterValidator(_power_of_two)]
+Resamples = Annotated[int, *_within(bounds.RESAMPLES)]
+Seed = Annotated[int, *_within(bounds.SEED)]
 
 
 class _OneOrMore:
