@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from accelstudy.errors import InputError, shown
+from accelstudy.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -25,23 +25,28 @@ class Range:
 
     def check(self, value: float) -> float:
         """Return the value; raise `InputError` with the range if it is outside."""
-        if not (self.least <= value <= self.most or (self.zero and value == 0)):
-            ends = f"{_plain(self.least)} to {_plain(self.most)}"
-            number = shown(value) if isinstance(value, int) else f"{value:g}"
-            raise InputError(
-                f"must be {'0, or ' if self.zero else ''}from {ends} {self.unit}".rstrip()
-                + f", not {number}"
-            )
-        return value
+        if self.least <= value <= self.most or (self.zero and value == 0):
+            return value
+        ends = f"from {_plain(self.least)} to {_plain(self.most)} {self.unit}".rstrip()
+        raise InputError(f"must be {'0, or ' if self.zero else ''}{ends}, not {_plain(value)}")
+
+    def check_key(self, key: str, value: float) -> None:
+        """Check the value of a key, which the error names."""
+        try:
+            self.check(value)
+        except InputError as error:
+            raise InputError(f"{key}: {error}") from None
 
 
 def _plain(value: float) -> str:
-    return f"{value:d}" if isinstance(value, int) else f"{value:g}"
+    if isinstance(value, int):
+        # Python writes no integer of more than 4300 digits.
+        return str(value) if abs(value) <= 10**20 else "a huge number"
+    return f"{value:.7g}"
 
 
 GRAVITY = Range(1e-3, 1e3, "m/s²")
 GRAVITY_ERROR = Range(-1e2, 1e2, "m/s²")
-FORCE = Range(-1e6, 1e6, "m/s²")
 # Forces are always observed, and an observation without noise has no finite weight; the best
 # gravimeters resolve 1e-9 m/s².
 SIGMA_FORCE = Range(1e-9, 1e3, "m/s²")
@@ -56,9 +61,11 @@ DURATION = Range(1e-6, 1e7, "s")
 RATE = Range(1e-6, 1e9, "per second")
 
 REPLICATES = Range(1, 10_000_000)
+SESSIONS = Range(100, 100_000)
 ATTITUDES = Range(1, 100_000)
 BASE_SAMPLES = Range(2, 2**20)
 RESAMPLES = Range(1, 100_000)
 POSITIONS = Range(1, 100_000)
-SAMPLES = Range(2, 10**12)
+SAMPLES = Range(2, 10**9)
+SIZE = Range(1e-6, 1e6)
 SEED = Range(0, 2**64 - 1)

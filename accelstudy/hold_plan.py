@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy import bounds
 from accelstudy.effects import Effect, Hold
 from accelstudy.errors import InputError, UnknownNameError
 from accelstudy.leveling import roll_pitch
@@ -17,7 +17,7 @@ from accelstudy.sensor import SensorModel
 Array = NDArray[np.float64]
 
 CHOICES = {"temperature_order": ("linear", "ABBA", "random"), "yaw": ("none", "random")}
-LEAST = {"temperature": -273.15, "vibration": 0.0}
+RANGES = {"temperature": bounds.TEMPERATURE, "vibration": bounds.VIBRATION}
 PROVIDES = {"time": "interval", "temperature": "temperature", "vibration": "vibration"}
 """Columns of the holds that are there only if the plan says so, and what of it does."""
 
@@ -50,14 +50,11 @@ class HoldPlan:
         for key, known in CHOICES.items():
             if getattr(self, key) not in known:
                 raise UnknownNameError(key, getattr(self, key), known)
-        if self.interval is not None and not 0 < self.interval < math.inf:
-            raise InputError(f"interval: must be above 0, not {self.interval:g}")
-        for key, least in LEAST.items():
-            pair = getattr(self, key)
-            if pair is not None and not all(least <= value < math.inf for value in pair):
-                raise InputError(
-                    f"{key}: must be two numbers of {least:g} or more, not {pair[0]:g}:{pair[1]:g}"
-                )
+        if self.interval is not None:
+            bounds.INTERVAL.check_key("interval", self.interval)
+        for key, allowed in RANGES.items():
+            for value in getattr(self, key) or ():
+                allowed.check_key(key, value)
 
     def missing(self, effect: Effect) -> str | None:
         """Column that an effect needs and the plan does not provide; None if there is all."""

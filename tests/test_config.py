@@ -254,7 +254,7 @@ BAD = {
     "infinite": ({"gravity_mps2": math.inf}, "gravity_mps2", "finite"),
     "not a number, NaN": ({"noise": {"gravity": {"error_mps2": math.nan}}}, "noise.gravity.error"),
     "NaN in a list": ({"grids": [grid(gravity_error_mps2=[0, math.nan])]}, "gravity_error_mps2.1"),
-    "no replicates": ({"grids": [grid(replicates=0)]}, "grids.0.replicates", "greater than 0"),
+    "no replicates": ({"grids": [grid(replicates=0)]}, "grids.0.replicates", "from 1 to 10000000"),
     "no models": ({"grids": [grid(models=[])]}, "grids.0.models", "at least 1 item"),
     "no schemes": ({"grids": [grid(schemes=[])]}, "grids.0.schemes", "at least 1 item"),
     "no approaches": ({"grids": [grid(approaches=[])]}, "grids.0.approaches", "at least 1"),
@@ -598,3 +598,51 @@ def test_cells_of_any_valid_study(keys, size):
     assert [cell for batch in divided for cell in batch] == cells
     for batch in divided:
         assert len(batch) == 1 or sum(cell.replicates for cell in batch) <= size
+
+
+def test_aliases_cannot_make_a_file_huge(tmp_path):
+    """Two hundred bytes that mean 10^11 values, in a known key; and a value that holds itself."""
+
+    def tens(start, form):
+        """Levels of which each means ten of the one before."""
+        levels = range(1, 12)
+        return "\n".join([start, *(form.format(i, ", ".join([f"*x{i - 1}"] * 10)) for i in levels)])
+
+    for name, text in {
+        "many.yaml": tens("x0: &x0 [a, b]", "x{0}: &x{0} [{1}]") + "\nmodels: *x11",
+        "merged.yaml": tens("x0: &x0 {a: 1}", "x{0}: &x{0} {{<<: [{1}]}}"),
+        "itself.yaml": "models: &a [*a]",
+    }.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+        with pytest.raises(InputError, match=r"more than 100000 values|a value holds itself"):
+            read_study(tmp_path / name)
+    (tmp_path / "few.yaml").write_text("a: &a {b: 1}\nc: *a\nd: {<<: *a}\n", encoding="utf-8")
+    assert read_layer(tmp_path / "few.yaml") == {"a": {"b": 1}, "c": {"b": 1}, "d": {"b": 1}}
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({"study": "x" * 101}, "study: string should have at most 100 characters"),
+        ({"gravity_mps2": 1e10}, "gravity_mps2: must be from 0.001 to 1000 m/s², not 1e+10"),
+        ({"seed": 10**400}, "seed: must be from 0 to 18446744073709551615, not a huge number"),
+        ({"grids": [grid(replicates=10**400)]}, "grids.0.replicates: must be from 1 to 10000000"),
+        ({"leveling": {"attitudes": 10**9}}, "leveling.attitudes: must be from 1 to 100000, not"),
+        (
+            {"sensitivity": {"roll_gon": 0, "pitch_gon": 0, "base_samples": 2**40}},
+            "sensitivity.base_samples: must be from 2 to 1048576",
+        ),
+        (
+            {"sensitivity": {"roll_gon": 9e11, "pitch_gon": 0}},
+            "sensitivity.roll_gon.0: must be from -400 to 400 gon, not 9e+11",
+        ),
+        ({"noise": {"sensor": {"sigma_mps2": 1e-12}}}, "noise.sensor.sigma_mps2: must be from"),
+        ({"noise": {"robot": {"sigma_mgon": 1e10}}}, "noise.robot.sigma_mgon: must be 0, or from"),
+        ({"models": {"m": ["a" * 10**6]}}, "models.m: unknown effect 'aaa"),
+    ],
+)
+def test_no_number_is_beyond_all_bounds(keys, message):
+    with pytest.raises(InputError) as error:
+        parse_study({**content(), **keys})
+    assert message in str(error.value)
+    assert len(str(error.value)) < 1000

@@ -81,18 +81,21 @@ TABLES = {
         lambda t: t.assign(time_s=t["time_s"].to_numpy()[::-1]),
         ("time_s: position 2", "in order of acquisition"),
     ),
-    "endless force": (lambda t: t.assign(fx=t["fx"] * 1e300), ("fx, fy, fz", "no unit")),
+    "endless force": (
+        lambda t: t.assign(fx=t["fx"] * 1e300),
+        ("fx: position 1", "must be from -1e+12"),
+    ),
     "no force": (
         lambda t: t.assign(**{f: 1e-300 * np.arange(N) for f in ("fx", "fy", "fz")}),
         ("fx, fy, fz", "no unit"),
     ),
     "endless angles": (
         lambda t: t.assign(roll_robot_gon=t["roll_robot_gon"] * 1e300),
-        ("roll_robot_gon: position 1", "beyond anything"),
+        ("roll_robot_gon: position 1", "must be from -400 to 400 gon"),
     ),
     "endless heat": (
         lambda t: t.assign(temperature_degC=t["temperature_degC"] * 1e300),
-        ("temperature_degC: position 1", "beyond anything"),
+        ("temperature_degC: position 1", "must be from -273.15 to 10000 °C"),
     ),
     "feet": (
         lambda t: t.assign(**{f: 3.28 * t[f] for f in ("fx", "fy", "fz")}),
@@ -305,7 +308,7 @@ def test_no_effect_is_named_in_what_is_its_own_model(robot, approach, digits, tm
     assert found["gap"]["sigma0_squared"]["before"] < 1e-6
 
 
-@pytest.mark.parametrize("sigma", [1e-6, 10.0, 1e6])
+@pytest.mark.parametrize("sigma", [1e-6, 10.0, 1e3])
 @pytest.mark.parametrize("approach", ["robot", "gravity"])
 def test_a_sigma_out_of_all_bounds_is_the_noise(robot, sigma, approach, tmp_path):
     measured = replace(robot, sigma_force=sigma)

@@ -124,7 +124,7 @@ def test_means_as_columns(tmp_path):
     ("content", "message"),
     [
         ({"rate": 100}, r"settings: rate: unknown key; did you mean 'rate_hz'\?"),
-        ({"rate_hz": -1}, "settings: rate_hz: input should be greater than 0, not -1"),
+        ({"rate_hz": -1}, r"settings: rate_hz: must be from 1e-06 to 1e\+09 per second, not -1"),
         ({"rate_hz": True}, "rate_hz: must be a number, not true"),
         ({"unit": "ft"}, "unit: input should be"),
         ({"columns": {"fx": 1.5}}, "columns.fx"),
@@ -191,7 +191,7 @@ def test_command_with_everything(tmp_path):
         ([], "give the column of time, or the rate"),
         (["--rate", "100", "--columns", "fx"], "--columns: expected fx=1,fy=2,fz=3"),
         (["--rate", "100", "--unit", "counts", "--scale", "a"], "--scale: expected numbers"),
-        (["--rate", "-5"], "options: rate_hz: input should be greater than 0"),
+        (["--rate", "-5"], "options: rate_hz: must be from 1e-06 to 1e+09 per second"),
         (["--rate", "nan"], "options: rate_hz"),
         (["--rate", "100", "--threshold", "1e-9"], "no static hold"),
     ],

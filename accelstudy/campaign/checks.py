@@ -9,12 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.campaign.header import COLUMNS, COUNTING, HEADER, LEAST, MOST, Header
+from accelstudy.campaign.header import ANY, COLUMNS, COUNTING, HEADER, MOST, RANGES, Header
 from accelstudy.errors import InputError
 from accelstudy.leveling import specific_force
 from accelstudy.units import GON, STANDARD_GRAVITY, to_si
 
 Array = NDArray[np.float64]
+
+FARTHEST = 1000
+"""Times gravity, beyond which a single mean is no measurement."""
 
 
 def check_names(names: Sequence[str], path: Path) -> None:
@@ -35,13 +38,13 @@ def check_column(
             raise InputError(f"{path}: {name}: {labels[i]}: {values[i]:.15g} {text}")
 
     if attribute in COUNTING:
-        # Beyond 2^53 not every integer is a float.
-        complain_of((values % 1 != 0) | (abs(values) > 2**53), "is no whole number")
-    if attribute in LEAST:
-        least = LEAST[attribute]
-        complain_of(values < least, f"is too small; it must be {least} or more")
-    if attribute not in (*COUNTING, "forces"):
-        complain_of(abs(values) > MOST, f"is beyond anything measured; expected less than {MOST:g}")
+        complain_of(values % 1 != 0, "is no whole number")
+    range_ = ANY if attribute == "forces" else RANGES.get(attribute, ANY)
+    for i in np.flatnonzero((values < range_.least) | (values > range_.most))[:1]:
+        try:
+            range_.check(values[i])
+        except InputError as error:
+            raise InputError(f"{path}: {name}: {labels[i]}: {error}") from None
     behind = np.diff(values, prepend=-np.inf)
     if attribute == "positions":
         text = "follows no smaller number; number the holds 1, 2, 3 … in order of acquisition"
@@ -108,6 +111,15 @@ def check_norm(raw: Array, forces: Array, header: Header, path: Path) -> None:
             " or `nominal`" if header.unit == "counts" else " or the columns"
         )
     raise InputError(f"{path}: {what}: {advice}")
+
+
+def check_outliers(forces: Array, labels: Sequence[str], gravity: float, path: Path) -> None:
+    """Check that no single mean is farther from gravity than any sensor or bump could take it."""
+    for i in np.flatnonzero(np.linalg.norm(forces, axis=1) > FARTHEST * gravity)[:1]:
+        raise InputError(
+            f"{path}: fx, fy, fz: {labels[i]}: more than {FARTHEST} times gravity; correct the "
+            "mean, or leave out the hold"
+        )
 
 
 def check_angles(angles: Array, forces: Array, gravity: float, path: Path) -> None:

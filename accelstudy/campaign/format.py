@@ -20,6 +20,7 @@ from accelstudy.campaign.checks import (
     check_angles,
     check_column,
     check_norm,
+    check_outliers,
     check_robot,
     check_size,
 )
@@ -161,6 +162,8 @@ def _parse_table(columns: Columns, header: Header, path: Path, plausible: bool) 
             values[attribute] = (array - offset) * scale
         check = check_norm if plausible else check_size
         check(given["forces"], values["forces"], header, path)
+        if plausible:
+            check_outliers(values["forces"], labels, header.gravity.value_mps2, path)
         if header.robot is not None:
             if plausible:
                 check_angles(given["angles"], values["forces"], header.gravity.value_mps2, path)

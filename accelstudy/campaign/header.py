@@ -8,9 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, model_validator
 
+from accelstudy import bounds
+from accelstudy.bounds import Range
 from accelstudy.campaign.layout import LogLayout
 from accelstudy.study.config.schema import Block
-from accelstudy.study.config.types import Finite, NotNegative, Number, Positive
+from accelstudy.study.config.types import (
+    Finite,
+    Gravity,
+    Number,
+    Positive,
+    SigmaAngle,
+    SigmaForce,
+    SigmaGravity,
+)
 from accelstudy.units import GON, to_si
 
 Array = NDArray[np.float64]
@@ -34,16 +44,21 @@ COLUMNS = {
 """Attributes of a campaign and the columns that make them up, all of them or none."""
 KNOWN = tuple(name for names in COLUMNS.values() for name in names)
 COUNTING = ("positions", "n_samples")
-LEAST = {
-    "positions": 1,
-    "n_samples": 1,
-    "sd": 0,
-    "sd_slope": 0,
-    "temperature": -273.15,
-    "vibration": 0,
-}
 MOST = 1e12
 """Beyond anything that is measured, in any unit; squares and cubes of less stay finite."""
+ANY = Range(-MOST, MOST)
+RANGES = {
+    "positions": Range(1, 2**53),  # beyond which not every integer is a float
+    "n_samples": Range(1, 2**53),
+    "sd": Range(0.0, MOST),
+    "sd_slope": Range(0.0, MOST),
+    "time": bounds.TIME,
+    "temperature": bounds.TEMPERATURE,
+    "vibration": bounds.VIBRATION,
+    "angles": bounds.ANGLE,
+    "yaw": bounds.ANGLE,
+}
+"""What columns can hold, in the unit of the file, where it is not `ANY`."""
 
 
 def _not_zero(value: float) -> float:
@@ -63,18 +78,16 @@ class Nominal(Block):
 
 
 class _Gravity(Block):
-    value_mps2: Annotated[Positive, Field(ge=1e-3, le=1e3)]
-    sigma_mps2: Annotated[NotNegative, Field(le=1e3)] = 0.0
+    value_mps2: Gravity
+    sigma_mps2: SigmaGravity = 0.0
 
 
 class _SensorNoise(Block):
-    # Forces are always observed, and an observation without noise has no finite weight; the best
-    # gravimeters resolve 1e-9 m/s².
-    sigma_mps2: Annotated[Positive, Field(ge=1e-9, le=MOST)]
+    sigma_mps2: SigmaForce
 
 
 class _Robot(Block):
-    angle_sigma_mgon: Annotated[NotNegative, Field(le=MOST)]
+    angle_sigma_mgon: SigmaAngle
 
 
 class Exclusion(Block):

@@ -27,7 +27,15 @@ from accelstudy.campaign.logs import (
 from accelstudy.errors import InputError, UnknownNameError
 from accelstudy.study.config.errors import first_error
 from accelstudy.study.config.layers import overlay, read_layer
-from accelstudy.study.config.types import Finite, NotNegative, OneOrMore, Positive
+from accelstudy.study.config.types import (
+    Finite,
+    Gravity,
+    NotNegative,
+    OneOrMore,
+    Positive,
+    Rate,
+    SigmaGravity,
+)
 from accelstudy.units import MGON, STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
@@ -46,8 +54,8 @@ class _Block(BaseModel):
 class GravitySettings(_Block):
     """Gravity where the sensor was."""
 
-    value_mps2: Positive = Field(STANDARD_GRAVITY, description="local gravity, m/s²")
-    sigma_mps2: NotNegative = Field(0.0, description="its standard deviation; 0 holds it fixed")
+    value_mps2: Gravity = Field(STANDARD_GRAVITY, description="local gravity, m/s²")
+    sigma_mps2: SigmaGravity = Field(0.0, description="its standard deviation; 0 holds it fixed")
 
 
 class ImportSettings(_Block):
@@ -61,7 +69,7 @@ class ImportSettings(_Block):
     )
     time: Place | None = Field(None, description="column of time")
     time_unit: Literal["s", "ms", "us", "ns"] = "s"
-    rate_hz: Positive | None = Field(None, description="samples per second, without time")
+    rate_hz: Rate | None = Field(None, description="samples per second, without time")
     variable: str | None = Field(None, description="which array of a MATLAB file")
     unit: Literal["m/s^2", "g", "counts"] = "m/s^2"
     scale: OneOrMore[Finite] | None = Field(None, description="with counts: m/s² per count")

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StrictInt, StrictStr
 
 from accelstudy.frames import Frame, parse_frame
-from accelstudy.study.config.types import Finite, OneOrMore, Positive
+from accelstudy.study.config.types import Finite, OneOrMore, Rate
 
 Place = Annotated[StrictInt, Field(ge=0)] | StrictStr
 """A column by its name in the header, or by its place, counted from 0."""
@@ -28,7 +28,7 @@ class LogLayout(BaseModel):
     )
     time: Place | None = Field(None, description="column of time")
     time_unit: Literal["s", "ms", "us", "ns"] = Field("s", description="unit of that column")
-    rate_hz: Positive | None = Field(None, description="samples per second, without time")
+    rate_hz: Rate | None = Field(None, description="samples per second, without time")
     variable: str | None = Field(None, description="which array of a MATLAB file")
     unit: Literal["m/s^2", "g", "counts"] = Field("m/s^2", description="unit of the forces")
     scale: OneOrMore[Finite] | None = Field(None, description="with counts: m/s² per count")

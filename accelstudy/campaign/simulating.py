@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from accelstudy import bounds
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.format import Campaign
 from accelstudy.effects import Effect, get_effect
@@ -32,6 +33,16 @@ STREAMS = ("sensor", "effects", "order", "noise", "sd", "gross")
 """What is drawn, each from a stream of its own, so that none changes another (nor the holds)."""
 
 ORDERS = ("scheme", "random")
+
+_RANGES = {
+    "seed": bounds.SEED,
+    "repeats": bounds.POSITIONS,
+    "repeat_first": replace(bounds.POSITIONS, least=0),
+    "n_samples": bounds.SAMPLES,
+    "sigma": bounds.SIGMA_FORCE,
+    "gravity": bounds.GRAVITY,
+    "size": bounds.SIZE,
+}
 
 
 @dataclass(frozen=True)
@@ -87,14 +98,12 @@ class CampaignSettings:
     def __post_init__(self) -> None:
         if self.order not in ORDERS:
             raise UnknownNameError("order", self.order, ORDERS)
-        limits = {"seed": 0, "repeats": 1, "repeat_first": 0, "sigma_angle": 0, "n_samples": 2}
-        for key, least in limits.items():
-            value = getattr(self, key)
-            if value is not None and not least <= value < math.inf:
-                raise InputError(f"{key}: must be {least} or more, not {value:g}")
-        for key in ("sigma", "gravity", "size"):
-            if not 0 < getattr(self, key) < math.inf:
-                raise InputError(f"{key}: must be above 0, not {getattr(self, key):g}")
+        for key, allowed in _RANGES.items():
+            if (value := getattr(self, key)) is not None:
+                allowed.check_key(key, value)
+        bounds.SIGMA_ANGLE.check_key("sigma_angle", self.sigma_angle / MGON)
+        n = self.repeats * get_scheme(self.scheme).n_positions + self.repeat_first
+        bounds.POSITIONS.check_key("repeats: number of positions", n)
 
     @property
     def holds(self) -> HoldPlan:

@@ -20,7 +20,7 @@ from accelstudy.models import get_model
 from accelstudy.names import check_path_name
 from accelstudy.study.config.errors import first_error
 from accelstudy.study.config.schema import Block
-from accelstudy.study.config.types import Count, ModelName, Seed
+from accelstudy.study.config.types import ModelName, Seed, Sessions
 
 
 def _known_settings(value: Any) -> Any:
@@ -41,7 +41,7 @@ class RoundTrip(Block):
     model: ModelName = Field("bias-scale-nonorthogonality", description="model that is diagnosed")
     approach: str | None = Field(None, description="robot if the campaign has one, by default")
     seed: Seed = Field(1, description="of the diagnosis")
-    replicates: Count = Field(1000, description="sessions simulated with either model")
+    replicates: Sessions = Field(1000, description="sessions simulated with either model")
 
     @model_validator(mode="after")
     def _names_exist(self) -> RoundTrip:

@@ -25,16 +25,27 @@ from accelstudy.schemes import get_scheme, scheme_names
 from accelstudy.sensor import SensorModel
 from accelstudy.simulation import Noise, sigma_of_mean
 from accelstudy.study.config.types import (
-    Count,
+    Angle,
+    Attitudes,
+    BaseSamples,
+    Duration,
     Finite,
+    Gravity,
+    GravityError,
+    Interval,
     ModelName,
-    NotNegative,
     OneOrMore,
     Pitch,
-    Positive,
-    PowerOfTwo,
+    Rate,
+    Replicates,
+    Resamples,
     Seed,
+    SigmaAngle,
+    SigmaForce,
+    SigmaGravity,
+    Temperature,
     Tilt,
+    Vibration,
 )
 from accelstudy.units import STANDARD_GRAVITY, to_si
 
@@ -42,7 +53,8 @@ CLAIMED_EFFECTS = ("bias", "scale", "nonorthogonality")
 """Effects that the model of the paper's claims and figures has."""
 
 
-Ends = tuple[Finite, Finite]
+Temperatures = tuple[Temperature, Temperature]
+Vibrations = tuple[Vibration, Vibration]
 """Two numbers, from and to."""
 
 
@@ -55,27 +67,27 @@ class Block(BaseModel):
 class SensorNoise(Block):
     """White noise of the accelerometer."""
 
-    sigma_mps2: Positive = Field(0.002, description="standard deviation per axis, m/s²")
+    sigma_mps2: SigmaForce = Field(0.002, description="standard deviation per axis, m/s²")
     per: Literal["position", "sample"] = Field(
         "position", description="whether sigma_mps2 is that of a position's mean or of one sample"
     )
-    rate_hz: Positive = Field(100.0, description="sampling rate; used with per: sample")
-    duration_s: Positive = Field(2.0, description="duration of a hold; used with per: sample")
+    rate_hz: Rate = Field(100.0, description="sampling rate; used with per: sample")
+    duration_s: Duration = Field(2.0, description="duration of a hold; used with per: sample")
 
 
 class RobotNoise(Block):
     """Noise of the robot's angles."""
 
-    sigma_mgon: NotNegative = Field(3.2, description="standard deviation of roll and of pitch")
+    sigma_mgon: SigmaAngle = Field(3.2, description="standard deviation of roll and of pitch")
 
 
 class GravityNoise(Block):
     """What is known of local gravity."""
 
-    sigma_mps2: NotNegative = Field(
+    sigma_mps2: SigmaGravity = Field(
         0.0, description="standard deviation of the value used; 0 holds it fixed in the adjustment"
     )
-    error_mps2: Finite = Field(0.0, description="systematic error of the value used")
+    error_mps2: GravityError = Field(0.0, description="systematic error of the value used")
 
 
 class NoiseConfig(Block):
@@ -94,12 +106,12 @@ class NoiseConfig(Block):
 class HoldsConfig(Block):
     """Conditions of the holds, on which some effects depend."""
 
-    interval_s: Positive | None = Field(None, description="time between holds")
-    temperature_degC: Ends | None = Field(None, description="temperatures from and to")
+    interval_s: Interval | None = Field(None, description="time between holds")
+    temperature_degC: Temperatures | None = Field(None, description="temperatures from and to")
     temperature_order: Literal["linear", "ABBA", "random"] = Field(
         "linear", description="course of the temperature; ABBA: in quarters of the session"
     )
-    vibration_mps2: Ends | None = Field(
+    vibration_mps2: Vibrations | None = Field(
         None, description="rms of the vibration, drawn for each hold between these"
     )
     yaw: Literal["none", "random"] = Field("none", description="yaw of the robot: zero, or drawn")
@@ -131,17 +143,17 @@ class Grid(Block):
     approaches: OneOrMore[str] = Field(
         default=["gravity", "robot"], description="names of approaches, or all"
     )
-    replicates: Count = Field(description="simulated calibrations per cell")
-    sensor_sigma_mps2: OneOrMore[Positive] | None = Field(
+    replicates: Replicates = Field(description="simulated calibrations per cell")
+    sensor_sigma_mps2: OneOrMore[SigmaForce] | None = Field(
         None, description="noise.sensor.sigma_mps2"
     )
-    robot_sigma_mgon: OneOrMore[NotNegative] | None = Field(
+    robot_sigma_mgon: OneOrMore[SigmaAngle] | None = Field(
         None, description="noise.robot.sigma_mgon"
     )
-    gravity_sigma_mps2: OneOrMore[NotNegative] | None = Field(
+    gravity_sigma_mps2: OneOrMore[SigmaGravity] | None = Field(
         None, description="noise.gravity.sigma_mps2"
     )
-    gravity_error_mps2: OneOrMore[Finite] | None = Field(
+    gravity_error_mps2: OneOrMore[GravityError] | None = Field(
         None, description="noise.gravity.error_mps2"
     )
 
@@ -149,7 +161,7 @@ class Grid(Block):
 class Presets(Block):
     """The rows of the paper's Table 1, each with its own model and scheme."""
 
-    replicates: Count = Field(description="simulated calibrations per row and approach")
+    replicates: Replicates = Field(description="simulated calibrations per row and approach")
     approaches: OneOrMore[str] = Field(
         default=["gravity", "robot"], description="names of approaches, or all"
     )
@@ -159,15 +171,15 @@ class LevelingConfig(Block):
     """Where the tilt error that a calibration leaves is evaluated."""
 
     max_tilt_gon: Tilt = Field(50.0, description="largest tilt of the z axis from the vertical")
-    attitudes: Count = Field(200, description="attitudes, spread evenly over that cap")
+    attitudes: Attitudes = Field(200, description="attitudes, spread evenly over that cap")
 
 
 class SensitivityConfig(Block):
     """Variance-based sensitivity analysis of leveling (figures 4 to 6)."""
 
-    base_samples: PowerOfTwo = Field(1024, description="Sobol base samples, a power of two")
-    resamples: Count = Field(100, description="bootstrap resamples for confidence intervals")
-    roll_gon: OneOrMore[Finite] = Field(description="rolls of the grid")
+    base_samples: BaseSamples = Field(1024, description="Sobol base samples, a power of two")
+    resamples: Resamples = Field(100, description="bootstrap resamples for confidence intervals")
+    roll_gon: OneOrMore[Angle] = Field(description="rolls of the grid")
     pitch_gon: OneOrMore[Pitch] = Field(description="pitches of the grid")
     model: ModelName = Field("bias-scale-nonorthogonality", description="model of figures 5 and 6")
     scheme: str = Field("mclaren-24", description="scheme whose calibration gives the sds")
@@ -183,7 +195,7 @@ class StudyConfig(Block):
         description="name; results go to results/<study>/"
     )
     seed: Seed = Field(description="seed of all random numbers")
-    gravity_mps2: Positive = Field(STANDARD_GRAVITY, description="true local gravity")
+    gravity_mps2: Gravity = Field(STANDARD_GRAVITY, description="true local gravity")
     noise: NoiseConfig = NoiseConfig()
     holds: HoldsConfig = HoldsConfig()
     sensor: dict[str, Quantity] = Field(
