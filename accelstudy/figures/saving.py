@@ -77,6 +77,8 @@ def save_all(figures: Mapping[str, Callable[[], Figure]], folder: Path) -> dict[
             _simplify(figure)
             svg, png = folder / f"{name}.svg", folder / f"{name}.png"
             elements[name] = save(figure, svg, png, name, PAGE_DPI)
+        except OSError:  # a full disk, say, which is no matter of the figure
+            raise
         except Exception as error:
             said = failure(f"The figure {name!r} could not be drawn", error)
             elements[name] = f'<p class="failed">{html.escape(said)}</p>'
