@@ -204,7 +204,7 @@ def _reported(out: Path) -> Iterator[list[Path]]:
         where = Path(str(error.filename)) if error.filename is not None else out
         inside = where.is_relative_to(out) or any(p.startswith(_PREFIX) for p in where.parts)
         place = "" if inside else f"{where}: "
-        reason = error.strerror or str(error).rpartition("] ")[2]  # Arrow has it in the text
+        reason = str(error.strerror or error).rpartition("] ")[2]  # Arrow puts more before it
         raise InputError(f"{out}: cannot be written: {place}{reason}") from None
     except InputError as error:
         text = str(error)
