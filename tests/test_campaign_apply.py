@@ -459,6 +459,19 @@ def test_a_matlab_array_is_leveled(tmp_path):
     )
 
 
+def test_a_single_reading_is_as_noisy_as_within_the_holds(tmp_path):
+    n = get_scheme("fibonacci-30").n_positions
+    sd = np.full((n, 3), 0.05)
+    noisy = read_calibration(fitted(tmp_path, "thermal_bias", {}, sd=sd))
+    plain = read_calibration(fitted(tmp_path, "thermal_bias", {}))
+    log = written_log(tmp_path / "log.csv", "thermal_bias", {}, temperature=np.full(40, 20.0))
+    for calibration, sigma in ((noisy, 0.05), (plain, SIGMA)):
+        level_log(calibration, log, tmp_path / "default.csv")
+        level_log(calibration, log, tmp_path / "given.csv", sigma=sigma)
+        found, expected = (errors_of(tmp_path / f"{name}.csv")[1] for name in ("default", "given"))
+        np.testing.assert_allclose(found, expected, rtol=0.05)
+
+
 def test_columns_of_the_campaign_that_a_log_lacks_are_said_to_come_from_there(tmp_path):
     calibration, log = read_calibration(calibration_file(tmp_path)), tmp_path / "log.csv"
     mixed_log().to_csv(log, index=False)

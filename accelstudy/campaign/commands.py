@@ -115,7 +115,7 @@ def check_sigmas_command(
 @click.option(
     "--sigma",
     type=click.FloatRange(min=0),
-    help="Noise of a reading, m/s².  [default: that of the mean of a position]",
+    help="Noise of a reading, m/s².  [default: that within the holds of the campaign]",
 )
 @force_option
 @angle_unit_option

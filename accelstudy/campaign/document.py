@@ -11,6 +11,7 @@ from accelstudy.campaign.assessment import MAX_TILT_GON, Assessment
 from accelstudy.campaign.fit import CampaignFit
 from accelstudy.campaign.gauges import GAUGES, affine_form, in_gauge
 from accelstudy.campaign.ranges import ranges_of
+from accelstudy.campaign.session import Campaign
 from accelstudy.campaign.verdict import state, verdict, warnings
 from accelstudy.units import MGON, recorded_unit, to_recorded
 
@@ -38,6 +39,7 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
         "sigma_position_mps2": number(fit.sigma_position),
         "sigma_position_priori_mps2": number(campaign.sigma_force),
         "sigma_position_posteriori_mps2": number(fit.sigma_position_posteriori),
+        "sigma_reading_mps2": _sigma_reading(campaign),
         "parameters": [
             {
                 "name": parameter.name,
@@ -121,6 +123,11 @@ def quality_document(assessment: Assessment) -> dict[str, Any]:
             "max_tilt_gon": MAX_TILT_GON,
         },
     }
+
+
+def _sigma_reading(campaign: Campaign) -> float | None:
+    """Noise of a single reading, m/s², from the samples within the holds."""
+    return None if campaign.sd is None else number(np.sqrt(np.mean(campaign.sd**2)))
 
 
 def _nominal(fit: CampaignFit) -> dict[str, list[float]] | None:

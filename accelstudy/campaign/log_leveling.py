@@ -65,7 +65,7 @@ def level_log(
     out : CSV or Parquet file; whole or not there
     given : mapping, optional
         How to read the log; see `readings_of`.
-    sigma : float, m/s², noise of a reading; that of a position of the campaign if omitted
+    sigma : float, m/s², noise of a reading; see `noise_of_reading` if omitted
     start : float, s, from the start of the calibration session to the first row; 0 if omitted
     chunk_size : int, rows held in memory at a time
 
@@ -76,17 +76,26 @@ def level_log(
         gravity in most rows that it must be in another unit.
     """
     readings = readings_of(log, calibration, given, start or 0.0)
-    noise = calibration.content["sigma_position_mps2"] if sigma is None else sigma
+    noise = noise_of_reading(calibration) if sigma is None else sigma
     account = Account(calibration, readings)
     with chunk_writer(out) as write:
         chunks = readings.chunks(chunk_size, typed=Path(out).suffix == ".parquet")
         for table, forces, hold in track(chunks, "leveling"):
-            corrected, added = _leveled(calibration, readings.frame, forces, hold, noise or 0.0)
+            corrected, added = _leveled(calibration, readings.frame, forces, hold, noise)
             account.take(forces, corrected, hold)
             write(_with(table, added))
         account.close()
     assumed = account.assumptions() if start is None else ()
     return Leveled(account.rows, account.empty, (*assumed, *account.warnings()))
+
+
+def noise_of_reading(calibration: Calibration) -> float:
+    """Noise of a reading, m/s²: that within the holds of the campaign.
+
+    Unless it is known it is that of the mean of a hold, which is smaller; 0 if neither is known.
+    """
+    known = (calibration.content.get(f"sigma_{what}_mps2") for what in ("reading", "position"))
+    return next((sigma for sigma in known if sigma is not None), 0.0)
 
 
 def _leveled(
