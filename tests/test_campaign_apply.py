@@ -407,6 +407,9 @@ def test_a_lost_sample_does_not_lose_the_log(tmp_path, chunk_size):
     (warning,) = leveled.warnings
     assert warning.startswith("5 of 7 rows have no calibrated force")
     assert "line 4, column fz (fz): nothing" in warning
+    log.write_text("fx,fy,fz,note\n1,2,9,a\n1,2\n", encoding="utf-8")
+    (warning,) = level_log(calibration, log, tmp_path / "out.csv").warnings
+    assert warning.endswith("line 3 has not the 4 columns of the others")
 
 
 @pytest.mark.parametrize("wanted", ["out.csv", "out.parquet"])

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
 
 from accelstudy.campaign.applying import Calibration
 from accelstudy.campaign.log_reading import Readings
+from accelstudy.campaign.log_tables import column_names, numbers
 from accelstudy.campaign.ranges import Watch
 from accelstudy.campaign.wording import counted, listed
 from accelstudy.effects import Hold
@@ -19,6 +21,9 @@ Array = NDArray[np.float64]
 
 CLIPPED = 0.999
 """Part of the sensor's range from which on a reading is none: a count less than all is the end."""
+
+RAGGED = "ragged"
+"""What is unusable of a line that has not as many cells as the others: all."""
 
 
 def clipped(calibration: Calibration, forces: Array) -> NDArray[np.bool_]:
@@ -40,11 +45,12 @@ class Account:
         self._calibration, self._readings = calibration, readings
         self._watch = Watch(calibration.ranges)
         self._norms = np.empty(0)
-        self._usable = self._far = self._first_empty = self._after = 0
+        self._usable = self._far = self._after = 0
+        self._first_empty: tuple[int, str | None] = (0, None)
         self.rows = self.empty = 0
 
-    def take(self, forces: Array, corrected: Array, hold: Hold) -> None:
-        """Take in readings and calibrated forces (k, 3), m/s² in frd, and their conditions.
+    def take(self, table: pa.Table, forces: Array, corrected: Array, hold: Hold) -> None:
+        """Take in rows, their readings and calibrated forces (k, 3), m/s² in frd, and conditions.
 
         Raises
         ------
@@ -53,7 +59,8 @@ class Account:
         """
         lost = np.isnan(corrected[:, 0])
         if lost.any() and not self.empty:
-            self._first_empty = self.rows + int(np.argmax(lost))
+            first = int(np.argmax(lost))
+            self._first_empty = self.rows + first, self._unusable(table, first)
         self.rows += len(lost)
         self.empty += int(lost.sum())
         norms = np.linalg.norm(forces, axis=1)
@@ -74,7 +81,7 @@ class Account:
         """Raise `InputError` if nothing of the log is of use, or most of it far from gravity."""
         if not self._usable:
             path = self._readings.source.path
-            raise InputError(f"{path}: no row has three numbers; the first: {self._reason(0)}")
+            raise InputError(f"{path}: no row has three numbers; the first: {self._reason()}")
         if 2 * self._far > self._usable:
             raise self._wrong_unit()
 
@@ -91,7 +98,7 @@ class Account:
         """What a user should know of the log."""
         of_all = f"of {counted(self.rows, 'row')}"
         if self.empty:
-            first = self._reason(self._first_empty)
+            first = self._reason()
             yield f"{self.empty} {of_all} have no calibrated force, their cells are empty; {first}"
         if self._after:
             yield (
@@ -116,18 +123,26 @@ class Account:
             for p in effect.parameters
         )
 
-    def _reason(self, row: int) -> str:
-        """Why a row has no calibrated force, with the place where it stands."""
+    def _unusable(self, table: pa.Table, row: int) -> str | None:
+        """Which of the columns that are used has no number in a row of a chunk."""
+        names = column_names(self._readings.source)
+        if all(not cell.is_valid for column in table.columns for cell in column.slice(row, 1)):
+            return RAGGED
+        for key, place in self._readings.places.items():
+            if not np.isfinite(numbers(table[names[place]].slice(row, 1))).all():
+                return key
+        return None
+
+    def _reason(self) -> str:
+        """Why the first empty row is, with the place where it stands."""
         source, places = self._readings.source, self._readings.places
-        where = f"row {row + 1}"
-        for key, place in places.items():
-            where, found = source.look_up(row, place)
-            try:
-                if np.isfinite(float(found.strip("'").replace(",", "."))):
-                    continue
-            except ValueError:
-                pass
-            return f"{where}, column {source.names[place]} ({key}): {found}"
+        row, key = self._first_empty
+        # Looks for the line in the file anew, so once.
+        where, found = source.look_up(row, places.get(key or "", places["fx"]))
+        if key == RAGGED:
+            return f"{where} has not the {len(source.names)} columns of the others"
+        if key is not None:
+            return f"{where}, column {source.names[places[key]]} ({key}): {found}"
         full = self._calibration.content.get("range_mps2")
         end = "" if full is None else f", or it is at the end of the range, ± {full:.4g} m/s²"
         return f"{where}: the calibration has no force for such a reading{end}"

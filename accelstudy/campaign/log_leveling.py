@@ -82,7 +82,7 @@ def level_log(
         chunks = readings.chunks(chunk_size, typed=Path(out).suffix == ".parquet")
         for table, forces, hold in track(chunks, "leveling"):
             corrected, added = _leveled(calibration, readings.frame, forces, hold, noise)
-            account.take(forces, corrected, hold)
+            account.take(table, forces, corrected, hold)
             write(_with(table, added))
         account.close()
     assumed = account.assumptions() if start is None else ()
