@@ -170,16 +170,53 @@ def test_figure_3_marks_the_closed_form(paper):
     assert marks == {12.98, 18.36}
 
 
-def test_figure_4_shows_what_does_not_vary_as_missing_and_not_as_zero(tables, paper):
+def test_figure_4_shows_sobol_over_linear_theory_and_marks_what_does_not_vary(tables, paper):
     table = tables["sensitivity"].copy()
     gone = (table["roll_gon"] == 0) & (table["output"] == "roll")
     table.loc[gone, ["total_effect", "ci95"]] = np.nan
     table.loc[gone, "defined"] = False
     drawn = draw("figure-4", {"sensitivity": table}, paper)
-    shown = np.ma.getmaskarray(drawn.axes[0].collections[0].get_array())
-    assert shown[:, 1].all()
-    assert not shown[:, [0, 2]].any()
+    ax = drawn.axes[1]  # f_y on roll: cos² of roll
+    theory, half, circles = ax.collections
+    assert set(circles.get_offsets()[:, 0]) == {-50, 50}
+    np.testing.assert_allclose(circles.get_array(), 0.5, atol=0.2)  # of 32 samples
+    assert set(ax.get_lines()[-1].get_xdata()) == {0}
+    np.testing.assert_allclose(np.abs(half.get_paths()[0].vertices[:, 0]), 50, atol=0.1)
+    assert np.max(theory.get_array()) > 0.999
     draw("figure-5", {"sensitivity": table}, paper)
+
+
+def test_total_effects_are_labelled_and_their_lines_go_through_zero(tables, paper):
+    drawn = draw("figure-5", tables, paper)
+    ax = drawn.axes[0]
+    labels = {text.get_text(): text.get_color() for text in ax.texts}
+    assert {"$f_y$", "$f_z$", r"$\alpha_{zx}$", "$b_y$"} <= labels.keys()
+    assert labels["$b_y$"] == style.group_colour("bias")
+    rows = tables["sensitivity"].query("analysis == 'gravity' and output == 'roll'")
+    small = rows.groupby("input")["total_effect"].max().loc[lambda share: share < 0.005].index
+    legend = drawn.legends[0].get_texts()[-1].get_text()
+    assert legend.startswith("below 1 % everywhere")
+    assert all(style.symbol(name) in legend for name in small)
+    assert not {style.symbol(name) for name in small} & labels.keys()
+    f_z = [line for line in ax.get_lines() if line.get_marker() in ("", "None", None)]
+    assert all(np.isfinite(line.get_ydata()).all() for line in f_z)
+
+
+def test_numbers_stand_in_table_1(tables, paper):
+    drawn = draw("table-1", tables, paper)
+    written = {text.get_text() for ax in drawn.axes for text in ax.texts}
+    tilt = tables["leveling"].set_index("cell")["roll_rms_mgon"][f"{NINE}/fibonacci-36/robot"]
+    assert f"{tilt:.1f}" in written
+
+
+def test_the_tilt_overview_shows_rms_quantile_and_the_noise_of_a_reading(tables, paper):
+    drawn = draw("leveling-overview", tables, paper)
+    row = tables["leveling"].set_index("cell").loc[f"{NINE}/mclaren-24/gravity"]
+    written = {text.get_text() for text in drawn.axes[0].texts}
+    assert {f"{row['roll_rms_mgon']:.1f}", f"{row['roll_rms_q95_mgon']:.1f}"} <= written
+    legend = " ".join(text.get_text() for text in drawn.legends[0].get_texts())
+    assert "95 % of the calibrations" in legend
+    assert "13.0 mgon" in legend
 
 
 def test_figure_7_draws_the_mean_sd_and_the_first_simulation(tables, paper):

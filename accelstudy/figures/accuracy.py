@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator
+from matplotlib.ticker import LogLocator, MultipleLocator
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.figures.registry import Tables, figure
 from accelstudy.figures.style import ANGLE_COLOURS, COLUMN, FULL, new_figure
 from accelstudy.leveling import sigma_roll_pitch, specific_force
 from accelstudy.study.config import StudyConfig
-from accelstudy.units import GON, MGON
+from accelstudy.units import GON, attitude_unit, display_unit, to_attitude, to_display
 
 Array = NDArray[np.float64]
 
@@ -24,13 +24,13 @@ TILTED = (0.0, 50.0)
 """Roll and pitch of figure 3, gon."""
 
 
-def sigma_mgon(
+def shown_sigma(
     roll_gon: ArrayLike, pitch_gon: ArrayLike, sigma_force: ArrayLike, g: float
 ) -> Array:
-    """Standard deviations (..., 2) of roll and pitch in mgon, for equal noise on all axes."""
+    """Standard deviations (..., 2) of roll and pitch as shown, for equal noise on all axes."""
     roll, pitch, sigma = np.broadcast_arrays(roll_gon, pitch_gon, sigma_force)
     force = np.stack(specific_force(roll * GON, pitch * GON, g), axis=-1)
-    return sigma_roll_pitch(force, sigma[..., None, None] ** 2 * np.eye(3)) / MGON
+    return to_display(sigma_roll_pitch(force, sigma[..., None, None] ** 2 * np.eye(3)), "rad")
 
 
 @figure(
@@ -42,7 +42,9 @@ def sigma_mgon(
 def accuracy_over_attitude(tables: Tables, study: StudyConfig) -> Figure:
     """Two maps of the standard deviation over roll and pitch."""
     roll, pitch = np.meshgrid(ROLL, PITCH)
-    sigma = sigma_mgon(roll, pitch, study.sigma_force, study.gravity_mps2)
+    sigma = shown_sigma(roll, pitch, study.sigma_force, study.gravity_mps2)
+    roll, pitch = to_attitude(roll * GON), to_attitude(pitch * GON)
+    unit = display_unit("rad")
     fig = new_figure(FULL, 66)
     axes = fig.subplots(1, 2, sharex=True, sharey=True)
     for ax, title, values in zip(axes, ("roll", "pitch"), np.moveaxis(sigma, -1, 0), strict=True):
@@ -57,7 +59,7 @@ def accuracy_over_attitude(tables: Tables, study: StudyConfig) -> Figure:
             vmax=np.ceil(sigma.max()),
         )
         ax.set_title(f"$\\sigma_\\{'phi' if title == 'roll' else 'theta'}$ of {title}")
-        ax.set_xlabel("roll $\\phi$ / gon")
+        ax.set_xlabel(f"roll $\\phi$ / {attitude_unit()}")
         ax.grid(False)
         if np.ptp(values) > 1e-6 * values.max():
             _contours(ax, roll, pitch, values)
@@ -65,20 +67,20 @@ def accuracy_over_attitude(tables: Tables, study: StudyConfig) -> Figure:
             ax.text(
                 0,
                 0,
-                f"{values.mean():.2f} mgon\nat every attitude",
+                f"{values.mean():.2f} {unit}\nat every attitude",
                 ha="center",
                 va="center",
                 color="white",
             )
-    axes[0].set_yticks([-75, -50, -25, 0, 25, 50, 75])
-    axes[0].set_ylabel("pitch $\\theta$ / gon")
-    fig.colorbar(image, ax=axes, label="standard deviation / mgon", pad=0.02)
+    axes[0].yaxis.set_major_locator(MultipleLocator(25))
+    axes[0].set_ylabel(f"pitch $\\theta$ / {attitude_unit()}")
+    fig.colorbar(image, ax=axes, label=f"standard deviation / {unit}", pad=0.02)
     return fig
 
 
 def _contours(ax: Axes, roll: Array, pitch: Array, values: Array) -> None:
     """Labelled lines at round values, away from the edges."""
-    highest = values[np.abs(pitch) <= 75].max()
+    highest = values[np.abs(pitch) <= 0.94 * pitch.max()].max()
     round_values = LogLocator(subs=(1, 1.5, 2, 3, 5, 7)).tick_values(values.min(), highest)
     levels = [x for x in round_values if values.min() < x < highest]
     lines = ax.contour(roll, pitch, values, levels=levels, colors="white", linewidths=0.7)
@@ -101,9 +103,9 @@ def accuracy_over_noise(tables: Tables, study: StudyConfig) -> Figure:
     fig = new_figure(COLUMN, 62)
     ax = fig.subplots()
     noise = np.linspace(0.0, 5.0, 51) * study.sigma_force
-    over_noise = sigma_mgon(*TILTED, noise, study.gravity_mps2)
-    at_study = sigma_mgon(*TILTED, study.sigma_force, study.gravity_mps2)
-    x = study.sigma_force * 1e3
+    over_noise = shown_sigma(*TILTED, noise, study.gravity_mps2)
+    at_study = shown_sigma(*TILTED, study.sigma_force, study.gravity_mps2)
+    x, unit = study.sigma_force * 1e3, display_unit("rad")
     ax.vlines(x, 0, at_study.max(), color="#777777", linewidth=0.8, linestyle=":")
     for i, (name, greek) in enumerate((("roll", "phi"), ("pitch", "theta"))):
         ax.plot(
@@ -111,13 +113,14 @@ def accuracy_over_noise(tables: Tables, study: StudyConfig) -> Figure:
             over_noise[:, i],
             color=ANGLE_COLOURS[name],
             linestyle=("-", "--")[i],
-            label=f"{name} $\\sigma_\\{greek}$: {at_study[i]:.2f} mgon at {x:g} mm/s²",
+            label=f"{name} $\\sigma_\\{greek}$: {at_study[i]:.2f} {unit} at {x:g} mm/s²",
         )
         ax.plot(x, at_study[i], "o", color=ANGLE_COLOURS[name])
     ax.set_xlim(0, noise[-1] * 1e3)
     ax.set_ylim(bottom=0)
     ax.set_xlabel("accelerometer noise $\\sigma_f$ / mm/s²")
-    ax.set_ylabel("standard deviation / mgon")
-    ax.set_title(f"roll {TILTED[0]:g} gon, pitch {TILTED[1]:g} gon")
+    ax.set_ylabel(f"standard deviation / {unit}")
+    angles = [f"{to_attitude(angle * GON):g} {attitude_unit()}" for angle in TILTED]
+    ax.set_title("roll {}, pitch {}".format(*angles))
     ax.legend(loc="upper left", frameon=True, framealpha=1, edgecolor="white")
     return fig

@@ -23,8 +23,8 @@ from accelstudy.figures.style import (
     in_order,
     new_figure,
     say_empty,
+    shown,
     spread,
-    unit_label,
 )
 from accelstudy.models import PRESETS, Preset, get_model
 from accelstudy.schemes import get_scheme
@@ -39,7 +39,7 @@ PALE = 0.3
 @figure(
     "table-1",
     title="Table 1: published calibrations and what they determine",
-    category="Study",
+    category="Paper",
     tables=("summary", "leveling"),
     when=lambda study: study.presets is not None,
 )
@@ -58,7 +58,7 @@ def published_calibrations(tables: Tables, study: StudyConfig) -> Figure:
         rows = summary[summary["group"] == group]
         _draw_group(ax, rows, approaches)
         ax.set_title(group_label(group).replace("non-orthogonality", "non-orthogo-\nnality"))
-        ax.set_xlabel(f"sd / {unit_label(rows['unit'].iloc[0])}")
+        ax.set_xlabel(f"sd / {shown([], rows['unit'].iloc[0])[1]}")
     _draw_tilt(axes[-1], tables["leveling"], summary, approaches)
     for ax in axes:
         _finish(ax)
@@ -106,9 +106,10 @@ def _draw_group(ax: Axes, rows: pd.DataFrame, approaches: list[str]) -> None:
             if its.empty:
                 continue
             known = True
+            values, _ = shown(its["sd_empirical"], its["unit"].iloc[0])
             _mark(
                 ax,
-                its["sd_empirical"].mean(),
+                values.mean(),
                 y + offset,
                 approach,
                 pale=bool(its["estimable"].all()),
@@ -121,8 +122,9 @@ def _draw_tilt(
     ax: Axes, leveling: pd.DataFrame, summary: pd.DataFrame, approaches: list[str]
 ) -> None:
     ax.set_title("tilt error\n(roll, rms)")
-    ax.set_xlabel("mgon")
-    rms = {} if leveling.empty else leveling.set_index("cell")["roll_rms_mgon"].to_dict()
+    ax.set_xlabel(shown([], "mgon")[1])
+    known = {} if leveling.empty else leveling.set_index("cell")["roll_rms_mgon"].to_dict()
+    rms = dict(zip(known, shown(list(known.values()), "mgon")[0], strict=True))
     run = set(summary["cell"])
     for y, preset in enumerate(PRESETS):
         for approach, offset in _places(approaches).items():
@@ -132,10 +134,19 @@ def _draw_tilt(
 
 
 def _mark(ax: Axes, value: float, y: float, approach: str, *, pale: bool) -> None:
-    """Marker at a standard deviation, or a cross if there is none."""
+    """Marker and number at a standard deviation, or a cross if there is none."""
     colour = approach_colour(approach)
     if np.isfinite(value) and value > 0:
         ax.plot(value, y, approach_marker(approach), color=colour)
+        ax.annotate(
+            _number(value),
+            (value, y),
+            (4, 0),
+            textcoords="offset points",
+            color=colour,
+            va="center",
+            fontsize=6.5,
+        )
     else:
         ax.plot(
             CROSS_AT,
@@ -145,6 +156,12 @@ def _mark(ax: Axes, value: float, y: float, approach: str, *, pale: bool) -> Non
             transform=ax.get_yaxis_transform(),
             alpha=PALE if pale else 1,
         )
+
+
+def _number(value: float) -> str:
+    """Two significant digits, three from 10 to 100 and whole numbers above."""
+    decimals = 1 if value >= 10 else 1 - int(np.floor(np.log10(value)))
+    return f"{value:.{decimals if value < 100 else 0}f}"
 
 
 def _dash(ax: Axes, y: int) -> None:
@@ -160,7 +177,7 @@ def _dash(ax: Axes, y: int) -> None:
 
 
 def _finish(ax: Axes) -> None:
-    """Logarithmic axis from one power of ten to another, with room for the crosses."""
+    """Logarithmic axis about the values, with room for their numbers and for the crosses."""
     values = np.concatenate(
         [np.asarray(line.get_xdata(), float) for line in ax.get_lines() if line.get_marker() != "x"]
         or [np.empty(0)]
@@ -175,7 +192,7 @@ def _finish(ax: Axes) -> None:
         return
     low, high = values.min() / 1.5, values.max() * 1.5
     ax.set_xscale("log")
-    ax.set_xlim(low, high * (high / low) ** 0.25)
+    ax.set_xlim(low, high * (high / low) ** 0.55)
     low, high = ax.get_xlim()
     ticks = np.asarray(LogLocator(subs=(1, 2, 5)).tick_values(low, high))
     shown = ticks[(ticks >= low) & (ticks <= high)]
