@@ -3,25 +3,42 @@
 import json
 
 import numpy as np
+import pandas as pd
 import pytest
 import yaml
 from click.testing import CliRunner
 from study_helpers import content, grid
 
+from accelstudy.approaches import get_approach
+from accelstudy.campaign.applying import read_calibration
 from accelstudy.campaign.batch_config import parse_batch
+from accelstudy.campaign.document import calibration_document
+from accelstudy.campaign.export import export
+from accelstudy.campaign.fit import fit_campaign
+from accelstudy.campaign.log_reading import readings_of
 from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign
 from accelstudy.cli import main
 from accelstudy.diagnosis.calibration import diagnosed_calibration
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.round_trip import parse_round_trip
+from accelstudy.effects import Hold
 from accelstudy.errors import InputError
 from accelstudy.figures.style import model_title
+from accelstudy.frames import parse_frame
 from accelstudy.models import get_model
 from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study
 
 NINE = "bias-scale-nonorthogonality"
 HIDDEN = f"{NINE}+warm_up(tau=400)+thermal_bias"
+
+
+TURNED = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+
+
+def run_out(*arguments):
+    """Standard output only."""
+    return CliRunner().invoke(main, [str(argument) for argument in arguments]).stdout
 
 
 def run(*arguments, code=0):
@@ -231,3 +248,118 @@ def test_a_calibration_with_the_noise_that_was_found():
     assert np.mean(content["sigma_position_axes_mps2"]) == pytest.approx(diagnosis.sigma_position)
     assert content["sigma_position_axes_mps2"][2] > 2 * content["sigma_position_axes_mps2"][0]
     assert "weighted by their noise" in content["warnings"][0]
+
+
+# --- forms for devices ---------------------------------------------------------------------------
+
+
+def by_the_export(text, raw, **conditions):
+    """Calibrate readings as a stranger would, by nothing but the exported JSON."""
+    given = json.loads(text)
+    readings, effects = given["readings"], [e for e in given["effects"] if e["part"] == "sensor"]
+    names = {p["name"]: p["value"] for e in effects for p in e["parameters"]}
+    to_frd = np.array(readings["to_frd"])
+    forces = (raw - np.array(readings["offset"])) * np.array(readings["scale"])
+    f_s = forces @ (np.array(readings["mending"]) @ to_frd).T
+
+    def evaluated(formula, f):
+        known = {"f_x": f[:, 0], "f_y": f[:, 1], "f_z": f[:, 2], "g": given["gravity_mps2"]}
+        functions = {"exp": np.exp, "sign": np.sign, "Abs": np.abs}
+        return eval(formula, {}, {**functions, **known, **names, **conditions}) + np.zeros(len(f))
+
+    f_a = f_s
+    for _ in range(60):
+        added = [[evaluated(o, f_a) for o in e["output"]] for e in effects if "output" in e]
+        f_a = f_s - np.sum(added, axis=0).T
+    turned = [
+        [[evaluated(part, f_a)[0] for part in row] for row in e["axes"]]
+        for e in effects
+        if "axes" in e
+    ]
+    return f_a @ (np.eye(3) + np.sum(turned, axis=0)).T @ to_frd
+
+
+def test_a_stranger_implements_an_exported_calibration(diagnosed):
+    path = diagnosed / "calibration.json"
+    raw = np.random.default_rng(1).normal(0, 5, (5, 3))
+    time, temperature = np.linspace(0, 1000, 5), np.linspace(10, 40, 5)
+    expected = read_calibration(path).correct(raw, Hold(time=time, temperature=temperature))
+    text = run("export", path)
+    found = by_the_export(text, raw, time=time, temperature=temperature)
+    np.testing.assert_allclose(found, expected, atol=1e-9)
+    assert json.loads(text)["matrix_3x4"] is None
+    assert set(json.loads(text)["symbols"]) == {"f_x", "g", "time", "temperature"}
+    assert yaml.safe_load(run("export", path, "--form", "yaml")) == json.loads(text)
+    for form in ("c", "matrix"):
+        line = run("export", path, "--form", form, code=2)
+        assert "no matrix can hold thermal_bias and warm_up" in line
+        assert "json and yaml" in line
+        assert line.count("\n") == 1
+
+
+@pytest.mark.parametrize("frame", ["frd", "flu", "rfu"])
+def test_forms_take_and_give_the_axes_of_the_log(frame, whole, tmp_path):
+    """With data of a campaign whose axes were mended, in counts of a log with axes of its own."""
+    scale, offset = [0.02, 0.021, 0.019], [500, 510, 490]
+    log = {"unit": "counts", "scale": scale, "offset": offset, "frame": frame}
+    mended = {"error": "axis_error", "reason": "x is read as −y", "matrix": TURNED}
+    path = tmp_path / "calibration.json"
+    path.write_text(json.dumps({**whole, "log": log, "mended": mended}), encoding="utf-8")
+    calibration = read_calibration(path)
+    raw = np.random.default_rng(2).normal(500, 300, (6, 3))
+    axes = parse_frame(frame)
+    forces = axes.to_frd((raw - offset) * scale) @ np.transpose(TURNED)
+    expected = axes.from_frd(calibration.correct(forces))
+    result = CliRunner().invoke(main, ["export", str(path), "--form", "matrix"])
+    assert result.stderr == "warning: the calibration is of mended data: x is read as −y\n"
+    matrix = np.array([row.split() for row in result.stdout.splitlines()], float)
+    np.testing.assert_allclose(raw @ matrix[:, :3].T + matrix[:, 3], expected, atol=1e-8)
+    np.testing.assert_allclose(by_the_export(run_out("export", path), raw), expected, atol=1e-8)
+    header = run_out("export", path, "--form", "c")
+    assert f"in the axes {frame}:" in header
+    assert "x, y, z in counts" in header
+    assert "x is read as −y" in header
+    readings = readings_of(log_of(raw, tmp_path), calibration, {"columns": COLUMNS})
+    ((_, read, _),) = readings.chunks()
+    np.testing.assert_allclose(axes.from_frd(calibration.correct(read)), expected, atol=1e-8)
+
+
+COLUMNS = {"fx": 0, "fy": 1, "fz": 2}
+
+
+def log_of(forces, folder):
+    path = folder / "log.csv"
+    pd.DataFrame(forces, columns=["fx", "fy", "fz"]).to_csv(path, index=False)
+    return path
+
+
+def test_apply_mends_readings_as_the_data_were(tmp_path):
+    campaign, _, content = calibration_of(gross_errors=("unit_error(force=0.1019716212978)",))
+    path = tmp_path / "calibration.json"
+    path.write_text(json.dumps(content), encoding="utf-8")
+    log, right = log_of(campaign.forces, tmp_path), read_calibration(path)
+    expected = right.correct(campaign.forces * 9.80665)
+    for options, words in (
+        ([], "the forces are in g; readings are mended likewise"),
+        (["--unit", "g"], "the forces are in g; readings are taken as the options say"),
+    ):
+        arguments = ["apply", path, log, "--columns", "fx=0,fy=1,fz=2", *options]
+        result = CliRunner().invoke(
+            main, [*map(str, arguments), "--out", str(tmp_path / "out.csv"), "--force"]
+        )
+        assert result.exit_code == 0, result.output
+        assert f"warning: the calibration is of mended data: {words}" in result.stderr
+        leveled = pd.read_csv(tmp_path / "out.csv")
+        columns = [f"f{axis}_calibrated_mps2" for axis in "xyz"]
+        np.testing.assert_allclose(leveled[columns], expected, atol=1e-5)
+
+
+def test_the_rig_stays_where_it_was():
+    """What belongs to the rig is exported with a note, and is in no matrix."""
+    campaign, _ = simulate_campaign(CampaignSettings(scheme="fibonacci-30", order="random"))
+    model = get_model(f"{NINE}+encoder_scale")
+    content = calibration_document(fit_campaign(campaign, model, get_approach("robot")))
+    assert content["affine"] is not None
+    effects = json.loads(export(content, "json"))["effects"]
+    assert [effect["spec"] for effect in effects if "note" in effect] == ["encoder_scale"]
+    assert len(export(content, "matrix").splitlines()) == 3

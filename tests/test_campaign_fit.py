@@ -114,9 +114,13 @@ def calibration_in(unit, nominal=None):
     return {
         "campaign": "test",
         "model": NINE.name,
+        "effects": [effect.spec for effect in NINE.effects],
         "unit": unit,
         "nominal": nominal,
-        "parameters": [],
+        "gravity_mps2": 9.81,
+        "parameters": [
+            {"name": p.name, "value": 0.0, "sigma": 1.0, "unit": p.unit} for p in NINE.parameters
+        ],
         "affine": {"matrix": k.tolist(), "bias_mps2": bias.tolist()},
     }
 

@@ -164,6 +164,12 @@ class _Affine(BaseModel):
     bias_mps2: Triple
 
 
+class _Mended(BaseModel):
+    error: str
+    reason: str
+    matrix: Annotated[list[Triple], PerAxis] | None
+
+
 class _Document(BaseModel):
     """What is read of `calibration.json`; the rest is for persons and other programs."""
 
@@ -181,6 +187,7 @@ class _Document(BaseModel):
     affine: _Affine | None
     log: LogLayout | None = None
     range_mps2: Positive | None = None
+    mended: _Mended | None = None
     ranges: dict[str, Annotated[list[Finite], Field(min_length=2, max_length=2)]] = {}
 
     @model_validator(mode="after")

@@ -168,12 +168,20 @@ def apply_command(
 def export_command(calibration: Path, form: str) -> None:
     """Print a CALIBRATION in a form that a device takes.
 
-    CALIBRATION is a calibration.json.
+    CALIBRATION is a calibration.json. json and yaml carry every effect: parameters with sigmas and
+    units, and the formulas to implement. c and matrix hold M in force = M · (x, y, z, 1), readings
+    and forces in the axes of the log; they carry bias, scale, non-orthogonality and whatever else
+    is linear in the force, and no effect that is not, or that depends on time, temperature,
+    vibration or the position before.
     """
     from accelstudy.campaign.applying import read_calibration
     from accelstudy.campaign.export import export
 
-    click.echo(export(read_calibration(calibration).content, form), nl=False)
+    content = read_calibration(calibration).content
+    text = export(content, form)
+    if mended := content["mended"]:
+        click.echo(f"warning: the calibration is of mended data: {mended['reason']}", err=True)
+    click.echo(text, nl=False)
 
 
 COMMANDS = (calibrate_command, check_sigmas_command, apply_command, export_command)

@@ -10,16 +10,42 @@ import numpy as np
 import yaml
 from numpy.typing import ArrayLike, NDArray
 
-from accelstudy.errors import InputError
+from accelstudy.campaign.gauges import not_affine
+from accelstudy.campaign.logs import conversion
+from accelstudy.effects import Effect
+from accelstudy.effects.defaults import formulas
+from accelstudy.errors import InputError, UnknownNameError
+from accelstudy.frames import FRD, Frame, parse_frame
+from accelstudy.models import compose
+from accelstudy.sensor import SensorModel
 from accelstudy.units import STANDARD_GRAVITY
+from accelstudy.wording import joined
 
 Array = NDArray[np.float64]
 
 FORMS = ("json", "yaml", "c", "matrix")
 
+STEPS = (
+    "f_s = mending · to_frd · ((raw − offset) · scale), m/s²",
+    "f_a from f_s = f_a + Σ output, where output is that at f_a = (f_x, f_y, f_z): repeat "
+    "f_a ← f_s − Σ output, from f_a = f_s on, until it settles",
+    "f_b = (I + Σ axes) · f_a",
+    "result = to_frdᵀ · f_b, m/s², in the axes of the readings",
+)
+"""How a reading is calibrated; sums are over the effects of the sensor."""
+SYMBOLS = {
+    "f_x": "m/s², f_a along x; likewise f_y, f_z",
+    "g": "m/s², gravity_mps2",
+    "temperature": "°C",
+    "time": "s since the start of the session",
+    "vibration": "m/s², rms while the sensor stands still",
+    "step_x": "m/s², f_a along x less that of the position before; likewise step_y, step_z",
+    "roll": "rad, attitude of the rig; likewise pitch, yaw",
+}
+
 
 def device_matrix(calibration: Mapping[str, Any]) -> Array:
-    """M (3, 4) with f_b = M · (raw, 1), from the raw unit of the campaign to m/s².
+    """M (3, 4) with f = M · (raw, 1), from raw readings to m/s², both in the axes of the log.
 
     Parameters
     ----------
@@ -28,17 +54,20 @@ def device_matrix(calibration: Mapping[str, Any]) -> Array:
     Raises
     ------
     InputError
-        If the model is not affine, so that no matrix can hold it.
+        If the model has effects that no matrix can hold.
     """
+    if unfit := not_affine(_model(calibration)):
+        raise InputError(
+            f"no matrix can hold {joined(list(unfit))} of the model {calibration['model']!r}; "
+            "the forms json and yaml carry all effects"
+        )
     affine = calibration["affine"]
     if affine is None:
-        raise InputError(
-            f"model {calibration['model']!r} is not affine: no matrix can hold it; use json or yaml"
-        )
+        raise InputError(f"the model {calibration['model']!r} with these parameters has no inverse")
     k, bias = np.array(affine["matrix"]), np.array(affine["bias_mps2"])
-    scale, offset = raw_conversion(calibration)
-    linear = k * scale
-    return np.column_stack([linear, -linear @ offset - k @ bias])
+    scale, offset, frame = _readings(calibration)
+    linear = frame.matrix.T @ k @ mending(calibration) @ frame.matrix * scale
+    return np.column_stack([linear, -linear @ offset - frame.matrix.T @ k @ bias])
 
 
 def raw_conversion(calibration: Mapping[str, Any]) -> tuple[Array, Array]:
@@ -50,24 +79,99 @@ def raw_conversion(calibration: Mapping[str, Any]) -> tuple[Array, Array]:
     return np.full(3, factor), np.zeros(3)
 
 
+def mending(calibration: Mapping[str, Any]) -> Array:
+    """C (3, 3) by which forces as they are read become those that were fitted, in frd.
+
+    It is not I where the calibration is of data with a gross error that a diagnosis mended.
+    """
+    mended = calibration.get("mended") or {}
+    return np.eye(3) if mended.get("matrix") is None else np.array(mended["matrix"], dtype=float)
+
+
 def export(calibration: Mapping[str, Any], form: str) -> str:
     """Text of a calibration in one of `FORMS`.
 
-    "json" and "yaml" hold the parameters with sigmas and the matrix, "c" is a header with the
-    matrix, "matrix" the plain 3 × 4 numbers.
+    "json" and "yaml" hold all: parameters with sigmas, formulas of the effects and, where there is
+    one, the matrix; "c" is a header with the matrix, "matrix" the plain 3 × 4 numbers.
     """
     if form == "matrix":
         return "\n".join(_row(row, " ") for row in device_matrix(calibration)) + "\n"
     if form == "c":
         return _c_header(calibration)
-    short = {key: calibration[key] for key in ("campaign", "model", "unit", "parameters")}
-    affine = calibration["affine"] is not None
-    short["matrix_3x4"] = device_matrix(calibration).tolist() if affine else None
     if form == "json":
-        return json.dumps(short, indent=2, ensure_ascii=False) + "\n"
+        return json.dumps(_whole(calibration), indent=2, ensure_ascii=False) + "\n"
     if form == "yaml":
-        return yaml.safe_dump(short, sort_keys=False, allow_unicode=True)
-    raise InputError(f"unknown form {form!r} (known: {', '.join(FORMS)})")
+        return yaml.safe_dump(_whole(calibration), sort_keys=False, allow_unicode=True)
+    raise UnknownNameError("form", form, FORMS)
+
+
+def _model(calibration: Mapping[str, Any]) -> SensorModel:
+    return compose(calibration["model"], tuple(calibration["effects"]))
+
+
+def _readings(calibration: Mapping[str, Any]) -> tuple[Array, Array, Frame]:
+    """Scale and offset (3,) of raw readings, and their axes: those of the log, if there was one."""
+    log = calibration.get("log")
+    if log is None:
+        return *raw_conversion(calibration), FRD
+    scale, offset = conversion(log["unit"], log.get("scale"), log.get("offset"))
+    return scale, offset, parse_frame(log["frame"])
+
+
+def _whole(calibration: Mapping[str, Any]) -> dict[str, Any]:
+    """All that a stranger needs to implement a calibration."""
+    model = _model(calibration)
+    scale, offset, frame = _readings(calibration)
+    values = iter(calibration["parameters"])
+    effects = [
+        _effect(effect, [next(values) for _ in effect.parameters]) for effect in model.effects
+    ]
+    used = " ".join(json.dumps(effect) for effect in effects)
+    matrix = None
+    if not not_affine(model) and calibration["affine"] is not None:
+        matrix = device_matrix(calibration).tolist()
+    return {
+        "campaign": calibration["campaign"],
+        "model": calibration["model"],
+        "unit": _unit(calibration),
+        "gravity_mps2": calibration["gravity_mps2"],
+        "readings": {
+            "frame": frame.name,
+            "scale": scale.tolist(),
+            "offset": offset.tolist(),
+            "to_frd": frame.matrix.tolist(),
+            "mending": mending(calibration).tolist(),
+        },
+        "steps": list(STEPS),
+        "symbols": {name: text for name, text in SYMBOLS.items() if name in used or name == "g"},
+        "effects": effects,
+        "ranges": calibration.get("ranges") or {},
+        "parameters": calibration["parameters"],
+        "matrix_3x4": matrix,
+    }
+
+
+def _effect(effect: Effect, parameters: list[Any]) -> dict[str, Any]:
+    """What an effect adds, with its parameters in SI."""
+    notes = []
+    if effect.part == "rig":
+        notes.append("belongs to the rig: not for readings of the sensor away from it")
+    if effect.drifts:
+        notes.append("known in its session only: keep time within ranges.time_s")
+    return {
+        "spec": effect.spec,
+        "part": effect.part,
+        **({"note": "; ".join(notes)} if notes else {}),
+        **formulas(effect),
+        "parameters": [
+            {key: p[key] for key in ("name", "value", "sigma", "unit")} for p in parameters
+        ],
+    }
+
+
+def _unit(calibration: Mapping[str, Any]) -> str:
+    log = calibration.get("log")
+    return str(calibration["unit"] if log is None else log["unit"])
 
 
 def _row(values: ArrayLike, separator: str) -> str:
@@ -76,11 +180,17 @@ def _row(values: ArrayLike, separator: str) -> str:
 
 def _c_header(calibration: Mapping[str, Any]) -> str:
     rows = ",\n".join(f"    {{{_row(row, ', ')}}}" for row in device_matrix(calibration))
-    comment = str(calibration["campaign"]).replace("*/", "* /")
+    frame = _readings(calibration)[2]
+    lines = [
+        f"Accelerometer calibration of {calibration['campaign']}.",
+        f"Specific force in m/s^2 = M * (x, y, z, 1), with x, y, z in {_unit(calibration)}.",
+        f"Both are in the axes {frame.name}: where x, y and z point, as forward, right, down.",
+    ]
+    if (calibration.get("mended") or {}).get("matrix") is not None:
+        lines.append(f"M mends the readings, too: {calibration['mended']['reason']}.")
+    comment = "\n * ".join(line.replace("*/", "* /") for line in lines)
     return (
-        f"/* Accelerometer calibration of {comment}.\n"
-        " * Specific force in m/s^2 = M * (x, y, z, 1), "
-        f"with x, y, z in {calibration['unit']}. */\n"
+        f"/* {comment} */\n"
         "#ifndef ACCELEROMETER_CALIBRATION_H\n#define ACCELEROMETER_CALIBRATION_H\n\n"
         f"static const double accelerometer_calibration[3][4] = {{\n{rows}\n}};\n\n#endif\n"
     )

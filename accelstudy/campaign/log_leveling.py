@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from accelstudy.campaign.applying import Calibration
 from accelstudy.campaign.log_account import Account, clipped
 from accelstudy.campaign.log_files import CHUNK
-from accelstudy.campaign.log_reading import readings_of
+from accelstudy.campaign.log_reading import Readings, readings_of
 from accelstudy.campaign.log_tables import chunk_writer
 from accelstudy.campaign.logs import AXES
 from accelstudy.effects import Hold
@@ -86,7 +86,21 @@ def level_log(
             write(_with(table, added))
         account.close()
     assumed = account.assumptions() if start is None else ()
-    return Leveled(account.rows, account.empty, (*assumed, *account.warnings()))
+    warnings = (*_mended(calibration, readings), *assumed, *account.warnings())
+    return Leveled(account.rows, account.empty, warnings)
+
+
+def _mended(calibration: Calibration, readings: Readings) -> tuple[str, ...]:
+    """Say that the calibration is of mended data, and whether readings were mended likewise."""
+    mended = calibration.content.get("mended")
+    if mended is None:
+        return ()
+    said = f"the calibration is of mended data: {mended['reason']}"
+    if mended["matrix"] is None:
+        return (said,)
+    if np.array_equal(readings.mending, np.eye(3)):
+        return (f"{said}; readings are taken as the options say, and are not mended",)
+    return (f"{said}; readings are mended likewise",)
 
 
 def noise_of_reading(calibration: Calibration) -> float:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from accelstudy.campaign.applying import Calibration
-from accelstudy.campaign.export import raw_conversion
+from accelstudy.campaign.export import mending, raw_conversion
 from accelstudy.campaign.layout import LogLayout
 from accelstudy.campaign.log_files import CHUNK, Source, open_source
 from accelstudy.campaign.log_tables import column_names, numbers, read_chunks
@@ -42,6 +42,7 @@ class Readings:
     start : float, s, from the start of the calibration session to the first row
     scale, offset : (3,), f = (raw − offset) · scale, in the axes of the log
     frame : Frame, the axes of the log
+    mending : (3, 3), turns forces in frd as they are read into mended ones
     """
 
     source: Source
@@ -52,6 +53,7 @@ class Readings:
     scale: Array
     offset: Array
     frame: Frame
+    mending: Array
 
     def chunks(
         self, chunk_size: int = CHUNK, typed: bool = False
@@ -81,7 +83,8 @@ class Readings:
                 step_y=still,
                 step_z=still,
             )
-            yield table, self.frame.to_frd((forces - self.offset) * self.scale), hold
+            read = self.frame.to_frd((forces - self.offset) * self.scale)
+            yield table, read @ self.mending.T, hold
             row += len(table)
 
 
@@ -131,7 +134,21 @@ def readings_of(
             )
     scale, offset = _conversion(calibration, layout, given.get("unit"))
     factor = TIME_UNITS[layout.time_unit]
-    return Readings(source, places, layout.rate_hz, factor, start, scale, offset, layout.axes)
+    # What is told of the log is right, whatever was wrong in the campaign.
+    told = {"unit_error": "unit", "axis_error": "frame"}
+    mended = calibration.content.get("mended")
+    mends = mended is None or told.get(mended["error"]) not in given
+    return Readings(
+        source,
+        places,
+        layout.rate_hz,
+        factor,
+        start,
+        scale,
+        offset,
+        layout.axes,
+        mending(calibration.content) if mends else np.eye(3),
+    )
 
 
 def _layout(calibration: Calibration, given: Mapping[str, Any]) -> LogLayout:
