@@ -8,6 +8,7 @@ from accelstudy.campaign.allan import (
     AllanSums,
     accuracy_of_mean,
     allan_deviation,
+    allan_moments,
     averaging_factors,
 )
 
@@ -60,13 +61,13 @@ def test_random_walk_and_flicker():
 def test_records_are_pooled():
     sums = AllanSums()
     for seed in range(20):
-        sums.add(white(seed, 3 * 500).reshape(-1, 3) + seed)
+        sums.add(allan_moments(white(seed, 3 * 500).reshape(-1, 3) + seed))
     curve = sums.deviation(STEP)
     assert curve.deviation.shape == (len(curve.tau), 3)
     assert curve.tau[-1] <= 2.5
     assert curve.differences[0] == 20 * 499
     assert curve.pooled[0] == pytest.approx(0.02, rel=0.02)
-    sums.add(np.zeros((1, 3)))
+    sums.add(allan_moments(np.zeros((1, 3))))
     np.testing.assert_array_equal(sums.deviation(STEP).differences, curve.differences)
 
 
@@ -74,7 +75,7 @@ def test_records_are_pooled():
 def test_white_noise_is_found_white(duration):
     sums = AllanSums()
     for seed in range(30):
-        sums.add(white(seed, 3 * 500).reshape(-1, 3))
+        sums.add(allan_moments(white(seed, 3 * 500).reshape(-1, 3)))
     n = round(duration / STEP)
     accuracy = accuracy_of_mean(sums.deviation(STEP), duration, 0.02, n)
     assert accuracy.white == pytest.approx(0.02 / np.sqrt(n))

@@ -188,7 +188,7 @@ def test_command_with_everything(tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ([], "give the column of time, or the rate"),
+        ([], "give the column of time (--time), or the rate (--rate)"),
         (["--rate", "100", "--columns", "fx"], "--columns: expected fx=1,fy=2,fz=3"),
         (["--rate", "100", "--unit", "counts", "--scale", "a"], "--scale: expected numbers"),
         (["--rate", "-5"], "options: rate_hz: must be from 1e-06 to 1e+09 per second"),

@@ -169,8 +169,8 @@ def test_override_and_limits(tmp_path):
         ({"shortest": 5.0}, r"no static hold of 5 s or more \(8 shorter ones"),
         ({"threshold": 1e-6}, "no static hold"),
         ({"threshold": 0.0}, "threshold: must be positive"),
-        ({"window": 0.02}, "a window of 0.02 s holds 2 samples; are the rate"),
-        ({"window": 1e6}, "are the rate"),
+        ({"window": 0.02}, "a window of 0.02 s holds 2 samples, at 100 per second; is the rate"),
+        ({"window": 1e6}, r"is the rate \(--rate\) right"),
         ({"window": 1e3}, "too few samples for a window of 100001"),
     ]:
         with pytest.raises(InputError, match=message):

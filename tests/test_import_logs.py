@@ -25,7 +25,7 @@ TABLE = np.column_stack([TIME, FORCES])
 
 
 def everything(log):
-    times, forces = zip(*log.chunks(), strict=True)
+    times, forces, *_ = zip(*log.chunks(), strict=True)
     return np.concatenate(times), np.concatenate(forces)
 
 
@@ -73,7 +73,7 @@ def test_text(tmp_path, text, options, chunk_size):
 
 def test_chunks_are_small(tmp_path):
     log = open_log(written(tmp_path, lines(before=["t,fx,fy,fz"])), chunk_size=7)
-    assert [len(time) for time, _ in log.chunks()] == [7] * 7 + [1]
+    assert [len(rows.time) for rows in log.chunks()] == [7] * 7 + [1]
 
 
 @pytest.mark.parametrize("array", [TABLE, TABLE.T])
@@ -112,9 +112,9 @@ def test_a_group_of_rows_is_not_held_in_memory(tmp_path):
     pq.write_table(table, tmp_path / "log.parquet", row_group_size=n, use_dictionary=False)
     del table
     before, held = pa.total_allocated_bytes(), []
-    for _, piece in open_log(tmp_path / "log.parquet", rate=100, chunk_size=1000).chunks():
+    for rows in open_log(tmp_path / "log.parquet", rate=100, chunk_size=1000).chunks():
         held.append(pa.total_allocated_bytes() - before)
-        assert len(piece) == 1000
+        assert len(rows.forces) == 1000
     # A whole column is 3.2 MB, and a page of one 1 MB.
     assert max(held) < 7e6 < forces.nbytes
 
@@ -190,7 +190,10 @@ def test_the_line_is_that_of_the_file(tmp_path):
         ({"columns": {"fx": "a"}}, "there are several columns 'a'"),
         ({"columns": {"fx": 1, "fy": 1, "fz": 3}}, "name the same column"),
         ({"columns": {"gx": 1}}, "unknown column 'gx'"),
-        ({"columns": {"fx": 1, "fy": 2, "fz": 3}}, "give the column of time, or the rate"),
+        (
+            {"columns": {"fx": 1, "fy": 2, "fz": 3}},
+            "give the column of time",
+        ),
         ({**BY_PLACE, "rate": 100}, "not both"),
         ({"columns": BY_PLACE["columns"], "rate": 0}, "rate must be positive"),
         ({**BY_PLACE, "unit": "counts"}, "needs a nominal scale"),

@@ -128,7 +128,7 @@ def known(campaign):
     @cache
     def calibrated(name, model=NINE):
         said, folder = campaign(name)
-        out = folder / model
+        out = folder.with_name(f"{name}, {model}")
         result = run("calibrate", folder, "--model", model, "--out", out)
         assert result.exit_code == 0, result.output
         content = json.loads((out / "calibration.json").read_text(encoding="utf-8"))

@@ -42,6 +42,47 @@ class AllanDeviation:
         """Curve of some of the channels."""
         return AllanDeviation(self.tau, self.deviation[:, chosen], self.differences)
 
+    def up_to(self, tau: float) -> AllanDeviation:
+        """Curve without averaging times beyond `tau`, s; the shortest one stays."""
+        kept = self.tau <= max(tau, self.tau[0] if len(self.tau) else 0.0)
+        return AllanDeviation(self.tau[kept], self.deviation[kept], self.differences[kept])
+
+
+@dataclass(frozen=True)
+class AllanMoments:
+    """What one record contributes to the Allan variance, whatever the direction that is asked for.
+
+    Attributes
+    ----------
+    factors : tuple of int, numbers of samples averaged
+    squares : (k, c, c) array, sums of products of the channels' differences of neighbouring means
+    terms, independent : (k,) int arrays, differences, and how many of them are independent
+    """
+
+    factors: tuple[int, ...]
+    squares: Array
+    terms: NDArray[np.int_]
+    independent: NDArray[np.int_]
+
+
+def allan_moments(samples: ArrayLike) -> AllanMoments:
+    """Moments of a record without gaps, (n, c).
+
+    Over m samples: σ²(τ) = ⟨(S[k + 2m] − 2 S[k + m] + S[k])²⟩ / (2 m²), S the running sum, and
+    the mean over all k (overlapping estimate; IEEE Std 1139).
+    """
+    samples = np.asarray(samples, dtype=float).reshape(len(np.asarray(samples)), -1)
+    sums = np.zeros((len(samples) + 1, samples.shape[1]))
+    np.cumsum(samples - samples.mean(axis=0), axis=0, out=sums[1:])
+    factors = averaging_factors(len(samples) // 2)
+    squares = np.zeros((len(factors), samples.shape[1], samples.shape[1]))
+    for i, m in enumerate(factors):
+        second = sums[2 * m :] - 2.0 * sums[m:-m] + sums[: -2 * m]
+        squares[i] = second.T @ second / (2.0 * m * m)
+    averaged = np.array(factors, dtype=int)
+    n = len(samples)
+    return AllanMoments(tuple(factors), squares, n + 1 - 2 * averaged, n // averaged - 1)
+
 
 class AllanSums:
     """What the records of one sensor contribute to its Allan variance; records may be short."""
@@ -52,21 +93,14 @@ class AllanSums:
         self._independent: dict[int, int] = {}
         self._channels = channels
 
-    def add(self, samples: ArrayLike) -> None:
-        """Add a record without gaps, (n, channels).
-
-        Over m samples: σ²(τ) = ⟨(S[k + 2m] − 2 S[k + m] + S[k])²⟩ / (2 m²), S the running sum, and
-        the mean over all k (overlapping estimate; IEEE Std 1139).
-        """
-        samples = np.asarray(samples, dtype=float).reshape(len(np.asarray(samples)), -1)
-        sums = np.zeros((len(samples) + 1, samples.shape[1]))
-        np.cumsum(samples - samples.mean(axis=0), axis=0, out=sums[1:])
-        for m in averaging_factors(len(samples) // 2):
-            second = sums[2 * m :] - 2.0 * sums[m:-m] + sums[: -2 * m]
-            squares = np.sum(second**2, axis=0) / (2.0 * m * m)
+    def add(self, record: AllanMoments, frame: Array | None = None) -> None:
+        """Add a record; its channels are turned to the columns of `frame`, (c, c), if given."""
+        turned = record.squares if frame is None else frame.T @ record.squares @ frame
+        for i, m in enumerate(record.factors):
+            squares = np.diagonal(turned[i])
             self._squares[m] = self._squares.get(m, np.zeros(self._channels)) + squares
-            self._terms[m] = self._terms.get(m, 0) + len(second)
-            self._independent[m] = self._independent.get(m, 0) + len(samples) // m - 1
+            self._terms[m] = self._terms.get(m, 0) + int(record.terms[i])
+            self._independent[m] = self._independent.get(m, 0) + int(record.independent[i])
 
     def deviation(self, step: float) -> AllanDeviation:
         """Allan deviation of all records together; `step` is the time between samples, s."""
@@ -91,7 +125,7 @@ def allan_deviation(samples: ArrayLike, step: float) -> AllanDeviation:
     """Overlapping Allan deviation of one record, (n,) or (n, channels); `step` in s."""
     values = np.asarray(samples, dtype=float).reshape(len(np.asarray(samples)), -1)
     sums = AllanSums(values.shape[1])
-    sums.add(values)
+    sums.add(allan_moments(values))
     return sums.deviation(step)
 
 

@@ -16,7 +16,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.header import HEADER, TABLES
-from accelstudy.campaign.importing import GravitySettings, ImportSettings
+from accelstudy.campaign.import_settings import GravitySettings, ImportSettings
 from accelstudy.campaign.public import import_settings
 from accelstudy.errors import InputError
 from accelstudy.models import get_model

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,36 +78,58 @@ def check_size(raw: Array, forces: Array, header: Header, path: Path) -> None:
         )
 
 
-def check_norm(raw: Array, forces: Array, header: Header, path: Path) -> None:
-    """Check that the forces are roughly as large as gravity, and say which unit would make them so.
+def likely_fault(given: float, norm: float, unit: str, gravity: float) -> str | None:
+    """What makes forces of the size `norm`, m/s², no specific forces of a sensor at rest.
 
     Real sensors are wrong by some tenths at worst, so a factor of two is not theirs.
+
+    Parameters
+    ----------
+    given : float, size in the unit of the file
+    norm : float, m/s²
+    unit : str, of the file
+    gravity : float, m/s²
+
+    Returns
+    -------
+    str
+        "gravity", the unit that would be right, "unknown", or None where nothing is wrong.
     """
 
-    def near(size: np.floating[Any] | float, gravity: float) -> bool:
-        return bool(gravity / 2 < size < gravity * 2)
+    def near(size: float, gravity: float) -> bool:
+        return gravity / 2 < size < gravity * 2
 
-    gravity = header.gravity.value_mps2
-    norm, given = (np.median(np.linalg.norm(array, axis=1)) for array in (forces, raw))
     if near(norm, gravity):
-        return
-    what = f"fx, fy, fz: their norm is about {given:.3g} {header.unit}"
-    if header.unit == "counts":
-        what = f"{what}, by `nominal` {norm:.3g} m/s^2"
+        return None
     if near(norm, STANDARD_GRAVITY):
+        return "gravity"
+    fits = {"m/s^2": 1.0, "g": STANDARD_GRAVITY}
+    better = [u for u, size in fits.items() if u != unit and near(given * size, gravity)]
+    if not better and unit != "counts" and given > 100:
+        better = ["counts"]
+    return better[0] if better else "unknown"
+
+
+def check_norm(raw: Array, forces: Array, header: Header, path: Path) -> None:
+    """Check that forces are roughly as large as gravity, and say which unit would make them so."""
+    gravity, unit = header.gravity.value_mps2, header.unit
+    norm, given = (float(np.median(np.linalg.norm(array, axis=1))) for array in (forces, raw))
+    fault = likely_fault(given, norm, unit, gravity)
+    if fault is None:
+        return
+    what = f"fx, fy, fz: their norm is about {given:.3g} {unit}"
+    if unit == "counts":
+        what = f"{what}, by `nominal` {norm:.3g} m/s^2"
+    if fault == "gravity":
         raise InputError(
             f"{path.with_name(HEADER)}: gravity.value_mps2: {gravity:g} does not fit the forces, "
             f"whose norm is about {norm:.3g} m/s^2; expected some 9.8"
         )
-    fits = {"m/s^2": 1.0, "g": STANDARD_GRAVITY}
-    better = [u for u, size in fits.items() if u != header.unit and near(given * size, gravity)]
-    if not better and header.unit != "counts" and given > 100:
-        better = ["counts"]
-    if better:
-        advice = f"looks like {better[0]}, not {header.unit}; correct `unit` in {HEADER}"
+    if fault != "unknown":
+        advice = f"looks like {fault}, not {unit}; correct `unit` in {HEADER}"
     else:
         advice = f"nowhere near gravity, {gravity:g} m/s^2; correct the unit" + (
-            " or `nominal`" if header.unit == "counts" else " or the columns"
+            " or `nominal`" if unit == "counts" else " or the columns"
         )
     raise InputError(f"{path}: {what}: {advice}")
 
@@ -122,18 +143,26 @@ def check_outliers(forces: Array, labels: Sequence[str], gravity: float, path: P
         )
 
 
-def check_angles(angles: Array, forces: Array, gravity: float, path: Path) -> None:
-    """Check that no other reading of the robot's angles fits the forces clearly better than gon.
+def misfit_of_angles(angles: Array, forces: Array, gravity: float) -> float:
+    """Rms of what forces (n, 3), m/s², differ from those at angles (n, 2), rad, over gravity."""
+    roll, pitch = angles.T
+    expected = np.column_stack(specific_force(roll, pitch, gravity))
+    return float(np.sqrt(np.mean(np.sum((forces - expected) ** 2, axis=1))) / gravity)
 
-    A sensor fits its robot within some hundredths of g. If gon fits worse than that, and another
-    reading several times better, that is no accident.
+
+def clearly_worse(misfit: float, other: float) -> bool:
+    """Whether another reading of the angles fits so much better that it is no accident.
+
+    A sensor fits its robot within some hundredths of g.
     """
+    return misfit > max(0.05, 4 * other)
+
+
+def check_angles(angles: Array, forces: Array, gravity: float, path: Path) -> None:
+    """Check that no other reading of the robot's angles fits the forces clearly better than gon."""
 
     def misfit(unit: float, sign: int = 1) -> float:
-        roll, pitch = (angles * unit).T
-        expected = np.column_stack(specific_force(roll, pitch, gravity))
-        squares = np.sum((sign * forces - expected) ** 2, axis=1)
-        return float(np.sqrt(np.mean(squares)) / gravity)
+        return misfit_of_angles(angles * unit, sign * forces, gravity)
 
     readings = {
         "the angles look like degrees, not gon": misfit(to_si(1.0, "deg", "rad").item()),
@@ -141,5 +170,5 @@ def check_angles(angles: Array, forces: Array, gravity: float, path: Path) -> No
         "the forces have the opposite sign; at level specific force is (0, 0, -g)": misfit(GON, -1),
     }
     best = min(readings, key=lambda text: readings[text])
-    if misfit(GON) > max(0.05, 4 * readings[best]):
+    if clearly_worse(misfit(GON), readings[best]):
         raise InputError(f"{path}: {', '.join(COLUMNS['angles'])}: {best}")

@@ -145,7 +145,7 @@ def apply_command(
     depend on the position before, which a log does not tell, and are not corrected.
     """
     from accelstudy.campaign.applying import read_calibration
-    from accelstudy.campaign.importing_cli import parse_columns
+    from accelstudy.campaign.import_options import parse_columns
     from accelstudy.campaign.log_leveling import level_log
     from accelstudy.outputs import new_file
 

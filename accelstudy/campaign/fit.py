@@ -12,6 +12,7 @@ from accelstudy.adjustment.quality import GlobalTest, global_test
 from accelstudy.approaches import Approach
 from accelstudy.campaign.format import Campaign
 from accelstudy.campaign.header import COLUMNS
+from accelstudy.campaign.sphere import fit_sphere
 from accelstudy.design import Design, diagnose
 from accelstudy.errors import InputError
 from accelstudy.models import compose
@@ -232,16 +233,14 @@ def campaign_design(campaign: Campaign, model: SensorModel, approach: Approach) 
 def initial_values(model: SensorModel, forces: Array, gravity: float) -> Array:
     """Biases and a common scale from the sphere that fits best, (u,), SI; the rest is zero.
 
-    |f − b|² = (g (1 + s))² is linear in b and in (g (1 + s))² − |b|². Positions that do not
+    Positions that do not
     determine a sphere, and models without these parameters, start from an ideal sensor.
     """
-    design = np.column_stack([2 * forces, np.ones(len(forces))])
-    solution, _, rank, _ = np.linalg.lstsq(design, np.sum(forces**2, axis=1), rcond=1e-6)
-    center = solution[:3]
-    square = solution[3] + center @ center
-    if rank < 4 or square <= 0:
+    sphere = fit_sphere(forces)
+    if sphere is None:
         return np.zeros(model.n_parameters)
-    scale = np.sqrt(square) / gravity - 1
+    center, radius = sphere
+    scale = radius / gravity - 1
     names = ("x", "y", "z")
     values = {f"b_{i}": b for i, b in zip(names, center, strict=True)}
     return model.vector({**values, **{f"s_{i}": scale for i in names}})

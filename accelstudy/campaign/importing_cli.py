@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,30 +16,61 @@ if TYPE_CHECKING:
     from accelstudy.campaign.importing import ImportReport
 
 
+_SECTIONS = {
+    "The log": ("columns", "sensor", "time", "time_unit", "rate"),
+    "Its numbers": ("unit", "scale", "offset", "full_range", "frame"),
+    "The holds": ("threshold", "exclude", "join", "figure"),
+    "A table of means instead": ("means", "robot_sigma", "robot_unit"),
+    "The campaign": ("out", "name", "gravity", "settings_path"),
+}
+
+
+class _Sectioned(click.Command):
+    """A command whose options are listed in sections."""
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the sections, and what is in none of them at the end."""
+        options = [p for p in self.get_params(ctx) if isinstance(p, click.Option)]
+        rows = {p.name: row for p in options if (row := p.get_help_record(ctx))}
+        sections = {title: [rows.pop(name) for name in names] for title, names in _SECTIONS.items()}
+        for title, records in (*sections.items(), ("Other options", list(rows.values()))):
+            with formatter.section(title):
+                formatter.write_dl(records)
+
+
 @click.command(
     "import",
+    cls=_Sectioned,
     epilog=example(
         "accelstudy import log.csv --out my-campaign --rate 100 --columns fx=0,fy=1,fz=2"
     ),
 )
-@click.argument("log", type=PATH)
-@click.option("--out", type=PATH, required=True, help="Folder of the campaign.")
-@click.option("--settings", "settings_path", type=PATH, help="YAML file; options overlay it.")
-@click.option("--name", help="Name of the campaign.  [default: that of the file]")
-@click.option("--columns", help="Names or places from 0, as fx=1,fy=2,fz=3.")
+@click.argument("log", type=PATH, nargs=-1, required=True)
+@click.option("--columns", help="By name, or place from 0: fx=1,fy=2,fz=3,temperature=temp.")
+@click.option("--sensor", multiple=True, help="One of several: NAME=ax,ay,az; repeat it.")
 @click.option("--time", help="Column of time, by name or place.")
+@click.option("--time-unit", help="One of s, ms, us and ns, also since 1970.  [default: s]")
 @click.option("--rate", type=float, help="Samples per second, without a column of time.")
 @click.option("--unit", help="One of m/s^2, g and counts.  [default: m/s^2]")
 @click.option("--scale", help="With counts: m/s² per count, one number or three.")
-@click.option("--offset", help="With counts: reading at 0 m/s², one number or three.")
-@click.option("--gravity", type=float, help="Local gravity, m/s².  [default: 9.80665]")
+@click.option("--offset", help="With counts: reading at 0 m/s².  [default: from the holds]")
+@click.option("--range", "full_range", help="The sensor measures ± this: 78.5, 8g, 32767counts.")
+@click.option("--frame", help="Where x, y, z point: frd, flu (ROS), rfu …  [default: frd]")
 @click.option("--threshold", type=float, help="Sd of a window at rest, m/s², instead of chosen.")
-@click.option("--means", is_flag=True, help="LOG is a table of means already.")
+@click.option("--exclude", multiple=True, help="Leave out 13:moved or 120s-135s:moved; repeat it.")
+@click.option("--join", multiple=True, help="Holds that are one, as 4,5; repeat it.")
 @click.option("--figure/--no-figure", default=True, help="Draw the log with its holds.")
+@click.option("--means", is_flag=True, help="LOG is a table of means already.")
+@click.option("--robot-sigma", type=float, help="Sd of its robot angles roll and pitch, mgon.")
+@click.option("--robot-unit", help="Unit of these angles: gon, deg or rad.  [default: gon]")
+@click.option("--out", type=PATH, required=True, help="Folder of the campaign.")
+@click.option("--name", help="Name of the campaign.  [default: that of the file]")
+@click.option("--gravity", type=float, help="Local gravity, m/s².  [default: 9.80665]")
+@click.option("--settings", "settings_path", type=PATH, help="YAML file; options overlay it.")
 @force_option
 @quiet_option
 def import_command(
-    log: Path,
+    log: tuple[Path, ...],
     out: Path,
     settings_path: Path | None,
     means: bool,
@@ -48,17 +80,28 @@ def import_command(
 ) -> None:
     """Make a campaign of a raw LOG: find its static holds.
 
-    LOG is text (CSV or columns), MATLAB or Parquet. Without --threshold the noise of the log
-    itself says what is at rest; segmentation.png in the folder shows the outcome.
+    LOG is text (CSV or columns, perhaps .gz), MATLAB or Parquet. Several files, a folder or a
+    pattern are one position each. Without --threshold the noise of the log itself says what is at
+    rest; segmentation.png in the folder shows the outcome, with the numbers of the holds.
     """
-    from accelstudy.campaign.importing import import_to, read_settings
+    from accelstudy.campaign.import_options import files_of, settings_of
+    from accelstudy.campaign.importing import import_each
     from accelstudy.outputs import CAMPAIGN, result_folder
 
-    settings = read_settings(settings_path, _given(means=means or None, **options))
-    inputs = [log, *([] if settings_path is None else [settings_path])]
-    with result_folder(out, CAMPAIGN, inputs, force) as campaign:
-        _, report = import_to(campaign, log, settings, figure)
-    _show(report, out, figure)
+    settings = settings_of(settings_path, means=means or None, **options)
+    files = files_of(log)
+    folders = {name: out / name for name in settings.sensors} or {"": out}
+    inputs = [*files, *([] if settings_path is None else [settings_path])]
+    with ExitStack() as stack:
+        campaigns = {
+            name: stack.enter_context(result_folder(folder, CAMPAIGN, inputs, force))
+            for name, folder in folders.items()
+        }
+        imported = import_each(campaigns, files, settings, figure)
+    for name, (_, report) in imported.items():
+        if name:
+            say(f"sensor {name}")
+        _show(report, folders[name], figure)
 
 
 @click.command(
@@ -105,42 +148,3 @@ def _show(report: ImportReport, out: Path, figure: bool = True) -> None:
     if figure and report.holds is not None:
         say(f"figure: {out / 'segmentation.png'}")
     say(f"campaign: {out}")
-
-
-def _given(
-    columns: str | None,
-    scale: str | None,
-    offset: str | None,
-    rate: float | None,
-    gravity: float | None,
-    threshold: float | None,
-    time: str | None,
-    **others: str | bool | None,
-) -> dict[str, Any]:
-    """Options that were given, as the settings name them."""
-    content: dict[str, Any] = {
-        **others,
-        "columns": None if columns is None else parse_columns(columns),
-        "scale": None if scale is None else _numbers("--scale", scale),
-        "offset": None if offset is None else _numbers("--offset", offset),
-        "rate_hz": rate,
-        "time": time,
-        "threshold_mps2": threshold,
-        "gravity": None if gravity is None else {"value_mps2": gravity},
-    }
-    return {key: value for key, value in content.items() if value is not None}
-
-
-def parse_columns(text: str) -> dict[str, str]:
-    """Columns as an option gives them: fx=1,fy=2,fz=3."""
-    pairs = [part.split("=", 1) for part in text.split(",")]
-    if any(len(pair) != 2 for pair in pairs):
-        raise InputError(f"--columns: expected fx=1,fy=2,fz=3 or names, not {text!r}")
-    return {key.strip(): column.strip() for key, column in pairs}
-
-
-def _numbers(option: str, text: str) -> list[float]:
-    try:
-        return [float(part) for part in text.split(",")]
-    except ValueError:
-        raise InputError(f"{option}: expected numbers, as 1.5 or 1,2,3, not {text!r}") from None

@@ -1,46 +1,82 @@
 """Raw accelerometer logs, read piece by piece, so that their size does not matter.
 
 A log is text (comma, semicolon, tab or blanks between numbers, with or without header and comment
-lines), a MATLAB file or a Parquet file. It gives times in s and specific forces in m/s²; whatever
-is wrong with it is said in one line with the place where it stands.
+lines), a MATLAB file or a Parquet file. It gives times in s from its first sample on, and specific
+forces in m/s²; whatever is wrong with it is said in one line with the place where it stands.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from accelstudy.campaign.columns import AXES, LARGEST, Column, check_numbers, locate
 from accelstudy.campaign.log_files import CHUNK, Source, open_source
-from accelstudy.campaign.wording import listed
 from accelstudy.errors import InputError, UnknownNameError
+from accelstudy.frames import FRD, Frame
 from accelstudy.units import UNITS
 
-Array = NDArray[np.float64]
-Column = str | int
-"""A column by its name in the header, or by its place, counted from 0."""
+__all__ = ["AXES", "TIME_UNITS", "Log", "Recording", "conversion", "locate", "open_log"]
 
-AXES = ("fx", "fy", "fz")
+Array = NDArray[np.float64]
+
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+CONDITIONS = ("temperature", "vibration")
+"""Columns of a log besides time and forces."""
 GAP = 5.0
 """A step of time this many times the usual one is a gap."""
+_USUAL_RATE = 100.0
+"""1/s; of several units of time the one is likely that comes nearest to it."""
 
-_LARGEST = 1e15  # beyond it nothing is an acceleration or a time, and squares overflow
-_KNOWN_NAMES = {
-    "fx": r"f_?x|a_?x|acc?_?x|acc?el_?x|accelerationx|acceleration_x|x",
-    "fy": r"f_?y|a_?y|acc?_?y|acc?el_?y|accelerationy|acceleration_y|y",
-    "fz": r"f_?z|a_?z|acc?_?z|acc?el_?z|accelerationz|acceleration_z|z",
-    "time": r"t|time|time_s|timestamp|seconds",
-    "n_samples": r"n|n_samples|count",
-    "sd_fx": r"sd_?f?x|s_?x|sd_a_?x",
-    "sd_fy": r"sd_?f?y|s_?y|sd_a_?y",
-    "sd_fz": r"sd_?f?z|s_?z|sd_a_?z",
-}
+
+class Rows(NamedTuple):
+    """Neighbouring samples of a log.
+
+    Attributes
+    ----------
+    time : (k,) array, s
+    forces : (k, 3) array, m/s², in forward, right, down
+    conditions : (k, c) array, °C or m/s², NaN where nothing is known
+    anew : bool, whether another recording begins here, so that no hold goes on
+    """
+
+    time: Array
+    forces: Array
+    conditions: Array
+    anew: bool = False
+
+
+class Recording(Protocol):
+    """What the detector of holds takes: a log, or several."""
+
+    @property
+    def path(self) -> Path:
+        """What messages name."""
+        ...
+
+    @property
+    def step(self) -> float:
+        """Usual time between two samples, s."""
+        ...
+
+    @property
+    def conditions(self) -> tuple[str, ...]:
+        """Which of `CONDITIONS` there are."""
+        ...
+
+    def chunks(self) -> Iterator[Rows]:
+        """Samples from the beginning to the end."""
+        ...
+
+    def likely_unit(self) -> str:
+        """What to say where the rate is odd."""
+        ...
 
 
 def open_log(
@@ -54,21 +90,23 @@ def open_log(
     offset: ArrayLike | None = None,
     time_unit: str = "s",
     variable: str | None = None,
+    frame: Frame = FRD,
     chunk_size: int = CHUNK,
 ) -> Log:
     """Find out how a log is laid out.
 
     Parameters
     ----------
-    path : file; .parquet, .mat (binary or ASCII), anything else is text
-    columns : mapping of "fx", "fy", "fz" to columns; by their names in the header if omitted, or
-        the only three columns there are
+    path : file; .parquet, .mat (binary or ASCII), anything else is text, perhaps packed by gzip
+    columns : mapping of "fx", "fy", "fz", "temperature" and "vibration" to columns; by their names
+        in the header if omitted, or the only three columns there are. The last two may be absent.
     time : column of time; by its name in the header if omitted
     rate : float, samples per second, instead of a column of time
     unit : "m/s^2", "g" or "counts"
     scale, offset : number or (3,), with counts only: f = (raw − offset) · scale, in m/s²
     time_unit : "s", "ms", "us" or "ns"
     variable : str, which array of a MATLAB file
+    frame : Frame, the axes of the log
     chunk_size : int, rows held in memory at a time
 
     Raises
@@ -84,7 +122,11 @@ def open_log(
     if rate is not None and not (np.isfinite(rate) and rate > 0):
         raise InputError(f"{path}: the rate must be positive, not {rate:g}")
     source = open_source(path, variable)
-    places = locate(source, columns or {}, AXES)
+    given = dict(columns or {})
+    for key in given:
+        if key not in (*AXES, *CONDITIONS):
+            raise UnknownNameError("column", key, (*AXES, *CONDITIONS))
+    places = locate(source, {k: v for k, v in given.items() if k in AXES}, AXES)
     if rate is None:
         wanted = {} if time is None else {"time": time}
         try:
@@ -92,8 +134,27 @@ def open_log(
         except InputError as error:
             if time is not None:
                 raise
-            raise InputError(f"{error}; give the column of time, or the rate") from None
-    return Log(Path(path), source, places, rate, TIME_UNITS[time_unit], factor, shift, chunk_size)
+            raise InputError(
+                f"{error}; give the column of time (--time), or the rate (--rate)"
+            ) from None
+    for key in CONDITIONS:
+        wanted = {key: given[key]} if key in given else {}
+        found = locate(source, wanted, (key,), needed=False)
+        if key in given or not {*found.values()} & {*places.values()}:
+            places |= found
+    if len(set(places.values())) < len(places):
+        raise InputError(f"{path}: two of {', '.join(places)} name the same column")
+    return Log(
+        path=Path(path),
+        source=source,
+        places=places,
+        rate=rate,
+        time_factor=TIME_UNITS[time_unit],
+        scale=factor,
+        offset=shift,
+        frame=frame,
+        chunk_size=chunk_size,
+    )
 
 
 @dataclass(frozen=True)
@@ -104,10 +165,11 @@ class Log:
     ----------
     path : Path
     source : Source, what gives the numbers as they stand in the file
-    places : mapping of "fx", "fy", "fz" and perhaps "time" to columns
+    places : mapping of "fx", "fy", "fz" and perhaps "time" and `CONDITIONS` to columns
     rate : float, 1/s; None with a column of time
     time_factor : float, s per unit of that column
-    scale, offset : (3,), f = (raw − offset) · scale
+    scale, offset : (3,), f = (raw − offset) · scale, in the axes of the log
+    frame : Frame, the axes of the log
     chunk_size : int, rows held in memory at a time
     """
 
@@ -118,20 +180,52 @@ class Log:
     time_factor: float
     scale: Array
     offset: Array
+    frame: Frame
     chunk_size: int
+
+    @property
+    def conditions(self) -> tuple[str, ...]:
+        """Which of `CONDITIONS` the log has."""
+        return tuple(key for key in CONDITIONS if key in self.places)
 
     @cached_property
     def step(self) -> float:
-        """Usual time between two samples, s: the median over the first chunk."""
+        """Usual time between two samples, s: the mean one of the first chunk, without gaps.
+
+        Steps may jitter or come in multiples of a clock's tick. So the middle one may be far from
+        the mean, and only the mean belongs to the number of samples.
+        """
         if self.rate is not None:
             return 1.0 / self.rate
-        time, _ = next(self.chunks(), (np.empty(0), None))
-        if len(time) < 2:
-            raise InputError(f"{self.path}: too few samples ({len(time)})")
-        return float(np.median(np.diff(time)))
+        rows = next(self.chunks(), None)
+        if rows is None or len(rows.time) < 2:
+            raise InputError(f"{self.path}: too few samples")
+        return usual_step(np.diff(rows.time))
 
-    def chunks(self) -> Iterator[tuple[Array, Array]]:
-        """Times (k,), s, and specific forces (k, 3), m/s², from the beginning to the end.
+    @cached_property
+    def start(self) -> float:
+        """Time of the first sample as the file has it, s; NaN without a column of time."""
+        if self.rate is not None:
+            return np.nan
+        first = next(self.source.read([self.places["time"]], 1), np.full((1, 1), np.nan))
+        return float(first[0, 0]) * self.time_factor
+
+    def likely_unit(self) -> str:
+        """Unit of time with which the log has a usual rate, as a hint; empty if it has one."""
+        if self.rate is not None:
+            return ""
+        step = self.step / self.time_factor
+        rates = {unit: 1 / (step * factor) for unit, factor in TIME_UNITS.items()}
+        unit = min(rates, key=lambda unit: abs(np.log(rates[unit] / _USUAL_RATE)))
+        if TIME_UNITS[unit] == self.time_factor:
+            return ""
+        return (
+            f"; its times look like {unit}, which makes {rates[unit]:.4g} samples per second: "
+            f"give --time-unit {unit}"
+        )
+
+    def chunks(self) -> Iterator[Rows]:
+        """Samples from the beginning to the end; times count from the first one.
 
         Raises
         ------
@@ -140,21 +234,27 @@ class Log:
             there is nothing in the log or a channel is constant.
         """
         keys = list(self.places)
+        axes = [keys.index(axis) for axis in AXES]
+        others = [keys.index(key) for key in self.conditions]
         row, last = 0, -np.inf
         lowest, highest = np.full(3, np.inf), np.full(3, -np.inf)
-        for raw in self.source.read([self.places[key] for key in keys], self.chunk_size):
-            check_numbers(self.source, self.places, raw, row)
-            forces = (raw[:, [keys.index(axis) for axis in AXES]] - self.offset) * self.scale
-            if self.rate is None:
-                time = raw[:, keys.index("time")] * self.time_factor
+        clock = self.places.get("time")
+        for raw in self.source.read(list(self.places.values()), self.chunk_size, clock):
+            if clock is not None:
+                raw[:, keys.index("time")] *= self.time_factor
+            check_numbers(self.source, self.places, raw, row, self.conditions)
+            forces = self.frame.to_frd((raw[:, axes] - self.offset) * self.scale)
+            if clock is not None:
+                time = raw[:, keys.index("time")]
                 self._check_order(time, last, row)
                 last = time[-1]
             else:
+                assert self.rate is not None
                 time = np.arange(row, row + len(raw)) / self.rate
-            lowest = np.minimum(lowest, forces.min(axis=0))
-            highest = np.maximum(highest, forces.max(axis=0))
+            lowest = np.minimum(lowest, raw[:, axes].min(axis=0))
+            highest = np.maximum(highest, raw[:, axes].max(axis=0))
             row += len(raw)
-            yield time, forces
+            yield Rows(time, forces, raw[:, others])
         if row < 2:
             raise InputError(f"{self.path}: too few samples ({row})")
         for axis, constant in zip(AXES, lowest == highest, strict=True):
@@ -173,16 +273,27 @@ class Log:
             )
 
 
+def usual_step(steps: Array) -> float:
+    """Mean of steps of time without those that are gaps, `GAP` times the mean or more."""
+    kept = steps
+    while True:
+        mean = float(np.mean(kept))
+        without = steps[steps <= GAP * mean]
+        if len(without) == len(kept):
+            return mean
+        kept = without
+
+
 def conversion(unit: str, scale: ArrayLike | None, offset: ArrayLike | None) -> tuple[Array, Array]:
     """Scale and offset, (3,) each, that turn numbers in `unit` into m/s²."""
     if unit == "counts":
         if scale is None:
             raise InputError("unit counts needs a nominal scale, in m/s² per count")
         factor = _triple(scale, "scale")
-        if not np.all((np.abs(factor) > 0) & (np.abs(factor) <= _LARGEST)):
+        if not np.all((np.abs(factor) > 0) & (np.abs(factor) <= LARGEST)):
             raise InputError("scale: must not be 0, and must be finite")
         shift = _triple(0.0 if offset is None else offset, "offset")
-        if not np.all(np.abs(shift) <= _LARGEST):
+        if not np.all(np.abs(shift) <= LARGEST):
             raise InputError("offset: must be finite")
         return factor, shift
     if scale is not None or offset is not None:
@@ -198,81 +309,3 @@ def _triple(value: ArrayLike, name: str) -> Array:
     if given.shape not in ((1,), (3,)):
         raise InputError(f"{name}: one number or three, not {given.size}")
     return np.array(np.broadcast_to(given, 3))
-
-
-# --- Columns -------------------------------------------------------------------------------------
-
-
-def locate(
-    source: Source, given: Mapping[str, Column], wanted: Sequence[str], needed: bool = True
-) -> dict[str, int]:
-    """Places of the wanted columns: as given, by usual names, or the only three there are.
-
-    Raises
-    ------
-    InputError
-        If a column does not exist, is named twice, or (where `needed`) cannot be found.
-    """
-    for key in given:
-        if key not in wanted:
-            raise UnknownNameError("column", key, wanted)
-    places = {key: _place(source, key, column) for key, column in given.items()}
-    for key in wanted:
-        if key not in places:
-            pattern = _KNOWN_NAMES.get(key, re.escape(key))
-            found = [
-                i
-                for i, name in enumerate(source.names)
-                if re.fullmatch(pattern, re.sub(r"[\s.\-]+", "_", name.strip()), re.IGNORECASE)
-            ]
-            if len(found) == 1:
-                places[key] = found[0]
-    if not places and tuple(wanted[:3]) == AXES and len(source.names) == 3:
-        places = dict(zip(AXES, range(3), strict=True))
-    missing = [key for key in wanted if key not in places]
-    if needed and missing:
-        raise InputError(
-            f"{source.path}: which column is {missing[0]}? "
-            f"The columns are {listed(source.names)}, counted from 0"
-        )
-    if len(set(places.values())) < len(places):
-        raise InputError(f"{source.path}: two of {', '.join(places)} name the same column")
-    return places
-
-
-def _place(source: Source, key: str, column: Column) -> int:
-    names = list(source.names)
-    if column in names:
-        if names.count(str(column)) > 1:
-            raise InputError(f"{source.path}: {key}: there are several columns {column!r}")
-        return names.index(str(column))
-    if isinstance(column, int) or re.fullmatch(r"[0-9]{1,9}", column):
-        if 0 <= int(column) < len(names):
-            return int(column)
-        raise InputError(
-            f"{source.path}: {key}: no column {column}; there are {len(names)}, counted from 0"
-        )
-    raise InputError(f"{source.path}: {key}: no column {column!r}; there are {listed(names)}")
-
-
-def check_numbers(source: Source, places: Mapping[str, int], raw: Array, row: int = 0) -> None:
-    """Raise `InputError` at the first value of the rows from `row` on that is no usable number."""
-    bad = ~(np.abs(raw) <= _LARGEST)
-    if bad.any():
-        i, j = (int(k) for k in np.argwhere(bad)[0])
-        key, column = list(places.items())[j]
-        where, found = source.look_up(row + i, column)
-        raise InputError(
-            f"{source.path}: {where}, column {source.names[column]} ({key}): "
-            f"{found}, not a usable number"
-        )
-
-
-def read_columns(source: Source, places: Mapping[str, int]) -> Array:
-    """All rows of some columns, (n, len(places)); for small tables."""
-    chunks = list(source.read(list(places.values()), CHUNK))
-    if not chunks:
-        raise InputError(f"{source.path}: no row of numbers")
-    values = np.concatenate(chunks)
-    check_numbers(source, places, values)
-    return values

@@ -16,7 +16,7 @@ from urllib.request import Request, urlopen
 
 from pydantic import Field, ValidationError
 
-from accelstudy.campaign.importing import ImportSettings
+from accelstudy.campaign.import_settings import ImportSettings
 from accelstudy.errors import InputError, UnknownNameError
 from accelstudy.outputs import whole_file
 from accelstudy.study.config.errors import first_error

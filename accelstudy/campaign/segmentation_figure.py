@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -13,11 +14,12 @@ from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
 from accelstudy.campaign.holds import Holds
-from accelstudy.campaign.logs import Log
+from accelstudy.campaign.logs import Recording
 from accelstudy.campaign.windows import windows
 from accelstudy.campaign.wording import counted
 from accelstudy.figures.saving import save
 from accelstudy.figures.style import DPI, FULL, INK, STYLE, new_figure
+from accelstudy.progress import stage
 
 Array = NDArray[np.float64]
 
@@ -27,16 +29,19 @@ COLUMNS = 1200
 _COLOURS = ("#0072B2", "#D55E00", "#009E73")
 _THRESHOLD = "#CC79A7"
 _SHADE = "#DCE6F0"
+_LEFT_OUT: dict[str, Any] = {"facecolor": "#F2E4E4", "hatch": "////", "edgecolor": "#B08080"}
+_NUMBERS = 60
+"""Numbers of holds that stand beside each other; of more only every second, third, … is shown."""
 
 
-def draw_segmentation(log: Log, holds: Holds) -> Figure:
-    """Draw specific forces and the standard deviation of the windows over time, holds shaded.
+def draw_segmentation(log: Recording, holds: Holds) -> Figure:
+    """Draw specific forces and the standard deviation of the windows over time.
 
-    The log is read once more, and reduced to the smallest and the largest value in each of
-    `COLUMNS` spans of time.
+    Holds are shaded and numbered, those that are left out hatched. The log is read once more, and
+    reduced to the smallest and the largest value in each of `COLUMNS` spans of time.
     """
     edges, low, high = _envelope(log, holds)
-    middle = (edges[:-1] + edges[1:]) / 2 - holds.span[0]
+    middle = (edges[:-1] + edges[1:]) / 2
     with mpl.rc_context(STYLE):  # type: ignore[arg-type]
         figure = new_figure(FULL, 90)
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
@@ -46,41 +51,66 @@ def draw_segmentation(log: Log, holds: Holds) -> Figure:
         label = f"threshold {holds.threshold.sd:.2g} m/s²"
         below.axhline(holds.threshold.sd, color=_THRESHOLD, linestyle="--", label=label)
         for ax in (above, below):
-            for start, end in zip(holds.t0, holds.t1, strict=True):
-                ax.axvspan(
-                    start - holds.span[0], end - holds.span[0], color=_SHADE, lw=0, zorder=0.5
-                )
+            for start, end, used in zip(holds.t0, holds.t1, holds.used, strict=True):
+                look = {"color": _SHADE} if used else _LEFT_OUT
+                ax.axvspan(start, end, linewidth=0, zorder=0.5, **look)
+        _number(above, holds)
         above.set_ylabel("specific force / (m/s²)")
         below.set(yscale="log", xlabel="time / s", ylabel="window sd / (m/s²)")
-        below.set_xlim(0, holds.span[1] - holds.span[0])
+        below.set_xlim(0, holds.span[1])
         below.yaxis.set_minor_locator(NullLocator())
         handles, labels = above.get_legend_handles_labels()
         lines, texts = below.get_legend_handles_labels()
+        shades = [(Patch(color=_SHADE), counted(int(holds.used.sum()), "static hold"))]
+        if holds.left_out:
+            shades.append((Patch(linewidth=0, **_LEFT_OUT), f"{len(holds.left_out)} left out"))
         figure.legend(
-            [*handles, Patch(color=_SHADE), *lines],
-            [*labels, counted(len(holds), "static hold"), *texts],
+            [*handles, *(patch for patch, _ in shades), *lines],
+            [*labels, *(text for _, text in shades), *texts],
             loc="outside upper center",
-            ncols=5,
+            ncols=6,
         )
         figure.align_ylabels()
     return figure
 
 
-def render_segmentation(log: Log, holds: Holds, svg_path: str | Path, png_path: str | Path) -> None:
+def render_segmentation(
+    log: Recording, holds: Holds, svg_path: str | Path, png_path: str | Path
+) -> None:
     """Draw the segmentation and write it as SVG and PNG, each whole or not at all."""
     save(draw_segmentation(log, holds), svg_path, png_path, "Static holds", DPI)
 
 
-def _envelope(log: Log, holds: Holds) -> tuple[Array, Array, Array]:
+def _number(ax: Axes, holds: Holds) -> None:
+    """Write the numbers of the holds above them."""
+    every = 1 + (len(holds) - 1) // _NUMBERS
+    for i, (number, used) in enumerate(zip(holds.number, holds.used, strict=True)):
+        if i % every == 0 or not used:
+            ax.annotate(
+                f"{number}",
+                ((holds.t0[i] + holds.t1[i]) / 2, 1),
+                xycoords=("data", "axes fraction"),
+                xytext=(0, 1),
+                textcoords="offset points",
+                ha="center",
+                va="bottom",
+                fontsize=5,
+                color=INK if used else _LEFT_OUT["edgecolor"],
+            )
+
+
+def _envelope(log: Recording, holds: Holds) -> tuple[Array, Array, Array]:
     """Edges of the spans (k + 1,), and least and largest fx, fy, fz and sd in each (k, 4)."""
     count = max(1, min(COLUMNS, holds.total // 4))
     edges = np.linspace(*holds.span, count + 1)
     low, high = np.full((count, 4), np.inf), np.full((count, 4), -np.inf)
-    for batch in windows(log, holds.window):
-        values = np.column_stack([batch.forces, np.sqrt(batch.variance)])
-        span = np.clip(np.searchsorted(edges, batch.time, side="right") - 1, 0, count - 1)
-        np.minimum.at(low, span, values)
-        np.maximum.at(high, span, values)
+    with stage("figure", holds.total) as advance:
+        for batch in windows(log, holds.window):
+            values = np.column_stack([batch.forces, np.sqrt(batch.variance)])
+            span = np.clip(np.searchsorted(edges, batch.time, side="right") - 1, 0, count - 1)
+            np.minimum.at(low, span, values)
+            np.maximum.at(high, span, values)
+            advance(len(batch.time))
     empty = ~np.isfinite(low)
     low[empty] = high[empty] = np.nan  # a gap
     return edges, low, high

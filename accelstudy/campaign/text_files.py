@@ -91,7 +91,7 @@ class TextSource:
         try:
             with (
                 self._readable(),
-                self._open() as file,
+                self._open(self.first) as file,
                 pd.read_csv(
                     file,
                     sep=self.delimiter or r"\s+",
@@ -99,7 +99,6 @@ class TextSource:
                     header=None,
                     names=range(self.width + 1),
                     index_col=False,
-                    skiprows=self.first,
                     comment=self.comment,
                     quoting=csv.QUOTE_MINIMAL if self.quoted else csv.QUOTE_NONE,
                     skipinitialspace=True,
@@ -109,6 +108,8 @@ class TextSource:
                 ) as reader,
             ):
                 for chunk in reader:
+                    if not len(chunk):
+                        continue
                     # A cell too many lands in the column after the last.
                     if chunk[self.width].notna().any():
                         raise InputError(f"{self.path}: {self._odd_line()}")
@@ -144,13 +145,18 @@ class TextSource:
                 if number > self.first and line.strip() and line.lstrip()[0] != self.comment:
                     yield number, line.rstrip("\n")
 
-    def _open(self) -> TextIO:
-        with self.path.open("rb") as file:
-            packed = file.read(len(GZIP)) == GZIP
+    def _open(self, skipped: int = 0) -> TextIO:
+        """Open the file behind some of its lines; a quotation mark in a header means nothing."""
+        with self.path.open("rb") as start:
+            packed = start.read(len(GZIP)) == GZIP
         if packed:
             unpacked = cast(BinaryIO, gzip.GzipFile(self.path))
-            return TextIOWrapper(unpacked, encoding="utf-8-sig", errors="replace")
-        return self.path.open(encoding="utf-8-sig", errors="replace")
+            file: TextIO = TextIOWrapper(unpacked, encoding="utf-8-sig", errors="replace")
+        else:
+            file = self.path.open(encoding="utf-8-sig", errors="replace")
+        for _ in range(skipped):
+            file.readline()
+        return file
 
     @contextmanager
     def _readable(self) -> Iterator[None]:

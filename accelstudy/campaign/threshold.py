@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.campaign.logs import Log
+from accelstudy.campaign.logs import Recording
 from accelstudy.campaign.windows import Windows, windows
 from accelstudy.campaign.wording import counted
 from accelstudy.errors import InputError
+from accelstudy.progress import track
 
 Array = NDArray[np.float64]
 
@@ -61,6 +62,11 @@ class Survey:
         self.extremes[0] = _two_lowest(self.extremes[0], batch.forces)
         self.extremes[1] = -_two_lowest(-self.extremes[1], -batch.forces)
 
+    def quietest(self, share: float = 0.01) -> float:
+        """Standard deviation that this share of the windows does not exceed, m/s²."""
+        rank = np.searchsorted(np.cumsum(self.counts), share * self.counts.sum())
+        return float(10.0 ** (_BINS[min(rank, len(_BINS) - 2) + 1] / 2))
+
     def warnings(self) -> Iterator[str]:
         """What is odd about the log."""
         if self.gaps:
@@ -76,13 +82,16 @@ def _two_lowest(known: Array, forces: Array) -> Array:
     return np.array([lowest, np.where(candidates > lowest, candidates, np.inf).min(axis=0)])
 
 
-def survey_log(log: Log, width: int) -> Survey:
+def survey_log(log: Recording, width: int) -> Survey:
     """Read a log once, in windows of `width` samples."""
     survey = Survey()
-    for batch in windows(log, width):
+    for batch in track(windows(log, width), f"noise of {log.path.name}"):
         survey.add(batch)
     if not survey.total:
-        raise InputError(f"{log.path}: too few samples for a window of {width}, or gaps all over")
+        raise InputError(
+            f"{log.path}: too few samples for a window of {width}, or gaps all over"
+            f"{log.likely_unit()}"
+        )
     return survey
 
 
@@ -93,7 +102,7 @@ def given_threshold(sd: float) -> Threshold:
     return Threshold(sd, np.nan, "as given")
 
 
-def choose_threshold(survey: Survey, log: Log) -> Threshold:
+def choose_threshold(survey: Survey, log: Recording) -> Threshold:
     """Take a multiple of the noise floor: of the variance that windows at rest usually have.
 
     Otsu's valley of the logarithmic variances parts rest from motion, though not sharply; at rest

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.campaign.logs import GAP, Log
+from accelstudy.campaign.logs import GAP, Recording
 from accelstudy.errors import InputError
 
 Array = NDArray[np.float64]
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 _SMALLEST, _LARGEST = 8, 10**6  # samples
 
 
-def samples_in(log: Log, window: float) -> int:
+def samples_in(log: Recording, window: float) -> int:
     """Samples in a window of `window` seconds; odd, so that it has a middle.
 
     Raises
@@ -29,8 +29,9 @@ def samples_in(log: Log, window: float) -> int:
     samples = window / log.step
     if not _SMALLEST <= samples <= _LARGEST:
         raise InputError(
-            f"{log.path}: a window of {window:g} s holds {samples:.3g} samples; are the rate "
-            f"({1 / log.step:.6g} per second) and the unit of time right?"
+            f"{log.path}: a window of {window:g} s holds {samples:.3g} samples, at "
+            f"{1 / log.step:.6g} per second"
+            f"{log.likely_unit() or '; is the rate (--rate) right?'}"
         )
     return round(samples) | 1
 
@@ -39,44 +40,53 @@ def samples_in(log: Log, window: float) -> int:
 class Windows:
     """Neighbouring windows, one centred at each of m samples.
 
-    `piece` counts the gaps so far, `index` is the place of the first of these samples in the log.
+    `piece` counts the gaps so far, `recording` the recordings that ended; `index` is the place of
+    the first of these samples in the log.
     """
 
     piece: int
+    recording: int
     index: int
     time: Array
     forces: Array
+    conditions: Array
     variance: Array
     frozen: NDArray[np.bool_]
 
 
-def windows(log: Log, width: int) -> Iterator[Windows]:
+def windows(log: Recording, width: int) -> Iterator[Windows]:
     """Windows of `width` samples (odd), sliding by one; none spans a gap."""
-    half, piece, row = width // 2, 0, 0
-    times, forces = np.empty(0), np.empty((0, 3))
-    for chunk_times, chunk_forces in log.chunks():
-        before = times[-1:] if len(times) else chunk_times[:1]
-        jumps = np.diff(chunk_times, prepend=before) > GAP * log.step
-        edges = sorted({0, *np.flatnonzero(jumps).tolist(), len(chunk_times)})
+    half, piece, recording, row = width // 2, 0, 0, 0
+    times, values = np.empty(0), np.empty((0, 3 + len(log.conditions)))
+    for rows in log.chunks():
+        before = times[-1:] if len(times) else rows.time[:1]
+        jumps = np.diff(rows.time, prepend=before) > GAP * log.step
+        if rows.anew and row > 0:
+            jumps[0], recording = True, recording + 1
+        chunk = np.column_stack([rows.forces, rows.conditions])
+        edges = sorted({0, *np.flatnonzero(jumps).tolist(), len(chunk)})
         for first, end in pairwise(edges):
             if jumps[first]:
                 piece += 1
-                times, forces = times[:0], forces[:0]
-            times = np.concatenate([times, chunk_times[first:end]])
-            forces = np.concatenate([forces, chunk_forces[first:end]])
+                times, values = times[:0], values[:0]
+            times = np.concatenate([times, rows.time[first:end]])
+            values = np.concatenate([values, chunk[first:end]])
             row += end - first
             centred = max(0, len(times) - width + 1)
-            variance, frozen = _spread(forces, width) if centred else (np.empty(0), np.empty(0))
+            empty = np.empty(0), np.empty(0, dtype=bool)
+            variance, frozen = _spread(values[:, :3], width) if centred else empty
             inside = slice(half, half + centred)
             yield Windows(
                 piece,
+                recording,
                 row - len(times) + half,
                 times[inside],
-                forces[inside],
+                values[inside, :3],
+                values[inside, 3:],
                 variance,
-                frozen.astype(bool),
+                frozen,
             )
-            times, forces = times[centred:], forces[centred:]
+            times, values = times[centred:], values[centred:]
 
 
 def _spread(forces: Array, width: int) -> tuple[Array, NDArray[np.bool_]]:

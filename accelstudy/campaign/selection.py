@@ -1,0 +1,111 @@
+"""Holds that a person leaves out or joins, by their numbers in the figure or by time."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from accelstudy.campaign.segments import Segment
+from accelstudy.errors import InputError
+
+_BY_NUMBER = re.compile(r"\s*(\d{1,9})\s*:\s*(\S.*?)\s*")
+_BY_TIME = re.compile(r"\s*(\d+(?:\.\d*)?)\s*s?\s*-\s*(\d+(?:\.\d*)?)\s*s\s*:\s*(\S.*?)\s*")
+
+
+@dataclass(frozen=True)
+class Selection:
+    """What is left out, and what is joined; numbers are those of the holds as they are found.
+
+    Attributes
+    ----------
+    numbers : mapping of int to str, holds that are left out, with the reason
+    spans : tuple of (from, to, reason), s since the start of the log; holds in them are left out
+    joined : tuple of tuples of int, holds that are one
+    """
+
+    numbers: Mapping[int, str] = field(default_factory=dict)
+    spans: tuple[tuple[float, float, str], ...] = ()
+    joined: tuple[tuple[int, ...], ...] = ()
+
+    def join(self, found: Mapping[int, Segment]) -> dict[int, Segment]:
+        """Join holds; they keep the number of the first.
+
+        Raises
+        ------
+        InputError
+            If there is no such hold, or others lie between.
+        """
+        holds = dict(found)
+        for group in self.joined:
+            for number in group:
+                _check(number, holds, "join")
+            between = [n for n in holds if group[0] < n < group[-1] and n not in group]
+            if between:
+                raise InputError(f"join: {_names(group)}: hold {between[0]} lies between them")
+            for number in group[1:]:
+                holds[group[0]] = holds[group[0]] + holds.pop(number)
+        return holds
+
+    def left_out(self, holds: Mapping[int, Segment]) -> dict[int, str]:
+        """Holds that are left out, with the reason.
+
+        Raises
+        ------
+        InputError
+            If there is no such hold, or none in a span of time.
+        """
+        for number in self.numbers:
+            _check(number, holds, "exclude")
+        reasons = dict(self.numbers)
+        for start, end, reason in self.spans:
+            inside = [n for n, hold in holds.items() if hold.t0 <= end and hold.t1 >= start]
+            if not inside:
+                raise InputError(f"exclude: {start:g}s-{end:g}s: no hold lies there")
+            reasons |= {n: reason for n in inside if n not in reasons}
+        return reasons
+
+
+def parse_selection(exclude: Sequence[str], join: Sequence[str]) -> Selection:
+    """Selection from ``13:moved`` or ``120s-135s:somebody passed``, and from ``4,5``.
+
+    Raises
+    ------
+    InputError
+        If something is neither.
+    """
+    numbers: dict[int, str] = {}
+    spans = []
+    for text in exclude:
+        if match := _BY_NUMBER.fullmatch(text):
+            numbers[int(match[1])] = match[2]
+        elif (match := _BY_TIME.fullmatch(text)) and float(match[1]) < float(match[2]):
+            spans.append((float(match[1]), float(match[2]), match[3]))
+        else:
+            raise InputError(
+                f"exclude: expected a hold or a time, and why, as 13:moved or 120s-135s:moved, "
+                f"not {text!r}"
+            )
+    joined = []
+    for text in join:
+        parts = [part.strip() for part in text.split(",")]
+        if len(parts) < 2 or not all(re.fullmatch(r"\d{1,9}", part) for part in parts):
+            raise InputError(f"join: expected numbers of holds, as 4,5, not {text!r}")
+        joined.append(tuple(sorted({int(part) for part in parts})))
+    return Selection(numbers, tuple(spans), tuple(joined))
+
+
+def _check(number: int, holds: Mapping[int, Segment], key: str) -> None:
+    if number not in holds:
+        raise InputError(f"{key}: there is no hold {number}; they are {_names(list(holds))}")
+
+
+def _names(numbers: Sequence[int]) -> str:
+    """Numbers in one line, runs of them by their ends."""
+    runs: list[list[int]] = []
+    for number in sorted(numbers):
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    return ", ".join(f"{r[0]} to {r[-1]}" if len(r) > 2 else ", ".join(map(str, r)) for r in runs)
