@@ -7,6 +7,7 @@ from contextlib import redirect_stderr
 import pytest
 
 from accelstudy import progress
+from accelstudy.cli import main
 from accelstudy.progress import feedback, say, stage, track
 
 
@@ -65,6 +66,19 @@ def test_a_command_says_what_it_did_unless_it_is_quiet(capsys):
     with feedback(quiet=True):
         say("more")
     assert capsys.readouterr().out == "done\n"
+
+
+def test_a_command_that_takes_long(tmp_path, capsys):
+    main(["simulate-campaign", "--out", str(tmp_path / "c")], standalone_mode=False)
+    command = ["check-sigmas", str(tmp_path / "c"), "--replicates", "50"]
+    capsys.readouterr()
+    for quiet in ([], ["--quiet"]):
+        with redirect_stderr(Terminal()) as screen:
+            main([*command, *quiet], standalone_mode=False)
+        assert ("simulated campaigns" in screen.getvalue()) == (not quiet)
+        printed = capsys.readouterr().out
+        assert "alpha_zx" in printed
+        assert ("as the adjustment claims it" in printed) == (not quiet)
 
 
 def test_a_bar_goes_when_the_work_fails():

@@ -15,7 +15,7 @@ from accelstudy.options import (
     model_option,
     quiet_option,
 )
-from accelstudy.progress import say
+from accelstudy.progress import say, stage
 
 
 @click.command("calibrate", epilog=example("accelstudy calibrate my-campaign --out calibrated"))
@@ -37,7 +37,7 @@ def calibrate_command(campaign: Path, model: str, approach: str, out: Path, forc
     from accelstudy.units import display_unit, to_display
 
     chosen = get_model(model), get_approach(approach)
-    with result_folder(out, CALIBRATION, [campaign], force) as folder:
+    with result_folder(out, CALIBRATION, [campaign], force) as folder, stage("calibration"):
         measured = read_campaign(campaign)
         content = write_calibration(fit_campaign(measured, *chosen), folder)
     for warning in measured.warnings:

@@ -10,6 +10,7 @@ from scipy import stats
 
 from accelstudy.adjustment import calibrate
 from accelstudy.campaign.fit import CampaignFit, campaign_noise
+from accelstudy.progress import track
 from accelstudy.simulation import session
 from accelstudy.units import display_unit, to_display
 
@@ -42,7 +43,7 @@ def check_sigmas(fit: CampaignFit, replicates: int = 2000, seed: int = 1) -> pd.
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     ideal = session(model, fit.parameters, directions, fit.gravity, fit.campaign.hold)
     estimates = []
-    for block, first in enumerate(range(0, replicates, BLOCK)):
+    for block, first in enumerate(track(range(0, replicates, BLOCK), "simulated campaigns")):
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(block,)))
         drawn = ideal.draw(noise, BLOCK, rng).first(replicates - first)
         result = calibrate(model, approach, replace(drawn, initial=fit.parameters))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import shutil
 from collections.abc import Mapping
 from functools import cache
 from http.client import HTTPException
@@ -19,6 +18,7 @@ from pydantic import Field, ValidationError
 from accelstudy.campaign.import_settings import ImportSettings
 from accelstudy.errors import InputError, UnknownNameError
 from accelstudy.outputs import whole_file
+from accelstudy.progress import stage
 from accelstudy.study.config.errors import first_error
 from accelstudy.study.config.layers import read_layer
 from accelstudy.study.config.schema import Block
@@ -26,6 +26,8 @@ from accelstudy.study.config.schema import Block
 REGISTRY = Path(__file__).with_name("public_data.yaml")
 TIMEOUT = 30.0
 """s, that a server may be silent."""
+BLOCK = 1 << 16
+"""Bytes that are taken from it at a time."""
 
 
 class PublicData(Block):
@@ -197,12 +199,16 @@ def _download(url: str, part: Path, have: int) -> None:
             resumed = response.headers.get("Content-Range", "").startswith(f"bytes {have}-")
             with part.open("ab" if resumed else "wb") as file:
                 start = file.tell()
-                shutil.copyfileobj(response, file)
+                # Only a server that says how much there is can be held to it.
+                expected = response.headers.get("Content-Length", "").strip()
+                known = expected.isascii() and expected.isdigit()
+                total = int(expected[:18]) if known else None
+                with stage(f"download of {part.stem}", total) as advance:
+                    while block := response.read(BLOCK):
+                        advance(file.write(block))
                 came = file.tell() - start
-            # The end of a broken connection looks like the end of the file. Only a server that
-            # says how much there is can be held to it.
-            expected = response.headers.get("Content-Length", "").strip()
-            if expected.isascii() and expected.isdigit() and came < int(expected[:18]):
+            # The end of a broken connection looks like the end of the file.
+            if total is not None and came < total:
                 raise OSError(f"the connection broke after {came} of {expected} bytes")
     except HTTPError as error:
         # Nothing comes after what is there: it is whole, or wrong, which its checksum will tell.

@@ -21,7 +21,7 @@ from accelstudy.options import (
     model_option,
     quiet_option,
 )
-from accelstudy.progress import say
+from accelstudy.progress import say, stage
 
 
 @click.command(
@@ -123,6 +123,7 @@ def simulate_campaign_command(
     with (
         nullcontext() if truth_path is None else new_file(truth_path, force=force) as truth_file,
         result_folder(out, CAMPAIGN, force=force) as folder,
+        stage("simulation"),
     ):
         campaign, truth = simulate_campaign(settings)
         write_campaign(campaign, folder, plausible=not settings.gross_errors)

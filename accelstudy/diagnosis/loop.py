@@ -21,6 +21,7 @@ from accelstudy.diagnosis.positions import kept_positions
 from accelstudy.diagnosis.tilt import in_use
 from accelstudy.effects import Hold
 from accelstudy.leveling_error import leveling_error
+from accelstudy.progress import track
 from accelstudy.sensor import SensorModel
 from accelstudy.simulation import Noise, session
 from accelstudy.units import MGON
@@ -133,7 +134,7 @@ def close_loop(diagnosis: Diagnosis, replicates: int = REPLICATES, seed: int = 1
         drawn[simulation] = fit, p, ideal.draw(noise, replicates, rng).take(kept)
 
     tables = []
-    for simulation, calibration in CASES:
+    for simulation, calibration in track(CASES, "old and new simulation"):
         simulated, truth, observed = drawn[simulation]
         estimated = fits[calibration]
         result = _calibrated(estimated, observed)

@@ -20,6 +20,7 @@ from accelstudy.diagnosis.positions import positions_table
 from accelstudy.errors import InputError
 from accelstudy.models import get_model
 from accelstudy.outputs import DIAGNOSIS, result_folder, whole_file
+from accelstudy.progress import stage
 
 
 def diagnose_folder(
@@ -47,11 +48,14 @@ def diagnose_folder(
         If the input cannot be used, or `out` not be written; nothing is written then.
     """
     chosen = get_model(model), None if approach is None else get_approach(approach)
-    with result_folder(out, DIAGNOSIS, [campaign], force) as folder:
+    with result_folder(out, DIAGNOSIS, [campaign], force) as folder, stage("diagnosis"):
         # A unit or an axis that is wrong is for the diagnosis to find, not for the reader.
         measured = read_campaign(campaign, plausible=False)
-        diagnosis = diagnose(measured, *chosen, seed=seed)
-        write_diagnosis(diagnosis, folder, loop=close_loop(diagnosis, replicates, seed))
+        with stage("search for what is missing"):
+            diagnosis = diagnose(measured, *chosen, seed=seed)
+        loop = close_loop(diagnosis, replicates, seed)
+        with stage("figures and page"):
+            write_diagnosis(diagnosis, folder, loop=loop)
     return diagnosis
 
 

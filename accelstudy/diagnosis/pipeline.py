@@ -38,6 +38,7 @@ from accelstudy.diagnosis.search import (
 from accelstudy.diagnosis.tilt import leveling_rms
 from accelstudy.errors import InputError
 from accelstudy.gross_errors.recognition import Recognised, recognise
+from accelstudy.progress import stage
 from accelstudy.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -239,6 +240,10 @@ class _Run:
             found = (Named(name, name, (name,), None, None), *found)
         final, variance = finding.setting, self.unit_variance(finding.setting)
         names = [choice.best.name for choice in finding.chosen]
+        with stage("held-out positions"):
+            gap = self.gap(finding, variance)
+        with stage("next positions"):
+            following = self.next_positions(finding)
         return Diagnosis(
             campaign=self.campaign,
             approach=self.approach,
@@ -256,10 +261,10 @@ class _Run:
             screening=search.screening,
             probabilities=search.probabilities,
             location=self.location(finding, variance),
-            gap=self.gap(finding, variance),
+            gap=gap,
             changes=self.changes(finding, variance),
             upper_limits=tuple(upper_limits(final, variance, names)),
-            next_positions=self.next_positions(finding),
+            next_positions=following,
             simulations=SIMULATIONS,
             recognised=self.recognised,
             suspects=self.suspects,

@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
+from accelstudy.progress import track
+
 Array = NDArray[np.float64]
 
 SIMULATIONS = 1000
@@ -75,7 +77,7 @@ def screen(candidates: Mapping[str, Sequence[Array]], z: Array, null: Array) -> 
     single: dict[str, Array] = {}
     candidate: dict[str, float] = {}
     by_chance: list[Array] = []
-    for name, shapes in candidates.items():
+    for name, shapes in track(candidates.items(), "null simulation"):
         values = np.array([p_of_share(share(q, z), q.shape[1], r) for q in shapes])
         # Shapes of one dimension have p-values in the order of their shares.
         smallest = np.ones(len(null))
