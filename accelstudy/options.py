@@ -43,11 +43,26 @@ class Name(click.ParamType):  # type: ignore[type-arg]  # generic from click 8.5
         return [CompletionItem(name) for name in known if name.startswith(incomplete)]
 
 
+class ModelName(Name):
+    """A model: a name, a composition, of which the shell completes the last part, or a file."""
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """Models and, after a +, effects; files if no name begins with what was typed."""
+        before, plus, last = incomplete.rpartition("+")
+        found = super().shell_complete(ctx, param, last)
+        if plus:
+            found += EFFECT.shell_complete(ctx, param, last)
+        items = [CompletionItem(f"{before}{plus}{item.value}") for item in found]
+        return items or [CompletionItem(incomplete, type="file")]
+
+
 ANGLE_UNIT = Name("angle unit", "accelstudy.units", "ANGLE_UNITS")
 APPROACH = Name("approach", "accelstudy.approaches", "approach_names")
 EFFECT = Name("effect", "accelstudy.effects", "effect_names")
 GROSS_ERROR = Name("gross error", "accelstudy.gross_errors", "gross_error_names")
-MODEL = Name("model", "accelstudy.models", "MODELS")
+MODEL = ModelName("model", "accelstudy.models", "MODELS")
 NOISE_EFFECT = Name("noise effect", "accelstudy.noise_effects", "noise_effect_names")
 SCHEME = Name("scheme", "accelstudy.schemes", "scheme_names")
 

@@ -64,6 +64,8 @@ def test_the_shell_completes_commands_and_names():
     assert completed(["calibrate", "--ang"]) == ["--angle-unit"]
     assert completed(["calibrate", "--angle-unit", "d"]) == ["deg"]
     assert completed(["calibrate", "--model", "bias-scale"]) == [*MODELS]
+    assert completed(["calibrate", "--model", "bias+warm"]) == ["bias+warm_up"]
+    assert completed(["calibrate", "--model", "diag"]) == ["diag"]  # maybe a file
     assert completed(["schemes", "--approach", "r"]) == ["robot"]
     assert completed(["scheme", "mcl"]) == ["mclaren-24"]
     assert completed(["simulate-campaign", "--effect", "warm"]) == ["warm_up"]
