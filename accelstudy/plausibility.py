@@ -30,8 +30,9 @@ def largest(effect: Effect) -> float:
     """
     if effect.name in LARGEST:
         return LARGEST[effect.name]
-    typical = getattr(effect, "typical", None)
-    return np.inf if typical is None else FACTOR * float(typical[1])
+    if isinstance(type(effect).typical, property):  # not stated, but by default
+        return np.inf
+    return FACTOR * float(effect.typical[1])
 
 
 def largest_tilt() -> float:

@@ -9,16 +9,20 @@ import yaml
 from click.testing import CliRunner
 from study_helpers import content, grid
 
+from accelstudy.adjustment.quality import solve
+from accelstudy.adjustment.quality.redundancy import _leveling_slope
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.applying import read_calibration
 from accelstudy.campaign.batch_config import parse_batch
 from accelstudy.campaign.document import calibration_document
 from accelstudy.campaign.export import export
 from accelstudy.campaign.fit import fit_campaign
+from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.log_reading import readings_of
 from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign
 from accelstudy.cli import main
 from accelstudy.diagnosis.calibration import diagnosed_calibration
+from accelstudy.diagnosis.model_file import study_overlay
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.round_trip import parse_round_trip
 from accelstudy.effects import Hold
@@ -121,7 +125,7 @@ def test_a_study_of_compositions(tmp_path):
     assert new[len(old)].estimated_model.n_parameters == 12
     assert len({cell.name for cell in new}) == len(new)
     assert all(len(cell.name.split("/")) == 3 for cell in new)
-    assert model_title(new[len(old)].model) == "9 + warm up(tau=300)"
+    assert model_title(new[len(old)].model) == "9 + warm up (300)"
     # The condition of the holds is part of a cell, so seeds are compared without it.
     beside = parse_study(content(grids=[grid(), grid(models="bias-scale+quadratic_scale")]))
     seeds = {cell.name: cell.seed(1, 0).entropy for cell in study_cells(beside)}
@@ -363,3 +367,23 @@ def test_the_rig_stays_where_it_was():
     effects = json.loads(export(content, "json"))["effects"]
     assert [effect["spec"] for effect in effects if "note" in effect] == ["encoder_scale"]
     assert len(export(content, "matrix").splitlines()) == 3
+
+
+def test_positions_are_judged_by_leveling_at_the_reference_temperature(made):
+    """A change of what temperature does is no change there, and one of the rig nowhere."""
+    campaign = read_campaign(made / "c")
+    model = get_model(f"{NINE}+thermal_bias+encoder_scale")
+    fit = fit_campaign(campaign, model, get_approach("robot"))
+    slope = _leveling_slope(solve(model, fit.approach, fit.observed), 0.5, 10)
+    zero = np.all(slope == 0, axis=(0, 1))
+    names = [p.name for p, is_zero in zip(model.parameters, zero, strict=True) if is_zero]
+    assert names == ["b_T_x", "b_T_y", "b_T_z", "k_roll", "k_pitch"]
+
+
+def test_a_model_that_becomes_a_registered_one_is_a_study_too():
+    campaign, _ = simulate_campaign(CampaignSettings(scheme="fibonacci-30", approach="gravity"))
+    diagnosis = diagnose(campaign, get_model("bias-scale"))
+    assert diagnosis.extended.name == NINE
+    overlay = study_overlay(diagnosis)
+    assert overlay["models"] == {"extended": ["bias", "scale", "nonorthogonality"]}
+    assert parse_study({**overlay, "seed": 1}).grids[0].models == ["bias-scale", "extended"]

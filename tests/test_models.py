@@ -2,6 +2,7 @@
 
 import re
 
+import numpy as np
 import pytest
 import yaml
 from click.testing import CliRunner
@@ -14,6 +15,7 @@ from accelstudy.effects.defaults import equation_of, formulas, typical_of
 from accelstudy.errors import InputError
 from accelstudy.figures.style import _parameters, model_title
 from accelstudy.models import MODELS, get_model
+from accelstudy.plausibility import largest
 from accelstudy.study.config import parse_study
 
 NINE = "bias-scale-nonorthogonality"
@@ -90,9 +92,9 @@ def test_the_model_of_a_file(content, expected, tmp_path):
 
 def test_titles_of_compositions():
     assert model_title(f"{NINE}+warm_up(tau=300)+quadratic_scale") == (
-        "9 + warm up(tau=300) + quadratic scale"
+        "9 + warm up (300) + quadratic scale"
     )
-    assert model_title("bias+warm_up(tau=300)") == "bias + warm up(tau=300)"
+    assert model_title("bias+warm_up(tau=300)") == "bias + warm up (300)"
 
 
 def test_a_part_of_an_effect_takes_its_share_of_the_true_values():
@@ -143,6 +145,7 @@ def test_an_effect_that_says_no_more_than_it_must_serves_everywhere(squared, tmp
     page = (tmp_path / "d/report.html").read_text(encoding="utf-8")
     assert "squared scale" in page
     run("calibrate", tmp_path / "c", "--model", f"{NINE}+{squared}", "--out", tmp_path / "k")
+    assert largest(get_effect(squared)) == np.inf
 
 
 @pytest.mark.parametrize("name", effect_names())

@@ -9,7 +9,8 @@ import numpy as np
 
 from accelstudy.campaign.format import Campaign
 from accelstudy.diagnosis.pipeline import Diagnosis
-from accelstudy.models import composition_name
+from accelstudy.models import MODELS, composition_name
+from accelstudy.names import LONGEST
 from accelstudy.sensor import SensorModel
 from accelstudy.units import MGON
 
@@ -32,7 +33,8 @@ def study_overlay(diagnosis: Diagnosis) -> dict[str, Any]:
     if extended is not d.model:
         # One model of the file's own, which is thus the one that it stands for.
         added = [e.name for e in extended.effects[len(d.model.effects) :]]
-        own = {"-".join([study_name(models[0]), *added]): list(effects)}
+        name = "-".join([study_name(models[0]), *added])
+        own = {"extended" if name in MODELS or len(name) > LONGEST else name: list(effects)}
     noise: dict[str, Any] = {
         "sensor": {"sigma_mps2": d.sigma_position, "per": "position"},
         "gravity": {"sigma_mps2": d.campaign.sigma_gravity, "error_mps2": 0.0},
@@ -86,7 +88,7 @@ def study_holds(campaign: Campaign, model: SensorModel) -> dict[str, Any]:
 
 def study_name(name: str) -> str:
     """Return the name of a campaign as the name of a study: letters, digits, _ and - only."""
-    return re.sub(r"[^A-Za-z0-9_-]+", "-", name).strip("-_") or "campaign"
+    return re.sub(r"[^A-Za-z0-9_-]+", "-", name)[:LONGEST].strip("-_") or "campaign"
 
 
 def _truth(model: SensorModel, parameters: list[float]) -> dict[str, dict[str, Any]]:

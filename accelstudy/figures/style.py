@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from functools import cache
 from typing import Any
@@ -177,10 +178,15 @@ def model_title(model: str) -> str:
         default=None,
     )
     if known is None:
-        return model.replace("+", " + ").replace("_", " ") if "+" in model else model
+        return " + ".join(map(_part_title, model.split("+"))) if "+" in model else model
     parameters, added = TITLES[known].split(":")[0], model.removeprefix(known)[1:]
     parts = added.split("+") if "(" in added or "+" in added else added.split("-")
-    return " + ".join([parameters, *(part.replace("_", " ") for part in parts)])
+    return " + ".join([parameters, *map(_part_title, parts)])
+
+
+def _part_title(part: str) -> str:
+    """Name an effect as words, with the number of its setting."""
+    return re.sub(r"\((?:\w+=)?", " (", part.replace("_", " "))
 
 
 def new_figure(width: float, height_mm: float) -> Figure:

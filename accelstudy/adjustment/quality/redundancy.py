@@ -10,6 +10,7 @@ from scipy import special
 
 from accelstudy.adjustment.quality.solution import Solution
 from accelstudy.effects import Hold
+from accelstudy.effects.base import REFERENCE_TEMPERATURE
 from accelstudy.leveling import jacobian, roll_pitch
 from accelstudy.leveling_error import cap_forces
 from accelstudy.units import GON
@@ -116,11 +117,13 @@ def reliability(
 
 
 def _leveling_slope(solution: Solution, max_tilt: float, attitudes: int) -> Array:
-    """Derivatives of roll and pitch by the model's parameters, (k, 2, u)."""
+    """Derivatives of roll and pitch by the model's parameters, (k, 2, u); 0 by those of the rig."""
     model, g = solution.model, solution.gravity
-    p = solution.parameters[: model.n_parameters]
+    p = np.where(model.stays, solution.parameters[: model.n_parameters], 0.0)
     f_b = cap_forces(max_tilt, attitudes, g)
     roll, pitch = roll_pitch(tuple(f_b.T))
     at_rest = dict.fromkeys(Hold.columns(), np.zeros(attitudes))
-    hold = Hold(**{**at_rest, "roll": roll, "pitch": pitch})
-    return jacobian(f_b) @ model.correction_jacobian(model.sense(f_b, p, g, hold), p, g, hold)
+    reference = np.full(attitudes, REFERENCE_TEMPERATURE)
+    hold = Hold(**{**at_rest, "roll": roll, "pitch": pitch, "temperature": reference})
+    slope = model.correction_jacobian(model.sense(f_b, p, g, hold), p, g, hold)
+    return jacobian(f_b) @ slope * model.stays
