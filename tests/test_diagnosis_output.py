@@ -123,6 +123,7 @@ def test_the_page_tells_its_story_in_order(written):
         "Does the simulation now look like the measurement?",
         "What can this campaign not see?",
         "What to measure next",
+        "Use it",
     ]
 
 
@@ -302,7 +303,7 @@ def test_a_figure_that_fails_takes_nothing_with_it(tmp_path, monkeypatch, capsys
         ({"modle": 1}, "did you mean 'model'"),
         ({"model": "nine"}, "unknown model 'nine'"),
         ({"campaign": {"schem": "rings-24"}}, "did you mean 'scheme'"),
-        ({"campaign": {"sigma": -1}}, "sigma: must be above 0"),
+        ({"campaign": {"sigma": -1}}, "sigma: must be from 1e-09"),
     ],
 )
 def test_the_example_is_checked(change, words):
