@@ -147,6 +147,13 @@ def test_a_bad_log_is_one_line(campaign, tmp_path):
         assert words in result.stderr
         assert result.stderr.count("\n") == 1
         assert not (tmp_path / "x.csv").exists()
+    log.write_text("1,2,9\n", encoding="utf-8")
+    arguments = "apply", tmp_path / "out/calibration.json", log, "--out", tmp_path / "x.csv"
+    assert "--columns: expected fx=1" in run(*arguments, "--columns", "0,1,2").stderr
+    assert run(*arguments, "--columns", "fx=1,fy=0,fz=2", "--unit", "m/s^2").exit_code == 0
+    assert "--force" in run(*arguments).stderr
+    assert "is the input" in run(*arguments[:4], log, "--force").stderr
+    assert log.read_text(encoding="utf-8") == "1,2,9\n"
 
 
 @pytest.mark.parametrize("form", ["json", "yaml", "c", "matrix"])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from accelstudy.campaign.applying import Calibration
 from accelstudy.campaign.log_reading import Readings
 from accelstudy.campaign.log_tables import column_names, numbers
-from accelstudy.campaign.ranges import Watch
+from accelstudy.campaign.ranges import MARGIN, Watch
 from accelstudy.campaign.wording import counted, listed
 from accelstudy.effects import Hold
 from accelstudy.errors import InputError
@@ -74,7 +74,7 @@ class Account:
                 raise self._wrong_unit()
         self._usable += len(norms)
         if self._calibration.drifts and hold.time is not None:
-            self._after += int(np.sum(hold.time > self._session_end))
+            self._after += int(np.sum(hold.time > (1 + MARGIN) * self._session_end))
         self._watch.look_at(corrected, hold)
 
     def close(self) -> None:
