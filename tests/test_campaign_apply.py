@@ -364,7 +364,11 @@ def test_parquet_keeps_its_types(tmp_path):
     [
         ("log.csv", "fx,fy,fz,fz\n1,2,9,9\n", "which column is fz"),
         ("log.csv", "fx,fy,fz\n", "no line of numbers"),
-        ("log.csv", "fx,fy,fz\n0.1,0.2,-1\n0.5,0.5,-0.8\n", "looks like g, give --unit g"),
+        (
+            "log.csv",
+            "fx,fy,fz\n0.1,0.2,-1\n0.5,0.5,-0.8\n",
+            "about 1.02 m.s.2: these look like g; give --unit g",
+        ),
         (
             "log.csv",
             "fx,fy,fz\n100,200,9000\n0,9100,100\n1,2,9\n",

@@ -9,13 +9,14 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from accelstudy.campaign.applying import Calibration
+from accelstudy.campaign.checks import likely_fault
 from accelstudy.campaign.log_reading import Readings
 from accelstudy.campaign.log_tables import column_names, numbers
 from accelstudy.campaign.ranges import MARGIN, Watch
 from accelstudy.campaign.wording import counted, listed
 from accelstudy.effects import Hold
 from accelstudy.errors import InputError
-from accelstudy.units import UNITS, display_unit, to_display
+from accelstudy.units import display_unit, to_display
 
 Array = NDArray[np.float64]
 
@@ -148,15 +149,17 @@ class Account:
         return f"{where}: the calibration has no force for such a reading{end}"
 
     def _wrong_unit(self) -> InputError:
-        path, gravity = self._readings.source.path, self._calibration.gravity
+        readings, gravity = self._readings, self._calibration.gravity
         norm = float(np.median(self._norms))
-        factor = abs(float(self._readings.scale[0]))
-        near = [
-            f"; it looks like {unit}, give --unit {unit}"
-            for unit in ("m/s^2", "g")
-            if gravity / 2 < norm / factor * UNITS["m/s^2"][unit] < gravity * 2
-        ]
+        given = norm / abs(float(readings.scale[0]))
+        fault = likely_fault(given, norm, readings.unit, gravity)
+        looks = f"these look like {fault}; give --unit {fault}"
         return InputError(
-            f"{path}: the norm of the readings is about {norm:.3g} m/s², nowhere near gravity, "
-            f"{gravity:.3g} m/s²" + "".join(near or ["; give the --unit or the --columns of it"])
+            f"{readings.source.path}: the readings are about {given:.3g} {readings.unit}: "
+            + (
+                looks
+                if fault in ("m/s^2", "g")
+                else "nowhere near gravity, "
+                f"{gravity:.3g} m/s²; give the --unit or the --columns of this log"
+            )
         )

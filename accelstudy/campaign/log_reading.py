@@ -40,6 +40,7 @@ class Readings:
     rate : float, 1/s, if it tells the time
     time_factor : float, s per unit of the column of time
     start : float, s, from the start of the calibration session to the first row
+    unit : str, of the forces
     scale, offset : (3,), f = (raw − offset) · scale, in the axes of the log
     frame : Frame, the axes of the log
     mending : (3, 3), turns forces in frd as they are read into mended ones
@@ -50,6 +51,7 @@ class Readings:
     rate: float | None
     time_factor: float
     start: float
+    unit: str
     scale: Array
     offset: Array
     frame: Frame
@@ -132,7 +134,10 @@ def readings_of(
                 f"{log}: the effect {effect} needs the {condition} of each row; "
                 f"{OPTIONS[condition]} says it"
             )
-    scale, offset = _conversion(calibration, layout, given.get("unit"))
+    unit = layout.unit
+    if calibration.log is None and "unit" not in given:
+        unit = calibration.content["unit"]
+    scale, offset = _conversion(calibration, layout, unit)
     factor = TIME_UNITS[layout.time_unit]
     # What is told of the log is right, whatever was wrong in the campaign.
     told = {"unit_error": "unit", "axis_error": "frame"}
@@ -144,6 +149,7 @@ def readings_of(
         layout.rate_hz,
         factor,
         start,
+        unit,
         scale,
         offset,
         layout.axes,
@@ -190,14 +196,12 @@ def _places(
     return places
 
 
-def _conversion(
-    calibration: Calibration, layout: LogLayout, unit: str | None
-) -> tuple[Array, Array]:
-    """Scale and offset (3,) of the readings, in the axes of the log."""
-    if calibration.log is None and unit in (None, calibration.content["unit"]):
+def _conversion(calibration: Calibration, layout: LogLayout, unit: str) -> tuple[Array, Array]:
+    """Scale and offset (3,) of readings in a unit, in the axes of the log."""
+    if calibration.log is None and unit == calibration.content["unit"]:
         return raw_conversion(calibration.content)
-    if layout.unit != "counts":
-        return conversion(layout.unit, None, None)
+    if unit != "counts":
+        return conversion(unit, None, None)
     if layout.scale is None:
         raise InputError("--unit counts: the calibration has no nominal scale of counts")
     return conversion("counts", layout.scale, layout.offset)
