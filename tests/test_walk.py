@@ -46,30 +46,30 @@ def log_csv(path):
     np.savetxt(path, readings, "%.5f", delimiter=",")
 
 
-@pytest.fixture
-def folder(tmp_path):
-    """What a reader has: a log of a sensor, the configurations, and verdicts of a study."""
-    shutil.copytree(ROOT / "config", tmp_path / "config")
-    log_csv(tmp_path / "log.csv")
+@pytest.fixture(scope="module")
+def steps(site, tmp_path_factory):
+    """What came of all commands, in a folder that holds what a reader has.
+
+    That is a log of a sensor and, for studies, the configurations and the verdicts of one.
+    """
+    folder = tmp_path_factory.mktemp("walk")
+    log_csv(folder / "log.csv")
+    shutil.copytree(ROOT / "config", folder / "config")
     claim = {
         "claim": "c", "section": "4.2", "statement": "it holds", "unit": "%", "paper": 50.0,
         "ours": 41.25, "ci95_low": 40.0, "ci95_high": 42.0, "verdict": "reproduced",
         "sentence": "So it is.",
     }  # fmt: skip
-    path = tmp_path / "results/paper/claims.parquet"
+    path = folder / "results/paper/claims.parquet"
     path.parent.mkdir(parents=True)
     write_table(path, pd.DataFrame([claim]), PROVENANCE)
-    return tmp_path
 
-
-def walked(source, site, folder):
-    """Steps of a walk in `folder` with the package installed in `site`."""
     known = ("PATH", "HOME", "LANG", "OPENBLAS_NUM_THREADS")
     environment = {name: os.environ[name] for name in known if name in os.environ}
     environment |= {"PYTHONPATH": str(site), "MPLBACKEND": "agg"}
     environment["PATH"] = f"{site / 'bin'}:{environment['PATH']}"
     done = subprocess.run(
-        [sys.executable, ROOT / "tests/walk.py", source, "steps.json"],
+        [sys.executable, ROOT / "tests/walk.py", README, "steps.json"],
         cwd=folder, env=environment, capture_output=True, text=True,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -78,27 +78,31 @@ def walked(source, site, folder):
     return content["steps"]
 
 
-def judge(steps):
+def test_the_package_has_all_its_files(site):
+    for path in (ROOT / "accelstudy").rglob("*.*"):
+        if path.suffix != ".pyc":
+            assert (site / path.relative_to(ROOT)).exists(), path
+
+
+@pytest.mark.parametrize("source", ["README", "help"])
+def test_each_command_runs_and_writes_what_it_says(steps, source):
     for step in steps:
-        if "skipped" not in step:
+        if step["source"] == source and "skipped" not in step:
             assert step["status"] == 0, f"{step['command']}\n{step['output']}"
             assert not step["missing"], f"{step['command']} did not write {step['missing']}"
 
 
-def test_readme(site, folder):
-    steps = walked(README, site, folder)
-    judge(steps)
-    run = [step["command"] for step in steps if "skipped" not in step]
+def test_the_readme_has_what_a_reader_needs(steps):
+    run = [s for s in steps if s["source"] == "README" and "skipped" not in s]
     for command in ("import", "calibrate", "apply", "export", "diagnose", "effects --campaign"):
-        assert any(step.startswith(f"accelstudy {command} ") for step in run), command
-    (python,) = (step for step in steps if "import " in step["command"][:7])
+        assert any(s["command"].startswith(f"accelstudy {command} ") for s in run), command
+    (python,) = (s for s in run if s["command"].startswith("import "))
     assert len(re.findall(r"\d", python["output"])) > 50  # three arrays of numbers
 
 
-def test_examples_of_the_help(site, folder):
-    steps = walked("help", site, folder)
-    judge(steps)
-    assert {step["command"].split()[1] for step in steps} == set(main.commands)
+def test_each_help_has_an_example(steps):
+    found = {s["command"].split()[1] for s in steps if s["source"] == "help"}
+    assert found == set(main.commands)
 
 
 def test_make_targets_and_files_of_the_readme_exist():

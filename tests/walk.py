@@ -1,9 +1,9 @@
-"""Walk a text as its reader would: run each command in it, in order, in the present folder.
+"""Walk a README and the help as their reader would: run each command, in order, in this folder.
 
-    python walk.py README.md steps.json    # the blocks of a README
-    python walk.py help steps.json         # the example at the end of each command's help
+    python walk.py README.md steps.json
 
-Runs with whatever package is installed; test_walk.py installs it and judges the outcome.
+First come the blocks of the README, then the example at the end of each command's help, if it is
+not among them. Runs with whatever package is installed; test_walk.py installs it and judges.
 """
 
 import json
@@ -16,15 +16,17 @@ from pathlib import Path
 
 from click.testing import CliRunner
 
+import accelstudy
+from accelstudy.cli import main
+
 SKIPPED = {
     "make": "needs the repository, and minutes",
     "snakemake": "needs the repository, and minutes",
-    "source": "needs the repository",
     "accelstudy public [a-z-]+": "downloads",
     r".*(zsh|fish)_source": "is for another shell",
 }
 """Beginnings of commands that are not run -> why."""
-WRITTEN = re.compile(r"^(?:campaign|figure|model|report|table): (\S+)", re.MULTILINE)
+WRITTEN = re.compile(r"^(?:campaign|figure|report): (\S+)", re.MULTILINE)
 """What a command says that it wrote."""
 
 
@@ -38,12 +40,11 @@ def readme_commands(text):
             yield block
 
 
-def help_commands(main):
+def help_commands():
     """Examples in the help of all commands, in the order of `accelstudy --help`."""
     for name in main.list_commands(None):
         text = CliRunner().invoke(main, [name, "--help"]).output
-        _, _, example = text.partition("Example:\n")
-        yield from joined(example)
+        yield from joined(text.partition("Example:\n")[2])
 
 
 def joined(block):
@@ -51,43 +52,46 @@ def joined(block):
     return filter(None, map(str.strip, block.replace("\\\n", " ").splitlines()))
 
 
-def run(main, command):
+def words(command):
+    return [command] if command.startswith("import ") else shlex.split(command, comments=True)
+
+
+def run(command):
     """Exit status and output of a command, in this process where that can be."""
-    if command.startswith("import "):
-        process = [sys.executable, "-c", command]
-    elif command.startswith("accelstudy "):
-        result = CliRunner().invoke(main, shlex.split(command, comments=True)[1:])
+    if command.startswith("accelstudy "):
+        result = CliRunner().invoke(main, words(command)[1:])
         if result.exception is not None and not isinstance(result.exception, SystemExit):
             return 1, "".join(traceback.format_exception(result.exception))
         return result.exit_code, result.output
-    else:
-        process = ["bash", "-c", command]
+    python = command.startswith("import ")
+    process = [sys.executable, "-c", command] if python else ["bash", "-c", command]
     done = subprocess.run(process, capture_output=True, text=True)
     return done.returncode, done.stdout + done.stderr
 
 
-def walk(main, command):
+def step(source, command):
     """What came of a command: its exit status, its output, and what it failed to write."""
+    made = {"source": source, "command": command}
     for beginning, why in SKIPPED.items():
         if re.match(rf"{beginning}\b", command):
-            return {"command": command, "skipped": why}
-    status, output = run(main, command)
-    words = [] if command.startswith("import ") else shlex.split(command, comments=True)
-    claimed = [words[i + 1] for i, word in enumerate(words) if word in ("--out", "--truth")]
+            return {**made, "skipped": why}
+    status, output = run(command)
+    given = words(command)
+    claimed = [given[i + 1] for i, word in enumerate(given) if word in ("--out", "--truth")]
     missing = [path for path in claimed + WRITTEN.findall(output) if not Path(path).exists()]
-    return {"command": command, "status": status, "output": output, "missing": missing}
+    return {**made, "status": status, "output": output, "missing": missing}
 
 
 if __name__ == "__main__":
-    import accelstudy
-    from accelstudy.cli import main
-
-    source, out = sys.argv[1:]
-    commands = (
-        help_commands(main)
-        if source == "help"
-        else readme_commands(Path(source).read_text(encoding="utf-8"))
-    )
-    steps = [walk(main, command) for command in commands]
+    readme, out = map(Path, sys.argv[1:])
+    steps = [step("README", command) for command in readme_commands(readme.read_text("utf-8"))]
+    known = [words(made["command"]) for made in steps]
+    for command in help_commands():
+        again = words(command) in known
+        steps.append(
+            {"source": "help", "command": command, "skipped": "is in the README"}
+            if again
+            else step("help", command)
+        )
     content = {"package": accelstudy.__file__, "steps": steps}
-    Path(out).write_text(json.dumps(content, indent=2, ensure_ascii=False), encoding="utf-8")
+    out.write_text(json.dumps(content, indent=2, ensure_ascii=False), encoding="utf-8")
