@@ -126,7 +126,7 @@ def blocks(study: StudyConfig, factor: Factor) -> list[Block]:
     study's default, or the middle one if the default is not among them (of an even number the
     lower of the two in the middle).
     """
-    if factor is POSITIONS and not _names_sizes(study):
+    if not (_names_sizes(study) if factor is POSITIONS else _lists_values(study, factor)):
         return []
     table = cell_table(study)
     by = "family" if factor is POSITIONS else "scheme"
@@ -148,6 +148,13 @@ def blocks(study: StudyConfig, factor: Factor) -> list[Block]:
             rows = rows.assign(x=rows[factor.column], subject=str(subject))
             found.setdefault(tuple(levels.items()), []).append(rows)
     return [Block(dict(levels), pd.concat(parts)) for levels, parts in found.items()]
+
+
+def _lists_values(study: StudyConfig, factor: Factor) -> bool:
+    """Whether the grids list different values of a noise setting; quicker than all cells."""
+    values = [getattr(grid, factor.column) for grid in study.all_grids]
+    listed = {value for each in values if each is not None for value in each}
+    return len(listed) + (None in values) > 1
 
 
 def _names_sizes(study: StudyConfig) -> bool:
@@ -192,7 +199,7 @@ def _level_text(factor: Factor, level: Level) -> str:
         return f"{factor.shown(value):.4g}"
 
     text = f"{factor.title} {number(level.value)}"
-    if level.value:
+    if level.value or level.others:
         text += f" {unit_label(display_unit(factor.unit))}"
     if not level.others:
         return text
