@@ -57,9 +57,7 @@ def implausible_parameters(effects: Sequence[Effect], parameters: Array) -> list
             if not abs(value) <= bound:
                 shown, most = (number(float(to_display(v, parameter.unit))) for v in (value, bound))
                 unit = display_unit(parameter.unit)
-                found.append(
-                    f"{parameter.name} = {shown} {unit}; ± {most} is the most that is believed"
-                )
+                found.append(f"{parameter.name} = {shown} {unit} (up to ± {most} is believed)")
     return found
 
 

@@ -7,6 +7,11 @@ from collections.abc import Sequence
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
+def words(name: str) -> str:
+    """Return a name of the catalogue as words."""
+    return name.replace("_", " ")
+
+
 def joined(items: Sequence[str], last: str = "and") -> str:
     """Join words: a, b and c; nothing of none."""
     if len(items) < 2:

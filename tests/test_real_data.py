@@ -17,13 +17,12 @@ from accelstudy.diagnosis.wording import (
     amount,
     shown_unit,
     verdict_lines,
-    words,
 )
 from accelstudy.effects import get_effect
 from accelstudy.errors import InputError
 from accelstudy.models import get_model
 from accelstudy.study.report import number
-from accelstudy.wording import probability
+from accelstudy.wording import probability, words
 
 DATA = Path(os.environ.get("ACCELSTUDY_SHARED", Path(__file__).parents[2] / "shared")) / "data"
 PAGE = (Path(__file__).parents[1] / "docs" / "real-data.md").read_text(encoding="utf-8")

@@ -32,6 +32,7 @@ def calibrate_command(campaign: Path, model: str, approach: str, out: Path, forc
     from accelstudy.campaign.fit import fit_campaign
     from accelstudy.campaign.format import read_campaign
     from accelstudy.campaign.output import write_calibration
+    from accelstudy.campaign.verdict import next_steps
     from accelstudy.models import get_model
     from accelstudy.outputs import CALIBRATION, result_folder
     from accelstudy.units import display_unit, to_display
@@ -39,7 +40,8 @@ def calibrate_command(campaign: Path, model: str, approach: str, out: Path, forc
     chosen = get_model(model), get_approach(approach)
     with result_folder(out, CALIBRATION, [campaign], force) as folder, stage("calibration"):
         measured = read_campaign(campaign)
-        content = write_calibration(fit_campaign(measured, *chosen), folder)
+        fit = fit_campaign(measured, *chosen)
+        content = write_calibration(fit, folder, campaign)
     for warning in measured.warnings:
         click.echo(f"warning: {warning}", err=True)
     for entry in content["parameters"]:
@@ -48,7 +50,10 @@ def calibrate_command(campaign: Path, model: str, approach: str, out: Path, forc
         sigma = f"{to_display(entry['sigma'], unit):.4f}" if known else "unknown"
         value = f"{to_display(entry['value'], unit):12.4f}"
         say(f"{entry['name']:>9} = {value} ± {sigma} {display_unit(unit)}")
-    say(content["quality"]["verdict"])
+    quality = content["quality"]
+    say(f"{quality['state'].upper()}: {quality['verdict']}")
+    what, command = next_steps(fit, quality["state"], campaign, out / "calibration.json")[0]
+    say(f"{what}: {command}")
     say(f"report: {out / 'report.html'}")
 
 

@@ -12,7 +12,7 @@ from accelstudy.campaign.fit import CampaignFit
 from accelstudy.campaign.gauges import GAUGES, affine_form, in_gauge
 from accelstudy.campaign.ranges import ranges_of
 from accelstudy.campaign.session import Campaign
-from accelstudy.campaign.verdict import state, verdict, warnings
+from accelstudy.campaign.verdict import state, verdict_lines, warnings
 from accelstudy.units import MGON, recorded_unit, to_recorded
 
 
@@ -85,7 +85,7 @@ def quality_document(assessment: Assessment) -> dict[str, Any]:
         "plausible": not warnings(assessment),
         "warnings": warnings(assessment),
         "gross_error": None if gross is None else {"name": gross.name, "reason": gross.reason},
-        "verdict": verdict(assessment),
+        "verdict": " ".join(verdict_lines(assessment)),
         "global_test": None
         if test is None
         else {

@@ -13,13 +13,18 @@ SUSPECT = "#D55E00"
 
 
 def residual_figure(fit: CampaignFit, positions: pd.DataFrame) -> Figure:
-    """|f_b| − g of each position, with the range of the quoted noise."""
+    """|f_b| − g of each position, with the range of the stated noise or, without it, of their own.
+
+    What is too large beside the noise that was stated has to look so.
+    """
     figure = new_figure(FULL, 62)
     ax = figure.add_subplot()
     x, y = positions["position"], 1e3 * positions["norm_residual_mps2"]
-    two_sigma = 2e3 * fit.sigma_position
+    stated = fit.campaign.sigma_force
+    two_sigma = 2e3 * (fit.sigma_position if stated is None else stated)
+    source = "from the residuals" if stated is None else "as stated"
     if np.isfinite(two_sigma):
-        ax.axhspan(-two_sigma, two_sigma, color="#E6E6E6", label="±2 σ of a position")
+        ax.axhspan(-two_sigma, two_sigma, color="#E6E6E6", label=f"±2 σ of a position, {source}")
     ax.axhline(0, color=INK, linewidth=0.8)
     ax.plot(x, y, "o", color=approach_colour(fit.approach.name), label="residual |f| − g")
     suspects = positions["suspect"]

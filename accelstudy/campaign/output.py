@@ -7,14 +7,16 @@ from typing import Any
 
 import pandas as pd
 
+from accelstudy.adjustment.quality.whole_model import REFUTED
 from accelstudy.campaign.assessment import assess, positions_table
 from accelstudy.campaign.document import calibration_document, json_text, quality_document
 from accelstudy.campaign.figures import correlation_figure, residual_figure
 from accelstudy.campaign.fit import CampaignFit
+from accelstudy.campaign.verdict import next_steps, verdict_lines
 from accelstudy.figures.saving import save_all
 from accelstudy.figures.style import unit_label
 from accelstudy.outputs import whole_file
-from accelstudy.pages import page_environment
+from accelstudy.pages import write_page
 from accelstudy.study.report import number
 from accelstudy.units import display_unit, to_display
 
@@ -22,10 +24,24 @@ LISTED = 200
 """Positions up to which the page lists all of them; of more, those that fit worst."""
 
 
-def write_calibration(fit: CampaignFit, folder: str | Path) -> dict[str, Any]:
+def write_calibration(
+    fit: CampaignFit, folder: str | Path, source: str | Path = "CAMPAIGN"
+) -> dict[str, Any]:
     """Assess a fit and write calibration.json, positions.parquet, figures/ and report.html.
 
-    Each file is whole or not there; calibration.json comes last. Returns its content.
+    Each file is whole or not there; calibration.json comes last. A page that fails takes the
+    numbers not with it.
+
+    Parameters
+    ----------
+    fit : CampaignFit
+    folder : path, to write to
+    source : path of the campaign, for the commands that the page gives
+
+    Returns
+    -------
+    dict
+        The content of calibration.json.
     """
     folder = Path(folder)
     assessment = assess(fit)
@@ -42,17 +58,21 @@ def write_calibration(fit: CampaignFit, folder: str | Path) -> dict[str, Any]:
     with whole_file(folder / "positions.parquet") as path:
         positions.to_parquet(path, index=False)
 
-    environment = page_environment("campaign")
-    environment.filters.update(unit=lambda unit: unit_label(display_unit(unit)))
-    page = environment.get_template("report.html.j2").render(
+    lines = verdict_lines(assessment)
+    write_page(
+        folder / "report.html",
+        "campaign/report.html.j2",
+        " ".join(lines),
         doc=document,
         quality=quality,
+        lines=lines,
         positions=_listed(positions).to_dict("records"),
         shown=_shown,
-        **drawn,
+        unit=lambda unit: unit_label(display_unit(unit)),
+        refuted=REFUTED,
+        figures=drawn,
+        next_steps=next_steps(fit, quality["state"], source),
     )
-    with whole_file(folder / "report.html") as path:
-        path.write_text(page, encoding="utf-8")
     content = {**document, "quality": quality}
     with whole_file(folder / "calibration.json") as path:
         path.write_text(json_text(content), encoding="utf-8")

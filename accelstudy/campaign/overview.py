@@ -12,9 +12,9 @@ import pandas as pd
 
 from accelstudy.adjustment.quality.whole_model import REFUTED
 from accelstudy.campaign.batch import STATUS
-from accelstudy.campaign.verdict import BLIND, IMPLAUSIBLE, REJECTED
+from accelstudy.campaign.verdict import BLIND, IMPLAUSIBLE
 from accelstudy.outputs import whole_file
-from accelstudy.pages import page_environment
+from accelstudy.pages import render
 from accelstudy.study.report import number
 from accelstudy.study.tables import write_table
 from accelstudy.units import MGON, UNITS, display_unit
@@ -165,14 +165,13 @@ def _page(batch: str, table: pd.DataFrame, links: list[dict[str, str | None]]) -
         {**{k: None if pd.isna(v) else v for k, v in row.items()}, **link}
         for row, link in zip(table.to_dict("records"), links, strict=True)
     ]
-    environment = page_environment("campaign", trim_blocks=True)
-    environment.filters.update(shown=_shown, p_value=_p_value)
-    return environment.get_template("overview.html.j2").render(
+    return render(
+        "campaign/overview.html.j2",
+        shown=_shown,
         batch=batch,
         failed=[row for row in rows if row["status"] != "ok"],
         implausible=[row for row in rows if row["state"] == IMPLAUSIBLE],
         calibrated=[row for row in rows if row["status"] == "ok" and row["state"] != IMPLAUSIBLE],
-        rejected=REJECTED,
         level=REFUTED,
         robot=table["held_out_roll_rad"].notna().any(),
         blind=BLIND,
@@ -183,7 +182,3 @@ def _page(batch: str, table: pd.DataFrame, links: list[dict[str, str | None]]) -
 def _shown(value: float | None, unit: float = 1.0) -> str:
     """Show an SI value in a unit of that size; a dash where there is none."""
     return number(np.nan if value is None else value / unit)
-
-
-def _p_value(value: float) -> str:
-    return f"p = {value:.2g}" if value >= 1e-3 else "p < 0.001"

@@ -48,10 +48,10 @@ def warnings(assessment: Assessment) -> list[str]:
     return said
 
 
-def verdict(assessment: Assessment) -> str:
-    """Say whether the calibration is good, for what, and what limits it."""
+def verdict_lines(assessment: Assessment) -> list[str]:
+    """Say whether the calibration is good, for what, and what limits it; the first comes first."""
     fit = assessment.fit
-    words = [*_implausible(assessment), _consistency(fit)]
+    words = [*_implausible(assessment), *_consistency(fit)]
     if assessment.suspects:
         named = [str(fit.campaign.positions[s.position]) for s in assessment.suspects]
         what = "position" if len(named) == 1 else "positions"
@@ -62,27 +62,33 @@ def verdict(assessment: Assessment) -> str:
     if judged != IMPLAUSIBLE and np.isfinite(assessment.tilt).all():
         words.append(_tilt(assessment))
     if judged in (REJECTED, IMPLAUSIBLE):
-        words.append("`accelstudy diagnose` looks for the cause.")
+        words.append("What is wrong or missing, “accelstudy diagnose” may tell.")
     if not fit.approach.uses_angles:
         words.append(BLIND)
-    return " ".join(words)
+    return words
 
 
-def next_steps(assessment: Assessment, campaign: str | Path = "CAMPAIGN") -> list[tuple[str, str]]:
+def next_steps(
+    fit: CampaignFit,
+    judged: str,
+    campaign: str | Path = "CAMPAIGN",
+    result: str | Path = "calibration.json",
+) -> list[tuple[str, str]]:
     """Say what to do next, most urgent first: what for, and the command.
 
     Parameters
     ----------
-    assessment : Assessment
+    fit : CampaignFit
+    judged : str, its state
     campaign : path of the campaign's folder
+    result : path of calibration.json
     """
-    fit = assessment.fit
     parts = ["accelstudy", "diagnose", str(campaign), "--model", fit.model.name]
     if fit.campaign.angles is not None:
         parts += ["--approach", fit.approach.name]
     diagnose = shlex.join([*parts, "--out", f"{fit.campaign.name}-diagnosis"])
-    use = "accelstudy apply calibration.json LOG --out leveled.csv"
-    if state(assessment) in (REJECTED, IMPLAUSIBLE):
+    use = f"accelstudy apply {shlex.quote(str(result))} LOG --out leveled.csv"
+    if judged in (REJECTED, IMPLAUSIBLE):
         return [("Find what is wrong or missing", diagnose)]
     return [
         ("Level a log with this calibration", use),
@@ -129,29 +135,28 @@ def _tilt(assessment: Assessment) -> str:
     )
 
 
-def _consistency(fit: CampaignFit) -> str:
+def _consistency(fit: CampaignFit) -> list[str]:
     r, test = fit.adjustment.redundancy, fit.global_test
     if r == 0:
-        return "There is no redundancy: the positions determine the model and nothing checks it."
+        return ["There is no redundancy: the positions determine the model and nothing checks it."]
     if test is None:
-        return (
-            "The noise of a position is estimated from the residuals, "
-            f"{1e3 * fit.sigma_position:.2f} mm/s² with r = {r}; without an a-priori sigma nothing "
-            "says whether the model is complete."
-        )
+        return [
+            "The noise of a position is not stated, so nothing says whether the model is complete.",
+            f"From the residuals it is {1e3 * fit.sigma_position:.2f} mm/s² with r = {r}.",
+        ]
     if test.accepted and test.remark:
-        return f"With r = {r} the test of the model has next to no power."
+        return [f"With r = {r} the test of the model has next to no power."]
     ratio = float(np.sqrt(test.statistic / test.dof))
     p = p_value(test.p_value)
     if test.accepted:
-        return f"The residuals agree with the stated noise (σ̂0 = {ratio:.2f}, {p})."
+        return [f"The residuals agree with the stated noise (σ̂0 = {ratio:.2f}, {p})."]
     if ratio > 1:
-        return (
+        return [
             f"The residuals are {ratio:.1f} times as large as the stated noise allows "
-            f"({p}): it is understated, or an effect is missing. Sigmas are "
-            "those of the residuals."
-        )
-    return (
-        f"The residuals are only {ratio:.2g} times the stated noise ({p}): "
-        "it is overstated. Sigmas are those of the residuals."
-    )
+            f"({p}): it is understated, or an effect is missing.",
+            "Sigmas are those of the residuals.",
+        ]
+    return [
+        f"The residuals are only {ratio:.2g} times the stated noise ({p}): it is overstated.",
+        "Sigmas are those of the residuals.",
+    ]

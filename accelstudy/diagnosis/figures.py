@@ -19,10 +19,11 @@ from accelstudy.diagnosis.naming import UNKNOWN
 from accelstudy.diagnosis.pipeline import Diagnosis
 from accelstudy.diagnosis.positions import condition_sigma
 from accelstudy.diagnosis.search import LEVEL_EFFECTS
-from accelstudy.diagnosis.wording import GROUPS, words
+from accelstudy.diagnosis.wording import GROUPS
 from accelstudy.figures.style import FULL, INK, log_ticks, new_figure
 from accelstudy.study.report import number
 from accelstudy.units import display_unit, to_display
+from accelstudy.wording import words
 
 Array = NDArray[np.float64]
 

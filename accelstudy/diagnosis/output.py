@@ -55,12 +55,16 @@ def diagnose_folder(
             diagnosis = diagnose(measured, *chosen, seed=seed)
         loop = close_loop(diagnosis, replicates, seed)
         with stage("figures and page"):
-            write_diagnosis(diagnosis, folder, loop=loop)
+            write_diagnosis(diagnosis, folder, loop=loop, source=campaign)
     return diagnosis
 
 
 def write_diagnosis(
-    diagnosis: Diagnosis, folder: str | Path, report: bool = True, loop: Loop | None = None
+    diagnosis: Diagnosis,
+    folder: str | Path,
+    report: bool = True,
+    loop: Loop | None = None,
+    source: str | Path = "CAMPAIGN",
 ) -> dict[str, Any]:
     """Write what a diagnosis found; each file is whole or not there, diagnosis.json comes last.
 
@@ -70,6 +74,7 @@ def write_diagnosis(
     folder : path, made if it is not there
     report : bool, whether to write figures/ and report.html beside the files for programs
     loop : Loop, optional, simulations with the old and with the new model
+    source : path of the campaign, for the commands that the page gives
 
     Returns
     -------
@@ -96,7 +101,7 @@ def write_diagnosis(
         # Drawing takes as long to import as all of the above to compute.
         from accelstudy.diagnosis.report import write_report
 
-        write_report(diagnosis, document, positions, loop, folder, calibration)
+        write_report(diagnosis, document, positions, loop, folder, calibration, source)
     with whole_file(folder / "diagnosis.json") as path:
         path.write_text(json_text(document), encoding="utf-8")
     return document

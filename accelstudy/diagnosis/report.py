@@ -7,17 +7,16 @@ from typing import Any
 
 import pandas as pd
 
-from accelstudy.campaign.gauges import not_affine
+from accelstudy.adjustment.quality.whole_model import REFUTED
 from accelstudy.diagnosis import wording
 from accelstudy.diagnosis.figures import diagnosis_figures
 from accelstudy.diagnosis.loop import Loop
+from accelstudy.diagnosis.next_steps import next_steps
 from accelstudy.diagnosis.pipeline import LEVEL_NOISE, Diagnosis
 from accelstudy.diagnosis.search import LEVEL_EFFECTS, SURE
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.figures.saving import save_all
-from accelstudy.outputs import whole_file
-from accelstudy.pages import page_environment
-from accelstudy.wording import joined, p_value, probability
+from accelstudy.pages import write_page
 
 
 def write_report(
@@ -27,6 +26,7 @@ def write_report(
     loop: Loop | None,
     folder: Path,
     calibration: dict[str, Any] | None = None,
+    source: str | Path = "CAMPAIGN",
 ) -> None:
     """Write figures/ and report.html.
 
@@ -38,22 +38,21 @@ def write_report(
     loop : Loop, optional
     folder : Path
     calibration : dict, of `diagnosed_calibration`, optional
+    source : path of the campaign, for the commands that the page gives
     """
     drawn = save_all(diagnosis_figures(diagnosis, positions, loop), folder / "figures")
-    environment = page_environment("diagnosis", trim_blocks=True, lstrip_blocks=True)
-    environment.filters.update(
-        p=probability,
-        p_value=p_value,
-        words=wording.words,
-        joined=joined,
-        sentence=wording.sentence,
-        described=wording.described,
-    )
-    page = environment.get_template("report.html.j2").render(
+    lines = wording.verdict_lines(diagnosis)
+    write_page(
+        folder / "report.html",
+        "diagnosis/report.html.j2",
+        " ".join(lines),
         d=diagnosis,
         doc=document,
-        headline=wording.headline(diagnosis),
-        lines=wording.verdict_lines(diagnosis)[1:],
+        verdict="cannot tell" if wording.too_few(diagnosis) else diagnosis.verdict,
+        headline=lines[0],
+        lines=lines[1:],
+        sentence=wording.sentence,
+        described=wording.described,
         confirmation=wording.confirmation(diagnosis),
         advice=wording.advice(diagnosis),
         equation=lambda effect: get_effect(effect["spec"]).equation,
@@ -62,11 +61,11 @@ def write_report(
         unit=wording.shown_unit,
         estimate=wording.estimate,
         figures=drawn,
+        changed=wording.changed(diagnosis),
         calibration=calibration,
-        tells=not_affine(diagnosis.extended),
         level=LEVEL_EFFECTS,
         level_noise=LEVEL_NOISE,
+        level_sigma=REFUTED,
         sure=SURE,
+        next_steps=next_steps(diagnosis, calibration, source),
     )
-    with whole_file(folder / "report.html") as path:
-        path.write_text(page, encoding="utf-8")

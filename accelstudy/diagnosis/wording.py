@@ -10,7 +10,7 @@ from accelstudy.effects import effect_names, get_effect
 from accelstudy.figures.style import unit_label
 from accelstudy.study.report import number
 from accelstudy.units import display_unit, to_display
-from accelstudy.wording import joined, p_value
+from accelstudy.wording import joined, p_value, words
 
 GROUPS = {
     "direction": "with the direction of gravity",
@@ -32,11 +32,6 @@ HEADLINES = {
 }
 
 
-def words(name: str) -> str:
-    """Return a name of the catalogue as words."""
-    return name.replace("_", " ")
-
-
 def amount(value: float, unit: str) -> str:
     """Show an SI value in the unit that people use, without the unit."""
     return number(float(to_display(value, unit)))
@@ -54,21 +49,27 @@ def shown_unit(unit: str) -> str:
     return unit_label(display_unit(unit))
 
 
+def too_few(diagnosis: Diagnosis) -> bool:
+    """Whether nothing was found since nothing could be tested."""
+    return diagnosis.verdict == "no_effect" and not diagnosis.screening.p_family
+
+
 def headline(diagnosis: Diagnosis) -> str:
     """Say the verdict in one sentence."""
-    if diagnosis.verdict == "no_effect" and not diagnosis.screening.p_family:
+    if too_few(diagnosis):
         return "Too few positions to show whether anything is missing from the model."
     found = diagnosis.found
     if diagnosis.verdict == "gross_error":
         found = tuple(f for f in found if not _is_effect(f))
-    return HEADLINES[diagnosis.verdict].format(names=joined([_title(f) for f in found] or [""]))
+    known = {named.name for named in found}
+    return HEADLINES[diagnosis.verdict].format(names=joined([_title(f, known) for f in found]))
 
 
-def _title(named: Named) -> str:
+def _title(named: Named, known: set[str]) -> str:
     """Name what was found, with all that would be the same, or with its position."""
     if named.position is not None:
         return f"{words(named.name)} {named.position}"
-    same = [name for name in named.equivalence_class if name != named.name]
+    same = [name for name in named.equivalence_class if name not in known]
     return " or ".join(words(name) for name in (named.name, *same))
 
 
@@ -91,15 +92,15 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
         lines.append(_effect_line(named))
     if d.verdict == "gross_error" and any(f.position is not None for f in d.found):
         lines.append(
-            "It disagrees with the other positions: it was moved, or had not settled. The final "
-            "parameters are those without it."
+            "A position that disagrees with all others was moved, or the sensor had not settled. "
+            f"The final parameters are those {changed(d)}."
         )
     if d.gap.leveling is not None:
         before, after = (amount(value, "rad") for value in d.gap.leveling)
         unit = display_unit("rad")
         lines.append(
-            f"Tilt error of the calibrated sensor: {before} {unit} if the model lacks it, "
-            f"{after} {unit} if not."
+            f"Tilt error of the calibrated sensor: {before} {unit} as it is, {after} {unit} "
+            f"{changed(d)}."
         )
     if d.verdict == "named":
         lines.append(confirmation(d))
@@ -137,6 +138,14 @@ def confirmation(diagnosis: Diagnosis) -> str:
     if gap.confirmed:
         return f"Confirmed {tested}."
     return f"Not confirmed {tested}" + (f": {gap.reason}." if gap.reason else ".")
+
+
+def changed(diagnosis: Diagnosis) -> str:
+    """Say what the final fit does otherwise: with what was added, without what was left out."""
+    added = [words(named.name) for named in diagnosis.found if _is_effect(named)]
+    out = [str(named.position) for named in diagnosis.found if named.position is not None]
+    said = [f"with {joined(added)}"] if added else []
+    return joined([*said, *([f"without position {joined(out)}"] if out else [])])
 
 
 def _is_effect(named: Named) -> bool:

@@ -19,6 +19,9 @@ _FRONT = (
     "study/claims",
     "study/report.py",
     "study/job.py",
+    "pages/",
+    "plausibility.py",
+    "wording.py",
     *_MEASURED,
 )
 _TABLES = ("study/summary.py", "leveling_error.py", "closed_forms.py")
@@ -31,8 +34,8 @@ _UNUSED = {
     "simulate": (*_FRONT, *_TABLES, "sensitivity.py", *_CONFIG),
     "summarise": (*_FRONT, "sensitivity.py", *_CONFIG),
     "sensitivity": (*_FRONT, *_TABLES),
-    "claims": (*_COMMANDS, "figures/", *_MEASURED),
-    "figures": (*_COMMANDS, "study/claims", *_MEASURED),
+    "claims": (*_COMMANDS, "figures/", "plausibility.py", *_MEASURED),
+    "figures": (*_COMMANDS, "study/claims", "pages/", "plausibility.py", "wording.py", *_MEASURED),
     "campaign": (*_COMMANDS, "campaign/overview", "diagnosis/", *_STUDY),
     "diagnosis": (*_COMMANDS, "campaign/overview", *_STUDY),
     "overview": (*_COMMANDS, "figures/", "adjustment/", "diagnosis/", *_STUDY),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import pandas as pd
-from jinja2 import Environment, PackageLoader
 
 
 def number(value: float) -> str:
@@ -27,15 +26,12 @@ def interval(low: float, high: float) -> str:
 
 def claims_page(claims: pd.DataFrame, by_scheme: pd.DataFrame) -> str:
     """Page (HTML, self-contained) with all claims and their verdicts."""
-    environment = Environment(
-        loader=PackageLoader("accelstudy", "study"), autoescape=True, trim_blocks=True
-    )
-    environment.filters["number"] = number
-    template = environment.get_template("claims.html.j2")
-    return template.render(
+    from accelstudy.pages import render  # which shows numbers as here
+
+    return render(
+        "study/claims.html.j2",
         claims=claims.to_dict("records"),
         schemes=by_scheme.to_dict("records"),
-        interval=interval,
     )
 
 

@@ -1,0 +1,107 @@
+"""Pages (HTML, self-contained): one look, one glossary, one badge for each verdict."""
+
+from __future__ import annotations
+
+from functools import cache
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, Template
+
+from accelstudy.figures.saving import failure
+from accelstudy.outputs import whole_file
+from accelstudy.pages.glossary import explained
+from accelstudy.study.report import interval, number
+from accelstudy.units import (
+    GON,
+    MGON,
+    angle_note,
+    attitude_unit,
+    display_unit,
+    to_attitude,
+    to_display,
+)
+from accelstudy.wording import joined, p_value, probability, words
+
+BADGES = {
+    "accepted": ("✓ ACCEPTED", "good"),
+    "rejected": ("✗ REJECTED", "bad"),
+    "cannot tell": ("? CANNOT TELL", "open"),
+    "implausible": ("! IMPLAUSIBLE", "wrong"),
+    "not calibrated": ("✗ NOT CALIBRATED", "bad"),
+    "no_effect": ("✓ NOTHING FOUND", "good"),
+    "named": ("➜ NAMED", "found"),
+    "unknown": ("? UNKNOWN", "open"),
+    "noise_model": ("≈ NOISE", "noise"),
+    "gross_error": ("! GROSS ERROR", "wrong"),
+    "reproduced": ("✓ reproduced", "good"),
+    "not reproduced": ("✗ not reproduced", "bad"),
+    "slip in the paper": ("! slip in the paper", "noise"),
+}
+"""Word and colour class of each verdict; none rests on the colour alone."""
+
+
+def render(template: str, **content: Any) -> str:
+    """Render a page, with its terms explained.
+
+    Templates can use ``angle`` and ``attitude``, filters that show what is recorded in mgon and in
+    gon, the units that these choose, ``angle_unit`` and ``attitude_unit``, and ``angle_note``,
+    which belongs where the first of them is used.
+
+    Parameters
+    ----------
+    template : str, path of the template within the package; it extends `pages/base.html.j2`
+    content : what the template shows. `next_steps`, pairs of what for and a command, stand at the
+        end of the page
+    """
+    units = {
+        "angle_unit": display_unit("rad"),
+        "attitude_unit": attitude_unit(),
+        "angle_note": angle_note(),
+    }
+    return explained(_template(template).render({**units, **content}))
+
+
+def write_page(path: Path, template: str, fallback: str, **content: Any) -> None:
+    """Render and write a page; if that fails, one that says so, and a warning on stderr.
+
+    Parameters
+    ----------
+    path : Path
+    template, content : as in `render`
+    fallback : str, what is said all the same
+    """
+    try:
+        page = render(template, **content)
+    except Exception as error:
+        said = failure("The page could not be made", error)
+        page = (
+            '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>Report</title>'
+            f"</head>\n<body><p>{escape(fallback)}</p>\n<p>{escape(said)}</p></body></html>\n"
+        )
+    with whole_file(path) as part:
+        part.write_text(page, encoding="utf-8")
+
+
+@cache
+def _template(name: str) -> Template:
+    environment = Environment(
+        loader=PackageLoader("accelstudy", ""),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters.update(
+        angle=lambda mgon: number(to_display(mgon * MGON, "rad").item()),
+        attitude=lambda gon: to_attitude(gon * GON).item(),
+        badge=lambda verdict: BADGES[verdict][0],
+        colour=lambda verdict: BADGES[verdict][1],
+        joined=joined,
+        number=number,
+        p=probability,
+        p_value=p_value,
+        words=words,
+    )
+    environment.globals.update(interval=interval)
+    return environment.get_template(name)
