@@ -1,7 +1,8 @@
-"""What a calibration costs grows like its number of positions, and not like its square."""
+"""What a calibration or a diagnosis costs grows like its positions, not like their square."""
 
 import tracemalloc
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -18,9 +19,18 @@ from accelstudy.adjustment.quality import (
     suspects,
     variance_components,
 )
+from accelstudy.approaches import get_approach
 from accelstudy.campaign.fit import fit_campaign
 from accelstudy.campaign.output import write_calibration
 from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign
+from accelstudy.diagnosis import chance, search
+from accelstudy.diagnosis.colour import LENGTHS, quadratic_forms, restricted_likelihoods
+from accelstudy.diagnosis.hypotheses import setting_of
+from accelstudy.diagnosis.location import groups
+from accelstudy.diagnosis.noise import axis_factors
+from accelstudy.diagnosis.pipeline import diagnose
+from accelstudy.diagnosis.repeats import clusters
+from accelstudy.effects import Hold, get_effect
 from accelstudy.simulation import Noise
 
 FEW, MANY = 400, 1600
@@ -34,7 +44,6 @@ def dense_projector(solution):
 
 def peak(function):
     """Largest memory in use while a function runs, MB."""
-    function()  # what is made once and kept is made here
     tracemalloc.start()
     function()
     size = tracemalloc.get_traced_memory()[1]
@@ -153,3 +162,133 @@ def test_a_page_of_many_positions_lists_those_that_fit_worst(tmp_path):
     # The points are one image within the figure.
     assert "<image" in (tmp_path / "figures" / "residuals.svg").read_text()
     assert len(page) < 500_000
+
+
+# --- the diagnosis -------------------------------------------------------------------------------
+
+
+def complement(columns):
+    """Orthonormal basis of all that is orthogonal to columns."""
+    return np.linalg.qr(columns, mode="complete")[0][:, columns.shape[1] :]
+
+
+@pytest.fixture(scope="module", params=["gravity", "robot"])
+def setting(request):
+    """A campaign with a repeated scheme, all columns and observed gravity."""
+    campaign, _ = simulate_campaign(
+        CampaignSettings(
+            seed=4,
+            scheme="fibonacci-15",
+            repeats=2,
+            approach=request.param,
+            temperature=(10.0, 40.0),
+            temperature_order="random",
+        )
+    )
+    fit = fit_campaign(replace(campaign, sigma_gravity=1e-3), NINE, get_approach(request.param))
+    return setting_of(solve(NINE, fit.approach, fit.observed, fit.adjustment))
+
+
+def test_residuals_are_those_of_a_basis_of_the_residual_space(setting):
+    residuals = setting.frame.residuals
+    n = complement(residuals.design)
+    np.testing.assert_allclose(residuals.z, n @ n.T @ residuals.errors, atol=1e-9)
+    assert residuals.redundancy == n.shape[1]
+    rows = np.random.default_rng(1).standard_normal((len(n), 4))
+    np.testing.assert_allclose(residuals.project(rows), n @ n.T @ rows, atol=1e-12)
+    errors = residuals.project(rows)
+    for shapes in setting.candidates.values():
+        for h, part in zip(shapes, shapes.parts(errors.T).T, strict=True):
+            np.testing.assert_allclose(h.basis.T @ h.basis, np.eye(h.dim), atol=1e-9)
+            np.testing.assert_allclose(residuals.absorbed.T @ h.basis, 0, atol=1e-9)
+            np.testing.assert_allclose(part, np.sum((h.basis.T @ errors) ** 2, axis=0), rtol=1e-7)
+
+
+def test_repeats_and_lack_of_fit_share_the_residual_space(setting):
+    """Against a basis of all differences between conditions of one attitude."""
+    residuals = setting.frame.residuals
+    n, c = residuals.whitening.shape[:2]
+    labels = clusters(setting.frame.forces)
+    assert len(np.unique(labels)) == n / 2
+    differences = []
+    for i in range(n):
+        for axis in range(c if labels[i] != i else 0):
+            change = np.zeros((n, c, 1))
+            change[i, axis], change[labels[i], axis] = 1, -1
+            differences.append(residuals.rows(change))
+    basis = np.linalg.qr(residuals.project(np.concatenate(differences, axis=1)))[0]
+    found = groups(setting)
+    errors = residuals.project(np.random.default_rng(1).standard_normal((len(residuals.z), 5))).T
+    repeated = np.sum((errors @ basis) ** 2, axis=1)
+    assert found["repeat"].dims[0] == basis.shape[1]
+    np.testing.assert_allclose(found["repeat"].parts(errors)[:, 0], repeated, rtol=1e-9)
+    assert found["lack_of_fit"].dims[0] == residuals.redundancy - basis.shape[1]
+    rest = np.sum(errors**2, axis=1) - repeated
+    np.testing.assert_allclose(found["lack_of_fit"].parts(errors)[:, 0], rest, rtol=1e-9)
+
+
+def test_coloured_noise_has_the_likelihood_of_whole_covariance_matrices(setting):
+    residuals = setting.frame.residuals
+    n, c = residuals.whitening.shape[:2]
+    basis, i = complement(residuals.design), np.arange(n)
+    z, r = basis.T @ residuals.z, residuals.redundancy
+    g = np.einsum("ncr,nca->anr", basis[: n * c].reshape(n, c, -1), residuals.force_noise)
+    v = np.random.default_rng(2).standard_normal((4, n, 3))
+    forms, logs = quadratic_forms(v), restricted_likelihoods(residuals, (0.25, 16.0))
+    for k, length in enumerate(LENGTHS):
+        lag = np.abs(i[:, None] - i)
+        kernel = np.exp(-lag / length) if length < np.inf else (np.minimum(i[:, None], i) + 1) / n
+        np.testing.assert_allclose(forms[:, k], np.einsum("bia,ij,bja->b", v, kernel, v))
+        for j, strength in enumerate((0.25, 16.0)):
+            covariance = np.eye(r) + strength * np.einsum("anr,nm,ams->rs", g, kernel, g)
+            square = z @ np.linalg.solve(covariance, z)
+            expected = -np.linalg.slogdet(covariance)[1] / 2 - r / 2 * np.log(square)
+            assert logs[k, j] == pytest.approx(expected, rel=1e-9)
+
+
+def test_factors_of_the_axes_are_those_of_whole_matrices(setting):
+    residuals = setting.frame.residuals
+    n, c = residuals.whitening.shape[:2]
+    basis = complement(residuals.design)
+    g = np.einsum("ncr,nca->arn", basis[: n * c].reshape(n, c, -1), residuals.force_noise)
+    left = np.array([[np.sum((a.T @ b) ** 2) for b in g] for a in g])
+    angles = np.sum(g**2, axis=(1, 2)) - left.sum(axis=1)
+    z = basis.T @ residuals.z
+    right = np.array([np.sum((z @ a) ** 2) for a in g]) - angles
+    expected = np.maximum(np.linalg.solve(left, right), 0)
+    np.testing.assert_allclose(axis_factors(residuals), expected, rtol=1e-6, atol=1e-9)
+
+
+def test_a_jump_among_many_holds_is_found_where_it_is():
+    """Not all times are searched at first; those next to the best one are looked at then."""
+    hold = Hold(time=60.0 * np.arange(1000))
+    effect = get_effect("bias_jump")
+    coarse = effect.candidates(hold, np.zeros((1000, 3)), 9.8)
+    assert len(coarse) <= 100
+    times = np.array([c.shape["t"] for c in coarse])
+    assert (times[0], times[-1]) == (90, 60 * 997.5)
+    assert np.all(np.diff(times) > 0)
+    between = [b.shape["t"] for b in coarse[40].between(coarse[41], hold)]
+    assert 1 <= len(between) <= 7
+    assert times[40] < min(between) <= max(between) < times[41]
+    campaign, _ = simulate_campaign(
+        CampaignSettings(seed=4, scheme="fibonacci-400", effects=("bias_jump(t=3570)",), size=0.3)
+    )
+    found = diagnose(campaign, NINE)
+    assert [named.spec for named in found.found] == ["bias_jump(t=3570)"]
+
+
+def test_memory_of_a_diagnosis_is_linear_in_the_positions(monkeypatch):
+    # What is drawn at once has a size of its own, whatever the positions.
+    monkeypatch.setattr(chance, "AT_ONCE", 10_000)
+    monkeypatch.setattr(chance, "KEPT", 0)
+    monkeypatch.setattr(search, "Chance", partial(chance.Chance, simulations=20))
+
+    def run(n):
+        campaign, _ = simulate_campaign(
+            CampaignSettings(seed=4, scheme=f"fibonacci-{n}", approach="robot")
+        )
+        return diagnose(campaign, NINE)
+
+    few, many = FEW // 2, MANY // 2
+    assert peak(lambda: run(many)) < 1.3 * many / few * peak(lambda: run(few))

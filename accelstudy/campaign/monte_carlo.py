@@ -15,6 +15,9 @@ from accelstudy.simulation import session
 from accelstudy.units import display_unit, to_display
 
 BLOCK = 500
+"""Sessions that are simulated at once."""
+AT_ONCE = 500_000
+"""Positions of all of them together, at most."""
 
 
 def check_sigmas(fit: CampaignFit, replicates: int = 2000, seed: int = 1) -> pd.DataFrame:
@@ -43,9 +46,11 @@ def check_sigmas(fit: CampaignFit, replicates: int = 2000, seed: int = 1) -> pd.
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     ideal = session(model, fit.parameters, directions, fit.gravity, fit.campaign.hold)
     estimates = []
-    for block, first in enumerate(track(range(0, replicates, BLOCK), "simulated campaigns")):
+    size = max(1, min(BLOCK, AT_ONCE // fit.campaign.n_positions))
+    blocks = range(0, replicates, size)
+    for block, first in enumerate(track(blocks, "simulated campaigns")):
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(block,)))
-        drawn = ideal.draw(noise, BLOCK, rng).first(replicates - first)
+        drawn = ideal.draw(noise, size, rng).first(replicates - first)
         result = calibrate(model, approach, replace(drawn, initial=fit.parameters))
         estimates.append(result.parameters[result.converged, : model.n_parameters])
     errors = np.concatenate(estimates) - fit.parameters

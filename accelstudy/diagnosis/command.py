@@ -35,7 +35,7 @@ from accelstudy.progress import say
     default=1000,
     show_default=True,
     type=click.IntRange(min=100),
-    help="Sessions simulated with the old and with the new model.",
+    help="Sessions simulated with either model; fewer beyond 500 positions.",
 )
 @force_option
 @angle_unit_option

@@ -15,7 +15,6 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
     """Describe a diagnosis; all numbers are in SI but those whose key names another unit."""
     d = diagnosis
     test = d.global_test
-    z = d.setting.frame.residuals.z
     return {
         "schema_version": 1,
         "campaign": d.campaign.name,
@@ -96,7 +95,7 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
             }
             for position in d.next_positions
         ],
-        "redundancy": len(z),
+        "redundancy": d.setting.frame.residuals.redundancy,
         "n_positions": d.campaign.n_positions,
         "warnings": list(d.campaign.warnings),
     }

@@ -85,10 +85,13 @@ def split_positions(
     features = np.column_stack(columns)
     scale = features.std(axis=0)
     features = (features - features.mean(axis=0)) / np.where(scale > 0, scale, 1.0)
-    orders = np.array([rng.permutation(n) for _ in range(SPLITS)])
-    # The means of the two parts differ in proportion to the sum over either.
-    imbalance = np.sum(features[orders[:, :count]].sum(axis=1) ** 2, axis=1)
-    best = orders[int(np.argmin(imbalance))]
+    best, least = np.arange(n), np.inf
+    for _ in range(SPLITS):
+        order = rng.permutation(n)
+        # The means of the two parts differ in proportion to the sum over either.
+        imbalance = float(np.sum(features[order[:count]].sum(axis=0) ** 2))
+        if imbalance < least:
+            best, least = order, imbalance
     return np.sort(best[count:]), np.sort(best[:count])
 
 
@@ -118,8 +121,8 @@ def held_out_gap(
     size = float(d @ d + slope @ base.cofactors @ slope)
     before, after = (p.white.reshape(len(held), -1) ** 2 / variance for p in (first, second))
     gain = np.mean(before - after, axis=1)
-    chosen = rng.integers(len(gain), size=(RESAMPLES, len(gain)))
-    low, high = np.quantile(gain[chosen].mean(axis=1), [0.025, 0.975])
+    resampled = [gain[rng.integers(len(gain), size=len(gain))].mean() for _ in range(RESAMPLES)]
+    low, high = np.quantile(resampled, [0.025, 0.975])
     spread = np.einsum("mu,uv,mv->", second.slope, extended.cofactors, second.slope)
     return HeldOutGap(
         before=float(before.mean()),

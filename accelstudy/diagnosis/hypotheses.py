@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.adjustment.quality import Solution
+from accelstudy.adjustment.quality import Solution, root_of
 from accelstudy.diagnosis.residuals import Residuals, ideal_residuals
 from accelstudy.diagnosis.signatures import signature
+from accelstudy.diagnosis.spaces import Bases
 from accelstudy.effects import Effect, Hold, effect_names, get_effect
 from accelstudy.errors import InputError
 from accelstudy.leveling import roll_pitch
@@ -19,6 +21,8 @@ Array = NDArray[np.float64]
 
 VISIBLE = 3e-3
 """An effect is invisible where the model absorbs all but this share of its signature."""
+ROUNDING = 1e-9
+"""Share of a signature that may be left of nothing by rounding."""
 ALIKE = 0.9999
 """Canonical cosine above which two signatures are the same."""
 
@@ -35,8 +39,8 @@ class Hypothesis:
     spec : str, name with settings; of an outlier the index of its position
     effect : Effect; None for what is no effect of the sensor or the rig
     directions : (k, l) array, combinations of the parameters that the positions show
-    basis : (r, l) array, orthonormal, of the space of its signature in the residuals
-    ideal : (r, l) array, likewise for an ideal sensor, where what is equal is exactly so
+    basis : (m, l) array, orthonormal, of the space of its signature in the residuals
+    ideal : (m, l) array, likewise for an ideal sensor, where what is equal is exactly so
     """
 
     name: str
@@ -71,6 +75,95 @@ class Hypothesis:
         assert self.effect is not None
         assert self.smooth is not None
         return self.effect.shape[self.smooth]
+
+
+@dataclass(frozen=True)
+class EffectShapes(Bases, Sequence[Hypothesis]):
+    """Shapes of one effect.
+
+    Attributes
+    ----------
+    hypotheses : tuple of Hypothesis, whose bases are columns of `together`
+    """
+
+    hypotheses: tuple[Hypothesis, ...]
+
+    @classmethod
+    def of(cls, hypotheses: Sequence[Hypothesis]) -> EffectShapes:
+        """Gather shapes."""
+        bases = Bases(
+            np.concatenate([h.basis for h in hypotheses], axis=1),
+            np.array([h.dim for h in hypotheses]),
+        )
+        parts = np.split(bases.together, bases.ends[1:-1], axis=1)
+        shared = (replace(h, basis=part) for h, part in zip(hypotheses, parts, strict=True))
+        return cls(bases.together, bases.dims, tuple(shared))
+
+    def __len__(self) -> int:
+        return len(self.hypotheses)
+
+    @overload
+    def __getitem__(self, index: int) -> Hypothesis: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Hypothesis, ...]: ...
+    def __getitem__(self, index: int | slice) -> Hypothesis | tuple[Hypothesis, ...]:
+        return self.hypotheses[index]
+
+
+@dataclass(frozen=True)
+class BumpedPositions(Sequence[Hypothesis]):
+    """One hypothesis per position: that its conditions are shifted by anything.
+
+    Its space is spanned by R E_i H_i, with E_i the columns of the unit matrix that belong to the
+    position and H_i H_iᵀ = R_ii⁺, so that z has H_iᵀ z_i in it.
+
+    Attributes
+    ----------
+    residuals : Residuals
+    places : (s,) int array, the positions that are controlled by others
+    root : (s, c, c) array, H of these; columns of zeros for what is not controlled
+    dims : (s,) int array
+    """
+
+    residuals: Residuals
+    places: NDArray[np.int_]
+    root: Array
+    dims: NDArray[np.int_]
+
+    @classmethod
+    def of(cls, residuals: Residuals) -> BumpedPositions:
+        """All positions that the others control."""
+        root, rank = root_of(residuals.blocks)
+        places = np.flatnonzero((rank > 0) & (rank < residuals.redundancy))
+        return cls(residuals, places, root[places], rank[places])
+
+    def parts(self, errors: Array) -> Array:
+        """Squares of what residuals (..., m) have in each of them, (..., s)."""
+        n, c = self.residuals.whitening.shape[:2]
+        blocks = errors[..., : n * c].reshape(*errors.shape[:-1], n, c)[..., self.places, :]
+        return np.sum(np.einsum("...sc,scd->...sd", blocks, self.root) ** 2, axis=-1)
+
+    def __len__(self) -> int:
+        return len(self.places)
+
+    @overload
+    def __getitem__(self, index: int) -> Hypothesis: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Hypothesis, ...]: ...
+    def __getitem__(self, index: int | slice) -> Hypothesis | tuple[Hypothesis, ...]:
+        if isinstance(index, slice):
+            return tuple(self[i] for i in range(*index.indices(len(self))))
+        place = int(self.places[index])
+        directions = self.root[index][:, np.any(self.root[index] != 0, axis=0)]
+        rows = np.zeros((len(self.residuals.design), directions.shape[1]))
+        c = len(directions)
+        rows[place * c : (place + 1) * c] = directions
+        basis = self.residuals.project(rows)
+        return Hypothesis(OUTLIER, f"{OUTLIER}({place})", None, directions, basis, basis)
+
+
+Shapes: TypeAlias = EffectShapes | BumpedPositions
+"""All shapes of one thing that may be missing: a sequence of hypotheses, and their spaces."""
 
 
 @dataclass(frozen=True)
@@ -121,17 +214,26 @@ class Frame:
         g = self.solution.gravity
         shown = signature(effect, self.forces, self.angles, g, self.hold)
         projected = self.ideal.project(self.ideal.whitened(shown))
-        directions = span(projected, self.ideal.size(shown, g))
+        directions, ideal = span(projected, self.ideal.size(shown, g), VISIBLE)
         if not directions.shape[1]:
             return None
         actual = signature(effect, self.sensed, self.angles, g, self.hold).reduced(directions)
+        columns = self.residuals.project(self.residuals.whitened(actual))
+        # A force that passes a knee at the ideal sensor may not do so along the real axes.
+        sizes = np.linalg.norm(projected @ directions, axis=0)
+        also, basis = span(columns, sizes, ROUNDING)
+        if also.shape[1] < directions.shape[1]:
+            if not also.shape[1]:
+                return None
+            directions = directions @ also
+            ideal = span(projected @ directions, None, ROUNDING)[1]
         return Hypothesis(
             name=effect.name,
             spec=effect.spec,
             effect=effect,
             directions=directions,
-            basis=orthonormal(self.residuals.project(self.residuals.whitened(actual))),
-            ideal=orthonormal(projected @ directions),
+            basis=basis,
+            ideal=ideal,
         )
 
 
@@ -142,24 +244,19 @@ class Setting:
     Attributes
     ----------
     frame : Frame
-    candidates : dict of name to hypotheses, one per shape
+    candidates : dict of name to shapes
     invisible : tuple of str, effects of rank 0
     untestable : dict of name to the reason why it cannot be tested
     """
 
     frame: Frame
-    candidates: Mapping[str, Sequence[Hypothesis]]
+    candidates: Mapping[str, Shapes]
     invisible: tuple[str, ...]
     untestable: Mapping[str, str]
 
     def hypothesis(self, effect: Effect) -> Hypothesis | None:
         """Return what an effect would leave in the residuals; None if nothing."""
         return self.frame.hypothesis(effect)
-
-    @property
-    def bases(self) -> dict[str, list[Array]]:
-        """Bases of all shapes of each candidate."""
-        return {name: [h.basis for h in shapes] for name, shapes in self.candidates.items()}
 
     def nearest(self, hypothesis: Hypothesis) -> tuple[tuple[str, float], ...]:
         """Other effects and their largest canonical cosines, nearest first."""
@@ -170,27 +267,26 @@ class Setting:
         }
         return tuple(sorted(near.items(), key=lambda item: -item[1]))
 
-    @property
-    def all(self) -> list[Hypothesis]:
-        """All shapes of all candidates."""
-        return [h for shapes in self.candidates.values() for h in shapes]
 
+def span(columns: Array, sizes: Array | None, tolerance: float) -> tuple[Array, Array]:
+    """What columns (m, k) span.
 
-def span(projected: Array, sizes: Array | None = None, tolerance: float = VISIBLE) -> Array:
-    """Directions (k, l) in which columns, relative to their sizes, span a space; l is its rank."""
-    norms = np.linalg.norm(projected, axis=0) if sizes is None else sizes
+    Parameters
+    ----------
+    columns : (m, k) array
+    sizes : (k,) array beside which the columns are seen; their own norms if None
+    tolerance : float, share of them below which a direction counts as nothing
+
+    Returns
+    -------
+    directions : (k, l) array, combinations of the columns; l is their rank
+    basis : (m, l) array, orthonormal, of their space
+    """
+    norms = np.linalg.norm(columns, axis=0) if sizes is None else sizes
     scale = np.where(norms > 0, norms, 1.0)
-    _, values, right = np.linalg.svd(projected / scale, full_matrices=False)
-    return (right[values > tolerance] / scale).T
-
-
-def orthonormal(columns: Array) -> Array:
-    """Orthonormal basis of independent columns."""
-    if not columns.shape[1]:
-        return columns
-    norms = np.linalg.norm(columns, axis=0)
-    left, _, _ = np.linalg.svd(columns / np.where(norms > 0, norms, 1.0), full_matrices=False)
-    return left
+    left, values, right = np.linalg.svd(columns / scale, full_matrices=False)
+    seen = values > tolerance
+    return (right[seen] / scale).T, left[:, seen]
 
 
 def cosines(a: Array, b: Array) -> Array:
@@ -216,7 +312,7 @@ def setting_of(solution: Solution, names: Iterable[str] | None = None) -> Settin
     frame = Frame.of(solution)
     residuals, hold, forces = frame.residuals, frame.hold, frame.forces
     known = {effect.name for effect in solution.model.effects}
-    candidates: dict[str, list[Hypothesis]] = {}
+    candidates: dict[str, Shapes] = {}
     invisible, untestable = [], {}
     for name in effect_names() if names is None else names:
         if name in known:
@@ -232,7 +328,7 @@ def setting_of(solution: Solution, names: Iterable[str] | None = None) -> Settin
         seen = [shape for shape in shapes if shape is not None]
         fitting = [shape for shape in seen if shape.dim < residuals.redundancy]
         if fitting:
-            candidates[name] = fitting
+            candidates[name] = EffectShapes.of(fitting)
         elif seen:
             untestable[name] = (
                 f"its {seen[0].dim} parameters need more than the {residuals.redundancy} redundant "
@@ -240,26 +336,15 @@ def setting_of(solution: Solution, names: Iterable[str] | None = None) -> Settin
             )
         else:
             invisible.append(name)
-    outliers = list(outlier_hypotheses(residuals))
-    if outliers:
-        candidates[OUTLIER] = outliers
+    bumped = BumpedPositions.of(residuals)
+    if len(bumped):
+        candidates[OUTLIER] = bumped
     return Setting(
         frame=frame,
         candidates=candidates,
         invisible=tuple(invisible),
         untestable=untestable,
     )
-
-
-def outlier_hypotheses(residuals: Residuals) -> Iterable[Hypothesis]:
-    """One hypothesis per position: that its conditions are shifted by anything."""
-    n, c = residuals.whitening.shape[:2]
-    for i in range(n):
-        projected = residuals.basis[i * c : (i + 1) * c].T
-        directions = span(projected, np.ones(c), 1e-3)
-        if 0 < directions.shape[1] < residuals.redundancy:
-            basis = orthonormal(projected @ directions)
-            yield Hypothesis(OUTLIER, f"{OUTLIER}({i})", None, directions, basis, basis)
 
 
 def same_space(a: Hypothesis, b: Hypothesis) -> bool:

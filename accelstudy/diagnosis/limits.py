@@ -60,7 +60,7 @@ class Visibility:
 
 
 def signature_columns(frame: Frame, hypothesis: Hypothesis) -> Array:
-    """Signature of each parameter of an effect in the residual space, (r, k)."""
+    """Signature of each parameter of an effect in the residual space, (m, k)."""
     assert hypothesis.effect is not None
     shown = signature(
         hypothesis.effect, frame.sensed, frame.angles, frame.solution.gravity, frame.hold

@@ -7,9 +7,12 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.diagnosis.hypotheses import Hypothesis, Setting, orthonormal, span
+from accelstudy.diagnosis.chance import Chance
+from accelstudy.diagnosis.hypotheses import Setting, span
 from accelstudy.diagnosis.repeats import clusters
+from accelstudy.diagnosis.residuals import Residuals
 from accelstudy.diagnosis.signatures import signature
+from accelstudy.diagnosis.spaces import ABSORBED, Bases, LackOfFit, Repeats, Spaces
 from accelstudy.effects import get_effect
 from accelstudy.errors import InputError
 
@@ -31,22 +34,24 @@ ROBOT = (
     "axis_nonperpendicularity",
 )
 PREVIOUS = ("hysteresis", "settling")
+LACK_OF_FIT = "lack_of_fit"
+"""Everything but the differences of repeated positions, which are noise alone (pure error)."""
 
 
-def groups(setting: Setting) -> dict[str, Array]:
-    """Orthonormal bases (r, l) of the groups that the campaign can show."""
+def groups(setting: Setting) -> dict[str, Spaces]:
+    """Groups that the campaign can show, each one space; beside repeats also the lack of fit."""
     residuals, hold, n = setting.frame.residuals, setting.frame.hold, len(setting.frame.forces)
-    found: dict[str, Array] = {}
+    found: dict[str, Spaces] = {}
 
     def add(name: str, change: Array) -> None:
         """Enter a group given by changes of the sensor's output, (n, 3, k)."""
-        add_rows(name, residuals.rows(residuals.jac_observations[..., :3] @ change))
+        add_rows(name, residuals.stacked(residuals.by_observations[..., :3] @ change))
 
     def add_rows(name: str, rows: Array) -> None:
         projected = residuals.project(rows)
-        directions = span(projected, np.linalg.norm(rows, axis=0), 1e-2)
-        if 0 < directions.shape[1] < residuals.redundancy:
-            found[name] = orthonormal(projected @ directions)
+        basis = span(projected, np.linalg.norm(rows, axis=0), ABSORBED)[1]
+        if 0 < basis.shape[1] < residuals.redundancy:
+            found[name] = Bases(basis, np.array([basis.shape[1]]))
 
     def per_axis(values: Array) -> Array:
         """Regressors (n, k), separate for each axis, as changes (n, 3, 3k)."""
@@ -83,39 +88,42 @@ def groups(setting: Setting) -> dict[str, Array]:
         scale = np.einsum("na,ab->nab", t[:, None] * setting.frame.forces, np.eye(3))
         add("temperature", np.concatenate([linear, scale], axis=2))
     labels = clusters(setting.frame.forces)
-    contrasts = [
-        (np.arange(n) == i).astype(float) - (labels == labels[i]) / np.sum(labels == labels[i])
-        for i in range(n)
-        if np.sum(labels == labels[i]) > 1
-    ]
-    if contrasts:
-        add("repeat", per_axis(np.column_stack(contrasts)))
+    if len(np.unique(labels)) < n:
+        same = LackOfFit.of(residuals, labels)
+        repeats = Repeats(same, residuals.redundancy)
+        if 0 < repeats.dims[0] < residuals.redundancy:
+            found |= {"repeat": repeats, LACK_OF_FIT: same}
     return found
 
 
 def locate(
-    found: Mapping[str, Array], outliers: list[Hypothesis], z: Array, null: Array, variance: float
+    found: Mapping[str, Spaces],
+    bumped: Spaces | None,
+    residuals: Residuals,
+    chance: Chance,
+    variance: float,
 ) -> dict[str, float]:
     """Share of the excess χ² in the space of each group, in [0, 1].
 
     Parameters
     ----------
     found : what `groups` returned
-    outliers : hypotheses of single positions
-    z : (r,) array
-    null : (B, r) array, residuals without any effect
+    bumped : hypotheses of single positions, if there are any
+    residuals : Residuals
+    chance : Chance, residuals without any effect
     variance : float, of unit weight, of the noise
     """
-    excess = float(z @ z) / variance - len(z)
+    z = residuals.z
+    names = [name for name in found if name != LACK_OF_FIT]
+    excess = float(z @ z) / variance - residuals.redundancy
     if excess <= 0:
-        return {name: 0.0 for name in (*found, "single_position")}
+        return {name: 0.0 for name in (*names, "single_position")}
 
     def share(part: float, expected: float) -> float:
         return float(np.clip((part / variance - expected) / excess, 0.0, 1.0))
 
-    shares = {name: share(float(np.sum((z @ q) ** 2)), q.shape[1]) for name, q in found.items()}
-    if outliers:
-        parts = [np.sum((z @ h.basis) ** 2) for h in outliers]
-        usual = np.max([np.sum((null @ h.basis) ** 2, axis=1) for h in outliers], axis=0)
-        shares["single_position"] = share(float(np.max(parts)), float(np.mean(usual)))
+    shares = {n: share(float(found[n].parts(z)[0]), float(found[n].dims[0])) for n in names}
+    if bumped is not None:
+        usual = chance.statistic(residuals, lambda errors: bumped.parts(errors).max(axis=-1))
+        shares["single_position"] = share(float(bumped.parts(z).max()), float(np.mean(usual)))
     return shares

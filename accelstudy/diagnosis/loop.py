@@ -31,6 +31,14 @@ Array = NDArray[np.float64]
 REPLICATES = 1000
 CASES = (("old", "base"), ("new", "base"), ("new", "extended"))
 """Simulations and the calibrations that are made of them."""
+COLUMNS = [
+    *("simulation", "calibration", "replicate"),
+    *("sigma0_squared", "tilt_error_rad", "converged"),
+]
+POSITIONS = 500_000
+"""Positions of all sessions of a simulation together, at most; they are drawn at once."""
+LEAST = 100
+"""Sessions of a simulation that are simulated all the same."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +103,7 @@ def close_loop(diagnosis: Diagnosis, replicates: int = REPLICATES, seed: int = 1
     Parameters
     ----------
     diagnosis : Diagnosis
-    replicates : int, sessions of each simulation
+    replicates : int, sessions of each simulation; `POSITIONS` limits them, but to `LEAST`
     seed : int
 
     Returns
@@ -107,7 +115,7 @@ def close_loop(diagnosis: Diagnosis, replicates: int = REPLICATES, seed: int = 1
     d = diagnosis
     if d.extended is d.model or d.gap.leveling is None:
         return None
-    fits = {"base": d.base, "extended": d.final.frame.solution}
+    fits, hold = {"base": d.base, "extended": d.final.frame.solution}, d.setting.frame.hold
     kept = np.flatnonzero(kept_positions(d))
     noise = Noise(
         sigma_force=d.sigma_position,
@@ -121,49 +129,56 @@ def close_loop(diagnosis: Diagnosis, replicates: int = REPLICATES, seed: int = 1
     }
     if not np.isfinite(list(measured.values())).all():
         return None
-    drawn = {}
-    for stream, (simulation, calibration) in enumerate((("old", "base"), ("new", "extended"))):
-        fit = fits[calibration]
-        p = fit.parameters[: fit.model.n_parameters]
-        f_b = fit.model.correct(d.campaign.forces, p, fit.gravity, d.setting.frame.hold)
+    n = d.campaign.n_positions
+    replicates = min(replicates, max(LEAST, POSITIONS // n))
+    tables = []
+    for stream, simulation in enumerate(("old", "new")):
+        simulated = fits["base" if simulation == "old" else "extended"]
+        p = simulated.parameters[: simulated.model.n_parameters]
+        f_b = simulated.model.correct(d.campaign.forces, p, simulated.gravity, hold)
         if np.isnan(f_b).any():
             return None
         directions = -f_b / np.linalg.norm(f_b, axis=1, keepdims=True)
-        ideal = session(fit.model, p, directions, fit.gravity, d.setting.frame.hold)
+        ideal = session(simulated.model, p, directions, simulated.gravity, hold)
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(stream,)))
-        drawn[simulation] = fit, p, ideal.draw(noise, replicates, rng).take(kept)
-
-    tables = []
-    for simulation, calibration in track(CASES, "old and new simulation"):
-        simulated, truth, observed = drawn[simulation]
-        estimated = fits[calibration]
-        result = _calibrated(estimated, observed)
-        errors = _tilt_errors(
-            simulated.model,
-            truth,
-            estimated.model,
-            result.parameters[result.converged, : estimated.model.n_parameters],
-            simulated.gravity,
-            d.setting.frame.hold,
-        )
-        if np.isnan(errors).any():
-            return None
-        tilt = np.full(replicates, np.nan)
-        tilt[result.converged] = errors
-        tables.append(
-            pd.DataFrame(
-                {
-                    "simulation": simulation,
-                    "calibration": calibration,
-                    "replicate": np.arange(replicates),
-                    "sigma0_squared": result.variance_posteriori,
-                    "tilt_error_rad": tilt,
-                    "converged": result.converged,
-                }
-            )
-        )
+        size = max(1, POSITIONS // n)
+        for first in track(range(0, replicates, size), f"{simulation} simulation"):
+            numbers = np.arange(first, min(first + size, replicates))
+            drawn = ideal.draw(noise, len(numbers), rng).take(kept)
+            for calibration in (c for s, c in CASES if s == simulation):
+                table = _session_table(simulated, fits[calibration], drawn, hold)
+                if table is None:
+                    return None
+                known = {"simulation": simulation, "calibration": calibration}
+                tables.append(table.assign(**known, replicate=numbers)[COLUMNS])
     loop = Loop(pd.concat(tables, ignore_index=True), measured)
     return loop if all(len(loop.case(*case)) for case in CASES) else None
+
+
+def _session_table(
+    simulated: Solution, estimated: Solution, observed: Observations, hold: Hold
+) -> pd.DataFrame | None:
+    """Calibrate simulated sessions; None if readings that were corrected so have no tilt."""
+    result = _calibrated(estimated, observed)
+    errors = _tilt_errors(
+        simulated.model,
+        simulated.parameters[: simulated.model.n_parameters],
+        estimated.model,
+        result.parameters[result.converged, : estimated.model.n_parameters],
+        simulated.gravity,
+        hold,
+    )
+    if np.isnan(errors).any():
+        return None
+    tilt = np.full(len(result.converged), np.nan)
+    tilt[result.converged] = errors
+    return pd.DataFrame(
+        {
+            "sigma0_squared": result.variance_posteriori,
+            "tilt_error_rad": tilt,
+            "converged": result.converged,
+        }
+    )
 
 
 def _calibrated(fit: Solution, observed: Observations) -> Adjustment:

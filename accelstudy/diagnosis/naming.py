@@ -15,31 +15,34 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from accelstudy.diagnosis.colour import restricted_likelihoods
 from accelstudy.diagnosis.hypotheses import Hypothesis
-from accelstudy.diagnosis.noise import colour_kernels
 from accelstudy.diagnosis.residuals import Residuals
-from accelstudy.diagnosis.screening import share
+from accelstudy.diagnosis.screening import shares
+from accelstudy.diagnosis.spaces import Spaces
 
 Array = NDArray[np.float64]
 
 UNKNOWN = "unknown"
 COLOUR = "coloured_noise"
 LEVEL = "noise_level"
+STRENGTHS = (0.25, 1.0, 4.0, 16.0, 64.0)
+"""Variances of coloured noise beside that of white noise for which the evidence is averaged."""
 
 
-def log_evidence(r_squared: Array | float, dim: int, redundancy: int) -> Array:
+def log_evidence(r_squared: ArrayLike, dim: ArrayLike, redundancy: int) -> Array:
     """Log evidence against white noise, at the most likely g."""
-    t = np.minimum(np.asarray(r_squared, dtype=float), 1 - 1e-12)
+    t, dim = np.minimum(np.asarray(r_squared, dtype=float), 1 - 1e-12), np.asarray(dim)
     f = (t / dim) / ((1 - t) / (redundancy - dim))
     g = np.maximum(f - 1, 0.0)
     return (redundancy - dim) / 2 * np.log1p(g) - redundancy / 2 * np.log1p(g * (1 - t))
 
 
-def shapes_evidence(shapes: Sequence[Array], z: Array) -> Array:
-    """Log evidence of each shape (basis)."""
-    return np.array([float(log_evidence(share(q, z), q.shape[1], len(z))) for q in shapes])
+def shapes_evidence(shapes: Spaces, residuals: Residuals) -> Array:
+    """Log evidence of each shape."""
+    return log_evidence(shares(shapes, residuals.z), shapes.dims, residuals.redundancy)
 
 
 def mean_evidence(logs: Array, weights: Array | None = None) -> float:
@@ -57,22 +60,9 @@ def widths(shapes: Sequence[Hypothesis]) -> Array | None:
 
 def colour_evidence(residuals: Residuals) -> float:
     """Log evidence of coloured noise, mean over correlation lengths and strengths."""
-    n, c = residuals.whitening.shape[:2]
-    basis = residuals.basis[: n * c].reshape(n, c, -1)
-    g = np.einsum("ncr,nca->anr", basis, residuals.force_noise)
     z, r = residuals.z, residuals.redundancy
-    logs = []
-    for kernel in colour_kernels(n):
-        covariance = np.einsum("anr,nm,ams->rs", g, kernel, g, optimize=True)
-        values, vectors = np.linalg.eigh(covariance)
-        values = np.maximum(values, 0.0)
-        square = (vectors.T @ z) ** 2
-        for strength in (0.25, 1.0, 4.0, 16.0, 64.0):
-            scale = 1 + strength * values
-            logs.append(
-                -0.5 * np.sum(np.log(scale)) - r / 2 * np.log(np.sum(square / scale) / square.sum())
-            )
-    return mean_evidence(np.array(logs))
+    logs = restricted_likelihoods(residuals, STRENGTHS) + r / 2 * np.log(z @ z)
+    return mean_evidence(logs.ravel())
 
 
 def posterior(
@@ -89,7 +79,7 @@ def posterior(
 
 
 def known_level_evidence(
-    candidates: Mapping[str, Sequence[Array]], z: Array
+    candidates: Mapping[str, Spaces], residuals: Residuals
 ) -> tuple[float, float, str]:
     """Compare a wrong noise level with effects in noise of the given level.
 
@@ -99,16 +89,14 @@ def known_level_evidence(
     logarithm of the redundancy for having been chosen), log evidence of the effects together, and
     the name of the strongest; relative to that sigma is right and nothing is missing.
     """
-    r, omega = len(z), float(z @ z)
+    z, r = residuals.z, residuals.redundancy
+    omega = float(z @ z)
     level = -r / 2 * np.log(omega / r) - r / 2 + omega / 2 - np.log(r) / 2
     evidence = {}
     for name, shapes in candidates.items():
-        logs = []
-        for q in shapes:
-            part, dim = float(np.sum((z @ q) ** 2)), q.shape[1]
-            g = max(part / dim - 1, 0.0)
-            logs.append(g / (1 + g) * part / 2 - dim / 2 * np.log1p(g))
-        evidence[name] = mean_evidence(np.array(logs))
+        parts, dims = shapes.parts(z), shapes.dims
+        g = np.maximum(parts / dims - 1, 0.0)
+        evidence[name] = mean_evidence(g / (1 + g) * parts / 2 - dims / 2 * np.log1p(g))
     best = max(evidence, key=lambda name: evidence[name])
     # A wrong sigma is as probable beforehand as all effects together.
     return float(level), mean_evidence(np.array(list(evidence.values()))), best

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from scipy import special
 
 from accelstudy.adjustment.quality import global_test
+from accelstudy.diagnosis.chance import Chance
+from accelstudy.diagnosis.colour import quadratic_forms
 from accelstudy.diagnosis.repeats import clusters
 from accelstudy.diagnosis.residuals import Residuals
 
@@ -51,12 +53,12 @@ def force_residuals(residuals: Residuals, errors: Array) -> Array:
     return np.asarray(np.einsum("...nc,nca->...na", blocks, residuals.force_noise))
 
 
-def level_test(z: Array, variance: float = 1.0) -> NoiseTest:
+def level_test(residuals: Residuals) -> NoiseTest:
     """Whether the residuals are as large as sigma says, two-sided (the global test)."""
-    omega, r = float(z @ z) / variance, len(z)
-    test = global_test(omega, r)
+    factor = residuals.variance
+    omega = factor * residuals.redundancy
+    test = global_test(omega, residuals.redundancy)
     assert test is not None
-    factor = omega / r
     size = "larger" if factor > 1 else "smaller"
     return NoiseTest(
         "noise_level",
@@ -67,19 +69,18 @@ def level_test(z: Array, variance: float = 1.0) -> NoiseTest:
     )
 
 
-def axis_test(residuals: Residuals, null: Array) -> NoiseTest:
+def axis_test(residuals: Residuals, chance: Chance) -> NoiseTest:
     """Whether one axis is noisier than the others."""
-    e, chance = residuals.basis @ residuals.z, null @ residuals.basis.T
 
     def shares(errors: Array) -> Array:
         v = force_residuals(residuals, errors)
         squares = np.sum(v**2, axis=-2)
         return np.asarray(squares / np.sum(squares, axis=-1, keepdims=True))
 
-    usual = shares(chance)
-    scale = usual.std(axis=0)
-    statistic = float(np.max(np.abs(shares(e) - usual.mean(axis=0)) / scale))
-    p = _upper(np.max(np.abs(usual - usual.mean(axis=0)) / scale, axis=-1), statistic)
+    usual = chance.statistic(residuals, shares)
+    mean, scale = usual.mean(axis=0), usual.std(axis=0)
+    statistic = float(np.max(np.abs(shares(residuals.z) - mean) / scale))
+    p = _upper(np.max(np.abs(usual - mean) / scale, axis=-1), statistic)
     factors = axis_factors(residuals)
     return NoiseTest(
         "axis_noise",
@@ -93,36 +94,32 @@ def axis_test(residuals: Residuals, null: Array) -> NoiseTest:
 def axis_factors(residuals: Residuals) -> Array:
     """Variance factors of the three axes (MINQUE with equal a-priori weights), (3,), at least 0.
 
-    The noise of the axes has the covariance Σ κ_a G_a G_aᵀ in z, and what is left to I is that of
-    the robot's angles.
+    The noise of the axes has the covariance Σ κ_a G_a G_aᵀ in z, G_a = R F_a, and what is left to I
+    is that of the robot's angles. With t_ia = U_iᵀ f_ia, of position i, G_aᵀ G_b has the elements
+    δ_ij f_iaᵀ f_ib − t_iaᵀ t_jb, of which only sums of squares are needed.
     """
     n, c = residuals.whitening.shape[:2]
-    basis = residuals.basis[: n * c].reshape(n, c, -1)
-    # G_a, (r, n): columns Nᵀ L⁻¹ B σ of one axis.
-    g = [np.einsum("ncr,nc->rn", basis, residuals.force_noise[..., a]) for a in range(3)]
-    left = np.array([[np.sum((a.T @ b) ** 2) for b in g] for a in g])
-    angles = np.array([np.sum(part**2) for part in g]) - left.sum(axis=1)
-    right = np.array([np.sum((residuals.z @ part) ** 2) for part in g]) - angles
+    f = residuals.force_noise
+    t = np.einsum("ncu,nca->nau", residuals.absorbed[: n * c].reshape(n, c, -1), f)
+    own, taken = np.einsum("nca,ncb->nab", f, f), np.einsum("nau,nbu->nab", t, t)
+    normal = np.einsum("nau,nav->auv", t, t)
+    left = np.sum(own**2 - 2 * own * taken, axis=0) + np.einsum("auv,buv->ab", normal, normal)
+    angles = np.einsum("naa->a", own - taken) - left.sum(axis=1)
+    right = np.sum(force_residuals(residuals, residuals.z) ** 2, axis=0) - angles
     return np.maximum(np.linalg.lstsq(left, right, rcond=1e-9)[0], 0.0)
 
 
-def colour_test(residuals: Residuals, null: Array) -> NoiseTest:
+def colour_test(residuals: Residuals, chance: Chance) -> NoiseTest:
     """Whether the residuals of holds close in time are alike."""
-    e, chance = residuals.basis @ residuals.z, null @ residuals.basis.T
-    n = len(residuals.whitening)
-    kernels = colour_kernels(n)
 
     def statistics(errors: Array) -> Array:
-        v = force_residuals(residuals, errors)
         total = np.sum(errors**2, axis=-1)
-        return np.stack(
-            [np.einsum("...ia,ij,...ja->...", v, k, v, optimize=True) / total for k in kernels], -1
-        )
+        return quadratic_forms(force_residuals(residuals, errors)) / total[..., None]
 
-    usual = statistics(chance)
+    usual = chance.statistic(residuals, statistics)
     mean, scale = usual.mean(axis=0), usual.std(axis=0)
-    statistic = float(np.max((statistics(e) - mean) / scale))
-    v = force_residuals(residuals, e)
+    statistic = float(np.max((statistics(residuals.z) - mean) / scale))
+    v = force_residuals(residuals, residuals.z)
     successive = float(np.sum(v[1:] * v[:-1]) / np.sum(v**2))
     return NoiseTest(
         "coloured_noise",
@@ -133,29 +130,20 @@ def colour_test(residuals: Residuals, null: Array) -> NoiseTest:
     )
 
 
-def colour_kernels(n: int) -> list[Array]:
-    """Correlations of n holds: Gauss–Markov over 1, 3 and 8 holds, and a random walk."""
-    i = np.arange(n)
-    lag = np.abs(i[:, None] - i)
-    walk = np.minimum(i[:, None], i) + 1.0
-    return [*(np.exp(-lag / length) for length in (1.0, 3.0, 8.0)), walk / n]
-
-
-def tail_test(residuals: Residuals, null: Array) -> NoiseTest:
+def tail_test(residuals: Residuals, chance: Chance) -> NoiseTest:
     """Whether large residuals are more frequent than a normal distribution has them."""
-    e, chance = residuals.basis @ residuals.z, null @ residuals.basis.T
-    scale = np.sqrt(np.sum(residuals.basis**2, axis=1))
+    scale = np.sqrt(np.maximum(1 - np.sum(residuals.absorbed**2, axis=1), 0.0))
     controlled = scale > 0.05
 
     def kurtosis(errors: Array) -> Array:
-        s = errors[..., controlled] / scale[controlled]
-        return np.asarray(np.mean(s**4, axis=-1) / np.mean(s**2, axis=-1) ** 2)
+        squares = (errors[..., controlled] / scale[controlled]) ** 2
+        return np.asarray(np.mean(squares**2, axis=-1) / np.mean(squares, axis=-1) ** 2)
 
-    value = float(kurtosis(e))
+    value = float(kurtosis(residuals.z))
     return NoiseTest(
         "heavy_tails",
         value,
-        _upper(kurtosis(chance), value),
+        _upper(chance.statistic(residuals, kurtosis), value),
         (value,),
         f"kurtosis of the residuals {value:.1f}",
     )
@@ -180,8 +168,7 @@ def resolution_test(forces: Array, sigma: float) -> NoiseTest:
     least = 2 * special.gammaincinv((n - 1) / 2, GRID) / n if n > 1 else 0.0
     usual = np.exp(-((2 * np.pi * sigma * frequencies) ** 2) * least)
     for column in forces.T if lowest < 1 else ():
-        blocks = np.array_split(frequencies, max(1, steps // 4096))
-        power = np.concatenate([_rayleigh(column, block) for block in blocks])
+        power = _rayleigh_of_grid(column, frequencies)
         power = np.where(power > np.maximum(usual, 0.5), power, 0.0)
         k = int(np.argmax(power))
         if power[k] > best:
@@ -196,6 +183,17 @@ def _rayleigh(values: Array, frequencies: Array) -> Array:
     return np.asarray(np.abs(np.exp(2j * np.pi * np.outer(frequencies, values)).mean(axis=1)) ** 2)
 
 
+def _rayleigh_of_grid(values: Array, frequencies: Array) -> Array:
+    """Likewise at equally spaced frequencies: phases of a coarse grid times those of a fine one."""
+    width = int(np.ceil(np.sqrt(len(frequencies))))
+    fine = frequencies[:width] - frequencies[0]
+    total = np.zeros((len(frequencies[::width]), width), dtype=complex)
+    for part in np.array_split(values, len(values) // 4096 + 1):
+        coarse = np.exp(2j * np.pi * np.outer(frequencies[::width], part))
+        total += coarse @ np.exp(2j * np.pi * np.outer(part, fine))
+    return np.asarray(np.abs(total.ravel()[: len(frequencies)] / len(values)) ** 2)
+
+
 def _step(values: Array, around: Array) -> float:
     """Largest step of which values are multiples, given frequencies around a peak of the power.
 
@@ -208,21 +206,23 @@ def _step(values: Array, around: Array) -> float:
     return float(divisors[power > 0.99 * power[0]].max() / peak)
 
 
-def within_hold_test(z: Array, unit: float, sd: Array, n_samples: NDArray[np.int_]) -> NoiseTest:
+def within_hold_test(
+    residuals: Residuals, unit: float, sd: Array, n_samples: NDArray[np.int_]
+) -> NoiseTest:
     """Whether the means scatter more than white noise within the holds explains.
 
     Holds of one sample do not show their noise, nor do samples that are all the same.
 
     Parameters
     ----------
-    z : (r,) array of unit weight
+    residuals : Residuals
     unit : float, m/s², σ of unit weight
     sd : (n, 3) array, m/s², of the samples within the holds
     n_samples : (n,) int array
     """
     several = n_samples > 1
     sd, n_samples = sd[several], n_samples[several]
-    scatter = float(z @ z) / len(z) * unit**2
+    scatter = residuals.variance * unit**2
     if not sd.any():
         remark = "the holds say nothing of the noise within them"
         return NoiseTest("coloured_noise", 0.0, 1.0, (0.0,), remark)
@@ -232,7 +232,7 @@ def within_hold_test(z: Array, unit: float, sd: Array, n_samples: NDArray[np.int
     return NoiseTest(
         "coloured_noise",
         ratio,
-        float(special.fdtrc(len(z), freedom, ratio)),
+        float(special.fdtrc(residuals.redundancy, freedom, ratio)),
         (float(np.sqrt(white)),),
         f"white noise within the holds explains {1e3 * np.sqrt(white):.2f} of "
         f"{1e3 * np.sqrt(scatter):.2f} mm/s² of a position mean",

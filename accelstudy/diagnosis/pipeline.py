@@ -17,17 +17,17 @@ from accelstudy.campaign.fit import fit_campaign, least_sigma
 from accelstudy.campaign.format import Campaign
 from accelstudy.diagnosis import gap as gaps
 from accelstudy.diagnosis import noise as noises
+from accelstudy.diagnosis.chance import SIMULATIONS
 from accelstudy.diagnosis.changes import Change, parameter_changes
 from accelstudy.diagnosis.hypotheses import OUTLIER, Setting
 from accelstudy.diagnosis.limits import UpperLimit, upper_limits
-from accelstudy.diagnosis.location import locate
+from accelstudy.diagnosis.location import LACK_OF_FIT, locate
 from accelstudy.diagnosis.naming import COLOUR, LEVEL, known_level_evidence
 from accelstudy.diagnosis.next_positions import NextPosition, next_positions
 from accelstudy.diagnosis.noise import NoiseTest
 from accelstudy.diagnosis.residuals import Residuals
-from accelstudy.diagnosis.screening import SIMULATIONS, Screening, share
+from accelstudy.diagnosis.screening import Screening
 from accelstudy.diagnosis.search import (
-    LACK_OF_FIT,
     LEVEL_EFFECTS,
     SURE,
     Choice,
@@ -194,9 +194,9 @@ class _Run:
     seed: int
     recognised: Recognised | None
 
-    def rng(self, stage: int) -> np.random.Generator:
-        """Random numbers of a stage, which no other stage changes."""
-        return np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(stage,)))
+    def stage(self, number: int) -> np.random.SeedSequence:
+        """Seed of a stage, which no other stage changes."""
+        return np.random.SeedSequence(self.seed, spawn_key=(number,))
 
     @property
     def sigma_known(self) -> bool:
@@ -224,7 +224,7 @@ class _Run:
 
     @cached_property
     def search(self) -> Search:
-        return Search(self.first, self.rng(0))
+        return Search(self.first, self.stage(0))
 
     # --- the decision ---------------------------------------------------------------------------
 
@@ -291,37 +291,36 @@ class _Run:
     def noise_tests(self, setting: Setting) -> tuple[NoiseTest, ...]:
         """All tests of the noise that the campaign allows, on the residuals of a fit."""
         residuals, campaign = setting.frame.residuals, self.campaign
-        z = residuals.z
-        null = self.search.null[:, : len(z)]
+        chance = self.search.chance
         sigma = float(np.mean(residuals.sigmas[:, :3]))
         tests = []
         if self.sigma_known:
             tests.append(self.level(setting))
         base = setting is self.search.setting
-        axes = self.search.axes if base else noises.axis_test(residuals, null)
+        axes = self.search.axes if base else noises.axis_test(residuals, chance)
         tests += [
             axes,
-            noises.colour_test(residuals, null),
-            noises.tail_test(residuals, null),
+            noises.colour_test(residuals, chance),
+            noises.tail_test(residuals, chance),
             self.resolution,
         ]
         if campaign.sd is not None and campaign.n_samples is not None:
-            tests.append(noises.within_hold_test(z, sigma, campaign.sd, campaign.n_samples))
+            tests.append(noises.within_hold_test(residuals, sigma, campaign.sd, campaign.n_samples))
         return tuple(tests)
 
     def level(self, setting: Setting) -> NoiseTest:
         """Test the level of the noise; of the base fit as the calibration does, by its own Ω."""
         if setting is self.search.setting:
-            return noises.level_test(Residuals.of(self.first).z)
-        return noises.level_test(setting.frame.residuals.z)
+            return noises.level_test(Residuals.of(self.first))
+        return noises.level_test(setting.frame.residuals)
 
     @cached_property
     def resolution(self) -> NoiseTest:
         """Whether the readings are coarse, beside the noise of the base fit."""
-        z = self.search.z
-        sigma = float(np.mean(self.search.setting.frame.residuals.sigmas[:, :3]))
+        residuals = self.search.residuals
+        sigma = float(np.mean(residuals.sigmas[:, :3]))
         # A sigma far too large would take the attitudes for steps.
-        noise = sigma * min(1.0, float(np.sqrt(np.mean(z**2))))
+        noise = sigma * min(1.0, float(np.sqrt(residuals.variance)))
         return noises.resolution_test(self.campaign.forces, noise)
 
     def worst_noise(self, tests: Sequence[NoiseTest]) -> NoiseTest | None:
@@ -351,7 +350,7 @@ class _Run:
         if worst.name != LEVEL or worst.estimate[0] < 1:
             return Finding("noise_model", setting, worst.remark)
         # Larger residuals may be an effect that the sigma-free tests could not see.
-        level, best, name = known_level_evidence(setting.bases, self.search.z)
+        level, best, name = known_level_evidence(setting.candidates, self.search.residuals)
         probability = 1 / (1 + np.exp(best - level))
         if probability >= SURE:
             return Finding("noise_model", setting, worst.remark)
@@ -362,11 +361,9 @@ class _Run:
 
     def unit_variance(self, final: Setting) -> float:
         """Variance of unit weight: 1 if sigma is known and not refuted, else a posteriori."""
-        z = final.frame.residuals.z
-        posteriori = float(z @ z) / len(z)
         if self.sigma_known and self.level(final).p_value >= REFUTED:
             return 1.0
-        return posteriori
+        return final.frame.residuals.variance
 
     def sigma_source(self, final: Setting) -> str:
         """Where the noise level comes from."""
@@ -390,15 +387,16 @@ class _Run:
         That is the noise after what was found or, if something unknown is missing, the least that
         any group of regressors leaves.
         """
-        z, groups = self.search.z, self.search.groups
+        residuals, groups = self.search.residuals, self.search.groups
         if self.sigma_known:
             variance = 1.0
         elif finding.verdict == "unknown":
-            total, r = float(z @ z), len(z)
-            left = [(1 - float(share(q, z))) / (r - q.shape[1]) for q in groups.values()]
-            variance = min([variance, *(total * part for part in left)])
-        outliers = list(self.search.setting.candidates.get(OUTLIER, ()))
-        return locate(groups, outliers, z, self.search.null, variance)
+            z, r = residuals.z, residuals.redundancy
+            spaces = [space for name, space in groups.items() if name != LACK_OF_FIT]
+            left = [float((z @ z - q.parts(z)[0]) / (r - q.dims[0])) for q in spaces]
+            variance = min([variance, *left])
+        bumped = self.search.setting.candidates.get(OUTLIER)
+        return locate(groups, bumped, residuals, self.search.chance, variance)
 
     def described(self, finding: Finding, tests: Sequence[NoiseTest]) -> tuple[Named, ...]:
         """Describe what was found."""
@@ -500,12 +498,14 @@ class _Run:
                 f"least 3 are to be predicted, {needed + 3} in all; there are {n}"
             )
         frame, observed = self.search.setting.frame, self.first.observed
-        fitted, held = gaps.split_positions(frame.forces, frame.hold, count, self.rng(1))
+        fitted, held = gaps.split_positions(
+            frame.forces, frame.hold, count, np.random.default_rng(self.stage(1))
+        )
         try:
             base = solve(self.model, self.approach, observed.take(fitted))
         except (InputError, np.linalg.LinAlgError):
             return None, "the fitted positions do not determine the model"
-        part = Search(base, self.rng(3))
+        part = Search(base, self.stage(3))
         alternatives = []
         for choice in chosen:
             shown = tuple(m for m in choice.members if m in part.setting.candidates)
@@ -515,7 +515,14 @@ class _Run:
         refit = part.extend_best(alternatives)
         if refit is None:
             return None, "the fit to the fitted positions alone has no solution"
-        gap = gaps.held_out_gap(base, refit[1], observed.take(held), held, variance, self.rng(2))
+        gap = gaps.held_out_gap(
+            base,
+            refit[1],
+            observed.take(held),
+            held,
+            variance,
+            np.random.default_rng(self.stage(2)),
+        )
         if not part.chooses([choice.members for choice in chosen]):
             return gap, "the fitted positions alone would have chosen another effect"
         return gap, ""

@@ -1,10 +1,11 @@
 """The residuals of a calibration as a space in which hypotheses are compared.
 
-The misclosures of unit weight of an adjustment are e = R ε with R = I − Ã (ÃᵀÃ)⁻¹ Ãᵀ. With an
-orthonormal basis N of the null space of Ãᵀ they are r independent numbers z = Nᵀ e of one variance,
-whatever the parameters are. An effect that is missing from the model adds Nᵀ D p to them, D the
-derivatives of the conditions by its parameters p. All tests of the diagnosis work in this space, so
-they take into account what the parameters of the model have already absorbed.
+The misclosures of unit weight of an adjustment are z = R ε with R = I − Ã (ÃᵀÃ)⁻¹ Ãᵀ = I − U Uᵀ,
+U an orthonormal basis of the columns of Ã. They are m numbers in a space of r dimensions, in which
+they have one variance in all directions, whatever the parameters are. An effect that is missing
+from the model adds R D p to them, D the derivatives of the conditions by its parameters p. All
+tests of the diagnosis work in this space, so they take into account what the parameters of the
+model have already absorbed.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.calibration import CalibrationProblem
-from accelstudy.adjustment.quality import Solution, whitening_of
+from accelstudy.adjustment.quality import Solution, column_basis, diagonal_blocks, whitening_of
 from accelstudy.diagnosis.signatures import Signature
 from accelstudy.leveling import roll_pitch, specific_force
 
@@ -54,35 +55,48 @@ class Residuals:
         )
 
     @cached_property
-    def basis(self) -> Array:
-        """N, (m, r)."""
-        scaled = self.design / np.linalg.norm(self.design, axis=0)
-        u = scaled.shape[1]
-        return np.linalg.qr(scaled, mode="complete")[0][:, u:]
+    def absorbed(self) -> Array:
+        """U, (m, u)."""
+        return column_basis(self.design)
 
     @cached_property
     def z(self) -> Array:
-        """Residuals as independent numbers of one variance, (r,)."""
-        return np.asarray(self.basis.T @ self.errors)
+        """Residuals of unit weight, (m,)."""
+        return self.project(self.errors)
 
     @property
     def redundancy(self) -> int:
         """R."""
-        return self.basis.shape[1]
+        m, u = self.design.shape
+        return m - u
+
+    @property
+    def variance(self) -> float:
+        """Variance of unit weight a posteriori."""
+        return float(self.z @ self.z) / self.redundancy
+
+    @cached_property
+    def blocks(self) -> Array:
+        """R of each position, (n, c, c)."""
+        return diagonal_blocks(self.absorbed, *self.whitening.shape[:2])
 
     @cached_property
     def force_noise(self) -> Array:
         """L⁻¹ B for the forces in units of their sigmas, (n, c, 3)."""
-        forces = self.jac_observations[..., :3] * self.sigmas[:, None, :3]
-        return np.asarray(np.linalg.solve(self.whitening, forces))
+        return np.asarray(self.by_observations[..., :3] * self.sigmas[:, None, :3])
+
+    @cached_property
+    def by_observations(self) -> Array:
+        """L⁻¹ B, (n, c, o): derivatives of the conditions of unit weight by the observations."""
+        return np.asarray(np.linalg.solve(self.whitening, self.jac_observations))
 
     def whitened(self, signature: Signature) -> Array:
         """Derivatives of the conditions of unit weight by the parameters of an effect, (m, k)."""
-        b = self.jac_observations
+        b = self.by_observations
         change = b[..., :3] @ signature.force
-        if b.shape[-1] > 3:
-            change = change + b[..., 3:] @ signature.angles
-        return self.rows(change)
+        if b.shape[-1] > 3 and signature.angles.any():
+            change += b[..., 3:] @ signature.angles
+        return self.stacked(change)
 
     def size(self, signature: Signature, g: float) -> Array:
         """Size of a signature in the observations, of which the approach may see little, (k,).
@@ -95,13 +109,17 @@ class Residuals:
 
     def rows(self, change: Array) -> Array:
         """Scale changes of the conditions, (n, c, k), to unit weight, (m, k)."""
-        white = np.linalg.solve(self.whitening, change).reshape(-1, change.shape[-1])
+        return self.stacked(np.asarray(np.linalg.solve(self.whitening, change), dtype=float))
+
+    def stacked(self, change: Array) -> Array:
+        """Stack changes of unit weight, (n, c, k), with none of observed gravity, (m, k)."""
+        white = change.reshape(-1, change.shape[-1])
         prior = len(self.design) - len(white)
         return np.concatenate([white, np.zeros((prior, white.shape[1]))])
 
     def project(self, rows: Array) -> Array:
-        """Nᵀ rows: what the parameters of the model do not absorb, (r, k)."""
-        return np.asarray(self.basis.T @ rows)
+        """R rows: what the parameters of the model do not absorb of rows (m, k), likewise."""
+        return np.asarray(rows - self.absorbed @ (self.absorbed.T @ rows))
 
 
 def ideal_residuals(solution: Solution) -> tuple[Residuals, Array]:

@@ -9,18 +9,17 @@ shapes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
-from accelstudy.progress import track
+from accelstudy.diagnosis.spaces import Spaces
 
 Array = NDArray[np.float64]
 
-SIMULATIONS = 1000
 LEVEL = 0.05
 
 
@@ -52,39 +51,43 @@ class Screening:
         return min(self.p_family, key=lambda name: self.p_family[name], default="")
 
 
-def share(basis: Array, z: Array) -> Array:
-    """Share of residuals (..., r) in the space of a basis (r, l)."""
-    total = np.einsum("...r,...r->...", z, z)
-    part = np.sum((z @ basis) ** 2, axis=-1)
-    return np.minimum(part / np.where(total > 0, total, 1.0), 1.0)
+def shares(spaces: Spaces, z: Array) -> Array:
+    """Shares (..., s) of residuals (..., m) in some spaces."""
+    total = np.einsum("...m,...m->...", z, z)[..., None]
+    return np.minimum(spaces.parts(z) / np.where(total > 0, total, 1.0), 1.0)
 
 
-def p_of_share(t: Array, dim: int, redundancy: int) -> Array:
+def p_of_share(t: Array, dim: ArrayLike, redundancy: int) -> Array:
     """Probability of a larger share by chance."""
+    dim = np.asarray(dim)
     return np.asarray(special.betaincc(dim / 2, (redundancy - dim) / 2, t))
 
 
-def screen(candidates: Mapping[str, Sequence[Array]], z: Array, null: Array) -> Screening:
+def screen(
+    candidates: Mapping[str, Spaces], z: Array, redundancy: int, null: Iterable[Array]
+) -> Screening:
     """Test all shapes of all candidates.
 
     Parameters
     ----------
-    candidates : mapping of name to orthonormal bases (r, l), one per shape
-    z : (r,) array
-    null : (B, r) array, residuals without any effect
+    candidates : mapping of name to the spaces of its shapes
+    z : (m,) array
+    redundancy : int, r
+    null : arrays (b, m) of residuals without any effect
     """
-    r = len(z)
     single: dict[str, Array] = {}
     candidate: dict[str, float] = {}
     by_chance: list[Array] = []
-    for name, shapes in track(candidates.items(), "null simulation"):
-        values = np.array([p_of_share(share(q, z), q.shape[1], r) for q in shapes])
+    drawn = [
+        {name: _largest(spaces, errors) for name, spaces in candidates.items()} for errors in null
+    ]
+    for name, spaces in candidates.items():
+        dims = spaces.dims
+        values = p_of_share(shares(spaces, z), dims, redundancy)
         # Shapes of one dimension have p-values in the order of their shares.
-        smallest = np.ones(len(null))
-        for dim in {q.shape[1] for q in shapes}:
-            shares = np.max([share(q, null) for q in shapes if q.shape[1] == dim], axis=0)
-            smallest = np.minimum(smallest, p_of_share(shares, dim, r))
-        number = _effective_number(smallest) if len(shapes) > 1 else 1.0
+        largest = np.concatenate([part[name] for part in drawn])
+        smallest = p_of_share(largest, np.unique(dims), redundancy).min(axis=1)
+        number = _effective_number(smallest) if len(dims) > 1 else 1.0
         single[name] = values
         candidate[name] = float(_any_of(values.min(), number))
         by_chance.append(_any_of(smallest, number))
@@ -94,6 +97,14 @@ def screen(candidates: Mapping[str, Sequence[Array]], z: Array, null: Array) -> 
         p_candidate=candidate,
         p_family={name: float(_any_of(p, number)) for name, p in candidate.items()},
         best={name: int(np.argmin(values)) for name, values in single.items()},
+    )
+
+
+def _largest(spaces: Spaces, errors: Array) -> Array:
+    """Largest shares (b, d) of residuals (b, m) in the spaces of each dimension, ascending."""
+    found = shares(spaces, errors)
+    return np.stack(
+        [found[:, spaces.dims == dim].max(axis=1) for dim in np.unique(spaces.dims)], axis=1
     )
 
 

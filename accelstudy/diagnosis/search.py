@@ -12,10 +12,13 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import Solution, solve
 from accelstudy.diagnosis import noise as noises
+from accelstudy.diagnosis.chance import Chance
 from accelstudy.diagnosis.hypotheses import (
     OUTLIER,
+    EffectShapes,
     Hypothesis,
     Setting,
+    Shapes,
     same_space,
     setting_of,
 )
@@ -24,16 +27,16 @@ from accelstudy.diagnosis.naming import (
     COLOUR,
     UNKNOWN,
     colour_evidence,
-    log_evidence,
     mean_evidence,
     posterior,
     shapes_evidence,
     widths,
 )
 from accelstudy.diagnosis.noise import NoiseTest
-from accelstudy.diagnosis.pairs import best_pairs
+from accelstudy.diagnosis.pairs import Pair, best_pairs
 from accelstudy.diagnosis.residuals import Residuals
-from accelstudy.diagnosis.screening import SIMULATIONS, Screening, screen, share
+from accelstudy.diagnosis.screening import Screening, screen
+from accelstudy.diagnosis.spaces import Spaces
 from accelstudy.errors import InputError
 from accelstudy.models import composition_name
 from accelstudy.sensor import SensorModel
@@ -58,8 +61,6 @@ LEAST = 0.05
 """Smallest variance of an axis beside the mean of all: no axis is taken to be without noise."""
 WEIGHTINGS = 4
 """The variances of the axes are estimated anew in each weighting, and settle."""
-LACK_OF_FIT = "lack_of_fit"
-"""Everything but the differences of repeated positions, which are noise alone (pure error)."""
 
 
 @dataclass(frozen=True)
@@ -103,11 +104,11 @@ class Search:
     Parameters
     ----------
     first : Solution, with equal axes
-    rng : Generator, of the residuals without any effect
+    seed : SeedSequence, of the residuals without any effect
     """
 
     first: Solution
-    rng: np.random.Generator
+    seed: np.random.SeedSequence
 
     @property
     def model(self) -> SensorModel:
@@ -115,14 +116,14 @@ class Search:
         return self.first.model
 
     @cached_property
-    def null(self) -> Array:
-        """Residuals without any effect, (B, r)."""
-        return self.rng.standard_normal((SIMULATIONS, self.first.redundancy))
+    def chance(self) -> Chance:
+        """Residuals without any effect."""
+        return Chance(self.seed, len(self.first.design))
 
     @cached_property
     def axes(self) -> NoiseTest:
         """Whether the axes differ in noise, by the base fit."""
-        return noises.axis_test(Residuals.of(self.first), self.null)
+        return noises.axis_test(Residuals.of(self.first), self.chance)
 
     @property
     def exact(self) -> bool:
@@ -155,14 +156,14 @@ class Search:
         return setting_of(self.solution)
 
     @cached_property
-    def z(self) -> Array:
-        """Residuals of unit weight, (r,)."""
-        return self.setting.frame.residuals.z
+    def residuals(self) -> Residuals:
+        """Those of the base fit."""
+        return self.setting.frame.residuals
 
     # --- screening ------------------------------------------------------------------------------
 
     @cached_property
-    def groups(self) -> dict[str, Array]:
+    def groups(self) -> dict[str, Spaces]:
         """Groups of regressors: direction, time and so on."""
         return groups(self.setting)
 
@@ -171,11 +172,16 @@ class Search:
         """Tests of all candidates, and of the groups of regressors."""
         return self.screened(self.setting, self.groups)
 
-    def screened(self, setting: Setting, groups: Mapping[str, Array]) -> Screening:
+    def screened(self, setting: Setting, groups: Mapping[str, Spaces]) -> Screening:
         """Test all candidates and groups of regressors of a fit."""
-        z = setting.frame.residuals.z
-        spaces = {f"group:{name}": [basis] for name, basis in spaces_of(groups).items()}
-        return screen({**setting.bases, **spaces}, z, self.null[:, : len(z)])
+        residuals = setting.frame.residuals
+        spaces = {f"group:{name}": space for name, space in groups.items()}
+        return screen(
+            {**setting.candidates, **spaces},
+            residuals.z,
+            residuals.redundancy,
+            self.chance.errors(residuals),
+        )
 
     # --- naming ---------------------------------------------------------------------------------
 
@@ -183,7 +189,7 @@ class Search:
     def evidence_of_effects(self) -> dict[str, float]:
         """Log evidence of all candidates."""
         return {
-            name: mean_evidence(shapes_evidence([h.basis for h in shapes], self.z), widths(shapes))
+            name: mean_evidence(shapes_evidence(shapes, self.residuals), widths(shapes))
             for name, shapes in self.shapes.items()
         }
 
@@ -199,10 +205,8 @@ class Search:
     @cached_property
     def unknown_evidence(self) -> float:
         """Log evidence of something in one of the groups that is none of the effects."""
-        r = len(self.z)
-        spaces = spaces_of(self.groups).values()
-        logs = [float(log_evidence(share(q, self.z), q.shape[1], r)) for q in spaces]
-        return mean_evidence(np.array(logs)) if logs else 0.0
+        logs = [shapes_evidence(space, self.residuals) for space in self.groups.values()]
+        return mean_evidence(np.concatenate(logs)) if logs else 0.0
 
     @cached_property
     def classes(self) -> list[tuple[Hypothesis, tuple[str, ...]]]:
@@ -225,25 +229,46 @@ class Search:
 
     def best_shape(self, name: str) -> Hypothesis:
         """Shape of a candidate that explains most."""
-        return max(self.shapes[name], key=lambda h: float(share(h.basis, self.z)))
+        shapes = self.shapes[name]
+        return shapes[int(np.argmax(shapes.parts(self.residuals.z)))]
 
     @cached_property
-    def shapes(self) -> dict[str, Sequence[Hypothesis]]:
+    def shapes(self) -> dict[str, Shapes]:
         """Shapes of each candidate, close together about the best one of a smooth effect."""
         return {name: self.refined(shapes) for name, shapes in self.setting.candidates.items()}
 
-    def refined(self, shapes: Sequence[Hypothesis]) -> Sequence[Hypothesis]:
+    def refined(self, shapes: Shapes) -> Shapes:
         """Add shapes between the neighbours of the best one, and again between those."""
-        if shapes[0].smooth is None or len(shapes) < 2:
+        if not isinstance(shapes, EffectShapes) or len(shapes) < 2:
             return shapes
-        fine = list(shapes)
+        if shapes[0].smooth is None:
+            return self.completed(shapes)
         for _ in range(3):
-            best = int(np.argmax([float(share(h.basis, self.z)) for h in fine]))
-            low, high = (fine[k].value for k in (max(best - 1, 0), min(best + 1, len(fine) - 1)))
-            tried = (self.shaped(fine[best], value) for value in np.geomspace(low, high, 7)[1:-1])
-            fine += [h for h in tried if h is not None]
-            fine.sort(key=lambda h: h.value)
-        return fine
+            best = int(np.argmax(shapes.parts(self.residuals.z)))
+            around = (shapes[max(best - 1, 0)].value, shapes[min(best + 1, len(shapes) - 1)].value)
+            tried = (self.shaped(shapes[best], v) for v in np.geomspace(*around, 7)[1:-1])
+            fine = [*shapes, *(h for h in tried if h is not None)]
+            shapes = EffectShapes.of(sorted(fine, key=lambda h: h.value))
+        return shapes
+
+    def completed(self, shapes: EffectShapes) -> EffectShapes:
+        """Add shapes that were passed over next to the best one, until there are none."""
+        hold = self.setting.frame.hold
+        while True:
+            best = int(np.argmax(shapes.parts(self.residuals.z)))
+            effect = shapes[best].effect
+            assert effect is not None
+            fine = list(shapes)
+            for near in (best + 1, best - 1):
+                if 0 <= near < len(shapes):
+                    other = shapes[near].effect
+                    assert other is not None
+                    tried = [self.setting.hypothesis(e) for e in effect.between(other, hold)]
+                    found = [h for h in tried if h is not None and h.dim == shapes[best].dim]
+                    fine[max(best, near) : max(best, near)] = found
+            if len(fine) == len(shapes):
+                return shapes
+            shapes = EffectShapes.of(fine)
 
     def shaped(self, hypothesis: Hypothesis, value: float) -> Hypothesis | None:
         """Return a smooth effect with another value of its setting; None if it shows less."""
@@ -337,9 +362,8 @@ class Search:
         if solution is None:
             return None
         residuals = Residuals.of(solution)
-        null = self.null[:, : residuals.redundancy]
         try:
-            return self.weighted(solution, noises.axis_test(residuals, null))
+            return self.weighted(solution, noises.axis_test(residuals, self.chance))
         except (InputError, np.linalg.LinAlgError):
             return solution
 
@@ -395,9 +419,14 @@ class Search:
         finding = self.find_pair()
         return replace(finding, reason=alone or finding.reason)
 
+    @cached_property
+    def pairs(self) -> list[Pair]:
+        """All pairs of candidates, strongest evidence first."""
+        return best_pairs(self.setting.candidates, self.residuals)
+
     def find_pair(self) -> Finding:
         """Search all pairs, once no single effect is enough."""
-        pairs = best_pairs(self.setting.all, self.z)
+        pairs = self.pairs
         if not pairs:
             return self.nothing("no effect of the catalogue explains it")
         # All pairs together are as probable beforehand as all single effects together.
@@ -460,17 +489,8 @@ class Search:
         wanted = {name for members in names for name in members}
         if len(names) == 1:
             return max(self.evidence_of_effects, key=self.evidence_of_effects.__getitem__) in wanted
-        pairs = best_pairs(self.setting.all, self.z)
+        pairs = self.pairs
         return bool(pairs) and set(pairs[0].names) <= wanted
-
-
-def spaces_of(groups: Mapping[str, Array]) -> dict[str, Array]:
-    """Orthonormal bases of the groups and, beside repeats, of the lack of fit."""
-    if "repeat" not in groups:
-        return dict(groups)
-    repeat = groups["repeat"]
-    rest = np.linalg.qr(repeat, mode="complete")[0][:, repeat.shape[1] :]
-    return {**groups, LACK_OF_FIT: rest}
 
 
 def position_of(hypothesis: Hypothesis) -> int:

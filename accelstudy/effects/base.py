@@ -159,6 +159,10 @@ class Effect(Shaped):
         """Shapes of the effect that are worth a search in given holds with forces f (n, 3)."""
         return (self,)
 
+    def between(self, other: Effect, hold: Hold) -> Sequence[Effect]:
+        """Shapes between two candidates that were passed over, as there are so many positions."""
+        return ()
+
     def only(self, kept: tuple[int, ...]) -> Effect:
         """Return the effect with some of its parameters; the others are zero."""
         return _part(type(self), kept)(**self.shape)  # type: ignore[arg-type]

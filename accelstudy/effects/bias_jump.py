@@ -1,9 +1,15 @@
 """Bias jump: the bias steps after a knock."""
 
 import numpy as np
+from numpy.typing import NDArray
 
-from accelstudy.effects.base import Effect, per_axis, register
+from accelstudy.effects.base import Effect, Hold, per_axis, register
 from accelstudy.registry import Hyper
+
+MOST = 100
+"""Times that are searched at first; what lies between is looked at where it matters."""
+STEPS = 7
+"""Times between two of them that are looked at next."""
 
 
 @register
@@ -27,6 +33,28 @@ class BiasJump(Effect):
 
         A jump before the last hold is a single deviating hold by any other name.
         """
-        times = np.unique(hold.column("time"))
-        middles = (times[1:-2] + times[2:-1]) / 2 if len(times) > 3 else ()
-        return tuple(BiasJump(t=float(f"{t:.9g}")) for t in middles)
+        middles = _middles(hold)
+        return tuple(BiasJump(t=t) for t in middles[_spread(len(middles))])
+
+    def between(self, other, hold):
+        """Return some middles between the times of two candidates."""
+        middles = _middles(hold)
+        low, high = sorted((self.shape["t"], other.shape["t"]))
+        left = middles[(middles > low) & (middles < high)]
+        chosen = np.unique(np.linspace(0, len(left) - 1, STEPS).round().astype(int))
+        return tuple(BiasJump(t=t) for t in left[chosen]) if len(left) else ()
+
+
+def _middles(hold: Hold) -> NDArray[np.float64]:
+    """Middles between successive holds, as they are written, (k,)."""
+    times = np.unique(hold.column("time"))
+    middles = (times[1:-2] + times[2:-1]) / 2 if len(times) > 3 else ()
+    return np.array([float(f"{t:.9g}") for t in middles])
+
+
+def _spread(count: int) -> NDArray[np.int_]:
+    """Indices of all middles or, of very many, of some: the nearer to an end the closer."""
+    if count <= MOST:
+        return np.arange(count)
+    part = np.geomspace(1, (count + 1) / 2, MOST // 2) - 1
+    return np.unique(np.concatenate([part, count - 1 - part]).round().astype(int))

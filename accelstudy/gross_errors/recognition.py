@@ -24,6 +24,8 @@ USUAL_MISFIT = 0.15
 """Share of gravity by which a sensor may miss its robot before calibration."""
 CLEARLY = 4.0
 """How many times better an explanation must fit."""
+EXCHANGED = 1000
+"""Rows that may belong elsewhere, at most; where more do not fit, it is not their order."""
 ENOUGH = 8
 """Positions from which on an affine calibration says something of the others."""
 FORCE_UNITS = {
@@ -175,30 +177,36 @@ def _rows(campaign: Campaign) -> Recognised | None:
         solution = np.linalg.lstsq(root * design, root * expected, rcond=None)[0]
         distance = np.linalg.norm(design @ solution - expected, axis=1)
         weights = 1 / np.maximum(distance, 1e-4 * campaign.gravity)
-    cost = np.linalg.norm((design @ solution)[:, None] - expected[None], axis=2)
     # Repeated attitudes could be exchanged at will, so an exchange has to gain something.
-    usual = np.median(np.diag(cost))
-    charge = np.where(np.eye(len(forces), dtype=bool), 0.0, (CLEARLY * usual) ** 2)
-    total, rows = cost**2 + charge, np.arange(len(forces))
+    usual = np.median(distance)
+    wrong = np.flatnonzero(distance > CLEARLY * usual)
+    if not 1 < len(wrong) <= EXCHANGED:
+        return None
+    fitted = (design @ solution)[wrong]
+    cost = np.linalg.norm(fitted[:, None] - expected[wrong][None], axis=2)
+    total = cost**2 + np.where(np.eye(len(wrong), dtype=bool), 0.0, (CLEARLY * usual) ** 2)
+    rows = np.arange(len(wrong))
     if np.array_equal(np.argmin(total, axis=1), rows):
         return None
     from scipy.optimize import linear_sum_assignment  # slow to import, and seldom needed
 
-    belongs = linear_sum_assignment(total)[1]
-    moved = np.flatnonzero(belongs != rows)
+    found = linear_sum_assignment(total)[1]
+    moved = np.flatnonzero(found != rows)
     if not len(moved):
         return None
-    before, after = cost[moved, moved], cost[moved, belongs[moved]]
+    before, after = cost[moved, moved], cost[moved, found[moved]]
     clear = (before > CLEARLY * after) & (before > 20 * usual) & (before > 0.01 * campaign.gravity)
     if not np.all(clear):
         return None
+    belongs = np.arange(len(forces))
+    belongs[wrong] = wrong[found]
     order = np.empty(len(forces), dtype=int)
-    order[belongs] = rows
+    order[belongs] = np.arange(len(forces))
     mended = replace(
         campaign,
         forces=forces[order],
         sd=None if campaign.sd is None else campaign.sd[order],
         n_samples=None if campaign.n_samples is None else campaign.n_samples[order],
     )
-    positions = ", ".join(str(p) for p in campaign.positions[moved])
+    positions = ", ".join(str(p) for p in campaign.positions[wrong[moved]])
     return Recognised("row_order", f"the forces of positions {positions} are exchanged", mended)

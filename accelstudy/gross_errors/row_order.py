@@ -34,12 +34,13 @@ class RowOrder(GrossError):
             if self.is_open("first") or self.is_open("second"):
                 raise InputError(f"gross error {self.name!r}: give first and second, or neither")
             return self
-        distance = np.linalg.norm(campaign.forces[:, None] - campaign.forces, axis=-1)
-        pairs = np.argwhere(np.triu(distance > APART))
-        if not len(pairs):
-            raise InputError(f"gross error {self.name!r}: all positions are in the same attitude")
-        first, second = campaign.positions[rng.choice(pairs)].tolist()
-        return type(self)(first=first, second=second)
+        for first in rng.permutation(campaign.n_positions):
+            distance = np.linalg.norm(campaign.forces - campaign.forces[first], axis=1)
+            others = np.flatnonzero(distance > APART)
+            if len(others):
+                low, high = sorted(campaign.positions[[first, rng.choice(others)]].tolist())
+                return type(self)(first=low, second=high)
+        raise InputError(f"gross error {self.name!r}: all positions are in the same attitude")
 
     def act(self, campaign: Campaign) -> Campaign:
         """Exchange the rows of the forces and of their sds."""

@@ -23,6 +23,8 @@ from accelstudy.adjustment.quality.redundancy import (
 from accelstudy.adjustment.quality.solution import (
     Solution,
     column_basis,
+    diagonal_blocks,
+    root_of,
     solve,
     whitening_of,
 )
@@ -38,6 +40,7 @@ __all__ = [
     "Suspect",
     "VarianceComponents",
     "column_basis",
+    "diagonal_blocks",
     "global_test",
     "held_out",
     "holm",
@@ -45,6 +48,7 @@ __all__ = [
     "position_tests",
     "redundancy_numbers",
     "reliability",
+    "root_of",
     "select",
     "solve",
     "suspects",

@@ -98,22 +98,31 @@ class Solution:
     @cached_property
     def blocks(self) -> Array:
         """R of each position, (n, c, c)."""
-        n, c = self.misclosures.shape
-        part = self.basis[: n * c].reshape(n, c, -1)
-        return np.eye(c) - part @ np.swapaxes(part, 1, 2)
+        return diagonal_blocks(self.basis, *self.misclosures.shape)
 
     @cached_property
     def root(self) -> tuple[Array, NDArray[np.int_]]:
         """H (n, c, c) with H Hᵀ = R⁺ of each position, and the rank of R, (n,)."""
-        values, vectors = np.linalg.eigh(self.blocks)
-        seen = values > CONTROLLED
-        scale = np.where(seen, 1 / np.sqrt(np.where(seen, values, 1.0)), 0.0)
-        return vectors * scale[:, None], np.count_nonzero(seen, axis=1)
+        return root_of(self.blocks)
 
 
 def column_basis(design: Array) -> Array:
     """Orthonormal basis of the columns of a design (m, u) of full rank, (m, u)."""
     return np.asarray(np.linalg.qr(design / np.linalg.norm(design, axis=0))[0])
+
+
+def diagonal_blocks(basis: Array, n: int, c: int) -> Array:
+    """Blocks (n, c, c) of I − U Uᵀ on its diagonal, U (n c + k, u)."""
+    part = basis[: n * c].reshape(n, c, -1)
+    return np.eye(c) - part @ np.swapaxes(part, 1, 2)
+
+
+def root_of(blocks: Array) -> tuple[Array, NDArray[np.int_]]:
+    """H (n, c, c) with H Hᵀ = R⁺ of blocks R (n, c, c), and their ranks (n,)."""
+    values, vectors = np.linalg.eigh(blocks)
+    seen = values > CONTROLLED
+    scale = np.where(seen, 1 / np.sqrt(np.where(seen, values, 1.0)), 0.0)
+    return vectors * scale[:, None], np.count_nonzero(seen, axis=1)
 
 
 def whitening_of(b: Array, variances: Array) -> Array:

@@ -1,0 +1,70 @@
+"""What noise alone would leave in the residuals, by simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.diagnosis.residuals import Residuals
+from accelstudy.progress import track
+
+Array = NDArray[np.float64]
+
+SIMULATIONS = 1000
+AT_ONCE = 500_000
+"""Numbers that are drawn at once; all sets of very many positions together would not fit."""
+
+
+KEPT = 4_000_000
+"""Numbers that are kept; more are drawn again."""
+
+
+@dataclass(frozen=True)
+class Chance:
+    """Simulated residuals without any effect: white noise of unit weight less what a fit absorbs.
+
+    They are drawn again, the same, whenever they are needed; only few are kept.
+
+    Parameters
+    ----------
+    seed : SeedSequence
+    conditions : int, of the fit with the most
+    simulations : int
+    """
+
+    seed: np.random.SeedSequence
+    conditions: int
+    simulations: int = SIMULATIONS
+
+    def noise(self) -> Iterator[Array]:
+        """Draw white noise of unit weight, (b, conditions) each."""
+        rng = np.random.default_rng(self.seed)
+        for count in self.counts:
+            yield rng.standard_normal((count, self.conditions))
+
+    @property
+    def counts(self) -> list[int]:
+        """How many sets are drawn at once."""
+        size = max(1, AT_ONCE // self.conditions)
+        return [min(size, self.simulations - k) for k in range(0, self.simulations, size)]
+
+    @cached_property
+    def kept(self) -> list[Array] | None:
+        """All of it, if it is little."""
+        few = self.simulations * self.conditions <= KEPT
+        return list(self.noise()) if few else None
+
+    def errors(self, residuals: Residuals) -> Iterator[Array]:
+        """Yield residuals of a fit, (b, m) each, all simulations one after the other."""
+        m = len(residuals.design)
+        for drawn in track(self.kept or self.noise(), "null simulation", len(self.counts)):
+            noise = drawn[:, :m]
+            yield noise - (noise @ residuals.absorbed) @ residuals.absorbed.T
+
+    def statistic(self, residuals: Residuals, function: Callable[[Array], Array]) -> Array:
+        """Return a statistic of residuals (b, m), the first axis of its values being the set."""
+        return np.concatenate([function(errors) for errors in self.errors(residuals)])

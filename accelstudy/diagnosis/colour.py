@@ -1,0 +1,98 @@
+"""Coloured noise: correlations of successive holds, without matrices of holds by holds.
+
+The processes are those of `LENGTHS`: first-order Gauss–Markov, with the correlation exp(−|i − j|/l)
+of holds i and j, and a random walk, min(i, j)/n. Their quadratic forms are those of a convolution
+and of sums, and their likelihood is that of a Kalman filter, which is exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.diagnosis.residuals import Residuals
+
+Array = NDArray[np.float64]
+
+LENGTHS = (1.0, 3.0, 8.0, np.inf)
+"""Correlation lengths in holds; infinite for the random walk."""
+
+
+def quadratic_forms(v: Array) -> Array:
+    """Sums over axes of vᵀ K v for values v (..., n, 3), one for each process, (..., k)."""
+    n = v.shape[-2]
+    size = 2 ** int(np.ceil(np.log2(2 * n)))
+    lag = np.minimum(np.arange(size), size - np.arange(size))
+    power = np.sum(np.abs(np.fft.rfft(v, size, axis=-2)) ** 2, axis=-1)
+    # Of the spectrum of a real sequence, all but the ends stand for two frequencies.
+    twice = np.where((np.arange(power.shape[-1]) % (size // 2)) == 0, 1.0, 2.0) / size
+    forms = []
+    for length in LENGTHS:
+        if np.isfinite(length):
+            kernel = np.where(lag < n, np.exp(-lag / length), 0.0)
+            forms.append(power @ (twice * np.fft.rfft(kernel).real))
+        else:
+            later = np.cumsum(v[..., ::-1, :], axis=-2)
+            forms.append(np.sum(later**2, axis=(-2, -1)) / n)
+    return np.stack(forms, axis=-1)
+
+
+def restricted_likelihoods(residuals: Residuals, strengths: Sequence[float]) -> Array:
+    """Log likelihoods of residuals with white noise and a process on each axis, (k, s).
+
+    The covariance of unit weight is Σ = I + s F (I₃ ⊗ K) Fᵀ, with F the noise of the forces in the
+    conditions, at its most likely scale. In the residual space (Harville 1974, restricted maximum
+    likelihood), with an orthonormal basis U of the design,
+
+        log|Nᵀ Σ N| = log|Σ| + log|Uᵀ Σ⁻¹ U|,
+        zᵀ (Nᵀ Σ N)⁻¹ z = zᵀ Σ⁻¹ z − zᵀ Σ⁻¹ U (Uᵀ Σ⁻¹ U)⁻¹ Uᵀ Σ⁻¹ z.
+
+    Parameters
+    ----------
+    residuals : Residuals
+    strengths : variances s of the process on an axis, beside 1 of the white noise
+    """
+    n, c = residuals.whitening.shape[:2]
+    columns = np.column_stack([residuals.absorbed, residuals.z])
+    u = columns.shape[1] - 1
+    determinant, normal = _filtered(residuals, columns[: n * c].reshape(n, c, u + 1), strengths)
+    rest = columns[n * c :]  # observed gravity is no force
+    normal = normal + rest.T @ rest
+    design, mixed, square = normal[..., :u, :u], normal[..., :u, u:], normal[..., u, u]
+    determinant = determinant + np.linalg.slogdet(design)[1]
+    explained = np.swapaxes(mixed, -1, -2) @ np.linalg.solve(design, mixed)
+    square = square - explained[..., 0, 0]
+    return np.asarray(-determinant / 2 - residuals.redundancy / 2 * np.log(square))
+
+
+def _filtered(
+    residuals: Residuals, columns: Array, strengths: Sequence[float]
+) -> tuple[Array, Array]:
+    """log|Σ|, (k, s), and Cᵀ Σ⁻¹ C, (k, s, v, v), of columns C (n, c, v), by a Kalman filter."""
+    n, c, width = columns.shape
+    memory = np.array([np.exp(-1 / length) for length in LENGTHS])[:, None]
+    walk = np.isinf(np.array(LENGTHS))[:, None]
+    s = np.asarray(strengths, dtype=float)
+    first = s * np.where(walk, 1 / n, 1.0)
+    added = s * np.where(walk, 1 / n, 1 - memory**2)
+    memory = memory[..., None, None]
+    eye = np.eye(3)
+    state = np.zeros((*first.shape, 3, width))
+    covariance = first[..., None, None] * eye
+    growth = added[..., None, None] * eye
+    determinant = np.zeros(first.shape)
+    normal = np.zeros((*first.shape, width, width))
+    for f, seen in zip(residuals.force_noise, columns, strict=True):
+        gain = covariance @ f.T
+        innovation = seen - f @ state
+        inverse = np.linalg.inv(f @ gain + np.eye(c))
+        determinant -= np.linalg.slogdet(inverse)[1]
+        scaled = inverse @ innovation
+        normal += np.swapaxes(innovation, -1, -2) @ scaled
+        state = memory * (state + gain @ scaled)
+        left = covariance - gain @ inverse @ np.swapaxes(gain, -1, -2)
+        # Symmetric, or rounding errors would grow from hold to hold.
+        covariance = memory**2 * (left + np.swapaxes(left, -1, -2)) / 2 + growth
+    return determinant, normal

@@ -1,0 +1,128 @@
+"""Spaces of residuals in which something that is missing from a model would lie.
+
+Of a space only two things count: its dimension, and how large the part of residuals is that lies in
+it. Many spaces of one kind are looked at together. None of it needs a matrix of all conditions by
+all conditions, so that the effort grows like the number of positions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.diagnosis.residuals import Residuals
+
+Array = NDArray[np.float64]
+
+ABSORBED = 1e-2
+"""Share of a direction that has to be left of it, or it counts as absorbed by the model."""
+
+
+class Spaces(Protocol):
+    """Some spaces of residuals."""
+
+    @property
+    def dims(self) -> NDArray[np.int_]:
+        """Their dimensions, (s,)."""
+
+    def parts(self, errors: Array) -> Array:
+        """Squares of what residuals (..., m) have in each of them, (..., s)."""
+
+
+@dataclass(frozen=True)
+class Bases:
+    """Spaces given by orthonormal bases in the residual space.
+
+    Attributes
+    ----------
+    together : (m, Σ l) array, one basis beside the other
+    dims : (s,) int array, l
+    """
+
+    together: Array
+    dims: NDArray[np.int_]
+
+    def parts(self, errors: Array) -> Array:
+        """Squares of what residuals (..., m) have in each of them, (..., s)."""
+        return np.add.reduceat((errors @ self.together) ** 2, self.ends[:-1], axis=-1)
+
+    @property
+    def ends(self) -> NDArray[np.int_]:
+        """Where the bases begin and the last one ends, (s + 1,)."""
+        return np.concatenate([[0], np.cumsum(self.dims)])
+
+
+@dataclass(frozen=True)
+class LackOfFit:
+    """What is the same in positions of one attitude: all that is no difference between repeats.
+
+    A change of conditions by t that is the same in all positions of an attitude is L_iᵀ t at unit
+    weight (but for what varies between them). Of these directions, orthonormal within each
+    attitude, those are left that the model does not absorb.
+
+    Attributes
+    ----------
+    order : (n,) int array, positions sorted by attitude
+    starts : (a,) int array, where each attitude begins there
+    weights : (n, c, c) array, W_i with Σ W_i e_i the coordinates (c,) of an attitude, sorted
+    absorbed : (a c + k, l) array, orthonormal basis of what the model absorbs, in coordinates
+    """
+
+    order: NDArray[np.int_]
+    starts: NDArray[np.int_]
+    weights: Array
+    absorbed: Array
+
+    @classmethod
+    def of(cls, residuals: Residuals, labels: NDArray[np.int_]) -> LackOfFit:
+        """Of residuals whose positions have labels (n,), the same for the same attitude."""
+        order = np.argsort(labels, kind="stable")
+        starts = np.flatnonzero(np.diff(labels[order], prepend=-1))
+        whitening = residuals.whitening[order]
+        normal = np.add.reduceat(whitening @ np.swapaxes(whitening, 1, 2), starts, axis=0)
+        inverse = np.linalg.inv(np.linalg.cholesky(normal))
+        counts = np.diff(np.append(starts, len(labels)))
+        same = cls(order, starts, np.repeat(inverse, counts, axis=0) @ whitening, np.empty((0, 0)))
+        left, values, _ = np.linalg.svd(same._means(residuals.absorbed.T).T, full_matrices=False)
+        return cls(order, starts, same.weights, left[:, values > ABSORBED])
+
+    @property
+    def dims(self) -> NDArray[np.int_]:
+        """Its dimension, (1,)."""
+        rows, absorbed = self.absorbed.shape
+        return np.array([rows - absorbed])
+
+    def parts(self, errors: Array) -> Array:
+        """Squares of what residuals (..., m) have in it, (..., 1)."""
+        same = self._means(errors)
+        part = np.sum(same**2, axis=-1) - np.sum((same @ self.absorbed) ** 2, axis=-1)
+        return np.maximum(part, 0.0)[..., None]
+
+    def _means(self, errors: Array) -> Array:
+        """Coordinates of residuals (..., m): of each attitude, and of observed gravity."""
+        n, c = self.weights.shape[:2]
+        blocks = errors[..., : n * c].reshape(*errors.shape[:-1], n, c)[..., self.order, :]
+        weighted = np.einsum("ncd,...nd->...nc", self.weights, blocks)
+        sums = np.add.reduceat(weighted, self.starts, axis=-2)
+        return np.concatenate([sums.reshape(*errors.shape[:-1], -1), errors[..., n * c :]], axis=-1)
+
+
+@dataclass(frozen=True)
+class Repeats:
+    """Differences between positions of one attitude: what lack of fit leaves of the residuals."""
+
+    lack_of_fit: LackOfFit
+    redundancy: int
+
+    @property
+    def dims(self) -> NDArray[np.int_]:
+        """Its dimension, (1,)."""
+        return self.redundancy - self.lack_of_fit.dims
+
+    def parts(self, errors: Array) -> Array:
+        """Squares of what residuals (..., m) have in it, (..., 1)."""
+        total = np.sum(errors**2, axis=-1, keepdims=True)
+        return np.maximum(total - self.lack_of_fit.parts(errors), 0.0)
