@@ -387,3 +387,14 @@ def test_a_model_that_becomes_a_registered_one_is_a_study_too():
     overlay = study_overlay(diagnosis)
     assert overlay["models"] == {"extended": ["bias", "scale", "nonorthogonality"]}
     assert parse_study({**overlay, "seed": 1}).grids[0].models == ["bias-scale", "extended"]
+
+
+def test_a_large_effect_is_fitted_from_the_affine_part_on():
+    settings = CampaignSettings(
+        scheme="fibonacci-30", repeat_first=6, order="random", approach="gravity", seed=3,
+        effects=("saturation: 0.5, -0.5, -0.5",),
+    )  # fmt: skip
+    campaign, _ = simulate_campaign(settings)
+    model = get_model(f"{NINE}+saturation(knee=9.3163175)")
+    fit = fit_campaign(campaign, model, get_approach("gravity"))
+    np.testing.assert_allclose(fit.parameters[9:], [0.5, -0.5, -0.5], atol=0.05)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from accelstudy.adjustment import Adjustment, Observations, calibrate
 from accelstudy.adjustment.quality import GlobalTest, global_test
 from accelstudy.approaches import Approach
 from accelstudy.campaign.format import Campaign
+from accelstudy.campaign.gauges import not_affine
 from accelstudy.campaign.header import COLUMNS
 from accelstudy.campaign.sphere import fit_sphere
 from accelstudy.design import Design, diagnose
@@ -191,6 +193,7 @@ def fit_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> 
             f"{campaign.name}: sensor_noise.sigma_mps2: {noise.sigma_force:g} is too small beside "
             f"robot.angle_sigma_mgon: {noise.sigma_angle / MGON:g}; expected {least:.2g} or more"
         )
+    start_of = partial(initial_values, forces=campaign.forces, gravity=campaign.gravity)
     design = campaign_design(campaign, model, approach)
     if not design.estimable:
         raise InputError(
@@ -205,9 +208,17 @@ def fit_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> 
         gravity=campaign.gravity,
         sigma_gravity=campaign.sigma_gravity,
         hold=campaign.hold,
-        initial=initial_values(model, campaign.forces, campaign.gravity),
+        initial=start_of(model),
     )
     adjustment = calibrate(model, approach, observed)
+    if not adjustment.converged[0] and (unfit := not_affine(model)):
+        # Of a model with large effects the affine part alone is a better start.
+        rest = [effect.spec for effect in model.effects if effect.name not in unfit]
+        part = compose("affine part", tuple(rest))
+        first = calibrate(part, approach, replace(observed, initial=start_of(part)))
+        values = dict(zip(part.parameter_names, first.parameters[0].tolist(), strict=False))
+        observed = replace(observed, initial=model.vector(values))
+        adjustment = calibrate(model, approach, observed)
     if not adjustment.converged[0]:
         raise InputError(
             f"{campaign.name}: the adjustment of the model {model.name!r} does not converge; "
