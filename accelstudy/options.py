@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
 from importlib import import_module
 from pathlib import Path
@@ -58,12 +58,12 @@ class ModelName(Name):
         return items or [CompletionItem(incomplete, type="file")]
 
 
-ANGLE_UNIT = Name("angle unit", "accelstudy.units", "ANGLE_UNITS")
+ANGLE_UNIT = Name("angle_unit", "accelstudy.units", "ANGLE_UNITS")
 APPROACH = Name("approach", "accelstudy.approaches", "approach_names")
 EFFECT = Name("effect", "accelstudy.effects", "effect_names")
-GROSS_ERROR = Name("gross error", "accelstudy.gross_errors", "gross_error_names")
+GROSS_ERROR = Name("gross_error", "accelstudy.gross_errors", "gross_error_names")
 MODEL = ModelName("model", "accelstudy.models", "MODELS")
-NOISE_EFFECT = Name("noise effect", "accelstudy.noise_effects", "noise_effect_names")
+NOISE_EFFECT = Name("noise_effect", "accelstudy.noise_effects", "noise_effect_names")
 SCHEME = Name("scheme", "accelstudy.schemes", "scheme_names")
 
 model_option = click.option(
@@ -121,6 +121,30 @@ def quiet_option(command: Command) -> Command:
             return command(*args, **kwargs)
 
     return within  # type: ignore[return-value]
+
+
+class Sectioned(click.Command):
+    """A command with many options, which its help lists in sections.
+
+    Parameters
+    ----------
+    sections : mapping of title to names of the options, as the command's function has them
+    """
+
+    def __init__(self, *args: Any, sections: Mapping[str, Sequence[str]], **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.sections = sections
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the sections, and what is in none of them at the end."""
+        options = [p for p in self.get_params(ctx) if isinstance(p, click.Option)]
+        rows = {p.name: row for p in options if (row := p.get_help_record(ctx))}
+        sections = {
+            title: [rows.pop(name) for name in names] for title, names in self.sections.items()
+        }
+        for title, records in (*sections.items(), ("Other options", list(rows.values()))):
+            with formatter.section(title):
+                formatter.write_dl(records)
 
 
 def example(*commands: str) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from accelstudy.errors import InputError
-from accelstudy.options import PATH, example, force_option, quiet_option
+from accelstudy.options import PATH, Sectioned, example, force_option, quiet_option
 from accelstudy.progress import say
 
 if TYPE_CHECKING:
@@ -25,22 +25,10 @@ _SECTIONS = {
 }
 
 
-class _Sectioned(click.Command):
-    """A command whose options are listed in sections."""
-
-    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the sections, and what is in none of them at the end."""
-        options = [p for p in self.get_params(ctx) if isinstance(p, click.Option)]
-        rows = {p.name: row for p in options if (row := p.get_help_record(ctx))}
-        sections = {title: [rows.pop(name) for name in names] for title, names in _SECTIONS.items()}
-        for title, records in (*sections.items(), ("Other options", list(rows.values()))):
-            with formatter.section(title):
-                formatter.write_dl(records)
-
-
 @click.command(
     "import",
-    cls=_Sectioned,
+    cls=Sectioned,
+    sections=_SECTIONS,
     epilog=example(
         "accelstudy import log.csv --out my-campaign --rate 100 --columns fx=0,fy=1,fz=2"
     ),

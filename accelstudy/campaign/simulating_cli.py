@@ -15,6 +15,7 @@ from accelstudy.options import (
     NOISE_EFFECT,
     PATH,
     SCHEME,
+    Sectioned,
     approach_option,
     example,
     force_option,
@@ -23,9 +24,19 @@ from accelstudy.options import (
 )
 from accelstudy.progress import say, stage
 
+_SECTIONS = {
+    "What is written": ("out", "truth_path", "name", "seed"),
+    "The sensor": ("model", "effects", "size", "noise_effects", "gross_errors"),
+    "Its noise": ("sigma", "sigma_unknown", "robot_sigma_mgon", "n_samples"),
+    "The holds": ("scheme", "repeats", "repeat_first", "order", "approach", "yaw"),
+    "Their conditions": ("interval", "no_time", "temperature", "temperature_order", "vibration"),
+}
+
 
 @click.command(
     "simulate-campaign",
+    cls=Sectioned,
+    sections=_SECTIONS,
     epilog=example(
         'accelstudy simulate-campaign --out blind --truth truth.yaml --effect "warm_up(tau=400)"'
     ),
@@ -84,7 +95,7 @@ from accelstudy.progress import say, stage
 )
 @click.option("--vibration", help="Lowest and highest rms, m/s², as 0:1.")
 @click.option("--yaw", default="none", show_default=True, help="Of the holds: none or random.")
-@click.option("--samples-per-hold", "n_samples", type=int, help="Adds n_samples and sds.")
+@click.option("--samples-per-hold", "n_samples", type=int, help="Adds n_samples and their sds.")
 @force_option
 @quiet_option
 def simulate_campaign_command(
