@@ -167,8 +167,12 @@ def test_what_depends_on_conditions_is_corrected_by_those_of_the_row(
 
     without = pd.read_csv(log).drop(columns=condition)
     without.to_csv(tmp_path / "without.csv", index=False)
-    with pytest.raises(InputError, match=rf"{effects.split('(')[0]} needs the {condition}.*--"):
-        level_log(calibration, tmp_path / "without.csv", tmp_path / "never.csv")
+    stored = LogLayout(columns={c: c for c in ("temperature", "vibration")}, time=None)
+    for known in (None, stored):
+        with pytest.raises(InputError, match=rf"{effects.split('(')[0]} needs the {condition}.*--"):
+            level_log(
+                replace(calibration, log=known), tmp_path / "without.csv", tmp_path / "never.csv"
+            )
     assert not (tmp_path / "never.csv").exists()
 
 
@@ -479,6 +483,16 @@ def test_a_single_reading_is_as_noisy_as_within_the_holds(tmp_path):
         np.testing.assert_allclose(found, expected, rtol=0.05)
 
 
+def test_a_calibration_that_no_sensor_has_is_not_applied_without_a_word(tmp_path):
+    path, log = calibration_file(tmp_path), tmp_path / "log.csv"
+    mixed_log().to_csv(log, index=False)
+    content = json.loads(path.read_text(encoding="utf-8"))
+    content["quality"] = {"plausible": False, "warnings": ["s_y is beyond"], "state": "implausible"}
+    path.write_text(json.dumps(content), encoding="utf-8")
+    warnings = level_log(read_calibration(path), log, tmp_path / "out.csv").warnings
+    assert "do not use this calibration: s_y is beyond" in warnings
+
+
 def test_columns_of_the_campaign_that_a_log_lacks_are_said_to_come_from_there(tmp_path):
     calibration, log = read_calibration(calibration_file(tmp_path)), tmp_path / "log.csv"
     mixed_log().to_csv(log, index=False)
@@ -490,8 +504,9 @@ def test_columns_of_the_campaign_that_a_log_lacks_are_said_to_come_from_there(tm
     layout = LogLayout(columns={"fx": "fx", "fy": "fy", "fz": "fz", "temperature": "T"})
     known = replace(calibration, log=layout)
     level_log(known, log, tmp_path / "out.csv")
+    level_log(known, log, tmp_path / "out.csv", {"columns": {"temperature": "count"}})
     with pytest.raises(InputError, match="no column 'T'"):
-        level_log(known, log, tmp_path / "never.csv", {"temperature": "T"})
+        level_log(known, log, tmp_path / "never.csv", {"columns": {"temperature": "T"}})
 
 
 def test_what_the_calibration_did_not_see_is_counted(tmp_path):

@@ -170,6 +170,11 @@ class _Mended(BaseModel):
     matrix: Annotated[list[Triple], PerAxis] | None
 
 
+class _Quality(BaseModel):
+    plausible: bool = True
+    warnings: list[str] = []
+
+
 class _Document(BaseModel):
     """What is read of `calibration.json`; the rest is for persons and other programs."""
 
@@ -188,6 +193,7 @@ class _Document(BaseModel):
     log: LogLayout | None = None
     range_mps2: Positive | None = None
     mended: _Mended | None = None
+    quality: _Quality = _Quality()
     ranges: dict[str, Annotated[list[Finite], Field(min_length=2, max_length=2)]] = {}
 
     @model_validator(mode="after")

@@ -105,12 +105,12 @@ def check_sigmas_command(
 @click.argument("calibration", type=PATH)
 @click.argument("log", type=PATH)
 @click.option("--out", type=PATH, required=True, help="CSV or Parquet file to write.")
-@click.option("--columns", help="Names or places from 0, as fx=1,fy=2,fz=3.")
+@click.option(
+    "--columns", help="By name, or place from 0: fx=1,fy=2,fz=3,temperature=temp,vibration=5."
+)
 @click.option("--time", help="Column of time, by name or place.")
 @click.option("--time-unit", help="One of s, ms, us and ns.")
 @click.option("--rate", type=float, help="Samples per second, without a column of time.")
-@click.option("--temperature", help="Column of the temperature, °C.")
-@click.option("--vibration", help="Column of the vibration, m/s² rms.")
 @click.option("--unit", help="One of m/s^2, g and counts.")
 @click.option(
     "--start",

@@ -86,8 +86,17 @@ def level_log(
             write(_with(table, added))
         account.close()
     assumed = account.assumptions() if start is None else ()
-    warnings = (*_mended(calibration, readings), *assumed, *account.warnings())
+    doubts = (*_implausible(calibration), *_mended(calibration, readings))
+    warnings = (*doubts, *assumed, *account.warnings())
     return Leveled(account.rows, account.empty, warnings)
+
+
+def _implausible(calibration: Calibration) -> tuple[str, ...]:
+    """Say that no sensor has such a calibration."""
+    quality = calibration.content["quality"]
+    if quality["plausible"]:
+        return ()
+    return (f"do not use this calibration: {'; '.join(quality['warnings'])}",)
 
 
 def _mended(calibration: Calibration, readings: Readings) -> tuple[str, ...]:

@@ -25,7 +25,11 @@ from accelstudy.study.config.errors import first_error
 
 Array = NDArray[np.float64]
 
-OPTIONS = {"time": "--time or --rate", "temperature": "--temperature", "vibration": "--vibration"}
+OPTIONS = {
+    "time": "--time or --rate",
+    "temperature": "--columns temperature=NAME",
+    "vibration": "--columns vibration=NAME",
+}
 """Conditions that a log can tell, and the options that say where it does."""
 
 
@@ -103,8 +107,8 @@ def readings_of(
     log : file, of any kind that `open_source` reads
     calibration : Calibration
     given : mapping, optional
-        Keys of `LogLayout`, and columns of temperature and vibration. Columns of the forces replace
-        all that are known from the campaign; so does a column of time, or a rate.
+        Keys of `LogLayout`. Columns overlay those of the campaign's log; all three of the forces
+        replace them, as then the log is another. A column of time replaces a rate, and the reverse.
     start : float, s, from the start of the calibration session to the first row
 
     Returns
@@ -132,7 +136,7 @@ def readings_of(
         if condition in OPTIONS and not known:
             raise InputError(
                 f"{log}: the effect {effect} needs the {condition} of each row; "
-                f"{OPTIONS[condition]} says it"
+                f"give it by {OPTIONS[condition]}"
             )
     unit = layout.unit
     if calibration.log is None and "unit" not in given:
@@ -162,13 +166,11 @@ def _layout(calibration: Calibration, given: Mapping[str, Any]) -> LogLayout:
     known = {} if calibration.log is None else calibration.log.model_dump(exclude_none=True)
     if given.keys() & {"time", "rate_hz"}:
         known = {key: value for key, value in known.items() if key not in ("time", "rate_hz")}
-    columns = {
-        **given.get("columns", known.get("columns", {})),
-        **{key: given[key] for key in ("temperature", "vibration") if key in given},
-    }
-    others = {k: v for k, v in given.items() if k in LogLayout.model_fields}
+    columns = given.get("columns", {})
+    if not set(AXES) <= set(columns):
+        columns = {**known.get("columns", {}), **columns}
     try:
-        return LogLayout.model_validate({**known, **others, "columns": columns})
+        return LogLayout.model_validate({**known, **given, "columns": columns})
     except ValidationError as error:
         raise InputError(f"options: {first_error(error, LogLayout)}") from None
 
@@ -191,7 +193,7 @@ def _places(
             try:
                 places |= locate(source, wanted, (key,), needed=False)
             except InputError:
-                if key in needed or key in given:
+                if key in given:
                     raise
     return places
 
