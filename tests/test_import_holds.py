@@ -237,3 +237,15 @@ def test_mpu6050():
     path = shared("mpu6050/example_data_calibration.csv")
     holds = find_holds(open_log(path, rate=100, unit="counts", scale=G / 16384))
     assert len(holds) == 10
+
+
+@pytest.mark.parametrize(("sigma", "factor"), [(0.0003, 6), (0.002, 6), (0.01, 2), (0.1, 2)])
+def test_holds_that_are_noisier_than_the_others(tmp_path, sigma, factor):
+    """A quiet sensor feels a pump that runs now and then, and its holds are holds all the same."""
+    forces, edges = session(seed=2, holds=12, sigma=sigma)
+    rng = np.random.default_rng(1)
+    for start, end in edges[[2, 5, 9]]:
+        forces[start:end] += factor * sigma * rng.standard_normal((end - start, 3))
+    holds = find_holds(opened(tmp_path, forces))
+    assert len(holds) == len(edges)
+    assert np.all((holds.start >= edges[:, 0]) & (holds.end <= edges[:, 1]))

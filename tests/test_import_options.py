@@ -281,6 +281,7 @@ def settings(folder, text):
         (["--exclude", "13"], "exclude: expected a hold or a time, and why, as 13:moved"),
         (["--exclude", "1s-2s:x"], "exclude: 1s-2s: no hold lies there"),
         (["--join", "4"], "join: expected numbers of holds, as 4,5"),
+        (["--join", "4,5"], "join: holds 4 and 5 differ by"),
         (["--join", "4,6"], "join: 4, 6: hold 5 lies between them"),
     ],
 )

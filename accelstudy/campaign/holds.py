@@ -215,7 +215,7 @@ def find_joint_holds(
                 f"({counted(short, 'shorter one')}; a window is at rest up to "
                 f"{chosen[i].sd:.3g} m/s²)" + "".join(f"; {warning}" for warning in warnings)
             )
-        segments = selection.join(found)
+        segments = selection.join(found, chosen[i].sd)
         holds = _holds(
             segments, selection.left_out(segments), log, chosen[i], surveys[i], width, warnings
         )

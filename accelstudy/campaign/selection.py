@@ -6,6 +6,8 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from accelstudy.campaign.segments import Segment
 from accelstudy.errors import InputError
 
@@ -28,13 +30,18 @@ class Selection:
     spans: tuple[tuple[float, float, str], ...] = ()
     joined: tuple[tuple[int, ...], ...] = ()
 
-    def join(self, found: Mapping[int, Segment]) -> dict[int, Segment]:
+    def join(self, found: Mapping[int, Segment], alike: float) -> dict[int, Segment]:
         """Join holds; they keep the number of the first.
+
+        Parameters
+        ----------
+        found : mapping of int to Segment
+        alike : float, m/s², by which the means of holds in one attitude may differ
 
         Raises
         ------
         InputError
-            If there is no such hold, or others lie between.
+            If there is no such hold, others lie between, or they have not one attitude.
         """
         holds = dict(found)
         for group in self.joined:
@@ -44,6 +51,12 @@ class Selection:
             if between:
                 raise InputError(f"join: {_names(group)}: hold {between[0]} lies between them")
             for number in group[1:]:
+                step = float(np.linalg.norm(holds[number].mean - holds[group[0]].mean))
+                if step > alike:
+                    raise InputError(
+                        f"join: holds {group[0]} and {number} differ by {step:.2g} m/s²: the "
+                        "sensor was turned between them"
+                    )
                 holds[group[0]] = holds[group[0]] + holds.pop(number)
         return holds
 

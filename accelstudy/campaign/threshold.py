@@ -13,11 +13,14 @@ from accelstudy.campaign.windows import Windows, windows
 from accelstudy.campaign.wording import counted
 from accelstudy.errors import InputError
 from accelstudy.progress import track
+from accelstudy.units import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
 
-FACTOR = 9.0
-"""Threshold over noise floor, in variance; a sensor's noise differs between attitudes."""
+FACTOR = 3.0
+"""Threshold over noise floor; a sensor's noise differs between attitudes."""
+QUIET_FACTOR, QUIET = 10.0, 0.003 * STANDARD_GRAVITY
+"""The same for a quiet sensor, though only up to this, m/s²."""
 
 _BINS = np.linspace(-40.0, 40.0, 4001)  # decades of variance
 
@@ -107,6 +110,10 @@ def choose_threshold(survey: Survey, log: Recording) -> Threshold:
 
     Otsu's valley of the logarithmic variances parts rest from motion, though not sharply; at rest
     they crowd around one value, while in motion they spread over decades.
+
+    The multiple is 3, as noise differs between attitudes, and up to 10 as long as the threshold is
+    below 0.003 g: a quiet sensor feels steps and pumps that come and go, and what moves by less
+    than that in a second is not being turned.
     """
     counts = survey.counts
     if not counts.any():
@@ -117,11 +124,12 @@ def choose_threshold(survey: Survey, log: Recording) -> Threshold:
     mode = middle[np.argmax(np.convolve(quiet, np.ones(5), "same"))]
     crowd = np.where(np.abs(middle - mode) <= np.log10(2), counts, 0)
     floor = 10.0 ** middle[np.searchsorted(np.cumsum(crowd), crowd.sum() / 2)]
-    sd, noise = np.sqrt(FACTOR * floor), np.sqrt(floor)
+    noise = float(np.sqrt(floor))
+    sd = max(FACTOR * noise, min(QUIET_FACTOR * noise, QUIET))
     return Threshold(
-        float(sd),
-        float(noise),
-        f"{np.sqrt(FACTOR):.3g} times the noise floor of {noise:.3g} m/s², "
+        sd,
+        noise,
+        f"{sd / noise:.3g} times the noise floor of {noise:.3g} m/s², "
         "around which windows at rest crowd",
     )
 
