@@ -121,7 +121,7 @@ def caption(name: str, text: str, study: StudyConfig) -> str:
     """
     entry = get_figure(name)
     with _angles_of(study):
-        parts = [text.strip(), entry.note(study), angle_note() if entry.angles else ""]
+        parts = [text.strip(), entry.note(study), f"{angle_note()}." if entry.angles else ""]
     return " ".join(filter(None, parts)) + "\n"
 
 
