@@ -12,6 +12,11 @@ export PATH := $(CURDIR)/$(ENV)/bin:$(PATH)
 export VIRTUAL_ENV := $(CURDIR)/$(ENV)
 export PYTHONNOUSERSITE := 1
 unexport PYTHONPATH PYTHONHOME PYTHONDONTWRITEBYTECODE
+# Where the home folder cannot be written, what tools keep there is kept here.
+ifneq ($(shell mkdir -p "$${XDG_CACHE_HOME:-$$HOME/.cache}" 2>&- && test -w "$${XDG_CACHE_HOME:-$$HOME/.cache}" && echo yes),yes)
+export XDG_CACHE_HOME := $(CURDIR)/.cache
+export MPLCONFIGDIR := $(CURDIR)/.cache/matplotlib
+endif
 # Snakemake fills the cores with jobs; threads within a job would only compete with them.
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
@@ -60,7 +65,7 @@ lock: $(READY) ## lock the newest versions that pyproject.toml allows
 	uv export --quiet --frozen --no-emit-project --only-group build --output-file requirements-build.lock
 
 clean: ## remove the environment and all caches, but no results
-	rm -rf $(ENV) .coverage* .*_cache .hypothesis
+	rm -rf $(ENV) .cache .coverage* .*_cache .hypothesis
 	find accelstudy tests -name __pycache__ -prune -exec rm -r {} +
 
 # The stamp comes last: an environment without it is unfinished and made anew. The old one goes

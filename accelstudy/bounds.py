@@ -60,6 +60,7 @@ INTERVAL = Range(1e-6, 1e6, "s")
 DURATION = Range(1e-6, 1e7, "s")
 RATE = Range(1e-6, 1e9, "per second")
 
+CELLS = Range(1, 100_000)
 REPLICATES = Range(1, 10_000_000)
 SESSIONS = Range(100, 100_000)
 ATTITUDES = Range(1, 100_000)

@@ -232,21 +232,25 @@ def effects(campaign: Path | None, scheme: str | None, model: str, approach: str
 @main.command(epilog=example("accelstudy cells config/config.yaml config/sweeps/positions.yaml"))
 @click.argument("configs", nargs=-1, required=True, type=PATH)
 def cells(configs: tuple[Path, ...]) -> None:
-    """List the cells of a study, and which cannot be estimated.
+    """List the cells of a study, which cannot be estimated, and what it will take to run it.
 
     CONFIGS are YAML files; later ones overlay earlier ones, as with --configfile.
     """
     from accelstudy.design import diagnose
     from accelstudy.study.cells import study_cells
     from accelstudy.study.config import read_study
+    from accelstudy.study.effort import study_effort
 
     study = read_study(*configs)
-    for cell in study_cells(study):
+    chosen = study_cells(study)
+    effort = study_effort(study, chosen)
+    for cell in chosen:
         design = diagnose(
             cell.positions, cell.estimated_model, cell.conditions, cell.noise, hold=cell.hold
         )
         state = design.reason or f"r = {design.redundancy}, {cell.replicates} replicates"
         click.echo(f"{cell.name}: {state}")
+    click.echo(f"\n{effort}")
 
 
 @main.command(epilog=example("accelstudy config-schema"))

@@ -206,3 +206,24 @@ def test_what_no_sensor_can_have_is_not_called_good(tmp_path):
         assert (quality["state"], quality["plausible"]) == ("implausible", False)
         assert words in quality["warnings"]
         assert quality["verdict"].startswith("This looks like a gross error (")
+
+
+def test_no_position_predicted_by_the_others(tmp_path):
+    """Five positions with a robot and twelve parameters: each is needed by the fit."""
+    drawn = simulated_campaign(TRUTH)
+    few = {name: getattr(drawn, name)[[0, 3, 7, 11, 15]] for name in ("forces", "angles")}
+    write_campaign(
+        Campaign(
+            **{"name": "few", "positions": np.arange(1, 6), "gravity": drawn.gravity, **few},
+            sigma_force=0.002,
+            sigma_angle=drawn.sigma_angle,
+            yaw=np.zeros(5),
+        ),
+        tmp_path / "few",
+    )
+    model = "bias-scale-nonorthogonality-cubic"
+    options = ("--approach", "robot", "--model", model)
+    result = run("calibrate", tmp_path / "few", *options, "--out", tmp_path / "out")
+    assert result.exit_code == 0, repr(result.exception)
+    content = json.loads((tmp_path / "out/calibration.json").read_text(encoding="utf-8"))
+    assert content["quality"]["held_out"] is None

@@ -9,9 +9,11 @@ from accelstudy.campaign.batch_config import parse_batch
 from accelstudy.campaign.public import next_attempt
 from accelstudy.errors import InputError
 from accelstudy.study.config import read_layer
+from accelstudy.study.job import quote_python
 from accelstudy.study.provenance import check_writable, code_hash
 
 min_version("9.10")
+quote_python()
 
 
 # The environment of the Makefile is what counts; this is for executors that want a container.

@@ -8,9 +8,11 @@ from snakemake.utils import min_version
 from accelstudy.diagnosis.round_trip import parse_round_trip
 from accelstudy.errors import InputError
 from accelstudy.study.config import read_layer
+from accelstudy.study.job import quote_python
 from accelstudy.study.provenance import check_writable, code_hash
 
 min_version("9.10")
+quote_python()
 
 
 # The environment of the Makefile is what counts; this is for executors that want a container.

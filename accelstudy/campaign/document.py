@@ -100,7 +100,7 @@ def quality_document(assessment: Assessment) -> dict[str, Any]:
             for s in assessment.suspects
         ],
         "held_out": None
-        if held is None
+        if held is None or held.n_predicted == 0
         else {
             "n_predicted": held.n_predicted,
             "rms_mps2": number(held.rms),

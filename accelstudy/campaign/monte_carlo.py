@@ -10,6 +10,7 @@ from scipy import stats
 
 from accelstudy.adjustment import calibrate
 from accelstudy.campaign.fit import CampaignFit, campaign_noise
+from accelstudy.errors import InputError
 from accelstudy.progress import track
 from accelstudy.simulation import session
 from accelstudy.units import display_unit, to_display
@@ -37,6 +38,11 @@ def check_sigmas(fit: CampaignFit, replicates: int = 2000, seed: int = 1) -> pd.
         One row per parameter, in the units shown to people: parameter, unit, estimate, sigma (as
         claimed), sd_empirical with its 95 % interval, bias, ratio (sigma / sd_empirical),
         n_converged.
+
+    Raises
+    ------
+    InputError
+        If fewer than two simulated calibrations converge.
     """
     model, approach = fit.model, fit.approach
     noise = campaign_noise(fit.campaign)
@@ -55,6 +61,11 @@ def check_sigmas(fit: CampaignFit, replicates: int = 2000, seed: int = 1) -> pd.
         estimates.append(result.parameters[result.converged, : model.n_parameters])
     errors = np.concatenate(estimates) - fit.parameters
     n = len(errors)
+    if n < 2:
+        raise InputError(
+            f"{fit.campaign.name}: {n} of {replicates} simulated calibrations converge: no sigma "
+            "can be checked"
+        )
     sd = errors.std(axis=0, ddof=1)
     low, high = (sd * np.sqrt((n - 1) / stats.chi2.ppf(p, n - 1)) for p in (0.975, 0.025))
     rows = []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import shlex
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -10,6 +11,14 @@ from typing import Any
 
 from accelstudy.errors import InputError
 from accelstudy.study.config import StudyConfig, parse_study
+
+
+def quote_python() -> None:
+    """Let jobs start though the path of Python has a space.
+
+    Snakemake writes that path into commands of the shell as it is.
+    """
+    sys.executable = shlex.quote(sys.executable)
 
 
 @contextmanager

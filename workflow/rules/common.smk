@@ -6,6 +6,7 @@ from accelstudy.errors import InputError
 from accelstudy.figures import caption, figure_names, figure_tables, get_figure
 from accelstudy.study.cells import batches, study_cells
 from accelstudy.study.config import parse_study, read_layer
+from accelstudy.study.effort import study_effort
 from accelstudy.study.provenance import check_writable, code_hash
 from accelstudy.study.tables import TABLES
 
@@ -15,11 +16,13 @@ try:
     STUDY = parse_study(config, ", ".join(map(str, workflow.configfiles)) or "config")
     RESULTS = f"results/{STUDY.study}"
     check_writable(RESULTS)
+    CELLS = study_cells(STUDY)
+    EFFORT = study_effort(STUDY, CELLS)
 except InputError as error:
     raise WorkflowError(str(error)) from None
 
 # Cells run in batches, so that starting Python does not dominate; a batch is a job.
-BATCHES = {f"{i:04d}": cells for i, cells in enumerate(batches(study_cells(STUDY)))}
+BATCHES = {f"{i:04d}": cells for i, cells in enumerate(batches(CELLS))}
 PARTS = f"{RESULTS}/batches/{{batch}}"
 CAPTIONS = Path(str(workflow.current_basedir)).parent / "report/figures"
 ANALYSES = ["forces", "gravity", "robot"]
@@ -28,6 +31,10 @@ FINAL_TABLES = [
     *(["sensitivity"] if STUDY.sensitivity else []),
     *(["claims", "claims_by_scheme"] if STUDY.paper else []),
 ]
+
+
+onstart:
+    logger.info(f"{STUDY.study}: {EFFORT}")
 
 
 wildcard_constraints:

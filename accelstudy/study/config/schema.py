@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import re
 from collections.abc import Iterable, Sequence
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from accelstudy import bounds
 from accelstudy.approaches import approach_names, get_approach
 from accelstudy.design import diagnose
 from accelstudy.effects import Effect, get_effect
@@ -266,6 +268,8 @@ class StudyConfig(Block):
                 _known_schemes(grid.schemes)
             with _at(f"grids.{index}.approaches"):
                 _known_approaches(grid.approaches)
+            with _at(f"grids.{index}: number of cells"):
+                bounds.CELLS.check(self._n_cells(grid))
         if self.presets is not None:
             with _at("presets.approaches"):
                 _known_approaches(self.presets.approaches)
@@ -310,6 +314,19 @@ class StudyConfig(Block):
                 raise ValueError(f"sensitivity: {cell} cannot be estimated: {design.reason}")
             if self.paper and design.redundancy == 0:
                 raise ValueError(f"sensitivity: {cell} has no redundancy, which paper: true needs")
+
+    def _n_cells(self, grid: Grid) -> int:
+        """Number of combinations in a grid, which is not spelled out for it."""
+        lists: list[Sequence[object]] = [
+            self.model_names(grid.models),
+            _known_schemes(grid.schemes),
+            _known_approaches(grid.approaches),
+            grid.sensor_sigma_mps2 or [None],
+            grid.robot_sigma_mgon or [None],
+            grid.gravity_sigma_mps2 or [None],
+            grid.gravity_error_mps2 or [None],
+        ]
+        return math.prod(map(len, lists))
 
     @property
     def all_grids(self) -> list[Grid]:

@@ -1,0 +1,80 @@
+"""What a study takes is said before it starts, and what no machine can do is refused."""
+
+from pathlib import Path
+
+import pytest
+import yaml
+from click.testing import CliRunner
+from study_helpers import content, grid, make_study
+
+from accelstudy.cli import main
+from accelstudy.errors import InputError
+from accelstudy.study.cells import study_cells
+from accelstudy.study.config import read_study
+from accelstudy.study.effort import study_effort
+
+
+def effort(**keys):
+    study = make_study(**keys)
+    return study_effort(study, study_cells(study))
+
+
+def test_the_study_of_the_paper():
+    """It was measured to take two and a half minutes on two cores, and 0.35 GB of estimates."""
+    study = read_study(Path(__file__).parents[1] / "config" / "config.yaml")
+    found = study_effort(study, study_cells(study))
+    assert found.cells == 192
+    assert 150 < found.seconds < 600
+    assert 0.2e9 < found.disk < 0.7e9
+
+
+def test_it_grows_with_the_work():
+    small, large = (effort(grids=[grid(replicates=n)]) for n in (10_000, 1_000_000))
+    assert large.calibrations == 100 * small.calibrations
+    assert large.disk == 100 * small.disk
+    assert large.seconds > 4 * small.seconds
+    assert large.memory > 5 * small.memory
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({"grids": [grid(schemes="fibonacci-9999", replicates=10**7)]}, ["grids", "memory"]),
+        (
+            {
+                "grids": [
+                    grid(
+                        replicates=10**7,
+                        sensor_sigma_mps2=[1e-3 * i for i in range(1, 5000)],
+                    )
+                ]
+            },
+            ["grids", "calibrations", "lower replicates"],
+        ),
+        (
+            {
+                "grids": [
+                    grid(
+                        sensor_sigma_mps2=[1e-3 * i for i in range(1, 1000)],
+                        gravity_sigma_mps2=[1e-6 * i for i in range(1, 1000)],
+                    )
+                ]
+            },
+            ["grids.0: number of cells: must be from 1 to 100000"],
+        ),
+    ],
+)
+def test_what_no_machine_can_do(keys, words):
+    with pytest.raises(InputError) as error:
+        effort(**keys)
+    for word in words:
+        assert word in str(error.value)
+
+
+def test_cells_says_it(tmp_path):
+    (tmp_path / "tiny.yaml").write_text(yaml.safe_dump(content()), encoding="utf-8")
+    result = CliRunner().invoke(main, ["cells", str(tmp_path / "tiny.yaml")])
+    assert result.exit_code == 0, result.output
+    last = result.stdout.splitlines()[-1]
+    assert "calibrations: about" in last
+    assert "on one core" in last
