@@ -24,7 +24,9 @@ from accelstudy.options import (
     approach_option,
     example,
     model_option,
+    quiet_option,
 )
+from accelstudy.progress import say, stage, track
 from accelstudy.units import ANGLE_UNIT_VARIABLE, angles_in
 
 SECTIONS = {
@@ -99,6 +101,7 @@ def main(ctx: click.Context, angle_unit: str) -> None:
 @approach_option("gravity")
 @click.argument("names", nargs=-1, type=SCHEME)
 @angle_unit_option
+@quiet_option
 def schemes(model: str, approach: str, names: tuple[str, ...]) -> None:
     """List position schemes and what they can determine.
 
@@ -116,7 +119,7 @@ def schemes(model: str, approach: str, names: tuple[str, ...]) -> None:
     chosen_model, chosen_approach = get_model(model), get_approach(approach)
     check_needs_no_plan(chosen_model)
     rows = []
-    for name in names or scheme_names():
+    for name in track(names or scheme_names(), "schemes"):
         scheme = get_scheme(name)
         design = diagnose(scheme, chosen_model, chosen_approach)
         rows.append(
@@ -132,9 +135,9 @@ def schemes(model: str, approach: str, names: tuple[str, ...]) -> None:
                 "not estimable": ", ".join(design.not_estimable),
             }
         )
-    click.echo(f"model {chosen_model.name}, approach {approach}\n")
+    say(f"model {chosen_model.name}, approach {approach}\n")
     click.echo(pd.DataFrame(rows).to_string(index=False))
-    click.echo(
+    say(
         "\nrank and condition: of the scaled design at the ideal sensor; r: conditions - unknowns;"
         "\nm: mean of x²y²; pole: distance to the x axis, where roll is undefined;"
         f"\n{angle_note()}."
@@ -188,6 +191,7 @@ def models() -> None:
 @model_option
 @approach_option(None)
 @angle_unit_option
+@quiet_option
 def effects(campaign: Path | None, scheme: str | None, model: str, approach: str | None) -> None:
     """List all effects, or what a campaign can show of them.
 
@@ -200,7 +204,8 @@ def effects(campaign: Path | None, scheme: str | None, model: str, approach: str
     if campaign is None and scheme is None:
         from accelstudy.catalogue import catalogue
 
-        click.echo(f"{catalogue()}\n\n{angle_note()}.")
+        click.echo(catalogue())
+        say(f"\n{angle_note()}.")
         return
     if campaign is not None and scheme is not None:
         raise InputError("effects: --campaign and --scheme exclude each other; give one of them")
@@ -211,15 +216,17 @@ def effects(campaign: Path | None, scheme: str | None, model: str, approach: str
     from accelstudy.schemes import get_scheme
 
     chosen = get_model(model)
-    if campaign is not None:
-        named = None if approach is None else get_approach(approach)
-        setting = visibility.campaign_setting(read_campaign(campaign), chosen, named)
-    else:
-        setting = visibility.scheme_setting(
-            get_scheme(str(scheme)), chosen, get_approach(approach or "robot")
-        )
-    click.echo(visibility.visibility_table(setting).to_string(index=False))
-    click.echo(
+    with stage("what can be shown"):
+        if campaign is not None:
+            named = None if approach is None else get_approach(approach)
+            setting = visibility.campaign_setting(read_campaign(campaign), chosen, named)
+        else:
+            setting = visibility.scheme_setting(
+                get_scheme(str(scheme)), chosen, get_approach(approach or "robot")
+            )
+        table = visibility.visibility_table(setting).to_string(index=False)
+    click.echo(table)
+    say(
         "\nMDB: size of one parameter that a test at 0.1 % detects with a probability of 80 %;"
         "\nMIB: size at which the effect can also be told from the one it is most like;"
         "\nwith: setting in which the effect shows best, of those that a diagnosis tries;"
@@ -232,9 +239,10 @@ def effects(campaign: Path | None, scheme: str | None, model: str, approach: str
 @main.command(epilog=example("accelstudy cells config/config.yaml config/sweeps/positions.yaml"))
 @click.argument("configs", nargs=-1, required=True, type=PATH)
 def cells(configs: tuple[Path, ...]) -> None:
-    """List the cells of a study, which cannot be estimated, and what it will take to run it.
+    """List the cells of a study and what it will take.
 
-    CONFIGS are YAML files; later ones overlay earlier ones, as with --configfile.
+    Cells that cannot be estimated are listed with the reason. CONFIGS are YAML files; later ones
+    overlay earlier ones, as with --configfile.
     """
     from accelstudy.design import diagnose
     from accelstudy.study.cells import study_cells

@@ -114,7 +114,11 @@ def angle_unit_option(command: Command) -> Command:
 def quiet_option(command: Command) -> Command:
     """Add --quiet to a command that tells what it does, and show its progress."""
 
-    @click.option("--quiet", is_flag=True, help="Show no progress and print only warnings.")
+    @click.option(
+        "--quiet",
+        is_flag=True,
+        help="Show no progress, and print the result and warnings only.",
+    )
     @wraps(command)
     def within(*args: Any, quiet: bool, **kwargs: Any) -> Any:
         with feedback(quiet):

@@ -117,6 +117,9 @@ def test_all_schemes_by_default():
     assert faces[3:5] == ["6/9", "-"]
     assert faces[-3:] == ["alpha_yz,", "alpha_zy,", "alpha_zx"]
     assert rows_of(text, scheme_names())["mclaren-24"][6] == "0.0667"  # m = 1/15
+    table = output("schemes", "--quiet").strip("\n")
+    assert table in text
+    assert len(table.splitlines()) == 1 + len(scheme_names())
 
 
 def test_directions_of_a_scheme():
@@ -230,13 +233,17 @@ def test_effects():
 def test_cells(tmp_path):
     base, over = tmp_path / "base.yaml", tmp_path / "over.yaml"
     base.write_text(yaml.safe_dump(content(grids=[grid(schemes=["faces-6", "mclaren-24"])])))
-    lines = output("cells", base).splitlines()
+    *lines, gap, effort = output("cells", base).splitlines()
     assert len(lines) == 4
+    assert gap == ""
+    assert effort.startswith("4 cells, up to 240 calibrations: ")
     assert f"{NINE}/mclaren-24/gravity: r = 15, 60 replicates" in lines
     assert f"{NINE}/mclaren-24/robot: r = 63, 60 replicates" in lines
     assert lines[0].startswith(f"{NINE}/faces-6/gravity: rank 6 of 9: alpha_yz, ")
     over.write_text(yaml.safe_dump({"grids": [grid(approaches="robot", replicates=7)]}))
-    assert output("cells", base, over) == f"{NINE}/mclaren-24/robot: r = 63, 7 replicates\n"
+    assert output("cells", base, over).startswith(
+        f"{NINE}/mclaren-24/robot: r = 63, 7 replicates\n\n"
+    )
 
 
 def test_claims(tmp_path):
