@@ -321,6 +321,7 @@ def test_forms_take_and_give_the_axes_of_the_log(frame, whole, tmp_path):
     np.testing.assert_allclose(by_the_export(run_out("export", path), raw), expected, atol=1e-8)
     header = run_out("export", path, "--form", "c")
     assert f"in the axes {frame}:" in header
+    assert ("x forward, y left, z up." in header) == (frame == "flu")
     assert "x, y, z in counts" in header
     assert "x is read as −y" in header
     readings = readings_of(log_of(raw, tmp_path), calibration, {"columns": COLUMNS})

@@ -43,6 +43,9 @@ SYMBOLS = {
     "roll": "rad, attitude of the rig; likewise pitch, yaw",
 }
 
+WAYS = {"f": "forward", "b": "back", "r": "right", "l": "left", "d": "down", "u": "up"}
+"""Where an axis points, by the letter of a frame."""
+
 
 def device_matrix(calibration: Mapping[str, Any]) -> Array:
     """M (3, 4) with f = M · (raw, 1), from raw readings to m/s², both in the axes of the log.
@@ -181,10 +184,11 @@ def _row(values: ArrayLike, separator: str) -> str:
 def _c_header(calibration: Mapping[str, Any]) -> str:
     rows = ",\n".join(f"    {{{_row(row, ', ')}}}" for row in device_matrix(calibration))
     frame = _readings(calibration)[2]
+    ways = ", ".join(f"{i} {WAYS[letter]}" for i, letter in zip("xyz", frame.name, strict=True))
     lines = [
         f"Accelerometer calibration of {calibration['campaign']}.",
         f"Specific force in m/s^2 = M * (x, y, z, 1), with x, y, z in {_unit(calibration)}.",
-        f"Both are in the axes {frame.name}: where x, y and z point, as forward, right, down.",
+        f"Both are in the axes {frame.name}: {ways}.",
     ]
     if (calibration.get("mended") or {}).get("matrix") is not None:
         lines.append(f"M mends the readings, too: {calibration['mended']['reason']}.")
