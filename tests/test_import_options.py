@@ -56,7 +56,7 @@ def test_the_unit_of_time_is_suggested(tmp_path, turned):
     path = write(tmp_path, forces, time)
     result = call(path, "--out", tmp_path / "out")
     assert result.exit_code == 2
-    assert "its times look like us, which makes 100 samples per second" in result.stderr
+    assert "if its times are in us, there are 100 samples per second" in result.stderr
     assert "give --time-unit us" in result.stderr
     result = call(path, "--out", tmp_path / "out", "--time-unit", "us", "--no-figure")
     assert result.exit_code == 0, result.output
@@ -335,6 +335,8 @@ def test_one_file_per_position(tmp_path, turned, clock):
     assert campaign.positions.tolist() == [1, 2, 4, 5]
     assert "5, with the longest hold of each as one position" in report.notes[0]
     assert (campaign.time is not None) == (clock == "one")
+    assert campaign.name == "positions"
+    assert not any("gap" in text for text in report.warnings)
     middles = edges[[0, 1, 3, 4]].mean(axis=1)
     if clock == "one":
         np.testing.assert_allclose(np.diff(campaign.time), np.diff(middles) / RATE, atol=0.1)

@@ -76,7 +76,7 @@ def import_means(
         warnings.append("sigma of a mean is that of white noise; coloured noise makes it larger")
     forces = frame.to_frd((np.column_stack([values[axis] for axis in AXES]) - shift) * factor)
     campaign = imported_campaign(
-        path,
+        [path],
         settings,
         forces,
         sigma_force=sigma,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 def imported_campaign(
-    path: str | Path, settings: ImportSettings, forces: Array, **columns: Any
+    paths: Sequence[str | Path], settings: ImportSettings, forces: Array, **columns: Any
 ) -> Campaign:
     """Campaign of forces (n, 3) in m/s², in forward, right, down, as the settings describe it.
 
@@ -39,10 +39,10 @@ def imported_campaign(
         raw = frame.from_frd(forces) / factor + shift
     else:
         raw = forces / UNITS["m/s^2"][settings.unit]
-    _check_size(path, settings, raw, forces)
+    _check_size(paths[0], settings, raw, forces)
     return Campaign(
         **{
-            "name": settings.name or default_name(path),
+            "name": settings.name or default_name(paths),
             "positions": np.arange(1, len(forces) + 1),
             "forces": forces,
             "gravity": settings.gravity.value_mps2,
@@ -94,7 +94,9 @@ def layout_of(settings: LogLayout, source: Source, places: Mapping[str, int]) ->
     return LogLayout.model_validate({**layout, "columns": columns, "time": time})
 
 
-def default_name(path: str | Path) -> str:
-    """Name of a campaign: that of its file, without what says how it is packed."""
-    path = Path(path)
+def default_name(paths: Sequence[str | Path]) -> str:
+    """Name of a campaign: that of its file without its endings, or of the folder of several."""
+    path = Path(paths[0])
+    if len(paths) > 1:
+        return path.absolute().parent.name or path.stem
     return Path(path.stem).stem if path.suffix == ".gz" else path.stem

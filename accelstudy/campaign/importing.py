@@ -221,7 +221,7 @@ def _campaign(
             hold = holds.number[np.argmin(np.isfinite(values))]
             warnings.append(f"hold {hold} has no {name}; the column is left out")
     campaign = imported_campaign(
-        paths[0],
+        paths,
         settings,
         forces,
         positions=holds.number,

@@ -220,8 +220,8 @@ class Log:
         if TIME_UNITS[unit] == self.time_factor:
             return ""
         return (
-            f"; its times look like {unit}, which makes {rates[unit]:.4g} samples per second: "
-            f"give --time-unit {unit}"
+            f"; if its times are in {unit}, there are {rates[unit]:.4g} samples per second: give "
+            f"--time-unit {unit}"
         )
 
     def chunks(self) -> Iterator[Rows]:

@@ -30,8 +30,8 @@ _COLOURS = ("#0072B2", "#D55E00", "#009E73")
 _THRESHOLD = "#CC79A7"
 _SHADE = "#DCE6F0"
 _LEFT_OUT: dict[str, Any] = {"facecolor": "#F2E4E4", "hatch": "////", "edgecolor": "#B08080"}
-_NUMBERS = 60
-"""Numbers of holds that stand beside each other; of more only every second, third, … is shown."""
+_DIGITS = 130
+"""Digits that stand beside each other; of more only every second, third, … number is shown."""
 
 
 def draw_segmentation(log: Recording, holds: Holds) -> Figure:
@@ -83,7 +83,7 @@ def render_segmentation(
 
 def _number(ax: Axes, holds: Holds) -> None:
     """Write the numbers of the holds above them."""
-    every = 1 + (len(holds) - 1) // _NUMBERS
+    every = 1 + len(holds) * len(str(holds.number[-1])) // _DIGITS
     for i, (number, used) in enumerate(zip(holds.number, holds.used, strict=True)):
         if i % every == 0 or not used:
             ax.annotate(

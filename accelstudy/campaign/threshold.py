@@ -54,7 +54,7 @@ class Survey:
 
     def add(self, batch: Windows) -> None:
         """Take in some windows, which follow those before."""
-        self.gaps = batch.piece
+        self.gaps = batch.piece - batch.recording
         if not len(batch.time):
             return
         self.span = (batch.time[0] if np.isnan(self.span[0]) else self.span[0], batch.time[-1])
