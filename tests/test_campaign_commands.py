@@ -189,25 +189,6 @@ def test_what_is_not_there_is_one_line(arguments, tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
-def test_what_no_sensor_can_have_is_not_called_good(tmp_path):
-    """Two axes negated fit perfectly, with scales of −2."""
-    for error, words in {
-        "axis_error(x=1,y=-2,z=-3)": "axes have the wrong sign: y is read as −y, z is read as −z",
-        "axis_error(x=2,y=1,z=3)": "axes are swapped: x is read as y, y is read as x",
-        "row_order(first=4,second=14)": "the forces of positions 4, 14 are exchanged",
-    }.items():
-        wrong, out = tmp_path / words[:9], tmp_path / f"{words[:9]}-out"
-        made = run("simulate-campaign", "--out", wrong, "--scheme", "fibonacci-30", "--order",
-                   "random", "--gross", error)  # fmt: skip
-        assert made.exit_code == 0, made.output
-        result = run("calibrate", wrong, "--approach", "robot", "--out", out)
-        assert result.exit_code == 0, result.output
-        quality = json.loads((out / "calibration.json").read_text(encoding="utf-8"))["quality"]
-        assert (quality["state"], quality["plausible"]) == ("implausible", False)
-        assert words in quality["warnings"]
-        assert quality["verdict"].startswith("This looks like a gross error (")
-
-
 def test_no_position_predicted_by_the_others(tmp_path):
     """Five positions with a robot and twelve parameters: each is needed by the fit."""
     drawn = simulated_campaign(TRUTH)

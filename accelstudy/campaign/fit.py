@@ -10,18 +10,20 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment import Adjustment, Observations, calibrate
 from accelstudy.adjustment.quality import GlobalTest, global_test
-from accelstudy.approaches import Approach
+from accelstudy.approaches import Approach, get_approach
 from accelstudy.campaign.format import Campaign
 from accelstudy.campaign.gauges import not_affine
 from accelstudy.campaign.header import COLUMNS
 from accelstudy.campaign.sphere import fit_sphere
 from accelstudy.design import Design, diagnose
 from accelstudy.errors import InputError
+from accelstudy.gross_errors.recognition import recognise
 from accelstudy.models import compose
 from accelstudy.schemes import Scheme
 from accelstudy.sensor import SensorModel
 from accelstudy.simulation import Noise
 from accelstudy.units import MGON
+from accelstudy.wording import words
 
 Array = NDArray[np.float64]
 
@@ -222,7 +224,7 @@ def fit_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> 
     if not adjustment.converged[0]:
         raise InputError(
             f"{campaign.name}: the adjustment of the model {model.name!r} does not converge; "
-            "a gross error in the data or a wrong unit is the usual cause"
+            f"{_cause(campaign)}; `accelstudy diagnose` looks for more"
         )
     return CampaignFit(campaign, model, approach, observed, adjustment, design)
 
@@ -239,6 +241,14 @@ def campaign_design(campaign: Campaign, model: SensorModel, approach: Approach) 
         gravity=campaign.gravity,
         hold=campaign.hold,
     )
+
+
+def _cause(campaign: Campaign) -> str:
+    """Say what may keep an adjustment from converging."""
+    found = recognise(campaign, get_approach("gravity" if campaign.angles is None else "robot"))
+    if found is None:
+        return "a gross error in the data or a wrong unit is the usual cause"
+    return f"this looks like a gross error ({words(found.name)}): {found.reason}"
 
 
 def initial_values(model: SensorModel, forces: Array, gravity: float) -> Array:
