@@ -1,5 +1,7 @@
 """From a log to a campaign folder: what is in it, settings, the figure, and the command."""
 
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -19,7 +21,7 @@ from accelstudy.campaign.importing import (
 from accelstudy.campaign.importing_cli import import_command
 from accelstudy.cli import Commands
 from accelstudy.errors import InputError
-from accelstudy.units import STANDARD_GRAVITY
+from accelstudy.units import STANDARD_GRAVITY, angles_in
 
 XSENS = {
     "columns": {"fx": 1, "fy": 2, "fz": 3},
@@ -65,7 +67,12 @@ def test_turning_is_not_noise(tmp_path):
         forces[a:b] += np.linspace(-0.02, 0.02, b - a)[:, None] * across
     campaign, report = import_log(write(tmp_path, forces), ImportSettings(rate_hz=100))
     assert campaign.sigma_force == pytest.approx(0.005 / np.sqrt(260), rel=0.5)
-    assert any("the sensor turns" in text for text in report.warnings)
+    (gon,) = (text for text in report.warnings if "the sensor turns" in text)
+    with angles_in("deg"):
+        _, report = import_log(write(tmp_path, forces), ImportSettings(rate_hz=100))
+    (deg,) = (text for text in report.warnings if "the sensor turns" in text)
+    size = [float(re.search(r"by some (\d+) m(?:gon|deg) within", text)[1]) for text in (gon, deg)]
+    assert size[1] == pytest.approx(0.9 * size[0], abs=1)
 
 
 def test_without_offset_no_direction(tmp_path):

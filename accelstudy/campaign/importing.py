@@ -24,7 +24,7 @@ from accelstudy.campaign.log_series import LogSeries
 from accelstudy.campaign.logs import AXES, Log, Recording, conversion, open_log
 from accelstudy.campaign.session import Campaign
 from accelstudy.errors import InputError
-from accelstudy.units import MGON
+from accelstudy.units import display_unit, to_display
 
 __all__ = [
     "GravitySettings",
@@ -257,9 +257,10 @@ def _accuracy(holds: Holds, gravity: float) -> tuple[MeanAccuracy, list[str]]:
             "sigma is that of all axes together"
         )
     elif (across := accuracy_in(slice(1, 3)).allan) > TURNING * accuracy.allan:
+        turned = f"{to_display(across / gravity, 'rad'):.0f} {display_unit('rad')}"
         warnings.append(
             f"across gravity the means vary by {shown(across)}, more than along it: the sensor "
-            f"turns by some {across / gravity / MGON:.0f} mgon within holds"
+            f"turns by some {turned} within holds"
         )
     if accuracy.slope is not None:
         warnings.append(

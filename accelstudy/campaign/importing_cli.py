@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from accelstudy.errors import InputError
-from accelstudy.options import PATH, Sectioned, example, force_option, quiet_option
+from accelstudy.options import (
+    PATH,
+    Sectioned,
+    angle_unit_option,
+    example,
+    force_option,
+    quiet_option,
+)
 from accelstudy.progress import say
 
 if TYPE_CHECKING:
@@ -56,6 +63,7 @@ _SECTIONS = {
 @click.option("--gravity", type=float, help="Local gravity, m/s².  [default: 9.80665]")
 @click.option("--settings", "settings_path", type=PATH, help="YAML file; options overlay it.")
 @force_option
+@angle_unit_option
 @quiet_option
 def import_command(
     log: tuple[Path, ...],
@@ -105,6 +113,7 @@ def import_command(
     help="Where the file is, in any subfolder, or is downloaded to.",
 )
 @force_option
+@angle_unit_option
 @quiet_option
 def public_command(name: str | None, out: Path | None, folder: Path, force: bool) -> None:
     """Make a campaign of public data, or list what there is.
