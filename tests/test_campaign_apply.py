@@ -293,7 +293,7 @@ def mixed_log():
 
 
 def read_back(path):
-    return pd.read_parquet(path) if path.suffix == ".parquet" else pd.read_csv(path)
+    return pd.read_csv(path) if ".csv" in path.name else pd.read_parquet(path)
 
 
 @pytest.mark.parametrize("chunk_size", [1, 7, N])
@@ -358,6 +358,9 @@ def test_parquet_keeps_its_types(tmp_path):
     level_log(calibration, tmp_path / "log.parquet", tmp_path / "out.parquet", chunk_size=1)
     assert pq.read_table(tmp_path / "out.parquet").select(log.column_names).equals(log)
     level_log(calibration, tmp_path / "log.parquet", tmp_path / "out.csv", chunk_size=1)
+    given = {"columns": {"fx": "when", "fy": "fy", "fz": "fz"}}
+    with pytest.raises(InputError, match="column when is timestamp"):
+        level_log(calibration, tmp_path / "log.parquet", tmp_path / "no.csv", given)
     text = (tmp_path / "out.csv").read_text(encoding="utf-8").splitlines()
     assert text[1].startswith("1,1.5,9,1,1970-01-01 00:00:00.000000000,")
     assert text[2].startswith("2,2.5,9.5,,1970-01-01 00:00:00.000000001,")
@@ -420,7 +423,7 @@ def test_a_lost_sample_does_not_lose_the_log(tmp_path, chunk_size):
     assert warning.endswith("line 3 has not the 4 columns of the others")
 
 
-@pytest.mark.parametrize("wanted", ["out.csv", "out.parquet"])
+@pytest.mark.parametrize("wanted", ["out.csv.gz", "out.pq"])
 @pytest.mark.parametrize(
     ("name", "text"),
     [

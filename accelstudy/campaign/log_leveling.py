@@ -15,7 +15,7 @@ from accelstudy.campaign.applying import Calibration
 from accelstudy.campaign.log_account import Account, clipped
 from accelstudy.campaign.log_files import CHUNK
 from accelstudy.campaign.log_reading import Readings, readings_of
-from accelstudy.campaign.log_tables import chunk_writer
+from accelstudy.campaign.log_tables import chunk_writer, is_parquet
 from accelstudy.campaign.logs import AXES
 from accelstudy.effects import Hold
 from accelstudy.frames import Frame
@@ -79,7 +79,7 @@ def level_log(
     noise = noise_of_reading(calibration) if sigma is None else sigma
     account = Account(calibration, readings)
     with chunk_writer(out) as write:
-        chunks = readings.chunks(chunk_size, typed=Path(out).suffix == ".parquet")
+        chunks = readings.chunks(chunk_size, typed=is_parquet(out))
         for table, forces, hold in track(chunks, "leveling"):
             corrected, added = _leveled(calibration, readings.frame, forces, hold, noise)
             account.take(table, forces, corrected, hold)

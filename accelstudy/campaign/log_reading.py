@@ -68,9 +68,10 @@ class Readings:
 
         See `read_chunks` for `typed`.
         """
-        names, row, first = column_names(self.source), 0, np.nan
+        names, places = column_names(self.source), list(self.places.items())
+        row, first = 0, np.nan
         for table in read_chunks(self.source, chunk_size, typed):
-            values = {key: numbers(table[names[place]]) for key, place in self.places.items()}
+            values = {key: self._numbers(table[names[place]], place) for key, place in places}
             forces = np.column_stack([values[axis] for axis in AXES])
             time = values.get("time")
             if self.rate is not None:
@@ -92,6 +93,15 @@ class Readings:
             read = self.frame.to_frd((forces - self.offset) * self.scale)
             yield table, read @ self.mending.T, hold
             row += len(table)
+
+    def _numbers(self, column: pa.ChunkedArray, place: int) -> Array:
+        kind = column.type
+        if not (
+            pa.types.is_string(kind) or pa.types.is_integer(kind) or pa.types.is_floating(kind)
+        ):
+            name = self.source.names[place]
+            raise InputError(f"{self.source.path}: column {name} is {kind}, not numbers")
+        return numbers(column)
 
 
 def readings_of(

@@ -7,6 +7,7 @@ on where a chunk ends. Parquet has types; those of a text's columns are found ou
 from __future__ import annotations
 
 import csv
+import gzip
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -78,10 +79,8 @@ def column_names(source: Source) -> list[str]:
 
 
 def numbers(column: pa.ChunkedArray) -> Array:
-    """Numbers of a column, NaN where there is none."""
+    """Numbers of a column of numbers or of text, NaN where there is none."""
     if not pa.types.is_string(column.type):
-        if not (pa.types.is_integer(column.type) or pa.types.is_floating(column.type)):
-            return np.full(len(column), np.nan)
         return column.cast(pa.float64(), safe=False).to_numpy()
     try:
         # Arrow reads any number in full precision, but stops at what is none.
@@ -167,25 +166,38 @@ def chunk_writer(path: str | Path) -> Iterator[Callable[[pa.Table], None]]:
 
     Parameters
     ----------
-    path : file to write; .parquet, anything else is CSV
+    path : file to write; see `is_parquet`, anything else is CSV, packed if it ends in .gz
     """
     path = Path(path)
     try:
-        with whole_file(path) as temporary:
-            if path.suffix == ".parquet":
-                with _parquet_writer(temporary) as write:
-                    yield write
-            else:
-                with temporary.open("w", encoding="utf-8", newline="") as file:
-
-                    def write(table: pa.Table) -> None:
-                        if not file.tell():
-                            csv.writer(file, lineterminator="\n").writerow(table.column_names)
-                        file.write("".join(_lines(table)))
-
-                    yield write
+        with (
+            whole_file(path) as temporary,
+            (_parquet_writer if is_parquet(path) else _csv_writer)(temporary) as write,
+        ):
+            yield write
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+
+def is_parquet(path: str | Path) -> bool:
+    """Whether a file is Parquet by its ending."""
+    return Path(path).suffix.lower() in (".parquet", ".pq")
+
+
+@contextmanager
+def _csv_writer(path: Path) -> Iterator[Callable[[pa.Table], None]]:
+    packed = path.suffix.lower() == ".gz"
+    with (gzip.open if packed else open)(path, "wt", encoding="utf-8", newline="") as file:
+        empty = True
+
+        def write(table: pa.Table) -> None:
+            nonlocal empty
+            if empty:
+                csv.writer(file, lineterminator="\n").writerow(table.column_names)
+            empty = False
+            file.write("".join(_lines(table)))
+
+        yield write
 
 
 def _lines(table: pa.Table) -> list[str]:
