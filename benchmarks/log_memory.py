@@ -4,8 +4,8 @@
 
 Generates logs of these sizes (100 and 1000 MB if none is given) in a folder that is removed
 afterwards, runs both commands on each as processes of their own, and prints their wall time and
-their largest resident memory. `apply` writes five to six times what it reads, so the folder of
-temporary files (TMPDIR says which) needs seven times the largest size.
+their largest resident memory. `apply` writes four times what it reads, so the folder of
+temporary files (TMPDIR says which) needs six times the largest size.
 """
 
 import os
