@@ -14,8 +14,10 @@ from scipy import stats
 from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
 from accelstudy.campaign import read_campaign, write_campaign
+from accelstudy.campaign.assessment import assess
 from accelstudy.campaign.fit import fit_campaign
 from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign
+from accelstudy.campaign.verdict import ACCEPTED, REJECTED, state
 from accelstudy.cli import main
 from accelstudy.diagnosis import gap
 from accelstudy.diagnosis.pipeline import diagnose
@@ -84,9 +86,20 @@ def test_the_family_errs_as_often_as_it_says(level):
 
 @pytest.mark.parametrize("approach", ["robot", "gravity"])
 def test_false_alarms_are_rare(approach):
-    runs = 40
-    verdicts = [diagnose(campaign(k, approach=approach)[0], NINE).verdict for k in range(runs)]
-    alarms = runs - verdicts.count("no_effect")
+    """And the calibration of the same campaign says nothing that the diagnosis contradicts."""
+    runs, alarms = 40, 0
+    for k in range(runs):
+        measured, _ = campaign(k, approach=approach)
+        found = diagnose(measured, NINE)
+        alarms += found.verdict != "no_effect"
+        assessment = assess(fit_campaign(measured, NINE, get_approach(approach)))
+        judged = state(assessment)
+        assert judged in (ACCEPTED, REJECTED)
+        assert not (judged == REJECTED and found.verdict == "no_effect")
+        assert not (judged == ACCEPTED and "noise_level" in names(found))
+        marked = {int(measured.positions[s.position]) for s in assessment.suspects}
+        said = {label for label, _ in found.suspects} | {named.position for named in found.found}
+        assert marked <= said
     assert alarms <= stats.binom.isf(0.001, runs, 0.05)
 
 

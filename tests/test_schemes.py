@@ -116,6 +116,8 @@ def test_directions_are_read_only():
         ("face-6", "faces-6"),
         ("fibonacci-0", "fibonacci-50"),
         ("fibonacci-024", "fibonacci-24"),
+        ("fibonaci-12", "fibonacci-12"),
+        ("randm-20-7", "random-20-7"),
         ("random-38-01", "random-38"),
     ],
 )
