@@ -399,3 +399,15 @@ def test_a_large_effect_is_fitted_from_the_affine_part_on():
     model = get_model(f"{NINE}+saturation(knee=9.3163175)")
     fit = fit_campaign(campaign, model, get_approach("gravity"))
     np.testing.assert_allclose(fit.parameters[9:], [0.5, -0.5, -0.5], atol=0.05)
+
+
+def test_a_part_of_an_effect_is_calibrated_and_read_again(made, tmp_path):
+    model = get_model(f"{NINE}+saturation(knee=9)[k_sat_z]")
+    path = tmp_path / "calibration.json"
+    fit = fit_campaign(read_campaign(made / "c"), model, get_approach("robot"))
+    path.write_text(json.dumps(calibration_document(fit)), encoding="utf-8")
+    calibration = read_calibration(path)
+    assert calibration.model.parameter_names[9:] == ("k_sat_z",)
+    effect = json.loads(run("export", path))["effects"][-1]
+    assert effect["spec"] == "saturation(knee=9)[k_sat_z]"
+    assert effect["output"][:2] == ["0", "0"]
