@@ -382,7 +382,7 @@ def test_positions_are_judged_by_leveling_at_the_reference_temperature(made):
 
 
 def test_a_model_that_becomes_a_registered_one_is_a_study_too():
-    campaign, _ = simulate_campaign(CampaignSettings(scheme="fibonacci-30", approach="gravity"))
+    campaign, _ = simulate_campaign(CampaignSettings(scheme="fibonacci-30"))
     diagnosis = diagnose(campaign, get_model("bias-scale"))
     assert diagnosis.extended.name == NINE
     overlay = study_overlay(diagnosis)
