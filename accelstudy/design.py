@@ -97,7 +97,9 @@ def diagnose(
     not_estimable = tuple(name for name, is_free in zip(names, free, strict=True) if is_free)
     reason = ""
     cofactors = np.full((len(names), len(names)), np.nan)
-    if not_estimable:
+    if not np.isfinite(a).all():
+        reason = "the sigmas differ too much: the conditions have no weights to compute with"
+    elif not_estimable:
         blind = _is_blind(model, approach, noise, gravity)
         reason = (
             f"rank {rank} of {len(names)}: {', '.join(not_estimable)} cannot be told apart by "
@@ -146,6 +148,8 @@ def _is_blind(model: SensorModel, approach: Approach, noise: Noise, gravity: flo
 
 def _rank(a: Array) -> tuple[int, float, NDArray[np.bool_]]:
     """Rank, condition and which columns lie in the null space of a design."""
+    if not np.isfinite(a).all():
+        return 0, np.inf, np.ones(a.shape[1], dtype=bool)
     length = np.linalg.norm(a, axis=0)
     longest = length.max() or 1.0
     # A column of rounding errors is no direction, and would be one at unit length.

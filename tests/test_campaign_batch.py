@@ -481,3 +481,25 @@ def test_what_a_page_shows_is_escaped(tmp_path):
     page = paths[2].read_text(encoding="utf-8")
     assert "<i>" not in page
     assert "&lt;i&gt;&amp;: no such folder" in page
+
+
+def test_an_error_that_nobody_has_foreseen_stops_no_other(tmp_path, monkeypatch):
+    """Nor what was written before it, half a calibration, is left."""
+    write_campaign(simulated_campaign({"b_x": 0.05}), tmp_path / "campaign")
+    content = {"batch": "b", "campaigns": [{"campaign": str(tmp_path / "campaign")}]}
+    (task,) = parse_batch(content).tasks()
+
+    def broken(fit, folder):
+        (folder / "report.html").write_text("half")
+        (folder / "figures").mkdir()
+        raise ZeroDivisionError("a\nb")
+
+    monkeypatch.setattr("accelstudy.campaign.batch.write_calibration", broken)
+    error = run_task(task, tmp_path / "out", log="results/b/logs/campaigns/campaign.log")
+    assert error == (
+        "internal error, please report it (ZeroDivisionError: a b); the log has the details: "
+        "results/b/logs/campaigns/campaign.log"
+    )
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["status.json"]
+    status = json.loads((tmp_path / "out/status.json").read_text(encoding="utf-8"))
+    assert (status["status"], status["error"]) == ("failed", error)

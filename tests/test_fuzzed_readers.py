@@ -22,6 +22,7 @@ from test_campaign_format import damages, edits
 
 from accelstudy.campaign.document import calibration_document
 from accelstudy.campaign.fit import fit_campaign
+from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.cli import main
 
 LOG = pd.DataFrame(np.random.default_rng(1).normal(0, 5, (30, 3)), columns=["fx", "fy", "fz"])
@@ -185,3 +186,70 @@ def test_damaged_log_to_be_leveled(calibration, name, damage, wanted):
         one_line_at_most(
             folder, *("apply", folder / "calibration.json", path, "--out", folder / wanted)
         )
+
+
+HOSTILE = [
+    *("0", "-1", "1", "nan", "inf", "1e300", "-1e300", "1e-300", "1e10", "1e-12", "9" * 400, "x"),
+    *("", "\x1b[31m", "../x", "{x}", "'", "x" * 300, "20:40", "1e300:1", "nan:0", "fibonacci-9"),
+    *("warm_up(tau=1e300)", "bias: 1e300, 0, 0", "heavy_tails(nu=2.000001)", "unit_error"),
+]
+OPTIONS = [
+    *("--name", "--seed", "--scheme", "--repeats", "--repeat-first", "--order", "--approach"),
+    *("--model", "--effect", "--size", "--noise-effect", "--gross", "--sigma", "--interval"),
+    *("--robot-sigma-mgon", "--temperature", "--vibration", "--yaw", "--samples-per-hold"),
+]
+
+
+@settings(max_examples=60)
+@given(st.lists(st.tuples(st.sampled_from(OPTIONS), st.sampled_from(HOSTILE)), max_size=2))
+def test_hostile_options(pairs):
+    """What can be simulated can be read; click says in its own way what is no number."""
+    with TemporaryDirectory() as folder:
+        out = Path(folder) / "out"
+        options = [word for pair in pairs for word in pair]
+        result = CliRunner().invoke(main, ["simulate-campaign", "--out", str(out), *options])
+        assert result.exit_code in (0, 2), repr(result.exception)
+        assert result.exception is None or isinstance(result.exception, SystemExit)
+        if result.exit_code == 0:
+            read_campaign(out, plausible=False)
+        else:
+            assert "error: " in result.stderr.lower()
+            assert len(result.stderr) < 2500
+            assert not list(Path(folder).iterdir())
+
+
+KEYS = [
+    *(("gravity", "value_mps2"), ("gravity", "sigma_mps2"), ("sensor_noise", "sigma_mps2")),
+    *(("robot", "angle_sigma_mgon"), "fx", "fz", "roll_robot_gon", "pitch_robot_gon"),
+]
+NUMBERS = [0, 1e-300, 1e-12, 1e-9, 1, -1, 100, 400, 500, 1e3, 1e10, 1e12, 1e160, 1e300]
+
+
+@settings(max_examples=40)
+@given(
+    st.lists(st.tuples(st.sampled_from(KEYS), st.sampled_from(NUMBERS)), min_size=1, max_size=2),
+    st.sampled_from(["gravity", "robot"]),
+    st.sampled_from(["bias-scale-nonorthogonality", "bias-scale-nonorthogonality-cubic"]),
+)
+@example([("pitch_robot_gon", 500)], "robot", "bias-scale-nonorthogonality-cubic")
+@example([("fx", 1e300)], "gravity", "bias-scale-nonorthogonality")
+@example(
+    [(KEYS[2], 1000), (KEYS[1], 1)], "robot", "bias-scale-nonorthogonality"
+)  # a sensor that knows nothing, and a gravity that knows little more
+def test_hostile_numbers(changes, approach, model):
+    with TemporaryDirectory() as name:
+        folder = Path(name) / "campaign"
+        write_campaign(simulated_campaign(TRUTH), folder)
+        header = yaml.safe_load((folder / "campaign.yaml").read_text(encoding="utf-8"))
+        table = pd.read_csv(folder / "positions.csv")
+        for key, value in changes:
+            if isinstance(key, tuple):
+                header.setdefault(key[0], {})[key[1]] = value
+            else:
+                table.loc[3, key] = float(value)
+        (folder / "campaign.yaml").write_text(yaml.safe_dump(header), encoding="utf-8")
+        table.to_csv(folder / "positions.csv", index=False)
+        one_line_at_most(
+            name, "check-sigmas", folder, "--model", model, "--approach", approach,
+            "--replicates", 5,
+        )  # fmt: skip

@@ -11,6 +11,7 @@ import pytest
 from study_helpers import NINE, PAPER_TRUTH, PROVENANCE, grid, make_cells, run_study, simulate
 
 import accelstudy
+from accelstudy.design import diagnose
 from accelstudy.errors import InputError
 from accelstudy.study import simulate as module
 from accelstudy.study import tables
@@ -237,3 +238,12 @@ def test_estimates_of_some_cells(written):
     one = read_estimates([written[1]], ROBOT)
     assert len(whole) == 2 * len(one) == 2 * 60 * 9
     assert isinstance(pq.read_schema(written[1]).field("cell").type, pa.DictionaryType)
+
+
+def test_sigmas_that_no_weights_span_are_said():
+    """The cell has no weights to compute with, and does not end the study."""
+    keys = {"sensor_sigma_mps2": 1e-9, "robot_sigma_mgon": 4e5}
+    (cell,) = make_cells(grid(schemes="mclaren-24", approaches="robot", **keys)).values()
+    design = diagnose(cell.positions, cell.estimated_model, cell.conditions, cell.noise)
+    assert not design.estimable
+    assert "the sigmas differ too much" in design.reason

@@ -270,6 +270,7 @@ class StudyConfig(Block):
                 _known_approaches(grid.approaches)
             with _at(f"grids.{index}: number of cells"):
                 bounds.CELLS.check(self._n_cells(grid))
+        self._check_gravity()
         if self.presets is not None:
             with _at("presets.approaches"):
                 _known_approaches(self.presets.approaches)
@@ -280,6 +281,16 @@ class StudyConfig(Block):
         elif self.paper:
             raise ValueError("paper: true needs the block `sensitivity` (figures 4 to 6)")
         return self
+
+    def _check_gravity(self) -> None:
+        """Check that every wrong value of gravity is one that gravity can have."""
+        errors = {"noise.gravity.error_mps2": [self.noise.gravity.error_mps2]}
+        for index, grid in enumerate(self.grids):
+            errors[f"grids.{index}.gravity_error_mps2"] = grid.gravity_error_mps2 or []
+        for key, values in errors.items():
+            with _at(f"{key}: with it gravity"):
+                for error in values:
+                    bounds.GRAVITY.check(self.gravity_mps2 + error)
 
     def _check_sensitivity(self, settings: SensitivityConfig) -> None:
         """Check that the cells exist whose standard deviations later stages need."""
