@@ -132,7 +132,8 @@ def test_every_caption_has_a_figure():
     assert {path.stem for path in CAPTIONS.glob("*.rst")} == captions
 
 
-@pytest.mark.parametrize("name", ALL)
+# One of each kind: a map, lines, a matrix, points.
+@pytest.mark.parametrize("name", ["figure-4", "figure-6", "leveling-overview", "closed-forms"])
 def test_svg_and_png_are_the_same_bytes_each_time(name, tables, paper, tmp_path):
     for folder in ("first", "second"):
         render(name, tables, paper, tmp_path / folder / "a.svg", tmp_path / folder / "a.png")

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from study_helpers import NINE, grid, make_study, run_study
 
-from accelstudy.figures import caption, draw, figure_names
+from accelstudy.errors import InputError
+from accelstudy.figures import angle_unit, caption, draw, figure_names
 from accelstudy.figures.factors import FACTORS, blocks
 
 SENSOR, ROBOT, GRAVITY_SD, GRAVITY_ERROR, POSITIONS = FACTORS
@@ -113,6 +114,9 @@ def test_the_unit_of_the_user_holds_where_the_study_names_none(monkeypatch):
     named = study.model_copy(update={"angle_unit": "gon"})
     assert "1 mgon" in caption("leveling-overview", "", named)
     assert named.fingerprint == study.fingerprint
+    monkeypatch.setenv("ACCELSTUDY_ANGLE_UNIT", "grad")
+    with pytest.raises(InputError, match=r"ACCELSTUDY_ANGLE_UNIT: 'grad' .* gon or deg"):
+        angle_unit(study)
 
 
 def test_what_failed_is_marked(factorial):

@@ -6,6 +6,7 @@ To add one, write a module next to this file with a function under `figure`.
 from accelstudy.figures.registry import (
     FigureEntry,
     Tables,
+    angle_unit,
     caption,
     draw,
     figure,
@@ -19,6 +20,7 @@ from accelstudy.registry import import_modules
 __all__ = [
     "FigureEntry",
     "Tables",
+    "angle_unit",
     "caption",
     "draw",
     "figure",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,12 +11,14 @@ import matplotlib as mpl
 import pandas as pd
 from matplotlib.figure import Figure
 
+from accelstudy.errors import InputError
 from accelstudy.figures.saving import save
 from accelstudy.figures.style import DPI, STYLE
 from accelstudy.registry import Registry
 from accelstudy.study.config import StudyConfig
-from accelstudy.units import angle_note, angles_in
+from accelstudy.units import ANGLE_UNITS, angle_note, angles_in
 
+ANGLE_UNIT_VARIABLE = "ACCELSTUDY_ANGLE_UNIT"
 Tables = Mapping[str, pd.DataFrame]
 Draw = Callable[[Tables, StudyConfig], Figure]
 
@@ -106,7 +107,7 @@ def draw(name: str, tables: Tables, study: StudyConfig) -> Figure:
     tables : mapping of table name to table, at least those of `figure_tables`
     study : StudyConfig
     """
-    with mpl.rc_context(STYLE), _angles_of(study):  # type: ignore[arg-type]
+    with mpl.rc_context(STYLE), angles_in(angle_unit(study)):  # type: ignore[arg-type]
         return get_figure(name).draw(tables, study)
 
 
@@ -120,14 +121,24 @@ def caption(name: str, text: str, study: StudyConfig) -> str:
     study : StudyConfig
     """
     entry = get_figure(name)
-    with _angles_of(study):
+    with angles_in(angle_unit(study)):
         parts = [text.strip(), entry.note(study), f"{angle_note()}." if entry.angles else ""]
     return " ".join(filter(None, parts)) + "\n"
 
 
-def _angles_of(study: StudyConfig) -> AbstractContextManager[None]:
-    """Show angles in the unit of the study or, where it names none, of the user."""
-    return angles_in(study.angle_unit or os.environ.get("ACCELSTUDY_ANGLE_UNIT"))
+def angle_unit(study: StudyConfig) -> str | None:
+    """Unit of angles in figures: that of the study or, where it names none, of the user.
+
+    Raises
+    ------
+    InputError
+        If the environment variable of the user names no such unit.
+    """
+    unit = study.angle_unit or os.environ.get(ANGLE_UNIT_VARIABLE) or None
+    if unit not in (None, *ANGLE_UNITS):
+        known = " or ".join(ANGLE_UNITS)
+        raise InputError(f"{ANGLE_UNIT_VARIABLE}: {unit!r} is no unit of angles; choose {known}")
+    return unit
 
 
 def render(

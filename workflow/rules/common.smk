@@ -3,7 +3,7 @@ from pathlib import Path
 from snakemake.exceptions import WorkflowError
 
 from accelstudy.errors import InputError
-from accelstudy.figures import caption, figure_names, figure_tables, get_figure
+from accelstudy.figures import angle_unit, caption, figure_names, figure_tables, get_figure
 from accelstudy.study.cells import batches, study_cells
 from accelstudy.study.config import parse_study, read_layer
 from accelstudy.study.effort import study_effort
@@ -16,6 +16,7 @@ try:
     STUDY = parse_study(config, ", ".join(map(str, workflow.configfiles)) or "config")
     RESULTS = f"results/{STUDY.study}"
     check_writable(RESULTS)
+    angle_unit(STUDY)
     CELLS = study_cells(STUDY)
     EFFORT = study_effort(STUDY, CELLS)
 except InputError as error:
