@@ -103,9 +103,10 @@ def summarise_batch(
 
 
 def counts(table: pd.DataFrame) -> str:
-    """How many campaigns of a table were calibrated, and how many of these believably."""
-    calibrated, implausible = (table["status"] == "ok").sum(), (table["state"] == IMPLAUSIBLE).sum()
-    doubt = f", {implausible} of them implausible" if implausible else ""
+    """How many campaigns of a table were calibrated, without those that no sensor can have."""
+    implausible = int((table["state"] == IMPLAUSIBLE).sum())
+    calibrated = int((table["status"] == "ok").sum()) - implausible
+    doubt = f", {implausible} implausible" if implausible else ""
     return f"{calibrated} of {len(table)} campaigns calibrated{doubt}"
 
 
