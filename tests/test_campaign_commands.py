@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -11,6 +12,7 @@ from page_helpers import assert_sound, text_of
 from test_campaign_fit import NINE, simulated_campaign
 
 from accelstudy.campaign import Campaign, write_campaign
+from accelstudy.campaign.layout import LogLayout
 from accelstudy.cli import main
 from accelstudy.simulation import Noise
 
@@ -76,6 +78,25 @@ def test_quiet(campaign, tmp_path):
     result = run("calibrate", campaign, "--out", tmp_path / "out", "--quiet")
     assert (result.exit_code, result.output) == (0, "")
     assert (tmp_path / "out/report.html").exists()
+
+
+def test_pages_say_what_was_left_out_and_how_the_log_was_read(tmp_path):
+    whole = replace(simulated_campaign(TRUTH), log=LogLayout(frame="flu"))
+    write_campaign(whole.without({5: "moved"}), tmp_path / "campaign")
+    for command, file in (("calibrate", "calibration.json"), ("diagnose", "diagnosis.json")):
+        out = tmp_path / command
+        result = run(command, tmp_path / "campaign", "--out", out)
+        assert result.exit_code == 0, result.output
+        assert (out / file).exists()
+        page = (out / "report.html").read_text(encoding="utf-8")
+        assert "The log's axes are flu" in page
+        assert "Left out of every fit: position 5 (moved)." in page
+        content = json.loads((out / "calibration.json").read_text(encoding="utf-8"))
+        assert content["log"]["frame"] == "flu"
+        assert content["excluded"] == [{"position": 5, "reason": "moved"}]
+        assert content["n_positions"] == whole.n_positions - 1
+        positions = pd.read_parquet(out / "positions.parquet")
+        assert positions["position"].tolist() == [n for n in whole.positions if n != 5]
 
 
 def test_a_bumped_position_is_named(tmp_path):

@@ -337,6 +337,7 @@ def test_one_file_per_position(tmp_path, turned, clock):
     assert (campaign.time is not None) == (clock == "one")
     assert campaign.name == "positions"
     assert not any("gap" in text for text in report.warnings)
+    assert f"{files[2]}: no static hold; position 3 is missing" in report.warnings
     middles = edges[[0, 1, 3, 4]].mean(axis=1)
     if clock == "one":
         np.testing.assert_allclose(np.diff(campaign.time), np.diff(middles) / RATE, atol=0.1)

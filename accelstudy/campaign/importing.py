@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -192,7 +193,9 @@ def _settings_of_sensors(settings: ImportSettings) -> dict[str, ImportSettings]:
 
 def _recording(paths: Sequence[str | Path], settings: ImportSettings) -> Recording:
     parts = [log_of(path, settings) for path in paths]
-    return parts[0] if len(parts) == 1 else LogSeries(parts)
+    if len(parts) == 1:
+        return parts[0]
+    return LogSeries([replace(part, lively=False) for part in parts])
 
 
 def _campaign(
@@ -212,6 +215,8 @@ def _campaign(
             "before and after it does not count"
             + ("" if log.timed else "; the times of the files do not tell that of a position")
         )
+        missing = [i for i in range(1, len(paths) + 1) if i not in holds.number]
+        warnings += [f"{paths[i - 1]}: no static hold; position {i} is missing" for i in missing]
     assert isinstance(first, Log)
     columns = {}
     for name, values in holds.conditions.items():

@@ -171,6 +171,7 @@ class Log:
     scale, offset : (3,), f = (raw − offset) · scale, in the axes of the log
     frame : Frame, the axes of the log
     chunk_size : int, rows held in memory at a time
+    lively : bool, whether each channel must change; in one position that of a coarse sensor may not
     """
 
     path: Path
@@ -182,6 +183,7 @@ class Log:
     offset: Array
     frame: Frame
     chunk_size: int
+    lively: bool = True
 
     @property
     def conditions(self) -> tuple[str, ...]:
@@ -258,7 +260,7 @@ class Log:
         if row < 2:
             raise InputError(f"{self.path}: too few samples ({row})")
         for axis, constant in zip(AXES, lowest == highest, strict=True):
-            if constant:
+            if constant and self.lively:
                 name = self.source.names[self.places[axis]]
                 raise InputError(f"{self.path}: column {name} ({axis}) is constant")
 
