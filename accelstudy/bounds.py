@@ -50,6 +50,7 @@ GRAVITY_ERROR = Range(-1e2, 1e2, "m/s²")
 # Forces are always observed, and an observation without noise has no finite weight; the best
 # gravimeters resolve 1e-9 m/s².
 SIGMA_FORCE = Range(1e-9, 1e3, "m/s²")
+SIGMA_READING = Range(1e-9, 1e3, "m/s²", zero=True)
 SIGMA_GRAVITY = Range(1e-9, 1e3, "m/s²", zero=True)
 SIGMA_ANGLE = Range(1e-6, 4e5, "mgon", zero=True)
 ANGLE = Range(-400.0, 400.0, "gon")

@@ -551,3 +551,12 @@ def test_where_nothing_can_be_written(tmp_path):
     for out in (tmp_path, log / "out.csv"):
         with pytest.raises(InputError, match="cannot be written"):
             level_log(calibration, log, out)
+
+
+@pytest.mark.parametrize("sigma", [1e300, np.nan, -1.0, 1e-12])
+def test_a_sigma_that_no_reading_has(tmp_path, sigma):
+    calibration, log = read_calibration(calibration_file(tmp_path)), tmp_path / "log.csv"
+    log.write_text("fx,fy,fz\n1,2,-9.6\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"--sigma: must be 0, or from 1e-09 to 1000 m/s²"):
+        level_log(calibration, log, tmp_path / "out.csv", sigma=sigma)
+    assert not (tmp_path / "out.csv").exists()

@@ -1,6 +1,8 @@
 """What every job of the workflow does: its log, and how it ends on bad input and on a defect."""
 
 import logging
+import shlex
+import sys
 from contextlib import contextmanager
 from types import SimpleNamespace
 
@@ -8,7 +10,7 @@ import pytest
 from study_helpers import content, make_study
 
 from accelstudy.errors import InputError
-from accelstudy.study.job import job
+from accelstudy.study.job import job, quote_python
 
 
 @contextmanager
@@ -64,3 +66,10 @@ def test_a_defect_leaves_its_traceback_in_the_log(log):
     text = log.read_text()
     assert "ERROR simulate failed" in text
     assert "ZeroDivisionError: a defect" in text
+
+
+def test_the_path_of_python_may_have_a_space(monkeypatch):
+    for path in ("/usr/bin/python", "/tmp/with space/bin/python"):
+        monkeypatch.setattr(sys, "executable", path)
+        quote_python()
+        assert shlex.split(sys.executable) == [path]

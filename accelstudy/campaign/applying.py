@@ -106,7 +106,7 @@ class Calibration:
         )
         by_parameters *= share
         variance = np.sum((by_parameters @ self.covariance) * by_parameters, axis=-1)
-        variance += sigma_force**2 * np.sum(slope**2, axis=-1)
+        variance += np.square(sigma_force) * np.sum(slope**2, axis=-1)
         return np.stack(roll_pitch(tuple(corrected.T)), axis=-1), np.sqrt(variance)
 
     def _as_continued(self, forces: Array, hold: Hold | None) -> tuple[Array, Array]:

@@ -11,6 +11,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from accelstudy import bounds
 from accelstudy.campaign.applying import Calibration
 from accelstudy.campaign.log_account import Account, clipped
 from accelstudy.campaign.log_files import CHUNK
@@ -76,6 +77,8 @@ def level_log(
         gravity in most rows that it must be in another unit.
     """
     readings = readings_of(log, calibration, given, start or 0.0)
+    if sigma is not None:
+        bounds.SIGMA_READING.check_key("--sigma", sigma)
     noise = noise_of_reading(calibration) if sigma is None else sigma
     account = Account(calibration, readings)
     with chunk_writer(out) as write:

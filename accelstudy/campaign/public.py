@@ -162,6 +162,8 @@ def fetch(data: PublicData, searched: Path, target: Path) -> Path:
         target.mkdir(parents=True, exist_ok=True)
         path = target / data.file_name
         part = path.with_name(f"{path.name}.part")
+        if part.is_symlink():  # no download of ours: it would be written to another place
+            part.unlink()
         _download_with_retries(data.url, part)
         found = _sha256(part)
         if found != data.sha256:
