@@ -174,7 +174,11 @@ def scheme(name: str) -> None:
 
 @main.command(epilog=example("accelstudy models"))
 def models() -> None:
-    """List sensor models, and the presets of Table 1."""
+    """List sensor models, and the presets of Table 1.
+
+    Commands take compositions, too: models and effects joined by +, as in
+    bias-scale+warm_up(tau=300).
+    """
     from accelstudy.models import MODELS, PRESETS, get_model
 
     for name in MODELS:

@@ -18,6 +18,9 @@ from accelstudy.effects import Effect, effect_names, get_effect
 from accelstudy.errors import InputError, UnknownNameError
 from accelstudy.sensor import SensorModel
 
+MODEL_FILE = "model.yaml"
+"""What a diagnosis calls its file with a model."""
+
 _NINE = ("bias", "scale", "nonorthogonality")
 
 MODELS: dict[str, tuple[str, ...]] = {
@@ -69,6 +72,8 @@ def get_model(text: str, extra: Mapping[str, Sequence[str]] | None = None) -> Se
     known = {**MODELS, **(extra or {})}
     if text in known:
         return compose(text, tuple(known[text]))
+    if text and os.path.isfile(inside := os.path.join(text, MODEL_FILE)):
+        raise InputError(f"{text}: a folder, not a model; take {inside}")
     if path := re.fullmatch(rf"(.*(?:\.ya?ml|[/{re.escape(os.sep)}].*?))(?::([\w-]+))?", text):
         return _model_of_file(path[1], path[2])
     parts = [part.strip() for part in re.split(r"\+(?![^()]*\))", text)]

@@ -55,6 +55,8 @@ def test_a_composition_has_one_name(text, name, number):
         ("bias++scale", "a part is empty"),
         ("bias+saturation[k_sat]", "did you mean 'k_sat_"),
         ("nowhere/model.yaml", "nowhere/model.yaml: No such file"),
+        (f"{'x' * 300}.yaml", "File name too long"),
+        ("x" * 5000, "unknown model"),
     ],
 )
 def test_what_is_no_model_is_one_line(text, words):
@@ -79,6 +81,8 @@ def test_what_is_no_model_is_one_line(text, words):
 def test_the_model_of_a_file(content, expected, tmp_path):
     path = tmp_path / "model.yaml"
     path.write_text(yaml.safe_dump(content), encoding="utf-8")
+    with pytest.raises(InputError, match=re.escape(f"a folder, not a model; take {path}")):
+        get_model(str(tmp_path))
     if isinstance(expected, str):
         assert get_model(str(path)).name == expected
         return
