@@ -15,6 +15,7 @@ from accelstudy.campaign.importing import (
     import_sensors,
     parse_settings,
 )
+from accelstudy.campaign.layout import LogLayout
 from accelstudy.campaign.logs import open_log
 from accelstudy.errors import InputError
 from accelstudy.frames import parse_frame
@@ -368,6 +369,8 @@ def test_means_with_a_robot(tmp_path, frame, unit):
     campaign = read_campaign(tmp_path / "out")
     np.testing.assert_allclose(campaign.angles, np.column_stack([roll, pitch]), atol=1e-12)
     np.testing.assert_allclose(campaign.yaw, yaw, atol=1e-12)
+    # Of a log it tells the axes, and not the columns.
+    assert campaign.log == LogLayout(frame=frame)
     np.testing.assert_allclose(campaign.forces, forces, atol=1e-12)
     wrong = "rad" if unit != "rad" else "gon"
     result = call(

@@ -12,7 +12,8 @@ from accelstudy.campaign.checks import clearly_worse, misfit_of_angles
 from accelstudy.campaign.columns import AXES, locate, read_columns
 from accelstudy.campaign.import_report import ImportReport
 from accelstudy.campaign.import_settings import ImportSettings
-from accelstudy.campaign.imported import imported_campaign, layout_of
+from accelstudy.campaign.imported import imported_campaign
+from accelstudy.campaign.layout import LogLayout
 from accelstudy.campaign.log_files import Source, open_source
 from accelstudy.campaign.logs import TIME_UNITS, conversion
 from accelstudy.campaign.session import Campaign
@@ -57,7 +58,7 @@ def import_means(
     settings = settings or ImportSettings()
     factor, shift = conversion(settings.unit, settings.scale, settings.offset)
     source = open_source(path, settings.variable)
-    values, places, warnings = _columns(source, settings)
+    values, warnings = _columns(source, settings)
     frame = settings.axes
 
     n_samples = None
@@ -85,7 +86,7 @@ def import_means(
         time=values.get("time"),
         temperature=values.get("temperature"),
         vibration=values.get("vibration"),
-        log=layout_of(settings, source, places),
+        log=_layout(settings),
         warnings=tuple(warnings),
     )
     if settings.robot is not None:
@@ -102,10 +103,15 @@ def import_means(
     return campaign, ImportReport(len(forces), None, sigma, None, (), tuple(warnings))
 
 
-def _columns(
-    source: Source, settings: ImportSettings
-) -> tuple[dict[str, Array], dict[str, int], list[str]]:
-    """Columns by their keys, their places, and what was not taken."""
+def _layout(settings: ImportSettings) -> LogLayout:
+    """What a table of means tells of logs: their unit and axes, but not their columns."""
+    return LogLayout.model_validate(
+        settings.model_dump(include={"unit", "scale", "offset", "frame"}, exclude_none=True)
+    )
+
+
+def _columns(source: Source, settings: ImportSettings) -> tuple[dict[str, Array], list[str]]:
+    """Columns by their keys, and what was not taken."""
     given = settings.columns
     for key in given:
         if key not in MEANS:
@@ -143,7 +149,7 @@ def _columns(
         factor = TIME_UNITS[settings.time_unit]
         first = float(next(source.read([places["time"]], 1))[0, 0]) * factor
         values["time"] = values["time"] * factor + (first if abs(first) < _YEARS else 0.0)
-    return values, places, warnings
+    return values, warnings
 
 
 def _check_angles(path: str | Path, angles: Array, unit: str, campaign: Campaign) -> None:
