@@ -73,6 +73,8 @@ def test_what_is_no_calibration_is_one_line(tmp_path, content):
     assert "\n" not in str(error.value)
     with pytest.raises(InputError, match="No such file"):
         read_calibration(tmp_path / "none.json")
+    with pytest.raises(InputError, match="a folder; give the calibration"):
+        read_calibration(tmp_path)
 
 
 # --- Effects that need more than the force -------------------------------------------------------
@@ -508,6 +510,8 @@ def test_columns_of_the_campaign_that_a_log_lacks_are_said_to_come_from_there(tm
     known = replace(calibration, log=layout)
     level_log(known, log, tmp_path / "out.csv")
     level_log(known, log, tmp_path / "out.csv", {"columns": {"temperature": "count"}})
+    with pytest.raises(InputError, match="the rate or the column of time, not both"):
+        level_log(known, log, tmp_path / "never.csv", {"time": "count", "rate_hz": 10})
     with pytest.raises(InputError, match="no column 'T'"):
         level_log(known, log, tmp_path / "never.csv", {"columns": {"temperature": "T"}})
 

@@ -216,6 +216,8 @@ def read_calibration(path: str | Path) -> Calibration:
     InputError
         If there is no such file or it is none.
     """
+    if Path(path).is_dir():
+        raise InputError(f"{path}: a folder; give the calibration.json in it")
     try:
         document = _Document.model_validate(json.loads(Path(path).read_text(encoding="utf-8")))
     except OSError as error:

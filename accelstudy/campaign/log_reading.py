@@ -131,6 +131,8 @@ def readings_of(
         If the file cannot be read, lacks a column, or does not tell what an effect needs.
     """
     given = dict(given or {})
+    if {"time", "rate_hz"} <= set(given):
+        raise InputError(f"{log}: give the rate or the column of time, not both")
     layout = _layout(calibration, given)
     source = open_source(log, layout.variable)
     try:
