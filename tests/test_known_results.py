@@ -249,7 +249,7 @@ def test_ctu_residuals(known, n, rms, sigma0):
     assert rms - 0.00005 < outcome.rms / MG < rms + 0.0002
     assert outcome.sigma0 / MG == pytest.approx(sigma0, rel=0.005)
     assert outcome.test is None
-    assert "without an a-priori sigma nothing says whether the model is complete" in outcome.verdict
+    assert "is not stated, so nothing says whether the model is complete" in outcome.verdict
     no_effect_is_missing(known, f"ctu {n}", 0.05)
 
 
