@@ -51,8 +51,8 @@ def test_all_is_made(made):
     assert document["effects"][0]["name"] == "thermal_bias"
     files = {path.name for path in diagnosis.iterdir() if not path.name.startswith(".")}
     assert files == {
-        "diagnosis.json", "report.html", "model.yaml", "positions.parquet", "loop.parquet",
-        "figures",
+        "calibration.json", "diagnosis.json", "report.html", "model.yaml", "positions.parquet",
+        "loop.parquet", "figures",
     }  # fmt: skip
     for name in ("evidence", "gap", "location", "loop", "residuals"):
         assert (diagnosis / "figures" / f"{name}.svg").stat().st_size > 1000
