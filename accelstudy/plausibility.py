@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 
 FACTOR = 20.0
 """Times the typical size of cheap equipment, beyond which a parameter is not believed."""
+CLEARLY = 3.0
+"""Standard deviations by which an estimate must be beyond its bound."""
 LARGEST = {"scale": 0.5, "base_tilt": 0.1, "encoder_offset": 0.1}
 """Effects with a bound of their own, SI. Beyond a half, a scale is a unit, a range or a sign; how a
 rig stands and where its circles begin is up to who set it up, not to its quality."""
@@ -40,21 +42,26 @@ def largest_tilt() -> float:
     return float(get_effect("bias").typical[1]) / STANDARD_GRAVITY
 
 
-def implausible_parameters(effects: Sequence[Effect], parameters: Array) -> list[str]:
+def implausible_parameters(effects: Sequence[Effect], parameters: Array, sigma: Array) -> list[str]:
     """Say of each parameter that no sensor has how large it is, and what would be believed.
+
+    A large estimate that the positions hardly determine says nothing of the sensor, so it counts
+    only if it is beyond the bound by `CLEARLY` of its standard deviations.
 
     Parameters
     ----------
     effects : sequence of Effect, of the model
-    parameters : (u,) array, SI, in the order of the effects
+    parameters, sigma : (u,) arrays, SI, in the order of the effects; a sigma that is unknown (NaN)
+        excuses nothing
     """
-    values = iter(np.asarray(parameters, dtype=float))
+    doubt = CLEARLY * np.nan_to_num(np.asarray(sigma, dtype=float), posinf=0.0)
+    values = iter(zip(np.asarray(parameters, dtype=float), doubt, strict=True))
     found = []
     for effect in effects:
         bound = largest(effect)
         for parameter in effect.parameters:
-            value = next(values)
-            if not abs(value) <= bound:
+            value, uncertain = next(values)
+            if not abs(value) <= bound + uncertain:
                 shown, most = (number(float(to_display(v, parameter.unit))) for v in (value, bound))
                 unit = display_unit(parameter.unit)
                 found.append(f"{parameter.name} = {shown} {unit} (up to ± {most} is believed)")

@@ -6,6 +6,7 @@ import pytest
 from test_import_campaign import XSENS, call
 from test_import_holds import RATE, G, session, shared, write
 
+from accelstudy.campaign import segmentation_figure
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.import_options import files_of
 from accelstudy.campaign.importing import (
@@ -13,6 +14,7 @@ from accelstudy.campaign.importing import (
     import_log,
     import_means,
     import_sensors,
+    import_to,
     parse_settings,
 )
 from accelstudy.campaign.layout import LogLayout
@@ -135,6 +137,17 @@ def test_temperature_vibration_and_range(tmp_path, turned):
     campaign, report = import_log(tmp_path / "log.parquet", ImportSettings(rate_hz=100))
     assert campaign.temperature is None
     assert any("hold 2 has no temperature" in text for text in report.warnings)
+
+
+def test_the_figure_shows_forces_without_the_offset_that_was_found(tmp_path, turned, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(segmentation_figure, "save", lambda figure, *_: drawn.append(figure))
+    raw = turned[0] / 0.001 + [33000, 33100, 32900]
+    settings = parse_settings({"rate_hz": RATE, "unit": "counts", "scale": 0.001})
+    import_to(tmp_path / "out", write(tmp_path, raw), settings)
+    low, high = drawn[0].axes[0].dataLim.intervaly
+    assert -30 < low < -5
+    assert 5 < high < 30
 
 
 def test_sigma_does_not_depend_on_the_offset():

@@ -166,8 +166,10 @@ def import_each(
             from accelstudy.campaign.segmentation_figure import render_segmentation
 
             files = (folders[name] / f"segmentation.{kind}" for kind in ("svg", "png"))
-            log = _recording(paths, _settings_of_sensors(settings)[name])
-            render_segmentation(log, report.holds, *files)
+            own = _settings_of_sensors(settings)[name]
+            if campaign.log is not None:  # it knows the offset that the positions showed
+                own = own.model_copy(update={"offset": campaign.log.offset})
+            render_segmentation(_recording(paths, own), report.holds, *files)
     return campaigns
 
 

@@ -41,7 +41,7 @@ def state(assessment: Assessment) -> str:
 def warnings(assessment: Assessment) -> list[str]:
     """Say what of a calibration can only be a gross error; nothing of a plausible one."""
     fit = assessment.fit
-    said = implausible_parameters(fit.model.effects, fit.parameters)
+    said = implausible_parameters(fit.model.effects, fit.parameters, fit.sigma)
     said += implausible_tilt(*assessment.tilt)
     if assessment.gross_error is not None:
         said.append(assessment.gross_error.reason)
