@@ -89,8 +89,10 @@ class SensorModel:
     @cached_property
     def hold_columns(self) -> tuple[str, ...]:
         """Columns of `Hold` on which the output of the sensor or the robot's reading depends."""
-        used = self.trace.sense.used | self.trace.reading.used
-        return tuple(name for name, symbol in self.trace.hold.items() if str(symbol) in used)
+        trace = self.trace
+        readings = trace.reading_errors(trace.force[:2])
+        used = sp.Matrix([*trace.h, *trace.t_matrix, *readings]).free_symbols
+        return tuple(name for name, symbol in trace.hold.items() if symbol in used)
 
     def sense(
         self,

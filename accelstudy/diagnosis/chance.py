@@ -19,7 +19,7 @@ AT_ONCE = 500_000
 """Numbers that are drawn at once; all sets of very many positions together would not fit."""
 
 
-KEPT = 4_000_000
+KEPT = 16_000_000
 """Numbers that are kept; more are drawn again."""
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import Solution, root_of
-from accelstudy.diagnosis.residuals import Residuals, ideal_residuals
+from accelstudy.diagnosis.residuals import Residuals, ideal_residuals, position_products
 from accelstudy.diagnosis.signatures import signature
 from accelstudy.diagnosis.spaces import Bases
 from accelstudy.effects import Effect, Hold, effect_names, get_effect
@@ -139,9 +139,8 @@ class BumpedPositions(Sequence[Hypothesis]):
 
     def parts(self, errors: Array) -> Array:
         """Squares of what residuals (..., m) have in each of them, (..., s)."""
-        n, c = self.residuals.whitening.shape[:2]
-        blocks = errors[..., : n * c].reshape(*errors.shape[:-1], n, c)[..., self.places, :]
-        return np.sum(np.einsum("...sc,scd->...sd", blocks, self.root) ** 2, axis=-1)
+        parts = position_products(errors, self.root, self.places)
+        return np.sum([part**2 for part in parts], axis=0)
 
     def __len__(self) -> int:
         return len(self.places)

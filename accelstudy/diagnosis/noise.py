@@ -16,7 +16,7 @@ from accelstudy.adjustment.quality import global_test
 from accelstudy.diagnosis.chance import Chance
 from accelstudy.diagnosis.colour import quadratic_forms
 from accelstudy.diagnosis.repeats import clusters
-from accelstudy.diagnosis.residuals import Residuals
+from accelstudy.diagnosis.residuals import Residuals, position_products
 
 Array = NDArray[np.float64]
 
@@ -48,9 +48,7 @@ class NoiseTest:
 
 def force_residuals(residuals: Residuals, errors: Array) -> Array:
     """Residuals of the forces in units of sigma, up to sign, (..., n, 3), of errors (..., m)."""
-    n, c = residuals.whitening.shape[:2]
-    blocks = errors[..., : n * c].reshape(*errors.shape[:-1], n, c)
-    return np.asarray(np.einsum("...nc,nca->...na", blocks, residuals.force_noise))
+    return np.stack(position_products(errors, residuals.force_noise), axis=-1)
 
 
 def level_test(residuals: Residuals) -> NoiseTest:

@@ -6,8 +6,10 @@ from numpy.typing import NDArray
 from accelstudy.effects.base import Effect, Hold, per_axis, register
 from accelstudy.registry import Hyper
 
-MOST = 100
-"""Times that are searched at first; what lies between is looked at where it matters."""
+ALL = 100
+"""Times up to which all are searched."""
+SOME = 50
+"""Of more, times that are searched at first; what lies between is looked at where it matters."""
 STEPS = 7
 """Times between two of them that are looked at next."""
 
@@ -54,7 +56,7 @@ def _middles(hold: Hold) -> NDArray[np.float64]:
 
 def _spread(count: int) -> NDArray[np.int_]:
     """Indices of all middles or, of very many, of some: the nearer to an end the closer."""
-    if count <= MOST:
+    if count <= ALL:
         return np.arange(count)
-    part = np.geomspace(1, (count + 1) / 2, MOST // 2) - 1
+    part = np.geomspace(1, (count + 1) / 2, SOME // 2) - 1
     return np.unique(np.concatenate([part, count - 1 - part]).round().astype(int))
