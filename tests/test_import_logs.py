@@ -361,6 +361,9 @@ cells = st.one_of(
     st.sampled_from([3, 65536]),
 )
 @example([["1", "2", "3"], ["1", "2", "3", "4"], ["2", "3", "4"]], ",", {"rate": 9.0}, None, 3)
+@example([['"'], ["0.0", "0.0", '"']], ",", {"rate": 100.0}, None, 3)
+@example([["1_0", "\u2028", "1", "1", "\u2028"], ["1e400"]], " ", {"rate": 100.0}, None, 3)
+@example([["1", "", "2", '"\n,1,nan\n"', "\t", "#"]], ",", {"rate": 100.0}, None, 3)
 def test_whatever_the_text(tmp_path, rows, separator, timing, columns, chunk_size):
     path = tmp_path / "log.csv"
     path.write_text("\n".join(separator.join(row) for row in rows), encoding="utf-8")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import gzip
+import warnings
 import zlib
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -107,7 +108,7 @@ class TextSource:
                     chunksize=chunk_size,
                 ) as reader,
             ):
-                for chunk in reader:
+                for chunk in _chunks(reader):
                     if not len(chunk):
                         continue
                     # A cell too many lands in the column after the last.
@@ -123,7 +124,7 @@ class TextSource:
             raise
         except pd.errors.EmptyDataError:
             return
-        except pd.errors.ParserError as error:
+        except (pd.errors.ParserError, pd.errors.ParserWarning) as error:
             if "inside string" in str(error):
                 raise InputError(f"{self.path}: a quotation mark opens and never closes") from None
             raise InputError(f"{self.path}: {self._odd_line()}") from None
@@ -192,6 +193,17 @@ def since(values: NDArray[Any], zero: Any) -> Array:
     if values.dtype.kind in "iu" and isinstance(zero, np.integer):
         return (values.astype(np.int64) - zero.astype(np.int64)).astype(float)
     return values.astype(float) - float(zero)
+
+
+def _chunks(reader: Iterator[pd.DataFrame]) -> Iterator[pd.DataFrame]:
+    """Yield tables of a reader; where pandas would warn that it loses cells, raise that warning."""
+    while True:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", pd.errors.ParserWarning)
+            chunk = next(reader, None)
+        if chunk is None:
+            return
+        yield chunk
 
 
 def split_line(line: str, delimiter: str | None) -> list[str]:
