@@ -172,6 +172,15 @@ def test_command(log, tmp_path):
     assert (out / "segmentation.svg").read_bytes() == svg
 
 
+def test_no_hold_is_said_to_be_shorter_than_the_shortest(tmp_path):
+    forces, _ = session(holds=8, still=24, moving=30)
+    _, report = import_log(
+        write(tmp_path, forces), ImportSettings(rate_hz=10, trim_s=0.2, threshold_mps2=0.3)
+    )
+    (line,) = [line for line in report.lines() if line.startswith("holds: ")]
+    assert float(re.search(r"of (\S+) to", line)[1]) >= 1.0
+
+
 def test_command_with_everything(tmp_path):
     forces, _ = session(holds=4)
     table = np.column_stack([np.arange(len(forces)) * 10.0, 1000 * forces + [1, 2, 3]])

@@ -46,7 +46,7 @@ class ImportReport:
             sigma = "unknown" if self.sigma_white is None else shown(self.sigma_white)
             return [f"{self.n_holds} positions; sigma of a mean: {sigma}", *self.notes]
         holds, accuracy = self.holds, self.accuracy
-        lengths = holds.t1 - holds.t0
+        lengths = holds.n_samples * holds.step
         lines = [
             f"log: {holds.span[1] - holds.span[0]:.1f} s at {1 / holds.step:.6g} per second",
             *self.notes,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import pandas as pd
 
 from accelstudy.adjustment.quality.whole_model import REFUTED
 from accelstudy.campaign.batch import STATUS
-from accelstudy.campaign.verdict import BLIND, IMPLAUSIBLE
+from accelstudy.campaign.verdict import ACCEPTED, BLIND, IMPLAUSIBLE, REJECTED, UNCHECKED
 from accelstudy.outputs import whole_file
 from accelstudy.pages import render
 from accelstudy.study.report import number
@@ -154,10 +155,33 @@ def _rad(mgon: float | None) -> float | None:
 def _links(folder: Path, start: Path) -> dict[str, str | None]:
     """Pages and pictures of a campaign, relative to the folder of the overview."""
     places = {"report": "report.html", "holds": "campaign/segmentation.png"}
-    return {
+    links = {
         key: (folder / place).relative_to(start).as_posix() if (folder / place).exists() else None
         for key, place in places.items()
     }
+    return {**links, "folder": folder.as_posix()}
+
+
+def _next_steps(rows: list[dict[str, Any]]) -> list[tuple[str, str]]:
+    """Say what to do with the first good and the first doubtful campaign, and the command."""
+    steps = []
+    good = next((row for row in rows if row["state"] in (ACCEPTED, UNCHECKED)), None)
+    if good is not None:
+        calibration = shlex.quote(f"{good['folder']}/calibration.json")
+        steps.append(
+            ("Level a log, for example", f"accelstudy apply {calibration} LOG --out leveled.csv")
+        )
+    doubtful = next((row for row in rows if row["state"] in (REJECTED, IMPLAUSIBLE)), None)
+    if doubtful is not None:
+        own = doubtful["kind"] == "campaign"
+        measured = doubtful["source"] if own else f"{doubtful['folder']}/campaign"
+        chosen = ["--model", doubtful["model"], "--approach", doubtful["approach"]]
+        command = ["accelstudy", "diagnose", measured, *chosen]
+        out = f"{doubtful['campaign']}-diagnosis"
+        steps.append(
+            ("Find what is wrong or missing, for example", shlex.join([*command, "--out", out]))
+        )
+    return steps
 
 
 def _page(batch: str, table: pd.DataFrame, links: list[dict[str, str | None]]) -> str:
@@ -177,6 +201,7 @@ def _page(batch: str, table: pd.DataFrame, links: list[dict[str, str | None]]) -
         robot=table["held_out_roll_rad"].notna().any(),
         blind=BLIND,
         small_angle=UNITS["rad"][display_unit("rad")],
+        next_steps=_next_steps(rows),
     )
 
 

@@ -6,6 +6,9 @@ import math
 
 import pandas as pd
 
+SWEEP = "config/sweeps/positions.yaml"
+"""A study for who has read the claims and wants one of their own."""
+
 
 def number(value: float) -> str:
     """Show a number with three significant digits; a dash where there is none."""
@@ -32,6 +35,10 @@ def claims_page(claims: pd.DataFrame, by_scheme: pd.DataFrame) -> str:
         "study/claims.html.j2",
         claims=claims.to_dict("records"),
         schemes=by_scheme.to_dict("records"),
+        next_steps=[
+            ("See what another study would run", f"accelstudy cells config/config.yaml {SWEEP}"),
+            ("Run it", f"snakemake --cores 2 --configfile {SWEEP}"),
+        ],
     )
 
 
