@@ -14,6 +14,7 @@ from errno import ENOTDIR
 from pathlib import Path
 from stat import S_ISDIR
 from tempfile import mkdtemp
+from time import sleep
 from types import ModuleType
 
 from accelstudy.errors import InputError
@@ -25,6 +26,8 @@ except ImportError:  # without locks, what a killed run leaves stays until someb
     fcntl = None
 
 _PREFIX, _SUFFIX = ".accelstudy-", ".part"
+WAIT = 0.05
+"""Seconds in which a run that took a new folder for one of a killed run has removed it."""
 
 
 @dataclass(frozen=True)
@@ -164,7 +167,9 @@ def _staging(near: Path) -> Iterator[Path]:
     while True:
         stage = Path(mkdtemp(prefix=_PREFIX, suffix=_SUFFIX, dir=folder))
         lock = _locked(stage)
-        if stage.exists():  # another run may have been quicker to lock it, and removed it
+        if lock is None and fcntl is not None:  # another run was quicker, and is removing it
+            sleep(WAIT)
+        if stage.exists():
             break
     try:
         yield stage

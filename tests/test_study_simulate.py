@@ -184,6 +184,7 @@ def test_a_whole_file_appears_at_once_and_overwrites_remains(tmp_path):
         temporary.write_text("remains of a killed job")
         remains, text = temporary, temporary.read_text()
     path.unlink()
+    remains.parent.mkdir()
     remains.write_text(text)
     with whole_file(path) as temporary:
         temporary.write_text("new")
