@@ -257,15 +257,17 @@ def test_a_machine_that_hums_is_still(tmp_path):
 # --- Holds by hand -------------------------------------------------------------------------------
 
 
-def test_holds_are_left_out_and_joined(tmp_path, turned):
+@pytest.mark.parametrize("by", ["number", "time"])
+def test_holds_are_left_out_and_joined(tmp_path, turned, by):
     forces, edges = turned
     bumped = forces.copy()
     middle = int(edges[3].mean())
     bumped[middle : middle + 20] += 5
     path = write(tmp_path, bumped)
     span = f"{edges[6, 0] / RATE:.2f}s-{edges[6, 1] / RATE:.2f}s:somebody passed"
+    both = "4,5" if by == "number" else "{:.2f}s-{:.2f}s".format(*edges[3] / RATE)
     result = call(
-        *(path, "--out", tmp_path / "out", "--rate", 100, "--join", "4,5"),
+        *(path, "--out", tmp_path / "out", "--rate", 100, "--join", both),
         *("--exclude", "2:moved", "--exclude", span),
         *("--settings", settings(tmp_path, "shortest_s: 0.2")),
     )
@@ -294,7 +296,8 @@ def settings(folder, text):
         (["--exclude", "13:moved"], "exclude: there is no hold 13; they are 1 to 8"),
         (["--exclude", "13"], "exclude: expected a hold or a time, and why, as 13:moved"),
         (["--exclude", "1s-2s:x"], "exclude: 1s-2s: no hold lies there"),
-        (["--join", "4"], "join: expected numbers of holds, as 4,5"),
+        (["--join", "4"], "join: expected numbers of holds or a time, as 4,5 or"),
+        (["--join", "1s-2s"], "join: 1s-2s: fewer than two holds lie there"),
         (["--join", "4,5"], "join: holds 4 and 5 differ by"),
         (["--join", "4,6"], "join: 4, 6: hold 5 lies between them"),
     ],

@@ -67,7 +67,7 @@ class ImportSettings(LogLayout):
     exclude: list[str] = Field(
         [], description="holds to leave out, as 13:moved or 120s-135s:somebody passed"
     )
-    join: list[str] = Field([], description="holds that are one, as 4,5")
+    join: list[str] = Field([], description="holds that are one, as 4,5 or 120s-135s")
 
     @property
     def selection(self) -> Selection:

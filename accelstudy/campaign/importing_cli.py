@@ -53,7 +53,7 @@ _SECTIONS = {
 @click.option("--frame", help="Where x, y, z point: frd, flu (ROS), rfu …  [default: frd]")
 @click.option("--threshold", type=float, help="Sd of a window at rest, m/s², instead of chosen.")
 @click.option("--exclude", multiple=True, help="Leave out 13:moved or 120s-135s:moved; repeat it.")
-@click.option("--join", multiple=True, help="Holds that are one, as 4,5; repeat it.")
+@click.option("--join", multiple=True, help="Holds that are one, as 4,5 or 120s-135s; repeat it.")
 @click.option("--figure/--no-figure", default=True, help="Draw the log with its holds.")
 @click.option("--means", is_flag=True, help="LOG is a table of means already.")
 @click.option("--robot-sigma", type=float, help="Sd of its robot angles roll and pitch, mgon.")

@@ -12,7 +12,8 @@ from accelstudy.campaign.segments import Segment
 from accelstudy.errors import InputError
 
 _BY_NUMBER = re.compile(r"\s*(\d{1,9})\s*:\s*(\S.*?)\s*")
-_BY_TIME = re.compile(r"\s*(\d+(?:\.\d*)?)\s*s?\s*-\s*(\d+(?:\.\d*)?)\s*s\s*:\s*(\S.*?)\s*")
+_SPAN = re.compile(r"\s*(\d+(?:\.\d*)?)\s*s?\s*-\s*(\d+(?:\.\d*)?)\s*s\s*")
+_BY_TIME = re.compile(_SPAN.pattern + r":\s*(\S.*?)\s*")
 
 
 @dataclass(frozen=True)
@@ -24,11 +25,13 @@ class Selection:
     numbers : mapping of int to str, holds that are left out, with the reason
     spans : tuple of (from, to, reason), s since the start of the log; holds in them are left out
     joined : tuple of tuples of int, holds that are one
+    joined_spans : tuple of (from, to), s likewise; holds in one of them are one
     """
 
     numbers: Mapping[int, str] = field(default_factory=dict)
     spans: tuple[tuple[float, float, str], ...] = ()
     joined: tuple[tuple[int, ...], ...] = ()
+    joined_spans: tuple[tuple[float, float], ...] = ()
 
     def join(self, found: Mapping[int, Segment], alike: float) -> dict[int, Segment]:
         """Join holds; they keep the number of the first.
@@ -41,10 +44,16 @@ class Selection:
         Raises
         ------
         InputError
-            If there is no such hold, others lie between, or they have not one attitude.
+            If there is no such hold, fewer than two in a span of time, others lie between, or they
+            have not one attitude.
         """
         holds = dict(found)
-        for group in self.joined:
+        groups = list(self.joined)
+        for start, end in self.joined_spans:
+            groups.append(tuple(_within(holds, start, end)))
+            if len(groups[-1]) < 2:
+                raise InputError(f"join: {start:g}s-{end:g}s: fewer than two holds lie there")
+        for group in groups:
             for number in group:
                 _check(number, holds, "join")
             between = [n for n in holds if group[0] < n < group[-1] and n not in group]
@@ -72,7 +81,7 @@ class Selection:
             _check(number, holds, "exclude")
         reasons = dict(self.numbers)
         for start, end, reason in self.spans:
-            inside = [n for n, hold in holds.items() if hold.t0 <= end and hold.t1 >= start]
+            inside = _within(holds, start, end)
             if not inside:
                 raise InputError(f"exclude: {start:g}s-{end:g}s: no hold lies there")
             reasons |= {n: reason for n in inside if n not in reasons}
@@ -80,7 +89,7 @@ class Selection:
 
 
 def parse_selection(exclude: Sequence[str], join: Sequence[str]) -> Selection:
-    """Selection from ``13:moved`` or ``120s-135s:somebody passed``, and from ``4,5``.
+    """Selection from ``13:moved`` or ``120s-135s:moved``, and from ``4,5`` or ``120s-135s``.
 
     Raises
     ------
@@ -99,13 +108,23 @@ def parse_selection(exclude: Sequence[str], join: Sequence[str]) -> Selection:
                 f"exclude: expected a hold or a time, and why, as 13:moved or 120s-135s:moved, "
                 f"not {text!r}"
             )
-    joined = []
+    joined, joined_spans = [], []
     for text in join:
+        if (match := _SPAN.fullmatch(text)) and float(match[1]) < float(match[2]):
+            joined_spans.append((float(match[1]), float(match[2])))
+            continue
         parts = [part.strip() for part in text.split(",")]
         if len(parts) < 2 or not all(re.fullmatch(r"\d{1,9}", part) for part in parts):
-            raise InputError(f"join: expected numbers of holds, as 4,5, not {text!r}")
+            raise InputError(
+                f"join: expected numbers of holds or a time, as 4,5 or 120s-135s, not {text!r}"
+            )
         joined.append(tuple(sorted({int(part) for part in parts})))
-    return Selection(numbers, tuple(spans), tuple(joined))
+    return Selection(numbers, tuple(spans), tuple(joined), tuple(joined_spans))
+
+
+def _within(holds: Mapping[int, Segment], start: float, end: float) -> list[int]:
+    """Numbers of the holds that lie in a span of time, if only in part."""
+    return sorted(n for n, hold in holds.items() if hold.t0 <= end and hold.t1 >= start)
 
 
 def _check(number: int, holds: Mapping[int, Segment], key: str) -> None:
