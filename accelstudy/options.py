@@ -127,6 +127,15 @@ def quiet_option(command: Command) -> Command:
     return within  # type: ignore[return-value]
 
 
+seed_option = click.option(
+    "--seed",
+    default=1,
+    show_default=True,
+    type=click.IntRange(min=0),
+    help="Of all random numbers.",
+)
+
+
 class Sectioned(click.Command):
     """A command with many options, which its help lists in sections.
 

@@ -45,6 +45,11 @@ def say(text: str) -> None:
         click.echo(text)
 
 
+def warn(text: str) -> None:
+    """Print a warning on standard error, whether the command is quiet or not."""
+    click.echo(f"warning: {text}", err=True)
+
+
 @contextmanager
 def stage(what: str, total: float | None = None) -> Iterator[Callable[[float], None]]:
     """Show `what` is being done within a ``with`` block; stages may lie within each other.

@@ -14,8 +14,9 @@ from accelstudy.options import (
     force_option,
     model_option,
     quiet_option,
+    seed_option,
 )
-from accelstudy.progress import say, stage
+from accelstudy.progress import say, stage, warn
 
 
 @click.command("calibrate", epilog=example("accelstudy calibrate my-campaign --out calibrated"))
@@ -43,7 +44,7 @@ def calibrate_command(campaign: Path, model: str, approach: str, out: Path, forc
         fit = fit_campaign(measured, *chosen)
         content = write_calibration(fit, folder, campaign)
     for warning in measured.warnings:
-        click.echo(f"warning: {warning}", err=True)
+        warn(warning)
     for entry in content["parameters"]:
         unit = entry["unit"]
         known = entry["sigma"] is not None
@@ -70,13 +71,7 @@ def calibrate_command(campaign: Path, model: str, approach: str, out: Path, forc
     type=click.IntRange(min=2),
     help="Simulated campaigns.",
 )
-@click.option(
-    "--seed",
-    default=1,
-    show_default=True,
-    type=click.IntRange(min=0),
-    help="Of all random numbers.",
-)
+@seed_option
 @angle_unit_option
 @quiet_option
 def check_sigmas_command(
@@ -163,7 +158,7 @@ def apply_command(
     with new_file(out, [calibration, log], force) as path:
         leveled = level_log(read_calibration(calibration), log, path, given, sigma, start)
     for warning in leveled.warnings:
-        click.echo(f"warning: {warning}", err=True)
+        warn(warning)
     say(f"{leveled.rows - leveled.empty} of {leveled.rows} rows leveled: {out}")
 
 
@@ -185,7 +180,7 @@ def export_command(calibration: Path, form: str) -> None:
     content = read_calibration(calibration).content
     text = export(content, form)
     if mended := content["mended"]:
-        click.echo(f"warning: the calibration is of mended data: {mended['reason']}", err=True)
+        warn(f"the calibration is of mended data: {mended['reason']}")
     click.echo(text, nl=False)
 
 

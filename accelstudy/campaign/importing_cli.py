@@ -17,7 +17,7 @@ from accelstudy.options import (
     force_option,
     quiet_option,
 )
-from accelstudy.progress import say
+from accelstudy.progress import say, warn
 
 if TYPE_CHECKING:
     from accelstudy.campaign.importing import ImportReport
@@ -141,7 +141,7 @@ def _show(report: ImportReport, out: Path, figure: bool = True) -> None:
     for line in report.lines():
         say(line)
     for warning in report.warnings:
-        click.echo(f"warning: {warning}", err=True)
+        warn(warning)
     if figure and report.holds is not None:
         say(f"figure: {out / 'segmentation.png'}")
     say(f"campaign: {out}")

@@ -11,7 +11,7 @@ from accelstudy.campaign.assessment import MAX_TILT_GON, Assessment
 from accelstudy.campaign.fit import CampaignFit
 from accelstudy.plausibility import implausible_parameters, implausible_tilt
 from accelstudy.units import GON, attitude_unit, display_unit, to_attitude, to_display
-from accelstudy.wording import joined, p_value
+from accelstudy.wording import joined, p_value, words
 
 ACCEPTED, REJECTED = "accepted", "rejected"
 UNCHECKED, IMPLAUSIBLE = "cannot tell", "implausible"
@@ -51,21 +51,21 @@ def warnings(assessment: Assessment) -> list[str]:
 def verdict_lines(assessment: Assessment) -> list[str]:
     """Say whether the calibration is good, for what, and what limits it; the first comes first."""
     fit = assessment.fit
-    words = [*_implausible(assessment), *_consistency(fit)]
+    lines = [*_implausible(assessment), *_consistency(fit)]
     if assessment.suspects:
         named = [str(fit.campaign.positions[s.position]) for s in assessment.suspects]
         what = "position" if len(named) == 1 else "positions"
-        words.append(
+        lines.append(
             f"In conflict with the others, to be checked or repeated: {what} {joined(named)}."
         )
     judged = state(assessment)
     if judged != IMPLAUSIBLE and np.isfinite(assessment.tilt).all():
-        words.append(_tilt(assessment))
+        lines.append(_tilt(assessment))
     if judged in (REJECTED, IMPLAUSIBLE):
-        words.append("What is wrong or missing, “accelstudy diagnose” may tell.")
+        lines.append("What is wrong or missing, “accelstudy diagnose” may tell.")
     if not fit.approach.uses_angles:
-        words.append(BLIND)
-    return words
+        lines.append(BLIND)
+    return lines
 
 
 def next_steps(
@@ -101,20 +101,20 @@ def _implausible(assessment: Assessment) -> list[str]:
     if not said:
         return []
     found, gross = said, assessment.gross_error
-    words = []
+    lines = []
     if gross is not None:
         found = said[:-1]
-        what = gross.name.replace("_", " ")
-        words.append(f"This looks like a gross error ({what}): {gross.reason}.")
+        what = words(gross.name)
+        lines.append(f"This looks like a gross error ({what}): {gross.reason}.")
     if found:
         cause = "" if gross is not None else " A wrong unit, sign, axis or row is the usual cause."
-        words.append(f"No sensor is like this: {joined(found)}.{cause}")
-    return words
+        lines.append(f"No sensor is like this: {joined(found)}.{cause}")
+    return lines
 
 
 def _tilt(assessment: Assessment) -> str:
     shares = assessment.tilt_shares
-    limit = max(shares, key=lambda name: float(shares[name].max())).replace("_", " ")
+    limit = words(max(shares, key=lambda name: float(shares[name].max())))
     most, unit = to_attitude(MAX_TILT_GON * GON), display_unit("rad")
     where = f"rms up to {most:.0f} {attitude_unit()} of tilt, noise of a reading apart"
     alone, whole = (

@@ -14,8 +14,9 @@ from accelstudy.options import (
     force_option,
     model_option,
     quiet_option,
+    seed_option,
 )
-from accelstudy.progress import say
+from accelstudy.progress import say, warn
 
 
 @click.command("diagnose", epilog=example("accelstudy diagnose my-campaign --out diagnosed"))
@@ -23,13 +24,7 @@ from accelstudy.progress import say
 @click.option("--out", type=PATH, required=True, help="Folder to write to.")
 @model_option
 @approach_option(None)
-@click.option(
-    "--seed",
-    default=1,
-    show_default=True,
-    type=click.IntRange(min=0),
-    help="Of all random numbers.",
-)
+@seed_option
 @click.option(
     "--replicates",
     default=1000,
@@ -59,11 +54,9 @@ def diagnose_command(
 
     diagnosis = diagnose_folder(campaign, out, model, approach, seed, replicates, force)
     for warning in diagnosis.campaign.warnings:
-        click.echo(f"warning: {warning}", err=True)
+        warn(warning)
     if diagnosis.recognised is not None:
-        click.echo(
-            f"warning: calibration.json is of mended data: {diagnosis.recognised.reason}", err=True
-        )
+        warn(f"calibration.json is of mended data: {diagnosis.recognised.reason}")
     for line in verdict_lines(diagnosis):
         say(line)
     say(f"report: {out / 'report.html'}")

@@ -7,7 +7,6 @@ import io
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-import click
 import matplotlib as mpl
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -18,6 +17,7 @@ from matplotlib.lines import Line2D
 
 from accelstudy.figures.style import STYLE
 from accelstudy.outputs import whole_file
+from accelstudy.progress import warn
 
 PAGE_DPI = 150
 """Of the figures of a page, which shows them as SVG."""
@@ -89,7 +89,7 @@ def failure(what: str, error: Exception) -> str:
     """Say what failed and by which error, and warn of it on stderr."""
     reason = " ".join(str(error).split())[:200]
     said = f"{what} ({type(error).__name__}: {reason})."
-    click.echo(f"warning: {said}", err=True)
+    warn(said)
     return said
 
 
