@@ -215,7 +215,7 @@ def effects(campaign: Path | None, scheme: str | None, model: str, approach: str
         raise InputError("effects: --campaign and --scheme exclude each other; give one of them")
     from accelstudy.approaches import get_approach
     from accelstudy.campaign.format import read_campaign
-    from accelstudy.diagnosis import visibility
+    from accelstudy.diagnosis.worth import visibility
     from accelstudy.models import get_model
     from accelstudy.schemes import get_scheme
 

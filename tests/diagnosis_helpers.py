@@ -6,7 +6,7 @@ from scipy.stats import binom
 from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign
-from accelstudy.diagnosis.hypotheses import setting_of
+from accelstudy.diagnosis.space.hypotheses import setting_of
 from accelstudy.effects import Hold
 from accelstudy.models import get_model
 from accelstudy.schemes import get_scheme

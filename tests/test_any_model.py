@@ -21,9 +21,9 @@ from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.log_reading import readings_of
 from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign
 from accelstudy.cli import main
-from accelstudy.diagnosis.calibration import diagnosed_calibration
-from accelstudy.diagnosis.model_file import study_overlay
 from accelstudy.diagnosis.pipeline import diagnose
+from accelstudy.diagnosis.report.calibration import diagnosed_calibration
+from accelstudy.diagnosis.report.model_file import study_overlay
 from accelstudy.diagnosis.round_trip import parse_round_trip
 from accelstudy.effects import Hold
 from accelstudy.errors import InputError

@@ -19,10 +19,10 @@ from accelstudy.campaign.fit import fit_campaign
 from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign
 from accelstudy.campaign.verdict import ACCEPTED, REJECTED, state
 from accelstudy.cli import main
-from accelstudy.diagnosis import gap
+from accelstudy.diagnosis.evidence.screening import p_of_share, screen, shares
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.screening import p_of_share, screen, shares
-from accelstudy.diagnosis.spaces import Bases
+from accelstudy.diagnosis.space.spaces import Bases
+from accelstudy.diagnosis.worth import gap
 from accelstudy.models import compose, get_model
 
 NINE = get_model("bias-scale-nonorthogonality")

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from accelstudy.campaign import write_campaign
 from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign
 from accelstudy.cli import main
-from accelstudy.diagnosis.document import diagnosis_document
 from accelstudy.diagnosis.pipeline import diagnose
+from accelstudy.diagnosis.report.document import diagnosis_document
 from accelstudy.effects import effect_names
 from accelstudy.errors import InputError
 from accelstudy.leveling import specific_force

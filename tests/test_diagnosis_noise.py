@@ -9,8 +9,8 @@ from quality_helpers import BOTH, SIGMA, STANDARD_ERRORS, draw, one, solutions
 from scipy import stats
 
 from accelstudy.adjustment.quality import solve
-from accelstudy.diagnosis.chance import Chance
-from accelstudy.diagnosis.noise import (
+from accelstudy.diagnosis.evidence.chance import Chance
+from accelstudy.diagnosis.evidence.noise import (
     axis_factors,
     axis_test,
     colour_test,
@@ -19,7 +19,7 @@ from accelstudy.diagnosis.noise import (
     tail_test,
     within_hold_test,
 )
-from accelstudy.diagnosis.residuals import Residuals
+from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.simulation import Noise
 
 RUNS, SIMULATED = 300, 300

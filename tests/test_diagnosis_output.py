@@ -15,11 +15,11 @@ from test_workflow import ROOT
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign
 from accelstudy.cli import main
-from accelstudy.diagnosis.loop import close_loop
-from accelstudy.diagnosis.output import diagnose_folder, write_diagnosis
 from accelstudy.diagnosis.pipeline import diagnose
+from accelstudy.diagnosis.report.output import diagnose_folder, write_diagnosis
+from accelstudy.diagnosis.report.wording import headline
 from accelstudy.diagnosis.round_trip import parse_round_trip
-from accelstudy.diagnosis.wording import headline
+from accelstudy.diagnosis.worth.loop import close_loop
 from accelstudy.errors import InputError
 from accelstudy.models import get_model
 from accelstudy.study.config import read_study
@@ -291,7 +291,7 @@ def test_bad_input_is_one_line(arguments, words, tmp_path, monkeypatch):
 def test_a_figure_that_fails_takes_nothing_with_it(tmp_path, monkeypatch, capsys):
     campaign = simulated("no_effect", tmp_path / "c")
     diagnosis = diagnose(campaign, NINE)
-    monkeypatch.setattr("accelstudy.diagnosis.figures.evidence_figure", lambda *_: 1 / 0)
+    monkeypatch.setattr("accelstudy.diagnosis.report.figures.evidence_figure", lambda *_: 1 / 0)
     write_diagnosis(diagnosis, tmp_path / "out")
     said = "The figure 'evidence' could not be drawn (ZeroDivisionError: division by zero)."
     assert capsys.readouterr().err == f"warning: {said}\n"

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, design, shuffled, some_holds
 
-from accelstudy.diagnosis.hypotheses import cosines, same_space
-from accelstudy.diagnosis.limits import signature_columns, upper_limits, visibilities
-from accelstudy.diagnosis.signatures import signature
+from accelstudy.diagnosis.space.hypotheses import cosines, same_space
+from accelstudy.diagnosis.space.signatures import signature
+from accelstudy.diagnosis.worth.limits import signature_columns, upper_limits, visibilities
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.sensor import SensorModel
 from accelstudy.simulation import Noise, session
@@ -126,7 +126,7 @@ def test_what_an_effect_leaves_in_the_residuals(name, approach):
     observed = session(model, truth, directions, G, hold).observations(Noise())
     # The sensitivity to previous positions is that of the sensor's own readings.
     from accelstudy.adjustment.quality import solve
-    from accelstudy.diagnosis.residuals import Residuals
+    from accelstudy.diagnosis.space.residuals import Residuals
 
     left = Residuals.of(solve(NINE, approach, observed))
     fitted = left.z

@@ -23,13 +23,13 @@ from accelstudy.approaches import get_approach
 from accelstudy.campaign.fit import fit_campaign
 from accelstudy.campaign.output import write_calibration
 from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign
-from accelstudy.diagnosis import chance, search
-from accelstudy.diagnosis.colour import LENGTHS, quadratic_forms, restricted_likelihoods
-from accelstudy.diagnosis.hypotheses import setting_of
-from accelstudy.diagnosis.location import groups
-from accelstudy.diagnosis.noise import axis_factors
+from accelstudy.diagnosis.evidence import chance, search
+from accelstudy.diagnosis.evidence.colour import LENGTHS, quadratic_forms, restricted_likelihoods
+from accelstudy.diagnosis.evidence.noise import axis_factors
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.repeats import clusters
+from accelstudy.diagnosis.space.hypotheses import setting_of
+from accelstudy.diagnosis.space.location import groups
+from accelstudy.diagnosis.space.repeats import clusters
 from accelstudy.effects import Hold, get_effect
 from accelstudy.simulation import Noise
 

@@ -12,7 +12,7 @@ import pytest
 from accelstudy.campaign.importing import import_file
 from accelstudy.campaign.public import import_settings, public_data, public_file
 from accelstudy.diagnosis.pipeline import Diagnosis, diagnose
-from accelstudy.diagnosis.wording import (
+from accelstudy.diagnosis.report.wording import (
     GROUPS,
     amount,
     shown_unit,

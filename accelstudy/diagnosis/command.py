@@ -49,8 +49,8 @@ def diagnose_command(
     CAMPAIGN is a folder. Tells missing effects, wrong noise and gross errors apart, adds what is
     missing to the model and tests it on positions that were not used.
     """
-    from accelstudy.diagnosis.output import diagnose_folder
-    from accelstudy.diagnosis.wording import verdict_lines
+    from accelstudy.diagnosis.report.output import diagnose_folder
+    from accelstudy.diagnosis.report.wording import verdict_lines
 
     diagnosis = diagnose_folder(campaign, out, model, approach, seed, replicates, force)
     for warning in diagnosis.campaign.warnings:

@@ -15,19 +15,8 @@ from accelstudy.approaches import Approach, get_approach
 from accelstudy.campaign.assessment import SUSPECT
 from accelstudy.campaign.fit import fit_campaign, least_sigma
 from accelstudy.campaign.format import Campaign
-from accelstudy.diagnosis import gap as gaps
-from accelstudy.diagnosis import noise as noises
-from accelstudy.diagnosis.chance import SIMULATIONS
-from accelstudy.diagnosis.changes import Change, parameter_changes
-from accelstudy.diagnosis.hypotheses import OUTLIER, Setting
-from accelstudy.diagnosis.limits import UpperLimit, upper_limits
-from accelstudy.diagnosis.location import LACK_OF_FIT, locate
-from accelstudy.diagnosis.naming import COLOUR, LEVEL, known_level_evidence
-from accelstudy.diagnosis.next_positions import NextPosition, next_positions
-from accelstudy.diagnosis.noise import NoiseTest
-from accelstudy.diagnosis.residuals import Residuals
-from accelstudy.diagnosis.screening import Screening
-from accelstudy.diagnosis.search import (
+from accelstudy.diagnosis.decision.explanations import Explanation, credible_set
+from accelstudy.diagnosis.decision.search import (
     LEVEL_EFFECTS,
     SURE,
     Choice,
@@ -35,7 +24,19 @@ from accelstudy.diagnosis.search import (
     Search,
     position_of,
 )
-from accelstudy.diagnosis.tilt import leveling_rms
+from accelstudy.diagnosis.evidence import noise as noises
+from accelstudy.diagnosis.evidence.chance import SIMULATIONS
+from accelstudy.diagnosis.evidence.naming import COLOUR, LEVEL, known_level_evidence
+from accelstudy.diagnosis.evidence.noise import NoiseTest
+from accelstudy.diagnosis.evidence.screening import Screening
+from accelstudy.diagnosis.space.hypotheses import OUTLIER, Setting
+from accelstudy.diagnosis.space.location import LACK_OF_FIT, locate
+from accelstudy.diagnosis.space.residuals import Residuals
+from accelstudy.diagnosis.worth import gap as gaps
+from accelstudy.diagnosis.worth.changes import Change, parameter_changes
+from accelstudy.diagnosis.worth.limits import UpperLimit, upper_limits
+from accelstudy.diagnosis.worth.next_positions import NextPosition, next_positions
+from accelstudy.diagnosis.worth.tilt import leveling_rms
 from accelstudy.errors import InputError
 from accelstudy.gross_errors.recognition import Recognised, recognise
 from accelstudy.progress import stage
@@ -75,7 +76,11 @@ class Named:
 
 @dataclass(frozen=True)
 class Gap:
-    """How far the disagreement shrinks; None where it does not apply."""
+    """How far the disagreement shrinks; None where it does not apply.
+
+    `statement` says what is confirmed: "effect", that one of the credible set is missing, or "name",
+    that it is the most probable one; None if nothing is.
+    """
 
     before: float
     after: float | None = None
@@ -83,6 +88,7 @@ class Gap:
     leveling: tuple[float, float] | None = None
     confirmed: bool = False
     reason: str = ""
+    statement: str | None = None
 
 
 @dataclass(frozen=True)
@@ -94,7 +100,8 @@ class Diagnosis:
     campaign : Campaign, with a recognised gross error mended
     approach : Approach
     model, extended : SensorModel, without and with the effects that were found
-    verdict : str, "no_effect", "named", "unknown", "noise_model" or "gross_error"
+    verdict : str, "no_effect", "named", "narrowed", "unknown", "noise_model" or "gross_error"
+    credible_set : tuple of Explanation, most probable first; empty if nothing is missing
     found : tuple of Named
     base : Solution, of the base model with equal axes
     setting : Setting, of the base fit, with unequal axes weighted
@@ -121,6 +128,7 @@ class Diagnosis:
     model: SensorModel
     extended: SensorModel
     verdict: str
+    credible_set: tuple[Explanation, ...]
     found: tuple[Named, ...]
     base: Solution
     setting: Setting
@@ -250,6 +258,7 @@ class _Run:
             model=self.model,
             extended=final.frame.solution.model,
             verdict=verdict,
+            credible_set=() if verdict == "no_effect" else self.credible_set,
             found=found,
             base=self.first,
             setting=search.setting,
@@ -269,6 +278,15 @@ class _Run:
             recognised=self.recognised,
             suspects=self.suspects,
             reason=reason,
+        )
+
+    @property
+    def credible_set(self) -> tuple[Explanation, ...]:
+        """Smallest set of explanations that holds what is missing."""
+        members = {best.name: names for best, names in self.search.classes}
+        return credible_set(
+            Explanation((name,), (members.get(name, (name,)),), p)
+            for name, p in self.search.probabilities.items()
         )
 
     def finding(self) -> tuple[Finding, tuple[NoiseTest, ...]]:

@@ -1,8 +1,8 @@
 import logging
 import os
 
-from accelstudy.diagnosis.output import diagnose_folder
-from accelstudy.diagnosis.wording import verdict_lines
+from accelstudy.diagnosis.report.output import diagnose_folder
+from accelstudy.diagnosis.report.wording import verdict_lines
 from accelstudy.study.job import logged
 from accelstudy.units import ANGLE_UNIT_VARIABLE, angles_in
 

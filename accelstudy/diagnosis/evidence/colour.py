@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.diagnosis.residuals import Residuals
+from accelstudy.diagnosis.space.residuals import Residuals
 
 Array = NDArray[np.float64]
 

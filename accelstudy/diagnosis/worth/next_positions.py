@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.diagnosis.hypotheses import Frame, Hypothesis
-from accelstudy.diagnosis.signatures import signature
+from accelstudy.diagnosis.space.hypotheses import Frame, Hypothesis
+from accelstudy.diagnosis.space.signatures import signature
 from accelstudy.effects import Hold
 from accelstudy.leveling import roll_pitch
 from accelstudy.schemes import get_scheme

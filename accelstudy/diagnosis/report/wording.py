@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from accelstudy.diagnosis.gap import SIGNIFICANT
 from accelstudy.diagnosis.pipeline import Diagnosis, Named
+from accelstudy.diagnosis.worth.gap import SIGNIFICANT
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.figures.style import unit_label
 from accelstudy.study.report import number

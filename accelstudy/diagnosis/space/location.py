@@ -7,12 +7,12 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.diagnosis.chance import Chance
-from accelstudy.diagnosis.hypotheses import Setting, span
-from accelstudy.diagnosis.repeats import clusters
-from accelstudy.diagnosis.residuals import Residuals
-from accelstudy.diagnosis.signatures import signature
-from accelstudy.diagnosis.spaces import ABSORBED, Bases, LackOfFit, Repeats, Spaces
+from accelstudy.diagnosis.evidence.chance import Chance
+from accelstudy.diagnosis.space.hypotheses import Setting, span
+from accelstudy.diagnosis.space.repeats import clusters
+from accelstudy.diagnosis.space.residuals import Residuals
+from accelstudy.diagnosis.space.signatures import signature
+from accelstudy.diagnosis.space.spaces import ABSORBED, Bases, LackOfFit, Repeats, Spaces
 from accelstudy.effects import get_effect
 from accelstudy.errors import InputError
 

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import Solution
-from accelstudy.diagnosis.hypotheses import Frame
-from accelstudy.diagnosis.residuals import Residuals
-from accelstudy.diagnosis.signatures import signature
+from accelstudy.diagnosis.space.hypotheses import Frame
+from accelstudy.diagnosis.space.residuals import Residuals
+from accelstudy.diagnosis.space.signatures import signature
 from accelstudy.effects import Effect
 
 Array = NDArray[np.float64]

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from scipy import special
 
 from accelstudy.adjustment.quality import global_test
-from accelstudy.diagnosis.chance import Chance
-from accelstudy.diagnosis.colour import quadratic_forms
-from accelstudy.diagnosis.repeats import clusters
-from accelstudy.diagnosis.residuals import Residuals, position_products
+from accelstudy.diagnosis.evidence.chance import Chance
+from accelstudy.diagnosis.evidence.colour import quadratic_forms
+from accelstudy.diagnosis.space.repeats import clusters
+from accelstudy.diagnosis.space.residuals import Residuals, position_products
 
 Array = NDArray[np.float64]
 

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import Solution, root_of
-from accelstudy.diagnosis.residuals import Residuals, ideal_residuals, position_products
-from accelstudy.diagnosis.signatures import signature
-from accelstudy.diagnosis.spaces import Bases
+from accelstudy.diagnosis.space.residuals import Residuals, ideal_residuals, position_products
+from accelstudy.diagnosis.space.signatures import signature
+from accelstudy.diagnosis.space.spaces import Bases
 from accelstudy.effects import Effect, Hold, effect_names, get_effect
 from accelstudy.errors import InputError
 from accelstudy.leveling import roll_pitch

@@ -11,19 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import Solution, solve
-from accelstudy.diagnosis import noise as noises
-from accelstudy.diagnosis.chance import Chance
-from accelstudy.diagnosis.hypotheses import (
-    OUTLIER,
-    EffectShapes,
-    Hypothesis,
-    Setting,
-    Shapes,
-    same_space,
-    setting_of,
-)
-from accelstudy.diagnosis.location import groups
-from accelstudy.diagnosis.naming import (
+from accelstudy.diagnosis.evidence import noise as noises
+from accelstudy.diagnosis.evidence.chance import Chance
+from accelstudy.diagnosis.evidence.naming import (
     COLOUR,
     UNKNOWN,
     colour_evidence,
@@ -32,11 +22,21 @@ from accelstudy.diagnosis.naming import (
     shapes_evidence,
     widths,
 )
-from accelstudy.diagnosis.noise import NoiseTest
-from accelstudy.diagnosis.pairs import Pair, best_pairs
-from accelstudy.diagnosis.residuals import Residuals
-from accelstudy.diagnosis.screening import Screening, screen
-from accelstudy.diagnosis.spaces import Spaces
+from accelstudy.diagnosis.evidence.noise import NoiseTest
+from accelstudy.diagnosis.evidence.pairs import Pair, best_pairs
+from accelstudy.diagnosis.evidence.screening import Screening, screen
+from accelstudy.diagnosis.space.hypotheses import (
+    OUTLIER,
+    EffectShapes,
+    Hypothesis,
+    Setting,
+    Shapes,
+    same_space,
+    setting_of,
+)
+from accelstudy.diagnosis.space.location import groups
+from accelstudy.diagnosis.space.residuals import Residuals
+from accelstudy.diagnosis.space.spaces import Spaces
 from accelstudy.errors import InputError
 from accelstudy.models import composition_name
 from accelstudy.sensor import SensorModel

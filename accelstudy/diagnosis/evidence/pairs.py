@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.diagnosis.hypotheses import OUTLIER, Hypothesis, Shapes
-from accelstudy.diagnosis.naming import log_evidence, mean_evidence
-from accelstudy.diagnosis.residuals import Residuals
+from accelstudy.diagnosis.evidence.naming import log_evidence, mean_evidence
+from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis, Shapes
+from accelstudy.diagnosis.space.residuals import Residuals
 
 Array = NDArray[np.float64]
 

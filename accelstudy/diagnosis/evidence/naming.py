@@ -17,11 +17,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from accelstudy.diagnosis.colour import restricted_likelihoods
-from accelstudy.diagnosis.hypotheses import Hypothesis
-from accelstudy.diagnosis.residuals import Residuals
-from accelstudy.diagnosis.screening import shares
-from accelstudy.diagnosis.spaces import Spaces
+from accelstudy.diagnosis.evidence.colour import restricted_likelihoods
+from accelstudy.diagnosis.evidence.screening import shares
+from accelstudy.diagnosis.space.hypotheses import Hypothesis
+from accelstudy.diagnosis.space.residuals import Residuals
+from accelstudy.diagnosis.space.spaces import Spaces
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.diagnosis.residuals import Residuals
+from accelstudy.diagnosis.space.residuals import Residuals
 
 Array = NDArray[np.float64]
 

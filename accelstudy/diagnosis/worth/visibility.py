@@ -9,8 +9,8 @@ from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import Approach, get_approach
 from accelstudy.campaign.fit import fit_campaign
 from accelstudy.campaign.format import Campaign
-from accelstudy.diagnosis.hypotheses import Setting, setting_of
-from accelstudy.diagnosis.limits import visibilities
+from accelstudy.diagnosis.space.hypotheses import Setting, setting_of
+from accelstudy.diagnosis.worth.limits import visibilities
 from accelstudy.effects import Effect, get_effect
 from accelstudy.hold_plan import check_needs_no_plan
 from accelstudy.schemes import Scheme

@@ -54,6 +54,14 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
             ],
         },
         "posterior": {name: number(p) for name, p in d.probabilities.items()},
+        "credible_set": [
+            {
+                "names": list(one.names),
+                "classes": [list(names) for names in one.classes],
+                "posterior": number(one.posterior),
+            }
+            for one in d.credible_set
+        ],
         "effects": [_effect(named) for named in d.found],
         "suspects": [{"position": label, "p_value": number(p)} for label, p in d.suspects],
         "location": {name: number(share) for name, share in d.location.items()},
@@ -139,5 +147,6 @@ def _gap(d: Diagnosis) -> dict[str, Any]:
             "after": None if roll_pitch is None else number(roll_pitch[1]),
         },
         "confirmed": gap.confirmed,
+        "confirmed_statement": gap.statement,
         "reason": gap.reason,
     }

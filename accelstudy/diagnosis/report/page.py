@@ -8,12 +8,12 @@ from typing import Any
 import pandas as pd
 
 from accelstudy.adjustment.quality.whole_model import REFUTED
-from accelstudy.diagnosis import wording
-from accelstudy.diagnosis.figures import diagnosis_figures
-from accelstudy.diagnosis.loop import Loop
-from accelstudy.diagnosis.next_steps import next_steps
+from accelstudy.diagnosis.decision.search import LEVEL_EFFECTS, SURE
 from accelstudy.diagnosis.pipeline import LEVEL_NOISE, Diagnosis
-from accelstudy.diagnosis.search import LEVEL_EFFECTS, SURE
+from accelstudy.diagnosis.report import wording
+from accelstudy.diagnosis.report.figures import diagnosis_figures
+from accelstudy.diagnosis.report.next_steps import next_steps
+from accelstudy.diagnosis.worth.loop import Loop
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.figures.saving import save_all
 from accelstudy.pages import write_page
@@ -44,7 +44,7 @@ def write_report(
     lines = wording.verdict_lines(diagnosis)
     write_page(
         folder / "report.html",
-        "diagnosis/report.html.j2",
+        "diagnosis/report/page.html.j2",
         " ".join(lines),
         d=diagnosis,
         doc=document,

@@ -9,8 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import noncentrality
-from accelstudy.diagnosis.hypotheses import ALIKE, OUTLIER, Frame, Hypothesis, Setting, cosines
-from accelstudy.diagnosis.signatures import signature
+from accelstudy.diagnosis.space.hypotheses import (
+    ALIKE,
+    OUTLIER,
+    Frame,
+    Hypothesis,
+    Setting,
+    cosines,
+)
+from accelstudy.diagnosis.space.signatures import signature
 from accelstudy.effects import Effect, get_effect
 
 Array = NDArray[np.float64]

@@ -11,12 +11,12 @@ import yaml
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.document import json_text
 from accelstudy.campaign.format import read_campaign
-from accelstudy.diagnosis.calibration import diagnosed_calibration
-from accelstudy.diagnosis.document import diagnosis_document
-from accelstudy.diagnosis.loop import REPLICATES, Loop, close_loop
-from accelstudy.diagnosis.model_file import study_overlay
 from accelstudy.diagnosis.pipeline import Diagnosis, diagnose
-from accelstudy.diagnosis.positions import positions_table
+from accelstudy.diagnosis.report.calibration import diagnosed_calibration
+from accelstudy.diagnosis.report.document import diagnosis_document
+from accelstudy.diagnosis.report.model_file import study_overlay
+from accelstudy.diagnosis.report.positions import positions_table
+from accelstudy.diagnosis.worth.loop import REPLICATES, Loop, close_loop
 from accelstudy.errors import InputError
 from accelstudy.models import get_model
 from accelstudy.outputs import DIAGNOSIS, result_folder, whole_file
@@ -99,7 +99,7 @@ def write_diagnosis(
         path.write_text(MODEL_HEADER + text, encoding="utf-8")
     if report:
         # Drawing takes as long to import as all of the above to compute.
-        from accelstudy.diagnosis.report import write_report
+        from accelstudy.diagnosis.report.page import write_report
 
         write_report(diagnosis, document, positions, loop, folder, calibration, source)
     with whole_file(folder / "diagnosis.json") as path:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
-from accelstudy.diagnosis.spaces import Spaces
+from accelstudy.diagnosis.space.spaces import Spaces
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.diagnosis.residuals import Residuals
+from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.progress import track
 
 Array = NDArray[np.float64]

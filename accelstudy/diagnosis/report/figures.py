@@ -14,12 +14,12 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
-from accelstudy.diagnosis.loop import CASES, Loop
-from accelstudy.diagnosis.naming import UNKNOWN
+from accelstudy.diagnosis.decision.search import LEVEL_EFFECTS
+from accelstudy.diagnosis.evidence.naming import UNKNOWN
 from accelstudy.diagnosis.pipeline import Diagnosis
-from accelstudy.diagnosis.positions import condition_sigma
-from accelstudy.diagnosis.search import LEVEL_EFFECTS
-from accelstudy.diagnosis.wording import GROUPS
+from accelstudy.diagnosis.report.positions import condition_sigma
+from accelstudy.diagnosis.report.wording import GROUPS
+from accelstudy.diagnosis.worth.loop import CASES, Loop
 from accelstudy.figures.style import FULL, INK, log_ticks, new_figure
 from accelstudy.study.report import number
 from accelstudy.units import display_unit, to_display

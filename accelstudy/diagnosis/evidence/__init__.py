@@ -1,0 +1,1 @@
+"""What the residuals say of each hypothesis, and what noise alone would say."""

@@ -1,0 +1,1 @@
+"""What a diagnosis writes: files for programs, and a page with figures."""

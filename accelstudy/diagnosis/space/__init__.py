@@ -1,0 +1,1 @@
+"""The space of residuals, and the hypotheses that live in it."""

@@ -1,0 +1,1 @@
+"""What a finding is worth: on held-out positions, in tilt, in further positions."""
