@@ -36,6 +36,24 @@ def catalogue() -> str:
     return "\n".join(lines)
 
 
+def family_of(*names: str) -> str:
+    """Return the family that effects, noise effects or gross errors have in common, or nothing.
+
+    Names that stand for none of these, such as "unknown", belong to no family.
+    """
+    families = {_family(name) for name in names}
+    return families.pop() if len(families) == 1 else ""
+
+
+def _family(name: str) -> str:
+    """Family of a name of the catalogue; empty if it is none."""
+    if name in effect_names():
+        return get_effect(name).family
+    if name in noise_effect_names():
+        return get_noise_effect(name).family
+    return get_gross_error(name).family if name in gross_error_names() else ""
+
+
 def _effect(effect: Effect) -> Iterator[str]:
     yield from _head(effect, effect.equation)
     unit = effect.parameters[0].unit
@@ -46,6 +64,8 @@ def _effect(effect: Effect) -> Iterator[str]:
     columns = compose(effect.spec, (effect.spec,)).hold_columns
     if needed := [column for column in columns if column in PROVIDES]:
         yield f"{INDENT}needs the {' and the '.join(needed)} of each hold"
+    if effect.family:
+        yield f"{INDENT}family: {effect.family}"
 
 
 def _noise_effect(effect: NoiseEffect) -> Iterator[str]:

@@ -77,11 +77,14 @@ class Shaped:
     ----------
     kind : str, what it is, for messages
     name : str, canonical
+    family : str, what it has in common with those that are easily taken for it; empty if there are
+        none
     hypers : tuple of Hyper, its settings, found in ``self.shape``
     """
 
     kind: ClassVar[str]
     name: ClassVar[str]
+    family: ClassVar[str] = ""
     hypers: ClassVar[tuple[Hyper, ...]] = ()
 
     def __init__(self, **shape: float) -> None:

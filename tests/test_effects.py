@@ -9,7 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from accelstudy.adjustment import calibrate
 from accelstudy.approaches import get_approach
+from accelstudy.catalogue import family_of
 from accelstudy.design import diagnose
+from accelstudy.diagnosis.report.wording import GROUPS
 from accelstudy.effects import Hold, effect_names, get_effect
 from accelstudy.effects.base import STILL
 from accelstudy.errors import InputError
@@ -83,6 +85,21 @@ def test_every_effect_of_the_catalogue_is_there():
         effect = get_effect(name)
         assert len(effect.parameters) == number
         assert effect.part == ("rig" if name in RIG else "sensor")
+
+
+def test_what_is_easily_confused_is_of_one_family():
+    assert family_of("bias_drift", "warm_up") == "slow change in time"
+    assert family_of("cubic_scale", "saturation") == "odd nonlinearity"
+    assert family_of("quadratic_scale", "scale_asymmetry") == "even nonlinearity"
+    assert family_of("encoder_offset", "base_tilt") == "attitude of the rig"
+    assert family_of("hysteresis", "settling") == "memory of the previous position"
+    assert family_of("coloured_noise", "heavy_tails") == "noise"
+    for apart in (("thermal_bias", "warm_up"), ("bias_drift", "unknown"), ("unknown",), ()):
+        assert not family_of(*apart)
+
+
+def test_location_counts_an_effect_in_one_of_the_groups_that_people_read_of():
+    assert {get_effect(name).group for name in effect_names()} - {""} <= set(GROUPS)
 
 
 @EACH

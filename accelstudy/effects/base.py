@@ -119,6 +119,8 @@ class Effect(Shaped):
     Attributes
     ----------
     name : str, canonical
+    family : str, what it has in common with effects that are easily taken for it, in plain words
+    group : str, in which `location` of a diagnosis counts it; empty where in none
     parameters : tuple of Parameter
     hypers : tuple of Hyper, numbers that shape the effect
     equation : str, what is added, for people; by default as the methods have it
@@ -130,6 +132,7 @@ class Effect(Shaped):
     """
 
     kind = "effect"
+    group: ClassVar[str] = ""
     parameters: ClassVar[tuple[Parameter, ...]]
     part: ClassVar[Literal["sensor", "rig"]] = "sensor"
     drifts: ClassVar[bool] = False

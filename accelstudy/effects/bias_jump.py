@@ -19,6 +19,8 @@ class BiasJump(Effect):
     """Bias step c for t > t_c; the time t_c is searched between the holds."""
 
     name = "bias_jump"
+    family = "sudden change"
+    group = "slow_time"
     parameters = per_axis("c", "m/s^2", "c_%")
     hypers = (Hyper("t", "s", 600.0),)
     equation = "c_i for t > t_c"

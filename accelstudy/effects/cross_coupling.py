@@ -8,6 +8,8 @@ class CrossCoupling(Effect):
     """Second-order cross-coupling k_ij f_i f_j/g, i ≠ j (Kip and Kio of IEEE Std 1293)."""
 
     name = "cross_coupling"
+    family = "even nonlinearity"
+    group = "direction"
     parameters = tuple(
         Parameter(f"k_{i}{j}", "1", f"$k_{{{i}{j}}}$") for i in AXES for j in AXES if i != j
     )

@@ -8,6 +8,8 @@ class CubicScale(Effect):
     """Third-order nonlinearity k_i f_i³/g² (K3 of IEEE Std 1293, in units of g²)."""
 
     name = "cubic_scale"
+    family = "odd nonlinearity"
+    group = "direction"
     parameters = per_axis("k3", "1", "k_{3%}")
     equation = "k_i f_i³ / g²"
     typical = (100e-6, 1000e-6)

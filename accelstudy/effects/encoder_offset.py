@@ -8,6 +8,8 @@ class EncoderOffset(Effect):
     """Zero offsets of the robot's roll and pitch."""
 
     name = "encoder_offset"
+    family = "attitude of the rig"
+    group = "robot_angles"
     parameters = (
         Parameter("c_roll", "rad", r"$c_\phi$"),
         Parameter("c_pitch", "rad", r"$c_\theta$"),

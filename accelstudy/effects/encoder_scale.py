@@ -8,6 +8,8 @@ class EncoderScale(Effect):
     """Scale errors of the robot's roll and pitch."""
 
     name = "encoder_scale"
+    family = "attitude of the rig"
+    group = "robot_angles"
     parameters = (
         Parameter("k_roll", "1", r"$k_\phi$"),
         Parameter("k_pitch", "1", r"$k_\theta$"),

@@ -11,6 +11,7 @@ class GravityError(Effect):
     """
 
     name = "gravity_error"
+    family = "linear scale"
     parameters = (Parameter("delta_g", "m/s^2", r"$\delta g$"),)
     equation = "δg f / g"
     typical = (1e-4, 27e-3)

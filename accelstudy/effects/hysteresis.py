@@ -8,6 +8,8 @@ class Hysteresis(Effect):
     """Output hysteresis h sign(f − f_prev) (IEEE Std 1293)."""
 
     name = "hysteresis"
+    family = "memory of the previous position"
+    group = "previous_position"
     parameters = per_axis("h", "m/s^2", "h_%")
     equation = "h_i sign(f_i − f_prev,i)"
     typical = (0.5e-3, 5e-3)

@@ -8,6 +8,7 @@ class MountingRotation(Effect):
     """Small rotation ε × f of the sensor against the flange, whose tilt it is to tell."""
 
     name = "mounting_rotation"
+    family = "alignment of the axes"
     parameters = per_axis("eps", "rad", "\\varepsilon_%")
     equation = "ε × f"
     typical = (2e-3, 17e-3)

@@ -8,6 +8,7 @@ class NonOrthogonality(Effect):
     """Upper triangle of T (Thalmann & Neuner 2018, eq. 4); α_ij turns axis i around body axis j."""
 
     name = "nonorthogonality"
+    family = "alignment of the axes"
     parameters = (
         Parameter("alpha_yz", "rad", r"$\alpha_{yz}$"),
         Parameter("alpha_zy", "rad", r"$\alpha_{zy}$"),

@@ -8,6 +8,8 @@ class QuadraticScale(Effect):
     """Second-order nonlinearity k_i f_i²/g (K2 of IEEE Std 1293, in units of g)."""
 
     name = "quadratic_scale"
+    family = "even nonlinearity"
+    group = "direction"
     parameters = per_axis("k2", "1", "k_{2%}")
     equation = "k_i f_i² / g"
     typical = (100e-6, 2500e-6)

@@ -8,6 +8,7 @@ class Scale(Effect):
     """Scale error s_i, S = diag(1 + s) (Thalmann & Neuner 2018, eq. 1 and 2)."""
 
     name = "scale"
+    family = "linear scale"
     parameters = per_axis("s", "1", "s_%")
     equation = "s_i f_i"
     typical = (300e-6, 0.03)

@@ -8,6 +8,8 @@ class ScaleAsymmetry(Effect):
     """Scale-factor asymmetry k_i |f_i| (IEEE Std 1293)."""
 
     name = "scale_asymmetry"
+    family = "even nonlinearity"
+    group = "direction"
     parameters = per_axis("k_abs", "1", "k_{\\pm %}")
     equation = "k_i |f_i|"
     typical = (100e-6, 500e-6)

@@ -8,6 +8,8 @@ class Settling(Effect):
     """Low-pass or settling tail k (f_prev − f)."""
 
     name = "settling"
+    family = "memory of the previous position"
+    group = "previous_position"
     parameters = (Parameter("k_settling", "1", "$k_{set}$"),)
     equation = "k (f_prev − f)"
     typical = (10e-6, 1000e-6)

@@ -8,6 +8,8 @@ class ThermalScale(Effect):
     """Scale-factor temperature sensitivity s_T (T − T0) f_i, T0 = 20 °C (IEEE Std 1293)."""
 
     name = "thermal_scale"
+    family = "temperature"
+    group = "temperature"
     parameters = per_axis("s_T", "1/K", "s_{T%}")
     equation = "s_T,i (T − T0) f_i"
     typical = (10e-6, 200e-6)

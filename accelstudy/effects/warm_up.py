@@ -11,6 +11,8 @@ class WarmUp(Effect):
     """Warm-up transient w exp(−t/τ); the time constant τ is searched."""
 
     name = "warm_up"
+    family = "slow change in time"
+    group = "slow_time"
     parameters = per_axis("w", "m/s^2", "w_%")
     hypers = (Hyper("tau", "s", 600.0, above=0, smooth=True),)
     equation = "w_i exp(−t/τ)"

@@ -30,6 +30,7 @@ class GrossError(Shaped):
     """
 
     kind = "gross error"
+    family = "gross error"
     equation: ClassVar[str]
 
     def drawn(self, campaign: Campaign, rng: np.random.Generator) -> Self:

@@ -29,6 +29,7 @@ class NoiseEffect(Shaped):
     """
 
     kind = "noise effect"
+    family = "noise"
     equation: ClassVar[str]
     typical: ClassVar[tuple[float, float]]
 

@@ -5,10 +5,24 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from accelstudy.effects import Hold
 from accelstudy.noise_effects.base import Array, NoiseEffect, register
 from accelstudy.registry import Hyper
+
+
+def memory(lag: ArrayLike, tau: float) -> Array:
+    """Share φ = exp(−Δt/τ) of the process that lasts over lags: its autocorrelation.
+
+    It does not end where τ is infinite: the process is a random walk then.
+    """
+    return np.asarray(np.exp(-np.asarray(lag, dtype=float) / tau))
+
+
+def renewed(phi: Array) -> Array:
+    """Variance that comes anew where a share φ lasts, so that the process stays stationary."""
+    return np.asarray(1 - phi**2)
 
 
 @register
@@ -34,6 +48,7 @@ class ColouredNoise(NoiseEffect):
         share, tau = self.shape["share"], self.shape["tau"]
         time = np.arange(float(noise.shape[1])) if hold.time is None else hold.time
         coloured = rng.standard_normal(noise.shape)
-        for k, phi in enumerate(np.exp(-np.diff(time) / tau), 1):
-            coloured[:, k] = phi * coloured[:, k - 1] + math.sqrt(1 - phi**2) * coloured[:, k]
+        lasting = memory(np.diff(time), tau)
+        for k, (phi, new) in enumerate(zip(lasting, np.sqrt(renewed(lasting)), strict=True), 1):
+            coloured[:, k] = phi * coloured[:, k - 1] + new * coloured[:, k]
         return noise + sigma * math.sqrt(share / (1 - share)) * coloured

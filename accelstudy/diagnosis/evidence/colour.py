@@ -1,8 +1,8 @@
 """Coloured noise: correlations of successive holds, without matrices of holds by holds.
 
-The processes are those of `LENGTHS`: first-order Gauss–Markov, with the correlation exp(−|i − j|/l)
-of holds i and j, and a random walk, min(i, j)/n. Their quadratic forms are those of a convolution
-and of sums, and their likelihood is that of a Kalman filter, which is exact.
+The processes are those of `LENGTHS`: the first-order Gauss–Markov process of `coloured_noise`,
+whose τ counts holds here, and a random walk, min(i, j)/n. Their quadratic forms are those of a
+convolution and of sums, and their likelihood is that of a Kalman filter, which is exact.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.diagnosis.space.residuals import Residuals
+from accelstudy.noise_effects.coloured_noise import memory, renewed
 
 Array = NDArray[np.float64]
 
@@ -31,7 +32,7 @@ def quadratic_forms(v: Array) -> Array:
     forms = []
     for length in LENGTHS:
         if np.isfinite(length):
-            kernel = np.where(lag < n, np.exp(-lag / length), 0.0)
+            kernel = np.where(lag < n, memory(lag, length), 0.0)
             forms.append(power @ (twice * np.fft.rfft(kernel).real))
         else:
             later = np.cumsum(v[..., ::-1, :], axis=-2)
@@ -72,12 +73,12 @@ def _filtered(
 ) -> tuple[Array, Array]:
     """log|Σ|, (k, s), and Cᵀ Σ⁻¹ C, (k, s, v, v), of columns C (n, c, v), by a Kalman filter."""
     n, c, width = columns.shape
-    memory = np.array([np.exp(-1 / length) for length in LENGTHS])[:, None]
+    lasting = np.array([memory(1.0, length) for length in LENGTHS])[:, None]
     walk = np.isinf(np.array(LENGTHS))[:, None]
     s = np.asarray(strengths, dtype=float)
     first = s * np.where(walk, 1 / n, 1.0)
-    added = s * np.where(walk, 1 / n, 1 - memory**2)
-    memory = memory[..., None, None]
+    added = s * np.where(walk, 1 / n, renewed(lasting))
+    lasting = lasting[..., None, None]
     eye = np.eye(3)
     state = np.zeros((*first.shape, 3, width))
     covariance = first[..., None, None] * eye
@@ -91,8 +92,8 @@ def _filtered(
         determinant -= np.linalg.slogdet(inverse)[1]
         scaled = inverse @ innovation
         normal += np.swapaxes(innovation, -1, -2) @ scaled
-        state = memory * (state + gain @ scaled)
+        state = lasting * (state + gain @ scaled)
         left = covariance - gain @ inverse @ np.swapaxes(gain, -1, -2)
         # Symmetric, or rounding errors would grow from hold to hold.
-        covariance = memory**2 * (left + np.swapaxes(left, -1, -2)) / 2 + growth
+        covariance = lasting**2 * (left + np.swapaxes(left, -1, -2)) / 2 + growth
     return determinant, normal

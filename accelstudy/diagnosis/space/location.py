@@ -8,32 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.diagnosis.evidence.chance import Chance
-from accelstudy.diagnosis.space.hypotheses import Setting, span
+from accelstudy.diagnosis.space.hypotheses import Frame, Setting, span
 from accelstudy.diagnosis.space.repeats import clusters
 from accelstudy.diagnosis.space.residuals import Residuals
-from accelstudy.diagnosis.space.signatures import signature
+from accelstudy.diagnosis.space.signatures import Signature, signature
 from accelstudy.diagnosis.space.spaces import ABSORBED, Bases, LackOfFit, Repeats, Spaces
-from accelstudy.effects import get_effect
+from accelstudy.effects import effect_names, get_effect
 from accelstudy.errors import InputError
 
 Array = NDArray[np.float64]
 
-DIRECTION = (
-    "cross_axis_misalignment",
-    "quadratic_scale",
-    "cubic_scale",
-    "scale_asymmetry",
-    "cross_coupling",
-)
-ROBOT = (
-    "base_tilt",
-    "encoder_offset",
-    "encoder_scale",
-    "encoder_eccentricity",
-    "encoder_eccentricity(order=2)",
-    "axis_nonperpendicularity",
-)
-PREVIOUS = ("hysteresis", "settling")
+ROBOT = "robot_angles"
+"""Group of the effects on what a robot reads, and of its base."""
+COURSES = ("slow_time", "temperature")
+"""Groups of whatever depends smoothly on a column of the holds."""
 LACK_OF_FIT = "lack_of_fit"
 """Everything but the differences of repeated positions, which are noise alone (pure error)."""
 
@@ -57,28 +45,8 @@ def groups(setting: Setting) -> dict[str, Spaces]:
         """Regressors (n, k), separate for each axis, as changes (n, 3, 3k)."""
         return np.einsum("nk,ab->nabk", values, np.eye(3)).reshape(n, 3, -1)
 
-    for name, effects in (
-        ("direction", DIRECTION),
-        ("robot_angles", ROBOT),
-        ("previous_position", PREVIOUS),
-    ):
-        if name == "robot_angles" and not setting.frame.solution.approach.uses_angles:
-            continue
-        parts = []
-        for effect in effects:
-            try:
-                shown = signature(
-                    get_effect(effect),
-                    setting.frame.forces,
-                    setting.frame.angles,
-                    setting.frame.solution.gravity,
-                    hold,
-                )
-            except InputError:
-                continue
-            parts.append(residuals.whitened(shown))
-        if parts:
-            add_rows(name, np.concatenate(parts, axis=1))
+    for name, signatures in _signatures(setting.frame).items():
+        add_rows(name, np.concatenate([residuals.whitened(s) for s in signatures], axis=1))
     if hold.time is not None and np.ptp(hold.time) > 0:
         t = 2 * (hold.time - hold.time.min()) / np.ptp(hold.time) - 1
         add("slow_time", per_axis(np.polynomial.legendre.legvander(t, 4)[:, 1:]))
@@ -93,6 +61,30 @@ def groups(setting: Setting) -> dict[str, Spaces]:
         repeats = Repeats(same, residuals.redundancy)
         if 0 < repeats.dims[0] < residuals.redundancy:
             found |= {"repeat": repeats, LACK_OF_FIT: same}
+    return found
+
+
+def _signatures(frame: Frame) -> dict[str, list[Signature]]:
+    """Signatures of the effects of each group that the campaign can show.
+
+    An effect whose shape is searched finely has no space of its own. Groups of `COURSES` have what
+    any smooth course can do, which is more than their effects.
+    """
+    found: dict[str, list[Signature]] = {}
+    for effect in map(get_effect, effect_names()):
+        if not effect.group or effect.group in COURSES or any(h.smooth for h in effect.hypers):
+            continue
+        if effect.group == ROBOT and not frame.solution.approach.uses_angles:
+            continue
+        g = frame.solution.gravity
+        try:
+            shown = [
+                signature(shape, frame.forces, frame.angles, g, frame.hold)
+                for shape in effect.candidates(frame.hold, frame.forces, g)
+            ]
+        except InputError:  # a column is absent
+            continue
+        found.setdefault(effect.group, []).extend(shown)
     return found
 
 
