@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shlex
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from accelstudy import suggested
 from accelstudy.adjustment.quality.whole_model import REFUTED
 from accelstudy.campaign.batch import STATUS
 from accelstudy.campaign.verdict import ACCEPTED, BLIND, IMPLAUSIBLE, REJECTED, UNCHECKED
@@ -167,20 +167,16 @@ def _next_steps(rows: list[dict[str, Any]]) -> list[tuple[str, str]]:
     steps = []
     good = next((row for row in rows if row["state"] in (ACCEPTED, UNCHECKED)), None)
     if good is not None:
-        calibration = shlex.quote(f"{good['folder']}/calibration.json")
-        steps.append(
-            ("Level a log, for example", f"accelstudy apply {calibration} LOG --out leveled.csv")
-        )
+        command = suggested.apply(f"{good['folder']}/calibration.json")
+        steps.append(("Level a log, for example", command))
     doubtful = next((row for row in rows if row["state"] in (REJECTED, IMPLAUSIBLE)), None)
     if doubtful is not None:
         own = doubtful["kind"] == "campaign"
         measured = doubtful["source"] if own else f"{doubtful['folder']}/campaign"
-        chosen = ["--model", doubtful["model"], "--approach", doubtful["approach"]]
-        command = ["accelstudy", "diagnose", measured, *chosen]
-        out = f"{doubtful['campaign']}-diagnosis"
-        steps.append(
-            ("Find what is wrong or missing, for example", shlex.join([*command, "--out", out]))
+        command = suggested.diagnose(
+            measured, doubtful["model"], doubtful["approach"], doubtful["campaign"]
         )
+        steps.append(("Find what is wrong or missing, for example", command))
     return steps
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import shlex
 from pathlib import Path
 
 import numpy as np
 
+from accelstudy import suggested
 from accelstudy.campaign.assessment import MAX_TILT_GON, Assessment
 from accelstudy.campaign.fit import CampaignFit
 from accelstudy.plausibility import implausible_parameters, implausible_tilt
@@ -83,15 +83,11 @@ def next_steps(
     campaign : path of the campaign's folder
     result : path of calibration.json
     """
-    parts = ["accelstudy", "diagnose", str(campaign), "--model", fit.model.name]
-    if fit.campaign.angles is not None:
-        parts += ["--approach", fit.approach.name]
-    diagnose = shlex.join([*parts, "--out", f"{fit.campaign.name}-diagnosis"])
-    use = f"accelstudy apply {shlex.quote(str(result))} LOG --out leveled.csv"
+    diagnose = suggested.diagnose(campaign, fit.model.name, fit.approach.name, fit.campaign.name)
     if judged in (REJECTED, IMPLAUSIBLE):
         return [("Find what is wrong or missing", diagnose)]
     return [
-        ("Level a log with this calibration", use),
+        ("Level a log with this calibration", suggested.apply(result)),
         ("See whether the residuals have a pattern that the model lacks", diagnose),
     ]
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from accelstudy import suggested
 from accelstudy.campaign.gauges import not_affine
 from accelstudy.diagnosis.pipeline import Diagnosis
 from accelstudy.wording import joined, words
@@ -24,25 +24,23 @@ def next_steps(
     campaign : path of the campaign's folder
     """
     d, steps = diagnosis, []
-    approach = ["--approach", d.approach.name]
-    again = ["accelstudy", "calibrate", str(campaign), "--model", d.model.name, *approach]
+    model, approach, name = d.model.name, d.approach.name, d.campaign.name
     if d.recognised is not None:
-        command = shlex.join([*again, "--out", f"{d.campaign.name}-calibrated"])
+        command = suggested.calibrate(campaign, model, approach, f"{name}-calibrated")
         steps.append(("Correct the campaign, and calibrate it then", command))
-    if d.verdict == "unknown":
-        look = ["accelstudy", "diagnose", str(campaign), "--model", d.model.name, *approach]
-        command = shlex.join([*look, "--out", f"{d.campaign.name}-diagnosis"])
-        steps.append(("Add positions to the campaign, and diagnose it again", command))
+    if d.verdict in ("narrowed", "unknown"):
+        what = "Add positions that tell more to the campaign, and diagnose it again"
+        steps.append((what, suggested.diagnose(campaign, model, approach, name)))
     if calibration is None:
         return steps
     use = "Level a log with the calibration that is beside this page"
-    steps.append((use, "accelstudy apply calibration.json LOG --out leveled.csv"))
+    steps.append((use, suggested.apply()))
     inside = not_affine(d.extended)
     form, why = "c", ""
     if inside:
         form, why = "json", f"; no matrix can hold {joined([words(name) for name in inside])}"
-    steps.append((f"Take it to a device{why}", f"accelstudy export calibration.json --form {form}"))
+    steps.append((f"Take it to a device{why}", suggested.export(form)))
     if d.extended is not d.model:
-        command = f"accelstudy calibrate CAMPAIGN --model model.yaml {shlex.join(approach)}"
-        steps.append(("Calibrate the next campaign with this model", f"{command} --out calibrated"))
+        command = suggested.calibrate("CAMPAIGN", "model.yaml", approach, "calibrated")
+        steps.append(("Calibrate the next campaign with this model", command))
     return steps
