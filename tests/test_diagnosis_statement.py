@@ -16,7 +16,7 @@ COSINES = {
 }
 
 
-def family(members):
+def family(*members):
     found = {FAMILIES.get(name, "") for name in members}
     return found.pop() if len(found) == 1 else ""
 

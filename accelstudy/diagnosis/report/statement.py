@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
+from accelstudy.catalogue import family_of
 from accelstudy.diagnosis.decision.explanations import CREDIBLE, Explanation
-from accelstudy.effects import effect_names, get_effect
 
 Names = tuple[str, ...]
 
@@ -71,16 +71,9 @@ class Statement:
     open: tuple[Explanation, ...]
 
 
-def family_of(members: Names) -> str:
-    """Return the family that all of these effects belong to; "" if there is none."""
-    known = effect_names()
-    families = {get_effect(name).family if name in known else "" for name in members}
-    return families.pop() if len(families) == 1 else ""
-
-
 def statement(
     credible_set: Iterable[Explanation],
-    family: Callable[[Names], str] = family_of,
+    family: Callable[..., str] = family_of,
     cosine: Callable[[str, str], float] | None = None,
 ) -> Statement:
     """Say what a credible set leaves no doubt of, and what it leaves open.
@@ -92,7 +85,7 @@ def statement(
     Parameters
     ----------
     credible_set : explanations that exclude each other
-    family : of the names that mean the same in this campaign
+    family : what names that mean the same in this campaign have in common, "" if nothing
     cosine : largest canonical cosine of two effects in this campaign, optional
     """
     left, certain = list(credible_set), []
@@ -110,7 +103,7 @@ def statement(
 
 def _certain(
     explanations: Sequence[Explanation],
-    family: Callable[[Names], str],
+    family: Callable[..., str],
     cosine: Callable[[str, str], float] | None,
 ) -> Part | None:
     """The most specific thing that is certain: a name or, if none is, a family."""
@@ -121,19 +114,19 @@ def _certain(
         members.update(zip(one.names, one.classes, strict=True))
         for name in one.names:
             names[name] += one.posterior
-        for common in dict.fromkeys(map(family, one.classes)):
+        for common in dict.fromkeys(family(*alike) for alike in one.classes):
             families[common] += one.posterior
     families.pop("", None)
     if (surest := _surest(names)) is not None:
         found, p = [surest], names[surest]
     elif (kind := _surest(families)) is not None:
-        found = [name for name, alike in members.items() if family(alike) == kind]
+        found = [name for name, alike in members.items() if family(*alike) == kind]
         found, p = sorted(found, key=lambda name: -names[name]), families[kind]
     else:
         return None
     pairs = combinations(found, 2)
     return Part(
-        family=family(members[found[0]]),
+        family=family(*members[found[0]]),
         names=tuple(Name(name, members[name], names[name]) for name in found),
         posterior=p,
         purity=None if cosine is None else min((cosine(*pair) for pair in pairs), default=None),
