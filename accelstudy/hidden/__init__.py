@@ -1,0 +1,1 @@
+"""The hidden-effect study: campaigns with known causes, and how well the diagnosis finds them."""

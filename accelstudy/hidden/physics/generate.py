@@ -1,0 +1,169 @@
+"""Campaigns with hidden effects, and the truth about them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.campaign.session import Campaign
+from accelstudy.errors import InputError
+from accelstudy.hidden.physics.atlas import Atlas, Shape, atlas
+from accelstudy.hidden.physics.case import Case, HiddenEffect, Truth, plain
+from accelstudy.hidden.physics.conditions import Conditions
+from accelstudy.hidden.physics.effects import EFFECTS, Effect
+from accelstudy.hidden.physics.measuring import Cause, Sensor, observe
+from accelstudy.hidden.physics.noise import NOISES, Noise
+from accelstudy.hidden.physics.oracle import oracle
+from accelstudy.hidden.physics.session import GRAVITY, Session
+
+Array = NDArray[np.float64]
+
+DRAWS = 50
+"""Settings that are drawn until an effect can be seen."""
+
+
+def generate(case: Case, seed: np.random.SeedSequence) -> tuple[Campaign, Truth]:
+    """Simulate a campaign.
+
+    Parameters
+    ----------
+    case : Case
+    seed : numpy.random.SeedSequence, from which all that is random follows
+
+    Raises
+    ------
+    InputError
+        If the design cannot see an effect.
+    """
+    rng = np.random.default_rng(seed)
+    own = atlas(case.design, case.approach)
+    session = own.session
+    sensor = Sensor.drawn(rng)
+    conditions = Conditions.of(session, case.approach, sensor)
+    causes, hidden, classes = [], [], []
+    for name, lam in zip(case.effect, case.lam, strict=True):
+        shape = _drawn_shape(EFFECTS[name], own, rng)
+        cause = _scaled(shape, lam, session, conditions, rng)
+        causes.append(cause)
+        parameters = tuple(cause.parameters[0].tolist())
+        hidden.append(HiddenEffect(name, cause.settings, parameters, lam))
+        classes.append(own.same_as(shape))
+    output, reading = (part[0] for part in observe(session, sensor, causes))
+    noise = Noise.drawn(case.noise, session, rng)
+    forces = noise.read(output, session, rng)
+    reading = reading + session.sigma_angle * rng.standard_normal(reading.shape)
+    campaign = _campaign(case, session, forces, reading)
+    campaign = _with_samples(campaign, session, sensor, causes, noise, rng)
+    corrected = (forces - sensor.bias) @ sensor.correction.T
+    z = own.conditions.seen(corrected[None], reading[None])[0]
+    verdict = oracle(case.design, case.approach).judge(z, case.lam)
+    truth = Truth(
+        set=case.set,
+        design=case.design,
+        approach=case.approach,
+        sigma_known=case.sigma_known,
+        seed=_numbers(seed),
+        effects=tuple(hidden),
+        classes=tuple(classes),
+        noise={
+            "kind": noise.kind,
+            "name": None if noise.kind is None else NOISES[noise.kind],
+            "settings": noise.settings,
+        },
+        gross={"name": None, "settings": {}},
+        sensor={
+            "bias": sensor.bias.tolist(),
+            "scale": sensor.scale.tolist(),
+            "lean": sensor.lean.tolist(),
+        },
+        oracle={
+            "detected": verdict.detected,
+            "best": plain(verdict.best),
+            "told": plain(verdict.told),
+        },
+    )
+    return campaign, truth
+
+
+def _drawn_shape(effect: Effect, own: Atlas, rng: np.random.Generator) -> Shape:
+    """Draw settings with which an effect can be seen."""
+    if effect.shows(own.session):
+        for _ in range(DRAWS):
+            shape = own.shape(effect, effect.draw(own.session, rng))
+            if shape is not None:
+                return shape
+    approach = "robot" if own.conditions.robot else "gravity"
+    raise InputError(
+        f"{own.session.name}, {approach}: cannot see {effect.name}; "
+        f"it sees {', '.join(own.visible)}"
+    )
+
+
+def _scaled(
+    shape: Shape, lam: float, session: Session, conditions: Conditions, rng: np.random.Generator
+) -> Cause:
+    """Draw parameters of an effect, so large that its noncentrality is `lam`."""
+    # What cannot be seen has no size.
+    drawn = rng.standard_normal(shape.effect.k)
+    drawn = shape.directions @ (shape.directions.T @ (abs(drawn) if shape.effect.loses else drawn))
+    cause = Cause(shape.effect, dict(shape.settings), shape.effect.typical * drawn[None])
+    without = conditions.misclosures(*observe(session, conditions.sensor, ()))
+    for _ in range(2):  # an effect is almost, but not quite, proportional to its parameters
+        with_it = conditions.misclosures(*observe(session, conditions.sensor, (cause,)))
+        found = float(np.sum(conditions.left(with_it - without) ** 2))
+        cause = replace(cause, parameters=cause.parameters * np.sqrt(lam / found))
+    return cause
+
+
+def _campaign(case: Case, session: Session, forces: Array, reading: Array) -> Campaign:
+    """What was written down, but for the samples within the holds."""
+    robot = case.approach == "robot"
+    return Campaign(
+        name=f"hidden {case.design}",
+        positions=np.arange(1, session.n + 1),
+        forces=forces,
+        gravity=GRAVITY,
+        sigma_force=session.sigma if case.sigma_known else None,
+        angles=reading if robot else None,
+        sigma_angle=session.sigma_angle if robot else None,
+        yaw=session.yaw if robot else None,
+        time=session.time,
+        temperature=session.temperature,
+        vibration=session.vibration,
+        full_range=session.full_range,
+    )
+
+
+def _with_samples(
+    campaign: Campaign,
+    session: Session,
+    sensor: Sensor,
+    causes: list[Cause],
+    noise: Noise,
+    rng: np.random.Generator,
+) -> Campaign:
+    """Add what the samples within the holds tell, where they were kept."""
+    if not session.n_samples:
+        return campaign
+    sd = noise.sds(session, rng)
+    n_samples = np.full(session.n, session.n_samples)
+    campaign = replace(campaign, sd=sd, n_samples=n_samples)
+    if not session.slopes:
+        return campaign
+    # Least-squares slope of n equally spaced samples with independent errors.
+    root = np.sqrt(12 / session.n_samples) / session.length
+    slope = root * noise.samples_sd(session) * rng.standard_normal(sd.shape)
+    if any(cause.effect.in_time for cause in causes):
+        half = session.length / 4
+        ahead, back = (observe(session.later(by), sensor, causes)[0][0] for by in (half, -half))
+        slope += (ahead - back) / (2 * half)
+    return replace(campaign, slope=slope, sd_slope=root * sd)
+
+
+def _numbers(seed: np.random.SeedSequence) -> tuple[int, ...]:
+    """Entropy and spawn key of a seed."""
+    entropy = seed.entropy
+    words = () if entropy is None else (entropy,) if isinstance(entropy, int) else tuple(entropy)
+    return (*(int(word) for word in words), *(int(key) for key in seed.spawn_key))
