@@ -109,6 +109,7 @@ class HoldPlan:
             roll=roll,
             pitch=pitch,
             yaw=np.zeros(k),
+            order=steps.column("order")[back] if time is None else time,
             **{name: steps.column(name)[back] for name in ("step_x", "step_y", "step_z")},
         )
 

@@ -44,6 +44,11 @@ UNITS: dict[str, dict[str, float]] = {
         "m/s^2/K": 1.0,
         "mg/K": 1e-3 * STANDARD_GRAVITY,
     },
+    "m/s^2/K^2": {
+        "mm/s^2/K^2": 1e-3,
+        "m/s^2/K^2": 1.0,
+        "mg/K^2": 1e-3 * STANDARD_GRAVITY,
+    },
     "1/K": {"ppm/K": 1e-6, "%/K": 1e-2, "1/K": 1.0},
     "m/s^2/s": {
         "mm/s^2/h": 1e-3 / 3600,

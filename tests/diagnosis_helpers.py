@@ -22,11 +22,13 @@ FULL = {
     **{"temperature": (10.0, 40.0), "temperature_order": "ABBA", "vibration": (0.0, 2.0)},
     **{"yaw": "random", "n_samples": 500},
 }
-"""A campaign with all columns, in which no effect of the catalogue hides behind another."""
+"""A campaign with all columns, in which no effect of the catalogue hides behind another, but a
+thermal curve behind a thermal bias: there are two temperatures."""
 
 ROTATIONS = {
     *("cross_axis_misalignment", "mounting_rotation", "base_tilt", "encoder_offset"),
-    *("encoder_scale", "encoder_eccentricity", "axis_nonperpendicularity"),
+    *("encoder_scale", "encoder_eccentricity", "axis_nonperpendicularity", "joint_compliance"),
+    "mounting_slip",
 }
 """Effects that only turn the sensor or misread its attitude."""
 

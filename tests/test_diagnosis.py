@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from diagnosis_helpers import ROTATIONS
 from scipy import stats
 
 from accelstudy.adjustment.quality import solve
@@ -226,16 +227,7 @@ def test_gravity_alone_is_blind_and_says_so():
     measured, _ = campaign(3, approach="gravity", effects=("mounting_rotation",))
     found = diagnose(measured, NINE)
     assert found.verdict == "no_effect"
-    assert set(found.setting.invisible) == {
-        "axis_nonperpendicularity",
-        "base_tilt",
-        "cross_axis_misalignment",
-        "encoder_eccentricity",
-        "encoder_offset",
-        "encoder_scale",
-        "gravity_error",
-        "mounting_rotation",
-    }
+    assert set(found.setting.invisible) == {"gravity_error", *ROTATIONS}
 
 
 def test_a_wrong_gravity_is_never_seen():
@@ -248,7 +240,8 @@ def test_a_wrong_gravity_is_never_seen():
 def test_columns_that_are_missing_are_named():
     measured = replace(campaign(3)[0], temperature=None, vibration=None)
     untestable = diagnose(measured, NINE).setting.untestable
-    assert set(untestable) == {"thermal_bias", "thermal_scale", "vibration_rectification"}
+    thermal = {"thermal_bias", "thermal_curve", "thermal_scale"}
+    assert set(untestable) == {*thermal, "vibration_rectification"}
     assert "'temperature'" in untestable["thermal_bias"]
 
 
@@ -331,7 +324,8 @@ def test_the_command_writes_what_the_contract_says(tmp_path):
     document = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
     assert document["schema_version"] == 1
     assert document["verdict"] == "named"
-    assert document["effects"][0]["name"] == "thermal_bias"
+    # Between two temperatures, a curve is the same as a line.
+    assert document["effects"][0]["equivalence_class"] == ["thermal_bias", "thermal_curve"]
     assert document["gap"]["confirmed"] is True
     assert document["invisible_effects"] == ["gravity_error"]
     for name in ("report.html", "model.yaml", "positions.parquet", "figures/gap.svg"):

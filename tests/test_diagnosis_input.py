@@ -185,7 +185,7 @@ def test_what_needs_a_missing_column_is_untestable_with_the_reason(robot, tmp_pa
     reasons = found["untestable_reasons"]
     needs = {
         "time": {"bias_drift", "bias_jump", "warm_up"},
-        "temperature": {"thermal_bias", "thermal_scale"},
+        "temperature": {"thermal_bias", "thermal_curve", "thermal_scale"},
         "vibration": {"vibration_rectification"},
     }
     assert set(found["untestable_effects"]) == set(reasons) == set().union(*needs.values())
@@ -198,7 +198,7 @@ def test_what_does_not_change_shows_nothing(robot, tmp_path):
     run = command(tmp_path, still)
     hidden = {
         *("thermal_bias", "thermal_scale", "vibration_rectification", "gravity_error"),
-        *("bias_drift", "bias_jump", "warm_up"),
+        *("bias_drift", "bias_jump", "warm_up", "thermal_curve", "mounting_slip"),
     }
     found = document(tmp_path, run)
     assert set(found["invisible_effects"]) == hidden

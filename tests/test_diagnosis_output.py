@@ -33,7 +33,7 @@ CASES = {
     "named": {
         "effects": (THERMAL,),
         "temperature": (20.0, 40.0),
-        "temperature_order": "ABBA",
+        "temperature_order": "random",
         "order": "random",
     },
     "clipped": {"effects": ("saturation(knee=9.3): 1, 1, 1",), "seed": 3},

@@ -33,11 +33,12 @@ NUMBERS = {
     **{"thermal_scale": 3, "warm_up": 3, "bias_drift": 3, "bias_jump": 3, "hysteresis": 3},
     **{"settling": 1, "vibration_rectification": 3, "saturation": 3, "gravity_error": 1},
     **{"base_tilt": 2, "encoder_offset": 2, "encoder_scale": 2, "encoder_eccentricity": 4},
-    **{"axis_nonperpendicularity": 1},
+    **{"axis_nonperpendicularity": 1, "joint_compliance": 2, "mounting_slip": 3},
+    **{"thermal_curve": 3},
 }
 RIG = {
     *("gravity_error", "base_tilt", "encoder_offset", "encoder_scale", "encoder_eccentricity"),
-    "axis_nonperpendicularity",
+    *("axis_nonperpendicularity", "joint_compliance", "mounting_slip"),
 }
 EACH = pytest.mark.parametrize("name", [*NINE, *NUMBERS])
 
@@ -155,6 +156,8 @@ OUTPUT = {
     "saturation": lambda f, f_prev, p, h: -p * np.sign(f) * np.maximum(0, np.abs(f) - 0.95 * G),
     "gravity_error": lambda f, f_prev, p, h: p[0] * f / G,
     "base_tilt": base_tilt,
+    "thermal_curve": lambda f, f_prev, p, h: np.outer((h.temperature - 20) ** 2, p),
+    "mounting_slip": lambda f, f_prev, p, h: (h.time > 600)[:, None] * np.cross(p, f),
 }
 AXES = {
     "nonorthogonality": lambda f, p: np.stack(
@@ -169,6 +172,7 @@ READING = {
     "encoder_scale": lambda a, p: p * a,
     "encoder_eccentricity": lambda a, p: p[[0, 2]] * np.sin(a) + p[[1, 3]] * np.cos(a),
     "axis_nonperpendicularity": lambda a, p: np.stack([p[0] * np.tan(a[:, 1]), 0 * a[:, 0]], 1),
+    "joint_compliance": lambda a, p: -p * np.sin(2 * a) * np.cos(a[:, ::-1]),
 }
 
 
@@ -222,6 +226,26 @@ def test_base_tilt_turns_with_the_same_matrix_as_gravity():
 def test_settings_shape_an_effect(spec, expected):
     p = np.array([1.0, -2.0, 0.5])
     np.testing.assert_allclose(added(get_effect(spec), p).output, expected(p), rtol=0, atol=1e-13)
+
+
+def test_a_flange_gives_way_where_its_encoders_do_not_see_it():
+    """The attitude is what the encoders say and the deflection there; a positive one is ahead."""
+    model = SensorModel.of("robot", ["joint_compliance"])
+    attitude, c = np.array([[0.4, -0.3], [2.0, 0.5]]), np.array([1e-3, -2e-3])
+    read = attitude + model.reading_errors(attitude, c)
+    deflected = c * np.sin(2 * read) * np.cos(read[:, ::-1])
+    np.testing.assert_allclose(read + deflected, attitude, rtol=0, atol=1e-15)
+    assert read[0, 0] < attitude[0, 0]
+
+
+def test_a_slip_counts_the_holds_where_they_have_no_time():
+    hold = Hold().with_steps(FORCES)
+    found = added(
+        get_effect("mounting_slip(t=12.5)"), np.ones(3), FORCES, some_hold(FORCES, time=None)
+    )
+    assert np.flatnonzero(found.output.any(axis=1))[0] == 12
+    times = [c.shape["t"] for c in get_effect("mounting_slip").candidates(hold, FORCES, G)]
+    np.testing.assert_array_equal(times, np.arange(2.5, 39))
 
 
 def test_order_of_the_eccentricity():
@@ -394,6 +418,8 @@ def test_columns_that_effects_need():
     expected = {
         "thermal_bias": {"temperature"},
         "thermal_scale": {"temperature"},
+        "thermal_curve": {"temperature"},
+        "mounting_slip": {"order"},
         "warm_up": {"time"},
         "bias_drift": {"time"},
         "bias_jump": {"time"},

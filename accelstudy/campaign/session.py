@@ -87,12 +87,11 @@ class Campaign:
         """What is known of the holds besides the forces, as the effects take it."""
         # What came before a hold came before it, whether it is used or not.
         whole, used = self._rows()
-        steps = Hold().with_steps(whole["forces"]).take(np.flatnonzero(used))
+        session = Hold(time=whole.get("time")).with_steps(whole["forces"])
         roll, pitch = (None, None) if self.angles is None else self.angles.T
         return replace(
-            steps,
+            session.take(np.flatnonzero(used)),
             temperature=self.temperature,
-            time=self.time,
             vibration=self.vibration,
             roll=roll,
             pitch=pitch,

@@ -55,6 +55,12 @@ def per_axis(name: str, unit: str, symbol: str) -> tuple[Parameter, ...]:
     return tuple(Parameter(f"{name}_{i}", unit, f"${symbol.replace('%', i)}$") for i in AXES)
 
 
+def after(when: Number, moment: Number, xp: Any) -> Number:
+    """1 after a moment, 0 before."""
+    sign = xp.sign(when - moment)
+    return (sign + xp.abs(sign)) / 2
+
+
 @dataclass(frozen=True)
 class Hold:
     """What is known of the static holds (positions) besides the forces, in order of acquisition.
@@ -70,6 +76,7 @@ class Hold:
     roll, pitch, yaw : (n,) arrays, rad, attitude known from outside
     step_x, step_y, step_z : (n,) arrays, m/s², specific force less that of the hold before; 0 in
         the first hold
+    order : (n,) array, the time or, where there is none, the number of the hold, from 1 on
     """
 
     temperature: NDArray[np.float64] | None = None
@@ -81,6 +88,7 @@ class Hold:
     step_x: NDArray[np.float64] | None = None
     step_y: NDArray[np.float64] | None = None
     step_z: NDArray[np.float64] | None = None
+    order: NDArray[np.float64] | None = None
 
     def take(self, positions: NDArray[np.int_]) -> Hold:
         """Return some of the holds; steps stay those from the holds that were before them."""
@@ -90,10 +98,14 @@ class Hold:
         )
 
     def with_steps(self, forces: NDArray[np.float64]) -> Hold:
-        """Return the holds with the steps of forces (n, 3), m/s², in order of acquisition."""
+        """Return all holds, in order of acquisition, with what follows from it.
+
+        These are `order`, and the steps of forces (n, 3), m/s².
+        """
         step = np.diff(forces, axis=0, prepend=forces[:1])
         step = np.where(np.abs(step) < STILL, 0.0, step)
-        return replace(self, step_x=step[:, 0], step_y=step[:, 1], step_z=step[:, 2])
+        order = np.arange(1.0, len(forces) + 1) if self.time is None else self.time
+        return replace(self, step_x=step[:, 0], step_y=step[:, 1], step_z=step[:, 2], order=order)
 
     @classmethod
     def columns(cls) -> tuple[str, ...]:

@@ -57,6 +57,7 @@ def typical_of(effect: Effect) -> tuple[float, float]:
     hold = Hold(
         temperature=30.0 * n, time=600.0 * n, vibration=n,
         roll=some * n, pitch=some * n, yaw=some * n, step_x=g * n, step_y=g * n, step_z=g * n,
+        order=600.0 * n,
     )  # fmt: skip
     reach = 0.0
     for p in np.eye(len(effect.parameters)):

@@ -71,7 +71,7 @@ def study_holds(campaign: Campaign, model: SensorModel) -> dict[str, Any]:
     other as random.
     """
     needed, holds = model.hold_columns, dict[str, Any]()
-    if "time" in needed and campaign.time is not None:
+    if {"time", "order"} & {*needed} and campaign.time is not None:
         holds["interval_s"] = float(np.ptp(campaign.time) / (campaign.n_positions - 1))
     if "temperature" in needed and campaign.temperature is not None:
         t = campaign.temperature

@@ -104,6 +104,7 @@ def _grid(frame: Frame) -> tuple[Array, Hold]:
         step_x=step[:, 0],
         step_y=step[:, 1],
         step_z=step[:, 2],
+        order=after(frame.hold.order),
     )
     return grid, hold
 

@@ -1,0 +1,36 @@
+"""Mounting slip: the mounting of the sensor gives way once."""
+
+from accelstudy.effects.base import Effect, after, per_axis, register
+from accelstudy.effects.step_times import step_times, times_between
+from accelstudy.registry import Hyper
+
+
+@register
+class MountingSlip(Effect):
+    """Small rotation ε × f of the sensor on the flange for t > t_c.
+
+    The time t_c is searched between the holds. Where they have no time it counts them, from 1 on.
+    """
+
+    name = "mounting_slip"
+    family = "sudden change"
+    parameters = per_axis("slip", "rad", "\\varepsilon_{s%}")
+    hypers = (Hyper("t", "s", 600.0),)
+    equation = "ε × f for t > t_c"
+    typical = (80e-6, 3e-3)
+    part = "rig"
+
+    def output(self, f, p, g, hold, xp):
+        """Return ε × f where t > t_c."""
+        (x, y, z), (a, b, c) = f, p
+        slipped = after(hold.order, self.shape["t"], xp)
+        return (slipped * (b * z - c * y), slipped * (c * x - a * z), slipped * (a * y - b * x))
+
+    def candidates(self, hold, f, g):
+        """Return times between the holds."""
+        return tuple(MountingSlip(t=t) for t in step_times(hold.column("order")))
+
+    def between(self, other, hold):
+        """Return some times between those of two candidates."""
+        times = times_between(self.shape["t"], other.shape["t"], hold.column("order"))
+        return tuple(MountingSlip(t=t) for t in times)
