@@ -11,11 +11,26 @@ import accelstudy.hidden.physics as physics
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign, write_campaign
-from accelstudy.hidden.physics import APPROACHES, DESIGNS, Case, generate, visible_effects
+from accelstudy.diagnosis.space.signatures import signature
+from accelstudy.effects import effect_names, get_effect
+from accelstudy.hidden.physics import (
+    APPROACHES,
+    DESIGNS,
+    NOISES,
+    Case,
+    generate,
+    invisible_effects,
+    visible_effects,
+    visible_gross,
+    visible_outside,
+)
+from accelstudy.hidden.physics.atlas import atlas
 from accelstudy.hidden.physics.designs import session
 from accelstudy.hidden.physics.effects import EFFECTS
 from accelstudy.hidden.physics.measuring import Cause, Sensor, observe
+from accelstudy.hidden.physics.noise import Noise
 from accelstudy.hidden.physics.rotations import in_turned_frame, rotated
+from accelstudy.hidden.physics.session import GRAVITY
 from accelstudy.models import get_model
 
 NINE = get_model("bias-scale-nonorthogonality")
@@ -113,3 +128,127 @@ def test_the_misfit_of_an_adjustment_is_the_noncentrality_that_was_asked_for(app
         value, _ = omega(replace(campaign, forces=forces[0], angles=robot), approach)
         assert value == pytest.approx(lam, rel=0.01), name
         assert name in truth.classes[0]
+
+
+@pytest.mark.parametrize("approach", APPROACHES)
+@pytest.mark.parametrize("name", [name for name in EFFECTS if name in effect_names()])
+def test_effects_leave_what_those_of_the_catalogue_leave(name, approach):
+    """Two sets of formulas, written apart, say the same of small effects of an ideal sensor."""
+    design = "long-60"
+    own, effect = atlas(design, approach), EFFECTS[name]
+    settings = effect.draw(own.session, np.random.default_rng(8))
+    shape = own.shape(effect, settings)
+    campaign, _ = generate(Case("null", design, "robot", True), seeded(7))
+    forces, angles = (part[0] for part in observe(own.session, Sensor(), ()))
+    hold = replace(campaign, forces=forces, angles=angles).hold
+    other = get_effect(name)
+    given = {key: value for key, value in settings.items() if key in other.shape}
+    if given != settings and any(settings.values()):
+        settings = dict.fromkeys(settings, 0.0)
+        shape = own.shape(effect, settings)
+    other = type(other)(**given)
+    found = signature(other, forces, angles, GRAVITY, hold)
+    step = 1e-4 / max(np.abs(found.force).max(), np.abs(found.angles).max())
+    left = [
+        own.conditions.seen(
+            forces + sign * step * np.moveaxis(found.force, 2, 0),
+            angles + sign * step * np.moveaxis(found.angles, 2, 0),
+        )
+        for sign in (1, -1)
+    ]
+    theirs = (left[0] - left[1]).T / (2 * step)
+    size = np.linalg.norm(theirs)
+    if shape is None:
+        scale = np.linalg.norm(found.force) + GRAVITY * np.linalg.norm(found.angles)
+        assert size < 1e-4 * scale / own.session.sigma
+        return
+    mine = shape.basis
+    assert np.linalg.norm(theirs - mine @ (mine.T @ theirs)) < 1e-4 * size
+    assert np.linalg.matrix_rank(theirs, tol=1e-4 * size) == shape.dim
+
+
+@EACH_DESIGN
+def test_what_is_called_invisible_leaves_nothing_and_what_is_outside_no_effect_explains(design):
+    for approach in APPROACHES:
+        own = atlas(design, approach)
+        for name in invisible_effects(design, approach):
+            case = Case("invisible", design, approach, True, (name,))
+            effect = generate(case, seeded(9))[1].effects[0]
+            cause = Cause(EFFECTS[name], effect.settings, np.array([effect.parameters]))
+            left = own.conditions.seen(*observe(own.session, Sensor(), [cause]))
+            assert np.sum(left**2) < 0.05, name
+            assert effect.parameters != (0.0,) * EFFECTS[name].k
+        for name in visible_outside(design, approach):
+            case = Case("outside", design, approach, True, (name,), (200.0,))
+            truth = generate(case, seeded(10))[1]
+            assert not any(truth.classes)
+            one, two = truth.left
+            assert 200 > one > two > 1, name
+
+
+def test_gross_errors_are_what_they_are_called():
+    for name in visible_gross("spread-24", "robot"):
+        case = Case("gross", "spread-24", "robot", True)
+        right, _ = generate(case, seeded(11))
+        wrong, truth = generate(replace(case, gross=name), seeded(11))
+        assert truth.gross["name"] == name
+        norms, others = (np.linalg.norm(c.forces, axis=1) for c in (right, wrong))
+        changed = np.flatnonzero(np.any(right.forces != wrong.forces, axis=1))
+        if name == "axis_error":
+            np.testing.assert_allclose(norms, others)
+            assert len(changed) == right.n_positions
+        elif name == "row_order":
+            np.testing.assert_allclose(np.sort(norms), np.sort(others))
+            assert 2 <= len(changed) <= 6
+            np.testing.assert_array_equal(right.angles, wrong.angles)
+        elif name == "unit_error":
+            factor = truth.gross["settings"].get("force", 1.0)
+            np.testing.assert_allclose(others, norms * factor)
+        else:
+            assert list(changed + 1) == [truth.gross["settings"]["position"]]
+
+
+@pytest.mark.parametrize("kind", [None, *NOISES])
+def test_the_noise_is_what_it_is_said_to_be(kind):
+    own, rng = session("repeats-30"), np.random.default_rng(12)
+    errors, axes, steps, expected = [], [], [], []
+    for _ in range(60):
+        noise = Noise.drawn(kind, own, rng)
+        output = rng.uniform(-9, 9, (own.n, 3))
+        error = (noise.read(output, own, rng) - output) / own.sigma
+        factor = noise.settings.get("factor", 1.0)
+        total = np.hypot(factor, noise.settings.get("ratio", 0.0))
+        errors.append(error / total)
+        axes.append(noise.axes)
+        rho = noise.settings.get("correlation", 0.0)
+        steps.append(np.mean((error[1:] - rho * error[:-1]) ** 2) / (1 - rho**2))
+        expected.append(total**2)
+    scaled = np.array(errors) / np.array(axes)[:, None, :]
+    count = scaled.size
+    if kind == "coarse":
+        assert np.mean(scaled**2) > 1.5
+        return
+    excess = 20 if kind == "tails" else 2
+    assert np.mean(scaled**2) == pytest.approx(1, abs=4 * np.sqrt(excess / count * 2))
+    if kind == "autoregressive":
+        np.testing.assert_allclose(np.mean(steps), 1, atol=0.1)
+        assert np.mean(scaled[:, 1:] * scaled[:, :-1]) > 0.3
+    elif kind is None or kind != "tails":
+        assert abs(np.mean(scaled[:, 1:] * scaled[:, :-1])) < 4 / np.sqrt(count)
+    if kind == "tails":
+        assert np.mean(scaled**4) > 4.5
+
+
+def test_samples_within_the_holds_tell_the_noise_and_what_drifts():
+    own = session("spread-24")
+    campaign, truth = generate(
+        Case("one", "spread-24", "gravity", True, ("bias_drift",), (1e6,)), seeded(13)
+    )
+    mean_sd = np.sqrt(np.mean(campaign.sd**2) / campaign.n_samples[0])
+    assert mean_sd == pytest.approx(own.sigma, rel=0.02)
+    off = (campaign.slope - truth.effects[0].parameters) / campaign.sd_slope
+    assert np.mean(off**2) == pytest.approx(1, abs=4 * np.sqrt(2 / off.size))
+    # The least-squares slope of one hold, by the samples themselves.
+    t = np.arange(campaign.n_samples[0]) * own.length / campaign.n_samples[0]
+    by_samples = campaign.sd[0, 0] / np.sqrt(np.sum((t - t.mean()) ** 2))
+    assert campaign.sd_slope[0, 0] == pytest.approx(by_samples, rel=1e-3)

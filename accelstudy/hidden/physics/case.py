@@ -19,7 +19,8 @@ class Case:
     approach : str, "gravity" or "robot"
     sigma_known : bool, whether the campaign states its sigma
     effect : tuple of str, what is hidden
-    lam : tuple of float, the noncentralities that they shall have
+    lam : tuple of float, the noncentralities that they shall have; none for usual sizes, of what
+        cannot be seen
     noise : str, kind of wrong noise; None where it is right
     gross : str, gross error; None for none
     """
@@ -55,9 +56,11 @@ class Truth:
     effects : tuple of HiddenEffect
     classes : tuple of tuple of str, for each effect the names that mean the same in this campaign
     noise : dict with kind, name (in the catalogue) and settings
-    gross : dict with name and settings
+    gross : dict with name (empty for none) and settings
     sensor : dict with the parameters of the sensor
     oracle : dict with detected, best and told
+    left : tuple of float, for the set "outside": how much of the noncentrality the best effect of
+        the catalogue leaves, and the best two
     """
 
     set: str
@@ -71,6 +74,7 @@ class Truth:
     gross: dict[str, Any]
     sensor: dict[str, Any]
     oracle: dict[str, Any]
+    left: tuple[float, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """As plain values."""

@@ -26,6 +26,7 @@ class Conditions:
     sensor : Sensor
     robot : bool, whether the readings of the encoders are used; else the norm of gravity is
     root : (n, c, c) array, inverse of a lower root of the covariance matrix of the misclosures
+    sigma : float, m/s², of an output
     directions : (n, 3) array, unit vectors along the specific force
     absorbed : (m, 9) array, orthonormal, what the nine parameters of a calibration absorb
     """
@@ -33,6 +34,7 @@ class Conditions:
     sensor: Sensor
     robot: bool
     root: Array
+    sigma: float
     directions: Array
     absorbed: Array
 
@@ -59,9 +61,9 @@ class Conditions:
         for column, (i, j) in enumerate(TRIANGLE):
             columns[:, i, column] = output[:, j] - sensor.bias[j]
         columns[:, :, 6:] = correction
-        at_truth = cls(sensor, robot, root, directions, np.zeros((0, 9)))
+        at_truth = cls(sensor, robot, root, session.sigma, directions, np.zeros((0, 9)))
         rows = at_truth._white(columns.transpose(2, 0, 1)).T
-        return cls(sensor, robot, root, directions, np.linalg.qr(rows)[0])
+        return cls(sensor, robot, root, session.sigma, directions, np.linalg.qr(rows)[0])
 
     def misclosures(self, output: Array, reading: Array) -> Array:
         """Misclosures (B, m) of unit weight of outputs (B, n, 3) and readings (B, n, 2)."""
@@ -70,6 +72,10 @@ class Conditions:
             return self._white(calibrated - level_force(reading))
         norms = np.sqrt(np.sum(calibrated**2, axis=-1)) - GRAVITY
         return np.asarray(norms * self.root[:, 0, 0])
+
+    def changed(self, forces: Array) -> Array:
+        """Misclosures (B, m) that small changes (B, n, 3) of the outputs make."""
+        return self._white(forces @ self.sensor.correction.T)
 
     def seen(self, output: Array, reading: Array) -> Array:
         """Misclosures (B, m) less what the parameters absorb."""

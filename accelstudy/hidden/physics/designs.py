@@ -123,7 +123,7 @@ def _hand_18(rng: np.random.Generator) -> Session:
 
 
 def _repeats_30(rng: np.random.Generator) -> Session:
-    directions = rng.permutation(np.tile(_spiral(10, rng), (3, 1)))
+    directions = rng.permutation(np.tile(_spiral(15, rng), (2, 1)))
     time = _times(30, 60.0, 30.0)
     course = _smooth(time, lambda t: 24 - 3 * np.cos(2 * np.pi * t / 1900))
     return Session(

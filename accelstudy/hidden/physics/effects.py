@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 Settings = Mapping[str, float]
 
 STILL = 0.02
-"""m/s², steps between holds that do not turn the magnetisation of a hysteresis."""
+"""m/s², a step between holds that nothing takes notice of."""
 REFERENCE = 20.0
 """°C, at which bias and scale are what they are said to be."""
 
@@ -86,19 +86,19 @@ class Effect:
         return all(getattr(session, name) is not None for name in self.needs)
 
 
-def _steps(f: Array) -> Array:
+def steps_of(f: Array) -> Array:
+    """Steps from hold to hold of forces (B, n, 3); of those that keep still, 0."""
     step = np.zeros(f.shape)
     step[:, 1:] = f[:, 1:] - f[:, :-1]
+    step[abs(step) < STILL] = 0
     return step
 
 
-def _column(values: Array | None) -> Array:
-    assert values is not None
+def column(values: Array | None) -> Array:
+    """What each hold has (n,), beside batches of axes."""
+    if values is None:
+        raise ValueError("the session does not have what an effect needs")
     return values[:, None]
-
-
-def _since(session: Session) -> Array:
-    return session.clock[:, None]
 
 
 # The sensor.
@@ -137,46 +137,46 @@ def _clipping(f: Array, p: Array, s: Settings, session: Session) -> Array:
 
 
 def _hysteresis(f: Array, p: Array, s: Settings, session: Session) -> Array:
-    step = _steps(f)
-    return p * ((step > STILL).astype(float) - (step < -STILL))
+    return p * np.sign(steps_of(f))
 
 
 def _tail(f: Array, p: Array, s: Settings, session: Session) -> Array:
-    return -p * _steps(f)
+    return -p * steps_of(f)
 
 
 def _rectified(f: Array, p: Array, s: Settings, session: Session) -> Array:
-    return p * _column(session.vibration) ** 2
+    return p * column(session.vibration) ** 2
 
 
-def _warmth(session: Session, tau: float = 0.0) -> Array:
+def warmth(session: Session, tau: float = 0.0) -> Array:
+    """How much warmer than `REFERENCE` a body with a lag of `tau` seconds is, (n, 1), K."""
     if session.course is None or session.time is None:
         raise ValueError(f"{session.name}: has no temperature")
     return session.course.lagged(session.time, tau)[:, None] - REFERENCE
 
 
 def _thermal_bias(f: Array, p: Array, s: Settings, session: Session) -> Array:
-    return p * _warmth(session, s["tau"])
+    return p * warmth(session, s["tau"])
 
 
 def _thermal_curve(f: Array, p: Array, s: Settings, session: Session) -> Array:
-    return p * _warmth(session) ** 2
+    return p * warmth(session) ** 2
 
 
 def _thermal_scale(f: Array, p: Array, s: Settings, session: Session) -> Array:
-    return p * _warmth(session) * f
+    return p * warmth(session) * f
 
 
 def _warm_up(f: Array, p: Array, s: Settings, session: Session) -> Array:
-    return p * np.exp(-_since(session) / s["tau"])
+    return p * np.exp(-column(session.clock) / s["tau"])
 
 
 def _drift(f: Array, p: Array, s: Settings, session: Session) -> Array:
-    return p * _since(session)
+    return p * column(session.clock)
 
 
 def _jump(f: Array, p: Array, s: Settings, session: Session) -> Array:
-    return p * (_since(session) > s["t"])
+    return p * (column(session.clock) > s["t"])
 
 
 # The rig.
@@ -202,7 +202,7 @@ def _mounting(rig: Rig, p: Array, s: Settings, session: Session) -> None:
 
 
 def _slip(rig: Rig, p: Array, s: Settings, session: Session) -> None:
-    rig.mounting = rig.mounting + p * (_since(session) > s["t"])
+    rig.mounting = rig.mounting + p * (column(session.clock) > s["t"])
 
 
 def _compliance(rig: Rig, p: Array, s: Settings, session: Session) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +14,16 @@ from accelstudy.hidden.physics.atlas import Atlas, Shape, atlas
 from accelstudy.hidden.physics.case import Case, HiddenEffect, Truth, plain
 from accelstudy.hidden.physics.conditions import Conditions
 from accelstudy.hidden.physics.effects import EFFECTS, Effect
+from accelstudy.hidden.physics.gross import GROSS
 from accelstudy.hidden.physics.measuring import Cause, Sensor, observe
 from accelstudy.hidden.physics.noise import NOISES, Noise
 from accelstudy.hidden.physics.oracle import oracle
+from accelstudy.hidden.physics.outside import OUTSIDE
 from accelstudy.hidden.physics.session import GRAVITY, Session
 
 Array = NDArray[np.float64]
 
+KNOWN = EFFECTS | OUTSIDE
 DRAWS = 50
 """Settings that are drawn until an effect can be seen."""
 
@@ -35,7 +39,7 @@ def generate(case: Case, seed: np.random.SeedSequence) -> tuple[Campaign, Truth]
     Raises
     ------
     InputError
-        If the design cannot see an effect.
+        If the design cannot see an effect that shall have a size.
     """
     rng = np.random.default_rng(seed)
     own = atlas(case.design, case.approach)
@@ -43,22 +47,31 @@ def generate(case: Case, seed: np.random.SeedSequence) -> tuple[Campaign, Truth]
     sensor = Sensor.drawn(rng)
     conditions = Conditions.of(session, case.approach, sensor)
     causes, hidden, classes = [], [], []
-    for name, lam in zip(case.effect, case.lam, strict=True):
-        shape = _drawn_shape(EFFECTS[name], own, rng)
-        cause = _scaled(shape, lam, session, conditions, rng)
+    for name, lam in zip(case.effect, case.lam or [0.0] * len(case.effect), strict=True):
+        effect = KNOWN[name]
+        if lam:
+            shape = _drawn_shape(effect, own, rng)
+            cause = _scaled(shape, lam, session, conditions, rng)
+            classes.append(own.same_as(shape))
+        else:
+            cause = _unseen(effect, session, rng)
+            classes.append((name,))
         causes.append(cause)
         parameters = tuple(cause.parameters[0].tolist())
         hidden.append(HiddenEffect(name, cause.settings, parameters, lam))
-        classes.append(own.same_as(shape))
-    output, reading = (part[0] for part in observe(session, sensor, causes))
+    output, encoders = (part[0] for part in observe(session, sensor, causes))
     noise = Noise.drawn(case.noise, session, rng)
     forces = noise.read(output, session, rng)
-    reading = reading + session.sigma_angle * rng.standard_normal(reading.shape)
+    reading = encoders + session.sigma_angle * rng.standard_normal(encoders.shape)
     campaign = _campaign(case, session, forces, reading)
     campaign = _with_samples(campaign, session, sensor, causes, noise, rng)
-    corrected = (forces - sensor.bias) @ sensor.correction.T
-    z = own.conditions.seen(corrected[None], reading[None])[0]
-    verdict = oracle(case.design, case.approach).judge(z, case.lam)
+    gross: dict[str, Any] = {"name": "", "settings": {}}
+    if case.gross is not None:
+        campaign, gross["settings"] = GROSS[case.gross](campaign, conditions, rng)
+        gross["name"] = case.gross
+    knowing = oracle(case.design, case.approach)
+    verdict = knowing.judge(_left(own, sensor, forces, reading), case.lam)
+    left = knowing.left(_left(own, sensor, output, encoders)) if case.set == "outside" else ()
     truth = Truth(
         set=case.set,
         design=case.design,
@@ -72,7 +85,7 @@ def generate(case: Case, seed: np.random.SeedSequence) -> tuple[Campaign, Truth]
             "name": None if noise.kind is None else NOISES[noise.kind],
             "settings": noise.settings,
         },
-        gross={"name": None, "settings": {}},
+        gross=gross,
         sensor={
             "bias": sensor.bias.tolist(),
             "scale": sensor.scale.tolist(),
@@ -83,6 +96,7 @@ def generate(case: Case, seed: np.random.SeedSequence) -> tuple[Campaign, Truth]
             "best": plain(verdict.best),
             "told": plain(verdict.told),
         },
+        left=left,
     )
     return campaign, truth
 
@@ -99,6 +113,18 @@ def _drawn_shape(effect: Effect, own: Atlas, rng: np.random.Generator) -> Shape:
         f"{own.session.name}, {approach}: cannot see {effect.name}; "
         f"it sees {', '.join(own.visible)}"
     )
+
+
+def _left(own: Atlas, sensor: Sensor, output: Array, reading: Array) -> Array:
+    """What a calibration leaves of the misclosures, (m,), whatever the sensor is."""
+    corrected = (output - sensor.bias) @ sensor.correction.T
+    return own.conditions.seen(corrected[None], reading[None])[0]
+
+
+def _unseen(effect: Effect, session: Session, rng: np.random.Generator) -> Cause:
+    """Draw an effect of usual size, whatever may be seen of it."""
+    parameters = effect.typical * rng.standard_normal((1, effect.k))
+    return Cause(effect, effect.draw(session, rng), parameters)
 
 
 def _scaled(

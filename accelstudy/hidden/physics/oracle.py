@@ -14,10 +14,15 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc, logsumexp
 
 from accelstudy.hidden.physics.atlas import Atlas, Shape, atlas
+from accelstudy.hidden.physics.outside import OUTSIDE
 
 Array = NDArray[np.float64]
 Class = tuple[str, ...]
 
+OUTSIDE_SHARE = 0.15
+"""Share of the noncentrality that two effects of the catalogue must leave on the average."""
+DIRECTIONS = 5
+"""Draws of parameters over which that is averaged."""
 LEVEL = 0.05
 SIMULATIONS = 4000
 """Misclosures without any effect, for the level of the smallest p-value."""
@@ -62,6 +67,12 @@ class Oracle:
     def classes(self) -> tuple[Class, ...]:
         """What each shape cannot be told from."""
         return tuple(self.atlas.same_as(shape) for shape in self.atlas.shapes)
+
+    def left(self, change: Array) -> tuple[float, float]:
+        """Noncentrality of misclosures (m,) that the best effect, and the best two, leave."""
+        size = float(change @ change)
+        one, two = np.max(self.atlas.parts(change)), np.max(self.pairs.parts(change))
+        return size - float(one), size - float(two)
 
     def judge(self, z: Array, sizes: Sequence[float]) -> Verdict:
         """Judge a campaign.
@@ -184,3 +195,21 @@ def _evidence(parts: Array, dims: Array | NDArray[np.int_], size: float) -> Arra
 def oracle(design: str, approach: str) -> Oracle:
     """The oracle of a design by an approach."""
     return Oracle(atlas(design, approach))
+
+
+@cache
+def visible_outside(design: str, approach: str) -> tuple[str, ...]:
+    """Names of what can be seen, is in no catalogue, and is not like any two effects that are."""
+    knowing, rng = oracle(design, approach), np.random.default_rng(0)
+    own, found = knowing.atlas, []
+    for name, effect in OUTSIDE.items():
+        shape = None
+        if effect.shows(own.session):
+            shape = own.shape(effect, effect.draw(own.session, rng))
+        if shape is None:
+            continue
+        drawn = rng.standard_normal((DIRECTIONS, shape.dim))
+        changes = drawn / np.linalg.norm(drawn, axis=1, keepdims=True) @ shape.basis.T
+        if np.mean([knowing.left(change)[1] for change in changes]) > OUTSIDE_SHARE:
+            found.append(name)
+    return tuple(found)

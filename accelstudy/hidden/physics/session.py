@@ -12,8 +12,6 @@ Array = NDArray[np.float64]
 
 GRAVITY = 9.80665
 """m/s², at the place of all sessions."""
-GRID_STEP = 2.0
-"""s, in which a lagging temperature is followed."""
 
 
 @dataclass(frozen=True)
@@ -40,20 +38,18 @@ class Course:
         """
         if tau == 0:
             return self.at(time)
-        steps = int(np.ceil((self.times[-1] - self.times[0]) / GRID_STEP)) + 1
-        grid = self.times[0] + GRID_STEP * np.arange(steps + int(5 * tau / GRID_STEP))
-        outside = self.at(grid)
-        body = np.empty(len(grid))
-        body[0] = outside[0]
-        # Exact for what changes linearly within a step.
-        decay = np.exp(-GRID_STEP / tau)
-        slope = np.diff(outside) / GRID_STEP
-        gain = outside[1:] - tau * slope - decay * (outside[:-1] - tau * slope)
-        value = float(body[0])
-        for i, part in enumerate(gain.tolist(), start=1):
-            value = decay * value + part
-            body[i] = value
-        return np.interp(time, grid, body)
+        moments = np.union1d(self.times, time)
+        outside = self.at(moments)
+        # Behind what changes linearly a body stays back by tau times the slope, when it is used to
+        # it; what else it is away from that decays.
+        steps = np.diff(moments)
+        back = tau * np.diff(outside) / steps
+        decay = np.exp(-steps / tau)
+        body = [float(outside[0])]
+        for i, kept in enumerate(decay.tolist()):
+            away = body[i] - (outside[i] - back[i])
+            body.append(float(outside[i + 1] - back[i] + kept * away))
+        return np.asarray(body)[np.searchsorted(moments, time)]
 
 
 @dataclass(frozen=True)
