@@ -11,11 +11,11 @@ import accelstudy.hidden.physics as physics
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign, write_campaign
+from accelstudy.campaign.header import COLUMNS
 from accelstudy.diagnosis.space.signatures import signature
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.hidden.physics import (
     APPROACHES,
-    DESIGNS,
     NOISES,
     Case,
     generate,
@@ -34,7 +34,6 @@ from accelstudy.hidden.physics.session import GRAVITY
 from accelstudy.models import get_model
 
 NINE = get_model("bias-scale-nonorthogonality")
-EACH_DESIGN = pytest.mark.parametrize("design", DESIGNS)
 
 
 def seeded(*key):
@@ -92,21 +91,25 @@ def test_a_seed_gives_the_same_campaign_whatever_ran_before():
     assert not np.array_equal(first.forces, other.forces)
 
 
-@EACH_DESIGN
+@pytest.mark.parametrize("design", ["long-60", "repeats-30", "snub-24"])
 def test_a_campaign_can_be_written_and_read(design, tmp_path):
     for approach in APPROACHES:
         campaign, _ = generate(Case("null", design, approach, True), seeded(4))
         write_campaign(campaign, tmp_path / approach)
         again = read_campaign(tmp_path / approach)
-        np.testing.assert_allclose(again.forces, campaign.forces)
+        for name in COLUMNS:
+            one, other = getattr(campaign, name), getattr(again, name)
+            assert (one is None) == (other is None), name
+            if one is not None:
+                np.testing.assert_allclose(other, one, err_msg=name)
         assert (again.angles is None) == (approach == "gravity")
 
 
 @pytest.mark.parametrize("approach", APPROACHES)
 def test_campaigns_without_effects_fit_as_well_as_their_sigma_says(approach):
     total, freedom = 0.0, 0
-    for i, design in enumerate(DESIGNS):
-        for j in range(8):
+    for i, design in enumerate(("spread-24", "hand-18", "repeats-30")):
+        for j in range(10):
             campaign, _ = generate(Case("null", design, approach, True), seeded(5, i, j))
             value, redundancy = omega(campaign, approach)
             total, freedom = total + value, freedom + redundancy
@@ -167,7 +170,7 @@ def test_effects_leave_what_those_of_the_catalogue_leave(name, approach):
     assert np.linalg.matrix_rank(theirs, tol=1e-4 * size) == shape.dim
 
 
-@EACH_DESIGN
+@pytest.mark.parametrize("design", ["abba-48", "snub-24", "repeats-30"])
 def test_what_is_called_invisible_leaves_nothing_and_what_is_outside_no_effect_explains(design):
     for approach in APPROACHES:
         own = atlas(design, approach)
@@ -183,7 +186,7 @@ def test_what_is_called_invisible_leaves_nothing_and_what_is_outside_no_effect_e
             truth = generate(case, seeded(10))[1]
             assert not any(truth.classes)
             one, two = truth.left
-            assert 200 > one > two > 1, name
+            assert 200 > one > two > 20, name
 
 
 def test_gross_errors_are_what_they_are_called():

@@ -9,23 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.campaign.session import Campaign
-from accelstudy.errors import InputError
-from accelstudy.hidden.physics.atlas import Atlas, Shape, atlas
+from accelstudy.hidden.physics.atlas import Atlas
 from accelstudy.hidden.physics.case import Case, HiddenEffect, Truth, plain
 from accelstudy.hidden.physics.conditions import Conditions
-from accelstudy.hidden.physics.effects import EFFECTS, Effect
+from accelstudy.hidden.physics.drawing import drawn
 from accelstudy.hidden.physics.gross import GROSS
 from accelstudy.hidden.physics.measuring import Cause, Sensor, observe
 from accelstudy.hidden.physics.noise import NOISES, Noise
 from accelstudy.hidden.physics.oracle import oracle
-from accelstudy.hidden.physics.outside import OUTSIDE
 from accelstudy.hidden.physics.session import GRAVITY, Session
 
 Array = NDArray[np.float64]
-
-KNOWN = EFFECTS | OUTSIDE
-DRAWS = 50
-"""Settings that are drawn until an effect can be seen."""
 
 
 def generate(case: Case, seed: np.random.SeedSequence) -> tuple[Campaign, Truth]:
@@ -42,20 +36,15 @@ def generate(case: Case, seed: np.random.SeedSequence) -> tuple[Campaign, Truth]
         If the design cannot see an effect that shall have a size.
     """
     rng = np.random.default_rng(seed)
-    own = atlas(case.design, case.approach)
+    knowing = oracle(case.design, case.approach)
+    own = knowing.atlas
     session = own.session
     sensor = Sensor.drawn(rng)
     conditions = Conditions.of(session, case.approach, sensor)
     causes, hidden, classes = [], [], []
     for name, lam in zip(case.effect, case.lam or [0.0] * len(case.effect), strict=True):
-        effect = KNOWN[name]
-        if lam:
-            shape = _drawn_shape(effect, own, rng)
-            cause = _scaled(shape, lam, session, conditions, rng)
-            classes.append(own.same_as(shape))
-        else:
-            cause = _unseen(effect, session, rng)
-            classes.append((name,))
+        cause, same = drawn(name, lam, knowing, conditions, rng)
+        classes.append(same)
         causes.append(cause)
         parameters = tuple(cause.parameters[0].tolist())
         hidden.append(HiddenEffect(name, cause.settings, parameters, lam))
@@ -69,7 +58,6 @@ def generate(case: Case, seed: np.random.SeedSequence) -> tuple[Campaign, Truth]
     if case.gross is not None:
         campaign, gross["settings"] = GROSS[case.gross](campaign, conditions, rng)
         gross["name"] = case.gross
-    knowing = oracle(case.design, case.approach)
     verdict = knowing.judge(_left(own, sensor, forces, reading), case.lam)
     left = knowing.left(_left(own, sensor, output, encoders)) if case.set == "outside" else ()
     truth = Truth(
@@ -101,46 +89,10 @@ def generate(case: Case, seed: np.random.SeedSequence) -> tuple[Campaign, Truth]
     return campaign, truth
 
 
-def _drawn_shape(effect: Effect, own: Atlas, rng: np.random.Generator) -> Shape:
-    """Draw settings with which an effect can be seen."""
-    if effect.shows(own.session):
-        for _ in range(DRAWS):
-            shape = own.shape(effect, effect.draw(own.session, rng))
-            if shape is not None:
-                return shape
-    approach = "robot" if own.conditions.robot else "gravity"
-    raise InputError(
-        f"{own.session.name}, {approach}: cannot see {effect.name}; "
-        f"it sees {', '.join(own.visible)}"
-    )
-
-
 def _left(own: Atlas, sensor: Sensor, output: Array, reading: Array) -> Array:
     """What a calibration leaves of the misclosures, (m,), whatever the sensor is."""
     corrected = (output - sensor.bias) @ sensor.correction.T
     return own.conditions.seen(corrected[None], reading[None])[0]
-
-
-def _unseen(effect: Effect, session: Session, rng: np.random.Generator) -> Cause:
-    """Draw an effect of usual size, whatever may be seen of it."""
-    parameters = effect.typical * rng.standard_normal((1, effect.k))
-    return Cause(effect, effect.draw(session, rng), parameters)
-
-
-def _scaled(
-    shape: Shape, lam: float, session: Session, conditions: Conditions, rng: np.random.Generator
-) -> Cause:
-    """Draw parameters of an effect, so large that its noncentrality is `lam`."""
-    # What cannot be seen has no size.
-    drawn = rng.standard_normal(shape.effect.k)
-    drawn = shape.directions @ (shape.directions.T @ (abs(drawn) if shape.effect.loses else drawn))
-    cause = Cause(shape.effect, dict(shape.settings), shape.effect.typical * drawn[None])
-    without = conditions.misclosures(*observe(session, conditions.sensor, ()))
-    for _ in range(2):  # an effect is almost, but not quite, proportional to its parameters
-        with_it = conditions.misclosures(*observe(session, conditions.sensor, (cause,)))
-        found = float(np.sum(conditions.left(with_it - without) ** 2))
-        cause = replace(cause, parameters=cause.parameters * np.sqrt(lam / found))
-    return cause
 
 
 def _campaign(case: Case, session: Session, forces: Array, reading: Array) -> Campaign:
