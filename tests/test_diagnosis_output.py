@@ -3,23 +3,31 @@
 import hashlib
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 import yaml
 from click.testing import CliRunner
+from jsonschema import Draft202012Validator
 from page_helpers import assert_sound, text_of
 from test_workflow import ROOT
 
+from accelstudy.adjustment.quality import solve
+from accelstudy.approaches import get_approach
+from accelstudy.campaign.fit import fit_campaign
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign
 from accelstudy.cli import main
-from accelstudy.diagnosis.pipeline import diagnose
+from accelstudy.diagnosis.decision.explanations import Explanation
+from accelstudy.diagnosis.pipeline import Gap, diagnose
 from accelstudy.diagnosis.report.output import diagnose_folder, write_diagnosis
 from accelstudy.diagnosis.report.wording import headline
 from accelstudy.diagnosis.round_trip import parse_round_trip
+from accelstudy.diagnosis.space.hypotheses import setting_of
 from accelstudy.diagnosis.worth.loop import close_loop
+from accelstudy.diagnosis.worth.next_positions import next_positions
 from accelstudy.errors import InputError
 from accelstudy.models import get_model
 from accelstudy.study.config import read_study
@@ -58,6 +66,11 @@ HEADLINES = {
 }
 
 
+SCHEMA = Draft202012Validator(
+    yaml.safe_load((ROOT / "docs/diagnosis.schema.yaml").read_text(encoding="utf-8"))
+)
+
+
 def run(*arguments):
     return CliRunner().invoke(main, [str(argument) for argument in arguments])
 
@@ -87,10 +100,17 @@ def written(tmp_path_factory):
     return get
 
 
+@pytest.fixture(scope="module")
+def named(tmp_path_factory):
+    """Diagnosis of the named effect, for what can be told of it otherwise."""
+    return diagnose(simulated("named", tmp_path_factory.mktemp("named") / "c"), NINE)
+
+
 @pytest.mark.parametrize("case", CASES)
 def test_every_verdict_is_written_and_told(written, case):
     out, content, printed = written(case)
     assert content["verdict"] == ("named" if case in ("gravity", "clipped") else case)
+    assert [error.message for error in SCHEMA.iter_errors(content)] == []
     page = (out / "report.html").read_text(encoding="utf-8")
     assert HEADLINES[case] in printed
     assert HEADLINES[case] in text_of(page)
@@ -124,10 +144,101 @@ def test_the_page_tells_its_story_in_order(written):
         "Does the simulation now look like the measurement?",
         "What can this campaign not see?",
         "What to measure next",
-        "Use it",
         "What to do next",
         "Terms",
     ]
+
+
+def explained(*explanations):
+    return tuple(Explanation(names, tuple((n,) for n in names), p) for *names, p in explanations)
+
+
+def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
+    shapes = named.setting.candidates
+    thermal, drift = (shapes[name][0] for name in ("thermal_bias", "thermal_scale"))
+    diagnosis = replace(
+        named,
+        verdict="narrowed",
+        credible_set=explained(("thermal_bias", 0.55), ("thermal_scale", 0.4)),
+        gap=replace(named.gap, statement="effect"),
+        next_positions=tuple(next_positions(named.setting.frame, (thermal,), (drift,))),
+    )
+    content = write_diagnosis(diagnosis, tmp_path)
+    assert [error.message for error in SCHEMA.iter_errors(content)] == []
+    (part,) = content["certain"]
+    assert part["names"] == ["thermal_bias", "thermal_scale"]
+    assert part["posterior"] == pytest.approx(0.95)
+    assert 0 < part["purity"] < 1
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert_sound(page)
+    text = text_of(page)
+    for words in (
+        "➜ NARROWED The model lacks an effect of temperature: thermal bias or thermal scale.",
+        "This campaign cannot tell thermal bias (0.55) and thermal scale (0.4) apart; further",
+        "that such an effect is missing; not that it is thermal bias rather than a rival",
+        "a wrong name 7 where a right one that is withheld counts 3",
+        "to separate thermal bias and thermal scale",
+        "temperature / °C",
+        "takes thermal bias, and its sigmas do not know of the others",
+        "accelstudy diagnose CAMPAIGN --model bias-scale-nonorthogonality --approach robot",
+        "credible set explanations, the most probable first",
+    ):
+        assert words in text, words
+    assert (tmp_path / "figures/explanations.svg").stat().st_size > 1000
+    assert yaml.safe_load((tmp_path / "model.yaml").read_text("utf-8"))["models"]
+
+
+def test_what_is_certain_of_the_unknown_is_its_headline(named, tmp_path):
+    others = ("hysteresis", "settling", "saturation", "cubic_scale", "quadratic_scale")
+    diagnosis = replace(
+        named,
+        **{"verdict": "unknown", "found": (), "changes": (), "gap": Gap(named.gap.before)},
+        **{"extended": named.model, "final": named.setting, "reason": "too much is open"},
+        credible_set=explained(*(("thermal_bias", name, 0.19) for name in others)),
+    )
+    content = write_diagnosis(diagnosis, tmp_path)
+    assert [error.message for error in SCHEMA.iter_errors(content)] == []
+    assert [part["names"] for part in content["certain"]] == [["thermal_bias"]]
+    text = text_of((tmp_path / "report.html").read_text(encoding="utf-8"))
+    assert "The model lacks thermal bias; what is missing beside it has no name here." in text
+
+
+@pytest.mark.parametrize(
+    ("change", "path"),
+    [
+        ({"credible_set": []}, "$.credible_set"),
+        ({"effects": []}, "$.effects"),
+        ({"gap": {"confirmed": True, "confirmed_statement": None}}, "$.gap.confirmed_statement"),
+        ({"verdict": "no_effect"}, "$.effects"),
+    ],
+)
+def test_the_schema_asks_what_a_verdict_requires(written, change, path):
+    _, content, _ = written("named")
+    changed = {**content, **change, "gap": {**content["gap"], **change.get("gap", {})}}
+    assert path in [error.json_path for error in SCHEMA.iter_errors(changed)]
+
+
+def test_effects_of_time_are_told_apart_by_repeats_later():
+    campaign, _ = simulate_campaign(
+        CampaignSettings(
+            scheme="fibonacci-30", interval=60.0, effects=("bias_drift: 1e-5, 1e-5, 1e-5",)
+        )
+    )
+    fit = fit_campaign(campaign, NINE, get_approach("robot"))
+    setting = setting_of(solve(fit.model, fit.approach, fit.observed))
+    drift, warm = (setting.candidates[name][0] for name in ("bias_drift", "warm_up"))
+    found = next_positions(setting.frame, (drift,), (warm,))
+    assert all(position.anywhere and position.temperature is None for position in found)
+    assert [position.later for position in found] == pytest.approx([30 * 60.0] * 3)
+    assert [found[0].roll, found[0].pitch] == pytest.approx(campaign.angles[0], abs=0.01)
+    assert found[0].separates == (("bias_drift",), ("warm_up",))
+
+    quadratic = setting.candidates["quadratic_scale"][0]
+    both = next_positions(setting.frame, (drift, quadratic), (warm, quadratic))
+    assert both[0].separates == (("bias_drift",), ("warm_up",))
+    one = next_positions(setting.frame, (quadratic,), (setting.candidates["scale_asymmetry"][0],))
+    assert not one[0].anywhere
+    assert one[0].later is None
 
 
 def test_the_headline_names_all_that_would_be_the_same():
@@ -223,9 +334,8 @@ def test_same_seed_same_files(written, tmp_path):
         pd.testing.assert_frame_equal(*tables)
 
 
-def test_the_old_simulation_lacks_the_measurement(written, tmp_path):
-    campaign = simulated("named", tmp_path / "c")
-    diagnosis = diagnose(campaign, NINE)
+def test_the_old_simulation_lacks_the_measurement(written, named, tmp_path):
+    diagnosis = named
     loop = close_loop(diagnosis, 400, seed=3)
     assert not loop.contains("old", "base")
     assert loop.contains("new", "base")

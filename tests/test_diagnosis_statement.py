@@ -3,6 +3,7 @@
 import pytest
 
 from accelstudy.diagnosis.decision.explanations import Explanation
+from accelstudy.diagnosis.report.missing import missing, missing_in_part, not_told_apart
 from accelstudy.diagnosis.report.statement import statement
 
 SLOW, EVEN = "slow change in time", "even nonlinearity"
@@ -16,18 +17,32 @@ COSINES = {
 }
 
 
+FOUR_PAIRS = (
+    ("bias_drift+quadratic_scale", 0.36),
+    ("warm_up+quadratic_scale", 0.28),
+    ("scale_asymmetry+bias_drift", 0.2),
+    ("warm_up+scale_asymmetry", 0.15),
+)
+
+
 def family(*members):
     found = {FAMILIES.get(name, "") for name in members}
     return found.pop() if len(found) == 1 else ""
 
 
-def said(*explanations):
-    """Statement about explanations, each "one + two" with its posterior; = joins equal names."""
-    made = []
+def made(*explanations):
+    """Explanations, each "one+two" with its posterior; = joins names that mean the same."""
+    found = []
     for text, p in explanations:
         classes = tuple(tuple(part.split("=")) for part in text.split("+"))
-        made.append(Explanation(tuple(c[0] for c in classes), classes, p))
-    return statement(made, family, lambda a, b: COSINES.get(frozenset({a, b}), 0.2))
+        found.append(Explanation(tuple(c[0] for c in classes), classes, p))
+    return tuple(found)
+
+
+def said(*explanations):
+    """Statement about explanations."""
+    cosine = lambda a, b: COSINES.get(frozenset({a, b}), 0.2)  # noqa: E731
+    return statement(made(*explanations), family, cosine)
 
 
 def parts(found):
@@ -55,12 +70,7 @@ def test_near_rivals_are_one_family():
 
 
 def test_four_pairs_are_a_set_for_each_part():
-    found = said(
-        ("bias_drift+quadratic_scale", 0.36),
-        ("warm_up+quadratic_scale", 0.28),
-        ("scale_asymmetry+bias_drift", 0.2),
-        ("warm_up+scale_asymmetry", 0.15),
-    )
+    found = said(*FOUR_PAIRS)
     assert parts(found) == [
         (SLOW, ["bias_drift", "warm_up"]),
         (EVEN, ["quadratic_scale", "scale_asymmetry"]),
@@ -106,3 +116,78 @@ def test_too_little_is_not_certain():
     assert said() == said()
     assert not said().certain
     assert not said().open
+
+
+@pytest.mark.parametrize(
+    ("explanations", "words", "apart"),
+    [
+        (
+            [("bias_drift", 0.51), ("warm_up", 0.44)],
+            "a slow change in time: bias drift or warm up",
+            "bias drift (0.51) and warm up (0.44) apart",
+        ),
+        (
+            FOUR_PAIRS,
+            "a slow change in time (bias drift or warm up) and an even nonlinearity (quadratic "
+            "scale or scale asymmetry)",
+            "bias drift (0.56) and warm up (0.43), nor quadratic scale (0.64) and scale asymmetry "
+            "(0.35) apart",
+        ),
+        (
+            [("base_tilt=encoder_offset", 0.6), ("encoder_scale", 0.35)],
+            "an error in the attitude of the rig: base tilt, encoder offset or encoder scale",
+            "base tilt or encoder offset (0.6) and encoder scale (0.35) apart",
+        ),
+        (
+            [("bias_drift", 0.5), ("warm_up+hysteresis", 0.42)],
+            "a slow change in time (bias drift or warm up), and perhaps hysteresis",
+            "bias drift (0.5) and warm up (0.42) apart, nor whether hysteresis (0.42) is missing "
+            "as well",
+        ),
+        (
+            [("thermal_bias", 0.5), ("warm_up", 0.42)],
+            "thermal bias or warm up",
+            "thermal bias (0.5) and warm up (0.42) apart",
+        ),
+        (
+            [("bias_drift+hysteresis", 0.5), ("saturation", 0.45)],
+            "bias drift with hysteresis, or saturation",
+            "bias drift with hysteresis (0.5) and saturation (0.45) apart",
+        ),
+        (
+            [("bias_drift", 0.5), ("warm_up", 0.3), ("coloured_noise", 0.12)],
+            "a slow change in time: bias drift or warm up, unless it is coloured noise",
+            "bias drift (0.5) and warm up (0.3) apart",
+        ),
+        (
+            [("hysteresis", 0.68), ("coloured_noise", 0.25)],
+            "hysteresis, unless it is coloured noise",
+            "hysteresis (0.68) and coloured noise (0.25) apart",
+        ),
+    ],
+)
+def test_a_small_set_in_words(explanations, words, apart):
+    assert missing(made(*explanations)) == words
+    assert not_told_apart(made(*explanations)) == f"This campaign cannot tell {apart}"
+
+
+def test_what_is_certain_of_the_unknown_comes_first():
+    with_many = [(f"bias_drift+{name}", 0.18) for name in ("hysteresis", "settling", "saturation")]
+    spread = made(*with_many, ("warm_up+cubic_scale", 0.2), ("warm_up+quadratic_scale", 0.17))
+    slow = "a slow change in time (bias drift or warm up)"
+    assert missing_in_part(spread) == f"{slow}; what is missing beside it has no name here"
+    open_end = made(*with_many, ("warm_up", 0.2), ("warm_up+quadratic_scale", 0.17))
+    assert missing_in_part(open_end) == f"{slow}; whether more is missing, and what, is open"
+
+
+@pytest.mark.parametrize(
+    "explanations",
+    [
+        [("unknown", 0.95)],
+        [("bias_drift", 0.95)],  # it would have been named, had it not left a misfit
+        [("coloured_noise", 0.5), ("heavy_tails", 0.45)],
+        [("bias_drift", 0.3), ("hysteresis", 0.2), ("coloured_noise", 0.3), ("unknown", 0.15)],
+    ],
+)
+def test_nothing_is_certain_of_what_no_effect_explains(explanations):
+    assert missing_in_part(made(*explanations)) == ""

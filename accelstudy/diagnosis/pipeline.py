@@ -78,8 +78,8 @@ class Named:
 class Gap:
     """How far the disagreement shrinks; None where it does not apply.
 
-    `statement` says what is confirmed: "effect", that one of the credible set is missing, or "name",
-    that it is the most probable one; None if nothing is.
+    `statement` says what is confirmed: "effect", that one of the credible set is missing, or
+    "name", that it is the most probable one; None if nothing is.
     """
 
     before: float
@@ -470,7 +470,8 @@ class _Run:
             return Gap(before, after, leveling=leveling)
         held_out, reason = self.held_out(finding.chosen, variance if self.sigma_known else None)
         confirmed = held_out is not None and held_out.significant and not reason
-        return Gap(before, after, held_out, leveling, confirmed, reason)
+        said = "effect" if confirmed else None
+        return Gap(before, after, held_out, leveling, confirmed, reason, said)
 
     def changes(self, finding: Finding, variance: float) -> tuple[Change, ...]:
         """Compare what added effects should change of the other parameters with what they do."""
@@ -496,7 +497,9 @@ class _Run:
             (h for h in effects if h.name in near and h.name not in search.members(first)), None
         )
         return (
-            () if second is None else tuple(next_positions(search.setting.frame, (first, second)))
+            ()
+            if second is None
+            else tuple(next_positions(search.setting.frame, (first,), (second,)))
         )
 
     def held_out(

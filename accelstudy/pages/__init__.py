@@ -32,6 +32,7 @@ BADGES = {
     "not calibrated": ("✗ NOT CALIBRATED", "bad"),
     "no_effect": ("✓ NOTHING FOUND", "good"),
     "named": ("➜ NAMED", "found"),
+    "narrowed": ("➜ NARROWED", "found"),
     "unknown": ("? UNKNOWN", "open"),
     "noise_model": ("≈ NOISE", "noise"),
     "gross_error": ("! GROSS ERROR", "wrong"),

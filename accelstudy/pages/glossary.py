@@ -13,7 +13,10 @@ TERMS = {
     "a priori": "as stated beforehand, in the header of the campaign",
     "condition": "how much worse the least well known combination of parameters is known than the "
     "best; of the scaled design, 1 is ideal and 10⁶ hopeless",
+    "credible set": "explanations, the most probable first, until they hold a probability of 0.9 "
+    "together",
     "excess χ²": "what the squared residuals sum up to beyond what the noise explains",
+    "family": "effects that are alike in what they do, and easily taken for each other",
     "global test": "whether the residuals together are as large as the stated noise says (χ² test "
     "of the whole model)",
     "held-out": "of positions that a fit did not use and then predicted",
@@ -22,8 +25,11 @@ TERMS = {
     "MIB": "minimal identifiable bias: the size at which an effect can also be told from the one "
     "that it is most like",
     "misclosure": "what is left of a condition, such as |f| = g, before the adjustment",
-    "posterior probability": "how probable a name is once the data are seen, given that just one "
-    "thing is missing",
+    "p-value": "how often noise alone would look like this; no probability that a name is right",
+    "posterior probability": "how probable an explanation is once the data are seen, given that "
+    "something is missing",
+    "purity": "how alike the members of a set are, by the smallest cosine of two of them: near 1 "
+    "they are rivals, near 0 they are what happened to be left over",
     "redundancy": "conditions less unknowns: what is left to check a fit; 0 checks nothing",
     "residual": "what a fit leaves of an observation",
     "rms": "root of the mean square",
@@ -40,6 +46,7 @@ FORMS = {
     "a-priori": "a priori",
     "held out": "held-out",
     "misclosures": "misclosure",
+    "p-values": "p-value",
     "posterior": "posterior probability",
     "redundant": "redundancy",
     "residuals": "residual",

@@ -12,6 +12,7 @@ from accelstudy.campaign.assessment import assess
 from accelstudy.campaign.document import calibration_document, quality_document
 from accelstudy.campaign.fit import CampaignFit, campaign_design
 from accelstudy.diagnosis.pipeline import Diagnosis
+from accelstudy.diagnosis.report.missing import explanation_words, missing
 
 
 def diagnosed_fit(diagnosis: Diagnosis) -> CampaignFit:
@@ -51,6 +52,12 @@ def diagnosed_calibration(diagnosis: Diagnosis) -> dict[str, Any]:
     fit = diagnosed_fit(diagnosis)
     content = {**calibration_document(fit), "quality": quality_document(assess(fit))}
     warnings = list(fit.campaign.warnings)
+    if diagnosis.verdict == "narrowed":
+        warnings.append(
+            f"What is missing is {missing(diagnosis.credible_set)}. The calibration "
+            f"takes {explanation_words(diagnosis.credible_set[0])}, and its sigmas do not know of "
+            "the others."
+        )
     weights = np.asarray(fit.observed.sigma_force)
     if weights.ndim:
         sigmas = np.sqrt(fit.variance_factor) * weights[0]

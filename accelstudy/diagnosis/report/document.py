@@ -8,6 +8,7 @@ import numpy as np
 
 from accelstudy.campaign.document import number
 from accelstudy.diagnosis.pipeline import Diagnosis, Named
+from accelstudy.diagnosis.report.statement import cosine_in, statement
 from accelstudy.units import GON, MGON
 
 
@@ -62,6 +63,7 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
             }
             for one in d.credible_set
         ],
+        "certain": _certain(d),
         "effects": [_effect(named) for named in d.found],
         "suspects": [{"position": label, "p_value": number(p)} for label, p in d.suspects],
         "location": {name: number(share) for name, share in d.location.items()},
@@ -99,7 +101,9 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
                     if position.temperature is None
                     else {"temperature_degC": position.temperature}
                 ),
-                "separates": list(position.separates),
+                **({} if position.later is None else {"later_s": number(position.later)}),
+                "any_attitude": position.anywhere,
+                "separates": [name for names in position.separates for name in names],
             }
             for position in d.next_positions
         ],
@@ -107,6 +111,18 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
         "n_positions": d.campaign.n_positions,
         "warnings": list(d.campaign.warnings),
     }
+
+
+def _certain(d: Diagnosis) -> list[dict[str, Any]]:
+    return [
+        {
+            "family": part.family,
+            "names": [name.name for name in part.names],
+            "posterior": number(part.posterior),
+            "purity": number(part.purity),
+        }
+        for part in statement(d.credible_set, cosine=cosine_in(d.setting)).certain
+    ]
 
 
 def _effect(named: Named) -> dict[str, Any]:

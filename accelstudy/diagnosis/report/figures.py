@@ -18,6 +18,7 @@ from accelstudy.diagnosis.decision.search import LEVEL_EFFECTS
 from accelstudy.diagnosis.evidence.naming import UNKNOWN
 from accelstudy.diagnosis.pipeline import Diagnosis
 from accelstudy.diagnosis.report.positions import condition_sigma
+from accelstudy.diagnosis.report.set_figure import explanations_figure
 from accelstudy.diagnosis.report.wording import GROUPS
 from accelstudy.diagnosis.worth.loop import CASES, Loop
 from accelstudy.figures.style import FULL, INK, log_ticks, new_figure
@@ -60,6 +61,8 @@ def diagnosis_figures(
     figures: dict[str, Callable[[], Figure]] = {"residuals": lambda: residual_figure(d, positions)}
     if d.screening.p_family:
         figures["evidence"] = lambda: evidence_figure(d)
+    if len(d.credible_set) > 1:
+        figures["explanations"] = lambda: explanations_figure(d.credible_set)
     if d.gap.held_out is not None:
         figures["gap"] = lambda: gap_figure(d, positions)
     # Without sigma, the residuals of noise have no size that would be too much.

@@ -8,10 +8,12 @@ from typing import Any
 import pandas as pd
 
 from accelstudy.adjustment.quality.whole_model import REFUTED
+from accelstudy.diagnosis.decision.explanations import CREDIBLE
 from accelstudy.diagnosis.decision.search import LEVEL_EFFECTS, SURE
 from accelstudy.diagnosis.pipeline import LEVEL_NOISE, Diagnosis
 from accelstudy.diagnosis.report import wording
 from accelstudy.diagnosis.report.figures import diagnosis_figures
+from accelstudy.diagnosis.report.missing import family_words, separates
 from accelstudy.diagnosis.report.next_steps import next_steps
 from accelstudy.diagnosis.worth.loop import Loop
 from accelstudy.effects import effect_names, get_effect
@@ -63,6 +65,12 @@ def write_report(
         figures=drawn,
         changed=wording.changed(diagnosis),
         calibration=calibration,
+        added=diagnosis.verdict in wording.ADDED,
+        separates=separates(diagnosis.next_positions),
+        family=family_words,
+        credible=CREDIBLE,
+        wrong=round(10 * SURE),
+        withheld=round(10 * (1 - SURE)),
         level=LEVEL_EFFECTS,
         level_noise=LEVEL_NOISE,
         level_sigma=REFUTED,

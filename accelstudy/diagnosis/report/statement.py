@@ -10,10 +10,11 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, product
 
 from accelstudy.catalogue import family_of
 from accelstudy.diagnosis.decision.explanations import CREDIBLE, Explanation
+from accelstudy.diagnosis.space.hypotheses import Setting, cosines
 
 Names = tuple[str, ...]
 
@@ -62,7 +63,7 @@ class Statement:
 
     Attributes
     ----------
-    certain : tuple of Part, each missing with a probability of `CREDIBLE`, most probable first
+    certain : tuple of Part, most probable first
     open : tuple of Explanation, what may be missing beside them, most probable first; one without
         names stands for nothing. Empty if nothing is beside them
     """
@@ -75,11 +76,12 @@ def statement(
     credible_set: Iterable[Explanation],
     family: Callable[..., str] = family_of,
     cosine: Callable[[str, str], float] | None = None,
+    probability: float = CREDIBLE,
 ) -> Statement:
     """Say what a credible set leaves no doubt of, and what it leaves open.
 
-    A name is certain if the explanations that have it hold `CREDIBLE` together, and so is a family
-    if those that have one of its effects do. A set does not hold all explanations, so that these
+    A name is certain if the explanations that have it hold enough together, and so is a family if
+    those that have one of its effects do. A set does not hold all explanations, so that these
     probabilities are lower bounds.
 
     Parameters
@@ -87,9 +89,10 @@ def statement(
     credible_set : explanations that exclude each other
     family : what names that mean the same in this campaign have in common, "" if nothing
     cosine : largest canonical cosine of two effects in this campaign, optional
+    probability : float, that is enough to be certain
     """
     left, certain = list(credible_set), []
-    while (part := _certain(left, family, cosine)) is not None:
+    while (part := _certain(left, family, cosine, probability)) is not None:
         certain.append(part)
         left = [_without(one, [name.name for name in part.names]) for one in left]
     rest: dict[Names, Explanation] = {}
@@ -105,6 +108,7 @@ def _certain(
     explanations: Sequence[Explanation],
     family: Callable[..., str],
     cosine: Callable[[str, str], float] | None,
+    probability: float,
 ) -> Part | None:
     """The most specific thing that is certain: a name or, if none is, a family."""
     members: dict[str, Names] = {}
@@ -117,9 +121,9 @@ def _certain(
         for common in dict.fromkeys(family(*alike) for alike in one.classes):
             families[common] += one.posterior
     families.pop("", None)
-    if (surest := _surest(names)) is not None:
+    if (surest := _surest(names, probability)) is not None:
         found, p = [surest], names[surest]
-    elif (kind := _surest(families)) is not None:
+    elif (kind := _surest(families, probability)) is not None:
         found = [name for name, alike in members.items() if family(*alike) == kind]
         found, p = sorted(found, key=lambda name: -names[name]), families[kind]
     else:
@@ -133,12 +137,12 @@ def _certain(
     )
 
 
-def _surest(posteriors: Mapping[str, float]) -> str | None:
+def _surest(posteriors: Mapping[str, float], probability: float) -> str | None:
     """Most probable key, if it is certain; of equal ones the first."""
     if not posteriors:
         return None
     most = max(posteriors, key=lambda key: round(posteriors[key], DIGITS))
-    return most if round(posteriors[most], DIGITS) >= CREDIBLE else None
+    return most if round(posteriors[most], DIGITS) >= round(probability, DIGITS) else None
 
 
 def _without(explanation: Explanation, names: Sequence[str]) -> Explanation:
@@ -150,3 +154,13 @@ def _without(explanation: Explanation, names: Sequence[str]) -> Explanation:
         names=tuple(explanation.names[i] for i in kept),
         classes=tuple(explanation.classes[i] for i in kept),
     )
+
+
+def cosine_in(setting: Setting) -> Callable[[str, str], float]:
+    """Return what tells the largest canonical cosine of two effects; 0 of what is no effect."""
+
+    def cosine(one: str, other: str) -> float:
+        shapes = [setting.candidates.get(name, ()) for name in (one, other)]
+        return max((float(cosines(a.ideal, b.ideal)[0]) for a, b in product(*shapes)), default=0.0)
+
+    return cosine

@@ -5,6 +5,12 @@ from __future__ import annotations
 import math
 
 from accelstudy.diagnosis.pipeline import Diagnosis, Named
+from accelstudy.diagnosis.report.missing import (
+    explanation_words,
+    missing,
+    missing_in_part,
+    not_told_apart,
+)
 from accelstudy.diagnosis.worth.gap import SIGNIFICANT
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.figures.style import unit_label
@@ -26,10 +32,15 @@ GROUPS = {
 HEADLINES = {
     "no_effect": "Nothing that these data can show is missing from the model.",
     "named": "The model lacks {names}.",
+    "narrowed": "The model lacks {names}.",
     "unknown": "Something is missing from the model, and it has no name here.",
     "noise_model": "The sensor model is adequate, its noise is not: {names}.",
     "gross_error": "The data are not what they say: {names}.",
 }
+
+
+ADDED = ("named", "narrowed")
+"""Verdicts with which effects are added to the model."""
 
 
 def amount(value: float, unit: str) -> str:
@@ -59,10 +70,14 @@ def headline(diagnosis: Diagnosis) -> str:
     if too_few(diagnosis):
         return "Too few positions to show whether anything is missing from the model."
     found = diagnosis.found
+    if diagnosis.verdict == "narrowed":
+        return HEADLINES["narrowed"].format(names=missing(diagnosis.credible_set))
+    if diagnosis.verdict == "unknown" and (said := missing_in_part(diagnosis.credible_set)):
+        return f"The model lacks {said}."
     if diagnosis.verdict == "gross_error":
         found = tuple(f for f in found if not _is_effect(f))
-    known = {named.name for named in found}
-    return HEADLINES[diagnosis.verdict].format(names=joined([_title(f, known) for f in found]))
+    names = {named.name for named in found}
+    return HEADLINES[diagnosis.verdict].format(names=joined([_title(f, names) for f in found]))
 
 
 def _title(named: Named, known: set[str]) -> str:
@@ -76,7 +91,7 @@ def _title(named: Named, known: set[str]) -> str:
 def verdict_lines(diagnosis: Diagnosis) -> list[str]:
     """Say in a few sentences what was found; the first is the verdict."""
     d = diagnosis
-    lines = [headline(d)]
+    lines = [headline(d), *_narrowed(d)]
     if d.reason:
         lines.append(sentence(d.reason))
     if d.recognised is not None:
@@ -102,7 +117,7 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
             f"Tilt error of the calibrated sensor: {before} {unit} as it is, {after} {unit} "
             f"{changed(d)}."
         )
-    if d.verdict == "named":
+    if d.verdict in ADDED:
         lines.append(confirmation(d))
     if d.setting.invisible:
         lines.append(
@@ -127,7 +142,7 @@ def advice(diagnosis: Diagnosis) -> list[str]:
 
 
 def confirmation(diagnosis: Diagnosis) -> str:
-    """Say whether the named effect held on positions that were not used."""
+    """Say which statement about the added effects held on positions that were not used."""
     gap = diagnosis.gap
     if gap.held_out is None:
         return f"Not confirmed on data that were not used: {gap.reason}."
@@ -135,9 +150,15 @@ def confirmation(diagnosis: Diagnosis) -> str:
         f"on {len(gap.held_out.held)} held-out positions (z = {number(gap.held_out.z)}, "
         f"{SIGNIFICANT} needed)"
     )
-    if gap.confirmed:
-        return f"Confirmed {tested}."
-    return f"Not confirmed {tested}" + (f": {gap.reason}." if gap.reason else ".")
+    if not gap.confirmed:
+        return f"Not confirmed {tested}" + (f": {gap.reason}." if gap.reason else ".")
+    names = joined([words(named.name) for named in diagnosis.found if _is_effect(named)])
+    if gap.statement == "name":
+        return f"Confirmed {tested}: that it is {names}."
+    return (
+        f"Confirmed {tested}: that such an effect is missing; not that it is {names} rather than a "
+        "rival."
+    )
 
 
 def changed(diagnosis: Diagnosis) -> str:
@@ -180,6 +201,16 @@ def _agreement(d: Diagnosis) -> str:
         f"The residuals are as large as the noise says ({p_value(test.p_value)}), and have "
         f"{pattern}."
     )
+
+
+def _narrowed(d: Diagnosis) -> list[str]:
+    """Say what cannot be told apart, what could tell it, and what the rest is said of."""
+    if d.verdict != "narrowed":
+        return []
+    said = not_told_apart(d.credible_set)
+    further = "; further positions would, and the report says which" if d.next_positions else ""
+    taken = explanation_words(d.credible_set[0])
+    return [f"{said}{further}.", f"All else is said of the most probable explanation: {taken}."]
 
 
 def _refuted(d: Diagnosis) -> list[str]:

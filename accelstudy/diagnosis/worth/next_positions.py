@@ -1,9 +1,9 @@
-"""Which further positions would separate the rivals best."""
+"""Where, how warm and when to measure next, to separate two explanations best."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,127 +12,174 @@ from accelstudy.diagnosis.space.hypotheses import Frame, Hypothesis
 from accelstudy.diagnosis.space.signatures import signature
 from accelstudy.effects import Hold
 from accelstudy.leveling import roll_pitch
+from accelstudy.models import compose
 from accelstudy.schemes import get_scheme
 
 Array = NDArray[np.float64]
 
 COUNT = 3
 GRID = "fibonacci-60"
+LATER = (0.0, 0.5, 1.0)
+"""How long after the session further positions may be measured, in lengths of the session."""
+ANYWHERE = 0.7
+"""Ratio of the smallest to the largest gain of all attitudes from which on any of them will do."""
+
+Explanation = Sequence[Hypothesis]
+"""Effects that may be missing: one, or several together."""
 
 
 @dataclass(frozen=True)
 class NextPosition:
-    """A position worth measuring; angles in rad, temperature in °C or None."""
+    """A position worth measuring.
+
+    Attributes
+    ----------
+    roll, pitch : float, rad
+    temperature : float or None, °C; None where it does not matter
+    later : float or None, s after the last position; None where it does not matter
+    anywhere : bool, whether other attitudes would do nearly as well; this one is the session's own
+    separates : names that only the one, and that only the other explanation has
+    gain : float, by how many sigmas of a position they differ
+    """
 
     roll: float
     pitch: float
     temperature: float | None
-    separates: tuple[str, str]
+    later: float | None
+    anywhere: bool
+    separates: tuple[tuple[str, ...], tuple[str, ...]]
     gain: float
 
 
-def next_positions(frame: Frame, rivals: Sequence[Hypothesis]) -> list[NextPosition]:
+def next_positions(frame: Frame, first: Explanation, second: Explanation) -> list[NextPosition]:
     """Positions in which two explanations of the same residuals predict most differently.
 
     Both are fitted to all positions, each together with the parameters of the model. Of a grid of
-    attitudes, at the lowest, middle and highest temperature so far, those are chosen one after the
-    other whose predictions differ by the largest multiple of the noise of a position.
+    attitudes, at the lowest, middle and highest temperature so far and right after the session or
+    later, those are chosen one after the other whose predictions differ by the largest multiple of
+    the noise of a position. Temperature and time vary only where one of the effects depends on
+    them. Where the attitude hardly matters, those from the start of the session are to be repeated,
+    so that readings can be compared without any model.
 
     Parameters
     ----------
     frame : Frame, of the base fit
-    rivals : two hypotheses about effects
+    first, second : explanations by effects
     """
-    first, second = rivals
-    forces, hold = _grid(frame)
+    effects = [one.effect for one in (*first, *second) if one.effect is not None]
+    needed = {c for e in effects for c in compose(e.spec, (e.spec,)).hold_columns}
+    g = frame.solution.gravity
+    own = frame.forces[_apart(frame.forces, range(len(frame.forces)), g)]
+    attitudes = np.concatenate([own, -g * get_scheme(GRID).directions])
+    forces, hold, later = _grid(frame, attitudes, needed)
     differences = _prediction(frame, first, forces, hold) - _prediction(frame, second, forces, hold)
     sigma = float(np.mean(frame.residuals.sigmas[:, :3]))
-    if frame.solution.approach.uses_angles:
-        gain = np.sum((differences / sigma) ** 2, axis=1)
-    else:
+    if not frame.solution.approach.uses_angles:
         unit = forces / np.linalg.norm(forces, axis=1, keepdims=True)
-        gain = np.sum(unit * differences / sigma, axis=1) ** 2
-    chosen: list[int] = []
-    for i in np.argsort(-gain, kind="stable"):
-        apart = [
-            np.linalg.norm(forces[i] - forces[j]) > 0.5 * frame.solution.gravity for j in chosen
-        ]
-        if all(apart):
-            chosen.append(int(i))
-        if len(chosen) == COUNT:
-            break
+        differences = np.sum(unit * differences, axis=1, keepdims=True)
+    gain = np.linalg.norm(differences / sigma, axis=1)
+
+    start = int(np.argmax(gain)) // len(attitudes) * len(attitudes)
+    there = gain[start : start + len(attitudes)]  # at the best temperature and time
+    anywhere = bool(there.min() >= ANYWHERE * there.max())
+    if anywhere:
+        chosen = [start + i for i in range(len(own))]
+    else:
+        chosen = _apart(forces, np.argsort(-gain, kind="stable").tolist(), g)
     roll, pitch = roll_pitch(tuple(forces.T))
+    names = [tuple(one.name for one in explanation) for explanation in (first, second)]
     return [
         NextPosition(
             roll=float(roll[i]),
             pitch=float(pitch[i]),
-            temperature=None if hold.temperature is None else float(hold.temperature[i]),
-            separates=(first.name, second.name),
-            gain=float(np.sqrt(gain[i])),
+            temperature=float(hold.column("temperature")[i]) if "temperature" in needed else None,
+            later=None if later is None else float(later[i]),
+            anywhere=anywhere,
+            separates=(
+                tuple(name for name in names[0] if name not in names[1]),
+                tuple(name for name in names[1] if name not in names[0]),
+            ),
+            gain=float(gain[i]),
         )
         for i in chosen
     ]
 
 
-def _grid(frame: Frame) -> tuple[Array, Hold]:
-    """Forces (k, 3) and holds of the positions to choose from, measured after all others."""
-    forces = -frame.solution.gravity * get_scheme(GRID).directions
-    temperature = frame.hold.temperature
-    levels = [None] if temperature is None else [*np.quantile(temperature, [0.0, 0.5, 1.0])]
-    grid = np.tile(forces, (len(levels), 1))
-    k, n = len(grid), len(frame.forces)
+def _apart(forces: Array, order: Iterable[int], gravity: float) -> list[int]:
+    """Return the first places, in an order, whose attitudes clearly differ."""
+    chosen: list[int] = []
+    for i in order:
+        if all(np.linalg.norm(forces[i] - forces[j]) > 0.5 * gravity for j in chosen):
+            chosen.append(i)
+        if len(chosen) == COUNT:
+            break
+    return chosen
 
-    def after(values: Array | None) -> Array | None:
-        """The value that the next position would have."""
-        if values is None:
-            return None
-        step = (values[-1] - values[0]) / max(n - 1, 1)
-        return np.full(k, values[-1] + step)
 
-    def usual(values: Array | None) -> Array | None:
-        return None if values is None else np.full(k, np.median(values))
+def _grid(frame: Frame, attitudes: Array, needed: set[str]) -> tuple[Array, Hold, Array | None]:
+    """Forces (k, 3), holds and times after the session (k,) of the positions to choose from.
 
+    All attitudes stand together for each time and temperature. The times are None where there is
+    nothing to choose.
+    """
+    measured, n, m = frame.hold, len(frame.forces), len(attitudes)
+    delays, levels, later = np.zeros(1), np.zeros(1), None
+    if measured.time is not None:
+        length = float(measured.time[-1] - measured.time[0])
+        chosen = LATER if "time" in needed else LATER[:1]
+        delays = length * (np.array(chosen) + 1 / max(n - 1, 1))
+    if measured.temperature is not None:
+        shares = [0.0, 0.5, 1.0] if "temperature" in needed else [0.5]
+        levels = np.quantile(measured.temperature, shares)
+    rounds = len(delays) * len(levels)
+    grid = np.tile(attitudes, (rounds, 1))
+    delay = np.repeat(delays, len(levels) * m)
+    if "time" in needed and measured.time is not None:
+        later = delay
+    vibration = measured.vibration
     roll, pitch = roll_pitch(tuple(grid.T))
     step = grid - frame.forces[-1]
     hold = Hold(
-        temperature=None if temperature is None else np.repeat(np.array(levels, dtype=float), 60),
-        time=after(frame.hold.time),
-        vibration=usual(frame.hold.vibration),
+        temperature=(
+            None if measured.temperature is None else np.tile(np.repeat(levels, m), len(delays))
+        ),
+        time=None if measured.time is None else measured.time[-1] + delay,
+        vibration=None if vibration is None else np.full(len(grid), np.median(vibration)),
         roll=roll,
         pitch=pitch,
-        yaw=np.zeros(k),
+        yaw=np.zeros(len(grid)),
         step_x=step[:, 0],
         step_y=step[:, 1],
         step_z=step[:, 2],
         order=after(frame.hold.order),
     )
-    return grid, hold
+    return grid, hold, later
 
 
-def _prediction(frame: Frame, hypothesis: Hypothesis, forces: Array, hold: Hold) -> Array:
-    """Correction of the base prediction of the output that a hypothesis makes, (k, 3), m/s²."""
-    assert hypothesis.effect is not None
+def _prediction(frame: Frame, explanation: Explanation, forces: Array, hold: Hold) -> Array:
+    """Correction of the base prediction of the output that an explanation makes, (k, 3), m/s²."""
     g = frame.solution.gravity
     angles = np.column_stack([hold.column("roll"), hold.column("pitch")])
     residuals = frame.residuals
     model = frame.solution.model
 
-    def columns(at_forces: Array, at_angles: Array, at_hold: Hold) -> tuple[Array, Array]:
-        """Derivatives of the output by the parameters of the model, and by those of the effect."""
+    def columns(at_forces: Array, at_angles: Array, at_hold: Hold) -> Array:
+        """Derivatives of the output by the parameters of the model and by those of the effects."""
         base = [
             signature(effect, at_forces, at_angles, g, at_hold).force for effect in model.effects
         ]
-        shown = signature(hypothesis.effect, at_forces, at_angles, g, at_hold)  # type: ignore[arg-type]
-        shown = shown.reduced(hypothesis.directions)
-        turned = np.einsum("nia,nak->nik", _force_by_angles(at_forces, g), shown.angles)
-        return np.concatenate(base, axis=2), shown.force + turned
+        turning = _force_by_angles(at_forces, g)
+        added = []
+        for one in explanation:
+            assert one.effect is not None
+            shown = signature(one.effect, at_forces, at_angles, g, at_hold).reduced(one.directions)
+            added.append(shown.force + np.einsum("nia,nak->nik", turning, shown.angles))
+        return np.concatenate([*base, *added], axis=2)
 
-    base, effect = columns(frame.forces, frame.angles, frame.hold)
-    shown = np.concatenate([base, effect], axis=2)
+    shown = columns(frame.forces, frame.angles, frame.hold)
     rows = residuals.rows(residuals.jac_observations[..., :3] @ shown)
     solution = np.linalg.lstsq(rows, residuals.errors, rcond=1e-10)[0]
-    base, effect = columns(forces, angles, replace(hold))
-    return np.concatenate([base, effect], axis=2) @ solution
+    return columns(forces, angles, hold) @ solution
 
 
 def _force_by_angles(forces: Array, g: float) -> Array:

@@ -1,0 +1,147 @@
+"""What is missing from a model in plain words: what is certain first, then what is open."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from accelstudy.diagnosis.decision.explanations import CREDIBLE, Explanation
+from accelstudy.diagnosis.report.statement import Name, Part, Statement, statement
+from accelstudy.diagnosis.worth.next_positions import NextPosition
+from accelstudy.effects import effect_names
+from accelstudy.wording import joined, probability, words
+
+FAMILIES = {
+    "alignment of the axes": "a misalignment of the axes",
+    "attitude of the rig": "an error in the attitude of the rig",
+    "linear scale": "an error of the linear scale",
+    "noise": "noise of another kind",
+    "temperature": "an effect of temperature",
+}
+"""Families as what is missing; the others have an article before them."""
+
+MANY = 4
+"""Explanations that are still an answer."""
+NOT_AN_EFFECT = {"unknown": "something that is not in the catalogue"}
+"""How names that stand for no effect are said."""
+
+
+def name_words(name: str) -> str:
+    """Return a name of an explanation as words."""
+    return NOT_AN_EFFECT.get(name, words(name))
+
+
+def family_words(family: str) -> str:
+    """Return a family as what is missing: a slow change in time."""
+    article = "an" if family[0] in "aeiou" else "a"
+    return FAMILIES.get(family, f"{article} {family}")
+
+
+def explanation_words(explanation: Explanation) -> str:
+    """Return an explanation as words: bias drift with quadratic scale."""
+    return " with ".join(map(name_words, explanation.names))
+
+
+def missing(credible_set: Sequence[Explanation]) -> str:
+    """Say what is missing: a slow change in time (bias drift or warm up) and hysteresis."""
+    effects, others = _apart(credible_set)
+    return _missing(_if_it_is_an_effect(effects)) + (f", unless it is {_or(others)}" * bool(others))
+
+
+def missing_in_part(credible_set: Sequence[Explanation]) -> str:
+    """Say what is certain of something that has no name as a whole; nothing if nothing is.
+
+    A set that is small enough to be an answer and is none was refuted by what it leaves, and
+    nothing of it is certain.
+    """
+    known = statement(credible_set)
+    said = joined([_part(part) for part in known.certain if _is_effect(part)])
+    if not said or (len(credible_set) <= MANY and not _apart(credible_set)[1]):
+        return ""
+    if _surely_more(known, CREDIBLE):
+        return f"{said}; what is missing beside it has no name here"
+    return f"{said}; whether more is missing, and what, is open"
+
+
+def not_told_apart(credible_set: Sequence[Explanation]) -> str:
+    """Say what a campaign cannot tell apart; nothing if it tells everything apart."""
+    effects, others = _apart(credible_set)
+    known = _if_it_is_an_effect(effects)
+    alike = [
+        [(_names([name]), name.posterior) for name in part.names]
+        for part in known.certain
+        if len(part.names) > 1
+    ]
+    beside = known.open if alike or not others else credible_set
+    more = [(explanation_words(one), one.posterior) for one in beside if one.names]
+    if more and len(more) == len(beside):
+        alike.append(more)
+    said = [f"{', nor '.join(map(_listed, alike))} apart"] if alike else []
+    if len(more) < len(beside):
+        said.append(f"whether {_listed(more, 'or')} is missing as well")
+    return f"This campaign cannot tell {', nor '.join(said)}" if said else ""
+
+
+def _listed(alternatives: Sequence[tuple[str, float]], last: str = "and") -> str:
+    return joined([f"{what} ({probability(p)})" for what, p in alternatives], last)
+
+
+def separates(positions: Sequence[NextPosition]) -> str:
+    """Say which two explanations further positions would separate; nothing without any."""
+    if not positions:
+        return ""
+    first, second = (" with ".join(map(name_words, names)) for names in positions[0].separates)
+    return joined([first or "nothing more", second or "nothing more"])
+
+
+def _missing(known: Statement) -> str:
+    if not known.certain:
+        return _or(known.open)
+    if not known.open and len(known.certain) == 1:
+        return _part(known.certain[0], "{family}: {names}")
+    said = joined([_part(part) for part in known.certain])
+    if not known.open:
+        return said
+    more = _or([one for one in known.open if one.names])
+    surely = _surely_more(known, CREDIBLE * sum(one.posterior for one in known.open))
+    return f"{said}, and {more}" if surely else f"{said}, and perhaps {more}"
+
+
+def _part(part: Part, pattern: str = "{family} ({names})") -> str:
+    """Say one thing that is certain, with all names that it may have."""
+    names = _names(part.names)
+    if len(part.names) == 1:
+        return names
+    return pattern.format(family=family_words(part.family), names=names)
+
+
+def _names(names: Sequence[Name]) -> str:
+    """All names, with those that mean the same."""
+    said = [other for name in names for other in (name.name, *name.members)]
+    return joined(list(dict.fromkeys(map(name_words, said))), "or")
+
+
+def _or(explanations: Sequence[Explanation]) -> str:
+    said = [explanation_words(one) for one in explanations]
+    pairs = any(len(one.names) > 1 for one in explanations)
+    return ", or ".join(said) if pairs else joined(said, "or")
+
+
+def _apart(explanations: Sequence[Explanation]) -> tuple[list[Explanation], list[Explanation]]:
+    """Explanations by effects alone, and the others."""
+    known = effect_names()
+    effects = [one for one in explanations if all(name in known for name in one.names)]
+    return effects, [one for one in explanations if one not in effects]
+
+
+def _if_it_is_an_effect(effects: Sequence[Explanation]) -> Statement:
+    """What is certain given that it is one of these explanations."""
+    return statement(effects, probability=CREDIBLE * sum(one.posterior for one in effects))
+
+
+def _surely_more(known: Statement, probability: float) -> bool:
+    """Whether something is missing beside what is certain."""
+    return sum(one.posterior for one in known.open if one.names) >= probability
+
+
+def _is_effect(part: Part) -> bool:
+    return part.family != "noise" and part.names[0].name not in NOT_AN_EFFECT
