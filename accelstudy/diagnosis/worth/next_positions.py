@@ -134,7 +134,8 @@ def _grid(frame: Frame, attitudes: Array, needed: set[str]) -> tuple[Array, Hold
     rounds = len(delays) * len(levels)
     grid = np.tile(attitudes, (rounds, 1))
     delay = np.repeat(delays, len(levels) * m)
-    if "time" in needed and measured.time is not None:
+    time = None if measured.time is None else measured.time[-1] + delay
+    if "time" in needed and time is not None:
         later = delay
     vibration = measured.vibration
     roll, pitch = roll_pitch(tuple(grid.T))
@@ -143,7 +144,7 @@ def _grid(frame: Frame, attitudes: Array, needed: set[str]) -> tuple[Array, Hold
         temperature=(
             None if measured.temperature is None else np.tile(np.repeat(levels, m), len(delays))
         ),
-        time=None if measured.time is None else measured.time[-1] + delay,
+        time=time,
         vibration=None if vibration is None else np.full(len(grid), np.median(vibration)),
         roll=roll,
         pitch=pitch,
@@ -151,7 +152,7 @@ def _grid(frame: Frame, attitudes: Array, needed: set[str]) -> tuple[Array, Hold
         step_x=step[:, 0],
         step_y=step[:, 1],
         step_z=step[:, 2],
-        order=after(frame.hold.order),
+        order=np.full(len(grid), n + 1.0) if time is None else time,
     )
     return grid, hold, later
 
