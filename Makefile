@@ -1,6 +1,7 @@
 PYTHON ?= python3
 CORES ?= 2
 CAMPAIGNS ?= config/campaigns.yaml
+HIDDEN ?= config/hidden-effects.yaml
 
 SHELL := bash
 ENV := .venv
@@ -22,12 +23,12 @@ export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: help env test smoke reproduce report campaigns diagnose-example lint lock clean
+.PHONY: help env test smoke reproduce report campaigns diagnose-example hidden-effects lint lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-18s%s\n", $$1, $$2 }' Makefile
 	@echo 'PYTHON=python3.12 chooses the interpreter of a new environment, CORES=8 the cores used,'
-	@echo 'CAMPAIGNS=my.yaml the batch of `make campaigns`.'
+	@echo 'CAMPAIGNS=my.yaml the batch of `make campaigns`, HIDDEN=my.yaml the study of `make hidden-effects`.'
 
 env: $(READY) ## make the environment, from locked versions, in .venv
 
@@ -36,6 +37,7 @@ test: lint ## check and test the package, with coverage
 
 smoke: $(READY) ## run the whole workflow on a small configuration
 	snakemake --cores $(CORES) --configfile config/smoke.yaml
+	snakemake --cores $(CORES) --snakefile workflow/hidden.smk --configfile $(HIDDEN) config/hidden-smoke.yaml
 
 reproduce: $(READY) ## reproduce the paper
 	snakemake --cores $(CORES)
@@ -50,6 +52,9 @@ diagnose-example: $(READY) ## simulate a campaign with a hidden effect, find it,
 	snakemake --cores $(CORES) --snakefile workflow/diagnose.smk --configfile config/diagnose-example.yaml
 	snakemake --cores $(CORES) --configfile config/config.yaml results/diagnose-example/diagnosis/model.yaml
 
+hidden-effects: $(READY) ## study how well the diagnosis finds what is hidden
+	snakemake --cores $(CORES) --snakefile workflow/hidden.smk --configfile $(HIDDEN)
+
 lint: $(READY) ## check style, types and the workflow
 	ruff check
 	ruff format --check
@@ -58,6 +63,7 @@ lint: $(READY) ## check style, types and the workflow
 	snakemake --lint
 	snakemake --lint --snakefile workflow/campaigns.smk --configfile config/campaigns.yaml
 	snakemake --lint --snakefile workflow/diagnose.smk --configfile config/diagnose-example.yaml
+	snakemake --lint --snakefile workflow/hidden.smk --configfile config/hidden-effects.yaml
 
 lock: $(READY) ## lock the newest versions that pyproject.toml allows
 	uv lock --upgrade --default-index https://pypi.org/simple

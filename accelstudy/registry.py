@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from pkgutil import iter_modules
@@ -27,6 +28,7 @@ class Registry(Generic[Item]):
     def __init__(self, kind: str) -> None:
         self.kind = kind
         self._items: dict[str, Item] = {}
+        self._unlisted: frozenset[str] = frozenset()
 
     def check_free(self, name: str) -> None:
         """Raise `ValueError` if the name is taken."""
@@ -47,7 +49,17 @@ class Registry(Generic[Item]):
 
     def names(self) -> tuple[str, ...]:
         """Names of all items."""
-        return tuple(self._items)
+        return tuple(name for name in self._items if name not in self._unlisted)
+
+    @contextmanager
+    def without(self, names: Collection[str]) -> Iterator[None]:
+        """Leave items out of `names` for a while; who knows of one can still get it."""
+        before = self._unlisted
+        self._unlisted = before | set(names)
+        try:
+            yield
+        finally:
+            self._unlisted = before
 
 
 @dataclass(frozen=True)

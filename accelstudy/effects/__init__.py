@@ -10,12 +10,22 @@ from accelstudy.effects.base import (
     Hold,
     Parameter,
     effect_names,
+    effects_without,
     get_effect,
     register,
 )
 from accelstudy.registry import Hyper, import_modules
 
-__all__ = ["Effect", "Hold", "Hyper", "Parameter", "effect_names", "get_effect", "register"]
+__all__ = [
+    "Effect",
+    "Hold",
+    "Hyper",
+    "Parameter",
+    "effect_names",
+    "effects_without",
+    "get_effect",
+    "register",
+]
 
 # A module registers its effects when it is imported.
 import_modules(__name__, __path__)

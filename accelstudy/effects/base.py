@@ -222,6 +222,7 @@ _registry: ShapedRegistry[Effect] = ShapedRegistry("effect")
 EffectClass = TypeVar("EffectClass", bound=type[Effect])
 
 effect_names = _registry.names
+effects_without = _registry.without
 
 
 @cache

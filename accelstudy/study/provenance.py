@@ -11,7 +11,7 @@ from accelstudy.errors import InputError
 
 # Files that a stage does not use, so that an edit of them does not run it again. What is not named
 # counts: a new file runs everything again rather than nothing.
-_MEASURED = ("campaign/", "diagnosis/", "gross_errors/", "adjustment/quality/")
+_MEASURED = ("campaign/", "diagnosis/", "gross_errors/", "hidden/", "adjustment/quality/")
 _COMMANDS = ("cli.py", "catalogue.py")
 _FRONT = (
     *_COMMANDS,
@@ -30,15 +30,24 @@ _STUDY = (
     "study/claims",
     *(f"study/{name}.py" for name in ("analysis", "cells", "simulate", "summary")),
 )
+_SCORED = tuple(
+    f"hidden/{name}.py"
+    for name in ("figures", "judging", "limits", "page", "rates", "report", "score", "targets")
+)
+_DECIDED = tuple(f"diagnosis/{name}" for name in ("evidence/", "decision/", "pipeline.py"))
+_NOT_HIDDEN = (*_COMMANDS, "campaign/overview", "diagnosis/report/", "pages/", *_STUDY)
 _UNUSED = {
     "simulate": (*_FRONT, *_TABLES, "sensitivity.py", *_CONFIG),
     "summarise": (*_FRONT, "sensitivity.py", *_CONFIG),
     "sensitivity": (*_FRONT, *_TABLES),
     "claims": (*_COMMANDS, "figures/", "plausibility.py", *_MEASURED),
     "figures": (*_COMMANDS, "study/claims", "pages/", "plausibility.py", "wording.py", *_MEASURED),
-    "campaign": (*_COMMANDS, "campaign/overview", "diagnosis/", *_STUDY),
-    "diagnosis": (*_COMMANDS, "campaign/overview", *_STUDY),
-    "overview": (*_COMMANDS, "figures/", "adjustment/", "diagnosis/", *_STUDY),
+    "campaign": (*_COMMANDS, "campaign/overview", "diagnosis/", "hidden/", *_STUDY),
+    "diagnosis": (*_COMMANDS, "campaign/overview", "hidden/", *_STUDY),
+    "overview": (*_COMMANDS, "figures/", "adjustment/", "diagnosis/", "hidden/", *_STUDY),
+    "hidden": (*_NOT_HIDDEN, "figures/", "hidden/baselines.py", *_SCORED),
+    "baselines": (*_NOT_HIDDEN, "figures/", *_DECIDED, *_SCORED),
+    "score": (*_NOT_HIDDEN, "hidden/baselines.py", *_DECIDED),
 }
 
 

@@ -1,0 +1,183 @@
+"""One job of the study: campaigns are made and diagnosed, and truths and answers written apart."""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from time import process_time
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from accelstudy.campaign import Campaign
+from accelstudy.diagnosis.pipeline import Diagnosis, diagnose
+from accelstudy.effects import effects_without
+from accelstudy.errors import InputError
+from accelstudy.hidden.baselines import answers
+from accelstudy.hidden.cells import Cell, chunks, study_cells
+from accelstudy.hidden.config import HiddenConfig, parse_hidden
+from accelstudy.hidden.physics import Truth, generate
+from accelstudy.hidden.tables import SCHEMA
+from accelstudy.models import get_model
+from accelstudy.study.tables import write_table
+
+Row = dict[str, Any]
+Spec = Mapping[str, Any]
+
+
+def run_chunk(spec: Spec, outputs: Mapping[str, str | Path], provenance: Mapping[str, Any]) -> None:
+    """Diagnose the campaigns of a chunk.
+
+    The diagnosis is given the campaign, and nothing else. One that fails is a row with its error.
+    How long each took stands apart, as it is another time in every run.
+
+    Parameters
+    ----------
+    spec : mapping
+        config, chunk and chunks: the plain configuration, which part of it, and of how many
+    outputs : paths of the tables truths, outcomes and seconds
+    provenance : see `accelstudy.study.tables.origin`
+    """
+    config = parse_hidden(spec["config"])
+    model = get_model(config.model)
+    rows: dict[str, list[Row]] = {name: [] for name in outputs}
+
+    def answer(campaign: Campaign) -> Row:
+        return _outcome(diagnose(campaign, model, seed=config.diagnosis_seed))
+
+    for cell, k in _chunk(spec, config):
+        campaign, truth = _made(cell, k, config.seed)
+        start = process_time()
+        with effects_without(cell.removed):
+            answered, error = _tried(answer, campaign, f"{cell.name} {k}")
+        key = {"cell": cell.name, "campaign": k}
+        rows["truths"].append({**key, **truth})
+        rows["outcomes"].append({**key, **(answered or {}), "error": error or truth["failed"]})
+        rows["seconds"].append({**key, "seconds": process_time() - start})
+    for name, path in outputs.items():
+        write_table(path, _table(name, rows[name]), provenance)
+
+
+def run_baselines(spec: Spec, output: str | Path, provenance: Mapping[str, Any]) -> None:
+    """Let the simpler methods answer to some of the campaigns of a chunk; as `run_chunk`."""
+    config = parse_hidden(spec["config"])
+    model, rows = get_model(config.model), []
+
+    def answer(campaign: Campaign) -> list[Row]:
+        return [
+            {"method": method, "detected": detected, "found": json.dumps(names)}
+            for method, (detected, names) in answers(campaign, model)
+        ]
+
+    for cell, k in _chunk(spec, config):
+        if cell.one_in(config.baselines_every, k):
+            campaign, _ = _made(cell, k, config.seed)
+            with effects_without(cell.removed):
+                answered, _ = _tried(answer, campaign, f"{cell.name} {k}")
+            rows += [{"cell": cell.name, "campaign": k, **row} for row in answered or ()]
+    write_table(output, _table("baselines", rows), provenance)
+
+
+def _table(name: str, rows: list[Row]) -> pd.DataFrame:
+    return pd.DataFrame(rows, columns=[*SCHEMA[name]]).astype(SCHEMA[name])
+
+
+def _chunk(spec: Spec, config: HiddenConfig) -> Iterator[tuple[Cell, int]]:
+    """Cells and numbers of the campaigns of a chunk."""
+    for cell, numbers in chunks(study_cells(config), spec["chunks"])[spec["chunk"]]:
+        for k in numbers:
+            yield cell, k
+
+
+def _made(cell: Cell, k: int, seed: int) -> tuple[Campaign | None, Row]:
+    """Make a campaign and the row of its truth; None if it could not be made."""
+    made, error = _tried(
+        lambda own: generate(cell.case, own), cell.seed(seed, k), f"{cell.name} {k}: not made"
+    )
+    campaign, truth = made or (None, None)
+    return campaign, _truth(cell, truth, error)
+
+
+def _tried(work: Callable[[Any], Any], given: Any, what: str) -> tuple[Any, str]:
+    """Return what comes of what is given, and the error if nothing does; None comes of None."""
+    if given is None:
+        return None, ""
+    try:
+        return work(given), ""
+    except InputError as error:
+        logging.info("%s: %s", what, error)
+        return None, f"refused: {error}"
+    except OSError:  # a full disk, say, which is no matter of this campaign
+        raise
+    except Exception as error:
+        logging.exception("%s", what)
+        return None, f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
+
+
+def _truth(cell: Cell, truth: Truth | None, error: str) -> Row:
+    """Row of the table of truths; of a campaign that could not be made what was wanted."""
+    case = cell.case
+    known = {} if truth is None else truth.to_dict()
+    oracle = known.get("oracle") or {}
+    gross = known.get("gross") or {}
+    # What a session cannot show, or is not in the catalogue, is nothing that can be named rightly.
+    classes = [] if case.set == "invisible" else known.get("classes", [])
+    left = [[name for name in one if name not in cell.removed] for one in classes]
+    return {
+        "set": case.set,
+        "what": cell.what,
+        "size": cell.size,
+        "design": case.design,
+        "approach": case.approach,
+        "sigma": "given" if case.sigma_known else "not given",
+        "classes": json.dumps([one for one in left if one]),
+        "effects": json.dumps(known.get("effects", [])),
+        "noise": json.dumps(known.get("noise")),
+        "gross": json.dumps(gross),
+        "gross_name": gross.get("name", ""),
+        "oracle_detected": oracle.get("detected"),
+        "oracle_best": json.dumps(oracle.get("best", [])),
+        "oracle_told": json.dumps(oracle.get("told", [])),
+        "sensor": json.dumps(known.get("sensor")),
+        "seed": json.dumps(known.get("seed")),
+        "failed": error,
+    }
+
+
+def _outcome(d: Diagnosis) -> Row:
+    """Row of the table of outcomes."""
+    test, held = d.global_test, d.gap.held_out
+    return {
+        "verdict": d.verdict,
+        "found": json.dumps([one.name for one in d.found]),
+        "specs": json.dumps([one.spec for one in d.found]),
+        "found_classes": json.dumps([list(one.equivalence_class) for one in d.found]),
+        "positions": json.dumps([one.position for one in d.found]),
+        "posteriors": json.dumps([_rounded(one.posterior) for one in d.found]),
+        "credible_set": json.dumps(
+            [
+                {
+                    "names": list(one.names),
+                    "classes": [list(names) for names in one.classes],
+                    "posterior": _rounded(one.posterior),
+                }
+                for one in d.credible_set
+            ]
+        ),
+        "confirmed": bool(d.gap.confirmed),
+        "statement": d.gap.statement or "",
+        "held_out_z": np.nan if held is None else float(held.z),
+        "sigma0_before": float(d.gap.before),
+        "sigma0_after": np.nan if d.gap.after is None else float(d.gap.after),
+        "p_size": np.nan if test is None else float(test.p_value),
+        "redundancy": d.base.redundancy,
+        "positions_used": d.campaign.n_positions,
+        "reason": d.reason,
+    }
+
+
+def _rounded(probability: float | None) -> float | None:
+    return None if probability is None else float(f"{probability:.6g}")

@@ -1,0 +1,125 @@
+# Campaigns with hidden effects, each diagnosed, and how well that went:
+# snakemake --cores 2 --snakefile workflow/hidden.smk
+from snakemake.exceptions import WorkflowError
+from snakemake.utils import min_version
+
+from accelstudy.errors import InputError
+from accelstudy.hidden.cells import number_of_chunks
+from accelstudy.hidden.config import parse_hidden
+from accelstudy.hidden.tables import TABLES
+from accelstudy.study.config import read_layer
+from accelstudy.study.job import quote_python
+from accelstudy.study.provenance import check_writable, code_hash
+
+min_version("9.10")
+quote_python()
+
+
+configfile: "config/hidden-effects.yaml"
+
+
+# The environment of the Makefile is what counts; this is for executors that want a container.
+container: "docker://python:3.13-slim"
+
+
+try:
+    for path in workflow.configfiles:
+        read_layer(path)  # more strictly than Snakemake does
+    STUDY = parse_hidden(config, ", ".join(map(str, workflow.configfiles)) or "config")
+    RESULTS = f"results/{STUDY.study}"
+    check_writable(RESULTS)
+except InputError as error:
+    raise WorkflowError(str(error)) from None
+
+ORIGIN = {"config_hash": STUDY.fingerprint, "seed": STUDY.seed}
+CHUNKS = number_of_chunks(STUDY)
+NUMBERS = [f"{i:04d}" for i in range(CHUNKS)]
+
+
+onstart:
+    logger.info(f"{STUDY.study}: {STUDY.campaigns} campaigns at most, in {CHUNKS} jobs")
+
+
+wildcard_constraints:
+    chunk=r"\d{4}",
+
+
+def chunk_spec(wildcards):
+    """All on which the numbers of a chunk depend, as plain data."""
+    content = STUDY.model_dump(mode="json")
+    return {"config": content, "chunk": int(wildcards.chunk), "chunks": CHUNKS}
+
+
+rule hidden_effects:
+    default_target: True
+    input:
+        f"{RESULTS}/score.md",
+
+
+rule diagnose:
+    output:
+        truths=f"{RESULTS}/truths/{{chunk}}.parquet",
+        outcomes=f"{RESULTS}/outcomes/{{chunk}}.parquet",
+        seconds=f"{RESULTS}/seconds/{{chunk}}.parquet",
+    log:
+        f"{RESULTS}/logs/diagnose/{{chunk}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/diagnose/{{chunk}}.tsv"
+    threads: 1
+    resources:
+        mem_mb=2000,
+    params:
+        spec=chunk_spec,
+        provenance=ORIGIN,
+        code=code_hash("hidden"),
+    message:
+        "Simulate and diagnose chunk {wildcards.chunk}"
+    script:
+        "scripts/hidden_diagnose.py"
+
+
+rule baselines:
+    output:
+        f"{RESULTS}/baselines/{{chunk}}.parquet",
+    log:
+        f"{RESULTS}/logs/baselines/{{chunk}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/baselines/{{chunk}}.tsv"
+    threads: 1
+    resources:
+        mem_mb=2000,
+    params:
+        spec=chunk_spec,
+        provenance=ORIGIN,
+        code=code_hash("baselines"),
+    message:
+        "Try simpler methods on chunk {wildcards.chunk}"
+    script:
+        "scripts/hidden_baselines.py"
+
+
+rule score:
+    input:
+        truths=expand(f"{RESULTS}/truths/{{chunk}}.parquet", chunk=NUMBERS),
+        outcomes=expand(f"{RESULTS}/outcomes/{{chunk}}.parquet", chunk=NUMBERS),
+        baselines=expand(f"{RESULTS}/baselines/{{chunk}}.parquet", chunk=NUMBERS),
+        seconds=expand(f"{RESULTS}/seconds/{{chunk}}.parquet", chunk=NUMBERS),
+    output:
+        **{table: f"{RESULTS}/{table}.parquet" for table in TABLES},
+        page=f"{RESULTS}/score.md",
+        figures=directory(f"{RESULTS}/figures"),
+    log:
+        f"{RESULTS}/logs/score.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/score.tsv"
+    threads: 1
+    resources:
+        mem_mb=2000,
+    params:
+        config=STUDY.model_dump(mode="json"),
+        provenance=ORIGIN,
+        code=code_hash("score"),
+    message:
+        "Score all chunks"
+    script:
+        "scripts/hidden_score.py"

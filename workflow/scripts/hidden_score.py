@@ -1,0 +1,12 @@
+from accelstudy.hidden.config import parse_hidden
+from accelstudy.hidden.report import write_score
+from accelstudy.study.job import logged
+
+with logged(snakemake):
+    page = write_score(
+        parse_hidden(snakemake.params.config),
+        dict(snakemake.input.items()),
+        dict(snakemake.output.items()),
+        snakemake.params.provenance,
+    )
+    print(page, end="")
