@@ -26,7 +26,6 @@ class Conditions:
     sensor : Sensor
     robot : bool, whether the readings of the encoders are used; else the norm of gravity is
     root : (n, c, c) array, inverse of a lower root of the covariance matrix of the misclosures
-    sigma : float, m/s², of an output
     directions : (n, 3) array, unit vectors along the specific force
     absorbed : (m, 9) array, orthonormal, what the nine parameters of a calibration absorb
     """
@@ -34,7 +33,6 @@ class Conditions:
     sensor: Sensor
     robot: bool
     root: Array
-    sigma: float
     directions: Array
     absorbed: Array
 
@@ -61,9 +59,9 @@ class Conditions:
         for column, (i, j) in enumerate(TRIANGLE):
             columns[:, i, column] = output[:, j] - sensor.bias[j]
         columns[:, :, 6:] = correction
-        at_truth = cls(sensor, robot, root, session.sigma, directions, np.zeros((0, 9)))
+        at_truth = cls(sensor, robot, root, directions, np.zeros((0, 9)))
         rows = at_truth._white(columns.transpose(2, 0, 1)).T
-        return cls(sensor, robot, root, session.sigma, directions, np.linalg.qr(rows)[0])
+        return cls(sensor, robot, root, directions, np.linalg.qr(rows)[0])
 
     def misclosures(self, output: Array, reading: Array) -> Array:
         """Misclosures (B, m) of unit weight of outputs (B, n, 3) and readings (B, n, 2)."""

@@ -23,7 +23,12 @@ DRAWS = 200
 
 
 def drawn(
-    name: str, lam: float, knowing: Oracle, conditions: Conditions, rng: np.random.Generator
+    name: str,
+    lam: float,
+    session: Session,
+    conditions: Conditions,
+    knowing: Oracle,
+    rng: np.random.Generator,
 ) -> tuple[Cause, tuple[str, ...]]:
     """Draw an effect, and say what means the same.
 
@@ -31,8 +36,9 @@ def drawn(
     ----------
     name : str, of an effect of the catalogue or outside it
     lam : float, its noncentrality; 0 for an effect of usual size, however little of it shows
-    knowing : Oracle
-    conditions : Conditions, of the sensor that has the effect
+    session : Session, in which the joints stand where they really do
+    conditions : Conditions, of this session with the sensor that has the effect
+    knowing : Oracle, of the design
 
     Returns
     -------
@@ -47,13 +53,13 @@ def drawn(
     own = knowing.atlas
     effect = EFFECTS[name] if name in EFFECTS else OUTSIDE[name]
     if not lam:
-        return _of_usual_size(effect, own.session, rng), (name,)
+        return _of_usual_size(effect, session, rng), (name,)
     if effect.shows(own.session):
         for _ in range(DRAWS):
             shape = own.shape(effect, effect.draw(own.session, rng))
             if shape is None:
                 continue
-            cause, change = _scaled(shape, lam, own.session, conditions, rng)
+            cause, change = _scaled(shape, lam, session, conditions, rng)
             if name in EFFECTS or knowing.is_outside(change):
                 return cause, own.same_as(shape)
     approach = "robot" if conditions.robot else "gravity"

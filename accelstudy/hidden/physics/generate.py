@@ -22,6 +22,10 @@ from accelstudy.hidden.physics.session import GRAVITY, Session
 Array = NDArray[np.float64]
 
 
+ARRIVAL = 5e-4
+"""rad, sd of the joints about the attitudes of the design."""
+
+
 def generate(case: Case, seed: np.random.SeedSequence) -> tuple[Campaign, Truth]:
     """Simulate a campaign.
 
@@ -38,12 +42,14 @@ def generate(case: Case, seed: np.random.SeedSequence) -> tuple[Campaign, Truth]
     rng = np.random.default_rng(seed)
     knowing = oracle(case.design, case.approach)
     own = knowing.atlas
-    session = own.session
+    # No joint comes to rest exactly where it was sent.
+    arrived = own.session.joints + ARRIVAL * rng.standard_normal(own.session.joints.shape)
+    session = replace(own.session, joints=arrived)
     sensor = Sensor.drawn(rng)
     conditions = Conditions.of(session, case.approach, sensor)
     causes, hidden, classes = [], [], []
     for name, lam in zip(case.effect, case.lam or [0.0] * len(case.effect), strict=True):
-        cause, same = drawn(name, lam, knowing, conditions, rng)
+        cause, same = drawn(name, lam, session, conditions, knowing, rng)
         classes.append(same)
         causes.append(cause)
         parameters = tuple(cause.parameters[0].tolist())
@@ -56,7 +62,7 @@ def generate(case: Case, seed: np.random.SeedSequence) -> tuple[Campaign, Truth]
     campaign = _with_samples(campaign, session, sensor, causes, noise, rng)
     gross: dict[str, Any] = {"name": "", "settings": {}}
     if case.gross is not None:
-        campaign, gross["settings"] = GROSS[case.gross](campaign, conditions, rng)
+        campaign, gross["settings"] = GROSS[case.gross](campaign, session, conditions, rng)
         gross["name"] = case.gross
     verdict = knowing.judge(_left(own, sensor, forces, reading), case.lam)
     left = knowing.left(_left(own, sensor, output, encoders)) if case.set == "outside" else ()

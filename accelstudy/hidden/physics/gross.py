@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from accelstudy.campaign.session import Campaign
 from accelstudy.hidden.physics.conditions import Conditions
-from accelstudy.hidden.physics.session import GRAVITY
+from accelstudy.hidden.physics.session import GRAVITY, Session
 from accelstudy.units import GON, STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
@@ -27,11 +27,13 @@ PER_AXIS = ("forces", "sd", "slope", "sd_slope")
 FORCE_UNITS = (1 / STANDARD_GRAVITY, 1e3 / STANDARD_GRAVITY, STANDARD_GRAVITY)
 ANGLE_UNITS = (180 / np.pi * GON, GON)
 
-GrossError = Callable[[Campaign, Conditions, np.random.Generator], tuple[Campaign, Settings]]
+GrossError = Callable[
+    [Campaign, Session, Conditions, np.random.Generator], tuple[Campaign, Settings]
+]
 
 
 def _axis_error(
-    campaign: Campaign, conditions: Conditions, rng: np.random.Generator
+    campaign: Campaign, session: Session, conditions: Conditions, rng: np.random.Generator
 ) -> tuple[Campaign, Settings]:
     """Exchange channels, or turn their signs: one of the 47 ways that are wrong."""
     ways = [(o, s) for o in permutations(range(3)) for s in product((1.0, -1.0), repeat=3)]
@@ -47,7 +49,7 @@ def _axis_error(
 
 
 def _unit_error(
-    campaign: Campaign, conditions: Conditions, rng: np.random.Generator
+    campaign: Campaign, session: Session, conditions: Conditions, rng: np.random.Generator
 ) -> tuple[Campaign, Settings]:
     """Write the forces, or the angles, in another unit than the header says."""
     if campaign.angles is not None and rng.random() < 0.5:
@@ -61,7 +63,7 @@ def _unit_error(
 
 
 def _row_order(
-    campaign: Campaign, conditions: Conditions, rng: np.random.Generator
+    campaign: Campaign, session: Session, conditions: Conditions, rng: np.random.Generator
 ) -> tuple[Campaign, Settings]:
     """Exchange what the sensor measured in two holds, in three in a ring, or turn some around."""
     n = campaign.n_positions
@@ -85,21 +87,27 @@ def _row_order(
 
 
 def _outlier_position(
-    campaign: Campaign, conditions: Conditions, rng: np.random.Generator
+    campaign: Campaign, session: Session, conditions: Conditions, rng: np.random.Generator
 ) -> tuple[Campaign, Settings]:
     """Bump one hold, by much more than what could be detected."""
     sigma = float(np.exp(rng.uniform(np.log(15.0), np.log(150.0))))
     while True:
         row = int(rng.integers(campaign.n_positions))
         direction = rng.standard_normal(3)
-        error = sigma * conditions.sigma * direction / np.linalg.norm(direction)
+        error = sigma * session.sigma * direction / np.linalg.norm(direction)
         change = np.zeros((1, campaign.n_positions, 3))
         change[0, row] = error
         lam = float(np.sum(conditions.left(conditions.changed(change)) ** 2))
         if lam > LEAST:
             break
     settings = {"position": row + 1.0, **dict(zip("xyz", error.tolist(), strict=True))}
-    return replace(campaign, forces=campaign.forces + change[0]), settings | {"lam": lam}
+    settings["lam"] = lam
+    campaign = replace(campaign, forces=campaign.forces + change[0])
+    if campaign.slope is not None and rng.random() < 0.5:
+        # It was not bumped before the hold, but crept through it.
+        campaign = replace(campaign, slope=campaign.slope + 2 * change[0] / session.length)
+        settings["crept"] = 1.0
+    return campaign, settings
 
 
 GROSS: dict[str, GrossError] = {
