@@ -3,7 +3,12 @@
 import pytest
 
 from accelstudy.diagnosis.decision.explanations import Explanation
-from accelstudy.diagnosis.report.missing import missing, missing_in_part, not_told_apart
+from accelstudy.diagnosis.report.missing import (
+    missing,
+    missing_in_part,
+    most_probable,
+    not_told_apart,
+)
 from accelstudy.diagnosis.report.statement import statement
 
 SLOW, EVEN = "slow change in time", "even nonlinearity"
@@ -159,6 +164,11 @@ def test_too_little_is_not_certain():
             "a slow change in time: bias drift or warm up, unless it is coloured noise",
             "bias drift (0.5) and warm up (0.3) apart",
         ),
+        (  # what has next to no probability is left to the figure
+            [("bias_drift", 0.55), ("warm_up", 0.3), ("warm_up+settling", 0.04), ("unknown", 0.03)],
+            "a slow change in time: bias drift or warm up",
+            "bias drift (0.55) and warm up (0.34) apart",
+        ),
         (
             [("hysteresis", 0.68), ("coloured_noise", 0.25)],
             "hysteresis, unless it is coloured noise",
@@ -178,6 +188,20 @@ def test_what_is_certain_of_the_unknown_comes_first():
     assert missing_in_part(spread) == f"{slow}; what is missing beside it has no name here"
     open_end = made(*with_many, ("warm_up", 0.2), ("warm_up+quadratic_scale", 0.17))
     assert missing_in_part(open_end) == f"{slow}; whether more is missing, and what, is open"
+
+
+def test_the_unknown_is_said_by_families():
+    spread = made(
+        ("bias_drift", 0.4),
+        ("coloured_noise", 0.25),
+        ("warm_up", 0.2),
+        ("unknown", 0.1),
+        ("hysteresis", 0.05),
+    )
+    assert most_probable(spread) == (
+        "a slow change in time (0.6), noise of another kind (0.25) and something that is not in "
+        "the catalogue (0.1)"
+    )
 
 
 @pytest.mark.parametrize(

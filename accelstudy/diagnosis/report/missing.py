@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 
+from accelstudy.catalogue import family_of
 from accelstudy.diagnosis.decision.explanations import CREDIBLE, Explanation
 from accelstudy.diagnosis.report.statement import Name, Part, Statement, statement
 from accelstudy.diagnosis.worth.next_positions import NextPosition
@@ -21,6 +23,8 @@ FAMILIES = {
 
 MANY = 4
 """Explanations that are still an answer."""
+WORTH = 0.1
+"""Posterior from which on something open is worth a word; the figure has all of it."""
 NOT_AN_EFFECT = {"unknown": "something that is not in the catalogue"}
 """How names that stand for no effect are said."""
 
@@ -44,7 +48,8 @@ def explanation_words(explanation: Explanation) -> str:
 def missing(credible_set: Sequence[Explanation]) -> str:
     """Say what is missing: a slow change in time (bias drift or warm up) and hysteresis."""
     effects, others = _apart(credible_set)
-    return _missing(_if_it_is_an_effect(effects)) + (f", unless it is {_or(others)}" * bool(others))
+    unless = _or([one for one in others if one.posterior >= WORTH])
+    return _missing(_if_it_is_an_effect(effects)) + f", unless it is {unless}" * bool(unless)
 
 
 def missing_in_part(credible_set: Sequence[Explanation]) -> str:
@@ -62,6 +67,22 @@ def missing_in_part(credible_set: Sequence[Explanation]) -> str:
     return f"{said}; whether more is missing, and what, is open"
 
 
+def most_probable(credible_set: Sequence[Explanation]) -> str:
+    """Say what something unknown is most like: families, and names that have none."""
+    kinds: dict[str, float] = defaultdict(float)
+    for one in credible_set:
+        named = zip(one.names, one.classes, strict=True)
+        for kind in dict.fromkeys(_kind(name, members) for name, members in named):
+            kinds[kind] += one.posterior
+    worth = [(kind, p) for kind, p in kinds.items() if p >= WORTH]
+    return _listed(sorted(worth, key=lambda item: -item[1]))
+
+
+def _kind(name: str, members: tuple[str, ...]) -> str:
+    family = family_of(*members)
+    return family_words(family) if family else name_words(name)
+
+
 def not_told_apart(credible_set: Sequence[Explanation]) -> str:
     """Say what a campaign cannot tell apart; nothing if it tells everything apart."""
     effects, others = _apart(credible_set)
@@ -72,11 +93,12 @@ def not_told_apart(credible_set: Sequence[Explanation]) -> str:
         if len(part.names) > 1
     ]
     beside = known.open if alike or not others else credible_set
-    more = [(explanation_words(one), one.posterior) for one in beside if one.names]
-    if more and len(more) == len(beside):
+    more = [(explanation_words(o), o.posterior) for o in beside if o.names and o.posterior >= WORTH]
+    perhaps = any(not one.names for one in beside)
+    if len(more) > 1 and not perhaps:
         alike.append(more)
     said = [f"{', nor '.join(map(_listed, alike))} apart"] if alike else []
-    if len(more) < len(beside):
+    if more and perhaps:
         said.append(f"whether {_listed(more, 'or')} is missing as well")
     return f"This campaign cannot tell {', nor '.join(said)}" if said else ""
 
@@ -96,12 +118,12 @@ def separates(positions: Sequence[NextPosition]) -> str:
 def _missing(known: Statement) -> str:
     if not known.certain:
         return _or(known.open)
-    if not known.open and len(known.certain) == 1:
+    more = _or([one for one in known.open if one.names and one.posterior >= WORTH])
+    if not more and len(known.certain) == 1:
         return _part(known.certain[0], "{family}: {names}")
     said = joined([_part(part) for part in known.certain])
-    if not known.open:
+    if not more:
         return said
-    more = _or([one for one in known.open if one.names])
     surely = _surely_more(known, CREDIBLE * sum(one.posterior for one in known.open))
     return f"{said}, and {more}" if surely else f"{said}, and perhaps {more}"
 

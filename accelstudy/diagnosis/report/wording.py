@@ -9,6 +9,7 @@ from accelstudy.diagnosis.report.missing import (
     explanation_words,
     missing,
     missing_in_part,
+    most_probable,
     not_told_apart,
 )
 from accelstudy.diagnosis.worth.gap import SIGNIFICANT
@@ -102,6 +103,8 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
         lines += _refuted(d)
     lines += _suspects(d)
     if d.verdict == "unknown":
+        if like := most_probable(d.credible_set):
+            lines.append(f"Most probable: {like}.")
         lines.append(_where(d))
     for named in filter(_is_effect, d.found):
         lines.append(_effect_line(named))
