@@ -1,20 +1,21 @@
 """The study of hidden effects: its configuration, its cells and seeds, and its jobs."""
 
-import subprocess
-import sys
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import accelstudy
 from accelstudy.effects import effect_names, effects_without
 from accelstudy.errors import InputError
 from accelstudy.hidden import run
-from accelstudy.hidden.cells import Cell, chunks, number_of_chunks, study_cells
+from accelstudy.hidden.cells import Cell, chunks, number_of_chunks, planned, study_cells, write_plan
 from accelstudy.hidden.config import parse_hidden
 from accelstudy.hidden.physics import Case
 from accelstudy.hidden.tables import KEY
 from accelstudy.study.config import overlay, read_layer
+from accelstudy.study.provenance import code_hash
 from accelstudy.study.tables import read_table
 
 ROOT = Path(__file__).parents[1]
@@ -30,9 +31,12 @@ TINY = {
 PROVENANCE = {"config_hash": "0", "seed": 3}
 
 
-def spec(content=TINY, chunk=0, number=1):
-    config = parse_hidden(content)
-    return {"config": config.model_dump(mode="json"), "chunk": chunk, "chunks": number}
+@pytest.fixture(scope="module")
+def plan(tmp_path_factory):
+    """Configuration and campaigns of the tiny study."""
+    path, config = tmp_path_factory.mktemp("plan") / "plan.json", parse_hidden(TINY)
+    write_plan(config, path)
+    return config, list(planned(path, 0))
 
 
 def paths(folder):
@@ -68,13 +72,16 @@ def test_a_wrong_key_is_one_line(change, said):
 
 def test_a_kind_that_no_session_can_show():
     config = parse_hidden(overlay(TINY, {"one": {"kinds": ["thermal_bias"]}, "designs": "snub-24"}))
-    with pytest.raises(InputError, match=r"one\.kinds: no session can show thermal_bias"):
+    with pytest.raises(
+        InputError, match=r"one\.kinds: no session of the study can show thermal_bias"
+    ):
         study_cells(config)
 
 
 def test_the_full_study():
     """What the study promises: enough campaigns of each kind, in enough designs."""
-    config = parse_hidden(read_layer(ROOT / "config/hidden-effects.yaml"))
+    content = read_layer(ROOT / "config/hidden-effects.yaml")
+    config = parse_hidden({**content, "outside": None, "two": None})  # to plan them takes long
     cells = study_cells(config)
     null = [cell for cell in cells if cell.case.set == "null"]
     assert sum(cell.count for cell in null) >= 2000
@@ -89,7 +96,7 @@ def test_the_full_study():
     assert {size for _, size in counts} == {6, 10.5, 16, 25, 40, 60, 100, 400}
     # gravity_error is invisible everywhere.
     visible = set(effect_names()) - {"bias", "scale", "nonorthogonality", "gravity_error"}
-    assert {what for what, _ in counts} >= visible - {"mounting_slip", "joint_compliance"}
+    assert {what for what, _ in counts} >= visible
     assert len({cell.name for cell in cells}) == len(cells)
 
 
@@ -156,10 +163,10 @@ def test_a_family_that_is_taken_out():
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
+def whole(plan, tmp_path_factory):
     """The tiny study in one chunk."""
     folder = tmp_path_factory.mktemp("whole")
-    run.run_chunk(spec(), paths(folder), PROVENANCE)
+    run.run_chunk(*plan, paths(folder), PROVENANCE)
     return folder
 
 
@@ -177,17 +184,17 @@ def test_truths_and_outcomes(whole):
     assert (seconds["seconds"] > 0).all()
 
 
-def test_a_second_run_and_other_chunks_give_the_same_bytes(whole, tmp_path):
+def test_a_second_run_gives_the_same_bytes(plan, whole, tmp_path):
     """As a study that was broken off and goes on; only the times differ."""
-    run.run_chunk(spec(), paths(tmp_path), PROVENANCE)
+    run.run_chunk(*plan, paths(tmp_path), PROVENANCE)
     for name in ("truths", "outcomes"):
         assert paths(tmp_path)[name].read_bytes() == paths(whole)[name].read_bytes()
 
 
-def test_the_diagnosis_sees_the_campaign_only(whole, monkeypatch, tmp_path):
+def test_the_diagnosis_sees_the_campaign_only(plan, whole, monkeypatch, tmp_path):
     seen = []
     monkeypatch.setattr(run, "diagnose", lambda *given, **more: seen.append((given, more)))
-    run.run_chunk(spec(), paths(tmp_path), PROVENANCE)
+    run.run_chunk(*plan, paths(tmp_path), PROVENANCE)
     truths = read_table(paths(whole)["truths"])
     for (campaign, _), more in seen:
         assert list(more) == ["seed"]
@@ -196,52 +203,67 @@ def test_the_diagnosis_sees_the_campaign_only(whole, monkeypatch, tmp_path):
     assert len(seen) == len(truths)
 
 
-def test_what_fails_is_a_row_with_its_error(monkeypatch, tmp_path):
+def test_what_fails_is_a_row_with_its_error(plan, monkeypatch, tmp_path):
     def refuse(campaign, *_, **__):
         raise InputError("too few positions") if campaign.angles is None else KeyError("x")
 
     monkeypatch.setattr(run, "diagnose", refuse)
-    run.run_chunk(spec(), paths(tmp_path), PROVENANCE)
+    run.run_chunk(*plan, paths(tmp_path), PROVENANCE)
     outcomes = read_table(paths(tmp_path)["outcomes"])
     assert len(outcomes) == 3
     assert set(outcomes["error"]) <= {"refused: too few positions", "KeyError: 'x'"}
     assert (outcomes["error"] != "").all()
 
 
-def test_what_cannot_be_made_is_a_row_with_its_error(monkeypatch, tmp_path):
+def test_what_cannot_be_made_is_a_row_with_its_error(plan, monkeypatch, tmp_path):
     def refuse(case, seed):
         raise InputError("cannot see it")
 
     monkeypatch.setattr(run, "generate", refuse)
-    run.run_chunk(spec(), paths(tmp_path), PROVENANCE)
+    run.run_chunk(*plan, paths(tmp_path), PROVENANCE)
     truths, outcomes, _ = (read_table(path) for path in paths(tmp_path).values())
     assert outcomes["error"].tolist() == ["refused: cannot see it"] * 3
     assert truths["what"].tolist().count("hysteresis") == 2
 
 
-def test_simpler_methods(tmp_path):
+def test_simpler_methods(plan, tmp_path):
+    config, campaigns = plan
     path = tmp_path / "baselines.parquet"
-    run.run_baselines(spec(), path, PROVENANCE)
-    table = read_table(path)
-    assert table.groupby("method").size().to_dict() == dict.fromkeys(
-        ["chi2 omnibus", "known sigma", "F test", "BIC forward", "lasso"], 3
-    )
-    # λ = 100 is plain to all of them.
-    first = table[table["cell"].str.startswith("one")]
-    assert first["detected"].all()
-    named = first[first["method"] != "chi2 omnibus"]["found"]
-    assert named.str.startswith('["hysteresis"').mean() > 0.8
+    one = [(cell, k) for cell, k in campaigns if cell.case.set == "one"]
+    run.run_baselines(config, one[:1], path, PROVENANCE)
+    table = read_table(path).set_index("method")
+    assert set(table.index) == {"chi2 omnibus", "known sigma", "F test", "BIC forward", "lasso"}
+    assert table["detected"].all()  # λ = 100 is plain to all of them
+    named = table["found"].drop("chi2 omnibus")
+    assert named.str.startswith('["hysteresis"').all()
 
 
-def test_the_diagnosis_imports_nothing_of_the_study():
-    code = (
-        "import sys, pkgutil, importlib, accelstudy.diagnosis as d\n"
-        "for m in pkgutil.walk_packages(d.__path__, 'accelstudy.diagnosis.'):\n"
-        "    importlib.import_module(m.name)\n"
-        "print([n for n in sys.modules if n.startswith('accelstudy.hidden')])"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
+def test_the_study_is_known_to_nobody():
+    """What is diagnosed, and how, does not depend on the study."""
+    package = Path(accelstudy.__file__).parent
+    for path in sorted(package.rglob("*.py")):
+        if not path.is_relative_to(package / "hidden"):
+            assert "accelstudy.hidden" not in path.read_text(encoding="utf-8"), path
+
+
+def test_what_runs_again_after_an_edit(monkeypatch, tmp_path):
+    """To score anew, or to tune the diagnosis, takes no more than it must."""
+    stages = ("plan", "hidden", "baselines", "score")
+    package = Path(shutil.copytree(accelstudy.__path__[0], tmp_path / "accelstudy"))
+    monkeypatch.setattr(accelstudy, "__file__", str(package / "__init__.py"))
+    for name, expected in {
+        "diagnosis/pipeline.py": {"hidden"},
+        "hidden/targets.py": {"score"},
+        "hidden/baselines.py": {"baselines"},
+        "hidden/physics/noise.py": {*stages},
+        "effects/bias_drift.py": {*stages},
+        "cli.py": set(),
+        "study/summary.py": set(),
+    }.items():
+        before = {stage: code_hash(stage) for stage in stages}
+        with (package / name).open("a") as file:
+            file.write("# an edit\n")
+        assert {stage for stage in stages if code_hash(stage) != before[stage]} == expected, name
 
 
 def test_seeds_depend_on_the_seed_of_the_study():

@@ -31,6 +31,7 @@ try:
 except InputError as error:
     raise WorkflowError(str(error)) from None
 
+CONTENT = STUDY.model_dump(mode="json")
 ORIGIN = {"config_hash": STUDY.fingerprint, "seed": STUDY.seed}
 CHUNKS = number_of_chunks(STUDY)
 NUMBERS = [f"{i:04d}" for i in range(CHUNKS)]
@@ -44,19 +45,34 @@ wildcard_constraints:
     chunk=r"\d{4}",
 
 
-def chunk_spec(wildcards):
-    """All on which the numbers of a chunk depend, as plain data."""
-    content = STUDY.model_dump(mode="json")
-    return {"config": content, "chunk": int(wildcards.chunk), "chunks": CHUNKS}
-
-
 rule hidden_effects:
     default_target: True
     input:
         f"{RESULTS}/score.md",
 
 
+rule plan:
+    output:
+        f"{RESULTS}/plan.json",
+    log:
+        f"{RESULTS}/logs/plan.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/plan.tsv"
+    threads: 1
+    resources:
+        mem_mb=4000,
+    params:
+        config=CONTENT,
+        code=code_hash("plan"),
+    message:
+        "Plan the campaigns"
+    script:
+        "scripts/hidden_plan.py"
+
+
 rule diagnose:
+    input:
+        rules.plan.output,
     output:
         truths=f"{RESULTS}/truths/{{chunk}}.parquet",
         outcomes=f"{RESULTS}/outcomes/{{chunk}}.parquet",
@@ -69,7 +85,7 @@ rule diagnose:
     resources:
         mem_mb=2000,
     params:
-        spec=chunk_spec,
+        config=CONTENT,
         provenance=ORIGIN,
         code=code_hash("hidden"),
     message:
@@ -79,6 +95,8 @@ rule diagnose:
 
 
 rule baselines:
+    input:
+        rules.plan.output,
     output:
         f"{RESULTS}/baselines/{{chunk}}.parquet",
     log:
@@ -89,7 +107,7 @@ rule baselines:
     resources:
         mem_mb=2000,
     params:
-        spec=chunk_spec,
+        config=CONTENT,
         provenance=ORIGIN,
         code=code_hash("baselines"),
     message:
@@ -116,7 +134,7 @@ rule score:
     resources:
         mem_mb=2000,
     params:
-        config=STUDY.model_dump(mode="json"),
+        config=CONTENT,
         provenance=ORIGIN,
         code=code_hash("score"),
     message:

@@ -4,19 +4,29 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
 from itertools import combinations, pairwise
 from math import ceil, nan
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.errors import InputError
 from accelstudy.hidden.config import HiddenConfig
-from accelstudy.hidden.physics import Case, invisible_effects, visible_effects
+from accelstudy.hidden.physics import (
+    NOISES,
+    Case,
+    invisible_effects,
+    visible_effects,
+    visible_gross,
+    visible_outside,
+)
 from accelstudy.hidden.physics.atlas import atlas
+from accelstudy.outputs import whole_file
 
 CHUNK = 400
 """Campaigns in one job: some minutes, beside which starting Python does not matter."""
@@ -93,7 +103,7 @@ def study_cells(config: HiddenConfig) -> list[Cell]:
     Raises
     ------
     InputError
-        If no session can show a kind that the configuration names.
+        If no session of the study can show a kind that the configuration names.
     """
     cells = [cell for cases, count in _kinds(config) for cell in _spread(cases, count)]
     sessions = config.places
@@ -105,6 +115,27 @@ def study_cells(config: HiddenConfig) -> list[Cell]:
     return sorted(cells, key=session)
 
 
+def write_plan(config: HiddenConfig, path: str | Path) -> None:
+    """Write which campaigns there are in each chunk, which takes longer than to read it."""
+    plan = [
+        [{"case": asdict(cell.case), "campaigns": [part.start, part.stop]} for cell, part in chunk]
+        for chunk in chunks(study_cells(config), number_of_chunks(config))
+    ]
+    with whole_file(path) as temporary:
+        temporary.write_text(json.dumps(plan), encoding="utf-8")
+
+
+def planned(path: str | Path, chunk: int) -> Iterator[tuple[Cell, int]]:
+    """Cells and numbers of the campaigns of a chunk, as `write_plan` wrote them."""
+    for part in json.loads(Path(path).read_text(encoding="utf-8"))[chunk]:
+        content: dict[str, Any] = {
+            k: tuple(v) if isinstance(v, list) else v for k, v in part["case"].items()
+        }
+        numbers = range(*part["campaigns"])
+        for k in numbers:
+            yield Cell(Case(**content), len(numbers)), k
+
+
 def chunks(cells: Iterable[Cell], number: int) -> list[list[tuple[Cell, range]]]:
     """Divide the campaigns of cells into a number of chunks, as equal as they can be, in order."""
     cells = list(cells)
@@ -112,7 +143,7 @@ def chunks(cells: Iterable[Cell], number: int) -> list[list[tuple[Cell, range]]]
     result: list[list[tuple[Cell, range]]] = [[] for _ in range(number)]
     first = 0
     for cell in cells:
-        for chunk, (start, end) in zip(result, pairwise(ends), strict=True):
+        for chunk, (start, end) in zip(result, pairwise(ends.tolist()), strict=True):
             part = range(max(start - first, 0), min(end - first, cell.count))
             if part:
                 chunk.append((cell, part))
@@ -131,43 +162,44 @@ def limit_cells(config: HiddenConfig) -> list[Cell]:
     return [Cell(Case("null", *place, sigma_known=True), 1) for place in places]
 
 
+SEEN: Mapping[str, Callable[[str, str], Collection[str]]] = {
+    "noise": lambda design, approach: tuple(NOISES),
+    "one": visible_effects,
+    "removed": visible_effects,
+    "outside": visible_outside,
+    "gross": visible_gross,
+    "invisible": invisible_effects,
+}
+"""Kinds of each set that make sense in a design by an approach."""
+
+
 def _kinds(config: HiddenConfig) -> Iterator[tuple[list[Case], int]]:
     """Each kind and size: the cases among which its campaigns are spread, and how many they are."""
     places = config.places
     if config.nothing is not None:
         yield [Case("null", *place) for place in places], config.nothing.campaigns
-    if config.noise is not None:
-        for kind in config.kinds("noise"):
-            yield [Case("noise", *place, noise=kind) for place in places], config.noise.campaigns
-    for name in ("one", "removed"):
+    for name, seen in SEEN.items():
         block = getattr(config, name)
         for kind in config.kinds(name) if block else ():
-            able = _able(config, kind, visible_effects)
+            able = [place for place in places if kind in seen(*place[:2])]
             if not able and block.kinds != ["all"]:
-                raise InputError(f"{name}.kinds: no session can show {kind}")
-            for size in block.sizes:
-                yield [Case(name, *p, effect=(kind,), lam=(size,)) for p in able], block.campaigns
+                raise InputError(f"{name}.kinds: no session of the study can show {kind}")
+            hidden: dict[str, Any] = (
+                {name: kind} if name in ("noise", "gross") else {"effect": (kind,)}
+            )
+            for size in getattr(block, "sizes", [None]):
+                lam = () if size is None else (size,)
+                yield [Case(name, *p, lam=lam, **hidden) for p in able], block.campaigns
     if config.two is not None:
         for size in config.two.sizes:
             yield (
                 [
                     Case("two", *place, effect=pair, lam=(size, size))
                     for place in places
-                    for pair in _pairs(place[0], place[1])
+                    for pair in _pairs(*place[:2])
                 ],
                 config.two.campaigns,
             )
-    if config.invisible is not None:
-        for kind in config.kinds("invisible"):
-            able = _able(config, kind, invisible_effects)
-            yield [Case("invisible", *p, effect=(kind,)) for p in able], config.invisible.campaigns
-
-
-def _able(
-    config: HiddenConfig, kind: str, seen: Callable[[str, str], Collection[str]]
-) -> list[tuple[str, str, bool]]:
-    """Sessions among whose effects, those that they can show, say, a kind is."""
-    return [place for place in config.places if kind in seen(place[0], place[1])]
 
 
 @cache

@@ -12,8 +12,7 @@ from pydantic import Field, ValidationError, model_validator
 from accelstudy.bounds import Range
 from accelstudy.effects import effect_names
 from accelstudy.errors import InputError, UnknownNameError
-from accelstudy.hidden.physics import APPROACHES, DESIGNS, NOISES
-from accelstudy.hidden.physics.effects import EFFECTS
+from accelstudy.hidden.physics import APPROACHES, DESIGNS, EFFECTS, GROSS, NOISES, OUTSIDE
 from accelstudy.models import get_model
 from accelstudy.study.config.errors import first_error
 from accelstudy.study.config.schema import Block
@@ -57,6 +56,8 @@ KNOWN: Mapping[str, Sequence[str]] = {
     "noise": tuple(NOISES),
     "one": _EFFECTS,
     "removed": _EFFECTS,
+    "outside": tuple(OUTSIDE),
+    "gross": tuple(GROSS),
     "invisible": _EFFECTS,
 }
 """Kinds that each set may have."""
@@ -86,6 +87,8 @@ class HiddenConfig(Block):
     removed: Sized | None = Field(
         None, description="one effect whose family the diagnosis does not know"
     )
+    outside: Sized | None = Field(None, description="physics that was never in the catalogue")
+    gross: Kinds | None = Field(None, description="gross errors")
     invisible: Kinds | None = Field(None, description="effects that the session cannot show")
 
     @model_validator(mode="after")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -17,18 +17,22 @@ from accelstudy.diagnosis.pipeline import Diagnosis, diagnose
 from accelstudy.effects import effects_without
 from accelstudy.errors import InputError
 from accelstudy.hidden.baselines import answers
-from accelstudy.hidden.cells import Cell, chunks, study_cells
-from accelstudy.hidden.config import HiddenConfig, parse_hidden
+from accelstudy.hidden.cells import Cell
+from accelstudy.hidden.config import HiddenConfig
 from accelstudy.hidden.physics import Truth, generate
 from accelstudy.hidden.tables import SCHEMA
 from accelstudy.models import get_model
 from accelstudy.study.tables import write_table
 
 Row = dict[str, Any]
-Spec = Mapping[str, Any]
 
 
-def run_chunk(spec: Spec, outputs: Mapping[str, str | Path], provenance: Mapping[str, Any]) -> None:
+def run_chunk(
+    config: HiddenConfig,
+    campaigns: Iterable[tuple[Cell, int]],
+    outputs: Mapping[str, str | Path],
+    provenance: Mapping[str, Any],
+) -> None:
     """Diagnose the campaigns of a chunk.
 
     The diagnosis is given the campaign, and nothing else. One that fails is a row with its error.
@@ -36,19 +40,18 @@ def run_chunk(spec: Spec, outputs: Mapping[str, str | Path], provenance: Mapping
 
     Parameters
     ----------
-    spec : mapping
-        config, chunk and chunks: the plain configuration, which part of it, and of how many
+    config : HiddenConfig
+    campaigns : of (Cell, number of the campaign)
     outputs : paths of the tables truths, outcomes and seconds
     provenance : see `accelstudy.study.tables.origin`
     """
-    config = parse_hidden(spec["config"])
     model = get_model(config.model)
     rows: dict[str, list[Row]] = {name: [] for name in outputs}
 
     def answer(campaign: Campaign) -> Row:
         return _outcome(diagnose(campaign, model, seed=config.diagnosis_seed))
 
-    for cell, k in _chunk(spec, config):
+    for cell, k in campaigns:
         campaign, truth = _made(cell, k, config.seed)
         start = process_time()
         with effects_without(cell.removed):
@@ -61,9 +64,13 @@ def run_chunk(spec: Spec, outputs: Mapping[str, str | Path], provenance: Mapping
         write_table(path, _table(name, rows[name]), provenance)
 
 
-def run_baselines(spec: Spec, output: str | Path, provenance: Mapping[str, Any]) -> None:
-    """Let the simpler methods answer to some of the campaigns of a chunk; as `run_chunk`."""
-    config = parse_hidden(spec["config"])
+def run_baselines(
+    config: HiddenConfig,
+    campaigns: Iterable[tuple[Cell, int]],
+    output: str | Path,
+    provenance: Mapping[str, Any],
+) -> None:
+    """Let the simpler methods answer to some of the campaigns; parameters as in `run_chunk`."""
     model, rows = get_model(config.model), []
 
     def answer(campaign: Campaign) -> list[Row]:
@@ -72,7 +79,7 @@ def run_baselines(spec: Spec, output: str | Path, provenance: Mapping[str, Any])
             for method, (detected, names) in answers(campaign, model)
         ]
 
-    for cell, k in _chunk(spec, config):
+    for cell, k in campaigns:
         if cell.one_in(config.baselines_every, k):
             campaign, _ = _made(cell, k, config.seed)
             with effects_without(cell.removed):
@@ -83,13 +90,6 @@ def run_baselines(spec: Spec, output: str | Path, provenance: Mapping[str, Any])
 
 def _table(name: str, rows: list[Row]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=[*SCHEMA[name]]).astype(SCHEMA[name])
-
-
-def _chunk(spec: Spec, config: HiddenConfig) -> Iterator[tuple[Cell, int]]:
-    """Cells and numbers of the campaigns of a chunk."""
-    for cell, numbers in chunks(study_cells(config), spec["chunks"])[spec["chunk"]]:
-        for k in numbers:
-            yield cell, k
 
 
 def _made(cell: Cell, k: int, seed: int) -> tuple[Campaign | None, Row]:
@@ -124,7 +124,7 @@ def _truth(cell: Cell, truth: Truth | None, error: str) -> Row:
     oracle = known.get("oracle") or {}
     gross = known.get("gross") or {}
     # What a session cannot show, or is not in the catalogue, is nothing that can be named rightly.
-    classes = [] if case.set == "invisible" else known.get("classes", [])
+    classes = [] if case.set in ("invisible", "outside") else known.get("classes", [])
     left = [[name for name in one if name not in cell.removed] for one in classes]
     return {
         "set": case.set,
@@ -141,6 +141,7 @@ def _truth(cell: Cell, truth: Truth | None, error: str) -> Row:
         "oracle_detected": oracle.get("detected"),
         "oracle_best": json.dumps(oracle.get("best", [])),
         "oracle_told": json.dumps(oracle.get("told", [])),
+        "left": json.dumps(known.get("left", [])),
         "sensor": json.dumps(known.get("sensor")),
         "seed": json.dumps(known.get("seed")),
         "failed": error,

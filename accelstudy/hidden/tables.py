@@ -19,7 +19,7 @@ SCHEMA: dict[str, dict[str, str]] = {
         **dict.fromkeys(("design", "approach", "sigma", "classes", "effects", "noise"), _TEXT),
         **dict.fromkeys(("gross", "gross_name"), _TEXT),
         "oracle_detected": _FLAG,
-        **dict.fromkeys(("oracle_best", "oracle_told", "sensor", "seed", "failed"), _TEXT),
+        **dict.fromkeys(("oracle_best", "oracle_told", "left", "sensor", "seed", "failed"), _TEXT),
     },
     "outcomes": {
         **_KEYS,

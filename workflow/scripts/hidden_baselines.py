@@ -1,5 +1,12 @@
+from accelstudy.hidden.cells import planned
+from accelstudy.hidden.config import parse_hidden
 from accelstudy.hidden.run import run_baselines
 from accelstudy.study.job import logged
 
 with logged(snakemake):
-    run_baselines(snakemake.params.spec, snakemake.output[0], snakemake.params.provenance)
+    run_baselines(
+        parse_hidden(snakemake.params.config),
+        planned(snakemake.input[0], int(snakemake.wildcards.chunk)),
+        snakemake.output[0],
+        snakemake.params.provenance,
+    )

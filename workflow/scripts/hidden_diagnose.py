@@ -1,5 +1,12 @@
+from accelstudy.hidden.cells import planned
+from accelstudy.hidden.config import parse_hidden
 from accelstudy.hidden.run import run_chunk
 from accelstudy.study.job import logged
 
 with logged(snakemake):
-    run_chunk(snakemake.params.spec, dict(snakemake.output.items()), snakemake.params.provenance)
+    run_chunk(
+        parse_hidden(snakemake.params.config),
+        planned(snakemake.input[0], int(snakemake.wildcards.chunk)),
+        dict(snakemake.output.items()),
+        snakemake.params.provenance,
+    )
