@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,7 +102,8 @@ class HoldPlan:
         order = rng.permutation(k)
         steps = Hold().with_steps(forces[order])
         back = np.argsort(order)
-        return Hold(
+        return replace(
+            steps.take(back),
             time=time,
             temperature=temperature,
             vibration=vibration,
@@ -110,7 +111,6 @@ class HoldPlan:
             pitch=pitch,
             yaw=np.zeros(k),
             order=steps.column("order")[back] if time is None else time,
-            **{name: steps.column(name)[back] for name in ("step_x", "step_y", "step_z")},
         )
 
     def _rng(self, stream: int) -> np.random.Generator:

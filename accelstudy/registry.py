@@ -71,6 +71,7 @@ class Hyper:
     name, unit : str
     default : float; NaN leaves it open, and who uses the thing draws it
     above, below : float, between which it lies
+    none : float, where the thing lacks what is shaped; allowed beside these, and left unsaid
     smooth : bool, whether the thing changes smoothly with it, so that a search can be refined
     """
 
@@ -80,6 +81,7 @@ class Hyper:
     above: float = -math.inf
     below: float = math.inf
     smooth: bool = False
+    none: float = math.nan
 
 
 class Shaped:
@@ -104,13 +106,14 @@ class Shaped:
         for name, value in shape.items():
             if name not in known:
                 raise UnknownNameError(f"setting of the {self.kind} {self.name!r}", name, known)
-            above, below = known[name].above, known[name].below
-            if not above < value < below:
+            above, below, none = known[name].above, known[name].below, known[name].none
+            if value != none and not above < value < below:
                 bounds = [f"above {above:g}"] if above > -math.inf else []
                 bounds += [f"below {below:g}"] if below < math.inf else []
                 raise InputError(
                     f"{self.kind} {self.name!r}: {name}={value:g} must be a number "
                     + (" and ".join(bounds) or "that is finite")
+                    + ("" if math.isnan(none) else f", or {none:g}")
                 )
         self.shape = {**{hyper.name: hyper.default for hyper in self.hypers}, **shape}
 
@@ -121,8 +124,12 @@ class Shaped:
 
     @property
     def spec(self) -> str:
-        """Name with its settings, those left open excepted: ``warm_up(tau=300)``."""
-        fixed = [f"{k}={v:.12g}" for k, v in self.shape.items() if not math.isnan(v)]
+        """Name with its settings, those left open or at `none` excepted: ``warm_up(tau=300)``."""
+        fixed = [
+            f"{hyper.name}={value:.12g}"
+            for hyper in self.hypers
+            if not math.isnan(value := self.shape[hyper.name]) and value != hyper.none
+        ]
         return f"{self.name}({', '.join(fixed)})" if fixed else self.name
 
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,7 @@ import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.effects import Effect, Hold, Parameter, get_effect
+from accelstudy.effects.hold_symbols import HoldSymbols
 from accelstudy.errors import InputError
 from accelstudy.tracing import TracedFunction, derivative, inverse, symbolic, symbols
 from accelstudy.units import STANDARD_GRAVITY
@@ -92,7 +92,11 @@ class SensorModel:
         trace = self.trace
         readings = trace.reading_errors(trace.force[:2])
         used = sp.Matrix([*trace.h, *trace.t_matrix, *readings]).free_symbols
-        return tuple(name for name, symbol in trace.hold.items() if symbol in used)
+        names = {name for name, symbol in trace.hold.items() if symbol in used}
+        for tau, symbol in zip(trace.lags(self.settings), trace.lagged.values(), strict=True):
+            if symbol in used:
+                names |= {"temperature", "time"} if tau > 0 else {"temperature"}
+        return tuple(name for name in trace.hold if name in names)
 
     def sense(
         self,
@@ -225,8 +229,8 @@ class SensorTrace:
 
     Attributes
     ----------
-    force, output, p, settings, g, hold : the symbols of a force, of the output, of the parameters,
-        of the numbers that shape the effects, of gravity and of the columns of `Hold`
+    force, output, p, settings, g : the symbols of a force, of the output, of the parameters, of the
+        numbers that shape the effects and of gravity
     t_matrix : Matrix (3, 3), T
     h : list of 3 expressions, f_s as a function of f_a
     """
@@ -235,10 +239,7 @@ class SensorTrace:
         self.force = symbols("f_x", "f_y", "f_z")
         self.output = symbols("l_x", "l_y", "l_z")
         (self.g,) = symbols("g")
-        self.hold = dict(
-            zip(Hold.columns(), symbols(*(f"hold_{c}" for c in Hold.columns())), strict=True)
-        )
-        self._hold = SimpleNamespace(**self.hold)
+        self._hold = HoldSymbols("hold_")
         effects = [_in_symbols(kind) for kind in kinds]
         parameters = [symbols(*(q.name for q in effect.parameters)) for effect in effects]
         self._effects = list(zip(effects, parameters, strict=True))
@@ -252,6 +253,21 @@ class SensorTrace:
             added = effect.output(self.force, p, self.g, self._hold, symbolic)
             self.h = [a + b for a, b in zip(self.h, added, strict=True)]
 
+    @property
+    def hold(self) -> dict[str, sp.Symbol]:
+        """Symbols of the columns of `Hold`."""
+        return self._hold.columns
+
+    @property
+    def lagged(self) -> dict[sp.Symbol, sp.Symbol]:
+        """Symbols of temperatures behind a lag, by that of the lag."""
+        return self._hold.lagged_by
+
+    def lags(self, settings: NDArray[np.float64]) -> list[float]:
+        """Lags of the temperatures of `lagged`, of settings (s,)."""
+        values = dict(zip(self.settings, settings, strict=True))
+        return [float(values[tau]) for tau in self.lagged]
+
     def reading_errors(self, angles: tuple[Any, Any]) -> tuple[Any, Any]:
         """Sum of what the effects add to the robot's reading of roll and pitch."""
         total: tuple[Any, Any] = (sp.S.Zero, sp.S.Zero)
@@ -263,7 +279,8 @@ class SensorTrace:
     @property
     def arguments(self) -> tuple[sp.Symbol, ...]:
         """Symbols in the order in which generated functions take them."""
-        return (*self.force, *self.output, *self.p, *self.settings, self.g, *self.hold.values())
+        known = (*self.hold.values(), *self.lagged.values())
+        return (*self.force, *self.output, *self.p, *self.settings, self.g, *known)
 
     def evaluate(
         self,
@@ -285,6 +302,10 @@ class SensorTrace:
         columns = [
             hold.column(name) if str(symbol) in function.used else 0.0
             for name, symbol in self.hold.items()
+        ]
+        columns += [
+            hold.lagged(tau) if str(symbol) in function.used else 0.0
+            for tau, symbol in zip(self.lags(settings), self.lagged.values(), strict=True)
         ]
         shape = np.broadcast_shapes(force.shape[1:], (*parameters.shape[1:], 1), (*g.shape, 1))
         x = (*parameters[..., None], *settings)

@@ -178,6 +178,24 @@ def test_what_depends_on_conditions_is_corrected_by_those_of_the_row(
     assert not (tmp_path / "never.csv").exists()
 
 
+@pytest.mark.parametrize("chunk_size", [7, 100])
+def test_a_lag_goes_on_from_chunk_to_chunk(tmp_path, chunk_size):
+    effects, values = "thermal_bias(tau=400)", {"b_T_x": 2e-3, "b_T_y": -3e-3}
+    calibration, log = read_calibration(fitted(tmp_path, effects, values)), tmp_path / "log.csv"
+    time = np.linspace(0, 2000, 40)
+    written_log(log, effects, values, time=time, temperature=25 + 10 * np.sin(time / 500))
+    leveled = level_log(calibration, log, tmp_path / "out.csv", sigma=0, chunk_size=chunk_size)
+    errors, _ = errors_of(tmp_path / "out.csv")
+    # A chunk does not know the next reading of the thermometer.
+    assert np.sqrt(np.mean(errors**2)) < (10 if chunk_size < 40 else 3)
+    assert any("as warm as the first row says" in warning for warning in leveled.warnings)
+    assert not any("start of the calibration session" in warning for warning in leveled.warnings)
+    table = pd.read_csv(log).drop(columns="time")
+    table.to_csv(tmp_path / "without.csv", index=False)
+    with pytest.raises(InputError, match="thermal_bias needs the time"):
+        level_log(calibration, tmp_path / "without.csv", tmp_path / "never.csv")
+
+
 def test_a_drift_stays_where_the_session_left_it(tmp_path):
     values = {"d_x": 5e-5, "d_y": -4e-5, "d_z": 3e-5}
     calibration = read_calibration(fitted(tmp_path, "bias_drift", values))

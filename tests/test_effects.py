@@ -12,7 +12,7 @@ from accelstudy.approaches import get_approach
 from accelstudy.catalogue import family_of
 from accelstudy.design import diagnose
 from accelstudy.diagnosis.report.wording import GROUPS
-from accelstudy.effects import Hold, effect_names, get_effect
+from accelstudy.effects import Course, Hold, effect_names, get_effect
 from accelstudy.effects.base import STILL
 from accelstudy.errors import InputError
 from accelstudy.leveling import roll_pitch, specific_force
@@ -248,6 +248,39 @@ def test_a_slip_counts_the_holds_where_they_have_no_time():
     np.testing.assert_array_equal(times, np.arange(2.5, 39))
 
 
+def test_a_sensor_that_lags_behind_its_thermometer():
+    """As the differential equation of the lag has it, solved by small steps."""
+    time, temperature = np.array([100.0, 160.0, 230.0, 400.0]), np.array([20.0, 25.0, 25.0, 10.0])
+    fine = np.arange(100.0, 900.0, 0.01)
+    outside = np.interp(fine, time, temperature)
+    body, share = [outside[0]], np.exp(-0.01 / 80)
+    for value in outside[1:]:
+        body.append(share * body[-1] + (1 - share) * value)
+    at = np.array([130.0, 160.0, 300.0, 400.0, 600.0])
+    found = Course(time, temperature).behind(at, 80) + np.interp(at, time, temperature)
+    np.testing.assert_allclose(found, np.interp(at, fine, body), atol=2e-3)
+    assert Course(time, temperature).behind(50.0, 80) == 0
+
+
+def test_a_lag_is_a_setting_of_the_thermal_bias():
+    plain, lagging = get_effect("thermal_bias"), get_effect("thermal_bias(tau=500)")
+    assert plain.spec == get_effect("thermal_bias(tau=0)").spec == "thermal_bias"
+    assert SensorModel.of("lag", [lagging.spec]).hold_columns == ("temperature", "time")
+    p, model = np.array([1e-3, 2e-3, -1e-3]), SensorModel("lag", (lagging,))
+    expected = np.outer(HOLD.lagged(500) - 20, p)
+    np.testing.assert_allclose(added(lagging, p).output, expected, atol=1e-15)
+    sensed = model.sense(FORCES, p, G, HOLD)
+    np.testing.assert_allclose(sensed, FORCES + expected, atol=1e-13)
+    np.testing.assert_allclose(model.correct(sensed, p, G, HOLD), FORCES, atol=1e-12)
+    # What came before some holds came before them, though they are left out.
+    some = np.array([3, 17, 30])
+    np.testing.assert_array_equal(HOLD.take(some).lagged(500), HOLD.lagged(500)[some])
+    assert [c.spec for c in plain.candidates(Hold(), FORCES, G)] == ["thermal_bias"]
+    lags = [c.shape["tau"] for c in plain.candidates(HOLD, FORCES, G)]
+    assert lags[0] == 0
+    assert lags[-1] < np.ptp(HOLD.time) / 3
+
+
 def test_order_of_the_eccentricity():
     p = np.array([1.0, 2.0, 3.0, 4.0])
     a = np.stack([HOLD.roll, HOLD.pitch], axis=1)
@@ -311,6 +344,7 @@ def test_candidates_need_the_time(name):
         ("warm_up(tau)", "'tau' is no setting; expected name=number, such as tau=300"),
         ("warm_up(tau=ten)", "'tau=ten' is no setting"),
         ("warm_up(tau=0)", "effect 'warm_up': tau=0 must be a number above 0"),
+        ("thermal_bias(tau=-1)", "tau=-1 must be a number above 0, or 0"),
         ("saturation(knee=nan)", "knee=nan must be a number above 0"),
         ("bias_jump(t=inf)", "t=inf must be a number that is finite"),
         ("warm_up(tau=1", "unknown effect"),

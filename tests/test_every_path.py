@@ -32,6 +32,8 @@ CASES = {
     "axes-negated": ("--gross", "axis_error(x=1, y=-2, z=-3)"),
     "fx-fy": ("--scheme", "fibonacci-30", "--gross", "axis_error(x=2, y=1, z=3)"),
     **{name: (option, name) for option, name in ADDED},
+    "thermal-lag": ("--effect", "thermal_bias(tau=300)"),
+    "slip-without-time": ("--no-time", "--effect", "mounting_slip(t=12.5)"),
     "gravity-saturation": ("--approach", "gravity", "--effect", "saturation"),
     "gravity-outlier": ("--approach", "gravity", "--gross", "outlier_position"),
     "gravity-few": ("--approach", "gravity", "--scheme", "fibonacci-10"),

@@ -23,7 +23,6 @@ from accelstudy.adjustment.quality import (
     position_tests,
     redundancy_numbers,
     reliability,
-    select,
     solve,
 )
 from accelstudy.effects import Effect, Hold
@@ -63,9 +62,9 @@ def test_leaving_out_is_a_calibration_without_the_position(approach):
     found = held_out(model, approach, observed)
     assert found.n_predicted == 24
     for position in (0, 10, 23):
-        rest = select(observed, np.delete(np.arange(24), position))
+        rest = observed.take(np.delete(np.arange(24), position))
         x = calibrate(model, approach, rest).parameters[0]
-        alone = select(observed, np.array([position]))
+        alone = observed.take(np.array([position]))
         f_b = model.correct(alone.forces[0], x[:-1], x[-1], alone.hold)
         psi = np.linalg.norm(f_b) - x[-1]
         if approach is ROBOT:
@@ -146,7 +145,7 @@ def test_quality_of_a_model_with_columns():
 
 def test_selecting_all_positions_changes_nothing():
     model, observed = thermal_session()
-    chosen = select(observed, np.arange(24))
+    chosen = observed.take(np.arange(24))
     assert isinstance(chosen, Observations)
     np.testing.assert_array_equal(chosen.hold.temperature, observed.hold.temperature)
     np.testing.assert_array_equal(

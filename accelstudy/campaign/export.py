@@ -37,6 +37,8 @@ SYMBOLS = {
     "f_x": "m/s², f_a along x; likewise f_y, f_z",
     "g": "m/s², gravity_mps2",
     "temperature": "°C",
+    "temperature_lagged": "°C, T with tau dT/dt = temperature − T, tau in s of the spec; at first "
+    "T = temperature",
     "time": "s since the start of the session",
     "vibration": "m/s², rms while the sensor stands still",
     "step_x": "m/s², f_a along x less that of the position before; likewise step_y, step_z",

@@ -55,7 +55,8 @@ def _is_affine(kind: type[Effect]) -> bool:
     trace = trace_of((kind,))
     slopes = derivative(trace.h, trace.force).free_symbols
     used = set().union(*(sp.sympify(part).free_symbols for part in trace.h))
-    return not (slopes & {*trace.force, trace.g} or used & set(trace.hold.values()))
+    conditions = {*trace.hold.values(), *trace.lagged.values()}
+    return not (slopes & {*trace.force, trace.g} or used & conditions)
 
 
 def affine_form(model: SensorModel, parameters: ArrayLike) -> tuple[Array, Array] | None:

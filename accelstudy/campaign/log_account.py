@@ -88,7 +88,12 @@ class Account:
 
     def assumptions(self) -> Iterator[str]:
         """What is taken for granted as long as nobody says when the log was started."""
-        timed = [effect for effect, column in self._calibration.needs if column == "time"]
+        needs = self._calibration.needs
+        warmed = {effect for effect, column in needs if column == "temperature"}
+        timed = [e for e, column in needs if column == "time" and e not in warmed]
+        lagging = [e for e, column in needs if column == "time" and e in warmed]
+        if lagging:
+            yield f"{listed(lagging)}: the sensor is taken to be as warm as the first row says"
         if timed:
             yield (
                 f"{listed(timed)}: the first row is taken for the start of the calibration "

@@ -18,7 +18,7 @@ from accelstudy.campaign.layout import LogLayout
 from accelstudy.campaign.log_files import CHUNK, Source, open_source
 from accelstudy.campaign.log_tables import column_names, numbers, read_chunks
 from accelstudy.campaign.logs import AXES, TIME_UNITS, conversion, locate
-from accelstudy.effects import Hold
+from accelstudy.effects import Course, Hold
 from accelstudy.errors import InputError
 from accelstudy.frames import Frame
 from accelstudy.study.config.errors import first_error
@@ -70,6 +70,7 @@ class Readings:
         """
         names, places = column_names(self.source), list(self.places.items())
         row, first = 0, np.nan
+        course = Course(np.empty(0), np.empty(0))
         for table in read_chunks(self.source, chunk_size, typed):
             values = {key: self._numbers(table[names[place]], place) for key, place in places}
             forces = np.column_stack([values[axis] for axis in AXES])
@@ -80,15 +81,19 @@ class Readings:
                 if np.isnan(first):
                     first = next(iter(time[np.isfinite(time)]), np.nan)
                 time = self.start + (time - first) * self.time_factor
+            temperature = values.get("temperature")
+            if time is not None and temperature is not None:
+                course = course.then(time, temperature)
             # A log does not tell the position before: effects that need it add nothing.
             still = np.zeros(len(table))
             hold = Hold(
                 time=time,
-                temperature=values.get("temperature"),
+                temperature=temperature,
                 vibration=values.get("vibration"),
                 step_x=still,
                 step_y=still,
                 step_z=still,
+                course=course if len(course.time) else None,
             )
             read = self.frame.to_frd((forces - self.offset) * self.scale)
             yield table, read @ self.mending.T, hold

@@ -87,11 +87,11 @@ class Campaign:
         """What is known of the holds besides the forces, as the effects take it."""
         # What came before a hold came before it, whether it is used or not.
         whole, used = self._rows()
-        session = Hold(time=whole.get("time")).with_steps(whole["forces"])
+        session = Hold(time=whole.get("time"), temperature=whole.get("temperature"))
+        session = session.with_steps(whole["forces"]).take(np.flatnonzero(used))
         roll, pitch = (None, None) if self.angles is None else self.angles.T
         return replace(
-            session.take(np.flatnonzero(used)),
-            temperature=self.temperature,
+            session,
             vibration=self.vibration,
             roll=roll,
             pitch=pitch,

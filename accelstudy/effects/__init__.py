@@ -14,9 +14,11 @@ from accelstudy.effects.base import (
     get_effect,
     register,
 )
+from accelstudy.effects.lag import Course
 from accelstudy.registry import Hyper, import_modules
 
 __all__ = [
+    "Course",
     "Effect",
     "Hold",
     "Hyper",

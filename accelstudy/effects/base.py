@@ -22,6 +22,7 @@ from typing import Any, ClassVar, Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.effects.lag import Course
 from accelstudy.errors import InputError, UnknownNameError
 from accelstudy.registry import Shaped, ShapedRegistry
 
@@ -77,6 +78,8 @@ class Hold:
     step_x, step_y, step_z : (n,) arrays, m/s², specific force less that of the hold before; 0 in
         the first hold
     order : (n,) array, the time or, where there is none, the number of the hold, from 1 on
+    course : Course, of the temperature of the whole session, with what of it is left out; no
+        column. By default that of these holds.
     """
 
     temperature: NDArray[np.float64] | None = None
@@ -89,12 +92,14 @@ class Hold:
     step_y: NDArray[np.float64] | None = None
     step_z: NDArray[np.float64] | None = None
     order: NDArray[np.float64] | None = None
+    course: Course | None = None
 
     def take(self, positions: NDArray[np.int_]) -> Hold:
-        """Return some of the holds; steps stay those from the holds that were before them."""
+        """Return some of the holds, which keep what came before them: steps and temperatures."""
         columns = {name: getattr(self, name) for name in self.columns()}
         return Hold(
-            **{k: None if v is None else np.asarray(v)[positions] for k, v in columns.items()}
+            **{k: None if v is None else np.asarray(v)[positions] for k, v in columns.items()},
+            course=self._whole_course(),
         )
 
     def with_steps(self, forces: NDArray[np.float64]) -> Hold:
@@ -110,7 +115,7 @@ class Hold:
     @classmethod
     def columns(cls) -> tuple[str, ...]:
         """Names of all columns."""
-        return tuple(field.name for field in fields(cls))
+        return tuple(field.name for field in fields(cls) if field.name != "course")
 
     def column(self, name: str) -> NDArray[np.float64]:
         """Return a column, or raise `InputError` if these holds do not have it."""
@@ -118,6 +123,26 @@ class Hold:
         if values is None:
             raise InputError(f"the model needs the column {name!r} of each position; it is absent")
         return np.asarray(values, dtype=float)
+
+    def lagged(self, tau: float) -> NDArray[np.float64]:
+        """Temperature of what follows the thermometer with a first-order lag of `tau` s, °C, (n,).
+
+        Raises
+        ------
+        InputError
+            If there is no temperature or, for a lag above 0, no time.
+        """
+        temperature = self.column("temperature")
+        if tau == 0:
+            return temperature
+        time, course = self.column("time"), self._whole_course()
+        assert course is not None
+        return temperature + course.behind(time, tau)
+
+    def _whole_course(self) -> Course | None:
+        if self.course is not None or self.time is None or self.temperature is None:
+            return self.course
+        return Course(np.asarray(self.time), np.asarray(self.temperature))
 
 
 class Effect(Shaped):

@@ -10,6 +10,7 @@ import numpy as np
 import sympy as sp
 
 from accelstudy.effects.base import AXES, Effect, Hold, Matrix
+from accelstudy.effects.hold_symbols import HoldSymbols
 from accelstudy.tracing import symbolic, symbols
 from accelstudy.units import STANDARD_GRAVITY
 
@@ -80,7 +81,7 @@ def _expressions(effect: Effect) -> tuple[tuple[Any, ...], Matrix, tuple[Any, An
     }
     p = symbols(*(parameter.name for parameter in effect.parameters))
     f, (g,) = symbols(*(f"f_{axis}" for axis in AXES)), symbols("g")
-    known = Hold(**dict(zip(Hold.columns(), symbols(*Hold.columns()), strict=True)))
+    known = HoldSymbols()
     return (
         numbered.output(f, p, g, known, symbolic),
         numbered.axes(p, symbolic),

@@ -1,19 +1,37 @@
 """Thermal bias: the zero offset depends on temperature."""
 
+import numpy as np
+
 from accelstudy.effects.base import REFERENCE_TEMPERATURE, Effect, per_axis, register
+from accelstudy.registry import Hyper
+
+LAGS = (0.04, 0.1, 0.25)
+"""Time constants of a lag that are tried, in parts of the session."""
 
 
 @register
 class ThermalBias(Effect):
-    """Bias temperature sensitivity b_T (T − T0), T0 = 20 °C (IEEE Std 1293)."""
+    """Bias temperature sensitivity b_T (T − T0), T0 = 20 °C (IEEE Std 1293).
+
+    The sensor may follow the thermometer with a first-order lag: T is T_τ then, with
+    τ dT_τ/dt = T − T_τ, and T_τ = T when the session begins. By default τ is 0, which is none.
+    """
 
     name = "thermal_bias"
     family = "temperature"
     group = "temperature"
     parameters = per_axis("b_T", "m/s^2/K", "b_{T%}")
-    equation = "b_T,i (T − T0)"
+    hypers = (Hyper("tau", "s", 0.0, above=0, smooth=True, none=0.0),)
+    equation = "b_T,i (T_τ − T0)"
     typical = (0.5e-3, 7e-3)
 
     def output(self, f, p, g, hold, xp):
-        """Return b_T (T − T0)."""
-        return tuple(b * (hold.temperature - REFERENCE_TEMPERATURE) for b in p)
+        """Return b_T (T_τ − T0)."""
+        warmer = hold.lagged(self.shape["tau"]) - REFERENCE_TEMPERATURE
+        return tuple(b * warmer for b in p)
+
+    def candidates(self, hold, f, g):
+        """Return no lag and, where the time is known, some up to a third of the session."""
+        session = 0.0 if hold.time is None else float(np.ptp(hold.time))
+        lags = [float(f"{session * part:.3g}") for part in LAGS if session > 0]
+        return (ThermalBias(), *(ThermalBias(tau=tau) for tau in lags))

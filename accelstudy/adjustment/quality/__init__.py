@@ -9,7 +9,6 @@ from accelstudy.adjustment.quality.positions import (
     Suspect,
     holm,
     position_tests,
-    select,
     suspects,
 )
 from accelstudy.adjustment.quality.prediction import HeldOut, held_out
@@ -49,7 +48,6 @@ __all__ = [
     "redundancy_numbers",
     "reliability",
     "root_of",
-    "select",
     "solve",
     "suspects",
     "variance_components",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,7 +132,7 @@ def suspects(
     kept = np.arange(observed.forces.shape[1])
     found: list[Suspect] = []
     while len(found) < most:
-        tests = position_tests(solve(model, approach, select(observed, kept)))
+        tests = position_tests(solve(model, approach, observed.take(kept)))
         worst = tests.worst(sigma_known)
         if worst is None:
             break
@@ -142,21 +142,3 @@ def suspects(
         found.append(Suspect(int(kept[worst]), p_value, tests.gross_errors[worst]))
         kept = np.delete(kept, worst)
     return tuple(found)
-
-
-def select(observed: Observations, positions: NDArray[np.int_]) -> Observations:
-    """Return the observations of some positions; a change of force stays that of the session."""
-    n = observed.forces.shape[1]
-    hold = observed.hold
-    if hold is not None:
-        columns = {field.name: getattr(hold, field.name) for field in fields(hold)}
-        known = {name: values for name, values in columns.items() if values is not None}
-        hold = replace(hold, **{name: np.asarray(known[name])[positions] for name in known})
-    return replace(
-        observed,
-        forces=observed.forces[:, positions],
-        sigma_force=np.broadcast_to(observed.sigma_force, (n, 3))[positions],
-        angles=None if observed.angles is None else observed.angles[:, positions],
-        sigma_angle=np.broadcast_to(observed.sigma_angle, (n, 2))[positions],
-        hold=hold,
-    )

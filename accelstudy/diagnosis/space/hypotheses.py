@@ -65,15 +65,19 @@ class Hypothesis:
 
     @property
     def smooth(self) -> str | None:
-        """Name of the setting with which the effect changes smoothly, if it has one."""
-        hypers = () if self.effect is None else self.effect.hypers
-        return next((hyper.name for hyper in hypers if hyper.smooth), None)
+        """Name of the setting with which the effect changes smoothly, if it has one.
+
+        An effect that lacks what the setting shapes is no neighbour of those that do not.
+        """
+        shape, hypers = ({}, ()) if self.effect is None else (self.effect.shape, self.effect.hypers)
+        smooth = (h.name for h in hypers if h.smooth and shape[h.name] != h.none)
+        return next(smooth, None)
 
     @property
     def value(self) -> float:
-        """Value of the smooth setting."""
-        assert self.effect is not None
-        assert self.smooth is not None
+        """Value of the smooth setting; NaN if it has none."""
+        if self.effect is None or self.smooth is None:
+            return np.nan
         return self.effect.shape[self.smooth]
 
 

@@ -39,6 +39,9 @@ class _Columns:
     def __getattr__(self, name: str) -> Array:
         return self._hold.column(name)
 
+    def lagged(self, tau: float) -> Array:
+        return self._hold.lagged(tau)
+
 
 def signature(effect: Effect, forces: Array, angles: Array, g: float, hold: Hold) -> Signature:
     """Evaluate an effect for the unit vectors of its parameters, in which it is linear.

@@ -153,6 +153,7 @@ def _grid(frame: Frame, attitudes: Array, needed: set[str]) -> tuple[Array, Hold
         step_y=step[:, 1],
         step_z=step[:, 2],
         order=np.full(len(grid), n + 1.0) if time is None else time,
+        course=frame.hold.take(np.arange(n)).course,
     )
     return grid, hold, later
 

@@ -1,0 +1,58 @@
+"""What follows a temperature with a lag."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Course:
+    """A temperature that is known at some times, linear between them and constant after the last.
+
+    Attributes
+    ----------
+    time : (k,) array, s, in any order
+    temperature : (k,) array, °C
+    """
+
+    time: Array
+    temperature: Array
+
+    def then(self, time: Array, temperature: Array) -> Course:
+        """Go on with readings (n,) of a thermometer, of which one in each second is kept."""
+        last = np.floor(self.time[-1]) if len(self.time) else -np.inf
+        known = np.isfinite(temperature) & (np.floor(time) > last)
+        time, temperature = time[known], temperature[known]
+        _, kept = np.unique(np.floor(time), return_index=True)
+        return Course(
+            np.concatenate([self.time, time[kept]]),
+            np.concatenate([self.temperature, temperature[kept]]),
+        )
+
+    def behind(self, time: ArrayLike, tau: float) -> Array:
+        """By how much a body is warmer than the course, K, that follows it with a first-order lag.
+
+        The body has T_τ with τ dT_τ/dt = T − T_τ, and T_τ = T until the first time that is known.
+        Where T grows by s per second, T_τ − T goes to −s τ by exp(−Δt/τ), which is exact.
+
+        Parameters
+        ----------
+        time : array of any shape, s
+        tau : float, s, above 0
+        """
+        known, first = np.unique(self.time, return_index=True)
+        # The last temperature is kept.
+        rise = np.append(np.diff(self.temperature[first]) / np.diff(known), 0.0) * tau
+        behind = [0.0]
+        decay = np.exp(-np.diff(known) / tau)
+        for lasting, end in zip(decay.tolist(), rise[:-1].tolist(), strict=True):
+            behind.append((behind[-1] + end) * lasting - end)
+        at = np.asarray(time, dtype=float)
+        i = np.maximum(np.searchsorted(known, at, side="right") - 1, 0)
+        since = np.maximum(at - known[i], 0.0)
+        return np.asarray((np.array(behind)[i] + rise[i]) * np.exp(-since / tau) - rise[i])
