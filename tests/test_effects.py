@@ -244,6 +244,8 @@ def test_a_slip_counts_the_holds_where_they_have_no_time():
         get_effect("mounting_slip(t=12.5)"), np.ones(3), FORCES, some_hold(FORCES, time=None)
     )
     assert np.flatnonzero(found.output.any(axis=1))[0] == 12
+    left = hold.take(np.arange(20, 40)).with_steps(FORCES[20:])
+    assert left.order[0] == 21
     times = [c.shape["t"] for c in get_effect("mounting_slip").candidates(hold, FORCES, G)]
     np.testing.assert_array_equal(times, np.arange(2.5, 39))
 

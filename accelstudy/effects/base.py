@@ -105,11 +105,13 @@ class Hold:
     def with_steps(self, forces: NDArray[np.float64]) -> Hold:
         """Return all holds, in order of acquisition, with what follows from it.
 
-        These are `order`, and the steps of forces (n, 3), m/s².
+        These are the steps of forces (n, 3), m/s², and `order` unless it is known.
         """
         step = np.diff(forces, axis=0, prepend=forces[:1])
         step = np.where(np.abs(step) < STILL, 0.0, step)
-        order = np.arange(1.0, len(forces) + 1) if self.time is None else self.time
+        order = self.order
+        if order is None:
+            order = np.arange(1.0, len(forces) + 1) if self.time is None else self.time
         return replace(self, step_x=step[:, 0], step_y=step[:, 1], step_z=step[:, 2], order=order)
 
     @classmethod
