@@ -1,12 +1,15 @@
 """Signatures of effects: derivatives of the observations, and what a design shows of them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, design, shuffled, some_holds
+from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, campaign, design, shuffled, some_holds
 
 from accelstudy.diagnosis.space.hypotheses import cosines, same_space
 from accelstudy.diagnosis.space.signatures import signature
 from accelstudy.diagnosis.worth.limits import signature_columns, upper_limits, visibilities
+from accelstudy.diagnosis.worth.visibility import campaign_setting
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.sensor import SensorModel
 from accelstudy.simulation import Noise, session
@@ -165,3 +168,10 @@ def test_an_effect_is_judged_in_the_settings_that_a_diagnosis_tries():
         if row.status == "visible" and len(setting.candidates[row.name]) == 1:
             assert row.mdb == row.hardest_mdb, row.name
     assert rows["bias_drift"].easiest.shape == {}
+
+
+def test_a_sensor_whose_range_is_far_beyond_gravity_does_not_saturate():
+    measured, _ = campaign(3)
+    assert "saturation" in campaign_setting(measured, NINE).candidates
+    wide = campaign_setting(replace(measured, full_range=8 * G), NINE)
+    assert wide.invisible == ("gravity_error", "saturation")

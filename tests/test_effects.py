@@ -1,6 +1,7 @@
 """The effects of the catalogue: all there, as their formulas say, estimable or known not to be."""
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -327,6 +328,10 @@ def test_candidates_fit_the_session():
         assert session_length / 21 < candidate.shape["tau"] < session_length * 1.01
     for candidate in get_effect("saturation").candidates(HOLD, FORCES, G):
         assert 0.49 * G < candidate.shape["knee"] < G
+    for full, expected in ((0.82, [0.5, 0.8]), (2.7, [0.7, 0.99]), (8, [])):
+        within = replace(HOLD, full_range=full * G).take(np.arange(30))
+        knees = [c.shape["knee"] for c in get_effect("saturation").candidates(within, FORCES, G)]
+        np.testing.assert_allclose(np.divide(knees, G)[[0, -1] if knees else []], expected, 1e-3)
     few = some_hold(FORCES[:3], time=np.arange(3.0))
     assert get_effect("bias_jump").candidates(few, FORCES[:3], G) == ()
 

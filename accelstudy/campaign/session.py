@@ -96,6 +96,7 @@ class Campaign:
             roll=roll,
             pitch=pitch,
             yaw=self.yaw,
+            full_range=self.full_range,
         )
 
     @property

@@ -42,6 +42,10 @@ STILL = 0.02
 """m/s², a change of force from hold to hold below this is noise, and no step."""
 
 
+OF_ALL = ("course", "full_range")
+"""Attributes of `Hold` that have not one value per position."""
+
+
 @dataclass(frozen=True)
 class Parameter:
     """One parameter of an effect: its name, its SI unit and its symbol in figures (mathtext)."""
@@ -78,8 +82,11 @@ class Hold:
     step_x, step_y, step_z : (n,) arrays, m/s², specific force less that of the hold before; 0 in
         the first hold
     order : (n,) array, the time or, where there is none, the number of the hold, from 1 on
-    course : Course, of the temperature of the whole session, with what of it is left out; no
-        column. By default that of these holds.
+
+    Of the whole session:
+
+    course : Course, of the temperature, with what of it is left out; by default of these holds
+    full_range : float, m/s², the sensor measures ± this
     """
 
     temperature: NDArray[np.float64] | None = None
@@ -93,6 +100,7 @@ class Hold:
     step_z: NDArray[np.float64] | None = None
     order: NDArray[np.float64] | None = None
     course: Course | None = None
+    full_range: float | None = None
 
     def take(self, positions: NDArray[np.int_]) -> Hold:
         """Return some of the holds, which keep what came before them: steps and temperatures."""
@@ -100,6 +108,7 @@ class Hold:
         return Hold(
             **{k: None if v is None else np.asarray(v)[positions] for k, v in columns.items()},
             course=self._whole_course(),
+            full_range=self.full_range,
         )
 
     def with_steps(self, forces: NDArray[np.float64]) -> Hold:
@@ -117,7 +126,7 @@ class Hold:
     @classmethod
     def columns(cls) -> tuple[str, ...]:
         """Names of all columns."""
-        return tuple(field.name for field in fields(cls) if field.name != "course")
+        return tuple(field.name for field in fields(cls) if field.name not in OF_ALL)
 
     def column(self, name: str) -> NDArray[np.float64]:
         """Return a column, or raise `InputError` if these holds do not have it."""

@@ -6,12 +6,15 @@ from accelstudy.effects.base import Effect, per_axis, register
 from accelstudy.registry import Hyper
 from accelstudy.units import STANDARD_GRAVITY
 
+FIRST = 0.25
+"""Part of a stated range up to which a sensor does not saturate: who states one knows it so far."""
+
 
 @register
 class Saturation(Effect):
     """Loss of gain beyond a knee, −k_i sign(f_i) max(0, |f_i| − c); k = 1 is hard clipping.
 
-    The knee c, in m/s², is searched.
+    The knee c, in m/s², is searched. If the range of the sensor is stated it is within that.
     """
 
     name = "saturation"
@@ -30,6 +33,10 @@ class Saturation(Effect):
         )
 
     def candidates(self, hold, f, g):
-        """Return knees that some, but not most, of the forces exceed."""
+        """Return knees that some, but not most, of the forces exceed, within a stated range."""
         parts = (*np.arange(0.5, 0.96, 0.05), 0.97, 0.98, 0.99)
-        return tuple(Saturation(knee=float(f"{part * g:.4g}")) for part in parts)
+        knees = (float(f"{part * g:.4g}") for part in parts)
+        full = hold.full_range
+        return tuple(
+            Saturation(knee=knee) for knee in knees if full is None or FIRST * full <= knee <= full
+        )
