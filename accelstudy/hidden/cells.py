@@ -28,7 +28,7 @@ from accelstudy.hidden.physics import (
 from accelstudy.hidden.physics.atlas import atlas
 from accelstudy.outputs import whole_file
 
-CHUNK = 400
+CHUNK = 800
 """Campaigns in one job: some minutes, beside which starting Python does not matter."""
 
 

@@ -78,7 +78,7 @@ class HiddenConfig(Block):
         default=["given", "not given"], description="whether a campaign says how large its noise is"
     )
     baselines_every: Every = Field(
-        10, description="of each kind and size every so many campaigns get to the simpler methods"
+        20, description="of each kind and size every so many campaigns get to the simpler methods"
     )
     nothing: Nothing | None = Field(None, description="nothing is missing")
     noise: Kinds | None = Field(None, description="only the noise is not as it is said to be")

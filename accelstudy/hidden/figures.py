@@ -4,17 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Literal
 
 import numpy as np
 import pandas as pd
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from accelstudy.diagnosis.decision.explanations import CREDIBLE
-from accelstudy.figures.style import COLUMN, FULL, INK, Style, new_figure, say_empty
-from accelstudy.hidden.limits import power_over
+from accelstudy.figures.style import (
+    COLUMN,
+    FULL,
+    INK,
+    Style,
+    log_ticks,
+    new_figure,
+    say_empty,
+    spread,
+)
+from accelstudy.hidden.limits import EDGES, power_over
 from accelstudy.hidden.rates import ALL
+from accelstudy.hidden.score import VERDICTS
 from accelstudy.hidden.targets import LARGE, MOST_NAMES
 
 Tables = Mapping[str, pd.DataFrame]
@@ -50,7 +60,7 @@ def figures(tables: Tables) -> dict[str, Callable[[], Figure]]:
 
 def alarms(tables: Tables) -> Figure:
     """How often something is found where nothing is missing, and an effect where it is noise."""
-    fig = new_figure(FULL, 70)
+    fig = new_figure(FULL, 88)
     left, right = fig.subplots(1, 2)
     table = tables["shares"]
     null = table[(table["set"] == "null") & (table["quantity"] == "alarm")]
@@ -64,7 +74,7 @@ def alarms(tables: Tables) -> Figure:
     left.set_title("nothing missing: false alarms")
     noise = table[(table["set"] == "noise") & (table["what"] != ALL) & table["size"].isna()]
     for quantity, offset, style in (
-        ("noise_model", -0.15, OURS),
+        ("noise_model", -0.15, OTHERS["known sigma"]),
         ("answered", 0.15, OTHERS["BIC forward"]),
     ):
         part = noise[noise["quantity"] == quantity].sort_values("what")
@@ -75,41 +85,43 @@ def alarms(tables: Tables) -> Figure:
     for ax in (left, right):
         ax.set_xlabel("share of campaigns")
         ax.set_xlim(left=0)
-        _legend(ax, "lower right")
+    _legend(fig, 4)
     return fig
 
 
 def naming(tables: Tables) -> Figure:
     """Found and named rightly over λ, beside the oracle; one effect, and two."""
-    fig = new_figure(FULL, 66)
-    axes = fig.subplots(1, 3, sharey=True)
+    fig = new_figure(FULL, 72)
+    found, one, two = axes = fig.subplots(1, 3, sharey=True)
     table = tables["shares"]
-    found, one, two = axes
-    _curve(found, table, "one", "alarm", label="diagnosis", **OURS)
+    _curve(found, table, "one", "alarm", label="found, or right", **OURS)
     _curve(found, table, "one", "oracle found", label="oracle", **ORACLE)
     found.set_title("one effect: something found")
-    _curve(one, table, "one", "right", label="named or narrowed", **OURS)
-    _curve(one, table, "one", "named", label="named, right or wrong", **OTHERS["F test"])
+    _curve(one, table, "one", "right", **OURS)
+    _curve(one, table, "one", "named", label="named, right or wrong", **OTHERS["known sigma"])
     _curve(one, table, "one", "wrong", label="wrong", **OTHERS["BIC forward"])
-    _curve(one, table, "one", "oracle right", label="oracle", **ORACLE)
-    _curve(one, table, "one", "oracle right if told", label="oracle, if told", **TOLD)
+    _curve(one, table, "one", "oracle right", **ORACLE)
+    _curve(
+        one, table, "one", "oracle right if told", label="oracle, told that there is one", **TOLD
+    )
     one.set_title("one effect: name right")
-    _curve(two, table, "two", "right", label="both right", **OURS)
-    _curve(two, table, "two", "one of two", label="one right, none wrong", **OTHERS["F test"])
-    _curve(two, table, "two", "wrong", label="wrong", **OTHERS["BIC forward"])
-    _curve(two, table, "two", "oracle right", label="oracle", **ORACLE)
-    two.set_title("two effects, $\\lambda$ each")
+    _curve(two, table, "two", "right", **OURS)
+    _curve(two, table, "two", "one of two", label="one of two right, none wrong",
+           **OTHERS["F test"])  # fmt: skip
+    _curve(two, table, "two", "wrong", **OTHERS["BIC forward"])
+    _curve(two, table, "two", "oracle right", **ORACLE)
+    two.set_title("two effects: both right")
     found.set_ylabel("share of campaigns")
     for ax in axes:
         _over_size(ax)
-        _legend(ax, "lower right" if ax is found else "upper left")
     found.set_ylim(0, 1.02)
+    _legend(fig, 3)
     return fig
 
 
 def methods(tables: Tables) -> Figure:
     """Simpler methods on the same campaigns: all names right, and any name wrong."""
-    fig = new_figure(FULL, 62)
+    fig = new_figure(FULL, 70)
     axes = fig.subplots(1, 2, sharey=True)
     table = tables["baselines"]
     one = table[(table["set"] == "one") & table["size"].notna()]
@@ -124,34 +136,34 @@ def methods(tables: Tables) -> Figure:
     axes[1].set_title("one effect: some name is wrong")
     axes[0].set_ylabel("share of campaigns")
     axes[0].set_ylim(0, 1.02)
-    _legend(axes[1], "upper right")
+    _legend(fig, 6)
     return fig
 
 
 def sets(tables: Tables) -> Figure:
     """How often a credible set holds the truth, and how many names it has."""
-    fig = new_figure(FULL, 60)
+    fig = new_figure(FULL, 66)
     left, right = fig.subplots(1, 2)
+    two = OTHERS["BIC forward"]
     _curve(left, tables["shares"], "one", "set holds the truth", label="one effect", **OURS)
-    _curve(left, tables["shares"], "two", "set holds the truth", label="two effects",
-           **OTHERS["BIC forward"])  # fmt: skip
-    left.axhline(CREDIBLE, color=INK, linewidth=0.8, linestyle="--")
+    _curve(left, tables["shares"], "two", "set holds the truth", label="two effects", **two)
+    left.axhline(CREDIBLE, color=INK, linewidth=0.8, linestyle="--", label="stated")
     left.set_ylim(0, 1.02)
     left.set_ylabel("sets that hold the truth")
     campaigns = tables["campaigns"]
-    for name, style in (("one", OURS), ("two", OTHERS["BIC forward"])):
+    for name, style in (("one", OURS), ("two", two)):
         given = campaigns[(campaigns["set"] == name) & campaigns["set_given"].eq(True)]
         mean = given.groupby("size")["set_names"].agg(["mean", "sem"]).reset_index()
         if len(mean):
             error = 1.96 * mean["sem"].fillna(0)
             right.errorbar(mean["size"], mean["mean"], error, elinewidth=0.8, **style)
     right.plot([*MOST_NAMES], [*MOST_NAMES.values()], "_", color=INK, markersize=12,
-               label="at most, one effect")  # fmt: skip
+               label="wanted at most of one effect")  # fmt: skip
     right.set_ylim(bottom=0)
     right.set_ylabel("names in a set, mean")
     for ax in (left, right):
         _over_size(ax)
-        _legend(ax, "best")
+    _legend(fig, 4)
     return fig
 
 
@@ -171,7 +183,7 @@ def calibration(tables: Tables) -> Figure:
     ax.set_xlim(0, 1.02)
     ax.set_ylim(0, 1.02)
     ax.set_aspect("equal")
-    _legend(ax, "upper left")
+    _legend(fig, 2)
     return fig
 
 
@@ -185,7 +197,9 @@ def confusion(tables: Tables) -> Figure:
         return fig
     wide = table.pivot_table(index="truth", columns="answer", values="share", fill_value=0.0)
     families = [*wide.index]
-    answers = [*families, *(name for name in wide.columns if name not in families)]
+    others = [name for name in wide.columns if name not in families]
+    answers = sorted(others, key=lambda name: name in VERDICTS.values())
+    answers = [*families, *answers]
     wide = wide.reindex(columns=answers, fill_value=0.0)
     values = wide.to_numpy()
     image = ax.imshow(values, cmap="cividis", vmin=0, vmax=1, aspect="auto")
@@ -204,7 +218,7 @@ def confusion(tables: Tables) -> Figure:
 
 def outside(tables: Tables) -> Figure:
     """What becomes of physics that the catalogue does not have."""
-    fig = new_figure(FULL, 60)
+    fig = new_figure(FULL, 66)
     axes = fig.subplots(1, 2, sharey=True)
     titles = {"outside": "never in the catalogue", "removed": "its family is taken out"}
     for ax, (name, title) in zip(axes, titles.items(), strict=True):
@@ -215,15 +229,15 @@ def outside(tables: Tables) -> Figure:
         _over_size(ax)
         ax.axvline(LARGE, color=INK, linewidth=0.6, linestyle=":")
         ax.set_title(title)
-        _legend(ax, "upper left")
     axes[0].set_ylabel("share of campaigns")
     axes[0].set_ylim(0, 1.02)
+    _legend(fig, 3)
     return fig
 
 
 def limits(tables: Tables) -> Figure:
     """Power over the size beside the minimal detectable and identifiable sizes."""
-    fig = new_figure(FULL, 60)
+    fig = new_figure(FULL, 66)
     axes = fig.subplots(1, 2, sharey=True)
     cases = (
         ("by_mdb", "alarm", "MDB", "something found"),
@@ -236,11 +250,12 @@ def limits(tables: Tables) -> Figure:
         ax.axvline(1, color=INK, linewidth=0.6, linestyle=":")
         ax.axhline(0.8, color=INK, linewidth=0.6, linestyle=":")
         ax.set_xscale("log")
+        log_ticks(ax.xaxis, EDGES[0], EDGES[-1])
         ax.set_xlabel(f"size / {limit}")
         ax.set_title(title)
     axes[0].set_ylabel("share of campaigns")
     axes[0].set_ylim(0, 1.02)
-    _legend(axes[0], "lower right")
+    _legend(fig, 2)
     return fig
 
 
@@ -277,22 +292,24 @@ def _rows(ax: Axes, labels: pd.Series) -> None:
     ax.set_ylim(max(len(names), 1) - 0.5, -0.5)
 
 
-Place = Literal["best", "lower right", "upper left", "upper right"]
-
-
-def _legend(ax: Axes, place: Place) -> None:
-    """Add a legend, or say that there is nothing to be seen."""
-    if ax.get_legend_handles_labels()[1]:
-        ax.legend(loc=place, fontsize=6.5, frameon=True, framealpha=0.9, edgecolor="white")
-    else:
-        say_empty(ax, "no such campaigns")
+def _legend(fig: Figure, columns: int) -> None:
+    """Add one legend below all axes, or say where there is nothing to be seen."""
+    entries: dict[str, Artist] = {}
+    for ax in fig.axes:
+        handles, labels = ax.get_legend_handles_labels()
+        entries |= {k: v for k, v in zip(labels, handles, strict=True) if k not in entries}
+        if not labels and not ax.images:
+            say_empty(ax, "no such campaigns")
+    if entries:
+        fig.legend([*entries.values()], [*entries], loc="outside lower center", ncols=columns)
 
 
 def _over_size(ax: Axes) -> None:
+    """Make the abscissa that of sizes, with a tick at each that was simulated."""
+    drawn = [np.asarray(line.get_xdata(), dtype=float) for line in ax.get_lines()]
+    sizes = np.unique(np.concatenate([x for x in drawn if len(x) > 2] or [np.array([25.0])]))
     ax.set_xscale("log")
-    ticks = [6, 10, 16, 25, 40, 60, 100, 200, 400]
-    low, high = ax.get_xlim()
-    ax.set_xticks([t for t in ticks if low <= t <= high] or [25], minor=False)
+    ax.set_xticks(sizes[spread(np.log(sizes), 0.2)])
     ax.xaxis.set_major_formatter("{x:g}")
     ax.minorticks_off()
     ax.set_xlabel(SIZE)
