@@ -55,7 +55,7 @@ def some_hold(forces, seed=2, **columns):
         "vibration": rng.uniform(0, 1, n),
         "yaw": rng.uniform(-np.pi, np.pi, n),
     }
-    return Hold(**{**known, **columns}, roll=roll, pitch=pitch).with_steps(forces)
+    return Hold(**{**known, "roll": roll, "pitch": pitch, **columns}).with_steps(forces)
 
 
 FORCES = G * np.random.default_rng(1).uniform(-1.2, 1.2, (40, 3))
@@ -129,6 +129,12 @@ def base_tilt(f, f_prev, p, h):
     return attitude.inv().apply([p[0], p[1], 0]) * G
 
 
+def skew_axes(f, f_prev, p, h):
+    """A force that is turned by k tan θ about the roll axis."""
+    level = np.stack(specific_force(h.roll, h.pitch, G), axis=1)
+    return p[0] * np.tan(h.pitch)[:, None] * np.cross([1.0, 0.0, 0.0], level)
+
+
 def per_other_axis(f, k):
     """Σ k_ij f_i f_j over the other axes j, with k in the order xy, xz, yx, yz, zx, zy."""
     pairs = [(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)]
@@ -157,6 +163,7 @@ OUTPUT = {
     "saturation": lambda f, f_prev, p, h: -p * np.sign(f) * np.maximum(0, np.abs(f) - 0.95 * G),
     "gravity_error": lambda f, f_prev, p, h: p[0] * f / G,
     "base_tilt": base_tilt,
+    "axis_nonperpendicularity": skew_axes,
     "thermal_curve": lambda f, f_prev, p, h: np.outer((h.temperature - 20) ** 2, p),
     "mounting_slip": lambda f, f_prev, p, h: (h.time > 600)[:, None] * np.cross(p, f),
 }
@@ -172,7 +179,6 @@ READING = {
     "encoder_offset": lambda a, p: p + 0 * a,
     "encoder_scale": lambda a, p: p * a,
     "encoder_eccentricity": lambda a, p: p[[0, 2]] * np.sin(a) + p[[1, 3]] * np.cos(a),
-    "axis_nonperpendicularity": lambda a, p: np.stack([p[0] * np.tan(a[:, 1]), 0 * a[:, 0]], 1),
     "joint_compliance": lambda a, p: -p * np.sin(2 * a) * np.cos(a[:, ::-1]),
 }
 
@@ -227,6 +233,13 @@ def test_base_tilt_turns_with_the_same_matrix_as_gravity():
 def test_settings_shape_an_effect(spec, expected):
     p = np.array([1.0, -2.0, 0.5])
     np.testing.assert_allclose(added(get_effect(spec), p).output, expected(p), rtol=0, atol=1e-13)
+
+
+def test_axes_that_are_not_perpendicular_show_where_the_roll_axis_is_vertical():
+    hold = some_hold(FORCES, roll=np.full(40, 0.3), pitch=np.full(40, np.pi / 2))
+    found = added(get_effect("axis_nonperpendicularity"), np.array([1e-3]), FORCES, hold)
+    expected = 1e-3 * G * np.array([0.0, np.cos(0.3), -np.sin(0.3)])
+    np.testing.assert_allclose(found.output, np.tile(expected, (40, 1)), rtol=0, atol=1e-15)
 
 
 def test_a_flange_gives_way_where_its_encoders_do_not_see_it():
@@ -468,6 +481,7 @@ def test_columns_that_effects_need():
         "settling": {"step_x", "step_y", "step_z"},
         "vibration_rectification": {"vibration"},
         "base_tilt": {"roll", "pitch", "yaw"},
+        "axis_nonperpendicularity": {"roll", "pitch"},
     }
     for name in (*NINE, *NUMBERS):
         assert set(SensorModel.of(name, [name]).hold_columns) == expected.get(name, set())

@@ -5,17 +5,22 @@ from accelstudy.effects.base import Effect, Parameter, register
 
 @register
 class AxisNonPerpendicularity(Effect):
-    """Roll error k tan θ of axes that are not perpendicular (the tilting-axis error)."""
+    """Roll error k tan θ of axes that are not perpendicular (the tilting-axis error).
+
+    Written as what it does to the force, which is regular where the roll axis is vertical and
+    tan θ is not.
+    """
 
     name = "axis_nonperpendicularity"
     family = "attitude of the rig"
     group = "robot_angles"
     parameters = (Parameter("k_perp", "rad", r"$k_\perp$"),)
-    equation = "δφ = k tan θ"
+    equation = "k g sin θ [0, cos φ, −sin φ]ᵀ, that is δφ = k tan θ"
     typical = (0.1e-3, 0.5e-3)
     part = "rig"
 
-    def reading(self, angles, p, hold, xp):
-        """Return (k tan θ, 0)."""
+    def output(self, f, p, g, hold, xp):
+        """Return k g sin θ [0, cos φ, −sin φ]ᵀ."""
         (k,) = p
-        return (k * xp.tan(angles[1]), 0)
+        aside = k * g * xp.sin(hold.pitch)
+        return (0, aside * xp.cos(hold.roll), -aside * xp.sin(hold.roll))

@@ -221,7 +221,8 @@ def _encoder_scale(rig: Rig, p: Array, s: Settings, session: Session) -> None:
 
 def _eccentricity(rig: Rig, p: Array, s: Settings, session: Session) -> None:
     a, b = p[..., 0::2], p[..., 1::2]
-    rig.reading = rig.reading + a * np.sin(session.joints) + b * np.cos(session.joints)
+    turn = s["order"] * session.joints
+    rig.reading = rig.reading + a * np.sin(turn) + b * np.cos(turn)
 
 
 # Settings.
@@ -262,6 +263,14 @@ def _all_knees(session: Session) -> list[dict[str, float]]:
     return [{"knee": GRAVITY * float(part)} for part in np.arange(0.525, 0.98, 0.05)]
 
 
+def _any_order(session: Session, rng: np.random.Generator) -> dict[str, float]:
+    return {"order": float(rng.choice([1.0, 2.0]))}
+
+
+def _all_orders(session: Session) -> list[dict[str, float]]:
+    return [{"order": 1.0}, {"order": 2.0}]
+
+
 def _any_lag(session: Session, rng: np.random.Generator) -> dict[str, float]:
     lags = rng.random() < 0.5
     return {"tau": session.duration * rng.uniform(0.05, 0.33) if lags else 0.0}
@@ -298,7 +307,7 @@ EFFECTS: dict[str, Effect] = {
         Effect("base_tilt", 2, 5e-4, rig=_tilt),
         Effect("encoder_offset", 2, 2e-4, rig=_encoder_offset),
         Effect("encoder_scale", 2, 1e-4, rig=_encoder_scale),
-        Effect("encoder_eccentricity", 4, 2e-4, rig=_eccentricity),
+        Effect("encoder_eccentricity", 4, 2e-4, _eccentricity, draw=_any_order, grid=_all_orders),
         Effect("axis_nonperpendicularity", 1, 3e-4, rig=_skew),
         Effect("joint_compliance", 2, 5e-4, rig=_compliance),
         Effect("mounting_slip", 3, 1e-3, _slip, None, (), False, False, _any_moment, _all_moments),
