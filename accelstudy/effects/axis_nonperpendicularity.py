@@ -15,7 +15,7 @@ class AxisNonPerpendicularity(Effect):
     family = "attitude of the rig"
     group = "robot_angles"
     parameters = (Parameter("k_perp", "rad", r"$k_\perp$"),)
-    equation = "k g sin θ [0, cos φ, −sin φ]ᵀ, that is δφ = k tan θ"
+    equation = "δφ = k tan θ"
     typical = (0.1e-3, 0.5e-3)
     part = "rig"
 
