@@ -77,6 +77,18 @@ class HoldPlan:
             yaw=self._rng(2).uniform(-np.pi, np.pi, n) if self.yaw == "random" else np.zeros(n),
         )
 
+    def moved(self, hold: Hold, dt: float) -> Hold:
+        """Return conditions a moment later within each hold of a session, s.
+
+        A temperature that rises steadily does so within the holds, too; one that is set is kept.
+        """
+        assert hold.time is not None
+        temperature = hold.temperature
+        if temperature is not None and self.temperature_order == "linear":
+            span = max(float(np.ptp(hold.time)), dt)
+            temperature = temperature + dt / span * (temperature[-1] - temperature[0])
+        return replace(hold, time=hold.time + dt, temperature=temperature)
+
     def use(self, forces: Array, n: int) -> Hold:
         """Return conditions in which a sensor is used that was calibrated in n positions.
 

@@ -57,6 +57,8 @@ class Observations:
     sigma_gravity : float, m/s²; 0 holds gravity fixed
     hold : Hold, what else is known of the positions
     initial : (u,) array, SI, initial values of the model's parameters; an ideal sensor if None
+    slope, sd_slope : (n, 3) arrays, m/s²/s, of the output within each position, and its standard
+        deviation, R = 1; the adjustment does not use them
     """
 
     forces: Array
@@ -67,6 +69,8 @@ class Observations:
     sigma_gravity: float = 0.0
     hold: Hold | None = None
     initial: Array | None = None
+    slope: Array | None = None
+    sd_slope: Array | None = None
 
     def take(self, positions: NDArray[np.int_]) -> Observations:
         """Return the sessions with some of their positions."""
@@ -81,6 +85,8 @@ class Observations:
             sigma_force=chosen(self.sigma_force),
             sigma_angle=chosen(self.sigma_angle),
             hold=None if self.hold is None else self.hold.take(positions),
+            slope=None if self.slope is None else self.slope[positions],
+            sd_slope=None if self.sd_slope is None else self.sd_slope[positions],
         )
 
     def sessions(self, chosen: slice) -> Observations:

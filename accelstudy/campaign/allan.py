@@ -64,6 +64,13 @@ class AllanMoments:
     terms: NDArray[np.int_]
     independent: NDArray[np.int_]
 
+    def up_to(self, factor: float) -> AllanMoments:
+        """Return what the shorter averages contribute; the shortest one stays."""
+        k = max(1, int(np.searchsorted(self.factors, factor, side="right")))
+        return AllanMoments(
+            self.factors[:k], self.squares[:k], self.terms[:k], self.independent[:k]
+        )
+
 
 def allan_moments(samples: ArrayLike) -> AllanMoments:
     """Moments of a record without gaps, (n, c).

@@ -211,6 +211,9 @@ def fit_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> 
         sigma_gravity=campaign.sigma_gravity,
         hold=campaign.hold,
         initial=start_of(model),
+        # Beside means of unknown noise nobody knows what slopes weigh.
+        slope=None if campaign.sigma_force is None else campaign.slope,
+        sd_slope=None if campaign.sigma_force is None else campaign.sd_slope,
     )
     adjustment = calibrate(model, approach, observed)
     if not adjustment.converged[0] and (unfit := not_affine(model)):

@@ -24,12 +24,13 @@ from accelstudy.noise_effects import NoiseEffect, get_noise_effect
 from accelstudy.outputs import whole_file
 from accelstudy.registry import Shaped
 from accelstudy.schemes import get_scheme
-from accelstudy.simulation import Noise, session
+from accelstudy.sensor import SensorModel
+from accelstudy.simulation import Noise, Session, session
 from accelstudy.units import MGON, STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
 
-STREAMS = ("sensor", "effects", "order", "noise", "sd", "gross")
+STREAMS = ("sensor", "effects", "order", "noise", "sd", "gross", "slope")
 """What is drawn, each from a stream of its own, so that none changes another (nor the holds)."""
 
 ORDERS = ("scheme", "random")
@@ -39,6 +40,7 @@ _RANGES = {
     "repeats": bounds.POSITIONS,
     "repeat_first": replace(bounds.POSITIONS, least=0),
     "n_samples": bounds.SAMPLES,
+    "duration": bounds.INTERVAL,
     "sigma": bounds.SIGMA_FORCE,
     "gravity": bounds.GRAVITY,
     "size": bounds.SIZE,
@@ -70,6 +72,7 @@ class CampaignSettings:
     gravity : float, m/s²
     interval, temperature, temperature_order, vibration, yaw : as in `HoldPlan`
     n_samples : int, samples per hold, optional; adds their sds
+    duration : float, s, of a hold, optional; adds the slopes of its samples, and their sds
     """
 
     name: str = "simulated"
@@ -94,6 +97,7 @@ class CampaignSettings:
     vibration: tuple[float, float] | None = None
     yaw: str = "none"
     n_samples: int | None = None
+    duration: float | None = None
 
     def __post_init__(self) -> None:
         if self.order not in ORDERS:
@@ -102,6 +106,8 @@ class CampaignSettings:
             if (value := getattr(self, key)) is not None:
                 allowed.check_key(key, value)
         bounds.SIGMA_ANGLE.check_key("sigma_angle", self.sigma_angle / MGON)
+        if self.duration is not None and (self.n_samples is None or self.interval is None):
+            raise InputError("duration: needs n_samples and the interval between holds")
         n = self.repeats * get_scheme(self.scheme).n_positions + self.repeat_first
         bounds.POSITIONS.check_key("repeats: number of positions", n)
 
@@ -158,9 +164,8 @@ def simulate_campaign(settings: CampaignSettings) -> tuple[Campaign, dict[str, A
                 f"{PROVIDES[column]}: missing; the effect {effect.name!r} needs the {column} of "
                 "each hold"
             )
-    ideal = session(
-        model, np.concatenate([v for _, v in present]), directions, settings.gravity, hold
-    )
+    parameters = np.concatenate([v for _, v in present])
+    ideal = session(model, parameters, directions, settings.gravity, hold)
     noise = Noise(settings.sigma, settings.sigma_angle, effects=settings.noise_effects)
     drawn = ideal.draw(noise, 1, rng["noise"])
     robot = get_approach(settings.approach).uses_angles
@@ -177,6 +182,7 @@ def simulate_campaign(settings: CampaignSettings) -> tuple[Campaign, dict[str, A
         vibration=hold.vibration,
         yaw=hold.yaw if robot and settings.yaw != "none" else None,
         **_samples(settings, noise_effects, len(directions), rng["sd"]),
+        **_slopes(settings, model, parameters, ideal, noise_effects, rng["slope"]),
     )
     gross = []
     for spec in settings.gross_errors:
@@ -249,6 +255,32 @@ def _samples(
     sigma = settings.sigma * np.sqrt(n) * np.prod([e.within_hold for e in noise_effects], axis=0)
     scatter = np.sqrt(rng.chisquare(n - 1, (n_positions, 3)) / (n - 1))
     return {"n_samples": np.full(n_positions, n), "sd": sigma * scatter}
+
+
+def _slopes(
+    settings: CampaignSettings,
+    model: SensorModel,
+    parameters: Array,
+    ideal: Session,
+    noise_effects: Sequence[NoiseEffect],
+    rng: np.random.Generator,
+) -> dict[str, Any]:
+    """Slopes of the samples, and their sds: √12 σ over the time of a hold, as of white noise."""
+    if settings.duration is None:
+        return {}
+    # A line through samples has the slope between these two moments, up to the third order.
+    dt = np.sqrt(0.6) * settings.duration / 2
+    later, earlier = (
+        model.sense(ideal.f_b, parameters, settings.gravity, settings.holds.moved(ideal.hold, d))
+        for d in (dt, -dt)
+    )
+    within = np.prod([np.ones(3), *(e.within_hold for e in noise_effects)], axis=0)
+    sigma = np.sqrt(12.0) * settings.sigma * within / settings.duration
+    error = sigma * rng.standard_normal(ideal.forces.shape)
+    return {
+        "slope": (later - earlier) / (2 * dt) + error,
+        "sd_slope": np.broadcast_to(sigma, ideal.forces.shape),
+    }
 
 
 def _truth(

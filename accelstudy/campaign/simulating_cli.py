@@ -27,7 +27,7 @@ from accelstudy.progress import say, stage
 _SECTIONS = {
     "What is written": ("out", "truth_path", "name", "seed"),
     "The sensor": ("model", "effects", "size", "noise_effects", "gross_errors"),
-    "Its noise": ("sigma", "sigma_unknown", "robot_sigma_mgon", "n_samples"),
+    "Its noise": ("sigma", "sigma_unknown", "robot_sigma_mgon", "n_samples", "duration"),
     "The holds": ("scheme", "repeats", "repeat_first", "order", "approach", "yaw"),
     "Their conditions": ("interval", "no_time", "temperature", "temperature_order", "vibration"),
 }
@@ -96,6 +96,7 @@ _SECTIONS = {
 @click.option("--vibration", help="Lowest and highest rms, m/s², as 0:1.")
 @click.option("--yaw", default="none", show_default=True, help="Of the holds: none or random.")
 @click.option("--samples-per-hold", "n_samples", type=int, help="Adds n_samples and their sds.")
+@click.option("--hold", "duration", type=float, help="Its seconds; adds the slopes of samples.")
 @force_option
 @quiet_option
 def simulate_campaign_command(

@@ -23,7 +23,8 @@ def slope_sigmas(segments: Sequence[Segment], step: float) -> Array:
     slope has σ = √6 σ_A(T/2) / T with the Allan deviation σ_A; for flicker noise and a random walk
     the same is right within some 10 %. σ_A is that of the samples about the line of their own hold,
     so that slopes do not count as noise, over all holds together. The line takes the slowest noise
-    with it; so only averaging times up to an eighth of a hold are used, and carried on from there.
+    with it; so of each hold only averaging times up to an eighth of it are used. What is longer is
+    known from the long holds, or carried on: the noise of a sensor is slower in a long hold.
 
     Parameters
     ----------
@@ -33,9 +34,8 @@ def slope_sigmas(segments: Sequence[Segment], step: float) -> Array:
     sums = AllanSums()
     for segment in segments:
         for record in segment.wobble:
-            sums.add(record)
-    typical = float(np.median([segment.n for segment in segments])) * step
-    curve = sums.deviation(step).up_to(typical / SHARE)
+            sums.add(record.up_to(segment.n / SHARE))
+    curve = sums.deviation(step)
     variances = np.mean([np.diag(segment.covariance) for segment in segments], axis=0)
     sigma = np.empty((len(segments), 3))
     for i, segment in enumerate(segments):

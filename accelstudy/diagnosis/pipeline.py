@@ -227,7 +227,8 @@ class _Run:
                 )
             if not self.sigma_known:
                 least = max(1e-9, least_sigma(campaign, self.approach))
-                campaign = replace(campaign, sigma_force=max(fit.sigma_position, least))
+                sigma = max(fit.sigma_position, least)
+                campaign = replace(campaign, sigma_force=sigma, slope=None, sd_slope=None)
         return solve(fit.model, fit.approach, fit.observed, fit.adjustment)
 
     @cached_property
@@ -308,7 +309,7 @@ class _Run:
 
     def noise_tests(self, setting: Setting) -> tuple[NoiseTest, ...]:
         """All tests of the noise that the campaign allows, on the residuals of a fit."""
-        residuals, campaign = setting.frame.residuals, self.campaign
+        residuals, campaign = setting.frame.residuals.positions, self.campaign
         chance = self.search.chance
         sigma = float(np.mean(residuals.sigmas[:, :3]))
         tests = []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias, overload
 
@@ -11,16 +11,15 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import Solution, root_of
 from accelstudy.diagnosis.space.residuals import Residuals, ideal_residuals, position_products
-from accelstudy.diagnosis.space.signatures import signature
-from accelstudy.diagnosis.space.spaces import Bases
+from accelstudy.diagnosis.space.signatures import Signature, signature
+from accelstudy.diagnosis.space.slopes import Slopes
+from accelstudy.diagnosis.space.spaces import VISIBLE, Bases, span
 from accelstudy.effects import Effect, Hold, effect_names, get_effect
 from accelstudy.errors import InputError
 from accelstudy.leveling import roll_pitch
 
 Array = NDArray[np.float64]
 
-VISIBLE = 3e-3
-"""An effect is invisible where the model absorbs all but this share of its signature."""
 ROUNDING = 1e-9
 """Share of a signature that may be left of nothing by rounding."""
 ALIKE = 0.9999
@@ -202,7 +201,7 @@ class Frame:
         else:
             angles = np.column_stack(roll_pitch(tuple(forces.T)))
         t = model.axes_matrix(solution.parameters[: model.n_parameters])
-        return cls(
+        frame = cls(
             solution=solution,
             residuals=Residuals.of(solution),
             ideal=ideal,
@@ -211,16 +210,56 @@ class Frame:
             angles=angles,
             hold=implied_hold(solution, angles),
         )
+        return frame.with_slopes()
+
+    def signature(self, effect: Effect, ideal: bool = False) -> Signature:
+        """Signature of an effect of the sensor, or of an ideal one."""
+        forces = self.forces if ideal else self.sensed
+        return signature(effect, forces, self.angles, self.solution.gravity, self.hold)
+
+    def with_slopes(self) -> Frame:
+        """Add the slopes within the holds, as far as they add to what the means say."""
+        slopes = Slopes.of(self.solution.observed, self.forces)
+        if slopes is None:
+            return self
+        own = [self.signature(effect) for effect in self.solution.model.effects]
+        rows = slopes.beside(self.residuals, self.solution.parameters, own, self.of_time())
+        if rows is None:
+            return self
+        return replace(
+            self,
+            residuals=self.residuals.with_slopes(rows),
+            ideal=self.ideal.with_slopes(replace(rows, errors=0 * rows.errors)),
+        )
+
+    def of_time(self) -> Iterator[Signature]:
+        """Signatures of the effects beside the model that change the output within a hold."""
+        known = {effect.name for effect in self.solution.model.effects}
+        for name in effect_names():
+            try:
+                shapes = get_effect(name).candidates(self.hold, self.forces, self.solution.gravity)
+                for shape in () if name in known else shapes:
+                    shown = self.signature(shape)
+                    if not shown.rate.any():
+                        break
+                    yield shown
+            except InputError:  # a column is absent
+                continue
 
     def hypothesis(self, effect: Effect) -> Hypothesis | None:
         """Return what an effect would leave in the residuals; None if nothing."""
         g = self.solution.gravity
-        shown = signature(effect, self.forces, self.angles, g, self.hold)
-        projected = self.ideal.project(self.ideal.whitened(shown))
-        directions, ideal = span(projected, self.ideal.size(shown, g), VISIBLE)
+        shown = self.signature(effect, ideal=True)
+        # A fit is made to the means, so they have to show the effect.
+        means = self.ideal.positions
+        projected = means.project(means.whitened(shown))
+        directions, ideal = span(projected, means.size(shown, g), VISIBLE)
         if not directions.shape[1]:
             return None
-        actual = signature(effect, self.sensed, self.angles, g, self.hold).reduced(directions)
+        if self.ideal.slopes:
+            projected = self.ideal.project(self.ideal.whitened(shown))
+            ideal = span(projected @ directions, None, ROUNDING)[1]
+        actual = self.signature(effect).reduced(directions)
         columns = self.residuals.project(self.residuals.whitened(actual))
         # A force that passes a knee at the ideal sensor may not do so along the real axes.
         sizes = np.linalg.norm(projected @ directions, axis=0)
@@ -271,27 +310,6 @@ class Setting:
         return tuple(sorted(near.items(), key=lambda item: -item[1]))
 
 
-def span(columns: Array, sizes: Array | None, tolerance: float) -> tuple[Array, Array]:
-    """What columns (m, k) span.
-
-    Parameters
-    ----------
-    columns : (m, k) array
-    sizes : (k,) array beside which the columns are seen; their own norms if None
-    tolerance : float, share of them below which a direction counts as nothing
-
-    Returns
-    -------
-    directions : (k, l) array, combinations of the columns; l is their rank
-    basis : (m, l) array, orthonormal, of their space
-    """
-    norms = np.linalg.norm(columns, axis=0) if sizes is None else sizes
-    scale = np.where(norms > 0, norms, 1.0)
-    left, values, right = np.linalg.svd(columns / scale, full_matrices=False)
-    seen = values > tolerance
-    return (right[seen] / scale).T, left[:, seen]
-
-
 def cosines(a: Array, b: Array) -> Array:
     """Canonical cosines of two spaces with orthonormal bases, descending."""
     return np.clip(np.linalg.svd(a.T @ b, compute_uv=False), 0.0, 1.0)
@@ -329,12 +347,13 @@ def setting_of(solution: Solution, names: Iterable[str] | None = None) -> Settin
             untestable[name] = str(error)
             continue
         seen = [shape for shape in shapes if shape is not None]
-        fitting = [shape for shape in seen if shape.dim < residuals.redundancy]
+        fitting = [shape for shape in seen if shape.dim < residuals.positions.redundancy]
         if fitting:
             candidates[name] = EffectShapes.of(fitting)
         elif seen:
             untestable[name] = (
-                f"its {seen[0].dim} parameters need more than the {residuals.redundancy} redundant "
+                f"its {seen[0].dim} parameters need more than the "
+                f"{residuals.positions.redundancy} redundant "
                 "conditions there are"
             )
         else:

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.diagnosis.evidence.chance import Chance
-from accelstudy.diagnosis.space.hypotheses import Frame, Setting, span
+from accelstudy.diagnosis.space.hypotheses import Frame, Setting
 from accelstudy.diagnosis.space.repeats import clusters
 from accelstudy.diagnosis.space.residuals import Residuals
-from accelstudy.diagnosis.space.signatures import Signature, signature
-from accelstudy.diagnosis.space.spaces import ABSORBED, Bases, LackOfFit, Repeats, Spaces
-from accelstudy.effects import effect_names, get_effect
+from accelstudy.diagnosis.space.signatures import Signature, rate_of, signature
+from accelstudy.diagnosis.space.spaces import (
+    ABSORBED,
+    Bases,
+    LackOfFit,
+    Repeats,
+    Spaces,
+    span,
+)
+from accelstudy.effects import Hold, effect_names, get_effect
 from accelstudy.errors import InputError
 
 Array = NDArray[np.float64]
@@ -31,9 +38,11 @@ def groups(setting: Setting) -> dict[str, Spaces]:
     residuals, hold, n = setting.frame.residuals, setting.frame.hold, len(setting.frame.forces)
     found: dict[str, Spaces] = {}
 
-    def add(name: str, change: Array) -> None:
-        """Enter a group given by changes of the sensor's output, (n, 3, k)."""
-        add_rows(name, residuals.stacked(residuals.by_observations[..., :3] @ change))
+    def add(name: str, course: Callable[[Hold], Array]) -> None:
+        """Enter a group given by changes of the sensor's output, (n, 3, k), in some holds."""
+        change = residuals.by_observations[..., :3] @ course(hold)
+        rate = None if hold.time is None else rate_of(course, hold)
+        add_rows(name, residuals.stacked(change, rate))
 
     def add_rows(name: str, rows: Array) -> None:
         projected = residuals.project(rows)
@@ -41,20 +50,12 @@ def groups(setting: Setting) -> dict[str, Spaces]:
         if 0 < basis.shape[1] < residuals.redundancy:
             found[name] = Bases(basis, np.array([basis.shape[1]]))
 
-    def per_axis(values: Array) -> Array:
-        """Regressors (n, k), separate for each axis, as changes (n, 3, 3k)."""
-        return np.einsum("nk,ab->nabk", values, np.eye(3)).reshape(n, 3, -1)
-
     for name, signatures in _signatures(setting.frame).items():
         add_rows(name, np.concatenate([residuals.whitened(s) for s in signatures], axis=1))
     if hold.time is not None and np.ptp(hold.time) > 0:
-        t = 2 * (hold.time - hold.time.min()) / np.ptp(hold.time) - 1
-        add("slow_time", per_axis(np.polynomial.legendre.legvander(t, 4)[:, 1:]))
+        add("slow_time", _slow_course(hold))
     if hold.temperature is not None and np.ptp(hold.temperature) > 0:
-        t = 2 * (hold.temperature - hold.temperature.min()) / np.ptp(hold.temperature) - 1
-        linear = per_axis(np.column_stack([t, t**2]))
-        scale = np.einsum("na,ab->nab", t[:, None] * setting.frame.forces, np.eye(3))
-        add("temperature", np.concatenate([linear, scale], axis=2))
+        add("temperature", _thermal_course(hold, setting.frame.forces))
     labels = clusters(setting.frame.forces)
     if len(np.unique(labels)) < n:
         same = LackOfFit.of(residuals, labels)
@@ -62,6 +63,39 @@ def groups(setting: Setting) -> dict[str, Spaces]:
         if 0 < repeats.dims[0] < residuals.redundancy:
             found |= {"repeat": repeats, LACK_OF_FIT: same}
     return found
+
+
+def _slow_course(hold: Hold) -> Callable[[Hold], Array]:
+    """Biases that change smoothly in the time of holds."""
+    unit = _between(hold.column("time"))
+
+    def course(at: Hold) -> Array:
+        t = unit(at.column("time"))
+        return _per_axis(np.asarray(np.polynomial.legendre.legvander(t, 4), dtype=float)[:, 1:])
+
+    return course
+
+
+def _thermal_course(hold: Hold, forces: Array) -> Callable[[Hold], Array]:
+    """Biases that change smoothly with temperature, and scales that do in proportion to it."""
+    unit = _between(hold.column("temperature"))
+
+    def course(at: Hold) -> Array:
+        t = unit(at.column("temperature"))
+        scale = np.einsum("na,ab->nab", t[:, None] * forces, np.eye(3))
+        return np.concatenate([_per_axis(np.column_stack([t, t**2])), scale], axis=2)
+
+    return course
+
+
+def _between(values: Array) -> Callable[[Array], Array]:
+    """Scale to −1 at the least of values and 1 at the largest."""
+    return lambda at: 2 * (at - values.min()) / np.ptp(values) - 1
+
+
+def _per_axis(values: Array) -> Array:
+    """Regressors (n, k), separate for each axis, as changes (n, 3, 3k)."""
+    return np.einsum("nk,ab->nabk", values, np.eye(3)).reshape(len(values), 3, -1)
 
 
 def _signatures(frame: Frame) -> dict[str, list[Signature]]:

@@ -1,8 +1,13 @@
-"""What an effect would leave in the observations: its signature, from its one definition."""
+"""What an effect would leave in the observations: its signature, from its one definition.
+
+An effect of time changes the output within a hold, too. Its rate is the derivative of the same
+definition by the time of the hold, the temperature going on as it does from hold to hold.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +15,12 @@ from numpy.typing import NDArray
 from accelstudy.effects import Effect, Hold
 
 Array = NDArray[np.float64]
+
+MOMENT = 0.01
+"""s, beside which all courses of time are straight."""
+STEADY = 0.25
+"""Deviation of a temperature from the mean of those before and after it, beside their difference,
+up to which its course is steady."""
 
 
 @dataclass(frozen=True)
@@ -20,14 +31,16 @@ class Signature:
     ----------
     force : (n, 3, k) array, of the sensor's output
     angles : (n, 2, k) array, of the robot's reading
+    rate : (n, 3, k) array, of the change of the output within a hold, per s
     """
 
     force: Array
     angles: Array
+    rate: Array
 
     def reduced(self, directions: Array) -> Signature:
         """Signature of combinations of the parameters, `directions` (k, l)."""
-        return Signature(self.force @ directions, self.angles @ directions)
+        return Signature(self.force @ directions, self.angles @ directions, self.rate @ directions)
 
 
 class _Columns:
@@ -35,8 +48,10 @@ class _Columns:
 
     def __init__(self, hold: Hold) -> None:
         self._hold = hold
+        self.used: set[str] = set()
 
     def __getattr__(self, name: str) -> Array:
+        self.used.add(name)
         return self._hold.column(name)
 
     def lagged(self, tau: float) -> Array:
@@ -63,11 +78,52 @@ def signature(effect: Effect, forces: Array, angles: Array, g: float, hold: Hold
     columns = _Columns(hold)
     f = (forces[:, 0], forces[:, 1], forces[:, 2])
     attitude = (angles[:, 0], angles[:, 1])
-    force, reading = np.zeros((n, 3, k)), np.zeros((n, 2, k))
+
+    def output(columns: _Columns) -> Array:
+        force = np.zeros((n, 3, k))
+        for j, p in enumerate(np.eye(k)):
+            for i, value in enumerate(effect.output(f, tuple(p), g, columns, np)):
+                force[:, i, j] = value
+        return force
+
+    force, reading, rate = output(columns), np.zeros((n, 2, k)), np.zeros((n, 3, k))
+    if hold.time is not None and columns.used & {"time", "temperature"}:
+        rate = rate_of(lambda moved: output(_Columns(moved)), hold)
     for j, p in enumerate(np.eye(k)):
-        for i, value in enumerate(effect.output(f, tuple(p), g, columns, np)):
-            force[:, i, j] = value
         force[:, :, j] -= forces @ np.array(effect.axes(tuple(p), np), dtype=float).T
         for i, value in enumerate(effect.reading(attitude, tuple(p), columns, np)):
             reading[:, i, j] = value
-    return Signature(force, reading)
+    return Signature(force, reading, rate)
+
+
+def rate_of(output: Callable[[Hold], Array], hold: Hold) -> Array:
+    """Rate at which what depends on the holds changes within them, per s."""
+    later, earlier = (output(_moved(hold, dt)) for dt in (MOMENT, -MOMENT))
+    return (later - earlier) / (2 * MOMENT)
+
+
+def _moved(hold: Hold, dt: float) -> Hold:
+    """Holds at another moment of each of them, s."""
+    assert hold.time is not None
+    temperature = hold.temperature
+    if temperature is not None:
+        temperature = temperature + dt * temperature_rate(hold.time, temperature)
+    return replace(hold, time=hold.time + dt, temperature=temperature)
+
+
+def temperature_rate(time: Array, temperature: Array) -> Array:
+    """Rate of the temperature within each hold, (n,), K/s, as it goes on from hold to hold.
+
+    That is honest where its course is steady. Where it is set anew between the holds, it rests
+    within them as far as anybody knows.
+    """
+    at = np.unique(time, return_index=True)[1]
+    t, values = time[at], temperature[at]
+    if len(t) < 3:
+        return np.zeros(len(time))
+    share = (t[1:-1] - t[:-2]) / (t[2:] - t[:-2])
+    between = values[:-2] + share * (values[2:] - values[:-2])
+    off, change = values[1:-1] - between, values[2:] - values[:-2]
+    if np.sum(off**2) > STEADY**2 * np.sum(change**2):
+        return np.zeros(len(time))
+    return np.interp(time, t, np.gradient(values, t))

@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 
 ABSORBED = 1e-2
 """Share of a direction that has to be left of it, or it counts as absorbed by the model."""
+VISIBLE = 3e-3
+"""An effect is invisible where the model absorbs all but this share of its signature."""
 
 
 class Spaces(Protocol):
@@ -126,3 +128,24 @@ class Repeats:
         """Squares of what residuals (..., m) have in it, (..., 1)."""
         total = np.sum(errors**2, axis=-1, keepdims=True)
         return np.maximum(total - self.lack_of_fit.parts(errors), 0.0)
+
+
+def span(columns: Array, sizes: Array | None, tolerance: float) -> tuple[Array, Array]:
+    """What columns (m, k) span.
+
+    Parameters
+    ----------
+    columns : (m, k) array
+    sizes : (k,) array beside which the columns are seen; their own norms if None
+    tolerance : float, share of them below which a direction counts as nothing
+
+    Returns
+    -------
+    directions : (k, l) array, combinations of the columns; l is their rank
+    basis : (m, l) array, orthonormal, of their space
+    """
+    norms = np.linalg.norm(columns, axis=0) if sizes is None else sizes
+    scale = np.where(norms > 0, norms, 1.0)
+    left, values, right = np.linalg.svd(columns / scale, full_matrices=False)
+    seen = values > tolerance
+    return (right[seen] / scale).T, left[:, seen]

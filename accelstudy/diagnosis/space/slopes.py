@@ -1,0 +1,169 @@
+"""The slope of |f| within each hold, as evidence for effects of time.
+
+A hold that lasts shows how the bias changes while nothing moves. Of the slope of the samples only
+the part along gravity is taken: it is the rate of |f|, which no turning of the sensor changes, and
+real holds do turn. Beside a smooth course over the session the slopes show how far they scatter
+themselves. They often do so by more than their standard deviations say.
+
+One row for each hold would be many rows that tell nothing: for a change over the whole session the
+means of the holds know more than the slopes within them, by the square of its length over that of a
+hold. So only those combinations become rows of the residual space that add to what the means say of
+an effect of time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtr, chdtri
+
+from accelstudy.adjustment import Observations
+from accelstudy.adjustment.quality import column_basis
+from accelstudy.diagnosis.space.residuals import Residuals, SlopeRows
+from accelstudy.diagnosis.space.signatures import Signature
+from accelstudy.diagnosis.space.spaces import VISIBLE, span
+
+Array = NDArray[np.float64]
+
+FREEDOM = 6
+"""Slopes beyond those that a smooth course takes up, which tell how far they scatter, at least."""
+MOVED = 4.0
+"""Standard deviations beyond which a hold moved, and its slope tells nothing of the sensor."""
+ALONE = 0.8
+"""Share of a slope that a smooth course takes up, beyond which no other slope controls it."""
+DOUBT = 1.0
+"""By how much the variance of a slope is larger, beside 1, that no other controls: a long hold has
+slower noise than the others, and its standard deviation is carried on from theirs."""
+WORTH = 0.1
+"""Part of what the means say of an effect that a combination of slopes adds at least."""
+APART = 0.3
+"""Length of what is left of a combination beside the others, or it is one of them."""
+SHARE = 0.25
+"""Rows of slopes beside the redundancy of the means, at most: the slopes have a level of their own,
+and must not tell that of the means."""
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """Slopes of |f| within n holds, of unit weight.
+
+    Attributes
+    ----------
+    values : (n,) array; zero where a hold moved
+    by_rate : (n, 3) array, their derivatives by the rates of the output, likewise
+    variance : float, by which they scatter more than they say, at least 1
+    """
+
+    values: Array
+    by_rate: Array
+    variance: float
+
+    @classmethod
+    def of(cls, observed: Observations, forces: Array) -> Slopes | None:
+        """Slopes of one session with forces (n, 3); None where they cannot be judged."""
+        time = None if observed.hold is None else observed.hold.time
+        slope, sd = observed.slope, observed.sd_slope
+        if slope is None or sd is None or time is None or np.ptp(time) == 0:
+            return None
+        along = forces / np.linalg.norm(forces, axis=1, keepdims=True)
+        sigma = np.sqrt(np.sum((along * sd) ** 2, axis=1))
+        told = sigma > 0
+        by_rate = np.where(told[:, None], along / np.where(told, sigma, 1.0)[:, None], 0.0)
+        values = np.sum(by_rate * slope, axis=1)
+        course = smooth_course(time, by_rate)
+        if np.count_nonzero(told) < course.shape[1] + FREEDOM:
+            return None
+        basis = np.linalg.qr(course)[0]
+        taken = np.sum(basis**2, axis=1)
+        left = values - basis @ (basis.T @ values)
+        shown = told & (taken < ALONE)
+        squares = left**2 / np.where(shown, 1 - taken, 1.0)
+        variance = max(1.0, trimmed_mean_square(squares[shown]))
+        moved = shown & (squares > MOVED**2 * variance)
+        weight = np.where(moved, 0.0, 1 / np.sqrt(variance * (1 + DOUBT * taken)))
+        return cls(values * weight, by_rate * weight[:, None], variance)
+
+    def rows(self, rate: Array) -> Array:
+        """What rates of the output (n, 3, k) do to the slopes, (n, k)."""
+        return np.asarray(np.einsum("na,nak->nk", self.by_rate, rate))
+
+    def beside(
+        self,
+        residuals: Residuals,
+        parameters: Array,
+        own: Sequence[Signature],
+        others: Iterable[Signature],
+    ) -> SlopeRows | None:
+        """Combinations of slopes that add to what the means say; None if there is none.
+
+        Parameters
+        ----------
+        residuals : Residuals, of the means
+        parameters : (u,) array, of the fit
+        own : signatures of the effects of the model, in the order of its parameters
+        others : signatures of effects that may be missing and change the output within a hold
+        """
+        design, ends = residuals.design, np.cumsum([0, *(s.rate.shape[2] for s in own)])
+        by_model = np.zeros((len(self.values), design.shape[1]))
+        by_model[:, : ends[-1]] = -np.concatenate([self.rows(s.rate) for s in own], axis=1)
+        seen = []
+        for first, end in pairwise(ends):
+            if by_model[:, first:end].any():
+                rest = column_basis(np.delete(design, np.s_[first:end], axis=1))
+                columns = design[:, first:end]
+                means = columns - rest @ (rest.T @ columns)
+                seen.append((means, by_model[:, first:end], np.linalg.norm(columns, axis=0)))
+        for shown in others:
+            rows = residuals.whitened(shown)
+            means = residuals.project(rows)
+            seen.append((means, self.rows(shown.rate), np.linalg.norm(rows, axis=0)))
+        chosen = telling(seen, int(SHARE * residuals.redundancy))
+        if not chosen.size:
+            return None
+        by_model = chosen.T @ by_model
+        return SlopeRows(
+            rates=np.einsum("nq,na->qna", chosen, self.by_rate),
+            design=by_model,
+            errors=chosen.T @ self.values + by_model @ parameters,
+        )
+
+
+def smooth_course(time: Array, by_rate: Array) -> Array:
+    """What smooth changes of the biases do to slopes: even, ever faster or slower, and at first."""
+    t = (time - time.min()) / np.ptp(time)
+    functions = np.column_stack([np.ones_like(t), t, np.exp(-t / 0.1)])
+    return np.asarray(np.einsum("nk,na->nka", functions, by_rate).reshape(len(t), -1))
+
+
+def trimmed_mean_square(squares: Array) -> float:
+    """Variance of normal numbers by their squares (k,), of which the largest may be anything."""
+    kept = np.sort(squares)[: len(squares) - len(squares) // 10 - 1]
+    limit = chdtri(1, 1 - len(kept) / len(squares))
+    usual = chdtr(3, limit) / chdtr(1, limit)
+    return float(np.mean(kept) / usual)
+
+
+def telling(seen: Sequence[tuple[Array, Array, Array]], most: int) -> Array:
+    """Combinations of slopes that add to what the means say of effects, (n, q), orthonormal.
+
+    Parameters
+    ----------
+    seen : sequence of (m, l), (n, l) and (l,) arrays, for each effect what it does to the means
+        beside the model, and to the slopes, of unit weight, and its size in the means
+    most : int
+    """
+    found = [np.zeros((0, 0))]
+    for means, slopes, size in seen:
+        directions = span(means, size, VISIBLE)[0]
+        shown = np.linalg.norm(means @ directions, axis=0)
+        left, ratio, _ = np.linalg.svd(slopes @ directions / shown, full_matrices=False)
+        worth = ratio**2 > WORTH
+        found.append(left[:, worth] * np.minimum(ratio[worth], 1.0))
+    if len(found) == 1:
+        return found[0]
+    left, length, _ = np.linalg.svd(np.concatenate(found[1:], axis=1), full_matrices=False)
+    return np.asarray(left[:, length > APART][:, :most])
