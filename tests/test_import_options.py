@@ -7,6 +7,7 @@ from test_import_campaign import XSENS, call
 from test_import_holds import RATE, G, session, shared, write
 
 from accelstudy.campaign import segmentation_figure
+from accelstudy.campaign.allan import allan_moments
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.import_options import files_of
 from accelstudy.campaign.importing import (
@@ -19,6 +20,8 @@ from accelstudy.campaign.importing import (
 )
 from accelstudy.campaign.layout import LogLayout
 from accelstudy.campaign.logs import open_log
+from accelstudy.campaign.segments import Moments, Segment
+from accelstudy.campaign.slopes import slope_sigmas
 from accelstudy.errors import InputError
 from accelstudy.frames import parse_frame
 from accelstudy.leveling import specific_force
@@ -210,6 +213,32 @@ def test_slopes_are_as_well_known_as_they_say(tmp_path, colour):
     z = (campaign.slope - 0.002) / campaign.sd_slope
     assert np.std(z) == pytest.approx(1, abs=0.25)
     assert abs(np.mean(z)) < 3 / np.sqrt(z.size)
+
+
+def test_the_slope_of_a_long_hold_is_no_better_known_than_it_is():
+    """Flicker noise does not fall any further in a long first hold among short ones."""
+    first = []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        ends = np.cumsum([2400, *[200] * 23])
+        frequency = np.maximum(np.fft.rfftfreq(ends[-1]), 1 / ends[-1])
+        spectrum = np.fft.rfft(rng.standard_normal((ends[-1], 3)), axis=0)
+        flicker = np.fft.irfft(spectrum / np.sqrt(frequency)[:, None], ends[-1], axis=0)
+        samples = rng.standard_normal(flicker.shape) + 0.1 * flicker
+        segments = []
+        for forces in np.split(samples, ends[:-1]):
+            time = np.arange(len(forces)) / RATE
+            moments = Moments.of(np.column_stack([time, forces]))
+            slope = moments.products[0, 1:] / moments.products[0, 0]
+            line = (time - time.mean())[:, None] * slope
+            segments.append(
+                Segment(
+                    *(0, len(forces), 0.0, time[-1], moments, np.zeros((3, 0))),
+                    (allan_moments(forces),), (allan_moments(forces - line),),
+                )
+            )  # fmt: skip
+        first.append(segments[0].slope / slope_sigmas(segments, 1 / RATE)[0])
+    assert np.sqrt(np.mean(np.square(first))) < 2
 
 
 # --- What was never still ------------------------------------------------------------------------

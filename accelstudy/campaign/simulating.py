@@ -106,8 +106,12 @@ class CampaignSettings:
             if (value := getattr(self, key)) is not None:
                 allowed.check_key(key, value)
         bounds.SIGMA_ANGLE.check_key("sigma_angle", self.sigma_angle / MGON)
-        if self.duration is not None and (self.n_samples is None or self.interval is None):
-            raise InputError("duration: needs n_samples and the interval between holds")
+        if self.duration is not None and self.n_samples is None:
+            raise InputError("duration: slopes need n_samples, too")
+        if self.duration is not None and self.duration > (self.interval or 0.0):
+            raise InputError(
+                f"duration: {self.duration:g} s are more than the interval between holds"
+            )
         n = self.repeats * get_scheme(self.scheme).n_positions + self.repeat_first
         bounds.POSITIONS.check_key("repeats: number of positions", n)
 

@@ -97,9 +97,13 @@ def signature(effect: Effect, forces: Array, angles: Array, g: float, hold: Hold
 
 
 def rate_of(output: Callable[[Hold], Array], hold: Hold) -> Array:
-    """Rate at which what depends on the holds changes within them, per s."""
-    later, earlier = (output(_moved(hold, dt)) for dt in (MOMENT, -MOMENT))
-    return (later - earlier) / (2 * MOMENT)
+    """Rate at which what depends on the holds changes within them, per s; a jump has none."""
+
+    def difference(dt: float) -> Array:
+        return (output(_moved(hold, dt)) - output(_moved(hold, -dt))) / (2 * dt)
+
+    rate = difference(MOMENT)
+    return np.where(np.isclose(rate, difference(2 * MOMENT), rtol=1e-3), rate, 0.0)
 
 
 def _moved(hold: Hold, dt: float) -> Hold:

@@ -33,6 +33,8 @@ FREEDOM = 6
 """Slopes beyond those that a smooth course takes up, which tell how far they scatter, at least."""
 MOVED = 4.0
 """Standard deviations beyond which a hold moved, and its slope tells nothing of the sensor."""
+TENTH = 10
+"""One of so many holds, and one more, may have moved."""
 ALONE = 0.8
 """Share of a slope that a smooth course takes up, beyond which no other slope controls it."""
 DOUBT = 1.0
@@ -75,16 +77,18 @@ class Slopes:
         by_rate = np.where(told[:, None], along / np.where(told, sigma, 1.0)[:, None], 0.0)
         values = np.sum(by_rate * slope, axis=1)
         course = smooth_course(time, by_rate)
-        if np.count_nonzero(told) < course.shape[1] + FREEDOM:
+        freedom = np.count_nonzero(told) - course.shape[1]
+        if freedom < FREEDOM:
             return None
-        basis = np.linalg.qr(course)[0]
-        taken = np.sum(basis**2, axis=1)
-        left = values - basis @ (basis.T @ values)
-        shown = told & (taken < ALONE)
-        squares = left**2 / np.where(shown, 1 - taken, 1.0)
-        variance = max(1.0, trimmed_mean_square(squares[shown]))
-        moved = shown & (squares > MOVED**2 * variance)
-        weight = np.where(moved, 0.0, 1 / np.sqrt(variance * (1 + DOUBT * taken)))
+        for _ in range(1 + len(values) // TENTH):
+            taken, squares = about(course, values)
+            shown = told & (taken < ALONE)
+            variance = max(1.0, trimmed_mean_square(squares[shown]))
+            worst = int(np.argmax(np.where(shown, squares, 0.0)))
+            if squares[worst] <= MOVED**2 * variance:
+                break
+            values[worst], by_rate[worst], course[worst], told[worst] = 0.0, 0.0, 0.0, False
+        weight = 1 / np.sqrt(variance * (1 + DOUBT * taken))
         return cls(values * weight, by_rate * weight[:, None], variance)
 
     def rows(self, rate: Array) -> Array:
@@ -139,10 +143,18 @@ def smooth_course(time: Array, by_rate: Array) -> Array:
     return np.asarray(np.einsum("nk,na->nka", functions, by_rate).reshape(len(t), -1))
 
 
+def about(course: Array, values: Array) -> tuple[Array, Array]:
+    """Share of each of values (n,) that a course (n, k) takes up, and squares of what it leaves."""
+    basis = np.linalg.qr(course)[0]
+    taken = np.sum(basis**2, axis=1)
+    left = values - basis @ (basis.T @ values)
+    return taken, left**2 / np.maximum(1 - taken, 1 - ALONE)
+
+
 def trimmed_mean_square(squares: Array) -> float:
     """Variance of normal numbers by their squares (k,), of which the largest may be anything."""
-    kept = np.sort(squares)[: len(squares) - len(squares) // 10 - 1]
-    limit = chdtri(1, 1 - len(kept) / len(squares))
+    kept = np.sort(squares)[: len(squares) - len(squares) // TENTH - 1]
+    limit = chdtri(1, 1 - (len(kept) + 0.5) / (len(squares) + 0.5))
     usual = chdtr(3, limit) / chdtr(1, limit)
     return float(np.mean(kept) / usual)
 
