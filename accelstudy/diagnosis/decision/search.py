@@ -35,7 +35,7 @@ from accelstudy.diagnosis.space.hypotheses import (
     setting_of,
 )
 from accelstudy.diagnosis.space.location import groups
-from accelstudy.diagnosis.space.residuals import Residuals, most_rows
+from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.spaces import Spaces
 from accelstudy.errors import InputError
 from accelstudy.models import composition_name
@@ -118,7 +118,7 @@ class Search:
     @cached_property
     def chance(self) -> Chance:
         """Residuals without any effect."""
-        return Chance(self.seed, most_rows(self.first))
+        return Chance(self.seed, len(self.first.design))
 
     @cached_property
     def axes(self) -> NoiseTest:

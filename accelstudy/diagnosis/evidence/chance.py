@@ -19,6 +19,8 @@ AT_ONCE = 500_000
 """Numbers that are drawn at once; all sets of very many positions together would not fit."""
 
 
+SLOPES = 1
+"""Sets what is drawn for the slopes apart from all else that is drawn from the same seed."""
 KEPT = 16_000_000
 """Numbers that are kept; more are drawn again."""
 
@@ -32,7 +34,7 @@ class Chance:
     Parameters
     ----------
     seed : SeedSequence
-    conditions : int, of the fit with the most
+    conditions : int, of the positions in the fit with the most
     simulations : int
     """
 
@@ -60,9 +62,15 @@ class Chance:
 
     def errors(self, residuals: Residuals) -> Iterator[Array]:
         """Yield residuals of a fit, (b, m) each, all simulations one after the other."""
-        m = len(residuals.design)
+        m = len(residuals.positions.design)
+        key = (*self.seed.spawn_key, SLOPES)
+        rng = np.random.default_rng(np.random.SeedSequence(self.seed.entropy, spawn_key=key))
         for drawn in track(self.kept or self.noise(), "null simulation", len(self.counts)):
             noise = drawn[:, :m]
+            if residuals.slopes:
+                # From a stream of their own, so that the positions have the same draws as ever.
+                slopes = rng.standard_normal((len(noise), residuals.slopes))
+                noise = np.concatenate([noise, slopes], axis=1)
             yield noise - (noise @ residuals.absorbed) @ residuals.absorbed.T
 
     def statistic(self, residuals: Residuals, function: Callable[[Array], Array]) -> Array:

@@ -172,12 +172,6 @@ class Residuals:
         return np.asarray(rows - self.absorbed @ (self.absorbed.T @ rows))
 
 
-def most_rows(solution: Solution) -> int:
-    """Rows that the residual space of a fit has at most: with a slope for each hold."""
-    m = len(solution.design)
-    return m if solution.observed.slope is None else m + len(solution.observed.slope)
-
-
 def position_products(
     errors: Array, matrices: Array, places: NDArray[np.int_] | None = None
 ) -> list[Array]:
