@@ -87,7 +87,8 @@ class HoldPlan:
         if temperature is not None and self.temperature_order == "linear":
             span = max(float(np.ptp(hold.time)), dt)
             temperature = temperature + dt / span * (temperature[-1] - temperature[0])
-        return replace(hold, time=hold.time + dt, temperature=temperature)
+        same = hold.take(np.arange(len(hold.time)))  # with the course of the whole session
+        return replace(same, time=hold.time + dt, temperature=temperature)
 
     def use(self, forces: Array, n: int) -> Hold:
         """Return conditions in which a sensor is used that was calibrated in n positions.

@@ -11,7 +11,7 @@ from accelstudy.diagnosis.evidence.chance import Chance
 from accelstudy.diagnosis.space.hypotheses import Frame, Setting
 from accelstudy.diagnosis.space.repeats import clusters
 from accelstudy.diagnosis.space.residuals import Residuals
-from accelstudy.diagnosis.space.signatures import Signature, rate_of, signature
+from accelstudy.diagnosis.space.signatures import Moment, Signature, rate_of, signature
 from accelstudy.diagnosis.space.spaces import (
     ABSORBED,
     Bases,
@@ -38,9 +38,9 @@ def groups(setting: Setting) -> dict[str, Spaces]:
     residuals, hold, n = setting.frame.residuals, setting.frame.hold, len(setting.frame.forces)
     found: dict[str, Spaces] = {}
 
-    def add(name: str, course: Callable[[Hold], Array]) -> None:
+    def add(name: str, course: Callable[[Moment], Array]) -> None:
         """Enter a group given by changes of the sensor's output, (n, 3, k), in some holds."""
-        change = residuals.by_observations[..., :3] @ course(hold)
+        change = residuals.by_observations[..., :3] @ course(Moment(hold))
         rate = None if hold.time is None else rate_of(course, hold)
         add_rows(name, residuals.stacked(change, rate))
 
@@ -65,23 +65,23 @@ def groups(setting: Setting) -> dict[str, Spaces]:
     return found
 
 
-def _slow_course(hold: Hold) -> Callable[[Hold], Array]:
+def _slow_course(hold: Hold) -> Callable[[Moment], Array]:
     """Biases that change smoothly in the time of holds."""
     unit = _between(hold.column("time"))
 
-    def course(at: Hold) -> Array:
-        t = unit(at.column("time"))
+    def course(at: Moment) -> Array:
+        t = unit(at.time)
         return _per_axis(np.asarray(np.polynomial.legendre.legvander(t, 4), dtype=float)[:, 1:])
 
     return course
 
 
-def _thermal_course(hold: Hold, forces: Array) -> Callable[[Hold], Array]:
+def _thermal_course(hold: Hold, forces: Array) -> Callable[[Moment], Array]:
     """Biases that change smoothly with temperature, and scales that do in proportion to it."""
     unit = _between(hold.column("temperature"))
 
-    def course(at: Hold) -> Array:
-        t = unit(at.column("temperature"))
+    def course(at: Moment) -> Array:
+        t = unit(at.temperature)
         scale = np.einsum("na,ab->nab", t[:, None] * forces, np.eye(3))
         return np.concatenate([_per_axis(np.column_stack([t, t**2])), scale], axis=2)
 

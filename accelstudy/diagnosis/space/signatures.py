@@ -7,7 +7,7 @@ definition by the time of the hold, the temperature going on as it does from hol
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,19 +43,39 @@ class Signature:
         return Signature(self.force @ directions, self.angles @ directions, self.rate @ directions)
 
 
-class _Columns:
-    """The columns of a `Hold`; one that is absent raises `InputError` when a formula uses it."""
+class Moment:
+    """The columns of a `Hold` at some moment of each hold.
 
-    def __init__(self, hold: Hold) -> None:
-        self._hold = hold
+    One that is absent raises `InputError` when a formula uses it.
+
+    Parameters
+    ----------
+    hold : Hold
+    dt : float, s, after the middle of each hold
+    """
+
+    def __init__(self, hold: Hold, dt: float = 0.0) -> None:
+        self._hold, self._dt = hold, dt
         self.used: set[str] = set()
 
     def __getattr__(self, name: str) -> Array:
         self.used.add(name)
-        return self._hold.column(name)
+        values = self._hold.column(name)
+        if self._dt == 0:
+            return values
+        if name == "time":
+            return values + self._dt
+        if name == "temperature":
+            return values + self._dt * temperature_rate(self._hold.column("time"), values)
+        return values
 
     def lagged(self, tau: float) -> Array:
-        return self._hold.lagged(tau)
+        """Temperature behind a lag, which follows from the difference of the two."""
+        if tau == 0:
+            return self.temperature
+        self.used.add("temperature")
+        behind = self._hold.lagged(tau)
+        return behind + self._dt * (self._hold.column("temperature") - behind) / tau
 
 
 def signature(effect: Effect, forces: Array, angles: Array, g: float, hold: Hold) -> Signature:
@@ -75,44 +95,35 @@ def signature(effect: Effect, forces: Array, angles: Array, g: float, hold: Hold
         If the effect needs a column that the holds lack.
     """
     n, k = len(forces), len(effect.parameters)
-    columns = _Columns(hold)
+    now = Moment(hold)
     f = (forces[:, 0], forces[:, 1], forces[:, 2])
     attitude = (angles[:, 0], angles[:, 1])
 
-    def output(columns: _Columns) -> Array:
+    def output(at: Moment) -> Array:
         force = np.zeros((n, 3, k))
         for j, p in enumerate(np.eye(k)):
-            for i, value in enumerate(effect.output(f, tuple(p), g, columns, np)):
+            for i, value in enumerate(effect.output(f, tuple(p), g, at, np)):
                 force[:, i, j] = value
         return force
 
-    force, reading, rate = output(columns), np.zeros((n, 2, k)), np.zeros((n, 3, k))
-    if hold.time is not None and columns.used & {"time", "temperature"}:
-        rate = rate_of(lambda moved: output(_Columns(moved)), hold)
+    force, reading, rate = output(now), np.zeros((n, 2, k)), np.zeros((n, 3, k))
+    if hold.time is not None and now.used & {"time", "temperature"}:
+        rate = rate_of(output, hold)
     for j, p in enumerate(np.eye(k)):
         force[:, :, j] -= forces @ np.array(effect.axes(tuple(p), np), dtype=float).T
-        for i, value in enumerate(effect.reading(attitude, tuple(p), columns, np)):
+        for i, value in enumerate(effect.reading(attitude, tuple(p), now, np)):
             reading[:, i, j] = value
     return Signature(force, reading, rate)
 
 
-def rate_of(output: Callable[[Hold], Array], hold: Hold) -> Array:
+def rate_of(output: Callable[[Moment], Array], hold: Hold) -> Array:
     """Rate at which what depends on the holds changes within them, per s; a jump has none."""
 
     def difference(dt: float) -> Array:
-        return (output(_moved(hold, dt)) - output(_moved(hold, -dt))) / (2 * dt)
+        return (output(Moment(hold, dt)) - output(Moment(hold, -dt))) / (2 * dt)
 
     rate = difference(MOMENT)
     return np.where(np.isclose(rate, difference(2 * MOMENT), rtol=1e-3), rate, 0.0)
-
-
-def _moved(hold: Hold, dt: float) -> Hold:
-    """Holds at another moment of each of them, s."""
-    assert hold.time is not None
-    temperature = hold.temperature
-    if temperature is not None:
-        temperature = temperature + dt * temperature_rate(hold.time, temperature)
-    return replace(hold, time=hold.time + dt, temperature=temperature)
 
 
 def temperature_rate(time: Array, temperature: Array) -> Array:
