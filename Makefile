@@ -23,7 +23,7 @@ export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: help env test smoke reproduce report campaigns diagnose-example hidden-effects lint lock clean
+.PHONY: help env test smoke reproduce report campaigns diagnose-example hidden-effects hidden-docs lint lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-18s%s\n", $$1, $$2 }' Makefile
@@ -54,6 +54,13 @@ diagnose-example: $(READY) ## simulate a campaign with a hidden effect, find it,
 
 hidden-effects: $(READY) ## study how well the diagnosis finds what is hidden
 	snakemake --cores $(CORES) --snakefile workflow/hidden.smk --configfile $(HIDDEN)
+
+# Of the study as it stands in config/, whatever HIDDEN is.
+hidden-docs: $(READY) ## study hidden effects, and take score and figures into docs
+	$(MAKE) hidden-effects HIDDEN=config/hidden-effects.yaml
+	cp results/hidden-effects/score.md docs/hidden-effects-score.md
+	for name in alarms naming methods sets calibration confusion outside limits; do \
+	  cp results/hidden-effects/figures/$$name.png docs/figures/hidden-$$name.png; done
 
 lint: $(READY) ## check style, types and the workflow
 	ruff check

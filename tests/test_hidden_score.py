@@ -34,13 +34,13 @@ def truth(set_, classes=(), size=np.nan, oracle=None, **more):
     }  # fmt: skip
 
 
-def answer(verdict, *found, among=(), **more):
+def answer(verdict, *found, among=(), place=None, **more):
     """A row of the table of outcomes; the set is what was found at 0.8, and more at 0.15 each."""
     explanations = [] if verdict == "no_effect" else [(list(found) or ["unknown"], 0.8)]
     explanations += [(names, 0.15) for names in among]
     return {
         "verdict": verdict, "found": json.dumps(found), "specs": "[]", "found_classes": "[]",
-        "positions": "[]", "posteriors": "[]",
+        "positions": json.dumps([place] + [None] * (len(found) - 1)), "posteriors": "[]",
         "credible_set": json.dumps(
             [{"names": n, "classes": [[i] for i in n], "posterior": p} for n, p in explanations]
         ),
@@ -52,6 +52,8 @@ def answer(verdict, *found, among=(), **more):
 
 GIVEN_AWAY = {"verdict": None, "found": None, "credible_set": None, "confirmed": None}
 """What there is of a diagnosis that failed."""
+
+BUMPED = {"gross_name": "outlier_position", "gross": '{"settings": {"position": 7.0}}'}
 
 CASES = [
     *[(truth("null", sigma=s), answer("no_effect")) for s in ("given", "not given")] * 19,
@@ -72,6 +74,8 @@ CASES = [
     (truth("outside", size=150.0, what="fifth"), answer("narrowed", "settling")),
     (truth("gross", gross_name="axis_error"), answer("gross_error", "axis_error", "bias_drift")),
     (truth("gross", gross_name="row_order"), answer("unknown")),
+    (truth("gross", **BUMPED), answer("gross_error", "outlier_position", place=7)),
+    (truth("gross", **BUMPED), answer("gross_error", "outlier_position", place=8)),
 ]  # fmt: skip
 
 
@@ -97,6 +101,9 @@ def tables(parts):
     known = [{"what": what, **limit} for what in ("bias_drift", "quadratic_scale")]
     shuffled = parts["outcomes"].sample(frac=1, random_state=1)
     return score_tables(parts["truths"], shuffled, answers, pd.DataFrame(known))
+
+
+ORIGIN = {"config_hash": "0123", "seed": 5, "version": "1.2", "commit": "abcdef012345+"}
 
 
 def target(tables, figure, cases=""):
@@ -137,7 +144,8 @@ def test_names_are_right_in_any_order_and_each_for_another_effect():
         ("named or narrowed wrongly", "never in the catalogue", 1, 1, "no"),
         ("named or narrowed wrongly", "family taken out", 0, 1, "yes"),
         ("confirmed", "nothing missing", None, None, "no"),
-        ("recognised", "gross errors", 1 / 2, 2, "no"),
+        # A bumped hold is recognised where it is.
+        ("recognised", "gross errors", 2 / 4, 4, "no"),
     ],
 )
 def test_targets(tables, figure, cases, measured, n, met):
@@ -232,7 +240,8 @@ def test_limits(tables):
 
 def test_a_page_with_every_target_and_every_error(tables):
     seconds = pd.DataFrame({"seconds": [0.1, 0.2, 0.3]})
-    page = score_page(tables, seconds, "0123")
+    page = score_page(tables, seconds, ORIGIN)
+    assert "configuration `0123`, seed 5, accelstudy 1.2, commit `abcdef0123`" in page
     for row in tables["targets"].to_dict("records"):
         assert f"| {row['figure']} | {row['cases']} | {row['wanted']} |" in page
     assert "| refused | 1 |" in page

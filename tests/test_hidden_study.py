@@ -10,10 +10,12 @@ import accelstudy
 from accelstudy.effects import effect_names, effects_without
 from accelstudy.errors import InputError
 from accelstudy.hidden import run
+from accelstudy.hidden.baselines import METHODS
 from accelstudy.hidden.cells import Cell, chunks, number_of_chunks, planned, study_cells, write_plan
-from accelstudy.hidden.config import parse_hidden
+from accelstudy.hidden.config import SETS, parse_hidden
+from accelstudy.hidden.figures import figures
 from accelstudy.hidden.physics import Case
-from accelstudy.hidden.tables import KEY
+from accelstudy.hidden.tables import KEY, TABLES
 from accelstudy.study.config import overlay, read_layer
 from accelstudy.study.provenance import code_hash
 from accelstudy.study.tables import read_table
@@ -157,6 +159,29 @@ def test_a_family_that_is_taken_out():
     with effects_without(cell.removed):
         assert not {"bias_drift", "warm_up"} & set(effect_names())
     assert {"bias_drift", "warm_up"} <= set(effect_names())
+
+
+# --- the documents --------------------------------------------------------------------------------
+
+
+def test_the_score_in_the_documents_is_that_of_the_study():
+    """Of this configuration and, where the study was run here, of this very run."""
+    path = ROOT / "docs/hidden-effects-score.md"
+    if not path.exists():
+        pytest.skip("docs/hidden-effects-score.md is not written yet (make hidden-docs)")
+    text = path.read_text(encoding="utf-8")
+    config = parse_hidden(read_layer(ROOT / "config/hidden-effects.yaml"))
+    assert f"configuration `{config.fingerprint}`, seed {config.seed}" in text
+    made = ROOT / "results/hidden-effects/score.md"
+    assert not made.exists() or made.read_text(encoding="utf-8") == text
+
+
+def test_the_documents_name_every_figure_set_and_method():
+    text = (ROOT / "docs/hidden-effects.md").read_text(encoding="utf-8")
+    make = (ROOT / "Makefile").read_text(encoding="utf-8")
+    for name in (*figures({}), *SETS, *METHODS, *TABLES):
+        assert f"| `{name}` |" in text
+    assert f"for name in {' '.join(figures({}))};" in make
 
 
 # --- jobs ----------------------------------------------------------------------------------------

@@ -63,7 +63,6 @@ def _judged(row: dict[Any, Any]) -> dict[str, Any]:
     answered = ok and row["verdict"] in EFFECTS_GIVEN
     right = answered and same_effects(found, true)
     correct = answered and all_true(found, true)
-    gross = row["gross_name"]
     return {
         "ok": ok,
         "alarm": ok and row["verdict"] != "no_effect",
@@ -71,11 +70,20 @@ def _judged(row: dict[Any, Any]) -> dict[str, Any]:
         "right": right,
         "wrong": answered and not correct,
         "one_of_two": correct and not right,
-        # A gross error that ends a diagnosis is one that it did not recognise.
-        "recognised": row["verdict"] == "gross_error" and [gross] in found if gross else None,
+        "recognised": _recognised(row) if row["gross_name"] else None,
         **_judged_set(json.loads(row["credible_set"]) if ok else [], true),
         **_judged_oracle(row, true),
     }
+
+
+def _recognised(row: dict[Any, Any]) -> bool:
+    """Whether a gross error was; one that ended the diagnosis was not."""
+    if row["error"] or row["verdict"] != "gross_error":
+        return False
+    places = dict(zip(json.loads(row["found"]), json.loads(row["positions"]), strict=True))
+    true = json.loads(row["gross"]).get("settings", {}).get("position")
+    name = row["gross_name"]
+    return name in places and (true is None or places[name] == true)
 
 
 def _judged_set(explanations: Sequence[dict[str, Any]], true: Sequence[Class]) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,37 +14,40 @@ from accelstudy.study.report import number
 Tables = Mapping[str, pd.DataFrame]
 
 
-def score_page(tables: Tables, seconds: pd.DataFrame, fingerprint: str) -> str:
+def score_page(tables: Tables, seconds: pd.DataFrame, origin: Mapping[str, Any]) -> str:
     """Write the score as tables in Markdown.
 
     Parameters
     ----------
     tables : those of `accelstudy.hidden.tables.TABLES`
     seconds : DataFrame, processor time of each diagnosis
-    fingerprint : str, of the configuration
+    origin : see `accelstudy.study.tables.origin`
     """
     campaigns = tables["campaigns"]
     each = seconds["seconds"]
     parts = [
-        f"{len(campaigns)} campaigns, configuration `{fingerprint}`. A diagnosis took "
-        f"{number(float(each.median()))} s of processor time (median; 95 % of them below "
-        f"{number(float(each.quantile(0.95)))} s).",
-        "### Targets",
+        "# Score of the study of hidden effects",
+        "Written by `make hidden-effects`, not by hand; hidden-effects.md explains it.",
+        f"{len(campaigns)} campaigns, configuration `{origin['config_hash']}`, seed "
+        f"{origin['seed']}, accelstudy {origin['version']}, commit `{origin['commit'][:10]}`. A "
+        f"diagnosis took {number(float(each.median()))} s of processor time (median; 95 % of them "
+        f"below {number(float(each.quantile(0.95)))} s).",
+        "## Targets",
         target_table(tables["targets"]),
-        "### One effect, over its size",
+        "## One effect, over its size",
         size_table(tables["shares"]),
-        "### Verdicts",
+        "## Verdicts",
         verdict_table(tables["shares"]),
-        "### Simpler methods on the same campaigns",
+        "## Simpler methods on the same campaigns",
         method_table(tables["baselines"]),
-        "### Confirmed: how far the residuals shrink",
+        "## Confirmed: how far the residuals shrink",
         shrink_table(campaigns),
-        "### Each effect",
+        "## Each effect",
         effect_table(tables["shares"], tables["limits"]),
     ]
     failed = campaigns[~campaigns["ok"].astype(bool)]
     if len(failed):
-        parts += ["### Without an answer", failure_table(failed)]
+        parts += ["## Without an answer", failure_table(failed)]
     return "\n\n".join(parts) + "\n"
 
 

@@ -14,7 +14,7 @@ from accelstudy.hidden.page import score_page
 from accelstudy.hidden.score import score_tables
 from accelstudy.hidden.tables import TABLES
 from accelstudy.outputs import whole_file
-from accelstudy.study.tables import read_table, write_table
+from accelstudy.study.tables import origin, read_table, write_table
 
 PARTS = ("truths", "outcomes", "baselines", "seconds")
 """Tables that the chunks write."""
@@ -44,7 +44,7 @@ def write_score(
     folder = Path(outputs["figures"])
     folder.mkdir(parents=True, exist_ok=True)
     save_all(figures(tables), folder)
-    page = score_page(tables, parts["seconds"], config.fingerprint)
+    page = score_page(tables, parts["seconds"], origin(provenance))
     with whole_file(outputs["page"]) as path:
         path.write_text(page, encoding="utf-8")
     return page
