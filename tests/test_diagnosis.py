@@ -20,9 +20,7 @@ from accelstudy.campaign.fit import fit_campaign
 from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign
 from accelstudy.campaign.verdict import ACCEPTED, REJECTED, state
 from accelstudy.cli import main
-from accelstudy.diagnosis.evidence.screening import p_of_share, screen, shares
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.space.spaces import Bases
 from accelstudy.diagnosis.worth import gap
 from accelstudy.models import compose, get_model
 
@@ -49,40 +47,6 @@ def names(diagnosis):
 
 
 # --- statistics ----------------------------------------------------------------------------------
-
-
-def test_one_basis_is_tested_by_f():
-    rng = np.random.default_rng(1)
-    basis = np.linalg.qr(rng.standard_normal((40, 3)))[0]
-    z = 7.0 * rng.standard_normal(40)
-    inside = np.sum((basis.T @ z) ** 2)
-    f = (inside / 3) / ((z @ z - inside) / 37)
-    (share,) = shares(Bases(basis, np.array([3])), z)
-    assert p_of_share(share, 3, 40) == pytest.approx(stats.f.sf(f, 3, 37), rel=1e-9)
-
-
-def bases(columns):
-    """The spaces of columns."""
-    orthonormal = [np.linalg.qr(c)[0] for c in columns]
-    return Bases(np.concatenate(orthonormal, axis=1), np.array([c.shape[1] for c in columns]))
-
-
-@pytest.mark.parametrize("level", [0.01, 0.05])
-def test_the_family_errs_as_often_as_it_says(level):
-    rng = np.random.default_rng(2)
-    candidates = {
-        f"c{k}": bases([rng.standard_normal((60, 1 + k % 4)) for _ in range(1 + 3 * k)])
-        for k in range(5)
-    }
-    null = rng.standard_normal((1000, 60))
-    runs = 500
-    alarms = sum(
-        screen(candidates, rng.standard_normal(60), 60, [null]).smallest < level
-        for _ in range(runs)
-    )
-    # Both the draws of the test and those of the null simulation err.
-    sd = math.sqrt(level * (1 - level) * (1 / runs + 2 / len(null)))
-    assert abs(alarms / runs - level) < 4 * sd
 
 
 @pytest.mark.parametrize("approach", ["robot", "gravity"])

@@ -15,20 +15,14 @@ from accelstudy.approaches import Approach, get_approach
 from accelstudy.campaign.assessment import SUSPECT
 from accelstudy.campaign.fit import fit_campaign, least_sigma
 from accelstudy.campaign.format import Campaign
-from accelstudy.diagnosis.decision.explanations import Explanation, credible_set
-from accelstudy.diagnosis.decision.search import (
-    LEVEL_EFFECTS,
-    SURE,
-    Choice,
-    Finding,
-    Search,
-    position_of,
-)
+from accelstudy.diagnosis.decision import priors
+from accelstudy.diagnosis.decision.explanations import Explanation
+from accelstudy.diagnosis.decision.search import Search
+from accelstudy.diagnosis.decision.verdict import Choice, Finding, find, lack_of_fit
 from accelstudy.diagnosis.evidence import noise as noises
 from accelstudy.diagnosis.evidence.chance import SIMULATIONS
-from accelstudy.diagnosis.evidence.naming import COLOUR, LEVEL, known_level_evidence
+from accelstudy.diagnosis.evidence.detection import Detection
 from accelstudy.diagnosis.evidence.noise import NoiseTest
-from accelstudy.diagnosis.evidence.screening import Screening
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Setting
 from accelstudy.diagnosis.space.location import LACK_OF_FIT, locate
 from accelstudy.diagnosis.space.residuals import Residuals
@@ -44,9 +38,11 @@ from accelstudy.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-LEVEL_NOISE = 0.015
-"""Family-wise level of the tests of the noise beside that of its level, which has `REFUTED`; with
-`LEVEL_EFFECTS` they stay below 5 %."""
+LEVEL_EFFECTS = 0.035
+"""Level of the test for anything that is missing."""
+LEVEL_NOISE = 0.01
+"""Family-wise level of the tests of the noise beside that of its level, which has `REFUTED`; all
+together they alarm in 5 % of the campaigns in which nothing is missing."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +106,7 @@ class Diagnosis:
     sigma_source : str
     unit_variance : float, variance of unit weight that is taken for the noise
     noise_tests : tuple of NoiseTest
-    screening : Screening, of all candidates
+    screening : Detection, of all candidates
     probabilities : dict of name to posterior probability, given that something is missing
     location : dict of group to share of the excess χ²
     gap : Gap
@@ -137,7 +133,7 @@ class Diagnosis:
     sigma_source: str
     unit_variance: float
     noise_tests: tuple[NoiseTest, ...]
-    screening: Screening
+    screening: Detection
     probabilities: Mapping[str, float]
     location: Mapping[str, float]
     gap: Gap
@@ -233,7 +229,13 @@ class _Run:
 
     @cached_property
     def search(self) -> Search:
-        return Search(self.first, self.stage(0))
+        return Search(self.first, self.stage(0), self.sigma_known, self.within)
+
+    @property
+    def within(self) -> Array | None:
+        """Variances of the axes within the holds."""
+        sd = self.campaign.sd
+        return None if sd is None else np.mean(sd**2, axis=0)
 
     # --- the decision ---------------------------------------------------------------------------
 
@@ -259,7 +261,7 @@ class _Run:
             model=self.model,
             extended=final.frame.solution.model,
             verdict=verdict,
-            credible_set=() if verdict == "no_effect" else self.credible_set,
+            credible_set=finding.credible_set,
             found=found,
             base=self.first,
             setting=search.setting,
@@ -268,8 +270,8 @@ class _Run:
             sigma_source=self.sigma_source(final),
             unit_variance=variance,
             noise_tests=tests,
-            screening=search.screening,
-            probabilities=search.probabilities,
+            screening=search.detection,
+            probabilities=self.probabilities(finding),
             location=self.location(finding, variance),
             gap=gap,
             changes=self.changes(finding, variance),
@@ -281,14 +283,10 @@ class _Run:
             reason=reason,
         )
 
-    @property
-    def credible_set(self) -> tuple[Explanation, ...]:
-        """Smallest set of explanations that holds what is missing."""
-        members = {best.name: names for best, names in self.search.classes}
-        return credible_set(
-            Explanation((name,), (members.get(name, (name,)),), p)
-            for name, p in self.search.probabilities.items()
-        )
+    def probabilities(self, finding: Finding) -> dict[str, float]:
+        """Posterior of each single explanation; a class stands under its first name."""
+        posterior = finding.posterior or self.search.posterior
+        return {e.names[0]: e.posterior for e in posterior.explanations if len(e.names) == 1}
 
     def finding(self) -> tuple[Finding, tuple[NoiseTest, ...]]:
         """Find what is missing: effects first, then the noise, by the tests of it."""
@@ -296,8 +294,8 @@ class _Run:
         if search.exact:
             reason = "the campaign is its own model: what is left are rounding errors"
             return Finding("no_effect", search.setting, reason), ()
-        if search.screening.smallest < LEVEL_EFFECTS:
-            finding = search.find()
+        if search.detection.p_value < LEVEL_EFFECTS:
+            finding = find(search)
             return finding, self.noise_tests(finding.setting)
         tests = self.noise_tests(search.setting)
         worst = self.worst_noise(tests)
@@ -315,10 +313,8 @@ class _Run:
         tests = []
         if self.sigma_known:
             tests.append(self.level(setting))
-        base = setting is self.search.setting
-        axes = self.search.axes if base else noises.axis_test(residuals, chance)
         tests += [
-            axes,
+            noises.axis_test(residuals, chance),
             noises.colour_test(residuals, chance),
             noises.tail_test(residuals, chance),
             self.resolution,
@@ -344,7 +340,7 @@ class _Run:
 
     def worst_noise(self, tests: Sequence[NoiseTest]) -> NoiseTest | None:
         """Return what is wrong with the noise, the most specific finding first."""
-        level = next((t for t in tests if t.name == LEVEL), None)
+        level = next((t for t in tests if t.name == noises.LEVEL), None)
         counted = [
             t
             for t in tests
@@ -354,29 +350,30 @@ class _Run:
         ]  # fmt: skip
         others = LEVEL_NOISE / max(len(counted) - (level is not None), 1)
         found = [t for t in counted if t.p_value < (REFUTED if t is level else others)]
-        order = ["quantisation", COLOUR, "axis_noise", "heavy_tails", LEVEL]
+        order = [noises.STEPS, noises.COLOUR, noises.AXES, noises.TAILS, noises.LEVEL]
         return min(found, key=lambda t: order.index(t.name), default=None)
 
     def judge_noise(self, worst: NoiseTest) -> Finding:
         """Judge a finding about the noise, when no effect was significant."""
-        setting = self.search.setting
-        lack_of_fit = self.search.screening.p_candidate.get(f"group:{LACK_OF_FIT}", 1.0)
-        if lack_of_fit < REFUTED and worst.name != "quantisation":
-            return self.search.nothing(
+        setting, posterior = self.search.setting, self.search.posterior
+        if lack_of_fit(self.search) < REFUTED and worst.name != noises.STEPS:
+            reason = (
                 "repeated positions agree better with each other than with the model, so it is not "
                 "the noise"
             )
-        if worst.name != LEVEL or worst.estimate[0] < 1:
-            return Finding("noise_model", setting, worst.remark)
-        # Larger residuals may be an effect that the sigma-free tests could not see.
-        level, best, name = known_level_evidence(setting.candidates, self.search.residuals)
-        probability = 1 / (1 + np.exp(best - level))
-        if probability >= SURE:
-            return Finding("noise_model", setting, worst.remark)
-        return self.search.nothing(
-            f"{worst.remark}; it may be the noise (probability {probability:.2f}), but an effect "
-            f"such as {name} is not excluded"
+            return Finding("unknown", setting, reason, posterior=posterior)
+        if worst.name != noises.LEVEL or worst.estimate[0] < 1:
+            return Finding("noise_model", setting, worst.remark, posterior=posterior)
+        # Larger residuals may be an effect that the test for a pattern could not see.
+        noise = sum(e.posterior for e in posterior.explanations if e.names[0] in noises.NOISES)
+        if noise >= priors.MORE_PROBABLE:
+            return Finding("noise_model", setting, worst.remark, posterior=posterior)
+        name = next(n for e in posterior.explanations for n in e.names if n not in noises.NOISES)
+        reason = (
+            f"{worst.remark}; it may be the noise (probability {noise:.2f}), but "
+            f"{'something' if name == 'unknown' else 'an effect such as ' + name} is not excluded"
         )
+        return Finding("unknown", setting, reason, posterior=posterior)
 
     def unit_variance(self, final: Setting) -> float:
         """Variance of unit weight: 1 if sigma is known and not refuted, else a posteriori."""
@@ -422,17 +419,19 @@ class _Run:
         search = self.search
         if finding.verdict == "noise_model":
             worst = self.worst_noise(tests)
-            name = COLOUR if worst is None else worst.name
-            p = search.screening.smallest if worst is None else worst.p_value
-            return (Named(name, name, (name,), p, search.probabilities.get(name)),)
+            posterior = finding.posterior or search.posterior
+            top = next(e.names[0] for e in posterior.explanations if e.names[0] in noises.NOISES)
+            name = top if worst is None else worst.name
+            p = search.detection.p_value if worst is None else worst.p_value
+            return (Named(name, name, (name,), p, posterior.of_single(name)),)
         solution = finding.setting.frame.solution
         sigma = np.sqrt(np.diag(solution.cofactors) * self.unit_variance(finding.setting))
         columns = {name: i for i, name in enumerate(solution.model.parameter_names)}
         found = []
         for choice in finding.chosen:
-            best, p = choice.best, search.screening.p_family[choice.best.name]
+            best, p = choice.best, search.detection.p_family[choice.best.name]
             if best.shown is None:
-                label = int(self.campaign.positions[position_of(best)])
+                label = int(self.campaign.positions[best.place])
                 found.append(
                     Named(OUTLIER, OUTLIER, (OUTLIER,), p, choice.probability, position=label)
                 )
@@ -467,7 +466,7 @@ class _Run:
         final, hold = finding.setting.frame.solution, self.search.setting.frame.hold
         after = final.omega / final.redundancy
         leveling = leveling_rms(self.first, final, hold, variance)
-        if finding.verdict != "named":
+        if finding.verdict not in ("named", "narrowed"):
             return Gap(before, after, leveling=leveling)
         held_out, reason = self.held_out(finding.chosen, variance if self.sigma_known else None)
         confirmed = held_out is not None and held_out.significant and not reason
@@ -486,7 +485,7 @@ class _Run:
     def next_positions(self, finding: Finding) -> tuple[NextPosition, ...]:
         """Positions that tell the two most probable explanations apart, if both are near."""
         search, chosen = self.search, finding.chosen
-        if finding.verdict not in ("named", "unknown") or len(chosen) > 1:
+        if finding.verdict not in ("named", "narrowed", "unknown") or len(chosen) > 1:
             return ()
         effects = [best for best, _ in search.classes if best.effect is not None]
         first = chosen[0].best if chosen else next(iter(effects), None)
@@ -527,14 +526,14 @@ class _Run:
             base = solve(self.model, self.approach, observed.take(fitted))
         except (InputError, np.linalg.LinAlgError):
             return None, "the fitted positions do not determine the model"
-        part = Search(base, self.stage(3))
+        part = Search(base, self.stage(3), self.sigma_known, self.within)
         alternatives = []
         for choice in chosen:
             shown = tuple(m for m in choice.members if m in part.setting.candidates)
             if not shown:
                 return None, f"the fitted positions alone cannot show {choice.best.name}"
             alternatives.append((part.best_shape(shown[0]), shown))
-        refit = part.extend_best(alternatives)
+        refit = part.refits.best(alternatives)
         if refit is None:
             return None, "the fit to the fitted positions alone has no solution"
         gap = gaps.held_out_gap(

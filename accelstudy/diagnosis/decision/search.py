@@ -1,33 +1,29 @@
-"""The search for what a fitted model lacks: screen, name, add, and look again."""
+"""The search for what a fitted model lacks: the evidence of all that could be the case."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import Solution, solve
+from accelstudy.diagnosis.decision import priors
+from accelstudy.diagnosis.decision.posterior import Posterior, Weighed
+from accelstudy.diagnosis.decision.refits import Refits
 from accelstudy.diagnosis.evidence import noise as noises
+from accelstudy.diagnosis.evidence.axes import UnequalAxes
 from accelstudy.diagnosis.evidence.chance import Chance
-from accelstudy.diagnosis.evidence.naming import (
-    COLOUR,
-    UNKNOWN,
-    colour_evidence,
-    mean_evidence,
-    posterior,
-    shapes_evidence,
-    widths,
-)
-from accelstudy.diagnosis.evidence.noise import NoiseTest
-from accelstudy.diagnosis.evidence.pairs import Pair, best_pairs
-from accelstudy.diagnosis.evidence.screening import Screening, screen
+from accelstudy.diagnosis.evidence.colour import colour_density
+from accelstudy.diagnosis.evidence.detection import Detection, detect
+from accelstudy.diagnosis.evidence.field import UNKNOWN, Field, shape_weights
+from accelstudy.diagnosis.evidence.pairs import all_pairs
+from accelstudy.diagnosis.evidence.size import Evidence, Level, log_mean
+from accelstudy.diagnosis.evidence.unknown import unknown_beside
 from accelstudy.diagnosis.space.hypotheses import (
     OUTLIER,
-    EffectShapes,
     Hypothesis,
     Setting,
     Shapes,
@@ -35,66 +31,22 @@ from accelstudy.diagnosis.space.hypotheses import (
     setting_of,
 )
 from accelstudy.diagnosis.space.location import groups
+from accelstudy.diagnosis.space.refinement import refined, strongest
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.spaces import Spaces
-from accelstudy.errors import InputError
-from accelstudy.models import composition_name
-from accelstudy.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-LEVEL_EFFECTS = 0.025
-"""Family-wise level of the tests of effects, bumped positions and groups of regressors."""
-LEVEL_ADEQUATE = 0.004
-"""Family-wise level at which something is still missing beside a named effect."""
-SURE = 0.7
-"""Posterior probability from which on a name is given."""
-PRIOR = {COLOUR: 3.0}
-"""Prior weights beside 1 for each class: all real noise has some colour."""
 RIVAL = 0.5
 """Canonical cosine from which on an effect is listed as a rival."""
 ROUNDING = 1e-10
 """Residuals below this share of gravity are rounding errors, and no measurement."""
-AXES_DIFFER = 0.01
-"""Level at which axes are weighted by their noise."""
-LEAST = 0.05
-"""Smallest variance of an axis beside the mean of all: no axis is taken to be without noise."""
-WEIGHTINGS = 4
-"""The variances of the axes are estimated anew in each weighting, and settle."""
-
-
-@dataclass(frozen=True)
-class Choice:
-    """A hypothesis that was chosen.
-
-    Attributes
-    ----------
-    best : Hypothesis
-    members : tuple of str, names that mean the same in this campaign
-    probability : float, posterior
-    """
-
-    best: Hypothesis
-    members: tuple[str, ...]
-    probability: float
-
-
-@dataclass(frozen=True)
-class Finding:
-    """What a search found.
-
-    Attributes
-    ----------
-    verdict : str, "named", "gross_error", "noise_model" or "unknown"
-    setting : Setting, of the fit with what was chosen, or of the base fit
-    reason : str
-    chosen : tuple of Choice
-    """
-
-    verdict: str
-    setting: Setting
-    reason: str = ""
-    chosen: tuple[Choice, ...] = ()
+WORTH = 12.0
+"""Log odds to the strongest beyond which shapes between those tried at first do not matter."""
+UNDECIDED = 2.0
+"""Log evidence by which a shape may fall short of the best and still be the true one."""
+FIRST = 5
+"""Effects beside which something unknown is looked for."""
 
 
 @dataclass(frozen=True)
@@ -105,25 +57,19 @@ class Search:
     ----------
     first : Solution, with equal axes
     seed : SeedSequence, of the residuals without any effect
+    known : bool, whether sigma is given
+    within : (3,) array, variances of the axes within the holds; None if unknown
     """
 
     first: Solution
     seed: np.random.SeedSequence
-
-    @property
-    def model(self) -> SensorModel:
-        """The base model."""
-        return self.first.model
+    known: bool
+    within: Array | None = None
 
     @cached_property
     def chance(self) -> Chance:
         """Residuals without any effect."""
         return Chance(self.seed, len(self.first.design))
-
-    @cached_property
-    def axes(self) -> NoiseTest:
-        """Whether the axes differ in noise, by the base fit."""
-        return noises.axis_test(Residuals.of(self.first), self.chance)
 
     @property
     def exact(self) -> bool:
@@ -132,35 +78,45 @@ class Search:
         return rms < ROUNDING * self.first.gravity
 
     @cached_property
-    def solution(self) -> Solution:
-        """The base fit, with the axes weighted by their noise if it clearly differs."""
-        return self.weighted(self.first, self.axes)
+    def evidence(self) -> Evidence:
+        """The evidence of hypotheses in the residual space."""
+        return Evidence(Level.of(self.known), self.first.redundancy)
 
-    def weighted(self, solution: Solution, axes: NoiseTest) -> Solution:
-        """Fit again with unequal axes, if they are."""
-        if axes.p_value >= AXES_DIFFER or self.exact:
-            return solution
-        n, mean = len(solution.variances), np.mean(np.sqrt(solution.variances[:, :3]))
-        ratios, factors = np.ones(3), np.asarray(axes.estimate)
-        for _ in range(WEIGHTINGS):
-            ratios = np.maximum(ratios * factors / np.mean(ratios * factors), LEAST)
-            sigma = mean * np.sqrt(ratios) / np.mean(np.sqrt(ratios))
-            observed = replace(solution.observed, sigma_force=np.broadcast_to(sigma, (n, 3)))
-            solution = solve(solution.model, self.first.approach, observed)
-            factors = noises.axis_factors(Residuals.of(solution))
-        return solution
+    # --- the fit --------------------------------------------------------------------------------
+
+    @cached_property
+    def axes(self) -> UnequalAxes:
+        """How probable it is that the axes differ in noise, by the fit with equal ones."""
+        return UnequalAxes.of(Residuals.of(self.first), self.evidence, self.within)
 
     @cached_property
     def setting(self) -> Setting:
-        """The base fit and the hypotheses about it."""
-        return setting_of(self.solution)
+        """The base fit and the hypotheses about it.
 
-    @cached_property
+        The axes are weighted by their noise where that they differ is the best that can be said of
+        the residuals: better than that nothing is missing, or any one effect.
+        """
+        equal = setting_of(self.first)
+        if self.exact:
+            return equal
+        residuals = equal.frame.residuals
+        field = Field.of(equal.candidates, {})
+        z = residuals.z
+        best = np.logaddexp.reduce(self.evidence.of_noise(z @ z))
+        if field.names:
+            best = max(best, np.max(field.densities(self.evidence, z)) - np.log(len(field.names)))
+        if np.log(priors.AXES) + self.axes.log_density <= best:
+            return equal
+        sigma = np.sqrt(self.axes.ratios)
+        mean = np.mean(np.sqrt(self.first.variances[:, :3]))
+        shaped = np.broadcast_to(mean * sigma / np.mean(sigma), (len(self.first.variances), 3))
+        observed = replace(self.first.observed, sigma_force=shaped)
+        return setting_of(solve(self.first.model, self.first.approach, observed))
+
+    @property
     def residuals(self) -> Residuals:
         """Those of the base fit."""
         return self.setting.frame.residuals
-
-    # --- screening ------------------------------------------------------------------------------
 
     @cached_property
     def groups(self) -> dict[str, Spaces]:
@@ -168,122 +124,88 @@ class Search:
         return groups(self.setting)
 
     @cached_property
-    def screening(self) -> Screening:
-        """Tests of all candidates, and of the groups of regressors."""
-        return self.screened(self.setting, self.groups)
-
-    def screened(self, setting: Setting, groups: Mapping[str, Spaces]) -> Screening:
-        """Test all candidates and groups of regressors of a fit."""
-        residuals = setting.frame.residuals
-        spaces = {f"group:{name}": space for name, space in groups.items()}
-        return screen(
-            {**setting.candidates, **spaces},
-            residuals.z,
-            residuals.redundancy,
-            self.chance.errors(residuals),
-        )
-
-    # --- naming ---------------------------------------------------------------------------------
+    def field(self) -> Field:
+        """All candidates, side by side."""
+        return Field.of(self.setting.candidates, self.groups)
 
     @cached_property
-    def evidence_of_effects(self) -> dict[str, float]:
-        """Log evidence of all candidates."""
+    def detection(self) -> Detection:
+        """Whether anything is missing."""
+        return detect(self.field, self.evidence, self.residuals, self.chance)
+
+    def first_shape(self, name: str) -> Hypothesis:
+        """Shape of a candidate that explains most, of those that are tried at first."""
+        return strongest(self.setting.candidates[name], self.residuals.z)
+
+    # --- single hypotheses ----------------------------------------------------------------------
+
+    @cached_property
+    def shapes(self) -> dict[str, Shapes]:
+        """Shapes of each candidate, closer together about the best one where it matters."""
+        if not self.field.names:
+            return {}
+        logs = self.field.densities(self.evidence, self.residuals.z).tolist()
+        found = dict(zip(self.field.names, logs, strict=True))
+        top = max(logs, default=0.0)
         return {
-            name: mean_evidence(shapes_evidence(shapes, self.residuals), widths(shapes))
+            name: refined(self.setting, shapes) if found[name] > top - WORTH else shapes
+            for name, shapes in self.setting.candidates.items()
+        }
+
+    @cached_property
+    def densities(self) -> dict[str, float]:
+        """Log density of the residuals under each candidate, over its shapes."""
+        z = self.residuals.z
+        return {
+            name: float(
+                log_mean(
+                    self.evidence.of_spaces(shapes.parts(z), shapes.dims, z @ z),
+                    shape_weights(shapes),
+                )
+            )
             for name, shapes in self.shapes.items()
         }
 
     @cached_property
-    def evidence(self) -> dict[str, float]:
-        """Log evidence of all single hypotheses."""
-        return {
-            **self.evidence_of_effects,
-            COLOUR: colour_evidence(self.setting.frame.residuals),
-            UNKNOWN: self.unknown_evidence,
-        }
-
-    @cached_property
-    def unknown_evidence(self) -> float:
-        """Log evidence of something in one of the groups that is none of the effects."""
-        logs = [shapes_evidence(space, self.residuals) for space in self.groups.values()]
-        return mean_evidence(np.concatenate(logs)) if logs else 0.0
-
-    @cached_property
     def classes(self) -> list[tuple[Hypothesis, tuple[str, ...]]]:
         """Candidates with those that mean the same, strongest evidence first."""
-        left = sorted(self.setting.candidates, key=lambda name: -self.evidence[name])
+        left = sorted(self.densities, key=lambda name: -self.densities[name])
         classes = []
         while left:
             name = left.pop(0)
             best = self.best_shape(name)
-            alike = [
-                other
-                for other in left
-                if other != OUTLIER
-                and name != OUTLIER
-                and any(same_space(best, h) for h in self.setting.candidates[other])
-            ]
-            left = [other for other in left if other not in alike]
-            classes.append((best, tuple(sorted((name, *alike)))))
+            members = self.members(best)
+            left = [other for other in left if other not in members]
+            classes.append((best, members))
         return classes
 
     def best_shape(self, name: str) -> Hypothesis:
         """Shape of a candidate that explains most."""
-        shapes = self.shapes[name]
-        return shapes[int(np.argmax(shapes.parts(self.residuals.z)))]
+        return strongest(self.shapes[name], self.residuals.z)
+
+    def members(self, hypothesis: Hypothesis) -> tuple[str, ...]:
+        """Names that mean the same as a hypothesis in this campaign."""
+        if hypothesis.effect is None:
+            return (hypothesis.name,)
+        if hypothesis.name not in self._members:
+            own = self.probable_shapes(hypothesis.name)
+            names = {
+                name
+                for name, shapes in self.setting.candidates.items()
+                if name != OUTLIER and any(same_space(a, b) for a in own for b in shapes)
+            }
+            self._members[hypothesis.name] = tuple(sorted(names | {hypothesis.name}))
+        return self._members[hypothesis.name]
 
     @cached_property
-    def shapes(self) -> dict[str, Shapes]:
-        """Shapes of each candidate, close together about the best one of a smooth effect."""
-        return {name: self.refined(shapes) for name, shapes in self.setting.candidates.items()}
+    def _members(self) -> dict[str, tuple[str, ...]]:
+        return {}
 
-    def refined(self, shapes: Shapes) -> Shapes:
-        """Add shapes between the neighbours of the best one, and again between those."""
-        if not isinstance(shapes, EffectShapes) or len(shapes) < 2:
-            return shapes
-        if shapes[0].smooth is None:
-            return self.completed(shapes)
-        for _ in range(3):
-            best = int(np.argmax(shapes.parts(self.residuals.z)))
-            around = (shapes[max(best - 1, 0)].value, shapes[min(best + 1, len(shapes) - 1)].value)
-            tried = (self.shaped(shapes[best], v) for v in np.geomspace(*around, 7)[1:-1])
-            fine = [*shapes, *(h for h in tried if h is not None)]
-            shapes = EffectShapes.of(sorted(fine, key=lambda h: h.value))
-        return shapes
-
-    def completed(self, shapes: EffectShapes) -> EffectShapes:
-        """Add shapes that were passed over next to the best one, until there are none."""
-        hold = self.setting.frame.hold
-        while True:
-            best = int(np.argmax(shapes.parts(self.residuals.z)))
-            effect = shapes[best].effect
-            assert effect is not None
-            fine = list(shapes)
-            for near in (best + 1, best - 1):
-                if 0 <= near < len(shapes):
-                    other = shapes[near].effect
-                    assert other is not None
-                    tried = [self.setting.hypothesis(e) for e in effect.between(other, hold)]
-                    found = [h for h in tried if h is not None and h.dim == shapes[best].dim]
-                    fine[max(best, near) : max(best, near)] = found
-            if len(fine) == len(shapes):
-                return shapes
-            shapes = EffectShapes.of(fine)
-
-    def shaped(self, hypothesis: Hypothesis, value: float) -> Hypothesis | None:
-        """Return a smooth effect with another value of its setting; None if it shows less."""
-        assert hypothesis.effect is not None
-        assert hypothesis.smooth is not None
-        effect = type(hypothesis.effect)(**{hypothesis.smooth: float(f"{value:.6g}")})
-        shaped = self.setting.hypothesis(effect)
-        return shaped if shaped is not None and shaped.dim == hypothesis.dim else None
-
-    @cached_property
-    def probabilities(self) -> dict[str, float]:
-        """Posterior probabilities given that something is missing; a class under its first name."""
-        evidence = {best.name: self.evidence[best.name] for best, _ in self.classes}
-        evidence |= {name: self.evidence[name] for name in (COLOUR, UNKNOWN)}
-        return posterior(evidence, PRIOR)
+    def probable_shapes(self, name: str) -> list[Hypothesis]:
+        """Shapes of a candidate between which the residuals do not decide."""
+        shapes, z = self.shapes[name], self.residuals.z
+        logs = self.evidence.of_spaces(shapes.parts(z), shapes.dims, z @ z)
+        return [shapes[int(i)] for i in np.flatnonzero(logs > logs.max() - UNDECIDED)]
 
     def rivals(self, best: Hypothesis, members: Sequence[str]) -> tuple[tuple[str, float], ...]:
         """Other effects with similar signatures, nearest first."""
@@ -295,204 +217,73 @@ class Search:
             if cosine >= RIVAL and name not in members
         )
 
-    # --- extending the model --------------------------------------------------------------------
-
-    def extended_model(self, chosen: Sequence[Hypothesis]) -> SensorModel:
-        """The base model with the effects of hypotheses added."""
-        effects = [h.shown for h in chosen if h.shown is not None]
-        if not effects:
-            return self.model
-        together = (*self.model.effects, *effects)
-        return SensorModel(composition_name(together), together)
-
-    def refit(self, chosen: Sequence[Hypothesis]) -> Solution | None:
-        """Fit rigorously with effects added and bumped positions left out."""
-        try:
-            model = self.extended_model(chosen)
-        except InputError:  # two effects whose parameters have the same names
-            return None
-        # From an ideal sensor the iterations may not reach a large effect.
-        start = dict(zip(self.model.parameter_names, self.first.parameters, strict=False))
-        observed = replace(self.first.observed, initial=model.vector(start))
-        bumped = [position_of(h) for h in chosen if h.effect is None]
-        if bumped:
-            observed = observed.take(np.setdiff1d(np.arange(len(self.first.misclosures)), bumped))
-        try:
-            solution = solve(model, self.first.approach, observed)
-        except (InputError, np.linalg.LinAlgError):
-            return None
-        if not self.first.approach.uses_angles:
-            # Readings without a force that belongs to them have no attitude either.
-            p = solution.parameters[: model.n_parameters]
-            f_b = model.correct(observed.forces[0], p, solution.gravity, observed.hold)
-            if np.isnan(f_b).any():
-                return None
-        return solution if solution.redundancy > 0 else None
-
-    def sharpened(self, chosen: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """Search the settings of smooth effects by refits: a large effect is not of first order."""
-        sharp = list(chosen)
-        for k, start in enumerate(chosen):
-            if start.smooth is None:
-                continue
-            from scipy.optimize import minimize_scalar  # slow to import, and seldom needed
-
-            values = [h.value for h in self.setting.candidates[start.name]]
-            low = max((v for v in values if v < start.value), default=start.value)
-            high = min((v for v in values if v > start.value), default=start.value)
-
-            def omega(log: float, k: int = k, start: Hypothesis = start) -> float:
-                shaped = self.shaped(start, np.exp(log))
-                if shaped is None:
-                    return self.first.omega
-                trial = self.refit([*sharp[:k], shaped, *sharp[k + 1 :]])
-                return self.first.omega if trial is None else trial.omega
-
-            found = minimize_scalar(
-                omega, bounds=np.log([low, high]), method="bounded", options={"xatol": 1e-4}
-            )
-            shaped = self.shaped(start, np.exp(found.x))
-            if shaped is not None and found.fun < omega(np.log(start.value)):
-                sharp[k] = shaped
-        return sharp
-
-    def extend(self, chosen: Sequence[Hypothesis]) -> Solution | None:
-        """Refit; axes that seemed unequal because of the effect are equal now."""
-        solution = self.refit(chosen)
-        if solution is None:
-            return None
-        residuals = Residuals.of(solution)
-        try:
-            return self.weighted(solution, noises.axis_test(residuals, self.chance))
-        except (InputError, np.linalg.LinAlgError):
-            return solution
-
-    def extend_best(
-        self, chosen: Sequence[tuple[Hypothesis, tuple[str, ...]]]
-    ) -> tuple[list[Hypothesis], Solution] | None:
-        """Refit with the members of the classes that fit best.
-
-        To first order the members of a class are the same. Large effects are not of first order.
-        """
-        alternatives = [
-            [best if name == best.name else self.best_shape(name) for name in members]
-            if best.effect is not None
-            else [best]
-            for best, members in chosen
-        ]
-        sharp = [self.sharpened(one) for one in product(*alternatives)]
-        refits = [(one, self.extend(one)) for one in sharp]
-        solved = [(one, solution) for one, solution in refits if solution is not None]
-        return min(solved, key=lambda item: item[1].omega, default=None)
-
-    def adequate(self, solution: Solution) -> tuple[bool, Setting]:
-        """Whether nothing more is missing after a refit."""
-        setting = setting_of(solution)
-        return self.screened(setting, groups(setting)).smallest >= LEVEL_ADEQUATE, setting
-
-    # --- the decision ---------------------------------------------------------------------------
-
-    def find(self) -> Finding:
-        """Name what is missing, given that something is."""
-        top = next(iter(self.probabilities))
-        sure = self.probabilities[top]
-        if top == COLOUR and sure >= SURE:
-            return self.nothing("successive holds are alike", "noise_model")
-        alone = ""
-        if top not in (COLOUR, UNKNOWN):
-            best, members = next(item for item in self.classes if item[0].name == top)
-            refit = self.extend_best([(best, members)])
-            if refit is not None:
-                (best,), solution = refit
-                adequate, setting = self.adequate(solution)
-                if adequate and sure >= SURE:
-                    verdict = "gross_error" if best.effect is None else "named"
-                    return Finding(verdict, setting, chosen=(Choice(best, members, sure),))
-                if adequate:
-                    second = list(self.probabilities)[1]
-                    return self.nothing(
-                        f"{top} explains it with a probability of {sure:.2f} only, and {second} "
-                        f"with {self.probabilities[second]:.2f}"
-                    )
-            elif sure >= SURE:
-                alone = f"{top} explains most of it, but a model with it has no solution"
-        finding = self.find_pair()
-        return replace(finding, reason=alone or finding.reason)
+    # --- everything -----------------------------------------------------------------------------
 
     @cached_property
-    def pairs(self) -> list[Pair]:
-        """All pairs of candidates, strongest evidence first."""
-        return best_pairs(self.setting.candidates, self.residuals)
+    def singles(self) -> list[Weighed]:
+        """One effect, one bumped position, or something unknown."""
+        each = -np.log(max(len(self.classes), 1))
+        found = [
+            Weighed((best.name,), (members,), self.densities[best.name] + each, (best,))
+            for best, members in self.classes
+        ]
+        unknown = self.detection.densities.get(UNKNOWN)
+        if unknown is not None:
+            found.append(Weighed((UNKNOWN,), ((UNKNOWN,),), unknown + np.log(priors.UNKNOWN)))
+        return found
 
-    def find_pair(self) -> Finding:
-        """Search all pairs, once no single effect is enough."""
-        pairs = self.pairs
-        if not pairs:
-            return self.nothing("no effect of the catalogue explains it")
-        # All pairs together are as probable beforehand as all single effects together.
-        prior = dict.fromkeys(map(str, range(len(pairs))), len(self.classes) / len(pairs))
-        evidence = {str(i): pair.log_evidence for i, pair in enumerate(pairs)}
-        evidence |= {best.name: self.evidence[best.name] for best, _ in self.classes}
-        evidence |= {name: self.evidence[name] for name in (COLOUR, UNKNOWN)}
-        probabilities = posterior(evidence, PRIOR | prior)
-        top = next(iter(probabilities))
-        if top == COLOUR and probabilities[top] >= SURE:
-            return self.nothing("successive holds are alike", "noise_model")
-        if top in (COLOUR, UNKNOWN):
-            return self.nothing("no effect or pair of effects explains it")
-        if top in self.evidence:
-            return self.nothing(f"{top} is most probable, but does not explain all of it")
-        pair = pairs[int(top)]
-        # Pairs whose members mean the same are one.
-        seen = {h.spec: h for other in pairs for h in other.best}
-        alike = {spec: self.members(h) for spec, h in seen.items()}
-        members = [alike[h.spec] for h in pair.best]
-        sure = sum(
-            probabilities[str(i)]
-            for i, other in enumerate(pairs)
-            if {alike[h.spec] for h in other.best} == set(members)
-        )
-        if sure < SURE:
-            return self.nothing(
-                f"the most probable pair, {' and '.join(pair.names)}, has a probability of "
-                f"{sure:.2f} only"
-            )
-        refit = self.extend_best(list(zip(pair.best, members, strict=True)))
-        if refit is None:
-            return self.nothing("the refit with two effects has no solution")
-        best, solution = refit
-        adequate, setting = self.adequate(solution)
-        if not adequate:
-            return self.nothing("two effects of the catalogue are not enough")
-        chosen = [Choice(h, m, sure) for h, m in zip(best, members, strict=True)]
-        chosen.sort(key=lambda choice: choice.best.effect is not None)
-        verdict = "gross_error" if chosen[0].best.effect is None else "named"
-        return Finding(verdict, setting, chosen=tuple(chosen))
+    @cached_property
+    def pairs(self) -> list[Weighed]:
+        """Two of them, or one of them beside something unknown."""
+        k = len(self.classes)
+        if k < 2:
+            return []
+        each = np.log(priors.TWO) - np.log(k * (k + 1) / 2)
+        found = []
+        for pair in all_pairs(self.shapes, self.residuals, self.evidence):
+            one, other = sorted(pair.best, key=lambda h: -self.densities[h.name])
+            both = (self.members(one), self.members(other))
+            if both[0] != both[1] or one.effect is None:
+                names = (one.name, other.name)
+                found.append(Weighed(names, both, pair.log_density + each, (one, other)))
+        for best, _ in self.classes[:FIRST]:
+            beside = unknown_beside(best, self.groups, self.residuals, self.evidence)
+            if beside is not None:
+                total = self.densities[best.name] + beside - np.log(k)
+                prior = np.log(priors.TWO * priors.UNKNOWN)
+                found.append(Weighed((UNKNOWN,), ((UNKNOWN,),), total + prior))
+        return found
 
-    def nothing(self, reason: str, verdict: str = "unknown") -> Finding:
-        """Return that no effect is named, and why."""
-        return Finding(verdict, self.setting, reason)
-
-    def members(self, hypothesis: Hypothesis) -> tuple[str, ...]:
-        """Names that mean the same as a hypothesis in this campaign."""
-        if hypothesis.effect is None:
-            return (hypothesis.spec,)
-        names = {
-            name
-            for name, shapes in self.setting.candidates.items()
-            if name != OUTLIER and any(same_space(hypothesis, h) for h in shapes)
+    @cached_property
+    def noises(self) -> list[Weighed]:
+        """Nothing but the noise is not what it is taken for."""
+        residuals = self.residuals
+        nothing = self.detection.noise
+        known = {
+            noises.COLOUR: np.log(priors.COLOUR) + colour_density(residuals, self.evidence),
+            noises.AXES: np.log(priors.AXES) + self.axes.log_density,
         }
-        return tuple(sorted(names | {hypothesis.name}))
+        if self.known:
+            known[noises.LEVEL] = float(nothing[1])
+        total = float(np.logaddexp.reduce(nothing))
+        tails = noises.tail_test(residuals, self.chance)
+        known[noises.TAILS] = total + np.log(priors.TAILS) + noises.most_evidence(tails.p_value)
+        return [Weighed((name,), ((name,),), float(log)) for name, log in known.items()]
 
     def chooses(self, names: Sequence[Sequence[str]]) -> bool:
         """Whether effects of these classes have the strongest evidence."""
         wanted = {name for members in names for name in members}
         if len(names) == 1:
-            return max(self.evidence_of_effects, key=self.evidence_of_effects.__getitem__) in wanted
-        pairs = self.pairs
-        return bool(pairs) and set(pairs[0].names) <= wanted
+            return max(self.densities, key=self.densities.__getitem__) in wanted
+        best = max((one for one in self.pairs if one.best), key=lambda one: one.log_weight)
+        return set(best.names) <= wanted
 
+    @cached_property
+    def posterior(self) -> Posterior:
+        """All that could be the case, if not nothing."""
+        return Posterior.of([*self.singles, *self.pairs, *self.noises])
 
-def position_of(hypothesis: Hypothesis) -> int:
-    """Index of the position that a hypothesis of a bumped position is about."""
-    return int(hypothesis.spec[len(OUTLIER) + 1 : -1])
+    @cached_property
+    def refits(self) -> Refits:
+        """Rigorous fits with hypotheses."""
+        return Refits(self.setting, self.shapes)

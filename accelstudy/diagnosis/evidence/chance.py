@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.progress import track
+
+if TYPE_CHECKING:
+    from accelstudy.diagnosis.evidence.field import Field
 
 Array = NDArray[np.float64]
 
@@ -72,6 +76,16 @@ class Chance:
                 slopes = rng.standard_normal((len(noise), residuals.slopes))
                 noise = np.concatenate([noise, slopes], axis=1)
             yield noise - (noise @ residuals.absorbed) @ residuals.absorbed.T
+
+    def errors_with_effects(self, residuals: Residuals, field: Field) -> Iterator[Array]:
+        """Yield residuals without and residuals with an effect at random, as many of either."""
+        key = (*self.seed.spawn_key, 0)
+        rng = np.random.default_rng(np.random.SeedSequence(self.seed.entropy, spawn_key=key))
+        for errors in self.errors(residuals):
+            half = len(errors) // 2 or 1
+            yield errors[:half]
+            changed = field.with_effects(errors[-half:], rng)
+            yield changed - (changed @ residuals.absorbed) @ residuals.absorbed.T
 
     def statistic(self, residuals: Residuals, function: Callable[[Array], Array]) -> Array:
         """Return a statistic of residuals (b, m), the first axis of its values being the set."""

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.diagnosis.evidence.size import Evidence, log_mean
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.noise_effects.coloured_noise import memory, renewed
 
@@ -19,6 +20,15 @@ Array = NDArray[np.float64]
 
 LENGTHS = (1.0, 3.0, 8.0, np.inf)
 """Correlation lengths in holds; infinite for the random walk."""
+STRENGTHS = (0.25, 1.0, 4.0, 16.0, 64.0)
+"""Variances of the process beside that of white noise, for which the evidence is averaged."""
+
+
+def colour_density(residuals: Residuals, evidence: Evidence) -> float:
+    """Log density of residuals with coloured noise, mean over correlation lengths and strengths."""
+    determinant, squares = restricted(residuals, STRENGTHS)
+    logs = np.logaddexp.reduce(evidence.of_noise(squares, determinant), axis=-1)
+    return float(log_mean(logs.ravel()))
 
 
 def quadratic_forms(v: Array) -> Array:
@@ -40,11 +50,11 @@ def quadratic_forms(v: Array) -> Array:
     return np.stack(forms, axis=-1)
 
 
-def restricted_likelihoods(residuals: Residuals, strengths: Sequence[float]) -> Array:
-    """Log likelihoods of residuals with white noise and a process on each axis, (k, s).
+def restricted(residuals: Residuals, strengths: Sequence[float]) -> tuple[Array, Array]:
+    """log|Nᵀ Σ N| and zᵀ (Nᵀ Σ N)⁻¹ z of white noise and a process on each axis, (k, s) each.
 
     The covariance of unit weight is Σ = I + s F (I₃ ⊗ K) Fᵀ, with F the noise of the forces in the
-    conditions, at its most likely scale. In the residual space (Harville 1974, restricted maximum
+    conditions. In the residual space (Harville 1974, restricted maximum
     likelihood), with an orthonormal basis U of the design,
 
         log|Nᵀ Σ N| = log|Σ| + log|Uᵀ Σ⁻¹ U|,
@@ -65,7 +75,7 @@ def restricted_likelihoods(residuals: Residuals, strengths: Sequence[float]) -> 
     determinant = determinant + np.linalg.slogdet(design)[1]
     explained = np.swapaxes(mixed, -1, -2) @ np.linalg.solve(design, mixed)
     square = square - explained[..., 0, 0]
-    return np.asarray(-determinant / 2 - residuals.redundancy / 2 * np.log(square))
+    return np.asarray(determinant), np.asarray(square)
 
 
 def _filtered(

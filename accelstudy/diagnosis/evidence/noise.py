@@ -20,6 +20,16 @@ from accelstudy.diagnosis.space.residuals import Residuals, position_products
 
 Array = NDArray[np.float64]
 
+LEVEL, AXES, COLOUR, TAILS = "noise_level", "axis_noise", "coloured_noise", "heavy_tails"
+STEPS = "quantisation"
+NOISES = {
+    LEVEL: "the residuals are larger than sigma says, and have no pattern",
+    AXES: "the axes differ in noise",
+    COLOUR: "successive holds are alike",
+    TAILS: "large residuals are more frequent than in a normal distribution",
+    STEPS: "the readings are coarse",
+}
+"""What is said where the noise is not what it is taken for."""
 
 GRID = 1e-5
 """Probability with which noise on a grid of attitudes passes for steps, at each resolution."""
@@ -240,3 +250,12 @@ def within_hold_test(
 def _upper(usual: Array, value: float) -> float:
     """Share of simulated values that are as large."""
     return float((1 + np.count_nonzero(usual >= value)) / (1 + len(usual)))
+
+
+def most_evidence(p: float) -> float:
+    """Log of the largest evidence that a p-value can mean (Sellke, Bayarri & Berger 2001).
+
+    −e p log p is the least Bayes factor for the null, over all alternatives of a usual form; from
+    1/e on a p-value means nothing.
+    """
+    return float(-np.log(-np.e * p * np.log(p))) if p < 1 / np.e else 0.0

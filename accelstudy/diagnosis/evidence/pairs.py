@@ -1,4 +1,4 @@
-"""Exhaustive search over pairs of hypotheses."""
+"""Evidence for all pairs of hypotheses."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.diagnosis.evidence.naming import log_evidence, mean_evidence
+from accelstudy.diagnosis.evidence.field import shape_weights
+from accelstudy.diagnosis.evidence.size import Evidence
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis, Shapes
 from accelstudy.diagnosis.space.residuals import Residuals
 
@@ -24,15 +25,16 @@ ROWS = 4096
 
 @dataclass(frozen=True)
 class Pair:
-    """Two candidates with their best shapes, and the evidence for both at once."""
+    """Two candidates in their best shapes, and the log density of the residuals with both."""
 
-    names: tuple[str, str]
     best: tuple[Hypothesis, Hypothesis]
-    log_evidence: float
+    log_density: float
 
 
-def best_pairs(candidates: Mapping[str, Shapes], residuals: Residuals) -> list[Pair]:
-    """Evidence for all pairs of candidates, over all shapes of both; strongest first.
+def all_pairs(
+    candidates: Mapping[str, Shapes], residuals: Residuals, evidence: Evidence
+) -> list[Pair]:
+    """Evidence for all pairs of candidates, over all shapes of both.
 
     Of the positions that may be bumped, the `POSITIONS` are tried that explain most by themselves;
     pairs with others count as pairs without any evidence.
@@ -41,60 +43,72 @@ def best_pairs(candidates: Mapping[str, Shapes], residuals: Residuals) -> list[P
     ----------
     candidates : mapping of name to shapes
     residuals : Residuals
+    evidence : Evidence
     """
     z, r = residuals.z, residuals.redundancy
-    hypotheses, standing = _tried(candidates, z)
-    names = [h.name for h in hypotheses]
+    tried, weights = _tried(candidates, z)
+    if len(tried) < 2:
+        return []
+    names = [h.name for h in tried]
     order = {name: i for i, name in enumerate(dict.fromkeys(names))}
     number = np.array([order[name] for name in names])
-    dims = np.array([h.dim for h in hypotheses])
-    gram, seen = _products(hypotheses, z)
-    alone, total = np.sum(seen**2, axis=1), float(z @ z)
-
-    tried: list[tuple[Array, ...]] = []
-    for i in range(len(dims) - 1):
-        others = np.arange(i + 1, len(dims))
-        # Shapes of one effect are alternatives, but two positions may both be bumped.
-        others = others[(number[others] != number[i]) | (names[i] == OUTLIER)]
-        others = others[dims[i] + dims[others] < r]
-        cross = np.moveaxis(gram[i][:, others], 1, 0)
-        left = np.eye(seen.shape[1]) - np.einsum("jab,jac->jbc", cross, cross)
-        values, vectors = np.linalg.eigh(left)
-        # Padding has eigenvalue 1 and no share in the residuals.
-        rest = seen[others] - np.einsum("jab,a->jb", cross, seen[i])
-        along = np.einsum("jab,ja->jb", vectors, rest) ** 2
-        part = alone[i] + np.sum(along / np.maximum(values, COLLINEAR), axis=1)
-        apart = values[:, 0] > COLLINEAR
-        others, part = others[apart], part[apart]
-        log = log_evidence(np.minimum(part / total, 1.0), dims[i] + dims[others], r)
-        tried.append((np.full(len(others), i), others, log))
-    if not tried:
-        return []
-    one, other, logs = (np.concatenate(column) for column in zip(*tried, strict=True))
+    dims = np.array([h.dim for h in tried])
+    gram, seen = _products(tried, z)
+    one, other = np.triu_indices(len(tried), 1)
+    # Shapes of one effect are alternatives, but two positions may both be bumped.
+    apart = (number[one] != number[other]) | (number[one] == order.get(OUTLIER, -1))
+    apart &= dims[one] + dims[other] < r
+    one, other = one[apart], other[apart]
+    parts, kept = [], []
+    for some in np.array_split(np.arange(len(one)), len(one) // ROWS + 1):
+        part, independent = _parts_of_both(gram, seen, one[some], other[some])
+        parts.append(part)
+        kept.append(independent)
+    part, independent = np.concatenate(parts), np.concatenate(kept)
+    one, other, part = one[independent], other[independent], part[independent]
+    logs = evidence.of_spaces(part, dims[one] + dims[other], float(z @ z))
+    weighted = logs + np.log(weights[one]) + np.log(weights[other])
     keys = number[one] * len(order) + number[other]
+    sequence = np.argsort(keys, kind="stable")
+    starts = np.flatnonzero(np.diff(keys[sequence], prepend=-1))
+    if not len(starts):
+        return []
+    totals = np.logaddexp.reduceat(weighted[sequence], starts)
     pairs = []
-    for key in np.unique(keys):
-        alike = np.flatnonzero(keys == key)
+    for k, total in enumerate(totals):
+        alike = sequence[starts[k] : starts[k + 1] if k + 1 < len(starts) else None]
         best = alike[np.argmax(logs[alike])]
-        first, second = sorted((one[best], other[best]), key=lambda k: -alone[k])
-        both = (hypotheses[first], hypotheses[second])
-        # The mean is over all positions, those included that were not tried.
-        untried = sum(h.name == OUTLIER for h in both) * np.log(standing)
-        mean = mean_evidence(logs[alike]) - float(untried)
-        pairs.append(Pair((both[0].name, both[1].name), both, mean))
-    return sorted(pairs, key=lambda pair: -pair.log_evidence)
+        twice = np.log(2.0) if number[one[best]] == number[other[best]] else 0.0
+        pairs.append(Pair((tried[one[best]], tried[other[best]]), float(total + twice)))
+    return pairs
 
 
-def _tried(candidates: Mapping[str, Shapes], z: Array) -> tuple[list[Hypothesis], float]:
-    """Shapes of which pairs are made, and how many bumped positions stand for one that is tried."""
-    hypotheses, standing = [], 1.0
+def _parts_of_both(
+    gram: Array, seen: Array, one: NDArray[np.int_], other: NDArray[np.int_]
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Squares of what residuals have in the space of two spaces, and whether these are two."""
+    cross = gram[one, :, other, :]
+    left = np.eye(seen.shape[1]) - np.swapaxes(cross, 1, 2) @ cross
+    values, vectors = np.linalg.eigh(left)
+    # Padding has eigenvalue 1 and no share in the residuals.
+    rest = seen[other] - np.einsum("jab,ja->jb", cross, seen[one])
+    along = np.einsum("jab,ja->jb", vectors, rest) ** 2
+    part = np.sum(seen[one] ** 2, axis=1)
+    part += np.sum(along / np.maximum(values, COLLINEAR), axis=1)
+    return part, values[:, 0] > COLLINEAR
+
+
+def _tried(candidates: Mapping[str, Shapes], z: Array) -> tuple[list[Hypothesis], Array]:
+    """Shapes of which pairs are made, and the prior probability of each in its candidate."""
+    tried: list[Hypothesis] = []
+    weights: list[Array] = []
     for name, shapes in candidates.items():
         places = np.arange(len(shapes))
         if name == OUTLIER and len(places) > POSITIONS:
             places = np.sort(np.argsort(-shapes.parts(z), kind="stable")[:POSITIONS])
-            standing = len(shapes) / POSITIONS
-        hypotheses += [shapes[int(k)] for k in places]
-    return hypotheses, standing
+        tried += [shapes[int(k)] for k in places]
+        weights.append(shape_weights(shapes)[places])
+    return tried, np.concatenate(weights) if weights else np.zeros(0)
 
 
 def _products(hypotheses: Sequence[Hypothesis], z: Array) -> tuple[Array, Array]:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from accelstudy.campaign.document import number
 from accelstudy.diagnosis.pipeline import Diagnosis, Named
 from accelstudy.diagnosis.report.statement import cosine_in, statement
@@ -48,7 +46,7 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
             "candidates": [
                 {
                     "name": name,
-                    "p_single": number(np.min(d.screening.p_single[name])),
+                    "p_single": number(d.screening.p_candidate[name]),
                     "p_family": number(d.screening.p_family[name]),
                 }
                 for name in sorted(d.screening.p_family, key=lambda n: d.screening.p_family[n])

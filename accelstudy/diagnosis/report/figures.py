@@ -14,9 +14,8 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
-from accelstudy.diagnosis.decision.search import LEVEL_EFFECTS
-from accelstudy.diagnosis.evidence.naming import UNKNOWN
-from accelstudy.diagnosis.pipeline import Diagnosis
+from accelstudy.diagnosis.evidence.field import UNKNOWN
+from accelstudy.diagnosis.pipeline import LEVEL_EFFECTS, Diagnosis
 from accelstudy.diagnosis.report.positions import condition_sigma
 from accelstudy.diagnosis.report.set_figure import explanations_figure
 from accelstudy.diagnosis.report.wording import GROUPS

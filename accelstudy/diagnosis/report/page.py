@@ -9,8 +9,8 @@ import pandas as pd
 
 from accelstudy.adjustment.quality.whole_model import REFUTED
 from accelstudy.diagnosis.decision.explanations import CREDIBLE
-from accelstudy.diagnosis.decision.search import LEVEL_EFFECTS, SURE
-from accelstudy.diagnosis.pipeline import LEVEL_NOISE, Diagnosis
+from accelstudy.diagnosis.decision.priors import SURE
+from accelstudy.diagnosis.pipeline import LEVEL_EFFECTS, LEVEL_NOISE, Diagnosis
 from accelstudy.diagnosis.report import wording
 from accelstudy.diagnosis.report.figures import diagnosis_figures
 from accelstudy.diagnosis.report.missing import family_words, separates

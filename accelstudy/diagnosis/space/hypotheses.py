@@ -56,11 +56,17 @@ class Hypothesis:
 
     @property
     def shown(self) -> Effect | None:
-        """Return the effect without parameters that no position shows."""
-        kept = tuple(np.flatnonzero(np.any(self.directions != 0, axis=1)).tolist())
-        if self.effect is None or len(kept) != self.dim:
+        """Return the effect with as many of its parameters as the positions can tell apart.
+
+        Those that no position shows are left out. Where only combinations show, the parameters that
+        are kept stand for them, and the others are zero.
+        """
+        if self.effect is None or self.dim == len(self.effect.parameters):
             return self.effect
-        return self.effect.only(kept)
+        from scipy.linalg import qr  # slow to import, and seldom needed
+
+        order = qr(self.directions.T, mode="r", pivoting=True)[1]
+        return self.effect.only(tuple(sorted(order[: self.dim].tolist())))
 
     @property
     def smooth(self) -> str | None:
@@ -71,6 +77,12 @@ class Hypothesis:
         shape, hypers = ({}, ()) if self.effect is None else (self.effect.shape, self.effect.hypers)
         smooth = (h.name for h in hypers if h.smooth and shape[h.name] != h.none)
         return next(smooth, None)
+
+    @property
+    def place(self) -> int:
+        """Index of the position that a hypothesis of a bumped position is about."""
+        assert self.effect is None
+        return int(self.spec[len(OUTLIER) + 1 : -1])
 
     @property
     def value(self) -> float:
@@ -156,12 +168,17 @@ class BumpedPositions(Sequence[Hypothesis]):
         if isinstance(index, slice):
             return tuple(self[i] for i in range(*index.indices(len(self))))
         place = int(self.places[index])
-        directions = self.root[index][:, np.any(self.root[index] != 0, axis=0)]
+        where, directions = self.rows_of(int(index))
         rows = np.zeros((len(self.residuals.design), directions.shape[1]))
-        c = len(directions)
-        rows[place * c : (place + 1) * c] = directions
+        rows[where] = directions
         basis = self.residuals.project(rows)
         return Hypothesis(OUTLIER, f"{OUTLIER}({place})", None, directions, basis, basis)
+
+    def rows_of(self, index: int) -> tuple[slice, Array]:
+        """Rows of the conditions of one position, and its H there, (c, l); R E H is a basis."""
+        place, root = int(self.places[index]), self.root[index]
+        c = len(root)
+        return slice(place * c, (place + 1) * c), root[:, np.any(root != 0, axis=0)]
 
 
 Shapes: TypeAlias = EffectShapes | BumpedPositions

@@ -110,11 +110,11 @@ def held_out_gap(
     base, extended : Solution, of the same positions
     rest : Observations, of the others
     held : indices of the others, for the record
-    variance : float, of unit weight; None takes that of the extended fit
+    variance : float, of unit weight; None takes that of the base fit
     rng : Generator, for the resampling
     """
     if variance is None:
-        variance = extended.omega / extended.redundancy
+        variance = base.omega / base.redundancy
     first, second = (_Prediction.of(solution, rest) for solution in (base, extended))
     d = first.white - second.white
     slope = d @ first.slope

@@ -1,0 +1,26 @@
+"""Prior weights of everything that could be the case, and the thresholds of a decision.
+
+Beside "one effect is missing", which weighs 1 and is shared evenly by the classes of effects and a
+bumped position. The probability that a given sigma is wrong is with the level (`evidence.size`).
+"""
+
+TWO = 0.06
+"""Two effects are missing: where a model was chosen with care that is rare."""
+UNKNOWN = 0.04
+"""Something is missing that is no effect of the catalogue, which has what is usual."""
+COLOUR = 0.1
+"""Nothing is missing but the noise has some colour, as all real noise has."""
+AXES = 0.03
+"""Nothing is missing but the axes differ in noise."""
+TAILS = 0.03
+"""Nothing is missing but large errors are more frequent than in a normal distribution."""
+STEPS = 0.05
+"""Nothing is missing but the readings are coarse."""
+
+SURE = 0.7
+"""Posterior probability from which on one name is given: a wrong name costs 7, a name that is
+withheld 3."""
+MANY = 4
+"""Explanations of a credible set that are still an answer."""
+MORE_PROBABLE = 0.5
+"""Probability from which on larger residuals without a pattern are called noise."""

@@ -1,0 +1,234 @@
+"""The verdict: which explanation is given, of the posterior over all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import special
+
+from accelstudy.adjustment.quality import Solution
+from accelstudy.adjustment.quality.whole_model import REFUTED
+from accelstudy.diagnosis.decision import priors
+from accelstudy.diagnosis.decision.explanations import Explanation
+from accelstudy.diagnosis.decision.posterior import Posterior, Weighed, of_effects
+from accelstudy.diagnosis.decision.search import Search
+from accelstudy.diagnosis.evidence.field import UNKNOWN
+from accelstudy.diagnosis.evidence.noise import NOISES
+from accelstudy.diagnosis.space.hypotheses import Hypothesis, Setting, setting_of
+from accelstudy.diagnosis.space.location import LACK_OF_FIT
+from accelstudy.wording import joined, words
+
+LARGE = 300.0
+"""Noncentrality beyond which an effect is judged by its refit, as it is not of first order."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A hypothesis that was chosen.
+
+    Attributes
+    ----------
+    best : Hypothesis
+    members : tuple of str, names that mean the same in this campaign
+    probability : float, posterior
+    """
+
+    best: Hypothesis
+    members: tuple[str, ...]
+    probability: float
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a search found.
+
+    Attributes
+    ----------
+    verdict : str, "no_effect", "named", "narrowed", "gross_error", "noise_model" or "unknown"
+    setting : Setting, of the fit with what was chosen, or of the base fit
+    reason : str
+    chosen : tuple of Choice
+    posterior : Posterior or None, where something is missing
+    """
+
+    verdict: str
+    setting: Setting
+    reason: str = ""
+    chosen: tuple[Choice, ...] = ()
+    posterior: Posterior | None = None
+
+    @property
+    def credible_set(self) -> tuple[Explanation, ...]:
+        """Smallest set of explanations that holds what is missing."""
+        return () if self.posterior is None else self.posterior.credible_set
+
+
+def find(search: Search) -> Finding:
+    """Say what is missing, given that something is."""
+    posterior = search.posterior
+    strongest = next((one for one in posterior.all if len(one.best) == 1), None)
+    if strongest is not None and _is_large(search, strongest):
+        posterior = _judged_by_refits(search, strongest)
+    top = posterior.top
+    if not top.best:
+        return _without_a_fit(search, posterior)
+    fit = search.refits.best(list(zip(top.best, top.classes, strict=True)))
+    if fit is None:
+        said = joined([words(name) for name in top.names])
+        reason = f"{said} explains most of it, but a model with it has no solution"
+        return Finding("unknown", search.setting, reason, posterior=posterior)
+    best, solution = fit
+    left = _misfit(search, solution)
+    if left:
+        said = joined([words(name) for name in top.names])
+        reason = f"with {said} added, the residuals are still {left:.2g} times the stated noise"
+        return Finding("unknown", search.setting, reason, posterior=posterior)
+    return _with_a_fit(search, posterior, best, solution)
+
+
+def _with_a_fit(
+    search: Search, posterior: Posterior, best: Sequence[Hypothesis], solution: Solution
+) -> Finding:
+    """Judge the most probable explanation, which has a fit."""
+    top, probability = posterior.top, posterior.probabilities[0]
+    chosen = tuple(
+        sorted(
+            (Choice(h, m, probability) for h, m in zip(best, top.classes, strict=True)),
+            key=lambda choice: choice.best.effect is not None,
+        )
+    )
+    credible = posterior.credible_set
+    if probability >= priors.SURE:
+        verdict = "gross_error" if chosen[0].best.effect is None else "named"
+    elif len(credible) <= priors.MANY and _of_effects(credible) >= priors.SURE:
+        verdict = "narrowed"
+    else:
+        return _without_a_fit(search, posterior)
+    return Finding(verdict, setting_of(solution), "", chosen, posterior)
+
+
+def _of_effects(credible: Sequence[Explanation]) -> float:
+    """Probability of the explanations by effects alone."""
+    return sum(one.posterior for one in credible if of_effects(one))
+
+
+def _without_a_fit(search: Search, posterior: Posterior) -> Finding:
+    """Judge where no effect or set of effects is probable enough."""
+    noise = [
+        (one.names[0], one.posterior)
+        for one in posterior.explanations
+        if one.names[0] in NOISES
+    ]  # fmt: skip
+    if sum(p for _, p in noise) >= priors.SURE:
+        name = noise[0][0]
+        return Finding("noise_model", search.setting, NOISES[name], posterior=posterior)
+    first = posterior.explanations[0]
+    said = joined([words(name) for name in first.names])
+    if first.names == (UNKNOWN,):
+        reason = "no effect or pair of effects of the catalogue explains it"
+    else:
+        second = joined([words(name) for name in posterior.explanations[1].names])
+        reason = (
+            f"{said} explains it with a probability of {first.posterior:.2f} only, and {second} "
+            f"with {posterior.explanations[1].posterior:.2f}"
+        )
+    return Finding("unknown", search.setting, reason, posterior=posterior)
+
+
+def _is_large(search: Search, top: Weighed) -> bool:
+    """Whether an effect is so large that its signature to first order is not enough."""
+    z, basis = search.residuals.z, top.best[0].basis
+    return top.best[0].effect is not None and float(np.sum((z @ basis) ** 2)) > LARGE
+
+
+def _judged_by_refits(search: Search, single: Weighed) -> Posterior:
+    """Posterior if an effect is large: it alone, or with another one in what its refit leaves.
+
+    To first order a large effect leaves so much that anything would be found beside it.
+    """
+    pairs = [one for one in search.pairs if len(one.best) == 2]
+    refitted = [_refitted(search, one) for one in (single, *sorted(pairs, key=_weight)[-1:])]
+    found = [one for one, _ in refitted]
+    alone, solution = refitted[0]
+    if solution is not None:
+        found += _beside(search, alone, solution)
+    others = [one for one in search.singles if one.best and one.names != single.names]
+    return Posterior.of([*found, *others, *search.noises])
+
+
+def _weight(one: Weighed) -> float:
+    return one.log_weight
+
+
+def _refitted(search: Search, one: Weighed) -> tuple[Weighed, Solution | None]:
+    """Weigh an explanation by its refit instead of by first order."""
+    fit = search.refits.best(list(zip(one.best, one.classes, strict=True)))
+    if fit is None:
+        return one, None
+    best, solution = fit
+    z, basis = search.residuals.z, np.concatenate([h.basis for h in one.best], axis=1)
+    left = z - basis @ np.linalg.lstsq(basis, z, rcond=None)[0]
+    parts = float(z @ z) - np.array([float(left @ left), solution.omega])
+    first, refit = search.evidence.of_spaces(parts, [basis.shape[1]] * 2, z @ z)
+    weight = one.log_weight + max(float(refit - first), 0.0)
+    return replace(one, log_weight=weight, best=tuple(best)), solution
+
+
+def _beside(search: Search, alone: Weighed, solution: Solution) -> list[Weighed]:
+    """One effect with another one, or with something unknown, in what its refit leaves."""
+    inner = Search(solution, search.seed, search.known, search.within)
+    z, field = inner.residuals.z, inner.field
+    nothing = float(np.logaddexp.reduce(inner.evidence.of_noise(z @ z)))
+    logs = field.densities(inner.evidence, z) - nothing + alone.log_weight
+    k = max(len(search.classes), 1)
+    found = []
+    for name, log in zip(field.names, logs.tolist(), strict=True):
+        if name == UNKNOWN:
+            weight = log + float(np.log(priors.TWO * priors.UNKNOWN))
+            found.append(Weighed((UNKNOWN,), ((UNKNOWN,),), weight))
+            continue
+        other = inner.first_shape(name)
+        both = (*alone.classes, inner.members(other))
+        weight = log + float(np.log(priors.TWO / k))
+        found.append(Weighed((*alone.names, name), both, weight, (*alone.best, other)))
+    return found
+
+
+def _misfit(search: Search, solution: Solution) -> float:
+    """By how much residuals are still larger than a sigma that holds; 0 if they are not."""
+    if not search.known or _refuted_by_repeats(search):
+        return 0.0
+    p = float(special.chdtrc(solution.redundancy, solution.omega))
+    ratio = float(np.sqrt(solution.omega / solution.redundancy))
+    return ratio if 2 * p < REFUTED else 0.0
+
+
+def _refuted_by_repeats(search: Search) -> bool:
+    """Whether repeated positions alone refute sigma, so that it is no measure of a misfit."""
+    square, freedom = _of_repeats(search)
+    if not freedom:
+        return False
+    p = special.chdtrc(freedom, square), special.chdtr(freedom, square)
+    return bool(2 * min(p) < REFUTED)
+
+
+def lack_of_fit(search: Search) -> float:
+    """Probability that repeats agree so much better with each other than with the model."""
+    square, freedom = _of_repeats(search)
+    rest = search.residuals.redundancy - freedom
+    if not freedom or not rest:
+        return 1.0
+    z = search.residuals.z
+    ratio = (float(z @ z) - square) / rest / (square / freedom)
+    return float(special.fdtrc(rest, freedom, ratio))
+
+
+def _of_repeats(search: Search) -> tuple[float, int]:
+    """Square of the differences of repeated positions, and its degrees of freedom."""
+    if LACK_OF_FIT not in search.groups:
+        return 0.0, 0
+    z, same = search.residuals.z, search.groups[LACK_OF_FIT]
+    square = float(z @ z) - float(same.parts(z)[0])
+    return max(square, 0.0), search.residuals.redundancy - int(same.dims[0])

@@ -1,0 +1,123 @@
+"""Whether anything is missing: the total evidence for it, beside what noise alone would show.
+
+The statistic is the log odds that a candidate is missing rather than nothing,
+
+    S = log Σ_k π_k m_k(z) − log m_0(z),
+
+over all candidates, shapes, sizes and levels of the noise. How large it becomes by chance is found
+by simulation of the same fit. Half of the simulated residuals have an effect at random. They count
+with the weight that makes them noise again (importance sampling), so that small probabilities are
+found by few simulations, too. Beyond what was simulated P(S ≥ s) ≤ exp(−s) holds, as exp(S) has the
+mean 1 in noise alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.diagnosis.evidence.chance import Chance
+from accelstudy.diagnosis.evidence.field import Field
+from accelstudy.diagnosis.evidence.size import Evidence
+from accelstudy.diagnosis.space.residuals import Residuals
+
+Array = NDArray[np.float64]
+
+ENOUGH = 10
+"""Simulated values beyond one that is observed, from which on their number is trusted."""
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """A statistic by chance: values (s, ...) of simulated residuals, and their weights (s,)."""
+
+    values: Array
+    weights: Array
+
+    def exceeds(self, value: float, column: int | None = None) -> float:
+        """Probability that noise alone reaches a value, of log odds or of a column of them."""
+        values = self.values if column is None else self.values[:, column]
+        return tail(values, self.weights, value)
+
+
+@dataclass(frozen=True)
+class Detection:
+    """Outcome of the test for anything that is missing.
+
+    Attributes
+    ----------
+    statistic : float, S
+    p_value : float, probability of a larger one by noise alone
+    densities : dict of candidate to log density of the residuals
+    noise : (c,) array, log density of the residuals in noise alone, by the components of the level
+    p_candidate : dict of candidate to p-value of it alone, over its shapes
+    p_family : dict of candidate to p-value of it as the strongest of all
+    by_chance : Simulated, S of simulated residuals
+    """
+
+    statistic: float
+    p_value: float
+    densities: Mapping[str, float]
+    noise: Array
+    p_candidate: Mapping[str, float]
+    p_family: Mapping[str, float]
+    by_chance: Simulated
+
+    @property
+    def smallest(self) -> float:
+        """Probability of the whole by chance."""
+        return self.p_value
+
+
+def detect(field: Field, evidence: Evidence, residuals: Residuals, chance: Chance) -> Detection:
+    """Test whether anything is missing.
+
+    Parameters
+    ----------
+    field : Field, candidates
+    evidence : Evidence
+    residuals : Residuals
+    chance : Chance
+    """
+    z = residuals.z
+    if not field.names:
+        nobody: Array = np.zeros(0)
+        return Detection(0.0, 1.0, {}, evidence.of_noise(z @ z), {}, {}, Simulated(nobody, nobody))
+    densities = field.densities(evidence, z)
+    noise = evidence.of_noise(z @ z)
+    nothing = np.logaddexp.reduce(noise)
+    k = len(field.names)
+    odds: list[Array] = []
+    weights: list[Array] = []
+    for errors in chance.errors_with_effects(residuals, field):
+        parts, squares = field.parts(errors), np.sum(errors**2, axis=-1)
+        logs = field.combined(evidence.of_spaces(parts, field.dims, squares))
+        odds.append(logs - np.logaddexp.reduce(evidence.of_noise(squares), axis=-1)[:, None])
+        weights.append(1 / (0.5 + 0.5 * np.exp(np.minimum(field.proposal(parts), 700.0))))
+    each, w = np.concatenate(odds), np.concatenate(weights)
+    total = np.logaddexp.reduce(each, axis=1) - np.log(k)
+    statistic = float(np.logaddexp.reduce(densities) - np.log(k) - nothing)
+    strongest = each.max(axis=1)
+    own = densities - nothing
+    return Detection(
+        statistic=statistic,
+        p_value=tail(total, w, statistic),
+        densities=dict(zip(field.names, densities.tolist(), strict=True)),
+        noise=noise,
+        p_candidate={n: tail(each[:, i], w, own[i]) for i, n in enumerate(field.names)},
+        p_family={n: tail(strongest, w, own[i], k) for i, n in enumerate(field.names)},
+        by_chance=Simulated(total, w),
+    )
+
+
+def tail(values: Array, weights: Array, value: float, count: int = 1) -> float:
+    """Probability that log odds, or the largest of `count` of them, reach a value by chance."""
+    beyond = values >= value
+    bound = float(count * np.exp(min(-value, 0.0)))
+    if np.count_nonzero(beyond) >= ENOUGH:
+        return float(min(np.sum(weights[beyond]) / len(weights), 1.0))
+    least = np.sum(weights[values >= np.sort(values)[-ENOUGH]]) / len(weights)
+    return float(min(least, bound, 1.0))

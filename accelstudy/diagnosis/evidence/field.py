@@ -1,0 +1,163 @@
+"""All that may be missing, side by side: each candidate with the spaces of its shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.diagnosis.evidence.size import Evidence
+from accelstudy.diagnosis.space.hypotheses import BumpedPositions, EffectShapes, Shapes
+from accelstudy.diagnosis.space.spaces import Bases, Spaces
+
+Array = NDArray[np.float64]
+
+UNKNOWN = "unknown"
+"""Something in one of the groups of regressors that is none of the effects."""
+PROPOSED = np.array([12.0, 25.0, 50.0])
+"""Noncentralities of effects that are simulated, of which a test at any usual level decides."""
+
+
+@dataclass(frozen=True)
+class Field:
+    """Candidates, each with spaces that are alternatives.
+
+    Attributes
+    ----------
+    names : tuple of str, K candidates
+    spaces : tuple of tuple of Spaces, of each
+    weights : tuple of arrays, prior probabilities of the spaces of each, which sum to 1
+    """
+
+    names: tuple[str, ...]
+    spaces: tuple[tuple[Spaces, ...], ...]
+    weights: tuple[Array, ...]
+
+    @classmethod
+    def of(cls, candidates: Mapping[str, Shapes], groups: Mapping[str, Spaces]) -> Field:
+        """Candidates and, as the last of them, something unknown in a group of regressors."""
+        names: list[str] = []
+        spaces: list[tuple[Spaces, ...]] = []
+        weights: list[Array] = []
+        for name, shapes in candidates.items():
+            names.append(name)
+            spaces.append((shapes,))
+            weights.append(shape_weights(shapes))
+        if groups:
+            names.append(UNKNOWN)
+            spaces.append(tuple(groups.values()))
+            weights.append(np.full(len(groups), 1 / len(groups)))
+        return cls(tuple(names), tuple(spaces), tuple(weights))
+
+    @cached_property
+    def dims(self) -> NDArray[np.int_]:
+        """Dimensions of all spaces, (s,)."""
+        parts = [space.dims for spaces in self.spaces for space in spaces]
+        return np.concatenate(parts) if parts else np.zeros(0, dtype=int)
+
+    @cached_property
+    def starts(self) -> NDArray[np.int_]:
+        """Where the spaces of each candidate begin, (K,)."""
+        return np.concatenate([[0], np.cumsum([len(w) for w in self.weights])[:-1]]).astype(int)
+
+    @cached_property
+    def _together(self) -> Bases:
+        """Bases of all candidates that have one, side by side."""
+        bases = [s for spaces in self.spaces for s in spaces if isinstance(s, Bases)]
+        if not bases:
+            return Bases(np.zeros((0, 0)), np.zeros(0, dtype=int))
+        return Bases(
+            np.concatenate([b.together for b in bases], axis=1),
+            np.concatenate([b.dims for b in bases]),
+        )
+
+    def parts(self, errors: Array) -> Array:
+        """Squares of what residuals (..., m) have in each space, (..., s)."""
+        found, first = [], 0
+        together = self._together
+        seen = together.parts(errors) if len(together.dims) else None
+        for spaces in self.spaces:
+            for space in spaces:
+                if isinstance(space, Bases):
+                    assert seen is not None
+                    found.append(seen[..., first : first + len(space.dims)])
+                    first += len(space.dims)
+                else:
+                    found.append(space.parts(errors))
+        return np.concatenate(found, axis=-1)
+
+    def densities(self, evidence: Evidence, errors: Array) -> Array:
+        """Log density of residuals (..., m) under each candidate, over its shapes, (..., K)."""
+        return self.combined(
+            evidence.of_spaces(self.parts(errors), self.dims, np.sum(errors**2, axis=-1))
+        )
+
+    def combined(self, logs: Array) -> Array:
+        """Log of the mean over the shapes of each candidate, (..., K), of logs (..., s)."""
+        weighted = logs + np.log(np.concatenate(self.weights))
+        return np.asarray(np.logaddexp.reduceat(weighted, self.starts, axis=-1))
+
+    # --- simulated effects ----------------------------------------------------------------------
+
+    @cached_property
+    def _proposed(self) -> tuple[NDArray[np.int_], Array]:
+        """Spaces in which effects can be drawn, (p,), and how often each is."""
+        able = [
+            isinstance(space, EffectShapes | BumpedPositions)
+            for spaces in self.spaces
+            for space in spaces
+            for _ in space.dims
+        ]
+        weights = np.concatenate([w / len(self.names) for w in self.weights])
+        chosen = np.flatnonzero(able)
+        return chosen, weights[chosen] / weights[chosen].sum()
+
+    def with_effects(self, noise: Array, rng: np.random.Generator) -> Array:
+        """Add effects at random to noise (b, m), one to each."""
+        chosen, weights = self._proposed
+        drawn = rng.choice(chosen, size=len(noise), p=weights)
+        sizes = rng.choice(PROPOSED, size=len(noise))
+        changed = noise.copy()
+        for i, space in enumerate(drawn):
+            dim = self.dims[space]
+            amounts = rng.standard_normal(dim) * np.sqrt(sizes[i] / dim)
+            rows, basis = self._basis(int(space))
+            changed[i, rows] += basis @ amounts
+        return changed
+
+    def _basis(self, number: int) -> tuple[slice, Array]:
+        """Rows of the conditions, and columns that span the space there, of one of all spaces."""
+        candidate = int(np.searchsorted(self.starts, number, side="right")) - 1
+        shapes = self.spaces[candidate][0]
+        place = number - int(self.starts[candidate])
+        if isinstance(shapes, BumpedPositions):
+            return shapes.rows_of(place)
+        assert isinstance(shapes, EffectShapes)
+        return slice(None), shapes[place].basis
+
+    def proposal(self, parts: Array) -> Array:
+        """Log density of residuals with an effect at random beside that of noise alone, (b,).
+
+        Parameters
+        ----------
+        parts : (b, s) array
+        """
+        chosen, weights = self._proposed
+        dims = self.dims[chosen]
+        total = np.full(len(parts), -np.inf)
+        for size in PROPOSED:
+            g = size / dims
+            logs = -dims / 2 * np.log1p(g) + g / (1 + g) / 2 * parts[:, chosen]
+            total = np.logaddexp(total, np.logaddexp.reduce(logs + np.log(weights), axis=1))
+        return np.asarray(total - np.log(len(PROPOSED)))
+
+
+def shape_weights(shapes: Shapes) -> Array:
+    """Prior probabilities of shapes: even over the logarithm of a smooth setting, else even."""
+    weights = np.ones(len(shapes))
+    if isinstance(shapes, EffectShapes) and len(shapes) > 1 and shapes[0].smooth is not None:
+        weights = np.gradient(np.log([h.value for h in shapes]))
+    return np.asarray(weights / weights.sum())

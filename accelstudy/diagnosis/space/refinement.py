@@ -1,0 +1,65 @@
+"""Shapes of an effect between those that are tried at first."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.diagnosis.space.hypotheses import EffectShapes, Hypothesis, Setting, Shapes
+
+Array = NDArray[np.float64]
+
+ROUNDS = 3
+"""How often shapes are added about the best one."""
+BETWEEN = 5
+"""Shapes that are added between its neighbours."""
+
+
+def strongest(shapes: Shapes, z: Array) -> Hypothesis:
+    """Shape that explains most of residuals z (m,)."""
+    return shapes[int(np.argmax(shapes.parts(z)))]
+
+
+def refined(setting: Setting, shapes: Shapes) -> Shapes:
+    """Add shapes between the neighbours of the best one, and again between those."""
+    z = setting.frame.residuals.z
+    if not isinstance(shapes, EffectShapes) or len(shapes) < 2:
+        return shapes
+    if shapes[0].smooth is None:
+        return _completed(setting, shapes)
+    for _ in range(ROUNDS):
+        best = int(np.argmax(shapes.parts(z)))
+        around = (shapes[max(best - 1, 0)].value, shapes[min(best + 1, len(shapes) - 1)].value)
+        tried = (shaped(setting, shapes[best], v) for v in np.geomspace(*around, BETWEEN + 2)[1:-1])
+        fine = [*shapes, *(h for h in tried if h is not None)]
+        shapes = EffectShapes.of(sorted(fine, key=lambda h: h.value))
+    return shapes
+
+
+def shaped(setting: Setting, hypothesis: Hypothesis, value: float) -> Hypothesis | None:
+    """Return a smooth effect with another value of its setting; None if it shows less."""
+    assert hypothesis.effect is not None
+    assert hypothesis.smooth is not None
+    effect = type(hypothesis.effect)(**{hypothesis.smooth: float(f"{value:.6g}")})
+    found = setting.hypothesis(effect)
+    return found if found is not None and found.dim == hypothesis.dim else None
+
+
+def _completed(setting: Setting, shapes: EffectShapes) -> EffectShapes:
+    """Add shapes that were passed over next to the best one, until there are none."""
+    z, hold = setting.frame.residuals.z, setting.frame.hold
+    while True:
+        best = int(np.argmax(shapes.parts(z)))
+        effect = shapes[best].effect
+        assert effect is not None
+        fine = list(shapes)
+        for near in (best + 1, best - 1):
+            if 0 <= near < len(shapes):
+                other = shapes[near].effect
+                assert other is not None
+                tried = [setting.hypothesis(e) for e in effect.between(other, hold)]
+                found = [h for h in tried if h is not None and h.dim == shapes[best].dim]
+                fine[max(best, near) : max(best, near)] = found
+        if len(fine) == len(shapes):
+            return shapes
+        shapes = EffectShapes.of(fine)
