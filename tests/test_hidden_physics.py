@@ -29,6 +29,7 @@ from accelstudy.hidden.physics.designs import session
 from accelstudy.hidden.physics.effects import EFFECTS
 from accelstudy.hidden.physics.measuring import Cause, Sensor, observe
 from accelstudy.hidden.physics.noise import Noise
+from accelstudy.hidden.physics.oracle import oracle
 from accelstudy.hidden.physics.rotations import in_turned_frame, rotated
 from accelstudy.hidden.physics.session import GRAVITY
 from accelstudy.models import get_model
@@ -265,3 +266,43 @@ def test_samples_within_the_holds_tell_the_noise_and_what_drifts():
     t = np.arange(campaign.n_samples[0]) * own.length / campaign.n_samples[0]
     by_samples = campaign.sd[0, 0] / np.sqrt(np.sum((t - t.mean()) ** 2))
     assert campaign.sd_slope[0, 0] == pytest.approx(by_samples, rel=1e-3)
+
+
+# --- the oracle ----------------------------------------------------------------------------------
+
+
+def test_the_oracle_keeps_its_level_and_knows_what_is_large():
+    knowing = oracle("snub-24", "robot")
+    rng, m = np.random.default_rng(14), len(knowing.atlas.together)
+    nothing = knowing.atlas.conditions.left(rng.standard_normal((600, m)))
+    alarms = np.mean([knowing.judge(z, ()).detected for z in nothing])
+    assert alarms == pytest.approx(0.05, abs=4 * np.sqrt(0.05 * 0.95 / 600))
+    right = []
+    for i, name in enumerate(knowing.atlas.visible):
+        case = Case("one", "snub-24", "robot", False, (name,), (2000.0,))
+        truth = generate(case, seeded(15, i))[1]
+        (told,) = truth.oracle["told"]
+        right.append(bool({*told} & {*truth.classes[0]}))
+        assert truth.oracle["detected"]
+        assert truth.oracle["best"] == truth.oracle["told"]
+    assert np.mean(right) > 0.85
+
+
+def test_pairs_hold_what_a_least_squares_fit_of_both_effects_explains():
+    knowing = oracle("hand-18", "robot")
+    pairs, shapes = knowing.pairs, knowing.atlas.shapes
+    z = knowing.atlas.conditions.left(np.random.default_rng(16).standard_normal((1, 54)))[0]
+    found = pairs.parts(z)
+    for k in range(0, len(found), 37):
+        both = np.column_stack([shapes[pairs.first[k]].basis, shapes[pairs.second[k]].basis])
+        fitted = both @ np.linalg.lstsq(both, z, rcond=1e-2)[0]
+        assert found[k] == pytest.approx(fitted @ fitted, rel=1e-6)
+        assert pairs.dims[k] == np.linalg.matrix_rank(both, tol=1e-2)
+
+
+def test_the_oracle_tells_two_effects():
+    names = ("hysteresis", "encoder_offset")
+    case = Case("two", "yaw-50", "robot", True, names, (300.0, 300.0))
+    truth = generate(case, seeded(17))[1].to_dict()
+    assert [set(one) for one in truth["oracle"]["best"]] == [{"hysteresis"}, {"encoder_offset"}]
+    assert [effect["lam"] for effect in truth["effects"]] == [300.0, 300.0]
