@@ -281,6 +281,8 @@ def test_a_sensor_that_lags_behind_its_thermometer():
 def test_a_lag_is_a_setting_of_the_thermal_bias():
     plain, lagging = get_effect("thermal_bias"), get_effect("thermal_bias(tau=500)")
     assert plain.spec == get_effect("thermal_bias(tau=0)").spec == "thermal_bias"
+    assert plain.equation == "b_T,i (T − T0)"
+    assert "lag" in lagging.equation
     assert SensorModel.of("lag", [lagging.spec]).hold_columns == ("temperature", "time")
     p, model = np.array([1e-3, 2e-3, -1e-3]), SensorModel("lag", (lagging,))
     expected = np.outer(HOLD.lagged(500) - 20, p)

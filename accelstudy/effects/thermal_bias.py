@@ -22,8 +22,13 @@ class ThermalBias(Effect):
     group = "temperature"
     parameters = per_axis("b_T", "m/s^2/K", "b_{T%}")
     hypers = (Hyper("tau", "s", 0.0, above=0, smooth=True, none=0.0),)
-    equation = "b_T,i (T_τ − T0)"
     typical = (0.5e-3, 7e-3)
+
+    @property
+    def equation(self):
+        """What it adds; the lag is named where there is one."""
+        lag = "b_T,i (T_τ − T0), T_τ behind T by the lag τ"
+        return lag if self.shape["tau"] else "b_T,i (T − T0)"
 
     def output(self, f, p, g, hold, xp):
         """Return b_T (T_τ − T0)."""
