@@ -246,6 +246,11 @@ def test_what_cannot_be_made_is_a_row_with_its_error(plan, monkeypatch, tmp_path
 
     monkeypatch.setattr(run, "generate", refuse)
     run.run_chunk(*plan, paths(tmp_path), PROVENANCE)
+    run.run_baselines(*plan, tmp_path / "baselines.parquet", PROVENANCE)
+    answers = read_table(tmp_path / "baselines.parquet")
+    assert len(answers) == 3 * len(METHODS)
+    assert not answers["detected"].any()
+    assert set(answers["error"]) == {"refused: cannot see it"}
     truths, outcomes, _ = (read_table(path) for path in paths(tmp_path).values())
     assert outcomes["error"].tolist() == ["refused: cannot see it"] * 3
     assert truths["what"].tolist().count("hysteresis") == 2

@@ -152,8 +152,6 @@ METHODS: Mapping[str, Callable[[Problem], Answer | None]] = {
 def answers(campaign: Campaign, model: SensorModel) -> Iterator[tuple[str, Answer]]:
     """Answers of all methods that apply to a campaign."""
     problem = Problem.of(campaign, model)
-    if not problem.shapes:
-        return
     for name, method in METHODS.items():
         answer = method(problem)
         if answer is not None:

@@ -16,7 +16,7 @@ from accelstudy.campaign import Campaign
 from accelstudy.diagnosis.pipeline import Diagnosis, diagnose
 from accelstudy.effects import effects_without
 from accelstudy.errors import InputError
-from accelstudy.hidden.baselines import answers
+from accelstudy.hidden.baselines import METHODS, answers
 from accelstudy.hidden.cells import Cell
 from accelstudy.hidden.config import HiddenConfig
 from accelstudy.hidden.physics import Truth, generate
@@ -70,21 +70,26 @@ def run_baselines(
     output: str | Path,
     provenance: Mapping[str, Any],
 ) -> None:
-    """Let the simpler methods answer to some of the campaigns; parameters as in `run_chunk`."""
+    """Let the simpler methods answer to some of the campaigns; parameters as in `run_chunk`.
+
+    Where none of them can work, as the model cannot be fitted, they find nothing, with the error.
+    """
     model, rows = get_model(config.model), []
 
     def answer(campaign: Campaign) -> list[Row]:
         return [
-            {"method": method, "detected": detected, "found": json.dumps(names)}
+            {"method": method, "detected": detected, "found": json.dumps(names), "error": ""}
             for method, (detected, names) in answers(campaign, model)
         ]
 
     for cell, k in campaigns:
         if cell.one_in(config.baselines_every, k):
-            campaign, _ = _made(cell, k, config.seed)
+            campaign, truth = _made(cell, k, config.seed)
             with effects_without(cell.removed):
-                answered, _ = _tried(answer, campaign, f"{cell.name} {k}")
-            rows += [{"cell": cell.name, "campaign": k, **row} for row in answered or ()]
+                answered, error = _tried(answer, campaign, f"{cell.name} {k}")
+            nothing = {"detected": False, "found": "[]", "error": error or truth["failed"]}
+            answered = answered or [{"method": method, **nothing} for method in METHODS]
+            rows += [{"cell": cell.name, "campaign": k, **row} for row in answered]
     write_table(output, _table("baselines", rows), provenance)
 
 

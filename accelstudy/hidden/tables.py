@@ -32,6 +32,6 @@ SCHEMA: dict[str, dict[str, str]] = {
         **dict.fromkeys(("reason", "error"), _TEXT),
     },
     "seconds": {**_KEYS, "seconds": _NUMBER},
-    "baselines": {**_KEYS, "method": _TEXT, "detected": _FLAG, "found": _TEXT},
+    "baselines": {**_KEYS, "method": _TEXT, "detected": _FLAG, "found": _TEXT, "error": _TEXT},
 }
 """Columns of the tables of a chunk, and their types; lists and mappings are JSON."""
