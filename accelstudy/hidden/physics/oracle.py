@@ -1,6 +1,9 @@
-"""The likelihood-ratio oracle: the best that any method could say of a campaign.
+"""The likelihood-ratio oracle: what could be said of a campaign by who knows all but the answer.
 
 It knows sigma, the sensor, the shapes of all effects, how many are missing and how large they are.
+It detects by the smallest p-value of all likelihood ratios; the total evidence of all effects, of
+known size, would detect some points more where little can be detected (at λ = 10: 0.48 for 0.41).
+What it names is the most probable answer, which nobody beats on the average.
 """
 
 from __future__ import annotations
