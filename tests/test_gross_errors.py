@@ -1,5 +1,6 @@
-"""Gross errors: what each does to a campaign, and what is refused."""
+"""Gross errors: what each does to a campaign, how it is undone, and what is refused."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,9 +10,11 @@ from accelstudy.approaches import get_approach
 from accelstudy.campaign.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign
+from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.errors import InputError
 from accelstudy.gross_errors import get_gross_error, gross_error_names
 from accelstudy.gross_errors.axis_error import SIGNED_PERMUTATIONS
+from accelstudy.gross_errors.recognition import recognise
 from accelstudy.models import get_model
 from accelstudy.units import STANDARD_GRAVITY
 
@@ -160,3 +163,133 @@ def test_no_angles_no_unit_of_angles():
     level = replace(CLEAN, forces=np.tile(CLEAN.forces[0], (24, 1)))
     with pytest.raises(InputError, match="all positions are in the same attitude"):
         spoiled("row_order", campaign=level)
+
+
+# --- recognition ---------------------------------------------------------------------------------
+
+GRAVITY, ROBOT = get_approach("gravity"), get_approach("robot")
+TEMPERATURE = {"temperature": (10.0, 40.0), "temperature_order": "ABBA"}
+DESIGNS = {
+    "plain": {"scheme": "faces-edges-18"},
+    "symmetric": {"scheme": "mclaren-24", "sigma": 0.01},
+    "repeated": {"scheme": "faces-6", "repeats": 4, "order": "random", "effects": ("warm_up",)},
+    "hot": {"scheme": "dodecahedron-20", "effects": ("thermal_bias",), "size": 3.0, **TEMPERATURE},
+    "clipped": {"scheme": "fibonacci-24", "effects": ("saturation",), "size": 2.0},
+    "turned": {"scheme": "rings-24", "effects": ("mounting_rotation",), "size": 5.0},
+    "many": {
+        "scheme": "fibonacci-50",
+        "repeat_first": 10,
+        "effects": ("cubic_scale",),
+        "size": 9.0,
+    },
+}
+"""Campaigns without a gross error, some with effects that are far too large for any sensor."""
+
+
+@pytest.fixture(scope="module")
+def designs():
+    return {
+        name: simulate_campaign(CampaignSettings(seed=7, **settings))[0]
+        for name, settings in DESIGNS.items()
+    }
+
+
+def exchanged(campaign, rows, places):
+    order = np.arange(campaign.n_positions)
+    order[rows] = places
+    return replace(campaign, forces=campaign.forces[order])
+
+
+@pytest.mark.parametrize("design", DESIGNS)
+def test_nothing_is_recognised_where_nothing_is_wrong(design, designs):
+    assert recognise(designs[design], ROBOT) is None
+    assert recognise(replace(designs[design], angles=None), GRAVITY) is None
+
+
+@pytest.mark.parametrize("design", DESIGNS)
+def test_all_axes_and_units_are_recognised_and_undone(design, designs):
+    right = designs[design]
+    wrong = [f"axis_error(x={x}, y={y}, z={z})" for x, y, z in SIGNED_PERMUTATIONS[1:]]
+    wrong += [
+        f"unit_error(force={factor})" for factor in (0.1019716212978, 101.9716212978, 9.80665)
+    ]
+    wrong += [f"unit_error(angle={factor})" for factor in (0.9, 0.015707963267949)]
+    for spec in wrong:
+        found = recognise(spoiled(spec, campaign=right), ROBOT)
+        assert found is not None, spec
+        assert found.name == spec.partition("(")[0], spec
+        np.testing.assert_allclose(found.mended.forces, right.forces, rtol=1e-9, err_msg=spec)
+        np.testing.assert_allclose(found.mended.angles, right.angles, rtol=1e-9, err_msg=spec)
+
+
+@pytest.mark.parametrize("design", DESIGNS)
+def test_exchanged_rows_are_recognised_and_put_back(design, designs):
+    right, rng = designs[design], np.random.default_rng(3)
+    for count in (2, 3, 4, 6):
+        rows = rng.choice(right.n_positions, count, replace=False)
+        first = rng.integers(right.n_positions - count + 1)
+        block = np.arange(first, first + count)
+        for wrong in (rows, block):
+            campaign = exchanged(right, wrong, np.roll(wrong, 1))
+            if np.abs(campaign.forces - right.forces).max() < 0.06:
+                continue  # repeats
+            found = recognise(campaign, ROBOT)
+            assert found is not None, (design, wrong)
+            assert found.name == "row_order"
+            # Which of two repeats is which does not show, and is all the same.
+            assert np.abs(found.mended.forces - right.forces).max() < 0.06, (design, wrong)
+
+
+def test_a_table_that_slipped_by_a_row_is_put_back(designs):
+    right = designs["many"]
+    rows = np.arange(right.n_positions)
+    found = recognise(exchanged(right, rows, np.roll(rows, 1)), ROBOT)
+    assert found.reason.endswith(" and 40 more are exchanged")
+    assert np.abs(found.mended.forces - right.forces).max() < 0.06
+
+
+def test_what_does_not_show_is_not_recognised(designs):
+    """Repeats that were exchanged, and the axes and rows where there is no robot."""
+    repeated = designs["repeated"]
+    alike = np.argsort(np.linalg.norm(repeated.forces - repeated.forces[0], axis=1))[:2]
+    assert recognise(exchanged(repeated, alike, alike[::-1]), ROBOT) is None
+    for spec in ("axis_error(x=-3, y=1, z=2)", "row_order(first=2, second=9)"):
+        assert recognise(spoiled(spec, campaign=BLIND), GRAVITY) is None
+
+
+def test_a_sensor_that_is_mounted_in_its_own_way_is_no_gross_error(designs):
+    angle = np.pi / 6
+    c, s = np.cos(angle), np.sin(angle)
+    for design in ("turned", "plain"):
+        right = designs[design]
+        turned = right.forces @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+        assert recognise(replace(right, forces=turned), ROBOT) is None
+
+
+def test_several_gross_errors_are_undone_together(designs):
+    right = designs["many"]
+    wrong = exchanged(right, [4, 9], [9, 4])
+    wrong.forces[20] += (3, -12, 8)
+    for spec in ("axis_error(x=2, y=-1, z=3)", "unit_error(force=0.1019716212978)"):
+        wrong = spoiled(spec, campaign=wrong)
+    found = recognise(wrong, ROBOT)
+    assert {name for name, _ in found.named} == set(gross_error_names())
+    assert ("outlier_position", 21) in found.named
+    np.testing.assert_allclose(found.mended.forces, np.delete(right.forces, 20, axis=0), atol=0.06)
+    mended = np.delete(wrong.forces, 20, axis=0) @ found.conversion.T
+    np.testing.assert_allclose(np.sort(mended, axis=0), np.sort(found.mended.forces, axis=0))
+
+
+@pytest.mark.parametrize(("approach", "size"), [("robot", 19.0), ("robot", 2.0), ("gravity", 9.0)])
+def test_a_position_that_no_calibration_bears_is_left_out(approach, size):
+    settings = CampaignSettings(scheme="fibonacci-24", seed=12, approach=approach)
+    campaign, _ = simulate_campaign(settings)
+    right = diagnose(campaign, get_model("bias-scale-nonorthogonality"))
+    outward = campaign.forces[16] / np.linalg.norm(campaign.forces[16])
+    campaign.forces[16] += size * outward
+    found = diagnose(campaign, get_model("bias-scale-nonorthogonality"))
+    assert found.verdict == "gross_error"
+    assert [(named.name, named.position) for named in found.found] == [("outlier_position", 17)]
+    told = re.search(r"position 17 is wrong by ([\d.]+) m/s\^2", found.reason)
+    assert float(told[1]) == pytest.approx(size, rel=0.05)
+    np.testing.assert_allclose(found.base.parameters, right.base.parameters, atol=0.01)

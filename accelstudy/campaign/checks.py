@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from accelstudy.campaign.header import ANY, COLUMNS, COUNTING, HEADER, MOST, RANGES, Header
 from accelstudy.errors import InputError
+from accelstudy.gross_errors.unit_error import ANGLES, FORCES, WORDS
 from accelstudy.leveling import specific_force
-from accelstudy.units import GON, STANDARD_GRAVITY, to_si
+from accelstudy.units import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
 
@@ -103,8 +104,7 @@ def likely_fault(given: float, norm: float, unit: str, gravity: float) -> str | 
         return None
     if near(norm, STANDARD_GRAVITY):
         return "gravity"
-    fits = {"m/s^2": 1.0, "g": STANDARD_GRAVITY}
-    better = [u for u, size in fits.items() if u != unit and near(given * size, gravity)]
+    better = [u for u in ("m/s^2", "g") if u != unit and near(given * FORCES[u], gravity)]
     if not better and unit != "counts" and given > 100:
         better = ["counts"]
     return better[0] if better else "unknown"
@@ -161,14 +161,14 @@ def clearly_worse(misfit: float, other: float) -> bool:
 def check_angles(angles: Array, forces: Array, gravity: float, path: Path) -> None:
     """Check that no other reading of the robot's angles fits the forces clearly better than gon."""
 
-    def misfit(unit: float, sign: int = 1) -> float:
-        return misfit_of_angles(angles * unit, sign * forces, gravity)
+    def misfit(unit: str, sign: int = 1) -> float:
+        return misfit_of_angles(angles * ANGLES[unit], sign * forces, gravity)
 
     readings = {
-        "the angles look like degrees, not gon": misfit(to_si(1.0, "deg", "rad").item()),
-        "the angles look like radians, not gon": misfit(1.0),
-        "the forces have the opposite sign; at level specific force is (0, 0, -g)": misfit(GON, -1),
+        f"the angles look like {word}, not gon": misfit(unit) for unit, word in WORDS.items()
     }
+    opposite = "the forces have the opposite sign; at level specific force is (0, 0, -g)"
+    readings[opposite] = misfit("gon", -1)
     best = min(readings, key=lambda text: readings[text])
-    if clearly_worse(misfit(GON), readings[best]):
+    if clearly_worse(misfit("gon"), readings[best]):
         raise InputError(f"{path}: {', '.join(COLUMNS['angles'])}: {best}")

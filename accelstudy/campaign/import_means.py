@@ -18,6 +18,7 @@ from accelstudy.campaign.log_files import Source, open_source
 from accelstudy.campaign.logs import TIME_UNITS, conversion
 from accelstudy.campaign.session import Campaign
 from accelstudy.errors import InputError, UnknownNameError
+from accelstudy.gross_errors import unit_error
 from accelstudy.units import MGON, UNITS
 
 Array = NDArray[np.float64]
@@ -155,14 +156,15 @@ def _columns(source: Source, settings: ImportSettings) -> tuple[dict[str, Array]
 def _check_angles(path: str | Path, angles: Array, unit: str, campaign: Campaign) -> None:
     """Check that the robot's angles (n, 2) fit the forces in this unit and frame, if in any."""
 
-    def misfit(size: float, sign: int = 1) -> float:
-        return misfit_of_angles(angles * size, sign * campaign.forces, campaign.gravity)
+    def misfit(unit: str, sign: int = 1) -> float:
+        given = angles * unit_error.ANGLES[unit]
+        return misfit_of_angles(given, sign * campaign.forces, campaign.gravity)
 
-    units = {name: UNITS["rad"][name] for name in ("gon", "deg", "rad")}
-    others = {f"--robot-unit {name}": misfit(units[name]) for name in units if name != unit}
-    others["another --frame"] = misfit(units[unit], -1)
+    units = unit_error.ANGLES
+    others = {f"--robot-unit {name}": misfit(name) for name in units if name != unit}
+    others["another --frame"] = misfit(unit, -1)
     best = min(others, key=lambda option: others[option])
-    if clearly_worse(misfit(units[unit]), others[best]):
+    if clearly_worse(misfit(unit), others[best]):
         raise InputError(
             f"{path}: the robot's angles do not fit the forces in {unit}; {best} would be right"
         )

@@ -247,8 +247,11 @@ class _Run:
         verdict, reason = finding.verdict, finding.reason
         if self.recognised is not None:
             verdict, reason = "gross_error", self.recognised.reason
-            name = self.recognised.name
-            found = (Named(name, name, (name,), None, None), *found)
+            gross = (
+                Named(name, name, (name,), None, None, position=position)
+                for name, position in self.recognised.named
+            )
+            found = (*gross, *found)
         final, variance = finding.setting, self.unit_variance(finding.setting)
         names = [choice.best.name for choice in finding.chosen]
         with stage("held-out positions"):

@@ -6,17 +6,49 @@ A gross error is not an effect of the sensor or of the rig: the data is not what
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from functools import cache
-from typing import ClassVar, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.campaign.format import Campaign
 from accelstudy.errors import InputError
 from accelstudy.registry import Shaped, ShapedRegistry
 
+if TYPE_CHECKING:  # the reader of campaigns takes the units of `unit_error`
+    from accelstudy.campaign.session import Campaign
+    from accelstudy.gross_errors.real_sensor import RealSensor
+
 Array = NDArray[np.float64]
+
+EVERYWHERE = 0
+SINGLE = (1, 2)
+"""Ranks of what is wrong in all positions alike, and of what is in single ones: rows that are not
+exchanged may be wrong by themselves."""
+READINGS = {"forces": False, "sd": True, "slope": False, "sd_slope": True}
+"""Columns with what the sensor reads, and whether they are sds, which have no sign."""
+
+
+@dataclass(frozen=True)
+class Mending:
+    """What would undo a gross error.
+
+    Attributes
+    ----------
+    reason : str, what is wrong, in words
+    campaign : Campaign, as it would have been right
+    conversion : (3, 3) array, turns forces as they were read into mended ones, where it is not I
+    changed : (n,) bool array, which positions would be others, where it is not all of them
+    left_out : tuple of int, positions that cannot be mended
+    """
+
+    reason: str
+    campaign: Campaign
+    conversion: Array | None = None
+    changed: NDArray[np.bool_] | None = None
+    left_out: tuple[int, ...] = ()
 
 
 class GrossError(Shaped):
@@ -27,11 +59,13 @@ class GrossError(Shaped):
     Attributes
     ----------
     equation : str, what it does, for people
+    rank : int, when it is looked for: those of all positions alike first, together
     """
 
     kind = "gross error"
     family = "gross error"
     equation: ClassVar[str]
+    rank: ClassVar[int]
 
     def drawn(self, campaign: Campaign, rng: np.random.Generator) -> Self:
         """Return the same error with all that was open drawn for a campaign."""
@@ -39,6 +73,10 @@ class GrossError(Shaped):
 
     def act(self, campaign: Campaign) -> Campaign:
         """Return the campaign with the error; nothing is open any more."""
+        raise NotImplementedError
+
+    def mendings(self, campaign: Campaign, sensor: RealSensor) -> Iterator[Mending]:
+        """Ways to undo the error, the simplest first; `sensor` fits most of the campaign."""
         raise NotImplementedError
 
     def apply(self, campaign: Campaign, rng: np.random.Generator) -> Campaign:
@@ -76,3 +114,13 @@ def register(error: GrossErrorClass) -> GrossErrorClass:
     """Class decorator: enter a gross error into the registry under its name."""
     _registry.add(error.name, error())
     return error
+
+
+def with_readings(campaign: Campaign, change: Callable[[Array], Array]) -> Campaign:
+    """Change all that the sensor reads, (n, 3) columns, likewise."""
+    columns: dict[str, Any] = {
+        name: np.abs(change(values)) if is_sd else change(values)
+        for name, is_sd in READINGS.items()
+        if (values := getattr(campaign, name)) is not None
+    }
+    return replace(campaign, **columns)

@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from accelstudy.campaign.format import Campaign
-from accelstudy.gross_errors.base import GrossError, register
+from accelstudy.gross_errors.base import SINGLE, GrossError, Mending, register
+from accelstudy.gross_errors.real_sensor import LOST
 from accelstudy.registry import Hyper
+from accelstudy.wording import joined
+
+if TYPE_CHECKING:
+    from accelstudy.campaign.session import Campaign
+    from accelstudy.gross_errors.real_sensor import RealSensor
 
 SIZE = 0.1
 """m/s², of an error that is drawn."""
+PART = 8
+"""One of so many positions may be bumped; of more, something else is wrong."""
 
 
 @register
@@ -30,6 +38,7 @@ class OutlierPosition(GrossError):
         *(Hyper(axis, "m/s^2", math.nan) for axis in "xyz"),
     )
     equation = "f + e in one position"
+    rank = SINGLE[1]
 
     def drawn(self, campaign: Campaign, rng: np.random.Generator) -> Self:
         """Draw the position, and the direction of e."""
@@ -48,3 +57,16 @@ class OutlierPosition(GrossError):
         forces = campaign.forces.copy()
         forces[self.row(campaign, "position")] += [self.shape[axis] for axis in "xyz"]
         return replace(campaign, forces=forces)
+
+    def mendings(self, campaign: Campaign, sensor: RealSensor) -> Iterator[Mending]:
+        """Leave out positions that are so wrong that a calibration would not bear them."""
+        far = sensor.wrong & (sensor.distance > LOST * sensor.gravity)
+        bumped = tuple(campaign.positions[far].tolist())
+        if not sensor.tells or not 0 < len(bumped) <= campaign.n_positions // PART:
+            return
+        sizes = joined([f"{size:.2g}" for size in sensor.distance[far]])
+        reason = f"position {joined([str(p) for p in bumped])} is wrong by {sizes} m/s^2"
+        if len(bumped) > 1:
+            reason = reason.replace("position", "positions", 1).replace(" is ", " are ", 1)
+        left = campaign.without(dict.fromkeys(bumped, reason))
+        yield Mending(reason, left, left_out=bumped)

@@ -3,23 +3,36 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from accelstudy.campaign.format import Campaign
 from accelstudy.errors import InputError
-from accelstudy.gross_errors.base import Array, GrossError, register
-from accelstudy.registry import Hyper
-from accelstudy.units import GON, STANDARD_GRAVITY, to_si
-
-USUAL = (
-    {"force": 1 / STANDARD_GRAVITY},
-    {"angle": float(GON / to_si(1, "deg", "rad"))},
-    {"angle": GON},
+from accelstudy.gross_errors.base import (
+    EVERYWHERE,
+    Array,
+    GrossError,
+    Mending,
+    register,
+    with_readings,
 )
-"""Forces in g in a column of m/s², and degrees or radians in one of gon."""
+from accelstudy.registry import Hyper
+from accelstudy.units import UNITS
+
+if TYPE_CHECKING:
+    from accelstudy.campaign.session import Campaign
+    from accelstudy.gross_errors.real_sensor import RealSensor
+
+FORCES = {unit: UNITS["m/s^2"][unit] for unit in ("m/s^2", "g", "mg")}
+"""Units in which sensors give forces, and their sizes in m/s²."""
+ANGLES = {unit: UNITS["rad"][unit] for unit in ("gon", "deg", "rad")}
+"""Units in which robots give angles, and their sizes in rad."""
+WORDS = {"deg": "degrees", "rad": "radians"}
+"""What people call them."""
+NEAR = 0.8
+"""Share of gravity to which a sensor comes, at worst, in the right unit."""
 
 
 @register
@@ -33,12 +46,15 @@ class UnitError(GrossError):
     name = "unit_error"
     hypers = (Hyper("force", "1", math.nan, above=0), Hyper("angle", "1", math.nan, above=0))
     equation = "f → factor · f, or (φ, θ) → factor · (φ, θ)"
+    rank = EVERYWHERE
 
     def drawn(self, campaign: Campaign, rng: np.random.Generator) -> Self:
         """Draw one of the usual mistakes."""
         if not self.is_open("force", "angle"):
             return self
-        possible = [case for case in USUAL if "force" in case or campaign.angles is not None]
+        possible = [{"force": 1 / FORCES["g"]}]
+        if campaign.angles is not None:
+            possible += [{"angle": 1 / size} for size in other_units(ANGLES, "gon").values()]
         return type(self)(**possible[rng.integers(len(possible))])
 
     def act(self, campaign: Campaign) -> Campaign:
@@ -46,14 +62,32 @@ class UnitError(GrossError):
         force, angle = np.nan_to_num([self.shape["force"], self.shape["angle"]], nan=1.0).tolist()
         if angle != 1 and campaign.angles is None:
             raise InputError(f"gross error {self.name!r}: angle: {campaign.name} has no angles")
+        return _multiplied(campaign, force, angle)
 
-        def times(values: Array | None, factor: float) -> Array | None:
-            return None if values is None else factor * values
+    def mendings(self, campaign: Campaign, sensor: RealSensor) -> Iterator[Mending]:
+        """Take the forces, or the angles, for numbers in another unit."""
+        norm = float(np.median(np.linalg.norm(campaign.forces, axis=1))) / campaign.gravity
+        for said in ("g", "m/s^2") if campaign.unit == "g" else ("m/s^2", "g"):
+            for unit, factor in other_units(FORCES, said).items():
+                if NEAR < factor * norm < 1 / NEAR:
+                    reason = f"the forces are in {unit}" + (", not in g" if said == "g" else "")
+                    mended = _multiplied(campaign, factor, 1.0)
+                    yield Mending(reason, mended, factor * np.eye(3))
+        if sensor.expected is not None:
+            for unit, factor in other_units(ANGLES, "gon").items():
+                reason = f"the robot's angles are in {WORDS[unit]}"
+                yield Mending(reason, _multiplied(campaign, 1.0, factor))
 
-        return replace(
-            campaign,
-            forces=force * campaign.forces,
-            sd=times(campaign.sd, force),
-            angles=times(campaign.angles, angle),
-            yaw=times(campaign.yaw, angle),
-        )
+
+def other_units(units: Mapping[str, float], said: str) -> dict[str, float]:
+    """Return the units that could be meant, and what numbers in `said` are to be multiplied by."""
+    return {unit: size / units[said] for unit, size in units.items() if unit != said}
+
+
+def _multiplied(campaign: Campaign, force: float, angle: float) -> Campaign:
+    def times(values: Array | None) -> Array | None:
+        return None if values is None else angle * values
+
+    if force != 1:
+        campaign = with_readings(campaign, lambda values: force * values)
+    return replace(campaign, angles=times(campaign.angles), yaw=times(campaign.yaw))

@@ -13,6 +13,7 @@ from accelstudy.campaign.document import calibration_document, quality_document
 from accelstudy.campaign.fit import CampaignFit, campaign_design
 from accelstudy.diagnosis.pipeline import Diagnosis
 from accelstudy.diagnosis.report.missing import explanation_words, missing
+from accelstudy.diagnosis.report.positions import kept_positions
 
 
 def diagnosed_fit(diagnosis: Diagnosis) -> CampaignFit:
@@ -22,7 +23,7 @@ def diagnosed_fit(diagnosis: Diagnosis) -> CampaignFit:
     which a recognised gross error is mended, and with the noise that the diagnosis takes.
     """
     d = diagnosis
-    bumped = [named.position for named in d.found if named.position is not None]
+    bumped = d.campaign.positions[~kept_positions(d)].tolist()
     campaign = d.campaign.without(dict.fromkeys(bumped, "bumped, as the diagnosis found"))
     solution = d.final.frame.solution
     start = solution.parameters[: d.extended.n_parameters]
