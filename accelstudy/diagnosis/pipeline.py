@@ -287,9 +287,14 @@ class _Run:
         )
 
     def probabilities(self, finding: Finding) -> dict[str, float]:
-        """Posterior of each single explanation; a class stands under its first name."""
-        posterior = finding.posterior or self.search.posterior
-        return {e.names[0]: e.posterior for e in posterior.explanations if len(e.names) == 1}
+        """Posterior of each single explanation; a class stands under its first name.
+
+        Where nothing is missing they only say what would come first, each name by itself.
+        """
+        if finding.posterior is None:
+            return self.search.probabilities
+        explanations = finding.posterior.explanations
+        return {e.names[0]: e.posterior for e in explanations if len(e.names) == 1}
 
     def finding(self) -> tuple[Finding, tuple[NoiseTest, ...]]:
         """Find what is missing: effects first, then the noise, by the tests of it."""

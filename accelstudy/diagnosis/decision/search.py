@@ -278,6 +278,16 @@ class Search:
         best = max((one for one in self.pairs if one.best), key=lambda one: one.log_weight)
         return set(best.names) <= wanted
 
+    @property
+    def probabilities(self) -> dict[str, float]:
+        """Probability of each candidate if just one of them is missing, largest first."""
+        logs = self.detection.densities
+        top = max(logs.values(), default=0.0)
+        weights = {name: float(np.exp(log - top)) for name, log in logs.items()}
+        total = sum(weights.values())
+        ranked = sorted(weights, key=lambda name: -weights[name])
+        return {name: weights[name] / total for name in ranked}
+
     @cached_property
     def posterior(self) -> Posterior:
         """All that could be the case, if not nothing."""
