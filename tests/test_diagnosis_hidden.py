@@ -15,7 +15,8 @@ from diagnosis_helpers import FULL, GRAVITY, NINE, ROBOT, most
 from accelstudy.adjustment.quality import solve
 from accelstudy.campaign.fit import fit_campaign
 from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign
-from accelstudy.diagnosis.pipeline import SURE, diagnose
+from accelstudy.diagnosis.decision.priors import SURE
+from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, same_space, setting_of
 from accelstudy.diagnosis.worth.limits import signature_columns
 from accelstudy.effects import get_effect

@@ -18,7 +18,7 @@ from accelstudy.campaign.format import Campaign
 from accelstudy.diagnosis.decision import priors
 from accelstudy.diagnosis.decision.explanations import Explanation
 from accelstudy.diagnosis.decision.search import Search
-from accelstudy.diagnosis.decision.verdict import Choice, Finding, find, lack_of_fit
+from accelstudy.diagnosis.decision.verdict import Finding, find, lack_of_fit
 from accelstudy.diagnosis.evidence import noise as noises
 from accelstudy.diagnosis.evidence.chance import SIMULATIONS
 from accelstudy.diagnosis.evidence.detection import Detection
@@ -26,8 +26,9 @@ from accelstudy.diagnosis.evidence.noise import NoiseTest
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Setting
 from accelstudy.diagnosis.space.location import LACK_OF_FIT, locate
 from accelstudy.diagnosis.space.residuals import Residuals
-from accelstudy.diagnosis.worth import gap as gaps
 from accelstudy.diagnosis.worth.changes import Change, parameter_changes
+from accelstudy.diagnosis.worth.gap import HeldOutGap
+from accelstudy.diagnosis.worth.held_out import held_out
 from accelstudy.diagnosis.worth.limits import UpperLimit, upper_limits
 from accelstudy.diagnosis.worth.next_positions import NextPosition, next_positions
 from accelstudy.diagnosis.worth.tilt import leveling_rms
@@ -80,7 +81,7 @@ class Gap:
 
     before: float
     after: float | None = None
-    held_out: gaps.HeldOutGap | None = None
+    held_out: HeldOutGap | None = None
     leveling: tuple[float, float] | None = None
     confirmed: bool = False
     reason: str = ""
@@ -476,10 +477,11 @@ class _Run:
         leveling = leveling_rms(self.first, final, hold, variance)
         if finding.verdict not in ("named", "narrowed"):
             return Gap(before, after, leveling=leveling)
-        held_out, reason = self.held_out(finding.chosen, variance if self.sigma_known else None)
-        confirmed = held_out is not None and held_out.significant and not reason
-        said = "effect" if confirmed else None
-        return Gap(before, after, held_out, leveling, confirmed, reason, said)
+        known = variance if self.sigma_known else None
+        seeds = [self.stage(number) for number in (1, 2, 3, 4)]
+        held = held_out(self.search, finding, known, LEVEL_EFFECTS, seeds)
+        confirmed = held.statement is not None
+        return Gap(before, after, held.gap, leveling, confirmed, held.reason, held.statement)
 
     def changes(self, finding: Finding, variance: float) -> tuple[Change, ...]:
         """Compare what added effects should change of the other parameters with what they do."""
@@ -509,49 +511,3 @@ class _Run:
             if second is None
             else tuple(next_positions(search.setting.frame, (first,), (second,)))
         )
-
-    def held_out(
-        self, chosen: Sequence[Choice], variance: float | None
-    ) -> tuple[gaps.HeldOutGap | None, str]:
-        """Choose and fit on a part of the positions, and predict the rest."""
-        n, c = self.campaign.n_positions, self.approach.n_conditions
-        u = self.first.design.shape[1]
-        k = sum(choice.best.dim for choice in chosen)
-        count = round(n * gaps.HELD_OUT)
-        needed = int(np.ceil((u + k + 3) / c))
-        if n - count < needed:
-            count = n - needed
-        if count < 3:
-            return None, (
-                f"no held-out positions: choosing and fitting needs {needed} positions and at "
-                f"least 3 are to be predicted, {needed + 3} in all; there are {n}"
-            )
-        frame, observed = self.search.setting.frame, self.first.observed
-        fitted, held = gaps.split_positions(
-            frame.forces, frame.hold, count, np.random.default_rng(self.stage(1))
-        )
-        try:
-            base = solve(self.model, self.approach, observed.take(fitted))
-        except (InputError, np.linalg.LinAlgError):
-            return None, "the fitted positions do not determine the model"
-        part = Search(base, self.stage(3), self.sigma_known, self.within)
-        alternatives = []
-        for choice in chosen:
-            shown = tuple(m for m in choice.members if m in part.setting.candidates)
-            if not shown:
-                return None, f"the fitted positions alone cannot show {choice.best.name}"
-            alternatives.append((part.best_shape(shown[0]), shown))
-        refit = part.refits.best(alternatives)
-        if refit is None:
-            return None, "the fit to the fitted positions alone has no solution"
-        gap = gaps.held_out_gap(
-            base,
-            refit[1],
-            observed.take(held),
-            held,
-            variance,
-            np.random.default_rng(self.stage(2)),
-        )
-        if not part.chooses([choice.members for choice in chosen]):
-            return gap, "the fitted positions alone would have chosen another effect"
-        return gap, ""

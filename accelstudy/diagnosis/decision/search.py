@@ -80,14 +80,21 @@ class Search:
     @cached_property
     def evidence(self) -> Evidence:
         """The evidence of hypotheses in the residual space."""
-        return Evidence(Level.of(self.known), self.first.redundancy)
+        return Evidence(Level.of(self.known), self.residuals.redundancy)
 
     # --- the fit --------------------------------------------------------------------------------
 
     @cached_property
+    def equal(self) -> Setting:
+        """The fit with equal axes."""
+        return setting_of(self.first)
+
+    @cached_property
     def axes(self) -> UnequalAxes:
         """How probable it is that the axes differ in noise, by the fit with equal ones."""
-        return UnequalAxes.of(Residuals.of(self.first), self.evidence, self.within)
+        residuals = self.equal.frame.residuals
+        evidence = Evidence(Level.of(self.known), residuals.redundancy)
+        return UnequalAxes.of(residuals, evidence, self.within)
 
     @cached_property
     def setting(self) -> Setting:
@@ -96,17 +103,18 @@ class Search:
         The axes are weighted by their noise where that they differ is the best that can be said of
         the residuals: better than that nothing is missing, or any one effect.
         """
-        equal = setting_of(self.first)
         if self.exact:
-            return equal
-        residuals = equal.frame.residuals
-        field = Field.of(equal.candidates, {})
-        z = residuals.z
-        best = np.logaddexp.reduce(self.evidence.of_noise(z @ z))
+            return self.equal
+        residuals = self.equal.frame.residuals
+        field = Field.of(self.equal.candidates, {})
+        evidence = Evidence(Level.of(self.known), residuals.redundancy)
+        z, best = residuals.z, 0.0
         if field.names:
-            best = max(best, np.max(field.densities(self.evidence, z)) - np.log(len(field.names)))
-        if np.log(priors.AXES) + self.axes.log_density <= best:
-            return equal
+            nothing = np.logaddexp.reduce(evidence.of_noise(z @ z))
+            odds = np.max(field.densities(evidence, z)) - np.log(len(field.names)) - nothing
+            best = max(best, float(odds))
+        if np.log(priors.AXES) + self.axes.log_evidence <= best:
+            return self.equal
         sigma = np.sqrt(self.axes.ratios)
         mean = np.mean(np.sqrt(self.first.variances[:, :3]))
         shaped = np.broadcast_to(mean * sigma / np.mean(sigma), (len(self.first.variances), 3))
@@ -257,17 +265,18 @@ class Search:
     @cached_property
     def noises(self) -> list[Weighed]:
         """Nothing but the noise is not what it is taken for."""
-        residuals = self.residuals
-        nothing = self.detection.noise
+        residuals, by_level = self.residuals, self.detection.noise
+        nothing = float(np.logaddexp.reduce(by_level))
+        # Where the axes are weighted, that they differ needs no further evidence.
+        unequal = np.log(priors.AXES) + self.axes.log_evidence if self.setting is self.equal else 0
+        tails = noises.tail_test(residuals.positions, self.chance)
         known = {
             noises.COLOUR: np.log(priors.COLOUR) + colour_density(residuals, self.evidence),
-            noises.AXES: np.log(priors.AXES) + self.axes.log_density,
+            noises.AXES: nothing + unequal,
+            noises.TAILS: nothing + np.log(priors.TAILS) + noises.most_evidence(tails.p_value),
         }
         if self.known:
-            known[noises.LEVEL] = float(nothing[1])
-        total = float(np.logaddexp.reduce(nothing))
-        tails = noises.tail_test(residuals, self.chance)
-        known[noises.TAILS] = total + np.log(priors.TAILS) + noises.most_evidence(tails.p_value)
+            known[noises.LEVEL] = float(by_level[1])
         return [Weighed((name,), ((name,),), float(log)) for name, log in known.items()]
 
     def chooses(self, names: Sequence[Sequence[str]]) -> bool:

@@ -170,9 +170,12 @@ def _refitted(search: Search, one: Weighed) -> tuple[Weighed, Solution | None]:
     best, solution = fit
     z, basis = search.residuals.z, np.concatenate([h.basis for h in one.best], axis=1)
     left = z - basis @ np.linalg.lstsq(basis, z, rcond=None)[0]
-    parts = float(z @ z) - np.array([float(left @ left), solution.omega])
+    # The refit is one of the means; of slopes it takes up what first order does.
+    means = left[: len(search.residuals.positions.design)]
+    gain = max(float(means @ means) - solution.omega, 0.0)
+    parts = float(z @ z - left @ left) + np.array([0.0, gain])
     first, refit = search.evidence.of_spaces(parts, [basis.shape[1]] * 2, z @ z)
-    weight = one.log_weight + max(float(refit - first), 0.0)
+    weight = one.log_weight + float(refit - first)
     return replace(one, log_weight=weight, best=tuple(best)), solution
 
 

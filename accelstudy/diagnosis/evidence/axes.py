@@ -31,11 +31,11 @@ class UnequalAxes:
 
     Attributes
     ----------
-    log_density : float, of the residuals, with nothing missing but equal axes
+    log_evidence : float, for unequal axes against equal ones, with nothing missing
     ratios : (3,) array, variances of the axes, posterior mean of log κ
     """
 
-    log_density: float
+    log_evidence: float
     ratios: Array
 
     @classmethod
@@ -58,7 +58,9 @@ class UnequalAxes:
             prior = (prior + _normal(x, y, centre, AS_WITHIN)) / 2
         posterior = prior * np.exp(densities - densities.max())
         mean = posterior @ logs / posterior.sum()
-        return cls(float(log_mean(densities, prior)), np.exp(mean))
+        z = residuals.z
+        nothing = float(np.logaddexp.reduce(evidence.of_noise(z @ z)))
+        return cls(float(log_mean(densities, prior)) - nothing, np.exp(mean))
 
 
 def _normal(x: Array, y: Array, centre: Array, spread: float) -> Array:

@@ -37,6 +37,13 @@ class Simulated:
     values: Array
     weights: Array
 
+    def beyond(self, level: float) -> float:
+        """Value that noise alone exceeds with the probability `level`."""
+        order = np.argsort(-self.values)
+        rate = np.cumsum(self.weights[order]) / len(self.values)
+        place = min(int(np.searchsorted(rate, level)), len(order) - 1)
+        return float(self.values[order[place]])
+
     def exceeds(self, value: float, column: int | None = None) -> float:
         """Probability that noise alone reaches a value, of log odds or of a column of them."""
         values = self.values if column is None else self.values[:, column]

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from accelstudy.diagnosis.evidence.size import Evidence, log_mean
-from accelstudy.diagnosis.space.hypotheses import Hypothesis, span
+from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.diagnosis.space.residuals import Residuals
-from accelstudy.diagnosis.space.spaces import ABSORBED, Bases, Spaces
+from accelstudy.diagnosis.space.spaces import ABSORBED, Bases, Spaces, span
 
 
 def unknown_beside(

@@ -153,6 +153,7 @@ def _gap(d: Diagnosis) -> dict[str, Any]:
             ),
         },
         "held_out_z": None if held is None else number(held.z),
+        "held_out_z_needed": None if held is None else number(held.needed),
         "held_out_positions": []
         if held is None
         else [int(d.campaign.positions[i]) for i in held.held],

@@ -12,7 +12,6 @@ from accelstudy.diagnosis.report.missing import (
     most_probable,
     not_told_apart,
 )
-from accelstudy.diagnosis.worth.gap import SIGNIFICANT
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.figures.style import unit_label
 from accelstudy.study.report import number
@@ -151,7 +150,7 @@ def confirmation(diagnosis: Diagnosis) -> str:
         return f"Not confirmed on data that were not used: {gap.reason}."
     tested = (
         f"on {len(gap.held_out.held)} held-out positions (z = {number(gap.held_out.z)}, "
-        f"{SIGNIFICANT} needed)"
+        f"{number(gap.held_out.needed)} needed)"
     )
     if not gap.confirmed:
         return f"Not confirmed {tested}" + (f": {gap.reason}." if gap.reason else ".")

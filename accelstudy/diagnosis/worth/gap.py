@@ -44,6 +44,7 @@ class HeldOutGap:
     z : float
     held : tuple of int, indices of the held-out positions
     misses : (tuple, tuple) of float, m/s², rms misclosure of each of them by either model
+    needed : float, z beyond which the correction is right at 5 %, given that it has a name
     """
 
     before: float
@@ -53,11 +54,12 @@ class HeldOutGap:
     z: float
     held: tuple[int, ...]
     misses: tuple[tuple[float, ...], tuple[float, ...]]
+    needed: float = SIGNIFICANT
 
     @property
     def significant(self) -> bool:
         """Whether the correction is right at 5 %."""
-        return self.z > SIGNIFICANT
+        return self.z > self.needed
 
 
 def split_positions(
@@ -115,7 +117,7 @@ def held_out_gap(
     """
     if variance is None:
         variance = base.omega / base.redundancy
-    first, second = (_Prediction.of(solution, rest) for solution in (base, extended))
+    first, second = (Prediction.of(solution, rest) for solution in (base, extended))
     d = first.white - second.white
     slope = d @ first.slope
     size = float(d @ d + slope @ base.cofactors @ slope)
@@ -136,7 +138,7 @@ def held_out_gap(
 
 
 @dataclass(frozen=True)
-class _Prediction:
+class Prediction:
     """What a fit leaves in unused positions.
 
     Attributes
@@ -151,7 +153,7 @@ class _Prediction:
     misses: tuple[float, ...]
 
     @classmethod
-    def of(cls, fit: Solution, observed: Observations) -> _Prediction:
+    def of(cls, fit: Solution, observed: Observations) -> Prediction:
         """Predict by a fit."""
         problem = CalibrationProblem.of(fit.model, fit.approach, replace(observed, initial=None))
         at = problem.linearised(fit.parameters, problem.observations[0])

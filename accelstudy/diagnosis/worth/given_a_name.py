@@ -1,0 +1,148 @@
+"""How large the held-out statistic must be, given that an effect was named.
+
+Held-out positions are used neither for choosing nor for fitting. But a name was given because all
+positions together, these among them, seemed to lack something. So where nothing is missing and a
+name was given nevertheless, they agree with it more often than one in twenty times. The campaign's
+own design is simulated: noise with an effect on purpose, with the weight that makes it noise again
+(importance sampling), in which something is found and a name given; and what the fitted positions
+choose and predict then.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.diagnosis.decision.explanations import CREDIBLE
+from accelstudy.diagnosis.decision.priors import MANY, SURE
+from accelstudy.diagnosis.decision.search import Search
+from accelstudy.diagnosis.evidence.field import UNKNOWN
+from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis
+from accelstudy.diagnosis.worth.gap import SIGNIFICANT
+
+Array = NDArray[np.float64]
+
+SETS = 800
+"""Simulated sets of residuals."""
+LEVEL = 0.05
+"""Probability that a name is confirmed though nothing is missing."""
+
+
+def needed_z(
+    search: Search,
+    part: Search,
+    fitted: NDArray[np.int_],
+    held: NDArray[np.int_],
+    level: float,
+    rng: np.random.Generator,
+) -> float:
+    """Value that the statistic exceeds with 5 %, if nothing is missing and a name was given.
+
+    Parameters
+    ----------
+    search, part : Search, of all positions and of the fitted ones
+    fitted, held : (f,) and (h,) int arrays, positions
+    level : float, of the test that found something
+    rng : Generator
+    """
+    residuals, field = search.residuals, search.field
+    added = field.with_effects(np.zeros((SETS, len(residuals.design))), rng)
+    noise = rng.standard_normal(added.shape) + residuals.project(added.T).T
+    z = residuals.project(noise.T).T
+    parts, squares = field.parts(z), np.sum(z**2, axis=-1)
+    logs = field.combined(search.evidence.of_spaces(parts, field.dims, squares))
+    nothing = np.logaddexp.reduce(search.evidence.of_noise(squares), axis=-1)
+    statistic = np.logaddexp.reduce(logs, axis=1) - np.log(len(field.names)) - nothing
+    label = _labels(search)
+    named, top = _named(logs, [label[name] for name in field.names])
+    found = np.flatnonzero(named & (statistic > search.detection.by_chance.beyond(level)))
+    if not len(found):
+        return SIGNIFICANT
+    weights = np.exp(-field.proposal(parts[found]))
+    chosen, values = _on_the_part(search, part, fitted, held, noise[found], rng)
+    confirmed = np.array([label.get(name, -2) for name in chosen]) == top[found]
+    order = np.argsort(-values)
+    rate = np.cumsum(np.where(confirmed, weights, 0.0)[order]) / weights.sum()
+    beyond = min(int(np.searchsorted(rate, LEVEL)), len(order) - 1)
+    return max(SIGNIFICANT, float(values[order[beyond]]))
+
+
+def _labels(search: Search) -> dict[str, int]:
+    """Number of the class of each candidate; a bumped position and the unknown have none."""
+    labels = {name: i for i, (_, names) in enumerate(search.classes) for name in names}
+    return {**labels, OUTLIER: -1, UNKNOWN: -1}
+
+
+def _named(logs: Array, labels: list[int]) -> tuple[NDArray[np.bool_], NDArray[np.int_]]:
+    """Whether residuals would be given a name or few, (b,), and the class that comes first."""
+    classes, own = sorted(set(labels) - {-1}), np.array(labels)
+    each = np.column_stack([*(logs[:, own == c].max(axis=1) for c in classes), logs[:, own < 0]])
+    p = np.exp(each - each.max(axis=1, keepdims=True))
+    p /= p.sum(axis=1, keepdims=True)
+    few = np.sort(p, axis=1)[:, -MANY:].sum(axis=1) >= CREDIBLE
+    first = np.argmax(p, axis=1)
+    effect = first < len(classes)
+    top = np.array([*classes, *[-1] * (each.shape[1] - len(classes))])[first]
+    return effect & ((p.max(axis=1) >= SURE) | few), top
+
+
+def _on_the_part(
+    search: Search,
+    part: Search,
+    fitted: NDArray[np.int_],
+    held: NDArray[np.int_],
+    noise: Array,
+    rng: np.random.Generator,
+) -> tuple[list[str], Array]:
+    """What the fitted positions choose of noise (b, m), and the held-out statistic, (b,)."""
+    positions = search.residuals.positions
+    n, c = positions.whitening.shape[:2]
+    rows = np.concatenate([_rows(fitted, c), np.arange(n * c, len(positions.design))])
+    rest = _rows(held, c)
+    own, beside = noise[:, rows], noise[:, rest]
+    slopes = rng.standard_normal((len(noise), part.residuals.slopes))
+    z = part.residuals.project(np.concatenate([own, slopes], axis=1).T).T
+    choices = _choices(part, z)
+    a, b = positions.design[rows], positions.design[rest]
+    taken = np.linalg.solve(a.T @ a, a.T)
+    left = own - (own @ taken.T) @ a.T
+    variance = np.sum(left**2, axis=1) / (len(rows) - a.shape[1])
+    if part.known:
+        variance = np.ones(len(noise))
+    missed = beside - (own @ taken.T) @ b.T
+    values = np.zeros(len(noise))
+    for spec in {h.spec: h for h in choices}.values():
+        some = np.array([h.spec == spec.spec for h in choices])
+        if spec.effect is None:
+            continue
+        frame = search.setting.frame
+        shown = positions.whitened(frame.signature(spec.effect))
+        shown = (shown @ spec.directions)[: len(positions.design)]
+        fit = np.linalg.pinv(shown[rows] - a @ (taken @ shown[rows]))
+        change = (left[some] @ fit.T) @ (shown[rest] - b @ (taken @ shown[rows])).T
+        slope = change @ b
+        size = np.sum(change**2, axis=1) + np.sum((slope @ np.linalg.inv(a.T @ a)) * slope, axis=1)
+        scale = np.sqrt(size * variance[some])
+        values[some] = np.sum(change * missed[some], axis=1) / scale
+    return [h.name for h in choices], values
+
+
+def _choices(part: Search, z: Array) -> list[Hypothesis]:
+    """Shape of the effect that explains most, for each of residuals (b, m)."""
+    field = part.field
+    squares = np.sum(z**2, axis=-1)
+    logs = part.evidence.of_spaces(field.parts(z), field.dims, squares)
+    total = field.combined(logs)
+    allowed = [k for k, name in enumerate(field.names) if name != UNKNOWN]
+    ends = [*field.starts[1:], len(field.dims)]
+    found = []
+    for each, own in zip(total[:, allowed], logs, strict=True):
+        k = allowed[int(np.argmax(each))]
+        place = int(np.argmax(own[field.starts[k] : ends[k]]))
+        found.append(part.setting.candidates[field.names[k]][place])
+    return found
+
+
+def _rows(positions: NDArray[np.int_], c: int) -> NDArray[np.int_]:
+    """Rows of the conditions of positions."""
+    return (positions[:, None] * c + np.arange(c)).ravel()

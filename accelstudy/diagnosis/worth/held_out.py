@@ -1,0 +1,148 @@
+"""Whether a finding holds on positions that were used neither for choosing nor for fitting it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.adjustment import Observations
+from accelstudy.adjustment.quality import Solution, solve
+from accelstudy.diagnosis.decision.priors import SURE
+from accelstudy.diagnosis.decision.search import Search
+from accelstudy.diagnosis.decision.verdict import Choice, Finding
+from accelstudy.diagnosis.worth.gap import (
+    HELD_OUT,
+    HeldOutGap,
+    Prediction,
+    held_out_gap,
+    split_positions,
+)
+from accelstudy.diagnosis.worth.given_a_name import needed_z
+from accelstudy.errors import InputError
+
+Array = NDArray[np.float64]
+
+LEAST = 3
+"""Positions that are to be predicted, at least."""
+BESIDE = 3
+"""Other explanations with which a name is compared."""
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """What held-out positions say of a finding.
+
+    Attributes
+    ----------
+    gap : HeldOutGap or None
+    reason : str, why nothing is confirmed; empty if it is
+    statement : str or None, "name" or "effect", what is confirmed
+    """
+
+    gap: HeldOutGap | None
+    reason: str
+    statement: str | None = None
+
+
+def held_out(
+    search: Search,
+    finding: Finding,
+    known: float | None,
+    level: float,
+    seeds: Sequence[np.random.SeedSequence],
+) -> HeldOut:
+    """Choose and fit on a part of the positions, and predict the rest.
+
+    Parameters
+    ----------
+    search : Search, of all positions
+    finding : Finding, named or narrowed
+    known : float, variance of unit weight; None takes that of the fit to the part
+    level : float, of the test that found something
+    seeds : of the split, the resampling, the part, and the simulation
+    """
+    frame, first = search.setting.frame, search.first
+    n, c = len(first.misclosures), search.first.approach.n_conditions
+    k = sum(choice.best.dim for choice in finding.chosen)
+    needed = int(np.ceil((first.design.shape[1] + k + 3) / c))
+    count = min(round(n * HELD_OUT), n - needed)
+    if count < LEAST:
+        return HeldOut(
+            None,
+            f"no held-out positions: choosing and fitting needs {needed} positions and at least "
+            f"{LEAST} are to be predicted, {needed + LEAST} in all; there are {n}",
+        )
+    rng = np.random.default_rng(seeds[0])
+    fitted, held = split_positions(frame.forces, frame.hold, count, rng)
+    try:
+        base = solve(first.model, first.approach, first.observed.take(fitted))
+    except (InputError, np.linalg.LinAlgError):
+        return HeldOut(None, "the fitted positions do not determine the model")
+    part = Search(base, seeds[2], search.known, search.within)
+    chosen, others = _chosen_alike(part, finding)
+    refit = _refit(part, chosen)
+    if isinstance(refit, str):
+        return HeldOut(None, refit)
+    rest, rng = first.observed.take(held), np.random.default_rng(seeds[1])
+    gap = held_out_gap(base, refit, rest, held, known, rng)
+    if others:
+        return HeldOut(gap, "the fitted positions alone would have chosen another effect")
+    rng = np.random.default_rng(seeds[3])
+    gap = replace(gap, needed=needed_z(search, part, fitted, held, level, rng))
+    if not gap.significant:
+        return HeldOut(gap, "")
+    sure = finding.verdict == "named" and _is_the_name(part, finding, refit, rest)
+    return HeldOut(gap, "", "name" if sure else "effect")
+
+
+def _chosen_alike(part: Search, finding: Finding) -> tuple[Sequence[Choice], bool]:
+    """Explanation of the credible set that a part chooses, and whether it would choose another."""
+    chosen = finding.chosen
+    if len(chosen) == 2:
+        return chosen, not part.chooses([choice.members for choice in chosen])
+    wanted = {
+        name: members
+        for one in finding.credible_set
+        if len(one.names) == 1
+        for members in one.classes
+        for name in members
+    }
+    best = max(part.densities, key=part.densities.__getitem__, default="")
+    if best not in wanted:
+        return chosen, True
+    return (Choice(part.best_shape(best), wanted[best], chosen[0].probability),), False
+
+
+def _refit(part: Search, chosen: Sequence[Choice]) -> Solution | str:
+    """Fit to a part with what was chosen; why not if that cannot be."""
+    alternatives = []
+    for choice in chosen:
+        shown = tuple(m for m in choice.members if m in part.setting.candidates)
+        if not shown:
+            return f"the fitted positions alone cannot show {choice.best.name}"
+        alternatives.append((part.best_shape(shown[0]), shown))
+    fit = part.refits.best(alternatives)
+    return "the fit to the fitted positions alone has no solution" if fit is None else fit[1]
+
+
+def _is_the_name(part: Search, finding: Finding, refit: Solution, rest: Observations) -> bool:
+    """Whether held-out positions by themselves prefer a name to the other explanations."""
+    assert finding.posterior is not None
+    variance = 1.0 if part.known else part.residuals.variance
+    logs = [_prediction(refit, rest, variance)]
+    for one in finding.posterior.all[1 : BESIDE + 1]:
+        if one.best and all(h.effect is not None for h in one.best):
+            chosen = [Choice(h, m, 0.0) for h, m in zip(one.best, one.classes, strict=True)]
+            other = _refit(part, chosen)
+            if not isinstance(other, str):
+                logs.append(_prediction(other, rest, variance))
+    weights = np.exp(np.array(logs) - max(logs))
+    return bool(weights[0] >= SURE * weights.sum())
+
+
+def _prediction(fit: Solution, rest: Observations, variance: float) -> float:
+    """Log density of held-out misclosures as a fit predicts them, up to a constant."""
+    return -float(np.sum(Prediction.of(fit, rest).white ** 2)) / (2 * variance)
