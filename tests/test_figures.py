@@ -268,15 +268,15 @@ def test_a_study_without_estimable_cells_draws(name, tables, paper):
     paint(draw(name, needed, paper))
 
 
-def test_effects_of_the_models_families_and_approaches_have_colours_of_their_own():
+def test_effects_of_the_models_causes_and_approaches_have_colours_of_their_own():
     modelled = {effect for effects in MODELS.values() for effect in effects}
     groups = [style.group_colour(name) for name in ("force", *modelled)]
     approaches = [style.approach_colour(name) for name in ("gravity", "robot")]
-    families = [*style.FAMILIES.values()]
-    assert len({*groups, *approaches, *families}) == len(groups) + len(approaches) + len(families)
+    causes = [*style.CAUSES.values()]
+    assert len({*groups, *approaches, *causes}) == len(groups) + len(approaches) + len(causes)
     for name in set(effect_names()) - modelled:
-        assert style.group_colour(name) == style.FAMILIES[style.family(name)]
-    assert {style.family(name) for name in set(effect_names()) - modelled} == set(style.FAMILIES)
+        assert style.group_colour(name) == style.CAUSES[style.cause(name)]
+    assert {style.cause(name) for name in set(effect_names()) - modelled} == set(style.CAUSES)
 
 
 # Machado, Oliveira & Fernandes (2009), linear RGB, severity 1.
@@ -305,11 +305,11 @@ def seen(colour, eye):
 
 
 @pytest.mark.parametrize("eye", EYES)
-def test_colours_of_families_keep_apart(eye):
+def test_colours_of_causes_keep_apart(eye):
     """A difference of 2 can be seen side by side; far apart in a figure it takes some more."""
     others = [colour for _, colour in style.GROUPS.values()]
-    others += [*style.APPROACH_COLOURS.values(), *style.FAMILIES.values()]
-    for colour in style.FAMILIES.values():
+    others += [*style.APPROACH_COLOURS.values(), *style.CAUSES.values()]
+    for colour in style.CAUSES.values():
         distances = [np.linalg.norm(seen(colour, eye) - seen(o, eye)) for o in others]
         assert sorted(distances)[1] > 15, colour
 

@@ -85,8 +85,8 @@ GROUPS = {
 """Group of parameters (an effect, or what else varies): its label and its colour."""
 
 # One cannot tell two dozen colours apart, so effects beyond the registered models share the colour
-# of their family. These keep apart from all others with normal and with red-green blind eyes.
-FAMILIES = {
+# of their cause. These keep apart from all others with normal and with red-green blind eyes.
+CAUSES = {
     "rig": "#332288",
     "environment": "#5C0A1E",
     "history": "#66C2C2",
@@ -110,15 +110,15 @@ def group_label(group: str) -> str:
 
 
 def group_colour(group: str) -> str:
-    """Colour of a group of parameters: its own, or that of the effect's family."""
+    """Colour of a group of parameters: its own, or that of the effect's cause."""
     if group in GROUPS:
         return GROUPS[group][1]
-    return FAMILIES[family(group)] if group in effect_names() else "#999999"
+    return CAUSES[cause(group)] if group in effect_names() else "#999999"
 
 
 @cache
-def family(effect: str) -> str:
-    """Family of an effect: what has it, or on what it depends beside the force."""
+def cause(effect: str) -> str:
+    """Cause of an effect: what has it, or on what it depends beside the force."""
     if get_effect(effect).part == "rig":
         return "rig"
     columns = set(compose(effect, (effect,)).hold_columns)
