@@ -44,11 +44,6 @@ class Simulated:
         place = min(int(np.searchsorted(rate, level)), len(order) - 1)
         return float(self.values[order[place]])
 
-    def exceeds(self, value: float, column: int | None = None) -> float:
-        """Probability that noise alone reaches a value, of log odds or of a column of them."""
-        values = self.values if column is None else self.values[:, column]
-        return tail(values, self.weights, value)
-
 
 @dataclass(frozen=True)
 class Detection:
