@@ -77,7 +77,7 @@ def assert_same(read, written):
 
 
 def test_holds_that_are_left_out_stay_in_the_file_and_in_the_history(tmp_path):
-    every = campaign()
+    every = campaign(temperature=np.arange(8.0) ** 2)
     reasons = {3: "moved", 8: "bumped"}
     write_campaign(every.without({8: "bumped"}).without({3: "moved"}), tmp_path)
     assert len((tmp_path / "positions.csv").read_text().splitlines()) == 1 + every.n_positions
@@ -87,10 +87,13 @@ def test_holds_that_are_left_out_stay_in_the_file_and_in_the_history(tmp_path):
     assert read.exclusions[0] == {"position": 3, "reason": "moved"}
     assert_same(read.whole, every)
     kept = read.positions - 1
-    for name in ("step_x", "temperature", "yaw", "roll"):
+    for name in ("step_x", "temperature", "yaw", "roll", "order"):
         np.testing.assert_allclose(
             getattr(read.hold, name), getattr(every.hold, name)[kept], atol=1e-12
         )
+    np.testing.assert_allclose(read.hold.lagged(20), every.hold.lagged(20)[kept], atol=1e-12)
+    untimed = replace(every, time=None).without(reasons)
+    assert untimed.hold.order.tolist() == [1, 2, 4, 5, 6, 7]
 
 
 @pytest.mark.parametrize(

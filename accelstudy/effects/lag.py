@@ -26,7 +26,7 @@ class Course:
     def then(self, time: Array, temperature: Array) -> Course:
         """Go on with readings (n,) of a thermometer, of which one in each second is kept."""
         last = np.floor(self.time[-1]) if len(self.time) else -np.inf
-        known = np.isfinite(temperature) & (np.floor(time) > last)
+        known = np.isfinite(temperature) & np.isfinite(time) & (np.floor(time) > last)
         time, temperature = time[known], temperature[known]
         _, kept = np.unique(np.floor(time), return_index=True)
         return Course(
