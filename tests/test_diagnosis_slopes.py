@@ -201,6 +201,13 @@ def test_a_sensor_that_settles_in_the_first_hold_is_recognised_by_its_slope():
         assert ahead[0] > max(ahead[1], 0) + 4
 
 
+def test_a_sensor_that_settles_is_no_noise():
+    """Explanations by the noise have to leave the slopes as they are, too."""
+    result = diagnose(settling(2), NINE)
+    assert result.verdict == "named"
+    assert [found.name for found in result.found] == ["warm_up"]
+
+
 def test_without_sigma_the_slopes_are_left_out():
     campaign = replace(settling(1), sigma_force=None)
     assert diagnose(campaign, NINE).setting.frame.residuals.slopes == 0

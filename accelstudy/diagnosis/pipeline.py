@@ -336,12 +336,12 @@ class _Run:
         """Test the level of the noise; of the base fit as the calibration does, by its own Ω."""
         if setting is self.search.setting:
             return noises.level_test(Residuals.of(self.first))
-        return noises.level_test(setting.frame.residuals)
+        return noises.level_test(setting.frame.residuals.positions)
 
     @cached_property
     def resolution(self) -> NoiseTest:
         """Whether the readings are coarse, beside the noise of the base fit."""
-        residuals = self.search.residuals
+        residuals = self.search.residuals.positions
         sigma = float(np.mean(residuals.sigmas[:, :3]))
         # A sigma far too large would take the attitudes for steps.
         noise = sigma * min(1.0, float(np.sqrt(residuals.variance)))
@@ -388,7 +388,7 @@ class _Run:
         """Variance of unit weight: 1 if sigma is known and not refuted, else a posteriori."""
         if self.sigma_known and self.level(final).p_value >= REFUTED:
             return 1.0
-        return final.frame.residuals.variance
+        return final.frame.residuals.positions.variance
 
     def sigma_source(self, final: Setting) -> str:
         """Where the noise level comes from."""
