@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -17,6 +18,7 @@ from accelstudy.campaign.fit import fit_campaign, least_sigma
 from accelstudy.campaign.format import Campaign
 from accelstudy.diagnosis.decision import priors
 from accelstudy.diagnosis.decision.explanations import Explanation
+from accelstudy.diagnosis.decision.posterior import of_effects
 from accelstudy.diagnosis.decision.search import Search
 from accelstudy.diagnosis.decision.verdict import Finding, find, lack_of_fit
 from accelstudy.diagnosis.evidence import noise as noises
@@ -279,7 +281,7 @@ class _Run:
             location=self.location(finding, variance),
             gap=gap,
             changes=self.changes(finding, variance),
-            upper_limits=tuple(upper_limits(final, variance, names)),
+            upper_limits=tuple(upper_limits(final, variance, [*names, *self.open(finding)])),
             next_positions=following,
             simulations=SIMULATIONS,
             recognised=self.recognised,
@@ -287,15 +289,26 @@ class _Run:
             reason=reason,
         )
 
+    def open(self, finding: Finding) -> set[str]:
+        """Names that a narrowed finding leaves open, to which no limit applies."""
+        if finding.verdict != "narrowed":
+            return set()
+        classes = [alike for one in finding.credible_set for alike in one.classes]
+        return {name for alike in classes for name in alike}
+
     def probabilities(self, finding: Finding) -> dict[str, float]:
-        """Posterior of each single explanation; a class stands under its first name.
+        """Posterior of each name, alone or with another; a class stands under its first name.
 
         Where nothing is missing they only say what would come first, each name by itself.
         """
         if finding.posterior is None:
             return self.search.probabilities
-        explanations = finding.posterior.explanations
-        return {e.names[0]: e.posterior for e in explanations if len(e.names) == 1}
+        first: dict[tuple[str, ...], str] = {}
+        found: dict[str, float] = defaultdict(float)
+        for one in finding.posterior.explanations:
+            for name, members in zip(one.names, one.classes, strict=True):
+                found[first.setdefault(members, name)] += one.posterior
+        return dict(sorted(found.items(), key=lambda item: -item[1]))
 
     def finding(self) -> tuple[Finding, tuple[NoiseTest, ...]]:
         """Find what is missing: effects first, then the noise, by the tests of it."""
@@ -493,21 +506,11 @@ class _Run:
         return parameter_changes(self.first, final, frame, added, variance)
 
     def next_positions(self, finding: Finding) -> tuple[NextPosition, ...]:
-        """Positions that tell the two most probable explanations apart, if both are near."""
-        search, chosen = self.search, finding.chosen
-        if finding.verdict not in ("named", "narrowed", "unknown") or len(chosen) > 1:
+        """Positions that tell the two most probable of the credible set apart."""
+        if finding.posterior is None or finding.verdict not in ("named", "narrowed", "unknown"):
             return ()
-        effects = [best for best, _ in search.classes if best.effect is not None]
-        first = chosen[0].best if chosen else next(iter(effects), None)
-        if first is None:
+        weighed = zip(finding.credible_set, finding.posterior.all, strict=False)
+        rivals = [one.best for explanation, one in weighed if of_effects(explanation)]
+        if len(rivals) < 2:
             return ()
-        near = {name for name, _ in search.rivals(first, ())}
-        # Rivals in the order of their evidence; what means the same cannot be told apart.
-        second = next(
-            (h for h in effects if h.name in near and h.name not in search.members(first)), None
-        )
-        return (
-            ()
-            if second is None
-            else tuple(next_positions(search.setting.frame, (first,), (second,)))
-        )
+        return tuple(next_positions(self.search.setting.frame, *rivals[:2]))

@@ -254,12 +254,13 @@ class Search:
             if both[0] != both[1] or one.effect is None:
                 names = (one.name, other.name)
                 found.append(Weighed(names, both, pair.log_density + each, (one, other)))
-        for best, _ in self.classes[:FIRST]:
+        for best, members in self.classes[:FIRST]:
             beside = unknown_beside(best, self.groups, self.residuals, self.evidence)
             if beside is not None:
                 total = self.densities[best.name] + beside - np.log(k)
                 prior = np.log(priors.TWO * priors.UNKNOWN)
-                found.append(Weighed((UNKNOWN,), ((UNKNOWN,),), total + prior))
+                both = (members, (UNKNOWN,))
+                found.append(Weighed((best.name, UNKNOWN), both, total + prior))
         return found
 
     @cached_property

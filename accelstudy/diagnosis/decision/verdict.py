@@ -126,7 +126,7 @@ def _without_a_fit(search: Search, posterior: Posterior) -> Finding:
         return Finding("noise_model", search.setting, NOISES[name], posterior=posterior)
     first = posterior.explanations[0]
     said = joined([words(name) for name in first.names])
-    if first.names == (UNKNOWN,):
+    if UNKNOWN in first.names:
         reason = "no effect or pair of effects of the catalogue explains it"
     else:
         second = joined([words(name) for name in posterior.explanations[1].names])
@@ -190,7 +190,8 @@ def _beside(search: Search, alone: Weighed, solution: Solution) -> list[Weighed]
     for name, log in zip(field.names, logs.tolist(), strict=True):
         if name == UNKNOWN:
             weight = log + float(np.log(priors.TWO * priors.UNKNOWN))
-            found.append(Weighed((UNKNOWN,), ((UNKNOWN,),), weight))
+            names, classes = (*alone.names, UNKNOWN), (*alone.classes, (UNKNOWN,))
+            found.append(Weighed(names, classes, weight))
             continue
         other = inner.first_shape(name)
         both = (*alone.classes, inner.members(other))

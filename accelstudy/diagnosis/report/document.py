@@ -6,6 +6,7 @@ from typing import Any
 
 from accelstudy.campaign.document import number
 from accelstudy.diagnosis.pipeline import Diagnosis, Named
+from accelstudy.diagnosis.report.missing import refuted
 from accelstudy.diagnosis.report.statement import cosine_in, statement
 from accelstudy.units import GON, MGON
 
@@ -112,6 +113,8 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def _certain(d: Diagnosis) -> list[dict[str, Any]]:
+    if d.verdict == "unknown" and refuted(d.credible_set):
+        return []
     return [
         {
             "family": part.family,

@@ -143,7 +143,7 @@ def evidence_figure(diagnosis: Diagnosis) -> Figure:
     percent = [100 * probabilities.get(name, 0.0) for name in shown]
     drawn = right.barh(place, percent, color=colours, height=0.6)
     right.bar_label(drawn, [_percent(probabilities.get(n)) for n in shown], padding=2, fontsize=7.5)
-    right.set(xlim=(0, 115), xlabel="probability, if one thing is missing / %")
+    right.set(xlim=(0, 115), xlabel="posterior probability, alone or with another / %")
     right.set_xticks([0, 25, 50, 75, 100])
     right.grid(axis="y", visible=False)
     return figure

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from accelstudy.catalogue import family_of
 from accelstudy.diagnosis.decision.explanations import CREDIBLE, Explanation
+from accelstudy.diagnosis.decision.priors import MANY, SURE
 from accelstudy.diagnosis.report.statement import Name, Part, Statement, statement
 from accelstudy.diagnosis.worth.next_positions import NextPosition
 from accelstudy.effects import effect_names
@@ -21,8 +22,6 @@ FAMILIES = {
 }
 """Families as what is missing; the others have an article before them."""
 
-MANY = 4
-"""Explanations that are still an answer."""
 WORTH = 0.1
 """Posterior from which on something open is worth a word; the figure has all of it."""
 NOT_AN_EFFECT = {"unknown": "something that is not in the catalogue"}
@@ -52,19 +51,28 @@ def missing(credible_set: Sequence[Explanation]) -> str:
     return _missing(_if_it_is_an_effect(effects)) + f", unless it is {unless}" * bool(unless)
 
 
-def missing_in_part(credible_set: Sequence[Explanation]) -> str:
-    """Say what is certain of something that has no name as a whole; nothing if nothing is.
-
-    A set that is small enough to be an answer and is none was refuted by what it leaves, and
-    nothing of it is certain.
-    """
+def without_a_name(credible_set: Sequence[Explanation]) -> str:
+    """Say in a sentence what is certain of something that has no name as a whole."""
     known = statement(credible_set)
     said = joined([_part(part) for part in known.certain if _is_effect(part)])
-    if not said or (len(credible_set) <= MANY and not _apart(credible_set)[1]):
-        return ""
+    if not said:
+        return "Something is missing from the model, and it has no name here."
+    if refuted(credible_set):
+        return f"What is missing from the model is much like {said}, and yet it has no name here."
     if _surely_more(known, CREDIBLE):
-        return f"{said}; what is missing beside it has no name here"
-    return f"{said}; whether more is missing, and what, is open"
+        return f"The model lacks {said}; what is missing beside it has no name here."
+    return f"The model lacks {said}; whether more is missing, and what, is open."
+
+
+def refuted(credible_set: Sequence[Explanation]) -> bool:
+    """Whether a set would be an answer, so that what has no name all the same is none of it.
+
+    Adding it left a misfit, say. It may imitate what is missing, and nothing of it is certain.
+    """
+    effects, _ = _apart(credible_set)
+    named = any(one.posterior >= SURE for one in effects)
+    narrowed = len(credible_set) <= MANY and sum(one.posterior for one in effects) >= SURE
+    return named or narrowed
 
 
 def most_probable(credible_set: Sequence[Explanation]) -> str:

@@ -8,9 +8,9 @@ from accelstudy.diagnosis.pipeline import Diagnosis, Named
 from accelstudy.diagnosis.report.missing import (
     explanation_words,
     missing,
-    missing_in_part,
     most_probable,
     not_told_apart,
+    without_a_name,
 )
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.figures.style import unit_label
@@ -33,7 +33,6 @@ HEADLINES = {
     "no_effect": "Nothing that these data can show is missing from the model.",
     "named": "The model lacks {names}.",
     "narrowed": "The model lacks {names}.",
-    "unknown": "Something is missing from the model, and it has no name here.",
     "noise_model": "The sensor model is adequate, its noise is not: {names}.",
     "gross_error": "The data are not what they say: {names}.",
 }
@@ -72,8 +71,8 @@ def headline(diagnosis: Diagnosis) -> str:
     found = diagnosis.found
     if diagnosis.verdict == "narrowed":
         return HEADLINES["narrowed"].format(names=missing(diagnosis.credible_set))
-    if diagnosis.verdict == "unknown" and (said := missing_in_part(diagnosis.credible_set)):
-        return f"The model lacks {said}."
+    if diagnosis.verdict == "unknown":
+        return without_a_name(diagnosis.credible_set)
     if diagnosis.verdict == "gross_error":
         found = tuple(f for f in found if not _is_effect(f))
     names = {named.name for named in found}
