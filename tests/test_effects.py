@@ -261,7 +261,7 @@ def test_a_slip_counts_the_holds_where_they_have_no_time():
     left = hold.take(np.arange(20, 40)).with_steps(FORCES[20:])
     assert left.order[0] == 21
     times = [c.shape["t"] for c in get_effect("mounting_slip").candidates(hold, FORCES, G)]
-    np.testing.assert_array_equal(times, np.arange(2.5, 39))
+    np.testing.assert_array_equal(times, np.arange(3.5, 38))
 
 
 def test_a_sensor_that_lags_behind_its_thermometer():

@@ -4,6 +4,9 @@ from accelstudy.effects.base import Effect, after, per_axis, register
 from accelstudy.effects.step_times import step_times, times_between
 from accelstudy.registry import Hyper
 
+LEAST = 2
+"""Holds on either side of a jump."""
+
 
 @register
 class BiasJump(Effect):
@@ -24,7 +27,7 @@ class BiasJump(Effect):
 
     def candidates(self, hold, f, g):
         """Return times between the holds."""
-        return tuple(BiasJump(t=t) for t in step_times(hold.column("time")))
+        return tuple(BiasJump(t=t) for t in step_times(hold.column("time"), LEAST))
 
     def between(self, other, hold):
         """Return some times between those of two candidates."""

@@ -4,6 +4,9 @@ from accelstudy.effects.base import Effect, after, per_axis, register
 from accelstudy.effects.step_times import step_times, times_between
 from accelstudy.registry import Hyper
 
+LEAST = 3
+"""Holds on either side of a slip: two hardly show a rotation."""
+
 
 @register
 class MountingSlip(Effect):
@@ -28,7 +31,7 @@ class MountingSlip(Effect):
 
     def candidates(self, hold, f, g):
         """Return times between the holds."""
-        return tuple(MountingSlip(t=t) for t in step_times(hold.column("order")))
+        return tuple(MountingSlip(t=t) for t in step_times(hold.column("order"), LEAST))
 
     def between(self, other, hold):
         """Return some times between those of two candidates."""

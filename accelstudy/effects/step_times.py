@@ -13,33 +13,32 @@ STEPS = 7
 """Times between two of them that are looked at next."""
 
 
-def step_times(when: Array) -> Array:
-    """Times (k,) that are searched at first: between holds, at least two of them on either side.
-
-    What happens before the last hold alone is a single deviating hold by any other name.
+def step_times(when: Array, least: int) -> Array:
+    """Times (k,) between holds that are searched at first.
 
     Parameters
     ----------
     when : (n,) array, of the holds
+    least : int, holds on either side; fewer that deviate are so many bumped holds by another name
     """
-    middles = _middles(when)
+    middles = _middles(when, least)
     return middles[_spread(len(middles))]
 
 
 def times_between(low: float, high: float, when: Array) -> Array:
     """Return some (k,) of those that were passed over between two times, in either order."""
-    middles = _middles(when)
+    middles = _middles(when, 1)
     left = middles[(middles > min(low, high)) & (middles < max(low, high))]
     if not len(left):
         return left
     return left[np.unique(np.linspace(0, len(left) - 1, STEPS).round().astype(int))]
 
 
-def _middles(when: Array) -> Array:
-    """Middles between successive holds, as they are written, (k,)."""
+def _middles(when: Array, least: int) -> Array:
+    """Middles between successive holds, with so many on either side, as they are written, (k,)."""
     times = np.unique(when)
-    middles = (times[1:-2] + times[2:-1]) / 2 if len(times) > 3 else ()
-    return np.array([float(f"{t:.9g}") for t in middles])
+    middles = (times[:-1] + times[1:]) / 2
+    return np.array([float(f"{t:.9g}") for t in middles[least - 1 : len(times) - least]])
 
 
 def _spread(count: int) -> NDArray[np.int_]:
