@@ -4,7 +4,10 @@ import hashlib
 import json
 import re
 from dataclasses import replace
+from itertools import pairwise
+from types import SimpleNamespace
 
+import matplotlib as mpl
 import numpy as np
 import pandas as pd
 import pytest
@@ -18,17 +21,21 @@ from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.fit import fit_campaign
 from accelstudy.campaign.format import write_campaign
+from accelstudy.campaign.output import write_calibration
 from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign
 from accelstudy.cli import main
 from accelstudy.diagnosis.decision.explanations import Explanation
 from accelstudy.diagnosis.pipeline import Gap, diagnose
+from accelstudy.diagnosis.report.figures import gap_figure, loop_figure
 from accelstudy.diagnosis.report.output import diagnose_folder, write_diagnosis
 from accelstudy.diagnosis.report.wording import headline
 from accelstudy.diagnosis.round_trip import parse_round_trip
 from accelstudy.diagnosis.space.hypotheses import setting_of
-from accelstudy.diagnosis.worth.loop import close_loop
+from accelstudy.diagnosis.worth.loop import CASES as CASES_OF_LOOP
+from accelstudy.diagnosis.worth.loop import Loop, close_loop
 from accelstudy.diagnosis.worth.next_positions import next_positions
 from accelstudy.errors import InputError
+from accelstudy.figures.style import STYLE
 from accelstudy.models import get_model
 from accelstudy.study.config import read_study
 from accelstudy.study.report import number
@@ -410,6 +417,50 @@ def test_a_figure_that_fails_takes_nothing_with_it(tmp_path, monkeypatch, capsys
     assert page.count("<svg") == 1
     assert (tmp_path / "out/diagnosis.json").exists()
     assert not list((tmp_path / "out").rglob("*.part"))
+
+    fit = fit_campaign(campaign, NINE, get_approach("robot"))
+    monkeypatch.setattr("accelstudy.campaign.output.correlation_figure", lambda _: 1 / 0)
+    write_calibration(fit, tmp_path / "calibrated")
+    said = said.replace("evidence", "correlations")
+    assert capsys.readouterr().err == f"warning: {said}\n"
+    page = (tmp_path / "calibrated/report.html").read_text(encoding="utf-8")
+    assert said in page.replace("&#x27;", "'")
+    assert page.count("<svg") == 1
+
+
+def test_variances_of_unit_weight_that_are_nothing_are_not_compared(tmp_path, monkeypatch):
+    """No figure of them could be drawn."""
+    sessions = pd.DataFrame(
+        [
+            {"simulation": s, "calibration": c, "replicate": i, "sigma0_squared": value}
+            for s, c in CASES_OF_LOOP
+            for i, value in enumerate((0.0, np.nan, np.inf, 1.2))
+        ]
+    ).assign(converged=True, tilt_error_rad=1e-3)
+    loop = Loop(sessions, {"base": 1.0, "extended": 1.0})
+    assert loop.interval("old", "base") == (1.2, 1.2)
+    loop_figure(loop)
+    diagnosis = diagnose(simulated("gravity", tmp_path / "c"), NINE)
+    nothing = sessions[["sigma0_squared", "tilt_error_rad", "converged"]][:1]
+    monkeypatch.setattr("accelstudy.diagnosis.worth.loop._session_table", lambda *_: nothing)
+    assert close_loop(diagnosis, 1) is None
+
+
+def test_numbers_of_many_positions_do_not_meet():
+    n = 1250
+    positions = pd.DataFrame(
+        {"split": "held-out", "position": np.arange(4, 4 * n + 1, 4), "predicted_before_mps2": 0.1}
+    ).assign(predicted_after_mps2=0.01)
+    solution = SimpleNamespace(whitening=np.eye(3)[None])
+    gap = SimpleNamespace(held_out=SimpleNamespace(before=2.0, after=1.0, floor=1.0))
+    final = SimpleNamespace(frame=SimpleNamespace(solution=solution))
+    diagnosis = SimpleNamespace(gap=gap, final=final, unit_variance=1e-6)
+    with mpl.rc_context(STYLE):
+        figure = gap_figure(diagnosis, positions)
+        figure.draw_without_rendering()
+        boxes = [label.get_window_extent() for label in figure.axes[0].get_xticklabels()]
+    assert len(boxes) > 5
+    assert all(a.x1 + 3 < b.x0 for a, b in pairwise(boxes))
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from click.testing import CliRunner
 from scipy.io import savemat
 from test_import_holds import G, session, shared, write
 
+from accelstudy.campaign import segmentation_figure
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.importing import (
     ImportSettings,
@@ -155,7 +156,7 @@ def test_settings_are_overlaid(tmp_path):
 # --- The command ---------------------------------------------------------------------------------
 
 
-def test_command(log, tmp_path):
+def test_command(log, tmp_path, monkeypatch):
     out = tmp_path / "campaign"
     result = call(log, "--out", out, "--rate", 100, "--name", "mine", "--gravity", G)
     assert result.exit_code == 0, result.output
@@ -168,8 +169,15 @@ def test_command(log, tmp_path):
     assert campaign.sigma_force == pytest.approx(expected.sigma_force)
     svg = (out / "segmentation.svg").read_bytes()
     assert (out / "segmentation.png").stat().st_size > 1e4
-    call(log, "--out", out, "--rate", 100)
+    assert call(log, "--out", out, "--rate", 100, "--force").exit_code == 0
     assert (out / "segmentation.svg").read_bytes() == svg
+    # A figure that fails takes the campaign not with it, and leaves no older one behind.
+    monkeypatch.setattr(segmentation_figure, "draw_segmentation", lambda *_: 1 / 0)
+    result = call(log, "--out", out, "--rate", 100, "--force")
+    assert result.exit_code == 0
+    assert "The figure 'segmentation' could not be drawn (ZeroDivisionError: div" in result.stderr
+    assert not list(out.glob("segmentation.*"))
+    np.testing.assert_array_equal(read_campaign(out).forces, campaign.forces)
 
 
 def test_no_hold_is_said_to_be_shorter_than_the_shortest(tmp_path):

@@ -17,7 +17,8 @@ from accelstudy.campaign.holds import Holds
 from accelstudy.campaign.logs import Recording
 from accelstudy.campaign.windows import windows
 from accelstudy.campaign.wording import counted
-from accelstudy.figures.saving import save
+from accelstudy.errors import InputError
+from accelstudy.figures.saving import failure, save
 from accelstudy.figures.style import DPI, FULL, INK, STYLE, new_figure
 from accelstudy.progress import stage
 
@@ -77,8 +78,18 @@ def draw_segmentation(log: Recording, holds: Holds) -> Figure:
 def render_segmentation(
     log: Recording, holds: Holds, svg_path: str | Path, png_path: str | Path
 ) -> None:
-    """Draw the segmentation and write it as SVG and PNG, each whole or not at all."""
-    save(draw_segmentation(log, holds), svg_path, png_path, "Static holds", DPI)
+    """Draw the segmentation and write it as SVG and PNG, each whole or not at all.
+
+    A figure that fails takes nothing with it: there is none, and a warning on stderr says why.
+    """
+    try:
+        save(draw_segmentation(log, holds), svg_path, png_path, "Static holds", DPI)
+    except (OSError, InputError):  # a full disk or a log that is gone is no matter of the figure
+        raise
+    except Exception as error:
+        for path in (svg_path, png_path):  # of an import before
+            Path(path).unlink(missing_ok=True)
+        failure("The figure 'segmentation' could not be drawn", error)
 
 
 def _number(ax: Axes, holds: Holds) -> None:

@@ -41,6 +41,8 @@ FEW = 4
 """Number of different values up to which the components of a residual stand side by side."""
 ABREAST = 0.03
 """Distance of the components there, as a part of the range."""
+DIGITS = 48
+"""Digits of the numbers of positions that stand beside each other."""
 LARGE = 20
 """Ratio of mean squares from which on bars are drawn on a logarithmic scale."""
 
@@ -86,7 +88,8 @@ def gap_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
     ax.vlines(place, after, before, color=OTHER, linewidth=0.8)
     ax.plot(place, before, "s", color=BEFORE, label="without the effect")
     ax.plot(place, after, "o", color=AFTER, label="with the effect")
-    every = max(1, len(held) // 16)
+    # Labels of long numbers must not meet.
+    every = -(-len(held) * len(str(held["position"].max())) // DIGITS)
     ax.set_xticks(place[::every], held["position"][::every])
     ax.set(xlabel="held-out position", ylabel="residual, rms / (mm/s²)")
     ax.set_ylim(0, 1.05 * max(before.max(), after.max(), sigma))

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.adjustment import Adjustment, Observations, calibrate
 from accelstudy.adjustment.quality import Solution
@@ -57,10 +57,10 @@ class Loop:
     measured: dict[str, float]
 
     def case(self, simulation: str, calibration: str) -> pd.DataFrame:
-        """Sessions of one simulation and one calibration that converged."""
+        """Sessions of one simulation and one calibration that converged to a variance."""
         s = self.sessions
         chosen = (s["simulation"] == simulation) & (s["calibration"] == calibration)
-        return s[chosen & s["converged"] & np.isfinite(s["sigma0_squared"])]
+        return s[chosen & s["converged"] & _comparable(s["sigma0_squared"])]
 
     def interval(self, simulation: str, calibration: str) -> tuple[float, float]:
         """Where the central 95 % of the simulated variances of unit weight lie."""
@@ -127,7 +127,7 @@ def close_loop(diagnosis: Diagnosis, replicates: int = REPLICATES, seed: int = 1
     measured = {
         name: float(_calibrated(fit, taken).variance_posteriori[0]) for name, fit in fits.items()
     }
-    if not np.isfinite(list(measured.values())).all():
+    if not _comparable(list(measured.values())).all():
         return None
     n = d.campaign.n_positions
     replicates = min(replicates, max(LEAST, POSITIONS // n))
@@ -153,6 +153,12 @@ def close_loop(diagnosis: Diagnosis, replicates: int = REPLICATES, seed: int = 1
                 tables.append(table.assign(**known, replicate=numbers)[COLUMNS])
     loop = Loop(pd.concat(tables, ignore_index=True), measured)
     return loop if all(len(loop.case(*case)) for case in CASES) else None
+
+
+def _comparable(variances: ArrayLike) -> NDArray[np.bool_]:
+    """Which variances of unit weight can be compared: a fit without residuals has none."""
+    values = np.asarray(variances, dtype=float)
+    return np.isfinite(values) & (values > 0)
 
 
 def _session_table(
