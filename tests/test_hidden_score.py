@@ -188,6 +188,9 @@ def test_shares(tables):
     row = share_of(table, "alarm", "null", sigma="given")
     assert (row["count"], row["n"]) == (1, 20)
     assert share_of(table, "wrong, of those named", "two")["share"] == pytest.approx(1 / 3)
+    # Narrowed to a set that holds the truth is not wrong; of the outside no set holds anything.
+    assert share_of(table, "wrong", "one", size=25.0)["count"] == 0
+    assert share_of(table, "wrong", "outside")["share"] == 1
     assert share_of(table, "one of two", "two", size=40.0)["share"] == pytest.approx(1 / 3)
     assert share_of(table, "confirmed, of those answered", "null")["share"] == 1
     assert share_of(table, "oracle found", "one", size=25.0)["share"] == 3 / 4

@@ -60,7 +60,7 @@ def figures(tables: Tables) -> dict[str, Callable[[], Figure]]:
 
 def alarms(tables: Tables) -> Figure:
     """How often something is found where nothing is missing, and an effect where it is noise."""
-    fig = new_figure(FULL, 88)
+    fig = _wide_labels(new_figure(FULL, 88))
     left, right = fig.subplots(1, 2)
     table = tables["shares"]
     null = table[(table["set"] == "null") & (table["quantity"] == "alarm")]
@@ -190,7 +190,7 @@ def calibration(tables: Tables) -> Figure:
 def confusion(tables: Tables) -> Figure:
     """What effects of each family are taken for."""
     table = tables["confusion"]
-    fig = new_figure(FULL, 105)
+    fig = _wide_labels(new_figure(FULL, 105))
     ax = fig.subplots()
     if table.empty:
         say_empty(ax, "no such campaigns")
@@ -259,6 +259,12 @@ def limits(tables: Tables) -> Figure:
     return fig
 
 
+def _wide_labels(fig: Figure) -> Figure:
+    """Leave room beside labels of words, whose widths differ between the formats."""
+    fig.set_layout_engine("constrained", w_pad=0.08)
+    return fig
+
+
 def _curve(ax: Axes, table: pd.DataFrame, set_: str, quantity: str, **style: object) -> None:
     """Draw a share over the size, with its intervals."""
     part = table[(table["set"] == set_) & (table["quantity"] == quantity) & table["size"].notna()]
@@ -306,8 +312,8 @@ def _legend(fig: Figure, columns: int) -> None:
 
 def _over_size(ax: Axes) -> None:
     """Make the abscissa that of sizes, with a tick at each that was simulated."""
-    drawn = [np.asarray(line.get_xdata(), dtype=float) for line in ax.get_lines()]
-    sizes = np.unique(np.concatenate([x for x in drawn if len(x) > 2] or [np.array([25.0])]))
+    drawn = [np.asarray(curve[0].get_xdata(), dtype=float) for curve in ax.containers]
+    sizes = np.unique(np.concatenate(drawn)) if drawn else np.array([25.0])
     ax.set_xscale("log")
     ax.set_xticks(sizes[spread(np.log(sizes), 0.2)])
     ax.xaxis.set_major_formatter("{x:g}")

@@ -63,15 +63,18 @@ def _judged(row: dict[Any, Any]) -> dict[str, Any]:
     answered = ok and row["verdict"] in EFFECTS_GIVEN
     right = answered and same_effects(found, true)
     correct = answered and all_true(found, true)
+    judged_set = _judged_set(json.loads(row["credible_set"]) if ok else [], true)
+    # To narrow it down to a set says no more than that it is one of the set.
+    held = row["verdict"] == "narrowed" and bool(judged_set.get("set_holds"))
     return {
         "ok": ok,
         "alarm": ok and row["verdict"] != "no_effect",
         "answered": answered,
         "right": right,
-        "wrong": answered and not correct,
+        "wrong": answered and not correct and not held,
         "one_of_two": correct and not right,
         "recognised": _recognised(row) if row["gross_name"] else None,
-        **_judged_set(json.loads(row["credible_set"]) if ok else [], true),
+        **judged_set,
         **_judged_oracle(row, true),
     }
 
