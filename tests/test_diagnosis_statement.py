@@ -209,8 +209,14 @@ def test_the_unknown_is_said_by_families():
         ("hysteresis", 0.05),
     )
     assert most_probable(spread) == (
-        "a slow change in time (0.6), noise of another kind (0.25) and something that is not in "
-        "the catalogue (0.1)"
+        "Most probable: a slow change in time (0.6), noise of another kind (0.25) and something "
+        "that is not in the catalogue (0.1)."
+    )
+    beside = made(("bias_drift+unknown", 0.7), ("bias_drift+hysteresis", 0.25))
+    assert without_a_name(beside).startswith("The model lacks bias drift; what is missing beside")
+    assert most_probable(beside) == (
+        "Most probable beside it: something that is not in the catalogue (0.7) and a memory of the "
+        "previous position (0.25)."
     )
 
 

@@ -76,14 +76,19 @@ def refuted(credible_set: Sequence[Explanation]) -> bool:
 
 
 def most_probable(credible_set: Sequence[Explanation]) -> str:
-    """Say what something unknown is most like: families, and names that have none."""
+    """Say what something without a name is most like, by families; nothing if that is open.
+
+    If something is certain, it is said of what is beside it.
+    """
+    known = statement(credible_set)
+    certain = bool(known.certain) and not refuted(credible_set)
     kinds: dict[str, float] = defaultdict(float)
-    for one in credible_set:
+    for one in known.open if certain else credible_set:
         named = zip(one.names, one.classes, strict=True)
         for kind in dict.fromkeys(_kind(name, members) for name, members in named):
             kinds[kind] += one.posterior
-    worth = [(kind, p) for kind, p in kinds.items() if p >= WORTH]
-    return _listed(sorted(worth, key=lambda item: -item[1]))
+    worth = sorted(((k, p) for k, p in kinds.items() if p >= WORTH), key=lambda item: -item[1])
+    return f"Most probable{' beside it' if certain else ''}: {_listed(worth)}." if worth else ""
 
 
 def _kind(name: str, members: tuple[str, ...]) -> str:

@@ -101,9 +101,7 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
         lines += _refuted(d)
     lines += _suspects(d)
     if d.verdict == "unknown":
-        if like := most_probable(d.credible_set):
-            lines.append(f"Most probable: {like}.")
-        lines.append(_where(d))
+        lines += [line for line in (most_probable(d.credible_set), _where(d)) if line]
     for named in filter(_is_effect, d.found):
         lines.append(_effect_line(named))
     if d.verdict == "gross_error" and any(f.position is not None for f in d.found):
