@@ -29,7 +29,8 @@ def next_steps(
         command = suggested.calibrate(campaign, model, approach, f"{name}-calibrated")
         steps.append(("Correct the campaign, and calibrate it then", command))
     if d.verdict in ("narrowed", "unknown"):
-        what = "Add positions that tell more to the campaign, and diagnose it again"
+        which = "the next positions" if d.next_positions else "positions"
+        what = f"Add {which} to the campaign, and diagnose it again"
         steps.append((what, suggested.diagnose(campaign, model, approach, name)))
     if calibration is None:
         return steps

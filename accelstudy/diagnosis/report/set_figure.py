@@ -8,8 +8,8 @@ from matplotlib.patches import Patch
 
 from accelstudy.catalogue import family_of
 from accelstudy.diagnosis.decision.explanations import CREDIBLE, Explanation
-from accelstudy.diagnosis.report.missing import name_words
 from accelstudy.figures.style import COLUMN, INK, MISSING, new_figure
+from accelstudy.wording import words
 
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00")
 """Of the families, the most probable first."""
@@ -50,7 +50,7 @@ def explanations_figure(explanations: tuple[Explanation, ...]) -> Figure:
     for row, posterior in enumerate([*(one.posterior for one in shown), *([rest] * (rest > 0))]):
         ax.annotate(f"{posterior:.2f}", (1, row), xytext=(4, 0), textcoords="offset points",
                     va="center", fontsize=7.5, annotation_clip=False)  # fmt: skip
-    labels = ["\nwith ".join(map(name_words, one.names)) for one in shown]
+    labels = ["\nwith ".join(map(words, one.names)) for one in shown]
     ax.set_yticks(range(len(shown) + (rest > 0)), labels + ["all others"] * (rest > 0))
     ax.set(xlim=(0, 1), xlabel="posterior probability, summed")
     ax.invert_yaxis()
