@@ -3,6 +3,8 @@
 import json
 import math
 import os
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +14,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from accelstudy.approaches import get_approach
+from accelstudy.campaign.assessment import assess
 from accelstudy.campaign.export import device_matrix, export
 from accelstudy.campaign.fit import fit_campaign, initial_values
 from accelstudy.campaign.format import Campaign
 from accelstudy.campaign.gauges import GAUGES, affine_form, in_gauge
 from accelstudy.campaign.monte_carlo import check_sigmas
+from accelstudy.campaign.verdict import verdict_lines
 from accelstudy.errors import InputError
 from accelstudy.models import get_model
 from accelstudy.schemes import get_scheme
@@ -220,3 +224,26 @@ def test_the_sigmas_of_a_real_campaign_hold_in_simulation():
     fit = fit_campaign(campaign_of(forces, 9.8189), NINE, GRAVITY)
     table = check_sigmas(fit, replicates=2000, seed=3)
     assert np.abs(table["ratio"] - 1).max() < 4.5 / math.sqrt(2 * 2000)
+
+
+def test_positions_in_conflict_are_not_blamed_alone():
+    """A bumped hold stands out, and so do those after a knock of the mounting."""
+    measured = simulated_campaign({"b_x": 0.1}, seed=2)
+    one = replace(measured, forces=measured.forces.copy())
+    one.forces[15] += [0.02, 0.02, -0.02]
+    (said,) = _in_conflict(one)
+    assert re.match(r"In conflict with the others: position 16 \(p [=<].*, all positions", said)
+    several = replace(measured, forces=measured.forces.copy())
+    several.forces[[3, 20, 11]] *= [[1.01], [0.994], [1.003]]
+    (said,) = _in_conflict(several)
+    assert said.startswith("In conflict with the others: positions 4, 12 and 21 (each with p")
+    assert said.endswith("They may be bumped, or show what the model lacks.")
+    assert _in_conflict(measured) == []
+
+
+def _in_conflict(campaign):
+    lines = verdict_lines(assess(fit_campaign(campaign, NINE, GRAVITY)))
+    found = [line for line in lines if line.startswith("In conflict")]
+    advised = "What is wrong or missing, “accelstudy diagnose” may tell." in lines
+    assert advised == bool(found)
+    return found

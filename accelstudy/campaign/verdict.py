@@ -52,16 +52,11 @@ def verdict_lines(assessment: Assessment) -> list[str]:
     """Say whether the calibration is good, for what, and what limits it; the first comes first."""
     fit = assessment.fit
     lines = [*_implausible(assessment), *_consistency(fit)]
-    if assessment.suspects:
-        named = [str(fit.campaign.positions[s.position]) for s in assessment.suspects]
-        what = "position" if len(named) == 1 else "positions"
-        lines.append(
-            f"In conflict with the others, to be checked or repeated: {what} {joined(named)}."
-        )
+    lines += _conflict(assessment)
     judged = state(assessment)
     if judged != IMPLAUSIBLE and np.isfinite(assessment.tilt).all():
         lines.append(_tilt(assessment))
-    if judged in (REJECTED, IMPLAUSIBLE):
+    if judged in (REJECTED, IMPLAUSIBLE) or assessment.suspects:
         lines.append("What is wrong or missing, “accelstudy diagnose” may tell.")
     if not fit.approach.uses_angles:
         lines.append(BLIND)
@@ -106,6 +101,25 @@ def _implausible(assessment: Assessment) -> list[str]:
         cause = "" if gross is not None else " A wrong unit, sign, axis or row is the usual cause."
         lines.append(f"No sensor is like this: {joined(found)}.{cause}")
     return lines
+
+
+def _conflict(assessment: Assessment) -> list[str]:
+    """Name the positions that the others do not bear, which need not be the fault of the holds."""
+    found = sorted(assessment.suspects, key=lambda suspect: suspect.position)
+    if not found:
+        return []
+    labels = [str(assessment.fit.campaign.positions[suspect.position]) for suspect in found]
+    p = p_value(max(suspect.p_value for suspect in found))
+    if len(found) == 1:
+        return [
+            f"In conflict with the others: position {labels[0]} ({p}, all positions counted). It "
+            "may be bumped, or show what the model lacks."
+        ]
+    least = p if "<" in p else f"{p} or less"
+    return [
+        f"In conflict with the others: positions {joined(labels)} (each with {least}, all positions "
+        "counted). They may be bumped, or show what the model lacks."
+    ]
 
 
 def _tilt(assessment: Assessment) -> str:

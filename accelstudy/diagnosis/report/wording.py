@@ -227,7 +227,9 @@ def _refuted(d: Diagnosis) -> list[str]:
 def _suspects(d: Diagnosis) -> list[str]:
     """Say which positions a calibration marks, where the verdict is not about them."""
     found = {named.position for named in d.found}
-    labels = [str(label) for label, _ in d.suspects if label not in found]
+    labels = [
+        str(label) for label in sorted(label for label, _ in d.suspects) if label not in found
+    ]
     if not labels:
         return []
     what = f"position{'' if len(labels) == 1 else 's'} {joined(labels)}"
