@@ -117,8 +117,8 @@ def _conflict(assessment: Assessment) -> list[str]:
         ]
     least = p if "<" in p else f"{p} or less"
     return [
-        f"In conflict with the others: positions {joined(labels)} (each with {least}, all positions "
-        "counted). They may be bumped, or show what the model lacks."
+        f"In conflict with the others: positions {joined(labels)} (each with {least}, all "
+        "positions counted). They may be bumped, or show what the model lacks."
     ]
 
 
