@@ -116,6 +116,11 @@ def test_two_of_a_family_are_two_things():
     assert beside(found) == [(("warm_up",), 0.6), (("quadratic_scale",), 0.35)]
 
 
+def test_two_bumped_positions_count_once():
+    found = said(("outlier_position+outlier_position", 0.6), ("outlier_position", 0.35))
+    assert [part.posterior for part in found.certain] == [pytest.approx(0.95)]
+
+
 def test_too_little_is_not_certain():
     assert not said(("bias_drift", 0.5), ("warm_up", 0.3)).certain
     assert said() == said()

@@ -306,8 +306,10 @@ class _Run:
         first: dict[tuple[str, ...], str] = {}
         found: dict[str, float] = defaultdict(float)
         for one in finding.posterior.explanations:
-            for name, members in zip(one.names, one.classes, strict=True):
-                found[first.setdefault(members, name)] += one.posterior
+            # Two bumped positions have one name.
+            named = zip(one.classes, one.names, strict=True)
+            for name in {first.setdefault(members, name): None for members, name in named}:
+                found[name] += one.posterior
         return dict(sorted(found.items(), key=lambda item: -item[1]))
 
     def finding(self) -> tuple[Finding, tuple[NoiseTest, ...]]:

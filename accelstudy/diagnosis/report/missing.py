@@ -16,6 +16,7 @@ from accelstudy.wording import joined, probability, words
 FAMILIES = {
     "alignment of the axes": "a misalignment of the axes",
     "attitude of the rig": "an error in the attitude of the rig",
+    "gross error": "a bumped position",
     "linear scale": "an error of the linear scale",
     "noise": "noise of another kind",
     "temperature": "an effect of temperature",

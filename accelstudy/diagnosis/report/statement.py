@@ -116,7 +116,7 @@ def _certain(
     families: dict[str, float] = defaultdict(float)
     for one in explanations:
         members.update(zip(one.names, one.classes, strict=True))
-        for name in one.names:
+        for name in dict.fromkeys(one.names):
             names[name] += one.posterior
         for common in dict.fromkeys(family(*alike) for alike in one.classes):
             families[common] += one.posterior

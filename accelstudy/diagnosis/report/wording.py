@@ -38,10 +38,6 @@ HEADLINES = {
 }
 
 
-ADDED = ("named", "narrowed")
-"""Verdicts with which effects are added to the model."""
-
-
 def amount(value: float, unit: str) -> str:
     """Show an SI value in the unit that people use, without the unit."""
     return number(float(to_display(value, unit)))
@@ -116,7 +112,7 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
             f"Tilt error of the calibrated sensor: {before} {unit} as it is, {after} {unit} "
             f"{changed(d)}."
         )
-    if d.verdict in ADDED:
+    if judged(d):
         lines.append(confirmation(d))
     if d.setting.invisible:
         lines.append(
@@ -138,6 +134,11 @@ def advice(diagnosis: Diagnosis) -> list[str]:
     if "repeat" not in d.location and (d.verdict == "noise_model" or not d.sigma_known):
         lines.append("Repeated attitudes would show the noise from hold to hold without any model.")
     return lines
+
+
+def judged(diagnosis: Diagnosis) -> bool:
+    """Whether effects were added that held-out positions are asked about."""
+    return diagnosis.gap.held_out is not None or bool(diagnosis.gap.reason)
 
 
 def confirmation(diagnosis: Diagnosis) -> str:
