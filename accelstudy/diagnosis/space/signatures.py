@@ -141,4 +141,4 @@ def temperature_rate(time: Array, temperature: Array) -> Array:
     off, change = values[1:-1] - between, values[2:] - values[:-2]
     if np.sum(off**2) > STEADY**2 * np.sum(change**2):
         return np.zeros(len(time))
-    return np.interp(time, t, np.gradient(values, t))
+    return np.interp(time, t, np.gradient(values, t, edge_order=2))
