@@ -108,6 +108,12 @@ def test_where_the_residuals_of_white_noise_live():
         assert f"{100 * location[group]:.0f} % {GROUPS[group]}" in FLAT
 
 
+def variances_taken(d):
+    """Variances of the axes, beside their mean."""
+    variances = d.setting.frame.solution.variances[0, :3]
+    return variances / variances.mean()
+
+
 def test_the_y_axis_of_the_innalabs():
     d = diagnosed("innalabs-49")
     y = d.campaign.forces[:, 1] / d.campaign.gravity
@@ -116,6 +122,8 @@ def test_the_y_axis_of_the_innalabs():
     many, few = (number(float(np.sqrt(np.mean(residuals[r] ** 2)))) for r in (carried, ~carried))
     assert f"the {np.count_nonzero(carried)} in which y carries more than 0.8 g" in FLAT
     assert f"leave {many} mm/s² rms, the others {few}" in FLAT
+    x, y_taken, z = (number(v) for v in variances_taken(d))
+    assert f"variances are taken as {x}, {y_taken} and {z} of the mean" in FLAT
     down = residuals[y < -0.95]
     assert f"from {number(down.min())} to {number(down.max())} mm/s²" in FLAT
 
