@@ -18,7 +18,7 @@ from accelstudy.diagnosis.space.location import groups
 from accelstudy.simulation import Noise
 
 R = 40
-LEVELS = {"given": Level.of(known=True), "not given": Level((1.0,), (0.5,))}
+LEVELS = {"given": Level.given(), "not given": Level((1.0,), (0.5,), known=False)}
 
 
 def exact(level, z, basis):
@@ -58,7 +58,7 @@ def test_the_level_of_the_test_is_what_it_says(setting):
     """The value exceeded with 5 % and 1 %, found by importance sampling, in noise drawn apart."""
     residuals = setting.frame.residuals
     field = Field.of(setting.candidates, groups(setting))
-    evidence = Evidence(Level.of(known=True), residuals.redundancy)
+    evidence = Evidence(Level.given(), residuals.redundancy)
     chance = Chance(np.random.SeedSequence(1), len(residuals.design))
     by_chance = detect(field, evidence, residuals, chance).by_chance
     assert np.mean(by_chance.weights) == pytest.approx(1.0, abs=0.1)
@@ -92,7 +92,7 @@ def test_noise_is_not_noise_with_an_effect(setting):
 def test_a_pair_is_worth_the_space_of_both(setting):
     """Of two candidates with one shape each the density is that of their joint space."""
     residuals = setting.frame.residuals
-    evidence = Evidence(Level.of(known=False), residuals.redundancy)
+    evidence = Evidence(Level.unknown(), residuals.redundancy)
     names = [n for n, s in setting.candidates.items() if len(s) == 1][:3]
     found = all_pairs({n: setting.candidates[n] for n in names}, residuals, evidence)
     assert found
@@ -114,7 +114,7 @@ def test_axes_are_weighted_as_far_as_the_data_say(approach):
             noise = Noise(sigma_angle=1e-6, effects=effects)
             residuals = design(shuffled("fibonacci-60"), approach, noise=noise, seed=seed)
             residuals = residuals.frame.residuals
-            evidence = Evidence(Level.of(known=False), residuals.redundancy)
+            evidence = Evidence(Level.unknown(), residuals.redundancy)
             axes = UnequalAxes.of(residuals, evidence, None)
             odds[effect].append(axes.log_evidence)
             assert np.prod(axes.ratios) == pytest.approx(1.0)
@@ -127,7 +127,7 @@ def test_axes_are_weighted_as_far_as_the_data_say(approach):
 def test_what_the_holds_show_of_the_axes_counts_where_residuals_say_little():
     """With equal residuals the ratios within the holds are believed by half or so."""
     residuals = design(shuffled("mclaren-24"), GRAVITY, seed=3).frame.residuals
-    evidence = Evidence(Level.of(known=False), residuals.redundancy)
+    evidence = Evidence(Level.unknown(), residuals.redundancy)
     alone = UnequalAxes.of(residuals, evidence, None).ratios
     shown = UnequalAxes.of(residuals, evidence, np.array([1.0, 1.0, 4.0])).ratios
     assert alone[2] / np.mean(alone[:2]) < shown[2] / np.mean(shown[:2]) < 5

@@ -25,6 +25,7 @@ from accelstudy.diagnosis.evidence import noise as noises
 from accelstudy.diagnosis.evidence.chance import SIMULATIONS
 from accelstudy.diagnosis.evidence.detection import Detection
 from accelstudy.diagnosis.evidence.noise import NoiseTest
+from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Setting
 from accelstudy.diagnosis.space.location import LACK_OF_FIT, locate
 from accelstudy.diagnosis.space.residuals import Residuals
@@ -41,6 +42,8 @@ from accelstudy.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
+BEYOND_WHITE = 5.0
+"""Ratio of variances up to which white noise within the holds may explain the scatter of means."""
 LEVEL_EFFECTS = 0.035
 """Level of the test for anything that is missing."""
 LEVEL_NOISE = 0.01
@@ -228,17 +231,40 @@ class _Run:
                 least = max(1e-9, least_sigma(campaign, self.approach))
                 sigma = max(fit.sigma_position, least)
                 campaign = replace(campaign, sigma_force=sigma, slope=None, sd_slope=None)
-        return solve(fit.model, fit.approach, fit.observed, fit.adjustment)
+        fitted = solve(fit.model, fit.approach, fit.observed, fit.adjustment)
+        if self.sigma_known or not self.is_white(fit.sigma_position_posteriori):
+            return fitted
+        assert self.white is not None
+        observed = replace(fit.observed, sigma_force=float(np.sqrt(np.mean(self.white))))
+        return solve(fit.model, fit.approach, observed)
+
+    @property
+    def noise_level(self) -> Level:
+        """What is known of the noise of a position mean."""
+        if self.sigma_known:
+            return Level.given()
+        sigma = self.first.variances[:, :3].mean()
+        supposed = self.white is not None and np.isclose(sigma, np.mean(self.white))
+        return Level.within_holds() if supposed else Level.unknown()
+
+    def is_white(self, sigma: float) -> bool:
+        """Whether white noise within the holds may explain a scatter of the means."""
+        least = least_sigma(self.campaign, self.approach)
+        if self.white is None or np.mean(self.white) <= least**2:
+            return False
+        return bool(1 / BEYOND_WHITE < sigma**2 / np.mean(self.white) < BEYOND_WHITE)
 
     @cached_property
     def search(self) -> Search:
-        return Search(self.first, self.stage(0), self.sigma_known, self.within)
+        return Search(self.first, self.stage(0), self.noise_level, self.white)
 
-    @property
-    def within(self) -> Array | None:
-        """Variances of the axes within the holds."""
-        sd = self.campaign.sd
-        return None if sd is None else np.mean(sd**2, axis=0)
+    @cached_property
+    def white(self) -> Array | None:
+        """Variances of position means, (3,), if white noise within the holds is all there is."""
+        sd, n = self.campaign.sd, self.campaign.n_samples
+        if sd is None or n is None or not np.all(sd > 0):
+            return None
+        return np.asarray(np.mean(sd**2 / n[:, None], axis=0))
 
     # --- the decision ---------------------------------------------------------------------------
 

@@ -6,16 +6,14 @@ bumped position. The probability that a given sigma is wrong is with the level (
 
 TWO = 0.06
 """Two effects are missing: where a model was chosen with care that is rare."""
-UNKNOWN = 0.04
+UNKNOWN = 0.02
 """Something is missing that is no effect of the catalogue, which has what is usual."""
-COLOUR = 0.1
+COLOUR = 0.06
 """Nothing is missing but the noise has some colour, as all real noise has."""
 AXES = 0.03
 """Nothing is missing but the axes differ in noise."""
-TAILS = 0.03
+TAILS = 0.02
 """Nothing is missing but large errors are more frequent than in a normal distribution."""
-STEPS = 0.05
-"""Nothing is missing but the readings are coarse."""
 
 SURE = 0.7
 """Posterior probability from which on one name is given: a wrong name costs 7, a name that is

@@ -57,13 +57,13 @@ class Search:
     ----------
     first : Solution, with equal axes
     seed : SeedSequence, of the residuals without any effect
-    known : bool, whether sigma is given
+    level : Level, what is known of sigma
     within : (3,) array, variances of the axes within the holds; None if unknown
     """
 
     first: Solution
     seed: np.random.SeedSequence
-    known: bool
+    level: Level
     within: Array | None = None
 
     @cached_property
@@ -80,7 +80,7 @@ class Search:
     @cached_property
     def evidence(self) -> Evidence:
         """The evidence of hypotheses in the residual space."""
-        return Evidence(Level.of(self.known), self.residuals.redundancy)
+        return Evidence(self.level, self.residuals.redundancy)
 
     # --- the fit --------------------------------------------------------------------------------
 
@@ -93,7 +93,7 @@ class Search:
     def axes(self) -> UnequalAxes:
         """How probable it is that the axes differ in noise, by the fit with equal ones."""
         residuals = self.equal.frame.residuals
-        evidence = Evidence(Level.of(self.known), residuals.redundancy)
+        evidence = Evidence(self.level, residuals.redundancy)
         return UnequalAxes.of(residuals, evidence, self.within)
 
     @cached_property
@@ -107,7 +107,7 @@ class Search:
             return self.equal
         residuals = self.equal.frame.residuals
         field = Field.of(self.equal.candidates, {})
-        evidence = Evidence(Level.of(self.known), residuals.redundancy)
+        evidence = Evidence(self.level, residuals.redundancy)
         z, best = residuals.z, 0.0
         if field.names:
             nothing = np.logaddexp.reduce(evidence.of_noise(z @ z))
@@ -276,8 +276,10 @@ class Search:
             noises.AXES: nothing + unequal,
             noises.TAILS: nothing + np.log(priors.TAILS) + noises.most_evidence(tails.p_value),
         }
-        if self.known:
-            known[noises.LEVEL] = float(by_level[1])
+        if len(by_level) > 1:
+            # More noise than within the holds is an offset from hold to hold.
+            name = noises.LEVEL if self.level.known else noises.COLOUR
+            known[name] = np.logaddexp(known.get(name, -np.inf), by_level[1])
         return [Weighed((name,), ((name,),), float(log)) for name, log in known.items()]
 
     def chooses(self, names: Sequence[Sequence[str]]) -> bool:

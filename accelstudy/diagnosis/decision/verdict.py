@@ -181,7 +181,7 @@ def _refitted(search: Search, one: Weighed) -> tuple[Weighed, Solution | None]:
 
 def _beside(search: Search, alone: Weighed, solution: Solution) -> list[Weighed]:
     """One effect with another one, or with something unknown, in what its refit leaves."""
-    inner = Search(solution, search.seed, search.known, search.within)
+    inner = Search(solution, search.seed, search.level, search.within)
     z, field = inner.residuals.z, inner.field
     nothing = float(np.logaddexp.reduce(inner.evidence.of_noise(z @ z)))
     logs = field.densities(inner.evidence, z) - nothing + alone.log_weight
@@ -202,7 +202,7 @@ def _beside(search: Search, alone: Weighed, solution: Solution) -> list[Weighed]
 
 def _misfit(search: Search, solution: Solution) -> float:
     """By how much residuals are still larger than a sigma that holds; 0 if they are not."""
-    if not search.known or _refuted_by_repeats(search):
+    if not search.level.known or _refuted_by_repeats(search):
         return 0.0
     p = float(special.chdtrc(solution.redundancy, solution.omega))
     ratio = float(np.sqrt(solution.omega / solution.redundancy))

@@ -29,7 +29,7 @@ SIZE_WEIGHTS = np.where(SIZES < 1500, 0.9 / 6, 0.1 / 7)
 """Prior of λ: even on a scale of logarithms from what is hardly seen (4) to what is plain (1000).
 Beyond that an effect would have been noticed without any test: one tenth."""
 
-DOUBT = 0.2
+DOUBT = 0.15
 """Prior probability that a sigma that is given is wrong."""
 AS_GIVEN = 200.0
 """ν of a sigma that is right: people know it to 5 %."""
@@ -37,6 +37,9 @@ DOUBTED = 3.0
 """ν of one that is wrong: anything from half to twice is usual then."""
 NOT_GIVEN = 1e-3
 """ν of one that is not given: its size says nothing."""
+MORE_THAN_WITHIN = 0.5
+"""Prior probability that means scatter more than white noise within the holds explains, where the
+holds alone say how large the noise is."""
 
 _LOGS = np.concatenate([np.linspace(0.0, 60.0, 241), np.geomspace(61.0, 1e5, 120)])
 """Where the integral over λ is tabulated: −(ν + r)/2 · log(1 − x), x = ‖Qᵀz‖²/(ν + ‖z‖²)."""
@@ -49,17 +52,28 @@ class Level:
     Attributes
     ----------
     weights, freedoms : (c,) tuples of float, prior probabilities, and ν of each
+    known : bool, whether sigma is given
     """
 
     weights: tuple[float, ...]
     freedoms: tuple[float, ...]
+    known: bool
 
     @classmethod
-    def of(cls, known: bool) -> Level:
-        """Of a sigma that is given, or of one that is not."""
-        if known:
-            return cls((1 - DOUBT, DOUBT), (AS_GIVEN, DOUBTED))
-        return cls((1.0,), (NOT_GIVEN,))
+    def given(cls) -> Level:
+        """Of a sigma that is given."""
+        return cls((1 - DOUBT, DOUBT), (AS_GIVEN, DOUBTED), known=True)
+
+    @classmethod
+    def within_holds(cls) -> Level:
+        """Of a sigma that is not given, where the noise within the holds may be all there is."""
+        more = MORE_THAN_WITHIN
+        return cls((1 - more, more), (AS_GIVEN, DOUBTED), known=False)
+
+    @classmethod
+    def unknown(cls) -> Level:
+        """Of a sigma of which nothing is known."""
+        return cls((1.0,), (NOT_GIVEN,), known=False)
 
 
 @dataclass(frozen=True)

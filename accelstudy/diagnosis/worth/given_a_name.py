@@ -107,7 +107,7 @@ def _on_the_part(
     taken = np.linalg.solve(a.T @ a, a.T)
     left = own - (own @ taken.T) @ a.T
     variance = np.sum(left**2, axis=1) / (len(rows) - a.shape[1])
-    if part.known:
+    if part.level.known:
         variance = np.ones(len(noise))
     missed = beside - (own @ taken.T) @ b.T
     values = np.zeros(len(noise))

@@ -81,7 +81,7 @@ def held_out(
         base = solve(first.model, first.approach, first.observed.take(fitted))
     except (InputError, np.linalg.LinAlgError):
         return HeldOut(None, "the fitted positions do not determine the model")
-    part = Search(base, seeds[2], search.known, search.within)
+    part = Search(base, seeds[2], search.level, search.within)
     chosen, others = _chosen_alike(part, finding)
     refit = _refit(part, chosen)
     if isinstance(refit, str):
@@ -131,7 +131,7 @@ def _refit(part: Search, chosen: Sequence[Choice]) -> Solution | str:
 def _is_the_name(part: Search, finding: Finding, refit: Solution, rest: Observations) -> bool:
     """Whether held-out positions by themselves prefer a name to the other explanations."""
     assert finding.posterior is not None
-    variance = 1.0 if part.known else part.residuals.variance
+    variance = 1.0 if part.level.known else part.residuals.variance
     logs = [_prediction(refit, rest, variance)]
     for one in finding.posterior.all[1 : BESIDE + 1]:
         if one.best and all(h.effect is not None for h in one.best):
