@@ -83,10 +83,11 @@ def test_wrong_names_are_rarer_than_the_posterior_says():
     """Of single effects at random in six designs.
 
     A name is wrong with the probability 1 − posterior, of which the sum is what is expected of all
-    names together; and of the campaigns less than 3 % get a wrong name.
+    names together; and of the campaigns less than 3 % get a wrong name. A credible set lacks the
+    truth in one of ten.
     """
     campaigns = [
-        (*case, size, 100 + k) for k, case in enumerate((CASES * 4)[:20]) for size in SIZES
+        (*case, size, 100 + k) for k, case in enumerate((CASES * 3)[:16]) for size in SIZES
     ]
     outcomes, doubts = Counter(), []
     for design, approach, size, seed in campaigns:
@@ -97,34 +98,41 @@ def test_wrong_names_are_rarer_than_the_posterior_says():
             doubts.append(1 - found.found[0].posterior)
             outcome = "right" if named_right(found, classes) else "wrong"
         outcomes[outcome] += 1
-        outcomes["confirmed wrong"] += outcome == "wrong" and found.gap.confirmed
-        outcomes["plain and right"] += outcome == "right" and size > 20
+        outcomes["confirmed wrong"] += outcome == "wrong" and found.gap.statement == "name"
+        best = outcome == "right" or (outcome == "narrowed" and named_right(found, classes))
+        outcomes["plain and right"] += best and size > 20
+        if found.credible_set:
+            outcomes["sets"] += 1
+            outcomes["without the truth"] += not any(
+                len(one.names) == 1 and one.names[0] in classes[0] for one in found.credible_set
+            )
     n = len(campaigns)
     assert max(doubts) <= 1 - SURE
     expected, spread = sum(doubts), np.sqrt(sum(d * (1 - d) for d in doubts))
     assert outcomes["wrong"] <= expected + 3.1 * spread
     assert outcomes["wrong"] <= most(n, 0.03, RARE)
     assert outcomes["confirmed wrong"] <= most(n, 0.03, RARE)
+    assert outcomes["without the truth"] <= most(outcomes["sets"], 0.1, RARE)
     assert outcomes["no_effect"] <= n / 3
     # It is no use to be always in doubt: most of what is plain has its name.
-    assert outcomes["plain and right"] > 0.6 * 2 / 3 * n
+    assert outcomes["plain and right"] > 0.7 * 2 / 3 * n
 
 
 def test_odd_noise_is_no_effect():
     odd = ("heavy_tails(nu=4)", "coloured_noise", "coloured_noise(tau=60)", "axis_noise(kappa_z=4)")
-    noises = odd * 15
+    noises = odd * 8
     named = 0
     for k, noise in enumerate(noises):
         design, approach = CASES[(k // len(odd)) % len(CASES)]
         keys = {**DESIGNS[design], "approach": approach, "seed": 500 + k}
         measured, _ = simulate_campaign(CampaignSettings(**keys, noise_effects=(noise,)))
-        named += diagnose(measured, NINE).verdict == "named"
+        named += diagnose(measured, NINE).verdict in ("named", "narrowed")
     assert named <= most(len(noises), 0.05, RARE)
 
 
 def test_of_two_effects_both_names_are_right_or_none_is_given():
     """A name too few is a name that is right; a wrong one is as rare as among single effects."""
-    runs, wrong, both = 12, 0, 0
+    runs, wrong, both = 9, 0, 0
     for k in range(runs):
         design, approach = ("full", "robot") if k % 3 else ("full", "gravity")
         measured, classes = hidden(design, approach, 80.0, 900 + k, count=2)
@@ -157,7 +165,7 @@ def outside(kind, size, seed, approach):
 @pytest.mark.parametrize("kind", ["steps times sign", "fifth harmonic"])
 def test_what_the_catalogue_lacks_gets_no_name_of_it(kind):
     """Named as an effect it is at most as often as the posterior admits to be wrong."""
-    runs, named = 20, 0
+    runs, named = 12, 0
     for k in range(runs):
         approach = ("robot", "gravity")[k % 2]
         found = diagnose(outside(kind, 1000.0, 700 + k, approach), NINE)

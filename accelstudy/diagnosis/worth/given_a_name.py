@@ -19,6 +19,7 @@ from accelstudy.diagnosis.decision.search import Search
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis
 from accelstudy.diagnosis.worth.gap import SIGNIFICANT
+from accelstudy.diagnosis.worth.linear import LinearSplit
 
 Array = NDArray[np.float64]
 
@@ -29,19 +30,14 @@ LEVEL = 0.05
 
 
 def needed_z(
-    search: Search,
-    part: Search,
-    fitted: NDArray[np.int_],
-    held: NDArray[np.int_],
-    level: float,
-    rng: np.random.Generator,
+    search: Search, part: Search, split: LinearSplit, level: float, rng: np.random.Generator
 ) -> float:
     """Value that the statistic exceeds with 5 %, if nothing is missing and a name was given.
 
     Parameters
     ----------
     search, part : Search, of all positions and of the fitted ones
-    fitted, held : (f,) and (h,) int arrays, positions
+    split : LinearSplit
     level : float, of the test that found something
     rng : Generator
     """
@@ -59,7 +55,7 @@ def needed_z(
     if not len(found):
         return SIGNIFICANT
     weights = np.exp(-field.proposal(parts[found]))
-    chosen, values = _on_the_part(search, part, fitted, held, noise[found], rng)
+    chosen, values = _on_the_part(part, split, noise[found], rng)
     confirmed = np.array([label.get(name, -2) for name in chosen]) == top[found]
     order = np.argsort(-values)
     rate = np.cumsum(np.where(confirmed, weights, 0.0)[order]) / weights.sum()
@@ -87,41 +83,24 @@ def _named(logs: Array, labels: list[int]) -> tuple[NDArray[np.bool_], NDArray[n
 
 
 def _on_the_part(
-    search: Search,
-    part: Search,
-    fitted: NDArray[np.int_],
-    held: NDArray[np.int_],
-    noise: Array,
-    rng: np.random.Generator,
+    part: Search, split: LinearSplit, noise: Array, rng: np.random.Generator
 ) -> tuple[list[str], Array]:
     """What the fitted positions choose of noise (b, m), and the held-out statistic, (b,)."""
-    positions = search.residuals.positions
-    n, c = positions.whitening.shape[:2]
-    rows = np.concatenate([_rows(fitted, c), np.arange(n * c, len(positions.design))])
-    rest = _rows(held, c)
-    own, beside = noise[:, rows], noise[:, rest]
+    own = noise[:, split.rows[0]]
     slopes = rng.standard_normal((len(noise), part.residuals.slopes))
-    z = part.residuals.project(np.concatenate([own, slopes], axis=1).T).T
-    choices = _choices(part, z)
-    a, b = positions.design[rows], positions.design[rest]
-    taken = np.linalg.solve(a.T @ a, a.T)
-    left = own - (own @ taken.T) @ a.T
-    variance = np.sum(left**2, axis=1) / (len(rows) - a.shape[1])
-    if part.level.known:
-        variance = np.ones(len(noise))
-    missed = beside - (own @ taken.T) @ b.T
+    choices = _choices(part, part.residuals.project(np.concatenate([own, slopes], axis=1).T).T)
+    left, missed = split.beside(noise)
+    variance = np.ones(len(noise))
+    if not part.level.known:
+        variance = np.sum(left**2, axis=1) / (own.shape[1] - len(split.cofactors))
     values = np.zeros(len(noise))
-    for spec in {h.spec: h for h in choices}.values():
-        some = np.array([h.spec == spec.spec for h in choices])
-        if spec.effect is None:
+    for chosen in {h.spec: h for h in choices}.values():
+        if chosen.effect is None:
             continue
-        frame = search.setting.frame
-        shown = positions.whitened(frame.signature(spec.effect))
-        shown = (shown @ spec.directions)[: len(positions.design)]
-        fit = np.linalg.pinv(shown[rows] - a @ (taken @ shown[rows]))
-        change = (left[some] @ fit.T) @ (shown[rest] - b @ (taken @ shown[rows])).T
-        slope = change @ b
-        size = np.sum(change**2, axis=1) + np.sum((slope @ np.linalg.inv(a.T @ a)) * slope, axis=1)
+        some = np.array([h.spec == chosen.spec for h in choices])
+        change = split.corrections(chosen, left[some])
+        slope = change @ split.designs[1]
+        size = np.sum(change**2, axis=1) + np.sum((slope @ split.cofactors) * slope, axis=1)
         scale = np.sqrt(size * variance[some])
         values[some] = np.sum(change * missed[some], axis=1) / scale
     return [h.name for h in choices], values
@@ -141,8 +120,3 @@ def _choices(part: Search, z: Array) -> list[Hypothesis]:
         place = int(np.argmax(own[field.starts[k] : ends[k]]))
         found.append(part.setting.candidates[field.names[k]][place])
     return found
-
-
-def _rows(positions: NDArray[np.int_], c: int) -> NDArray[np.int_]:
-    """Rows of the conditions of positions."""
-    return (positions[:, None] * c + np.arange(c)).ravel()

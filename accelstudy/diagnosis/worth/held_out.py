@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.adjustment import Observations
 from accelstudy.adjustment.quality import Solution, solve
 from accelstudy.diagnosis.decision.priors import SURE
 from accelstudy.diagnosis.decision.search import Search
@@ -16,11 +15,11 @@ from accelstudy.diagnosis.decision.verdict import Choice, Finding
 from accelstudy.diagnosis.worth.gap import (
     HELD_OUT,
     HeldOutGap,
-    Prediction,
     held_out_gap,
     split_positions,
 )
 from accelstudy.diagnosis.worth.given_a_name import needed_z
+from accelstudy.diagnosis.worth.linear import LinearSplit
 from accelstudy.errors import InputError
 
 Array = NDArray[np.float64]
@@ -91,10 +90,12 @@ def held_out(
     if others:
         return HeldOut(gap, "the fitted positions alone would have chosen another effect")
     rng = np.random.default_rng(seeds[3])
-    gap = replace(gap, needed=needed_z(search, part, fitted, held, level, rng))
+    split = LinearSplit(frame, fitted, held)
+    gap = replace(gap, needed=needed_z(search, part, split, level, rng))
     if not gap.significant:
         return HeldOut(gap, "")
-    sure = finding.verdict == "named" and _is_the_name(part, finding, refit, rest)
+    alone = finding.verdict == "named" and len(finding.chosen) == 1
+    sure = alone and _is_the_name(search, part, finding, split)
     return HeldOut(gap, "", "name" if sure else "effect")
 
 
@@ -128,21 +129,15 @@ def _refit(part: Search, chosen: Sequence[Choice]) -> Solution | str:
     return "the fit to the fitted positions alone has no solution" if fit is None else fit[1]
 
 
-def _is_the_name(part: Search, finding: Finding, refit: Solution, rest: Observations) -> bool:
+def _is_the_name(search: Search, part: Search, finding: Finding, split: LinearSplit) -> bool:
     """Whether held-out positions by themselves prefer a name to the other explanations."""
     assert finding.posterior is not None
+    left, missed = split.beside(search.residuals.errors[None])
     variance = 1.0 if part.level.known else part.residuals.variance
-    logs = [_prediction(refit, rest, variance)]
-    for one in finding.posterior.all[1 : BESIDE + 1]:
-        if one.best and all(h.effect is not None for h in one.best):
-            chosen = [Choice(h, m, 0.0) for h, m in zip(one.best, one.classes, strict=True)]
-            other = _refit(part, chosen)
-            if not isinstance(other, str):
-                logs.append(_prediction(other, rest, variance))
+    logs = []
+    for one in finding.posterior.all[: BESIDE + 1]:
+        if len(one.best) == 1 and one.best[0].effect is not None:
+            rest = missed - split.corrections(one.best[0], left)
+            logs.append(-float(np.sum(rest**2)) / (2 * variance))
     weights = np.exp(np.array(logs) - max(logs))
     return bool(weights[0] >= SURE * weights.sum())
-
-
-def _prediction(fit: Solution, rest: Observations, variance: float) -> float:
-    """Log density of held-out misclosures as a fit predicts them, up to a constant."""
-    return -float(np.sum(Prediction.of(fit, rest).white ** 2)) / (2 * variance)
