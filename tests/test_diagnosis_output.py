@@ -60,7 +60,7 @@ CASES = {
         "temperature_order": "random",
     },
     "noise_model": {"noise_effects": ("noise_level(kappa=4)",)},
-    "gross_error": {"gross_errors": ("row_order(first=3, second=9)",)},
+    "gross_error": {"gross_errors": ("axis_error(x=2, y=1, z=3)", "row_order(first=3, second=9)")},
 }
 HEADLINES = {
     "named": "The model lacks thermal bias.",
@@ -131,6 +131,10 @@ def test_every_verdict_is_written_and_told(written, case):
     if case in ("named", "gravity"):
         assert {"gap", "loop", "location"} <= drawn
         assert "on data that were not used?" in text_of(page)
+    if case == "gross_error":
+        assert [effect["name"] for effect in content["effects"]] == ["axis_error", "row_order"]
+        assert "The forces of positions 3, 9 are exchanged. The data were mended" in text_of(page)
+        assert "It concerns the noise" not in page
     if case == "clipped":  # readings without an inverse cannot be simulated again
         assert "loop" not in drawn
     if case == "gravity":

@@ -275,6 +275,8 @@ def test_several_gross_errors_are_undone_together(designs):
     found = recognise(wrong, ROBOT)
     assert {name for name, _ in found.named} == set(gross_error_names())
     assert ("outlier_position", 21) in found.named
+    assert found.reasons["unit_error"] == "the forces are in g"
+    assert found.reason.count(";") == len(found.reasons) - 1
     np.testing.assert_allclose(found.mended.forces, np.delete(right.forces, 20, axis=0), atol=0.06)
     mended = np.delete(wrong.forces, 20, axis=0) @ found.conversion.T
     np.testing.assert_allclose(np.sort(mended, axis=0), np.sort(found.mended.forces, axis=0))

@@ -63,9 +63,17 @@ class Recognised:
         return self.errors[0][0]
 
     @property
+    def reasons(self) -> dict[str, str]:
+        """What is wrong, in words, by what it is called."""
+        found: dict[str, list[str]] = {}
+        for name, mending in self.errors:
+            found.setdefault(name, []).append(mending.reason)
+        return {name: "; ".join(reasons) for name, reasons in found.items()}
+
+    @property
     def reason(self) -> str:
-        """What is wrong, in words."""
-        return "; ".join(mending.reason for _, mending in self.errors)
+        """All that is wrong, in words."""
+        return "; ".join(self.reasons.values())
 
     @property
     def mended(self) -> Campaign:
