@@ -300,11 +300,11 @@ class SensorTrace:
         """
         hold = hold or Hold()
         columns = [
-            hold.column(name) if str(symbol) in function.used else 0.0
+            hold.column(name) if symbol in function.used else 0.0
             for name, symbol in self.hold.items()
         ]
         columns += [
-            hold.lagged(tau) if str(symbol) in function.used else 0.0
+            hold.lagged(tau) if symbol in function.used else 0.0
             for tau, symbol in zip(self.lags(settings), self.lagged.values(), strict=True)
         ]
         shape = np.broadcast_shapes(force.shape[1:], (*parameters.shape[1:], 1), (*g.shape, 1))

@@ -49,13 +49,14 @@ def inverse(matrix: sp.Matrix) -> sp.Matrix:
     """Inverse of a 3 × 3 matrix.
 
     It is formed of placeholders, since SymPy would expand the products of the entries: seconds for
-    a full matrix, and nothing that the elimination of common subexpressions would not find.
+    a full matrix, and nothing that the elimination of common subexpressions would not find. That
+    they have a determinant needs no proof, for which `inv` takes longer than for all else.
     """
     if matrix.is_diagonal():
         return sp.diag(*(1 / matrix[i, i] for i in range(3)))
     place = sp.Matrix(3, 3, lambda i, j: sp.Dummy() if matrix[i, j] != 0 else 0)
     entries = {place[i, j]: matrix[i, j] for i in range(3) for j in range(3) if place[i, j] != 0}
-    return place.inv(method="ADJ").xreplace(entries)
+    return (place.adjugate() / place.det(method="berkowitz")).xreplace(entries)
 
 
 @dataclass(frozen=True)
@@ -85,9 +86,9 @@ class TracedFunction:
         return function
 
     @cached_property
-    def used(self) -> frozenset[str]:
-        """Names of the arguments on which the result depends."""
-        return frozenset(str(symbol) for symbol in self.expressions.free_symbols)
+    def used(self) -> frozenset[sp.Basic]:
+        """Arguments on which the result depends."""
+        return frozenset(self.expressions.free_symbols)
 
     def __call__(self, shape: tuple[int, ...], *arguments: Any) -> NDArray[np.float64]:
         """Evaluate at arrays that broadcast to `shape`; returns an array (rows, columns, *shape).

@@ -158,7 +158,7 @@ class CalibrationEquations:
         if self.angles:
             b = sp.Matrix.hstack(b, derivative(psi, self.angles))
         at = dict(zip(force, trace.t_matrix * sp.Matrix(trace.force), strict=True))
-        return sp.Matrix.hstack(psi, a, b).subs(at, simultaneous=True)
+        return sp.Matrix.hstack(psi, a, b).xreplace(at)
 
     def _in_output(self, told: sp.Matrix) -> sp.Matrix:
         trace, h = self.trace, sp.Matrix(self.trace.h)
