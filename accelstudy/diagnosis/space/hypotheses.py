@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import takewhile
 from typing import TypeAlias, overload
 
 import numpy as np
@@ -11,9 +12,9 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import Solution, root_of
 from accelstudy.diagnosis.space.residuals import Residuals, ideal_residuals, position_products
-from accelstudy.diagnosis.space.signatures import Signature, signature
+from accelstudy.diagnosis.space.signatures import Moments, Signature, signatures
 from accelstudy.diagnosis.space.slopes import Slopes
-from accelstudy.diagnosis.space.spaces import VISIBLE, Bases, span
+from accelstudy.diagnosis.space.spaces import VISIBLE, Bases, spans
 from accelstudy.effects import Effect, Hold, effect_names, get_effect
 from accelstudy.errors import InputError
 from accelstudy.leveling import roll_pitch
@@ -22,6 +23,8 @@ Array = NDArray[np.float64]
 
 ROUNDING = 1e-9
 """Share of a signature that may be left of nothing by rounding."""
+AT_ONCE = 10_000_000
+"""Numbers that are worked on at once, about."""
 ALIKE = 0.9999
 """Canonical cosine above which two signatures are the same."""
 
@@ -197,7 +200,7 @@ class Frame:
     forces : (n, 3) array, m/s², of the ideal sensor
     sensed : (n, 3) array, m/s², the same along the sensitive axes as the base fit finds them
     angles : (n, 2) array, rad, attitude as it is read or, without a robot, as the forces say
-    hold : Hold, with what is implied filled in
+    moments : Moments, of the holds with what is implied filled in
     """
 
     solution: Solution
@@ -206,7 +209,12 @@ class Frame:
     forces: Array
     sensed: Array
     angles: Array
-    hold: Hold
+    moments: Moments
+
+    @property
+    def hold(self) -> Hold:
+        """The holds with what is implied filled in."""
+        return self.moments.hold
 
     @classmethod
     def of(cls, solution: Solution) -> Frame:
@@ -225,14 +233,18 @@ class Frame:
             forces=forces,
             sensed=np.asarray(np.linalg.solve(t, forces.T).T),
             angles=angles,
-            hold=implied_hold(solution, angles),
+            moments=Moments(implied_hold(solution, angles)),
         )
         return frame.with_slopes()
 
-    def signature(self, effect: Effect, ideal: bool = False) -> Signature:
-        """Signature of an effect of the sensor, or of an ideal one."""
+    def signature(self, effect: Effect) -> Signature:
+        """Signature of an effect of the sensor."""
+        return self.signatures((effect,))
+
+    def signatures(self, shapes: Sequence[Effect], ideal: bool = False) -> Signature:
+        """Signatures of shapes of an effect of the sensor, or of an ideal one, side by side."""
         forces = self.forces if ideal else self.sensed
-        return signature(effect, forces, self.angles, self.solution.gravity, self.hold)
+        return signatures(shapes, forces, self.angles, self.solution.gravity, self.moments)
 
     def with_slopes(self) -> Frame:
         """Add the slopes within the holds, as far as they add to what the means say."""
@@ -253,47 +265,51 @@ class Frame:
         """Signatures of the effects beside the model that change the output within a hold."""
         known = {effect.name for effect in self.solution.model.effects}
         for name in effect_names():
+            if name in known:
+                continue
             try:
                 shapes = get_effect(name).candidates(self.hold, self.forces, self.solution.gravity)
-                for shape in () if name in known else shapes:
-                    shown = self.signature(shape)
-                    if not shown.rate.any():
-                        break
-                    yield shown
+                shown = self.signatures(shapes).split(len(shapes)) if shapes else []
             except InputError:  # a column is absent
                 continue
+            yield from takewhile(lambda one: bool(one.rate.any()), shown)
 
-    def hypothesis(self, effect: Effect) -> Hypothesis | None:
-        """Return what an effect would leave in the residuals; None if nothing."""
-        g = self.solution.gravity
-        shown = self.signature(effect, ideal=True)
+    def hypotheses(self, shapes: Sequence[Effect]) -> list[Hypothesis | None]:
+        """Return what shapes of an effect would leave in the residuals; None for nothing."""
+
+        def of_each(columns: Array) -> Array:
+            """Columns (m, s k) of all shapes as those of each, (s, m, k)."""
+            return np.moveaxis(columns.reshape(len(columns), len(shapes), -1), 1, 0)
+
+        shown = self.signatures(shapes, ideal=True)
         # A fit is made to the means, so they have to show the effect.
         means = self.ideal.positions
-        projected = means.project(means.whitened(shown))
-        directions, ideal = span(projected, means.size(shown, g), VISIBLE)
-        if not directions.shape[1]:
-            return None
+        projected = of_each(means.project(means.whitened(shown)))
+        sizes = means.size(shown, self.solution.gravity).reshape(len(shapes), -1)
+        directions, ideal, seen = spans(projected, sizes, VISIBLE)
         if self.ideal.slopes:
-            projected = self.ideal.project(self.ideal.whitened(shown))
-            ideal = span(projected @ directions, None, ROUNDING)[1]
-        actual = self.signature(effect).reduced(directions)
-        columns = self.residuals.project(self.residuals.whitened(actual))
+            projected = of_each(self.ideal.project(self.ideal.whitened(shown)))
+            ideal = spans(projected @ directions, None, ROUNDING)[1]
+        columns = of_each(self.residuals.project(self.residuals.whitened(self.signatures(shapes))))
         # A force that passes a knee at the ideal sensor may not do so along the real axes.
-        sizes = np.linalg.norm(projected @ directions, axis=0)
-        also, basis = span(columns, sizes, ROUNDING)
-        if also.shape[1] < directions.shape[1]:
-            if not also.shape[1]:
-                return None
-            directions = directions @ also
-            ideal = span(projected @ directions, None, ROUNDING)[1]
-        return Hypothesis(
-            name=effect.name,
-            spec=effect.spec,
-            effect=effect,
-            directions=directions,
-            basis=basis,
-            ideal=ideal,
-        )
+        sizes = np.linalg.norm(projected @ directions, axis=1)
+        also, basis, rank = spans(columns @ directions, sizes, ROUNDING)
+        for i in np.flatnonzero(rank < seen):
+            directions[i] = directions[i] @ also[i]
+            ideal[i] = spans((projected[i] @ directions[i])[None], None, ROUNDING)[1][0]
+        return [
+            Hypothesis(
+                name=effect.name,
+                spec=effect.spec,
+                effect=effect,
+                directions=directions[i, :, : rank[i]],
+                basis=basis[i, :, : rank[i]],
+                ideal=ideal[i, :, : rank[i]],
+            )
+            if rank[i]
+            else None
+            for i, effect in enumerate(shapes)
+        ]
 
 
 @dataclass(frozen=True)
@@ -315,7 +331,7 @@ class Setting:
 
     def hypothesis(self, effect: Effect) -> Hypothesis | None:
         """Return what an effect would leave in the residuals; None if nothing."""
-        return self.frame.hypothesis(effect)
+        return self.frame.hypotheses((effect,))[0]
 
     def nearest(self, hypothesis: Hypothesis) -> tuple[tuple[str, float], ...]:
         """Other effects and their largest canonical cosines, nearest first."""
@@ -356,10 +372,10 @@ def setting_of(solution: Solution, names: Iterable[str] | None = None) -> Settin
         if name in known:
             continue
         try:
-            shapes = [
-                frame.hypothesis(effect)
-                for effect in get_effect(name).candidates(hold, forces, solution.gravity)
-            ]
+            effects = get_effect(name).candidates(hold, forces, solution.gravity)
+            size = max(1, AT_ONCE // residuals.design.size)
+            parts = [effects[i : i + size] for i in range(0, len(effects), size)]
+            shapes = [shape for part in parts for shape in frame.hypotheses(part)]
         except InputError as error:
             untestable[name] = str(error)
             continue

@@ -11,7 +11,7 @@ from accelstudy.diagnosis.evidence.chance import Chance
 from accelstudy.diagnosis.space.hypotheses import Frame, Setting
 from accelstudy.diagnosis.space.repeats import clusters
 from accelstudy.diagnosis.space.residuals import Residuals
-from accelstudy.diagnosis.space.signatures import Moment, Signature, rate_of, signature
+from accelstudy.diagnosis.space.signatures import Moment, Signature, rate_of
 from accelstudy.diagnosis.space.spaces import (
     ABSORBED,
     Bases,
@@ -110,15 +110,12 @@ def _signatures(frame: Frame) -> dict[str, list[Signature]]:
             continue
         if effect.group == ROBOT and not frame.solution.approach.uses_angles:
             continue
-        g = frame.solution.gravity
+        shapes = effect.candidates(frame.hold, frame.forces, frame.solution.gravity)
         try:
-            shown = [
-                signature(shape, frame.forces, frame.angles, g, frame.hold)
-                for shape in effect.candidates(frame.hold, frame.forces, g)
-            ]
+            shown = frame.signatures(shapes, ideal=True)
         except InputError:  # a column is absent
             continue
-        found.setdefault(effect.group, []).extend(shown)
+        found.setdefault(effect.group, []).append(shown)
     return found
 
 

@@ -6,11 +6,12 @@ definition by the time of the hold, the temperature going on as it does from hol
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.effects import Effect, Hold
 
@@ -42,24 +43,37 @@ class Signature:
         """Signature of combinations of the parameters, `directions` (k, l)."""
         return Signature(self.force @ directions, self.angles @ directions, self.rate @ directions)
 
+    def split(self, count: int) -> list[Signature]:
+        """Signatures of so many shapes that stand side by side."""
+        parts = (np.split(part, count, axis=2) for part in (self.force, self.angles, self.rate))
+        return [Signature(*part) for part in zip(*parts, strict=True)]
+
 
 class Moment:
     """The columns of a `Hold` at some moment of each hold.
 
-    One that is absent raises `InputError` when a formula uses it.
+    One that is absent raises `InputError` when a formula uses it. They are computed once.
 
     Parameters
     ----------
     hold : Hold
     dt : float, s, after the middle of each hold
+    axes : int, number of axes after that of the holds
     """
 
-    def __init__(self, hold: Hold, dt: float = 0.0) -> None:
-        self._hold, self._dt = hold, dt
+    def __init__(self, hold: Hold, dt: float = 0.0, axes: int = 0) -> None:
+        self._hold, self._dt, self._axes = hold, dt, axes
+        self._known: dict[str | float, Array] = {}
         self.used: set[str] = set()
 
     def __getattr__(self, name: str) -> Array:
         self.used.add(name)
+        if name not in self._known:
+            values = self._column(name)
+            self._known[name] = values.reshape(len(values), *[1] * self._axes)
+        return self._known[name]
+
+    def _column(self, name: str) -> Array:
         values = self._hold.column(name)
         if self._dt == 0:
             return values
@@ -69,61 +83,113 @@ class Moment:
             return values + self._dt * temperature_rate(self._hold.column("time"), values)
         return values
 
-    def lagged(self, tau: float) -> Array:
-        """Temperature behind a lag, which follows from the difference of the two."""
-        if tau == 0:
-            return self.temperature
+    def lagged(self, tau: Array) -> Array:
+        """Temperature behind each of some lags (s, 1), (n, s, 1)."""
         self.used.add("temperature")
-        behind = self._hold.lagged(tau)
-        return behind + self._dt * (self._hold.column("temperature") - behind) / tau
+        return np.stack([self._behind(t) for t in tau.ravel().tolist()], axis=1)[..., None]
+
+    def _behind(self, tau: float) -> Array:
+        """Temperature behind a lag, (n,), which follows from the difference of the two."""
+        if tau == 0:
+            return self._column("temperature")
+        if tau not in self._known:
+            behind = self._hold.lagged(tau)
+            rate = (self._hold.column("temperature") - behind) / tau
+            self._known[tau] = behind + self._dt * rate
+        return self._known[tau]
+
+
+class Moments:
+    """Holds, now and at the moments between which rates are taken.
+
+    Attributes
+    ----------
+    hold : Hold
+    now : Moment
+    around : tuple of Moment, `MOMENT` and twice that before and after; empty without a time
+    """
+
+    def __init__(self, hold: Hold) -> None:
+        self.hold, self.now = hold, Moment(hold, axes=2)
+        steps = () if hold.time is None else (-2, -1, 1, 2)
+        self.around = tuple(Moment(hold, step * MOMENT, axes=2) for step in steps)
 
 
 def signature(effect: Effect, forces: Array, angles: Array, g: float, hold: Hold) -> Signature:
-    """Evaluate an effect for the unit vectors of its parameters, in which it is linear.
+    """Signature of one effect; see `signatures`."""
+    return signatures((effect,), forces, angles, g, Moments(hold))
+
+
+def signatures(
+    shapes: Sequence[Effect], forces: Array, angles: Array, g: float, moments: Moments
+) -> Signature:
+    """Evaluate shapes of one effect for the unit vectors of its parameters, in which it is linear.
 
     Parameters
     ----------
-    effect : Effect
+    shapes : s effects of one kind
     forces : (n, 3) array, m/s², in sensor axes
     angles : (n, 2) array, rad, attitude
     g : float, m/s²
-    hold : Hold
+    moments : Moments
+
+    Returns
+    -------
+    Signature
+        Of the s k parameters, shape after shape.
 
     Raises
     ------
     InputError
         If the effect needs a column that the holds lack.
     """
-    n, k = len(forces), len(effect.parameters)
-    now = Moment(hold)
-    f = (forces[:, 0], forces[:, 1], forces[:, 2])
-    attitude = (angles[:, 0], angles[:, 1])
+    effect = _together(shapes)
+    n, s, k = len(forces), len(shapes), len(effect.parameters)
+    p = tuple(np.eye(k))
+    f, attitude = (tuple(values.T[:, :, None, None]) for values in (forces, angles))
+
+    def filled(values: Iterable[ArrayLike], count: int) -> Array:
+        full = np.zeros((n, count, s, k))
+        for i, value in enumerate(values):
+            full[:, i] = value
+        return full.reshape(n, count, s * k)
 
     def output(at: Moment) -> Array:
-        force = np.zeros((n, 3, k))
-        for j, p in enumerate(np.eye(k)):
-            for i, value in enumerate(effect.output(f, tuple(p), g, at, np)):
-                force[:, i, j] = value
-        return force
+        return filled(effect.output(f, p, g, at, np), 3)
 
-    force, reading, rate = output(now), np.zeros((n, 2, k)), np.zeros((n, 3, k))
-    if hold.time is not None and now.used & {"time", "temperature"}:
-        rate = rate_of(output, hold)
-    for j, p in enumerate(np.eye(k)):
-        force[:, :, j] -= forces @ np.array(effect.axes(tuple(p), np), dtype=float).T
-        for i, value in enumerate(effect.reading(attitude, tuple(p), now, np)):
-            reading[:, i, j] = value
-    return Signature(force, reading, rate)
+    now = moments.now
+    now.used.clear()
+    force, rate = output(now), np.zeros((n, 3, s * k))
+    if moments.around and now.used & {"time", "temperature"}:
+        rate = _rate(*map(output, moments.around))
+    axes = np.zeros((3, 3, k))
+    for i, row in enumerate(effect.axes(p, np)):
+        for j, value in enumerate(row):
+            axes[i, j] = value
+    if axes.any():
+        force -= np.tile(np.einsum("nb,abk->nak", forces, axes), s)
+    return Signature(force, filled(effect.reading(attitude, p, now, np), 2), rate)
+
+
+def _together(shapes: Sequence[Effect]) -> Effect:
+    """Shapes of one effect as one, whose settings are arrays (s, 1)."""
+    together = type(shapes[0])()
+    settings: Any = {
+        name: np.array([shape.shape[name] for shape in shapes])[:, None] for name in together.shape
+    }
+    together.shape = settings
+    return together
 
 
 def rate_of(output: Callable[[Moment], Array], hold: Hold) -> Array:
     """Rate at which what depends on the holds changes within them, per s; a jump has none."""
+    return _rate(*(output(Moment(hold, step * MOMENT)) for step in (-2, -1, 1, 2)))
 
-    def difference(dt: float) -> Array:
-        return (output(Moment(hold, dt)) - output(Moment(hold, -dt))) / (2 * dt)
 
-    rate = difference(MOMENT)
-    return np.where(np.isclose(rate, difference(2 * MOMENT), rtol=1e-3), rate, 0.0)
+def _rate(before: Array, shortly: Array, soon: Array, after: Array) -> Array:
+    """Rate between what is at −2, −1, 1 and 2 times `MOMENT`."""
+    rate = (soon - shortly) / (2 * MOMENT)
+    return np.where(np.isclose(rate, (after - before) / (4 * MOMENT), rtol=1e-3), rate, 0.0)
 
 
 def temperature_rate(time: Array, temperature: Array) -> Array:

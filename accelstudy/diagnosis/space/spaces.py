@@ -131,21 +131,39 @@ class Repeats:
 
 
 def span(columns: Array, sizes: Array | None, tolerance: float) -> tuple[Array, Array]:
-    """What columns (m, k) span.
+    """What columns (m, k) span: l combinations of them, (k, l), and a basis, (m, l); see `spans`.
 
     Parameters
     ----------
     columns : (m, k) array
-    sizes : (k,) array beside which the columns are seen; their own norms if None
+    sizes : (k,) array, or None
+    tolerance : float
+    """
+    each = None if sizes is None else sizes[None]
+    directions, basis, (rank,) = spans(columns[None], each, tolerance)
+    return directions[0, :, :rank], basis[0, :, :rank]
+
+
+def spans(
+    columns: Array, sizes: Array | None, tolerance: float
+) -> tuple[Array, Array, NDArray[np.int_]]:
+    """What each of several sets of columns (s, m, k) spans.
+
+    Parameters
+    ----------
+    columns : (s, m, k) array
+    sizes : (s, k) array beside which the columns are seen; their own norms if None
     tolerance : float, share of them below which a direction counts as nothing
 
     Returns
     -------
-    directions : (k, l) array, combinations of the columns; l is their rank
-    basis : (m, l) array, orthonormal, of their space
+    directions : (s, k, l) array, combinations of the columns, l the smaller of m and k
+    basis : (s, m, l) array, orthonormal, of their spaces
+    rank : (s,) int array; what is beyond it is zero
     """
-    norms = np.linalg.norm(columns, axis=0) if sizes is None else sizes
+    norms = np.linalg.norm(columns, axis=1) if sizes is None else sizes
     scale = np.where(norms > 0, norms, 1.0)
-    left, values, right = np.linalg.svd(columns / scale, full_matrices=False)
+    left, values, right = np.linalg.svd(columns / scale[:, None], full_matrices=False)
     seen = values > tolerance
-    return (right[seen] / scale).T, left[:, seen]
+    directions = np.swapaxes(right, 1, 2) / scale[..., None] * seen[:, None]
+    return directions, left * seen[:, None], np.count_nonzero(seen, axis=1)

@@ -17,7 +17,6 @@ from accelstudy.diagnosis.space.hypotheses import (
     Setting,
     cosines,
 )
-from accelstudy.diagnosis.space.signatures import signature
 from accelstudy.effects import Effect, get_effect
 
 Array = NDArray[np.float64]
@@ -69,10 +68,7 @@ class Visibility:
 def signature_columns(frame: Frame, hypothesis: Hypothesis) -> Array:
     """Signature of each parameter of an effect in the residual space, (m, k)."""
     assert hypothesis.effect is not None
-    shown = signature(
-        hypothesis.effect, frame.sensed, frame.angles, frame.solution.gravity, frame.hold
-    )
-    return frame.residuals.project(frame.residuals.whitened(shown))
+    return frame.residuals.project(frame.residuals.whitened(frame.signature(hypothesis.effect)))
 
 
 def whole_shapes(shapes: Sequence[Hypothesis]) -> list[Hypothesis]:
