@@ -106,8 +106,9 @@ def diagnose(
             + (f"the {approach.name} approach in any scheme" if blind else "these positions")
         )
     else:
-        at = ideal if parameters is None else np.asarray(parameters, dtype=float)
-        a = _design(scheme, model, approach, noise, at, gravity, hold)
+        if parameters is not None:
+            at = np.asarray(parameters, dtype=float)
+            a = _design(scheme, model, approach, noise, at, gravity, hold)
         scale = np.linalg.norm(a, axis=0)
         cofactors = np.linalg.inv((a / scale).T @ (a / scale)) / np.outer(scale, scale)
     return Design(

@@ -196,7 +196,9 @@ class SensorModel:
         angles = np.asarray(angles, dtype=float)
         errors = np.zeros_like(angles)
         for _ in range(10):  # each gains as many digits as the relative errors are small
-            errors = self.errors_of_reading(angles + errors, parameters, hold)
+            before, errors = errors, self.errors_of_reading(angles + errors, parameters, hold)
+            if np.array_equal(before, errors):
+                break
         return errors
 
     def errors_of_reading(

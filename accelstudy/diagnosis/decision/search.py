@@ -23,11 +23,10 @@ from accelstudy.diagnosis.evidence.pairs import all_pairs
 from accelstudy.diagnosis.evidence.size import Evidence, Level, log_mean
 from accelstudy.diagnosis.evidence.unknown import unknown_beside
 from accelstudy.diagnosis.space.hypotheses import (
-    OUTLIER,
+    EffectShapes,
     Hypothesis,
     Setting,
     Shapes,
-    same_space,
     setting_of,
 )
 from accelstudy.diagnosis.space.location import groups
@@ -200,7 +199,7 @@ class Search:
             names = {
                 name
                 for name, shapes in self.setting.candidates.items()
-                if name != OUTLIER and any(same_space(a, b) for a in own for b in shapes)
+                if isinstance(shapes, EffectShapes) and any(map(shapes.include, own))
             }
             self._members[hypothesis.name] = tuple(sorted(names | {hypothesis.name}))
         return self._members[hypothesis.name]

@@ -21,6 +21,8 @@ SPREAD = 0.7
 """Prior standard deviation of log κ about equal axes: a factor of two in variance is usual."""
 AS_WITHIN = 0.35
 """Likewise about the ratios within the holds."""
+AT_ONCE = 10_000_000
+"""Numbers that are worked on at once, about."""
 GRID = np.linspace(-2.5, 2.5, 9)
 CONTRASTS = np.array([[2.0, -1.0, -1.0], [0.0, 1.0, -1.0]]) / np.sqrt([[6.0], [2.0]])
 
@@ -84,12 +86,13 @@ def _restricted(residuals: Residuals, ratios: Array) -> tuple[Array, Array]:
     f = residuals.force_noise
     outer = np.einsum("nca,nda->nacd", f, f)
     determinants, squares = [], []
-    for kappa in ratios:
-        covariance = np.eye(c) + np.einsum("a,nacd->ncd", kappa - 1, outer)
-        weighted = np.linalg.solve(covariance, own)
-        normal = np.einsum("ncu,ncv->uv", own, weighted) + beside
-        design, mixed = normal[:-1, :-1], normal[:-1, -1]
-        size = np.sum(np.linalg.slogdet(covariance)[1]) + np.linalg.slogdet(design)[1]
+    for some in np.array_split(ratios, 1 + len(ratios) * own.size // AT_ONCE):
+        covariance = np.eye(c) + np.einsum("ga,nacd->gncd", some - 1, outer)
+        weighted = (np.linalg.inv(covariance) @ own).reshape(len(some), n * c, -1)
+        normal = own.reshape(n * c, -1).T @ weighted + beside
+        design, mixed = normal[:, :-1, :-1], normal[:, :-1, -1:]
+        size = np.sum(np.linalg.slogdet(covariance)[1], axis=1) + np.linalg.slogdet(design)[1]
+        explained = np.swapaxes(mixed, 1, 2) @ np.linalg.solve(design, mixed)
         determinants.append(size)
-        squares.append(normal[-1, -1] - mixed @ np.linalg.solve(design, mixed))
-    return np.array(determinants), np.array(squares)
+        squares.append(normal[:, -1, -1] - explained[:, 0, 0])
+    return np.concatenate(determinants), np.concatenate(squares)

@@ -120,23 +120,17 @@ class Field:
         chosen, weights = self._proposed
         drawn = rng.choice(chosen, size=len(noise), p=weights)
         sizes = rng.choice(PROPOSED, size=len(noise))
+        dims = self.dims[drawn]
+        amounts = rng.standard_normal(dims.sum()) * np.repeat(np.sqrt(sizes / dims), dims)
+        each = np.split(amounts, np.cumsum(dims)[:-1])
+        candidate = np.searchsorted(self.starts, drawn, side="right") - 1
         changed = noise.copy()
-        for i, space in enumerate(drawn):
-            dim = self.dims[space]
-            amounts = rng.standard_normal(dim) * np.sqrt(sizes[i] / dim)
-            rows, basis = self._basis(int(space))
-            changed[i, rows] += basis @ amounts
+        for k in np.unique(candidate):
+            own = np.flatnonzero(candidate == k)
+            shapes = self.spaces[k][0]
+            assert isinstance(shapes, EffectShapes | BumpedPositions)
+            changed[own] += shapes.drawn(drawn[own] - self.starts[k], [each[i] for i in own])
         return changed
-
-    def _basis(self, number: int) -> tuple[slice, Array]:
-        """Rows of the conditions, and columns that span the space there, of one of all spaces."""
-        candidate = int(np.searchsorted(self.starts, number, side="right")) - 1
-        shapes = self.spaces[candidate][0]
-        place = number - int(self.starts[candidate])
-        if isinstance(shapes, BumpedPositions):
-            return shapes.rows_of(place)
-        assert isinstance(shapes, EffectShapes)
-        return slice(None), shapes[place].basis
 
     def proposal(self, parts: Array) -> Array:
         """Log density of residuals with an effect at random beside that of noise alone, (b,).

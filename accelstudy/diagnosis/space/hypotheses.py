@@ -102,20 +102,36 @@ class EffectShapes(Bases, Sequence[Hypothesis]):
     Attributes
     ----------
     hypotheses : tuple of Hypothesis, whose bases are columns of `together`
+    ideals : Bases, their spaces for an ideal sensor
     """
 
     hypotheses: tuple[Hypothesis, ...]
+    ideals: Bases
 
     @classmethod
     def of(cls, hypotheses: Sequence[Hypothesis]) -> EffectShapes:
         """Gather shapes."""
-        bases = Bases(
-            np.concatenate([h.basis for h in hypotheses], axis=1),
-            np.array([h.dim for h in hypotheses]),
+        own = Bases.beside_each_other([h.basis for h in hypotheses])
+        ideals = Bases.beside_each_other([h.ideal for h in hypotheses])
+        shared = tuple(
+            replace(h, basis=basis, ideal=ideal)
+            for h, basis, ideal in zip(hypotheses, own.split(), ideals.split(), strict=True)
         )
-        parts = np.split(bases.together, bases.ends[1:-1], axis=1)
-        shared = (replace(h, basis=part) for h, part in zip(hypotheses, parts, strict=True))
-        return cls(bases.together, bases.dims, tuple(shared))
+        return cls(own.together, own.dims, shared, ideals)
+
+    def include(self, other: Hypothesis) -> bool:
+        """Whether one of the shapes cannot be told from another hypothesis."""
+        # The squares of the cosines sum to those of all products: most need no decomposition.
+        squares = self.ideals.parts(other.ideal.T).sum(axis=0)
+        likely = np.flatnonzero(squares > other.dim * ALIKE**2)
+        return any(same_space(other, self.hypotheses[i]) for i in likely)
+
+    def drawn(self, places: NDArray[np.int_], amounts: Sequence[Array]) -> Array:
+        """Sums of the columns of some bases by amounts (l,) of each, (b, m)."""
+        columns = np.zeros((len(places), self.together.shape[1]))
+        for row, place, amount in zip(columns, places, amounts, strict=True):
+            row[self.ends[place] : self.ends[place + 1]] = amount
+        return np.asarray(columns @ self.together.T)
 
     def __len__(self) -> int:
         return len(self.hypotheses)
@@ -176,6 +192,14 @@ class BumpedPositions(Sequence[Hypothesis]):
         rows[where] = directions
         basis = self.residuals.project(rows)
         return Hypothesis(OUTLIER, f"{OUTLIER}({place})", None, directions, basis, basis)
+
+    def drawn(self, places: NDArray[np.int_], amounts: Sequence[Array]) -> Array:
+        """Sums of the columns of some bases by amounts (l,) of each, (b, m), but for R."""
+        sums = np.zeros((len(places), len(self.residuals.design)))
+        for row, place, amount in zip(sums, places, amounts, strict=True):
+            where, directions = self.rows_of(int(place))
+            row[where] = directions @ amount
+        return sums
 
     def rows_of(self, index: int) -> tuple[slice, Array]:
         """Rows of the conditions of one position, and its H there, (c, l); R E H is a basis."""
@@ -405,9 +429,5 @@ def setting_of(solution: Solution, names: Iterable[str] | None = None) -> Settin
 def same_space(a: Hypothesis, b: Hypothesis) -> bool:
     """Whether two hypotheses cannot be told apart in these positions."""
     if a.dim != b.dim:
-        return False
-    cross = a.ideal.T @ b.ideal
-    # The squares of the cosines sum to that of the entries: most pairs need no decomposition.
-    if float(np.vdot(cross, cross)) <= a.dim * ALIKE**2:
         return False
     return bool(cosines(a.ideal, b.ideal)[-1] > ALIKE)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,7 +32,7 @@ def refined(setting: Setting, shapes: Shapes) -> Shapes:
     for _ in range(ROUNDS):
         best = int(np.argmax(shapes.parts(z)))
         around = (shapes[max(best - 1, 0)].value, shapes[min(best + 1, len(shapes) - 1)].value)
-        tried = (shaped(setting, shapes[best], v) for v in np.geomspace(*around, BETWEEN + 2)[1:-1])
+        tried = _all_shaped(setting, shapes[best], np.geomspace(*around, BETWEEN + 2)[1:-1])
         fine = [*shapes, *(h for h in tried if h is not None)]
         shapes = EffectShapes.of(sorted(fine, key=lambda h: h.value))
     return shapes
@@ -38,11 +40,18 @@ def refined(setting: Setting, shapes: Shapes) -> Shapes:
 
 def shaped(setting: Setting, hypothesis: Hypothesis, value: float) -> Hypothesis | None:
     """Return a smooth effect with another value of its setting; None if it shows less."""
+    return _all_shaped(setting, hypothesis, [value])[0]
+
+
+def _all_shaped(
+    setting: Setting, hypothesis: Hypothesis, values: Iterable[float]
+) -> list[Hypothesis | None]:
+    """Likewise with several values."""
     assert hypothesis.effect is not None
     assert hypothesis.smooth is not None
-    effect = type(hypothesis.effect)(**{hypothesis.smooth: float(f"{value:.6g}")})
-    found = setting.hypothesis(effect)
-    return found if found is not None and found.dim == hypothesis.dim else None
+    kind, name = type(hypothesis.effect), hypothesis.smooth
+    found = setting.frame.hypotheses([kind(**{name: float(f"{v:.6g}")}) for v in values])
+    return [h if h is not None and h.dim == hypothesis.dim else None for h in found]
 
 
 def _completed(setting: Setting, shapes: EffectShapes) -> EffectShapes:
@@ -57,7 +66,8 @@ def _completed(setting: Setting, shapes: EffectShapes) -> EffectShapes:
             if 0 <= near < len(shapes):
                 other = shapes[near].effect
                 assert other is not None
-                tried = [setting.hypothesis(e) for e in effect.between(other, hold)]
+                between = effect.between(other, hold)
+                tried = setting.frame.hypotheses(between) if between else []
                 found = [h for h in tried if h is not None and h.dim == shapes[best].dim]
                 fine[max(best, near) : max(best, near)] = found
         if len(fine) == len(shapes):

@@ -7,7 +7,9 @@ all conditions, so that the effort grows like the number of positions.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -47,11 +49,21 @@ class Bases:
     together: Array
     dims: NDArray[np.int_]
 
+    @classmethod
+    def beside_each_other(cls, bases: Sequence[Array]) -> Bases:
+        """Gather bases (m, l)."""
+        dims = np.array([basis.shape[1] for basis in bases])
+        return cls(np.concatenate(bases, axis=1), dims)
+
+    def split(self) -> list[Array]:
+        """Each of the bases, (m, l)."""
+        return np.split(self.together, self.ends[1:-1], axis=1)
+
     def parts(self, errors: Array) -> Array:
         """Squares of what residuals (..., m) have in each of them, (..., s)."""
         return np.add.reduceat((errors @ self.together) ** 2, self.ends[:-1], axis=-1)
 
-    @property
+    @cached_property
     def ends(self) -> NDArray[np.int_]:
         """Where the bases begin and the last one ends, (s + 1,)."""
         return np.concatenate([[0], np.cumsum(self.dims)])
