@@ -20,6 +20,7 @@ from accelstudy.campaign.fit import fit_campaign, initial_values
 from accelstudy.campaign.format import Campaign
 from accelstudy.campaign.gauges import GAUGES, affine_form, in_gauge
 from accelstudy.campaign.monte_carlo import check_sigmas
+from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign
 from accelstudy.campaign.verdict import verdict_lines
 from accelstudy.errors import InputError
 from accelstudy.models import get_model
@@ -247,3 +248,11 @@ def _in_conflict(campaign):
     advised = "What is wrong or missing, “accelstudy diagnose” may tell." in lines
     assert advised == bool(found)
     return found
+
+
+def test_repeats_of_too_few_attitudes_are_told():
+    """Noise makes the design regular, but six attitudes hold no nine parameters."""
+    settings = CampaignSettings(scheme="faces-6", repeats=3, approach="gravity")
+    campaign, _ = simulate_campaign(settings)
+    with pytest.raises(InputError, match=r"18 positions hardly determine it .* more attitudes"):
+        fit_campaign(campaign, NINE, GRAVITY)

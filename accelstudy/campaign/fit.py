@@ -30,6 +30,10 @@ Array = NDArray[np.float64]
 LEAST_RATIO = 1e-6
 """Noise of the forces beside that of the robot's angles below which double precision ends."""
 
+HARDLY = 10.0
+"""Condition beyond which it is the positions that keep an adjustment from converging: where noise
+alone tells repeats of too few attitudes apart."""
+
 UNIT_SIGMA = 1e-3
 """m/s², stands for an unknown sigma; only sigmas a posteriori mean anything then."""
 
@@ -227,7 +231,7 @@ def fit_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> 
     if not adjustment.converged[0]:
         raise InputError(
             f"{campaign.name}: the adjustment of the model {model.name!r} does not converge; "
-            f"{_cause(campaign)}; `accelstudy diagnose` looks for more"
+            f"{_cause(campaign, design)}"
         )
     return CampaignFit(campaign, model, approach, observed, adjustment, design)
 
@@ -246,12 +250,18 @@ def campaign_design(campaign: Campaign, model: SensorModel, approach: Approach) 
     )
 
 
-def _cause(campaign: Campaign) -> str:
+def _cause(campaign: Campaign, design: Design) -> str:
     """Say what may keep an adjustment from converging."""
     found = recognise(campaign, get_approach("gravity" if campaign.angles is None else "robot"))
-    if found is None:
-        return "a gross error in the data or a wrong unit is the usual cause"
-    return f"this looks like a gross error ({words(found.name)}): {found.reason}"
+    more = "`accelstudy diagnose` looks for more"
+    if found is not None:
+        return f"this looks like a gross error ({words(found.name)}): {found.reason}; {more}"
+    if design.condition > HARDLY:
+        return (
+            f"the {campaign.n_positions} positions hardly determine it (condition "
+            f"{design.condition:.0f}, up to {HARDLY:.0f} is usual); more attitudes are needed"
+        )
+    return f"a gross error in the data or a wrong unit is the usual cause; {more}"
 
 
 def initial_values(model: SensorModel, forces: Array, gravity: float) -> Array:
