@@ -6,7 +6,7 @@ bumped position. The probability that a given sigma is wrong is with the level (
 
 TWO = 0.06
 """Two effects are missing: where a model was chosen with care that is rare."""
-UNKNOWN = 0.02
+UNKNOWN = 0.04
 """Something is missing that is no effect of the catalogue, which has what is usual."""
 COLOUR = 0.06
 """Nothing is missing but the noise has some colour, as all real noise has."""

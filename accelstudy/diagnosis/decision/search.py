@@ -44,6 +44,8 @@ WORTH = 12.0
 """Log odds to the strongest beyond which shapes between those tried at first do not matter."""
 UNDECIDED = 2.0
 """Log evidence by which a shape may fall short of the best and still be the true one."""
+SAME = 0.25
+"""Log evidence within which two effects are equally good."""
 FIRST = 5
 """Effects beside which something unknown is looked for."""
 
@@ -180,11 +182,19 @@ class Search:
         classes = []
         while left:
             name = left.pop(0)
-            best = self.best_shape(name)
-            members = self.members(best)
+            members = self.members(self.best_shape(name))
+            alike = [other for other in left if other in members]
             left = [other for other in left if other not in members]
-            classes.append((best, members))
+            # Of what is equally good the name does not hang on rounding errors.
+            least = self.densities[name] - SAME
+            name = min(other for other in (name, *alike) if self.densities[other] >= least)
+            classes.append((self.best_shape(name), members))
         return classes
+
+    @cached_property
+    def called(self) -> dict[str, str]:
+        """Name of its class for each candidate."""
+        return {name: best.name for best, members in self.classes for name in members}
 
     def best_shape(self, name: str) -> Hypothesis:
         """Shape of a candidate that explains most."""
@@ -251,7 +261,7 @@ class Search:
             one, other = sorted(pair.best, key=lambda h: -self.densities[h.name])
             both = (self.members(one), self.members(other))
             if both[0] != both[1] or one.effect is None:
-                names = (one.name, other.name)
+                names = tuple(self.called.get(h.name, h.name) for h in (one, other))
                 found.append(Weighed(names, both, pair.log_density + each, (one, other)))
         for best, members in self.classes[:FIRST]:
             beside = unknown_beside(best, self.groups, self.residuals, self.evidence)
@@ -268,11 +278,13 @@ class Search:
         residuals, by_level = self.residuals, self.detection.noise
         nothing = float(np.logaddexp.reduce(by_level))
         # Where the axes are weighted, that they differ needs no further evidence.
-        unequal = np.log(priors.AXES) + self.axes.log_evidence if self.setting is self.equal else 0
+        unequal = nothing + np.log(priors.AXES) + self.axes.log_evidence
+        if self.setting is not self.equal:
+            unequal = float(by_level[0])
         tails = noises.tail_test(residuals.positions, self.chance)
         known = {
             noises.COLOUR: np.log(priors.COLOUR) + colour_density(residuals, self.evidence),
-            noises.AXES: nothing + unequal,
+            noises.AXES: unequal,
             noises.TAILS: nothing + np.log(priors.TAILS) + noises.most_evidence(tails.p_value),
         }
         if len(by_level) > 1:
@@ -280,14 +292,6 @@ class Search:
             name = noises.LEVEL if self.level.known else noises.COLOUR
             known[name] = np.logaddexp(known.get(name, -np.inf), by_level[1])
         return [Weighed((name,), ((name,),), float(log)) for name, log in known.items()]
-
-    def chooses(self, names: Sequence[Sequence[str]]) -> bool:
-        """Whether effects of these classes have the strongest evidence."""
-        wanted = {name for members in names for name in members}
-        if len(names) == 1:
-            return max(self.densities, key=self.densities.__getitem__) in wanted
-        best = max((one for one in self.pairs if one.best), key=lambda one: one.log_weight)
-        return set(best.names) <= wanted
 
     @property
     def probabilities(self) -> dict[str, float]:

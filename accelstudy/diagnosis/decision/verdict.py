@@ -76,8 +76,7 @@ def find(search: Search) -> Finding:
         return _without_a_fit(search, posterior)
     fit = search.refits.best(list(zip(top.best, top.classes, strict=True)))
     if fit is None:
-        said = joined([words(name) for name in top.names])
-        reason = f"{said} explains most of it, but a model with it has no solution"
+        reason = f"{_explained(top.names)} most of it, but a model with it has no solution"
         return Finding("unknown", search.setting, reason, posterior=posterior)
     best, solution = fit
     left = _misfit(search, solution)
@@ -125,16 +124,20 @@ def _without_a_fit(search: Search, posterior: Posterior) -> Finding:
         name = noise[0][0]
         return Finding("noise_model", search.setting, NOISES[name], posterior=posterior)
     first = posterior.explanations[0]
-    said = joined([words(name) for name in first.names])
     if UNKNOWN in first.names:
         reason = "no effect or pair of effects of the catalogue explains it"
     else:
         second = joined([words(name) for name in posterior.explanations[1].names])
         reason = (
-            f"{said} explains it with a probability of {first.posterior:.2f} only, and {second} "
-            f"with {posterior.explanations[1].posterior:.2f}"
+            f"{_explained(first.names)} it with a probability of {first.posterior:.2f} only, and "
+            f"{second} with {posterior.explanations[1].posterior:.2f}"
         )
     return Finding("unknown", search.setting, reason, posterior=posterior)
+
+
+def _explained(names: Sequence[str]) -> str:
+    """One or two names with the verb that belongs to them."""
+    return f"{joined([words(name) for name in names])} explain{'s' if len(names) == 1 else ''}"
 
 
 def _is_large(search: Search, top: Weighed) -> bool:

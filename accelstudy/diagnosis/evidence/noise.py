@@ -25,7 +25,7 @@ STEPS = "quantisation"
 NOISES = {
     LEVEL: "the residuals are larger than sigma says, and have no pattern",
     AXES: "the axes differ in noise",
-    COLOUR: "successive holds are alike",
+    COLOUR: "the noise lasts longer than a hold, or differs from hold to hold",
     TAILS: "large residuals are more frequent than in a normal distribution",
     STEPS: "the readings are coarse",
 }

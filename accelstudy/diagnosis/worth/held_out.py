@@ -101,20 +101,36 @@ def held_out(
 
 def _chosen_alike(part: Search, finding: Finding) -> tuple[Sequence[Choice], bool]:
     """Explanation of the credible set that a part chooses, and whether it would choose another."""
-    chosen = finding.chosen
+    chosen, credible = finding.chosen, finding.credible_set
     if len(chosen) == 2:
-        return chosen, not part.chooses([choice.members for choice in chosen])
+        best = max(
+            (one for one in part.pairs if len(one.best) == 2), key=lambda one: one.log_weight
+        )
+        same = [one for one in credible if _same(one.classes, best.names)]
+        if not same:
+            return chosen, True
+        p = same[0].posterior
+        return [Choice(h, m, p) for h, m in zip(best.best, best.classes, strict=True)], False
     wanted = {
         name: members
-        for one in finding.credible_set
+        for one in credible
         if len(one.names) == 1
         for members in one.classes
         for name in members
     }
-    best = max(part.densities, key=part.densities.__getitem__, default="")
-    if best not in wanted:
+    name = max(part.densities, key=part.densities.__getitem__, default="")
+    if name not in wanted:
         return chosen, True
-    return (Choice(part.best_shape(best), wanted[best], chosen[0].probability),), False
+    return [Choice(part.best_shape(name), wanted[name], chosen[0].probability)], False
+
+
+def _same(classes: Sequence[Sequence[str]], names: Sequence[str]) -> bool:
+    """Whether two names are of two classes, in either order."""
+    return len(classes) == 2 and any(
+        a in one and b in other
+        for a, b in (tuple(names), tuple(names[::-1]))
+        for one, other in (classes,)
+    )
 
 
 def _refit(part: Search, chosen: Sequence[Choice]) -> Solution | str:
