@@ -95,6 +95,7 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
         lines.append(_agreement(d))
     else:
         lines += _refuted(d)
+    lines += _weights(d)
     lines += _suspects(d)
     if d.verdict == "unknown":
         lines += [line for line in (most_probable(d.credible_set), _where(d)) if line]
@@ -223,6 +224,15 @@ def _refuted(d: Diagnosis) -> list[str]:
     return [
         f"With the base model the residuals are {much} the stated noise ({p_value(test.p_value)})."
     ]
+
+
+def _weights(d: Diagnosis) -> list[str]:
+    """Say how unequal axes are weighted."""
+    variances = d.setting.frame.solution.variances[0, :3]
+    if d.setting.frame.solution is d.base:
+        return []
+    parts = joined([number(float(v)) for v in variances / variances.mean()])
+    return [f"The axes are weighted by their noise: x, y and z have {parts} of the mean variance."]
 
 
 def _suspects(d: Diagnosis) -> list[str]:
