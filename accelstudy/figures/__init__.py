@@ -15,7 +15,6 @@ from accelstudy.figures.registry import (
     get_figure,
     render,
 )
-from accelstudy.registry import import_modules
 
 __all__ = [
     "FigureEntry",
@@ -29,6 +28,3 @@ __all__ = [
     "get_figure",
     "render",
 ]
-
-# A module registers its figures when it is imported.
-import_modules(__name__, __path__)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import matplotlib as mpl
@@ -14,7 +15,7 @@ from matplotlib.figure import Figure
 from accelstudy.errors import InputError
 from accelstudy.figures.saving import save
 from accelstudy.figures.style import DPI, STYLE
-from accelstudy.registry import Registry
+from accelstudy.registry import Registry, import_modules
 from accelstudy.study.config import StudyConfig
 from accelstudy.units import ANGLE_UNITS, angle_note, angles_in
 
@@ -53,7 +54,18 @@ class FigureEntry:
 
 
 _registry: Registry[FigureEntry] = Registry("figure")
-get_figure = _registry.get
+
+
+@cache
+def _all_figures() -> Registry[FigureEntry]:
+    """All figures; a module registers its own when it is imported, which takes a while."""
+    import_modules(__package__, [str(Path(__file__).parent)])
+    return _registry
+
+
+def get_figure(name: str) -> FigureEntry:
+    """Return the figure of that name; raise `UnknownNameError` if there is none."""
+    return _all_figures().get(name)
 
 
 def figure(
@@ -90,7 +102,7 @@ def figure(
 
 def figure_names(study: StudyConfig) -> tuple[str, ...]:
     """Names of the figures that a study has."""
-    return tuple(sorted(name for name in _registry.names() if get_figure(name).when(study)))
+    return tuple(sorted(name for name in _all_figures().names() if get_figure(name).when(study)))
 
 
 def figure_tables(name: str) -> tuple[str, ...]:

@@ -209,7 +209,7 @@ class Search:
             names = {
                 name
                 for name, shapes in self.setting.candidates.items()
-                if isinstance(shapes, EffectShapes) and any(map(shapes.include, own))
+                if isinstance(shapes, EffectShapes) and shapes.include(own)
             }
             self._members[hypothesis.name] = tuple(sorted(names | {hypothesis.name}))
         return self._members[hypothesis.name]

@@ -119,12 +119,14 @@ class EffectShapes(Bases, Sequence[Hypothesis]):
         )
         return cls(own.together, own.dims, shared, ideals)
 
-    def include(self, other: Hypothesis) -> bool:
-        """Whether one of the shapes cannot be told from another hypothesis."""
+    def include(self, others: Sequence[Hypothesis]) -> bool:
+        """Whether one of the shapes cannot be told from one of other hypotheses."""
+        dims = np.array([other.dim for other in others])
+        products = self.ideals.parts(np.concatenate([other.ideal.T for other in others]))
         # The squares of the cosines sum to those of all products: most need no decomposition.
-        squares = self.ideals.parts(other.ideal.T).sum(axis=0)
-        likely = np.flatnonzero(squares > other.dim * ALIKE**2)
-        return any(same_space(other, self.hypotheses[i]) for i in likely)
+        squares = np.add.reduceat(products, np.cumsum(dims) - dims, axis=0)
+        likely = np.argwhere(squares > dims[:, None] * ALIKE**2)
+        return any(same_space(others[i], self.hypotheses[k]) for i, k in likely)
 
     def drawn(self, places: NDArray[np.int_], amounts: Sequence[Array]) -> Array:
         """Sums of the columns of some bases by amounts (l,) of each, (b, m)."""
