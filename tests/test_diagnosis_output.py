@@ -25,10 +25,11 @@ from accelstudy.campaign.output import write_calibration
 from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign
 from accelstudy.cli import main
 from accelstudy.diagnosis.decision.explanations import Explanation
-from accelstudy.diagnosis.pipeline import Gap, diagnose
+from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.figures import gap_figure, loop_figure
 from accelstudy.diagnosis.report.output import diagnose_folder, write_diagnosis
 from accelstudy.diagnosis.report.wording import headline
+from accelstudy.diagnosis.result import Gap
 from accelstudy.diagnosis.round_trip import parse_round_trip
 from accelstudy.diagnosis.space.hypotheses import setting_of
 from accelstudy.diagnosis.worth.loop import CASES as CASES_OF_LOOP

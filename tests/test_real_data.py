@@ -11,13 +11,14 @@ import pytest
 
 from accelstudy.campaign.importing import import_file
 from accelstudy.campaign.public import import_settings, public_data, public_file
-from accelstudy.diagnosis.pipeline import Diagnosis, diagnose
+from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.wording import (
     GROUPS,
     amount,
     shown_unit,
     verdict_lines,
 )
+from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.effects import get_effect
 from accelstudy.errors import InputError
 from accelstudy.models import get_model

@@ -13,7 +13,8 @@ import numpy as np
 import pandas as pd
 
 from accelstudy.campaign import Campaign
-from accelstudy.diagnosis.pipeline import Diagnosis, diagnose
+from accelstudy.diagnosis.pipeline import diagnose
+from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.effects import effects_without
 from accelstudy.errors import InputError
 from accelstudy.hidden.baselines import METHODS, answers

@@ -11,9 +11,9 @@ from accelstudy.adjustment import calibrate
 from accelstudy.campaign.assessment import assess
 from accelstudy.campaign.document import calibration_document, quality_document
 from accelstudy.campaign.fit import CampaignFit, campaign_design
-from accelstudy.diagnosis.pipeline import Diagnosis
 from accelstudy.diagnosis.report.missing import explanation_words, missing
 from accelstudy.diagnosis.report.positions import kept_positions
+from accelstudy.diagnosis.result import Diagnosis
 
 
 def diagnosed_fit(diagnosis: Diagnosis) -> CampaignFit:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from accelstudy.campaign.document import number
-from accelstudy.diagnosis.pipeline import Diagnosis, Named
 from accelstudy.diagnosis.report.missing import refuted
 from accelstudy.diagnosis.report.statement import cosine_in, statement
+from accelstudy.diagnosis.result import Diagnosis, Named
 from accelstudy.units import GON, MGON
 
 

@@ -15,10 +15,11 @@ from matplotlib.ticker import MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
 from accelstudy.diagnosis.evidence.field import UNKNOWN
-from accelstudy.diagnosis.pipeline import LEVEL_EFFECTS, Diagnosis
+from accelstudy.diagnosis.pipeline import LEVEL_EFFECTS
 from accelstudy.diagnosis.report.positions import condition_sigma
 from accelstudy.diagnosis.report.set_figure import explanations_figure
 from accelstudy.diagnosis.report.wording import GROUPS
+from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.diagnosis.worth.loop import CASES, Loop
 from accelstudy.figures.style import FULL, INK, log_ticks, new_figure
 from accelstudy.study.report import number

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from accelstudy.campaign.format import Campaign
-from accelstudy.diagnosis.pipeline import Diagnosis
+from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.models import MODELS, composition_name
 from accelstudy.names import LONGEST
 from accelstudy.sensor import SensorModel

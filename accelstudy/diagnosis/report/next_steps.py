@@ -8,7 +8,7 @@ from typing import Any
 
 from accelstudy import suggested
 from accelstudy.campaign.gauges import not_affine
-from accelstudy.diagnosis.pipeline import Diagnosis
+from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.wording import joined, words
 
 

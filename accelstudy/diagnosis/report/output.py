@@ -11,11 +11,12 @@ import yaml
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.document import json_text
 from accelstudy.campaign.format import read_campaign
-from accelstudy.diagnosis.pipeline import Diagnosis, diagnose
+from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.calibration import diagnosed_calibration
 from accelstudy.diagnosis.report.document import diagnosis_document
 from accelstudy.diagnosis.report.model_file import study_overlay
 from accelstudy.diagnosis.report.positions import positions_table
+from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.diagnosis.worth.loop import REPLICATES, Loop, close_loop
 from accelstudy.errors import InputError
 from accelstudy.models import get_model

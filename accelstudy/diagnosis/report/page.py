@@ -9,12 +9,14 @@ import pandas as pd
 
 from accelstudy.adjustment.quality.whole_model import REFUTED
 from accelstudy.diagnosis.decision.explanations import CREDIBLE
+from accelstudy.diagnosis.decision.noise import LEVEL_NOISE
 from accelstudy.diagnosis.decision.priors import SURE
-from accelstudy.diagnosis.pipeline import LEVEL_EFFECTS, LEVEL_NOISE, Diagnosis
+from accelstudy.diagnosis.pipeline import LEVEL_EFFECTS
 from accelstudy.diagnosis.report import wording
 from accelstudy.diagnosis.report.figures import diagnosis_figures
 from accelstudy.diagnosis.report.missing import family_words, separates
 from accelstudy.diagnosis.report.next_steps import next_steps
+from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.diagnosis.worth.loop import Loop
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.figures.saving import save_all

@@ -7,7 +7,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import Solution, position_tests
-from accelstudy.diagnosis.pipeline import Diagnosis
+from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.units import GON
 
 Array = NDArray[np.float64]

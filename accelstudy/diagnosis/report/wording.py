@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from accelstudy.diagnosis.pipeline import Diagnosis, Named
 from accelstudy.diagnosis.report.missing import (
     explanation_words,
     missing,
@@ -12,6 +11,7 @@ from accelstudy.diagnosis.report.missing import (
     not_told_apart,
     without_a_name,
 )
+from accelstudy.diagnosis.result import Diagnosis, Named
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.figures.style import unit_label
 from accelstudy.study.report import number

@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.adjustment import Adjustment, Observations, calibrate
 from accelstudy.adjustment.quality import Solution
-from accelstudy.diagnosis.pipeline import Diagnosis
 from accelstudy.diagnosis.report.positions import kept_positions
+from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.diagnosis.worth.tilt import in_use
 from accelstudy.effects import Hold
 from accelstudy.leveling_error import leveling_error

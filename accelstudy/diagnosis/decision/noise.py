@@ -1,0 +1,115 @@
+"""What is said of the noise: its tests, and the verdict where no effect was significant."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from accelstudy.adjustment.quality.whole_model import REFUTED
+from accelstudy.campaign.format import Campaign
+from accelstudy.diagnosis.decision import priors
+from accelstudy.diagnosis.decision.search import Search
+from accelstudy.diagnosis.decision.verdict import Finding, lack_of_fit
+from accelstudy.diagnosis.evidence import noise as noises
+from accelstudy.diagnosis.evidence.noise import NoiseTest
+from accelstudy.diagnosis.space.hypotheses import Setting
+from accelstudy.diagnosis.space.residuals import Residuals
+
+LEVEL_NOISE = 0.01
+"""Family-wise level of the tests of the noise beside that of its level, which has `REFUTED`; with
+the test for anything that is missing they alarm in 5 % of the campaigns in which nothing is."""
+
+
+@dataclass(frozen=True)
+class NoiseJudge:
+    """Tests of the noise of a campaign, and what follows from them."""
+
+    search: Search
+    campaign: Campaign
+
+    def tests(self, setting: Setting) -> tuple[NoiseTest, ...]:
+        """All tests of the noise that the campaign allows, on the residuals of a fit."""
+        residuals, campaign = setting.frame.residuals.positions, self.campaign
+        chance = self.search.chance
+        sigma = float(np.mean(residuals.sigmas[:, :3]))
+        tests = []
+        if self.search.level.known:
+            tests.append(self.level(setting))
+        tests += [
+            noises.axis_test(residuals, chance),
+            noises.colour_test(residuals, chance),
+            noises.tail_test(residuals, chance),
+            self.resolution,
+        ]
+        if campaign.sd is not None and campaign.n_samples is not None:
+            tests.append(noises.within_hold_test(residuals, sigma, campaign.sd, campaign.n_samples))
+        return tuple(tests)
+
+    def level(self, setting: Setting) -> NoiseTest:
+        """Test the level of the noise; of the base fit as the calibration does, by its own Ω."""
+        if setting is self.search.setting:
+            return noises.level_test(Residuals.of(self.search.first))
+        return noises.level_test(setting.frame.residuals.positions)
+
+    @cached_property
+    def resolution(self) -> NoiseTest:
+        """Whether the readings are coarse, beside the noise of the base fit."""
+        residuals = self.search.residuals.positions
+        sigma = float(np.mean(residuals.sigmas[:, :3]))
+        # A sigma far too large would take the attitudes for steps.
+        noise = sigma * min(1.0, float(np.sqrt(residuals.variance)))
+        return noises.resolution_test(self.campaign.forces, noise)
+
+    def worst(self, tests: Sequence[NoiseTest]) -> NoiseTest | None:
+        """Return what is wrong with the noise, the most specific finding first."""
+        level = next((t for t in tests if t.name == noises.LEVEL), None)
+        counted = [
+            t
+            for t in tests
+            # A sigma that the residuals confirm knows of what varies from hold to hold.
+            if not (t.remark.startswith("white noise within") and self.search.level.known
+                    and level is not None and level.p_value >= REFUTED)
+        ]  # fmt: skip
+        others = LEVEL_NOISE / max(len(counted) - (level is not None), 1)
+        found = [t for t in counted if t.p_value < (REFUTED if t is level else others)]
+        order = [noises.STEPS, noises.COLOUR, noises.AXES, noises.TAILS, noises.LEVEL]
+        return min(found, key=lambda t: order.index(t.name), default=None)
+
+    def judged(self, worst: NoiseTest) -> Finding:
+        """Judge a finding about the noise, when no effect was significant."""
+        setting, posterior = self.search.setting, self.search.posterior
+        if lack_of_fit(self.search) < REFUTED and worst.name != noises.STEPS:
+            reason = (
+                "repeated positions agree better with each other than with the model, so it is not "
+                "the noise"
+            )
+            return Finding("unknown", setting, reason, posterior=posterior)
+        if worst.name != noises.LEVEL or worst.estimate[0] < 1:
+            return Finding("noise_model", setting, worst.remark, posterior=posterior)
+        # Larger residuals may be an effect that the test for a pattern could not see.
+        noise = sum(e.posterior for e in posterior.explanations if e.names[0] in noises.NOISES)
+        if noise >= priors.MORE_PROBABLE:
+            return Finding("noise_model", setting, worst.remark, posterior=posterior)
+        name = next(n for e in posterior.explanations for n in e.names if n not in noises.NOISES)
+        reason = (
+            f"{worst.remark}; it may be the noise (probability {noise:.2f}), but "
+            f"{'something' if name == 'unknown' else 'an effect such as ' + name} is not excluded"
+        )
+        return Finding("unknown", setting, reason, posterior=posterior)
+
+    def unit_variance(self, final: Setting) -> float:
+        """Variance of unit weight: 1 if sigma is known and not refuted, else a posteriori."""
+        if self.search.level.known and self.level(final).p_value >= REFUTED:
+            return 1.0
+        return final.frame.residuals.positions.variance
+
+    def sigma_source(self, final: Setting) -> str:
+        """Where the noise level comes from."""
+        return (
+            "a-priori"
+            if self.search.level.known and self.unit_variance(final) == 1
+            else "residuals"
+        )
