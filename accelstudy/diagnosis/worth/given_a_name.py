@@ -102,7 +102,9 @@ def _on_the_part(
         slope = change @ split.designs[1]
         size = np.sum(change**2, axis=1) + np.sum((slope @ split.cofactors) * slope, axis=1)
         scale = np.sqrt(size * variance[some])
-        values[some] = np.sum(change * missed[some], axis=1) / scale
+        # An effect that does not show in the held-out positions says nothing there.
+        shown = scale > 0
+        values[some] = np.sum(change * missed[some], axis=1) / np.where(shown, scale, np.inf)
     return [h.name for h in choices], values
 
 
