@@ -7,7 +7,7 @@ from diagnosis_helpers import NINE, ROBOT, G, shuffled
 from accelstudy.adjustment.quality import solve
 from accelstudy.diagnosis.decision.search import Search
 from accelstudy.diagnosis.evidence.size import Level
-from accelstudy.diagnosis.pipeline import LEVEL_EFFECTS
+from accelstudy.diagnosis.result import LEVEL_EFFECTS
 from accelstudy.diagnosis.worth import given_a_name
 from accelstudy.diagnosis.worth.gap import SIGNIFICANT, held_out_gap, split_positions
 from accelstudy.diagnosis.worth.linear import LinearSplit

@@ -23,7 +23,7 @@ from accelstudy.diagnosis.decision.verdict import Finding, find
 from accelstudy.diagnosis.evidence import noise as noises
 from accelstudy.diagnosis.evidence.chance import SIMULATIONS
 from accelstudy.diagnosis.evidence.noise import NoiseTest
-from accelstudy.diagnosis.result import Diagnosis, Gap, Named
+from accelstudy.diagnosis.result import Diagnosis, Gap, Named, level_of_effects
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
 from accelstudy.diagnosis.space.location import LACK_OF_FIT, locate
 from accelstudy.diagnosis.worth.changes import Change, parameter_changes
@@ -36,9 +36,6 @@ from accelstudy.progress import stage
 from accelstudy.sensor import SensorModel
 
 Array = NDArray[np.float64]
-
-LEVEL_EFFECTS = 0.035
-"""Level of the test for anything that is missing."""
 
 
 def diagnose(
@@ -181,7 +178,7 @@ class _Run:
         if search.exact:
             reason = "the campaign is its own model: what is left are rounding errors"
             return Finding("no_effect", search.setting, reason), ()
-        if search.detection.p_value < LEVEL_EFFECTS:
+        if search.detection.p_value < level_of_effects(self.fit.sigma_known):
             finding = find(search)
             return finding, self.noise.tests(finding.setting)
         tests = self.noise.tests(search.setting)
@@ -274,8 +271,9 @@ class _Run:
         if finding.verdict not in ("named", "narrowed"):
             return Gap(before, after, leveling=leveling)
         known = variance if self.fit.sigma_known else None
+        level = level_of_effects(self.fit.sigma_known)
         seeds = [self.stage(number) for number in (1, 2, 3, 4)]
-        held = held_out(self.search, finding, known, LEVEL_EFFECTS, seeds)
+        held = held_out(self.search, finding, known, level, seeds)
         confirmed = held.statement is not None
         return Gap(before, after, held.gap, leveling, confirmed, held.reason, held.statement)
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from accelstudy.adjustment.quality import GlobalTest, Solution, global_test
+from accelstudy.adjustment.quality.whole_model import REFUTED
 from accelstudy.approaches import Approach
 from accelstudy.campaign.format import Campaign
 from accelstudy.diagnosis.decision.explanations import Explanation
@@ -20,6 +21,17 @@ from accelstudy.diagnosis.worth.limits import UpperLimit
 from accelstudy.diagnosis.worth.next_positions import NextPosition
 from accelstudy.gross_errors.recognition import Recognised
 from accelstudy.sensor import SensorModel
+
+LEVEL_EFFECTS = 0.04
+"""Level of the test for anything that is missing, where the noise level is not tested, too."""
+
+
+def level_of_effects(sigma_known: bool) -> float:
+    """Level of the test for anything that is missing.
+
+    With the tests of the noise it makes 5 %; with a stated sigma its level is one of them.
+    """
+    return LEVEL_EFFECTS - REFUTED if sigma_known else LEVEL_EFFECTS
 
 
 @dataclass(frozen=True)
@@ -121,6 +133,11 @@ class Diagnosis:
     recognised: Recognised | None
     suspects: tuple[tuple[int, float], ...]
     reason: str
+
+    @property
+    def level(self) -> float:
+        """Level of the test for anything that is missing."""
+        return level_of_effects(self.sigma_known)
 
     @property
     def global_test(self) -> GlobalTest | None:

@@ -15,7 +15,6 @@ from matplotlib.ticker import MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
 from accelstudy.diagnosis.evidence.field import UNKNOWN
-from accelstudy.diagnosis.pipeline import LEVEL_EFFECTS
 from accelstudy.diagnosis.report.positions import condition_sigma
 from accelstudy.diagnosis.report.set_figure import explanations_figure
 from accelstudy.diagnosis.report.wording import GROUPS
@@ -135,8 +134,9 @@ def evidence_figure(diagnosis: Diagnosis) -> Figure:
     smallest = float(np.nanmin([*tested, 1.0]))
     left.hlines(place, tested, 1, color=colours, linewidth=1.2)
     left.scatter(tested, place, color=colours, s=18, zorder=3)
-    left.axvline(LEVEL_EFFECTS, color=BEFORE, linewidth=1, linestyle="--")
-    left.text(LEVEL_EFFECTS, 1.0, f"level {LEVEL_EFFECTS:g}", transform=left.get_xaxis_transform(),
+    level = diagnosis.level
+    left.axvline(level, color=BEFORE, linewidth=1, linestyle="--")
+    left.text(level, 1.0, f"level {level:g}", transform=left.get_xaxis_transform(),
               color=BEFORE, ha="center", va="bottom", fontsize=7.5)  # fmt: skip
     left.set_xscale("log")
     left.set_xlim(2, min(0.3 * smallest, 1e-3))

@@ -11,7 +11,6 @@ from accelstudy.adjustment.quality.whole_model import REFUTED
 from accelstudy.diagnosis.decision.explanations import CREDIBLE
 from accelstudy.diagnosis.decision.noise import LEVEL_NOISE
 from accelstudy.diagnosis.decision.priors import SURE
-from accelstudy.diagnosis.pipeline import LEVEL_EFFECTS
 from accelstudy.diagnosis.report import wording
 from accelstudy.diagnosis.report.figures import diagnosis_figures
 from accelstudy.diagnosis.report.missing import family_words, separates
@@ -74,7 +73,7 @@ def write_report(
         credible=CREDIBLE,
         wrong=round(10 * SURE),
         withheld=round(10 * (1 - SURE)),
-        level=LEVEL_EFFECTS,
+        level=diagnosis.level,
         level_noise=LEVEL_NOISE,
         level_sigma=REFUTED,
         sure=SURE,
