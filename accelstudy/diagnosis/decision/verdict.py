@@ -18,6 +18,9 @@ from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.noise import NOISES
 from accelstudy.diagnosis.space.hypotheses import Hypothesis, Setting, setting_of
 from accelstudy.diagnosis.space.location import LACK_OF_FIT
+from accelstudy.diagnosis.space.repeats import clusters
+from accelstudy.diagnosis.space.residuals import Residuals
+from accelstudy.diagnosis.space.spaces import LackOfFit, Spaces
 from accelstudy.wording import joined, words
 
 LARGE = 300.0
@@ -204,38 +207,42 @@ def _beside(search: Search, alone: Weighed, solution: Solution) -> list[Weighed]
 
 
 def _misfit(search: Search, solution: Solution) -> float:
-    """By how much residuals are still larger than a sigma that holds; 0 if they are not."""
-    if not search.level.known or _refuted_by_repeats(search):
-        return 0.0
+    """By how much residuals are still larger than a sigma that holds; 0 if they are not.
+
+    Where repeated positions refute sigma after the refit, too, it is no measure: then they are
+    themselves the measure of what is left.
+    """
     p = float(special.chdtrc(solution.redundancy, solution.omega))
+    if not search.level.known or 2 * p >= REFUTED:
+        return 0.0
     ratio = float(np.sqrt(solution.omega / solution.redundancy))
-    return ratio if 2 * p < REFUTED else 0.0
-
-
-def _refuted_by_repeats(search: Search) -> bool:
-    """Whether repeated positions alone refute sigma, so that it is no measure of a misfit."""
-    square, freedom = _of_repeats(search)
-    if not freedom:
-        return False
-    p = special.chdtrc(freedom, square), special.chdtr(freedom, square)
-    return bool(2 * min(p) < REFUTED)
+    left = Residuals.of(solution)
+    labels = clusters(search.setting.frame.forces)
+    if len(labels) != len(solution.misclosures) or len(np.unique(labels)) == len(labels):
+        return ratio
+    square, freedom = _of_repeats(left, LackOfFit.of(left, labels))
+    if not freedom or special.chdtrc(freedom, square) >= REFUTED / 2:
+        return ratio
+    return ratio if _of_fit(left, square, freedom) < REFUTED else 0.0
 
 
 def lack_of_fit(search: Search) -> float:
     """Probability that repeats agree so much better with each other than with the model."""
-    square, freedom = _of_repeats(search)
-    rest = search.residuals.redundancy - freedom
+    if LACK_OF_FIT not in search.groups:
+        return 1.0
+    return _of_fit(search.residuals, *_of_repeats(search.residuals, search.groups[LACK_OF_FIT]))
+
+
+def _of_fit(residuals: Residuals, square: float, freedom: int) -> float:
+    """F test of all that is no difference of repeats against their differences."""
+    rest = residuals.redundancy - freedom
     if not freedom or not rest:
         return 1.0
-    z = search.residuals.z
-    ratio = (float(z @ z) - square) / rest / (square / freedom)
+    ratio = (float(residuals.z @ residuals.z) - square) / rest / (square / freedom)
     return float(special.fdtrc(rest, freedom, ratio))
 
 
-def _of_repeats(search: Search) -> tuple[float, int]:
+def _of_repeats(residuals: Residuals, same: Spaces) -> tuple[float, int]:
     """Square of the differences of repeated positions, and its degrees of freedom."""
-    if LACK_OF_FIT not in search.groups:
-        return 0.0, 0
-    z, same = search.residuals.z, search.groups[LACK_OF_FIT]
-    square = float(z @ z) - float(same.parts(z)[0])
-    return max(square, 0.0), search.residuals.redundancy - int(same.dims[0])
+    square = float(residuals.z @ residuals.z) - float(same.parts(residuals.z)[0])
+    return max(square, 0.0), residuals.redundancy - int(same.dims[0])

@@ -51,9 +51,13 @@ def groups(setting: Setting) -> dict[str, Spaces]:
             found[name] = Bases(basis, np.array([basis.shape[1]]))
 
     for name, signatures in _signatures(setting.frame).items():
-        add_rows(name, np.concatenate([residuals.whitened(s) for s in signatures], axis=1))
+        rows = [residuals.whitened(s) for s in signatures]
+        if name == ROBOT and np.ptp(hold.column("yaw")) > 0:
+            change = residuals.by_observations[..., :3] @ _of_yaw(hold.column("yaw"))
+            rows.append(residuals.stacked(change))
+        add_rows(name, np.concatenate(rows, axis=1))
     if hold.time is not None and np.ptp(hold.time) > 0:
-        add("slow_time", _slow_course(hold))
+        add("slow_time", _slow_course(hold, setting.frame.forces))
     if hold.temperature is not None and np.ptp(hold.temperature) > 0:
         add("temperature", _thermal_course(hold, setting.frame.forces))
     labels = clusters(setting.frame.forces)
@@ -65,25 +69,34 @@ def groups(setting: Setting) -> dict[str, Spaces]:
     return found
 
 
-def _slow_course(hold: Hold) -> Callable[[Moment], Array]:
-    """Biases that change smoothly in the time of holds."""
+def _of_yaw(yaw: Array) -> Array:
+    """Biases that vary with the yaw of the robot, once and twice per turn, as changes (n, 3, k)."""
+    return _per_axis(np.column_stack([f(k * yaw) for k in (1, 2) for f in (np.sin, np.cos)]))
+
+
+def _slow_course(hold: Hold, forces: Array) -> Callable[[Moment], Array]:
+    """Biases that change smoothly in the time of holds, and scales that do in proportion to it."""
     unit = _between(hold.column("time"))
 
     def course(at: Moment) -> Array:
         t = unit(at.time)
-        return _per_axis(np.asarray(np.polynomial.legendre.legvander(t, 4), dtype=float)[:, 1:])
+        bias = np.asarray(np.polynomial.legendre.legvander(t, 4), dtype=float)[:, 1:]
+        scale = np.einsum("na,ab->nab", t[:, None] * forces, np.eye(3))
+        return np.concatenate([_per_axis(bias), scale], axis=2)
 
     return course
 
 
 def _thermal_course(hold: Hold, forces: Array) -> Callable[[Moment], Array]:
-    """Biases that change smoothly with temperature, and scales that do in proportion to it."""
+    """Biases that change smoothly with temperature, and two orders of the scale in proportion."""
     unit = _between(hold.column("temperature"))
 
     def course(at: Moment) -> Array:
         t = unit(at.temperature)
-        scale = np.einsum("na,ab->nab", t[:, None] * forces, np.eye(3))
-        return np.concatenate([_per_axis(np.column_stack([t, t**2])), scale], axis=2)
+        scales = [
+            np.einsum("na,ab->nab", t[:, None] * part, np.eye(3)) for part in (forces, forces**2)
+        ]
+        return np.concatenate([_per_axis(np.column_stack([t, t**2])), *scales], axis=2)
 
     return course
 
