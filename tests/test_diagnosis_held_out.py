@@ -1,5 +1,7 @@
 """Held-out positions: what they need to confirm a name, given that a name was given."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from diagnosis_helpers import NINE, ROBOT, G, shuffled
@@ -8,7 +10,7 @@ from accelstudy.adjustment.quality import solve
 from accelstudy.diagnosis.decision.search import Search
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.result import LEVEL_EFFECTS
-from accelstudy.diagnosis.worth import given_a_name
+from accelstudy.diagnosis.worth import given_a_name, held_out
 from accelstudy.diagnosis.worth.gap import SIGNIFICANT, held_out_gap, split_positions
 from accelstudy.diagnosis.worth.linear import LinearSplit
 from accelstudy.simulation import Noise, session
@@ -65,3 +67,10 @@ def test_prediction_to_first_order_is_that_of_refits(parts):
     change = split.corrections(search.best_shape("quadratic_scale"), left)
     assert np.mean(missed**2) == pytest.approx(gap.before, rel=0.02)
     assert np.mean((missed - change) ** 2) == pytest.approx(gap.after, rel=0.02)
+
+
+def test_a_part_that_can_show_no_pair_chooses_none():
+    """Positions that are too few for two effects at once would not have chosen these two."""
+    part = SimpleNamespace(pairs=[])
+    finding = SimpleNamespace(chosen=("one", "other"), credible_set=())
+    assert held_out._chosen_alike(part, finding) == (("one", "other"), True)

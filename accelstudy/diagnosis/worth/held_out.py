@@ -103,11 +103,10 @@ def _chosen_alike(part: Search, finding: Finding) -> tuple[Sequence[Choice], boo
     """Explanation of the credible set that a part chooses, and whether it would choose another."""
     chosen, credible = finding.chosen, finding.credible_set
     if len(chosen) == 2:
-        best = max(
-            (one for one in part.pairs if len(one.best) == 2), key=lambda one: one.log_weight
-        )
-        same = [one for one in credible if _same(one.classes, best.names)]
-        if not same:
+        pairs = [one for one in part.pairs if len(one.best) == 2]
+        best = max(pairs, key=lambda one: one.log_weight, default=None)
+        same = [one for one in credible if best and _same(one.classes, best.names)]
+        if best is None or not same:
             return chosen, True
         p = same[0].posterior
         return [Choice(h, m, p) for h, m in zip(best.best, best.classes, strict=True)], False
@@ -126,11 +125,10 @@ def _chosen_alike(part: Search, finding: Finding) -> tuple[Sequence[Choice], boo
 
 def _same(classes: Sequence[Sequence[str]], names: Sequence[str]) -> bool:
     """Whether two names are of two classes, in either order."""
-    return len(classes) == 2 and any(
-        a in one and b in other
-        for a, b in (tuple(names), tuple(names[::-1]))
-        for one, other in (classes,)
-    )
+    if len(classes) != 2:
+        return False
+    (one, other), (a, b) = classes, names
+    return (a in one and b in other) or (b in one and a in other)
 
 
 def _refit(part: Search, chosen: Sequence[Choice]) -> Solution | str:
