@@ -35,9 +35,14 @@ class BaseFit:
         """Whether the campaign states the noise of a position mean."""
         return self.campaign.sigma_force is not None
 
-    @cached_property
+    @property
     def solution(self) -> Solution:
         """The fit."""
+        return self._fit[0]
+
+    @cached_property
+    def _fit(self) -> tuple[Solution, bool]:
+        """The fit, and whether its sigma is supposed to be that of the noise within the holds."""
         campaign = self.campaign
         # Without a sigma the weights of forces and angles need one: that of the residuals.
         for _ in range(1 if self.sigma_known else 3):
@@ -54,19 +59,17 @@ class BaseFit:
                 campaign = replace(campaign, sigma_force=sigma, slope=None, sd_slope=None)
         fitted = solve(fit.model, fit.approach, fit.observed, fit.adjustment)
         if self.sigma_known or not self._is_white(fit.sigma_position_posteriori):
-            return fitted
+            return fitted, False
         assert self.white is not None
         observed = replace(fit.observed, sigma_force=float(np.sqrt(np.mean(self.white))))
-        return solve(fit.model, fit.approach, observed)
+        return solve(fit.model, fit.approach, observed), True
 
     @property
     def level(self) -> Level:
         """What is known of the noise of a position mean."""
         if self.sigma_known:
             return Level.given()
-        sigma = self.solution.variances[:, :3].mean()
-        supposed = self.white is not None and np.isclose(sigma, np.mean(self.white))
-        return Level.within_holds() if supposed else Level.unknown()
+        return Level.within_holds() if self._fit[1] else Level.unknown()
 
     def _is_white(self, sigma: float) -> bool:
         """Whether white noise within the holds may explain a scatter of the means."""

@@ -111,10 +111,9 @@ def naming(tables: Tables) -> Figure:
     _curve(two, table, "two", "wrong", **OTHERS["BIC forward"])
     _curve(two, table, "two", "oracle right", **ORACLE)
     two.set_title("two effects: both right")
-    found.set_ylabel("share of campaigns")
     for ax in axes:
         _over_size(ax)
-    found.set_ylim(0, 1.02)
+    _shares(found)
     _legend(fig, 3)
     return fig
 
@@ -134,8 +133,7 @@ def methods(tables: Tables) -> Figure:
         _over_size(ax)
     axes[0].set_title("one effect: the first name is right")
     axes[1].set_title("one effect: some name is wrong")
-    axes[0].set_ylabel("share of campaigns")
-    axes[0].set_ylim(0, 1.02)
+    _shares(axes[0])
     _legend(fig, 6)
     return fig
 
@@ -229,8 +227,7 @@ def outside(tables: Tables) -> Figure:
         _over_size(ax)
         ax.axvline(LARGE, color=INK, linewidth=0.6, linestyle=":")
         ax.set_title(title)
-    axes[0].set_ylabel("share of campaigns")
-    axes[0].set_ylim(0, 1.02)
+    _shares(axes[0])
     _legend(fig, 3)
     return fig
 
@@ -253,10 +250,15 @@ def limits(tables: Tables) -> Figure:
         log_ticks(ax.xaxis, EDGES[0], EDGES[-1])
         ax.set_xlabel(f"size / {limit}")
         ax.set_title(title)
-    axes[0].set_ylabel("share of campaigns")
-    axes[0].set_ylim(0, 1.02)
+    _shares(axes[0])
     _legend(fig, 2)
     return fig
+
+
+def _shares(ax: Axes) -> None:
+    """Make the vertical axis one of shares of campaigns."""
+    ax.set_ylabel("share of campaigns")
+    ax.set_ylim(0, 1.02)
 
 
 def _wide_labels(fig: Figure) -> Figure:

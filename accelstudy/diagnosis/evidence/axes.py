@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.diagnosis.evidence.restricted import restricted_to_residuals
 from accelstudy.diagnosis.evidence.size import Evidence, log_mean
 from accelstudy.diagnosis.space.residuals import Residuals
 
@@ -75,8 +76,7 @@ def _normal(x: Array, y: Array, centre: Array, spread: float) -> Array:
 def _restricted(residuals: Residuals, ratios: Array) -> tuple[Array, Array]:
     """log|Nᵀ Σ N| and zᵀ (Nᵀ Σ N)⁻¹ z for variances (g, 3) of the axes, (g,) each.
 
-    As in `colour`: with an orthonormal basis U of the design they are log|Σ| + log|Uᵀ Σ⁻¹ U| and
-    zᵀ Σ⁻¹ z − zᵀ Σ⁻¹ U (Uᵀ Σ⁻¹ U)⁻¹ Uᵀ Σ⁻¹ z.
+    The axes of the grid are taken some at a time, as all together would need much memory.
     """
     n, c = residuals.whitening.shape[:2]
     columns = np.column_stack([residuals.absorbed, residuals.z])
@@ -90,9 +90,8 @@ def _restricted(residuals: Residuals, ratios: Array) -> tuple[Array, Array]:
         covariance = np.eye(c) + np.einsum("ga,nacd->gncd", some - 1, outer)
         weighted = (np.linalg.inv(covariance) @ own).reshape(len(some), n * c, -1)
         normal = own.reshape(n * c, -1).T @ weighted + beside
-        design, mixed = normal[:, :-1, :-1], normal[:, :-1, -1:]
-        size = np.sum(np.linalg.slogdet(covariance)[1], axis=1) + np.linalg.slogdet(design)[1]
-        explained = np.swapaxes(mixed, 1, 2) @ np.linalg.solve(design, mixed)
-        determinants.append(size)
-        squares.append(normal[:, -1, -1] - explained[:, 0, 0])
+        whole = np.sum(np.linalg.slogdet(covariance)[1], axis=1)
+        determinant, square = restricted_to_residuals(whole, normal)
+        determinants.append(determinant)
+        squares.append(square)
     return np.concatenate(determinants), np.concatenate(squares)

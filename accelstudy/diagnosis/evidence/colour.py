@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.diagnosis.evidence.restricted import restricted_to_residuals
 from accelstudy.diagnosis.evidence.size import Evidence, log_mean
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.noise_effects.coloured_noise import memory, renewed
@@ -54,11 +55,7 @@ def restricted(residuals: Residuals, strengths: Sequence[float]) -> tuple[Array,
     """log|Nᵀ Σ N| and zᵀ (Nᵀ Σ N)⁻¹ z of white noise and a process on each axis, (k, s) each.
 
     The covariance of unit weight is Σ = I + s F (I₃ ⊗ K) Fᵀ, with F the noise of the forces in the
-    conditions. In the residual space (Harville 1974, restricted maximum
-    likelihood), with an orthonormal basis U of the design,
-
-        log|Nᵀ Σ N| = log|Σ| + log|Uᵀ Σ⁻¹ U|,
-        zᵀ (Nᵀ Σ N)⁻¹ z = zᵀ Σ⁻¹ z − zᵀ Σ⁻¹ U (Uᵀ Σ⁻¹ U)⁻¹ Uᵀ Σ⁻¹ z.
+    conditions.
 
     Parameters
     ----------
@@ -67,15 +64,9 @@ def restricted(residuals: Residuals, strengths: Sequence[float]) -> tuple[Array,
     """
     n, c = residuals.whitening.shape[:2]
     columns = np.column_stack([residuals.absorbed, residuals.z])
-    u = columns.shape[1] - 1
-    determinant, normal = _filtered(residuals, columns[: n * c].reshape(n, c, u + 1), strengths)
+    determinant, normal = _filtered(residuals, columns[: n * c].reshape(n, c, -1), strengths)
     rest = columns[n * c :]  # observed gravity is no force
-    normal = normal + rest.T @ rest
-    design, mixed, square = normal[..., :u, :u], normal[..., :u, u:], normal[..., u, u]
-    determinant = determinant + np.linalg.slogdet(design)[1]
-    explained = np.swapaxes(mixed, -1, -2) @ np.linalg.solve(design, mixed)
-    square = square - explained[..., 0, 0]
-    return np.asarray(determinant), np.asarray(square)
+    return restricted_to_residuals(determinant, normal + rest.T @ rest)
 
 
 def _filtered(

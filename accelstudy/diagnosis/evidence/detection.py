@@ -96,11 +96,10 @@ def detect(field: Field, evidence: Evidence, residuals: Residuals, chance: Chanc
     weights: list[Array] = []
     for errors in chance.errors_with_effects(residuals, field):
         parts, squares = field.parts(errors), np.sum(errors**2, axis=-1)
-        logs = field.combined(evidence.of_spaces(parts, field.dims, squares))
-        odds.append(logs - np.logaddexp.reduce(evidence.of_noise(squares), axis=-1)[:, None])
+        odds.append(field.odds(evidence, parts, squares))
         weights.append(1 / (0.5 + 0.5 * np.exp(np.minimum(field.proposal(parts), 700.0))))
     each, w = np.concatenate(odds), np.concatenate(weights)
-    total = np.logaddexp.reduce(each, axis=1) - np.log(k)
+    total = total_odds(each)
     statistic = float(np.logaddexp.reduce(densities) - np.log(k) - nothing)
     strongest = each.max(axis=1)
     own = densities - nothing
@@ -113,6 +112,11 @@ def detect(field: Field, evidence: Evidence, residuals: Residuals, chance: Chanc
         p_family={n: tail(strongest, w, own[i], k) for i, n in enumerate(field.names)},
         by_chance=Simulated(total, w),
     )
+
+
+def total_odds(each: Array) -> Array:
+    """S of log odds of each candidate, (b, K): that one of them is missing, whichever, (b,)."""
+    return np.asarray(np.logaddexp.reduce(each, axis=1) - np.log(each.shape[1]))
 
 
 def tail(values: Array, weights: Array, value: float, count: int = 1) -> float:

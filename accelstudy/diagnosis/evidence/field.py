@@ -100,6 +100,18 @@ class Field:
         weighted = logs + np.log(np.concatenate(self.weights))
         return np.asarray(np.logaddexp.reduceat(weighted, self.starts, axis=-1))
 
+    def odds(self, evidence: Evidence, parts: Array, squares: Array) -> Array:
+        """Log odds of each candidate against nothing, (b, K).
+
+        Parameters
+        ----------
+        evidence : Evidence
+        parts : (b, s) array, of `parts`
+        squares : (b,) array, ‖z‖²
+        """
+        logs = self.combined(evidence.of_spaces(parts, self.dims, squares))
+        return logs - np.logaddexp.reduce(evidence.of_noise(squares), axis=-1)[:, None]
+
     # --- simulated effects ----------------------------------------------------------------------
 
     @cached_property

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from accelstudy.diagnosis.decision.explanations import CREDIBLE
 from accelstudy.diagnosis.decision.priors import MANY, SURE
 from accelstudy.diagnosis.decision.search import Search
+from accelstudy.diagnosis.evidence.detection import total_odds
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis
 from accelstudy.diagnosis.worth.gap import SIGNIFICANT
@@ -46,12 +47,10 @@ def needed_z(
     noise = rng.standard_normal(added.shape) + residuals.project(added.T).T
     z = residuals.project(noise.T).T
     parts, squares = field.parts(z), np.sum(z**2, axis=-1)
-    logs = field.combined(search.evidence.of_spaces(parts, field.dims, squares))
-    nothing = np.logaddexp.reduce(search.evidence.of_noise(squares), axis=-1)
-    statistic = np.logaddexp.reduce(logs, axis=1) - np.log(len(field.names)) - nothing
+    odds = field.odds(search.evidence, parts, squares)
     label = _labels(search)
-    named, top = _named(logs, [label[name] for name in field.names])
-    found = np.flatnonzero(named & (statistic > search.detection.by_chance.beyond(level)))
+    named, top = _named(odds, [label[name] for name in field.names])
+    found = np.flatnonzero(named & (total_odds(odds) > search.detection.by_chance.beyond(level)))
     if not len(found):
         return SIGNIFICANT
     weights = np.exp(-field.proposal(parts[found]))
