@@ -2,7 +2,7 @@
 
 from accelstudy.study.cells import batches, study_cells
 from accelstudy.study.config import parse_study
-from accelstudy.study.simulate import simulate_batch
+from accelstudy.study.simulate import blocks, joined, n_blocks, simulate_batch
 from accelstudy.study.summary import summarise_batch
 from accelstudy.study.tables import TABLES, collect, read_table
 from accelstudy.units import MGON
@@ -41,6 +41,11 @@ def make_cells(*grids, **keys):
 
 def specification(cells, seed=1):
     return {"seed": seed, "cells": [cell.to_dict() for cell in cells]}
+
+
+def simulated(cell, seed=1):
+    """All replicates of a cell in one block."""
+    return joined(blocks(cell, seed, 0, n_blocks(cell)))
 
 
 def simulate(folder, cells, seed=1):

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from scipy import stats
-from study_helpers import NINE, grid, make_cells, make_study, run_study
+from study_helpers import NINE, grid, make_cells, make_study, run_study, simulated
 
 from accelstudy.effects import get_effect
 from accelstudy.errors import InputError
@@ -14,7 +14,6 @@ from accelstudy.leveling_error import cap_forces, leveling_error
 from accelstudy.models import get_model
 from accelstudy.sensor import SensorModel
 from accelstudy.study.cells import Cell
-from accelstudy.study.simulate import simulate_cell
 from accelstudy.units import MGON, STANDARD_GRAVITY
 
 FULL = HoldPlan(30.0, (10.0, 40.0), "random", (0.5, 2.0), "random", seed=3)
@@ -144,7 +143,7 @@ def test_a_study_of_effects_that_depend_on_the_holds(tmp_path):
 @pytest.mark.parametrize("name", ["vibration_rectification", "hysteresis", "encoder_scale"])
 def test_any_effect_can_be_switched_on(name):
     cells = make_cells(grid(), simulated_effects=["bias", name], holds=HOLDS)
-    assert np.isfinite(simulate_cell(cells[f"{NINE}/mclaren-24/robot"], 1).estimates).all()
+    assert np.isfinite(simulated(cells[f"{NINE}/mclaren-24/robot"]).estimates).all()
 
 
 @pytest.mark.parametrize(

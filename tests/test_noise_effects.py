@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from scipy import stats
-from study_helpers import grid, make_cells, make_study
+from study_helpers import grid, make_cells, make_study, simulated
 
 from accelstudy.effects import Hold
 from accelstudy.errors import InputError
@@ -14,7 +14,6 @@ from accelstudy.noise_effects import get_noise_effect, noise_effect_names
 from accelstudy.schemes import get_scheme
 from accelstudy.simulation import Noise, session
 from accelstudy.study.cells import Cell
-from accelstudy.study.simulate import simulate_cell
 
 MODEL = get_model("bias-scale-nonorthogonality")
 SIGMA, R = 0.003, 4000
@@ -165,7 +164,7 @@ def test_cells_have_the_noise_effects_of_the_study():
             plain[name].seed(1, 0).generate_state(4)
         )
     cell = make_cells(grid(replicates=2000), noise={"effects": ["noise_level(kappa=4)"]})
-    result = simulate_cell(cell["bias-scale-nonorthogonality/mclaren-24/gravity"], 1)
+    result = simulated(cell["bias-scale-nonorthogonality/mclaren-24/gravity"])
     # Ω is 4 χ²_r.
     assert result.omega.mean() / result.redundancy == pytest.approx(
         4, rel=4.5 * math.sqrt(2 / result.redundancy / 2000)

@@ -6,19 +6,19 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from study_helpers import NINE, PAPER_TRUTH, grid, make_cells, make_study, run_study
+from study_helpers import NINE, PAPER_TRUTH, grid, make_cells, make_study, run_study, simulated
 
 from accelstudy.models import MODELS, PRESETS
 from accelstudy.simulation import Noise
 from accelstudy.study.cells import batches, study_cells
-from accelstudy.study.simulate import BLOCK, simulate_cell
+from accelstudy.study.simulate import BLOCK, blocks
 from accelstudy.units import MGON
 
 GRAVITY, ROBOT = f"{NINE}/mclaren-24/gravity", f"{NINE}/mclaren-24/robot"
 
 
 def estimates(cell, seed=1):
-    return simulate_cell(cell, seed).estimates
+    return simulated(cell, seed).estimates
 
 
 # --- what a cell is ------------------------------------------------------------------------------
@@ -91,8 +91,8 @@ def test_model_of_the_user():
     cells = make_cells(grid(models="mine"), models={"mine": ["scale", "bias"]})
     cell = cells["mine/mclaren-24/robot"]
     assert cell.estimated_model.parameter_names == ("s_x", "s_y", "s_z", "b_x", "b_y", "b_z")
-    result = simulate_cell(cell, 1)
-    truth = [cell.truth[name] for name in result.parameter_names]
+    result = simulated(cell)
+    truth = [cell.truth[name] for name in cell.estimated_model.parameter_names]
     errors = (result.estimates.mean(axis=0) - truth) / result.sigma_priori[0]
     assert np.abs(errors).max() < 4.5 / np.sqrt(cell.replicates)
 
@@ -149,6 +149,13 @@ def test_more_replicates_extend_the_fewer():
     assert len(many) == BLOCK + 30
     for fewer in (1, 20, BLOCK, BLOCK + 1):
         np.testing.assert_array_equal(estimates(replace(cell, replicates=fewer)), many[:fewer])
+
+
+def test_a_block_does_not_depend_on_those_before_it():
+    cell = make_cells(grid(replicates=BLOCK + 30))[ROBOT]
+    (last,) = blocks(cell, 1, 1, 5)
+    np.testing.assert_array_equal(last.estimates, estimates(cell)[BLOCK:])
+    assert last.correlation_sum.diagonal() == pytest.approx(np.full(9, 30), rel=1e-12)
 
 
 def test_no_two_replicates_are_alike():

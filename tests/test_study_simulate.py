@@ -8,14 +8,23 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from study_helpers import NINE, PAPER_TRUTH, PROVENANCE, grid, make_cells, run_study, simulate
+from study_helpers import (
+    NINE,
+    PAPER_TRUTH,
+    PROVENANCE,
+    grid,
+    make_cells,
+    run_study,
+    simulate,
+    simulated,
+)
 
 import accelstudy
 from accelstudy.design import diagnose
 from accelstudy.errors import InputError
 from accelstudy.study import simulate as module
 from accelstudy.study import tables
-from accelstudy.study.simulate import CORRELATIONS, ESTIMATES, simulate_cell
+from accelstudy.study.simulate import CORRELATIONS, ESTIMATES, blocks
 from accelstudy.study.tables import (
     collect,
     git_commit,
@@ -50,7 +59,7 @@ def test_schema(written):
 def test_rows_of_the_estimates(written):
     cells, estimates, _ = written
     table = read_estimates(estimates, GRAVITY)
-    result = simulate_cell(cells[GRAVITY], 1)
+    result = simulated(cells[GRAVITY])
     assert table["replicate"].tolist() == np.repeat(np.arange(60), 9).tolist()
     assert table["parameter"].tolist() == 60 * [*PAPER_TRUTH]
     np.testing.assert_array_equal(table["estimate"], result.estimates.ravel())
@@ -145,6 +154,17 @@ def files(folder):
 
 
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt, SystemExit])
+def test_a_long_cell_is_written_chunk_by_chunk(monkeypatch, tmp_path):
+    cells = make_cells(grid(approaches="gravity", replicates=3 * module.BLOCK + 7)).values()
+    whole, correlations = simulate(tmp_path / "whole", cells)
+    monkeypatch.setattr(module, "BLOCKS_PER_CHUNK", 2)
+    parts, summed = simulate(tmp_path / "parts", cells)
+    sizes = [pq.ParquetFile(path).num_row_groups for path in (whole, parts)]
+    assert sizes == [1, 2]
+    pd.testing.assert_frame_equal(read_table(parts), read_table(whole), check_exact=True)
+    pd.testing.assert_frame_equal(read_table(summed), read_table(correlations), rtol=1e-13)
+
+
 def test_nothing_is_left_of_an_interrupted_file(error, tmp_path):
     table = simulate(tmp_path / "source", make_cells(grid(replicates=3)).values())[0]
     content = pq.read_table(table)
@@ -193,16 +213,27 @@ def test_a_whole_file_appears_at_once_and_overwrites_remains(tmp_path):
     assert path.read_text() == "new"
 
 
+def test_a_long_cell_is_written_chunk_by_chunk(monkeypatch, tmp_path):
+    cells = make_cells(grid(approaches="gravity", replicates=3 * module.BLOCK + 7)).values()
+    whole, correlations = simulate(tmp_path / "whole", cells)
+    monkeypatch.setattr(module, "BLOCKS_PER_CHUNK", 2)
+    parts, summed = simulate(tmp_path / "parts", cells)
+    sizes = [pq.ParquetFile(path).num_row_groups for path in (whole, parts)]
+    assert sizes == [1, 2]
+    pd.testing.assert_frame_equal(read_table(parts), read_table(whole), check_exact=True)
+    pd.testing.assert_frame_equal(read_table(summed), read_table(correlations), rtol=1e-13)
+
+
 def test_nothing_is_left_of_an_interrupted_batch(monkeypatch, tmp_path):
     calls = []
 
-    def broken(cell, seed):
+    def broken(cell, *which):
         calls.append(cell.name)
         if len(calls) == 2:
             raise KeyboardInterrupt
-        return simulate_cell(cell, seed)
+        return blocks(cell, *which)
 
-    monkeypatch.setattr(module, "simulate_cell", broken)
+    monkeypatch.setattr(module, "blocks", broken)
     with pytest.raises(KeyboardInterrupt):
         simulate(tmp_path, make_cells(grid()).values())
     assert calls == [GRAVITY, ROBOT]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -22,42 +23,54 @@ Array = NDArray[np.float64]
 
 BLOCK = 500
 """Replicates that are drawn and adjusted together, from one seed; small enough for the cache."""
+BLOCKS_PER_CHUNK = 20
+"""Blocks that are held and written together, as one row group: memory follows it, not the count."""
 
 log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class CellResult:
-    """Calibrations of one cell, R replicates; NaN where one did not converge.
+class Block:
+    """Calibrations of R replicates of one cell; NaN where one did not converge.
 
     Attributes
     ----------
-    parameter_names : tuple of str (gravity is the last one if it is observed)
-    estimates, sigma_priori : (R, u) arrays, SI
+    estimates, sigma_priori : (R, u) arrays, SI; gravity is the last parameter if it is observed
     omega : (R,) array
     redundancy : int
     iterations : (R,) int array
     converged : (R,) bool array
-    correlation : (u, u) array, of Σ_xx, mean over the converged replicates
+    correlation_sum : (u, u) array, sum over the converged replicates of the correlations from Σ_xx
     """
 
-    parameter_names: tuple[str, ...]
     estimates: Array
     sigma_priori: Array
     omega: Array
     redundancy: int
     iterations: NDArray[np.int_]
     converged: NDArray[np.bool_]
-    correlation: Array
+    correlation_sum: Array
 
 
-def simulate_cell(cell: Cell, seed: int) -> CellResult:
-    """Simulate and calibrate all replicates of an estimable cell.
+def n_blocks(cell: Cell) -> int:
+    """Number of blocks of a cell; the last one may have fewer replicates."""
+    return -(-cell.replicates // BLOCK)
 
-    Replicates are drawn in blocks, each from its own seed and drawn in full, so that a larger
-    number of replicates extends the smaller one.
+
+def blocks(cell: Cell, seed: int, first: int, count: int) -> Iterator[Block]:
+    """Simulate and calibrate blocks of an estimable cell, one after another.
+
+    Each block is drawn from its own seed, and in full, so that a larger number of replicates
+    extends the smaller one, and no block depends on which others are asked for.
+
+    Parameters
+    ----------
+    cell : Cell
+    seed : int, of the study
+    first, count : int, number of the first block, from 0 on, and how many are asked for; there are
+        no more than `n_blocks`
     """
-    simulated, estimated, approach = cell.simulated_model, cell.estimated_model, cell.conditions
+    simulated, estimated = cell.simulated_model, cell.estimated_model
     ideal = session(
         simulated,
         simulated.vector(cell.truth),
@@ -65,36 +78,43 @@ def simulate_cell(cell: Cell, seed: int) -> CellResult:
         cell.gravity,
         cell.hold,
     )
-    results = []
-    for block, first in enumerate(range(0, cell.replicates, BLOCK)):
+    for block in range(first, min(first + count, n_blocks(cell))):
         rng = np.random.default_rng(cell.seed(seed, block))
-        drawn = ideal.draw(cell.noise, BLOCK, rng)
-        results.append(calibrate(estimated, approach, drawn.first(cell.replicates - first)))
+        drawn = ideal.draw(cell.noise, BLOCK, rng).first(cell.replicates - block * BLOCK)
+        result = calibrate(estimated, cell.conditions, drawn)
+        yield Block(
+            estimates=result.parameters,
+            sigma_priori=result.sigma_priori,
+            omega=result.omega,
+            redundancy=result.redundancy,
+            iterations=result.iterations,
+            converged=result.converged,
+            correlation_sum=_correlation_sum(result),
+        )
 
-    def joined(name: str) -> Any:
-        return np.concatenate([getattr(result, name) for result in results])
 
-    names = estimated.parameter_names
-    return CellResult(
-        parameter_names=(*names, "g") if cell.noise.sigma_gravity > 0 else names,
-        estimates=joined("parameters"),
-        sigma_priori=joined("sigma_priori"),
-        omega=joined("omega"),
-        redundancy=results[0].redundancy,
-        iterations=joined("iterations"),
-        converged=joined("converged"),
-        correlation=_mean_correlation(results),
+def _correlation_sum(result: Adjustment) -> Array:
+    q = result.cofactors[result.converged]
+    sigma = np.sqrt(np.diagonal(q, axis1=1, axis2=2))
+    return (q / (sigma[:, :, None] * sigma[:, None, :])).sum(axis=0)
+
+
+def joined(parts: Iterable[Block]) -> Block:
+    """Join blocks that follow each other."""
+    parts = list(parts)
+
+    def together(name: str) -> Any:
+        return np.concatenate([getattr(part, name) for part in parts])
+
+    return Block(
+        estimates=together("estimates"),
+        sigma_priori=together("sigma_priori"),
+        omega=together("omega"),
+        redundancy=parts[0].redundancy,
+        iterations=together("iterations"),
+        converged=together("converged"),
+        correlation_sum=np.sum([part.correlation_sum for part in parts], axis=0),
     )
-
-
-def _mean_correlation(results: Iterable[Adjustment]) -> Array:
-    total, count = 0.0, 0
-    for result in results:
-        q = result.cofactors[result.converged]
-        sigma = np.sqrt(np.diagonal(q, axis1=1, axis2=2))
-        total = total + (q / (sigma[:, :, None] * sigma[:, None, :])).sum(axis=0)
-        count += len(q)
-    return np.asarray(total) / count if count else np.full_like(result.cofactors[0], np.nan)
 
 
 _NAME = pa.dictionary(pa.int32(), pa.string())
@@ -102,7 +122,7 @@ _NAME = pa.dictionary(pa.int32(), pa.string())
 ESTIMATES = pa.schema(
     {
         "cell": _NAME,
-        "replicate": pa.int32(),
+        "replicate": pa.int64(),
         "parameter": _NAME,
         "unit": _NAME,
         "truth": pa.float64(),
@@ -159,8 +179,18 @@ def simulate_batch(
             if not design.estimable:
                 log.info("%d/%d %s: %s", number, len(cells), cell.name, design.reason)
                 continue
-            result = simulate_cell(cell, spec["seed"])
-            failed = int(np.count_nonzero(~result.converged))
+            failed, correlation = 0, np.zeros(())
+            drawn = blocks(cell, spec["seed"], 0, n_blocks(cell))
+            for first in range(0, n_blocks(cell), BLOCKS_PER_CHUNK):
+                chunk = joined(islice(drawn, BLOCKS_PER_CHUNK))
+                write_estimates(_estimates_table(cell, chunk, first * BLOCK))
+                failed += int(np.count_nonzero(~chunk.converged))
+                correlation = correlation + chunk.correlation_sum
+            if failed < cell.replicates:
+                correlation /= cell.replicates - failed
+            else:
+                correlation[:] = np.nan
+            write_correlations(_correlations_table(cell, correlation))
             log.info(
                 "%d/%d %s: %d replicates, %d not converged",
                 number,
@@ -169,8 +199,6 @@ def simulate_batch(
                 cell.replicates,
                 failed,
             )
-            write_estimates(_estimates_table(cell, result))
-            write_correlations(_correlations_table(cell, result))
 
 
 def parameter_units(cell: Cell) -> dict[str, str]:
@@ -179,10 +207,10 @@ def parameter_units(cell: Cell) -> dict[str, str]:
     return {**units, "g": "m/s^2"} if cell.noise.sigma_gravity > 0 else units
 
 
-def _estimates_table(cell: Cell, result: CellResult) -> pa.Table:
-    names = result.parameter_names
-    n_replicates, u = result.estimates.shape
+def _estimates_table(cell: Cell, chunk: Block, first: int) -> pa.Table:
+    """Rows of a chunk whose first replicate has the number `first`."""
     units = parameter_units(cell)
+    n_replicates, u = chunk.estimates.shape
     truth = {**cell.truth, "g": cell.gravity}
 
     def per_replicate(values: Any) -> Any:
@@ -193,28 +221,28 @@ def _estimates_table(cell: Cell, result: CellResult) -> pa.Table:
 
     columns = {
         "cell": _coded(np.zeros(n_replicates * u), [cell.name]),
-        "replicate": per_replicate(np.arange(n_replicates)),
-        "parameter": _coded(per_parameter(list(range(u))), list(names)),
-        "unit": _coded(per_parameter(list(range(u))), [units[name] for name in names]),
-        "truth": per_parameter([truth.get(name, 0.0) for name in names]),
-        "estimate": result.estimates.ravel(),
-        "sigma_priori": result.sigma_priori.ravel(),
-        "omega": per_replicate(result.omega),
-        "redundancy": np.full(n_replicates * u, result.redundancy),
-        "iterations": per_replicate(result.iterations),
-        "converged": per_replicate(result.converged),
+        "replicate": per_replicate(np.arange(first, first + n_replicates)),
+        "parameter": _coded(per_parameter(list(range(u))), list(units)),
+        "unit": _coded(per_parameter(list(range(u))), list(units.values())),
+        "truth": per_parameter([truth.get(name, 0.0) for name in units]),
+        "estimate": chunk.estimates.ravel(),
+        "sigma_priori": chunk.sigma_priori.ravel(),
+        "omega": per_replicate(chunk.omega),
+        "redundancy": np.full(n_replicates * u, chunk.redundancy),
+        "iterations": per_replicate(chunk.iterations),
+        "converged": per_replicate(chunk.converged),
     }
     return pa.table(columns, schema=ESTIMATES)
 
 
-def _correlations_table(cell: Cell, result: CellResult) -> pa.Table:
-    names = list(result.parameter_names)
+def _correlations_table(cell: Cell, correlation: Array) -> pa.Table:
+    names = list(parameter_units(cell))
     u = len(names)
     columns = {
         "cell": _coded(np.zeros(u * u), [cell.name]),
         "parameter_1": _coded(np.repeat(np.arange(u), u), names),
         "parameter_2": _coded(np.tile(np.arange(u), u), names),
-        "adjustment": result.correlation.ravel(),
+        "adjustment": correlation.ravel(),
     }
     return pa.table(columns, schema=CORRELATIONS)
 
