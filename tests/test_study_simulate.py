@@ -154,17 +154,6 @@ def files(folder):
 
 
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt, SystemExit])
-def test_a_long_cell_is_written_chunk_by_chunk(monkeypatch, tmp_path):
-    cells = make_cells(grid(approaches="gravity", replicates=3 * module.BLOCK + 7)).values()
-    whole, correlations = simulate(tmp_path / "whole", cells)
-    monkeypatch.setattr(module, "BLOCKS_PER_CHUNK", 2)
-    parts, summed = simulate(tmp_path / "parts", cells)
-    sizes = [pq.ParquetFile(path).num_row_groups for path in (whole, parts)]
-    assert sizes == [1, 2]
-    pd.testing.assert_frame_equal(read_table(parts), read_table(whole), check_exact=True)
-    pd.testing.assert_frame_equal(read_table(summed), read_table(correlations), rtol=1e-13)
-
-
 def test_nothing_is_left_of_an_interrupted_file(error, tmp_path):
     table = simulate(tmp_path / "source", make_cells(grid(replicates=3)).values())[0]
     content = pq.read_table(table)
