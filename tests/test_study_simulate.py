@@ -177,11 +177,11 @@ def test_nothing_is_left_of_an_interrupted_file(error, tmp_path):
 
 
 def test_nothing_is_left_when_the_disk_is_full(monkeypatch, tmp_path):
-    def write(table, path, **options):
+    def write(path, table, **options):
         path.write_bytes(b"PAR1")
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(tables.pq, "write_table", write)
+    monkeypatch.setattr(tables, "write_parquet", write)
     with pytest.raises(OSError, match="No space"):
         write_table(tmp_path / "table.parquet", pd.DataFrame({"a": [1]}), PROVENANCE)
     assert files(tmp_path) == []

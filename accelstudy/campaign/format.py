@@ -11,7 +11,6 @@ from typing import Any, Literal
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 import yaml
 from numpy.typing import NDArray
 from pydantic import ValidationError
@@ -30,6 +29,7 @@ from accelstudy.campaign.session import Campaign
 from accelstudy.campaign.wording import one_line
 from accelstudy.errors import InputError
 from accelstudy.outputs import whole_file
+from accelstudy.parquet import write_parquet
 from accelstudy.study.config.errors import first_error
 from accelstudy.study.config.layers import overlay, read_layer
 from accelstudy.units import MGON
@@ -123,7 +123,7 @@ def write_campaign(
                     writer.writerow(columns)
                     writer.writerows(zip(*columns.values(), strict=True))
             else:
-                pq.write_table(pa.table(columns), temporary, write_page_checksum=True)
+                write_parquet(temporary, pa.table(columns))
         for name in set(TABLES) - {path.name}:
             (folder / name).unlink(missing_ok=True)
         with whole_file(folder / HEADER) as temporary:

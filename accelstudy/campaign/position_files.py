@@ -9,13 +9,11 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-import pyarrow as pa
-import pyarrow.parquet as pq
-
 from accelstudy.campaign.checks import check_names
 from accelstudy.campaign.header import KNOWN
 from accelstudy.campaign.wording import one_line
 from accelstudy.errors import InputError
+from accelstudy.parquet import whole_parquet
 
 Columns = Mapping[str, Sequence[Any]]
 
@@ -63,16 +61,11 @@ def _read_csv(path: Path) -> tuple[Columns, list[str]]:
 
 def _read_parquet(path: Path) -> tuple[Columns, list[str]]:
     """Columns of whatever Python makes of them; those that are not known are not looked at."""
-    try:
-        with pq.ParquetFile(path, page_checksum_verification=True) as file:
-            names = [str(name) for name in file.schema_arrow.names]
-            check_names(names, path)
-            table = file.read(columns=[name for name in names if name in KNOWN])
+    with whole_parquet(path) as file:
+        names = [str(name) for name in file.schema_arrow.names]
+        check_names(names, path)
+        table = file.read(columns=[name for name in names if name in KNOWN])
         return {n: table[n].to_pylist() if n in KNOWN else () for n in names}, []
-    except InputError:
-        raise
-    except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError) as error:
-        raise InputError(f"{path}: not a whole Parquet file ({one_line(error)})") from None
 
 
 def _ignored(path: Path, name: str) -> str:

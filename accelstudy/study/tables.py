@@ -12,13 +12,15 @@ from typing import Any
 
 import pandas as pd
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from accelstudy import __version__
-from accelstudy.errors import InputError
 from accelstudy.outputs import whole_file
+from accelstudy.parquet import parquet_file, read_parquet, whole_parquet, write_parquet
 
 METADATA_KEY = b"accelstudy"
+
+REMEDY = "delete it and run again"
+"""What to do with a damaged file; Snakemake then makes it anew."""
 
 TABLES = ("cells", "summary", "correlations", "leveling")
 """Tables that each batch of cells contributes to."""
@@ -68,7 +70,7 @@ def parquet_writer(
     metadata = {METADATA_KEY: json.dumps(origin(provenance)).encode()}
     with (
         whole_file(path) as temporary,
-        pq.ParquetWriter(
+        parquet_file(
             temporary,
             schema.with_metadata(metadata),
             compression="zstd",
@@ -84,7 +86,7 @@ def write_table(path: str | Path, table: pd.DataFrame, provenance: Mapping[str, 
     content = pa.Table.from_pandas(table, preserve_index=False)
     metadata = {**(content.schema.metadata or {}), METADATA_KEY: json.dumps(origin(provenance))}
     with whole_file(path) as temporary:
-        pq.write_table(content.replace_schema_metadata(metadata), temporary, compression="zstd")
+        write_parquet(temporary, content.replace_schema_metadata(metadata), compression="zstd")
 
 
 def read_table(path: str | Path | Sequence[str | Path], **options: Any) -> pd.DataFrame:
@@ -93,22 +95,14 @@ def read_table(path: str | Path | Sequence[str | Path], **options: Any) -> pd.Da
     Raises
     ------
     InputError
-        If the file is missing, or is no whole Parquet file.
+        If the file is missing, or is not whole as it was written.
     """
     if not isinstance(path, str | Path):
         return pd.concat([read_table(each, **options) for each in path], ignore_index=True)
     path = Path(path)
     if path.is_dir():
         return read_table(sorted(path.glob("*.parquet")), **options)
-    try:
-        return pq.read_table(path, partitioning=None, **options).to_pandas()
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
-    except (pa.ArrowInvalid, OSError) as error:
-        reason = str(error).splitlines()[0]
-        raise InputError(
-            f"{path}: not a whole Parquet file ({reason}); delete it and run again"
-        ) from None
+    return read_parquet(path, REMEDY, **options).to_pandas()
 
 
 def collect(parts: Sequence[str | Path], output: str | Path, provenance: Mapping[str, Any]) -> None:
@@ -118,7 +112,8 @@ def collect(parts: Sequence[str | Path], output: str | Path, provenance: Mapping
 
 def read_origin(path: str | Path) -> dict[str, Any]:
     """Origin of a file: config hash, seed, package version and commit."""
-    return json.loads(pq.read_schema(path).metadata[METADATA_KEY])
+    with whole_parquet(path, REMEDY) as file:
+        return json.loads(file.schema_arrow.metadata[METADATA_KEY])
 
 
 def read_estimates(
