@@ -10,7 +10,6 @@ from pathlib import Path
 
 import click
 
-from accelstudy import __version__
 from accelstudy.campaign.commands import COMMANDS
 from accelstudy.campaign.importing_cli import import_command, public_command
 from accelstudy.campaign.simulating_cli import simulate_campaign_command
@@ -75,7 +74,7 @@ class Commands(click.Group):
 
 
 @click.group(cls=Commands)
-@click.version_option(__version__, package_name="accelstudy")
+@click.version_option(package_name="accelstudy")
 @click.option(
     "--angle-unit",
     metavar="[gon|deg]",

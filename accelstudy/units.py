@@ -5,16 +5,19 @@ This is the only place where conversion factors stand.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from typing import TYPE_CHECKING
 
 from accelstudy.errors import UnknownNameError
 
-GON = np.pi / 200.0
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
+
+GON = math.pi / 200.0
 """One gon in rad."""
 MGON = 1e-3 * GON
 """One milligon in rad."""
@@ -27,9 +30,9 @@ UNITS: dict[str, dict[str, float]] = {
         "gon": GON,
         "rad": 1.0,
         "mrad": 1e-3,
-        "mdeg": 1e-3 * np.pi / 180.0,
-        "deg": np.pi / 180.0,
-        "arcsec": np.pi / 648000.0,
+        "mdeg": 1e-3 * math.pi / 180.0,
+        "deg": math.pi / 180.0,
+        "arcsec": math.pi / 648000.0,
     },
     "1": {"ppm": 1e-6, "%": 1e-2, "1": 1.0},
     "m/s^2": {
@@ -97,7 +100,7 @@ def attitude_unit() -> str:
 
 def to_attitude(angle: ArrayLike) -> NDArray[np.float64]:
     """Convert an angle from rad into the unit in which attitudes are shown."""
-    return np.asarray(angle, dtype=float) / UNITS["rad"][attitude_unit()]
+    return _converted(angle, "rad", attitude_unit())
 
 
 def angle_note() -> str:
@@ -128,7 +131,7 @@ def to_display(value: ArrayLike, unit: str) -> NDArray[np.float64]:
 
 
 def _converted(value: ArrayLike, unit: str, wanted: str) -> NDArray[np.float64]:
-    return np.asarray(value, dtype=float) / UNITS.get(unit, {}).get(wanted, 1.0)
+    return _numbers(value) / UNITS.get(unit, {}).get(wanted, 1.0)
 
 
 def to_si(value: ArrayLike, given: str, unit: str) -> NDArray[np.float64]:
@@ -142,4 +145,10 @@ def to_si(value: ArrayLike, given: str, unit: str) -> NDArray[np.float64]:
     known = UNITS.get(unit, {unit: 1.0})
     if given not in known:
         raise UnknownNameError(f"unit of a quantity in {unit}", given, known)
-    return np.asarray(value, dtype=float) * known[given]
+    return _numbers(value) * known[given]
+
+
+def _numbers(value: ArrayLike) -> NDArray[np.float64]:
+    import numpy as np  # half of the time of a command that shows no number, as --help
+
+    return np.asarray(value, dtype=float)

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import check_grad, least_squares, minimize
+from scipy.spatial.transform import Rotation
 
 from accelstudy.schemes import (
     Scheme,
@@ -27,6 +28,7 @@ from accelstudy.schemes.optimal import (
     design_criterion,
     gravity_design,
 )
+from accelstudy.schemes.polyhedra import generic
 
 SHARED = Path(os.environ.get("ACCELSTUDY_SHARED", Path(__file__).parents[2] / "shared"))
 
@@ -263,6 +265,11 @@ def test_mclaren_is_the_orbit_of_its_point():
 
 def test_mclaren_is_turned_off_the_roll_pole():
     assert np.degrees(get_scheme("mclaren-24").pole_distance) == pytest.approx(13.8, abs=0.05)
+
+
+def test_the_generic_orientation_is_by_the_angles_it_names():
+    turned = Rotation.from_euler("xyz", [15, 25, 35], degrees=True).apply(np.eye(3))
+    np.testing.assert_allclose(generic(np.eye(3)), turned, rtol=0, atol=3e-16)
 
 
 @pytest.mark.parametrize("name", ["mclaren-24", "dodecahedron-20", "icosidodecahedron-30"])

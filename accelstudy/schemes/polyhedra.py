@@ -7,6 +7,15 @@ import numpy as np
 from accelstudy.schemes.registry import Array, register
 
 GOLDEN_RATIO = (1 + np.sqrt(5)) / 2
+# Euler angles xyz of (15°, 25°, 35°) in numbers. Every job lists the schemes; to import
+# scipy.spatial's Rotation for them would take most of the time of that.
+_GENERIC = np.array(
+    [
+        [0.742403876506104, -0.46443208696509053, 0.4828450276703281],
+        [0.5198367907256845, 0.853978855082683, 0.02213201481317717],
+        [-0.4226182617406994, 0.23456971600980442, 0.8754260980655929],
+    ]
+)
 
 
 def cyclic_permutations(x: float, y: float, z: float) -> Array:
@@ -28,10 +37,7 @@ def generic(directions: Array) -> Array:
     Aligned with the axes, orbits of the octahedral and icosahedral groups leave cubic terms
     singular under the gravity norm; and a vertex on the x axis has no roll.
     """
-    from scipy.spatial.transform import Rotation  # slow to import, and seldom needed
-
-    turned: Array = Rotation.from_euler("xyz", [15, 25, 35], degrees=True).apply(directions)
-    return turned
+    return directions @ _GENERIC.T
 
 
 @register(
