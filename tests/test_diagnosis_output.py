@@ -25,6 +25,8 @@ from accelstudy.campaign.output import write_calibration
 from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign
 from accelstudy.cli import main
 from accelstudy.diagnosis.decision.explanations import Explanation
+from accelstudy.diagnosis.decision.posterior import Posterior, Weighed
+from accelstudy.diagnosis.decision.verdict import Finding
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.figures import gap_figure, loop_figure
 from accelstudy.diagnosis.report.output import diagnose_folder, write_diagnosis
@@ -168,12 +170,21 @@ def explained(*explanations):
 def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
     shapes = named.setting.candidates
     thermal, drift = (shapes[name][0] for name in ("thermal_bias", "thermal_scale"))
+    weighed = [
+        Weighed((name,), ((name,),), np.log(p), best)
+        for name, p, best in (
+            ("thermal_bias", 0.55, (thermal,)),
+            ("thermal_scale", 0.4, (drift,)),
+            ("unknown", 0.05, ()),
+        )
+    ]
+    finding = replace(named.beside.finding, verdict="narrowed", posterior=Posterior.of(weighed))
     diagnosis = replace(
         named,
         verdict="narrowed",
-        credible_set=explained(("thermal_bias", 0.55), ("thermal_scale", 0.4)),
+        credible_set=finding.credible_set,
         gap=replace(named.gap, statement="effect"),
-        next_positions=tuple(next_positions(named.setting.frame, (thermal,), (drift,))),
+        beside=replace(named.beside, finding=finding),
     )
     content = write_diagnosis(diagnosis, tmp_path)
     assert [error.message for error in SCHEMA.iter_errors(content)] == []
@@ -204,7 +215,8 @@ def test_what_is_certain_of_the_unknown_is_its_headline(named, tmp_path):
     others = ("hysteresis", "settling", "saturation", "cubic_scale", "quadratic_scale")
     diagnosis = replace(
         named,
-        **{"verdict": "unknown", "found": (), "changes": (), "gap": Gap(named.gap.before)},
+        **{"verdict": "unknown", "found": (), "gap": Gap(named.gap.before)},
+        beside=replace(named.beside, finding=Finding("unknown", named.setting)),
         **{"extended": named.model, "final": named.setting, "reason": "too much is open"},
         credible_set=explained(*(("thermal_bias", name, 0.19) for name in others)),
     )
@@ -356,7 +368,7 @@ def test_the_old_simulation_lacks_the_measurement(written, named, tmp_path):
     for case in (("old", "base"), ("new", "extended")):
         values = loop.case(*case)["sigma0_squared"]
         assert values.mean() == pytest.approx(1, abs=5 * values.std() / np.sqrt(len(values)))
-    before, after = diagnosis.gap.leveling
+    before, after = diagnosis.leveling
     assert loop.tilt("new", "base") == pytest.approx(before, rel=0.05)
     assert loop.tilt("new", "extended") == pytest.approx(after, rel=0.1)
     assert loop.tilt("old", "base") < 0.5 * before

@@ -10,14 +10,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.adjustment.quality import Solution, suspects
+from accelstudy.adjustment.quality import Solution
 from accelstudy.adjustment.quality.whole_model import REFUTED
 from accelstudy.approaches import Approach, get_approach
-from accelstudy.campaign.assessment import SUSPECT
 from accelstudy.campaign.format import Campaign
 from accelstudy.diagnosis.base_fit import BaseFit
+from accelstudy.diagnosis.beside import Beside
 from accelstudy.diagnosis.decision.noise import NoiseJudge
-from accelstudy.diagnosis.decision.posterior import of_effects
 from accelstudy.diagnosis.decision.search import Search
 from accelstudy.diagnosis.decision.verdict import Finding, find
 from accelstudy.diagnosis.evidence import noise as noises
@@ -25,12 +24,7 @@ from accelstudy.diagnosis.evidence.chance import SIMULATIONS
 from accelstudy.diagnosis.evidence.noise import NoiseTest
 from accelstudy.diagnosis.result import Diagnosis, Gap, Named, level_of_effects
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
-from accelstudy.diagnosis.space.location import LACK_OF_FIT, locate
-from accelstudy.diagnosis.worth.changes import Change, parameter_changes
 from accelstudy.diagnosis.worth.held_out import held_out
-from accelstudy.diagnosis.worth.limits import upper_limits
-from accelstudy.diagnosis.worth.next_positions import NextPosition, next_positions
-from accelstudy.diagnosis.worth.tilt import leveling_rms
 from accelstudy.gross_errors.recognition import Recognised, recognise
 from accelstudy.progress import stage
 from accelstudy.sensor import SensorModel
@@ -116,11 +110,10 @@ class _Run:
             )
             found = (*gross, *found)
         final, variance = finding.setting, self.noise.unit_variance(finding.setting)
-        names = [choice.best.name for choice in finding.chosen]
+        known = self.fit.sigma_known
+        trusted = known and self.noise.level(search.setting).p_value >= REFUTED
         with stage("held-out positions"):
             gap = self.gap(finding, variance)
-        with stage("next positions"):
-            following = self.next_positions(finding)
         return Diagnosis(
             campaign=self.campaign,
             approach=self.approach,
@@ -132,29 +125,18 @@ class _Run:
             base=self.first,
             setting=search.setting,
             final=final,
-            sigma_known=self.fit.sigma_known,
+            sigma_known=known,
             sigma_source=self.noise.sigma_source(final),
             unit_variance=variance,
             noise_tests=tests,
             screening=search.detection,
             probabilities=self.probabilities(finding),
-            location=self.location(finding, variance),
             gap=gap,
-            changes=self.changes(finding, variance),
-            upper_limits=tuple(upper_limits(final, variance, [*names, *self.open(finding)])),
-            next_positions=following,
+            beside=Beside(search, finding, variance, known, trusted),
             simulations=SIMULATIONS,
             recognised=self.recognised,
-            suspects=self.suspects,
             reason=reason,
         )
-
-    def open(self, finding: Finding) -> set[str]:
-        """Names that a narrowed finding leaves open, to which no limit applies."""
-        if finding.verdict != "narrowed":
-            return set()
-        classes = [alike for one in finding.credible_set for alike in one.classes]
-        return {name for alike in classes for name in alike}
 
     def probabilities(self, finding: Finding) -> dict[str, float]:
         """Posterior of each name, alone or with another; a class stands under its first name.
@@ -187,34 +169,7 @@ class _Run:
             return Finding("no_effect", search.setting), tests
         return self.noise.judged(worst), tests
 
-    @property
-    def suspects(self) -> tuple[tuple[int, float], ...]:
-        """Positions that a calibration by the base model marks, and their p-values."""
-        if self.search.exact:
-            return ()
-        trusted = self.fit.sigma_known and self.noise.level(self.search.setting).p_value >= REFUTED
-        first = self.first
-        found = suspects(first.model, first.approach, first.observed, SUSPECT, trusted)
-        return tuple((int(self.campaign.positions[s.position]), s.p_value) for s in found)
-
     # --- what else is said ----------------------------------------------------------------------
-
-    def location(self, finding: Finding, variance: float) -> dict[str, float]:
-        """Shares of the excess χ² above the given noise or, without it, above what is left.
-
-        That is the noise after what was found or, if something unknown is missing, the least that
-        any group of regressors leaves.
-        """
-        residuals, groups = self.search.residuals, self.search.groups
-        if self.fit.sigma_known:
-            variance = 1.0
-        elif finding.verdict == "unknown":
-            z, r = residuals.z, residuals.redundancy
-            spaces = [space for name, space in groups.items() if name != LACK_OF_FIT]
-            left = [float((z @ z - q.parts(z)[0]) / (r - q.dims[0])) for q in spaces]
-            variance = min([variance, *left])
-        bumped = self.search.setting.candidates.get(OUTLIER)
-        return locate(groups, bumped, residuals, self.search.chance, variance)
 
     def described(self, finding: Finding, tests: Sequence[NoiseTest]) -> tuple[Named, ...]:
         """Describe what was found."""
@@ -265,33 +220,13 @@ class _Run:
         before = self.first.omega / self.first.redundancy
         if not finding.chosen:
             return Gap(before)
-        final, hold = finding.setting.frame.solution, self.search.setting.frame.hold
+        final = finding.setting.frame.solution
         after = final.omega / final.redundancy
-        leveling = leveling_rms(self.first, final, hold, variance)
         if finding.verdict not in ("named", "narrowed"):
-            return Gap(before, after, leveling=leveling)
+            return Gap(before, after)
         known = variance if self.fit.sigma_known else None
         level = level_of_effects(self.fit.sigma_known)
         seeds = [self.stage(number) for number in (1, 2, 3, 4)]
         held = held_out(self.search, finding, known, level, seeds)
         confirmed = held.statement is not None
-        return Gap(before, after, held.gap, leveling, confirmed, held.reason, held.statement)
-
-    def changes(self, finding: Finding, variance: float) -> tuple[Change, ...]:
-        """Compare what added effects should change of the other parameters with what they do."""
-        effects = [choice.best.shown for choice in finding.chosen]
-        added = [effect for effect in effects if effect is not None]
-        if not added or len(added) < len(effects):
-            return ()
-        final, frame = finding.setting.frame.solution, self.search.setting.frame
-        return parameter_changes(self.first, final, frame, added, variance)
-
-    def next_positions(self, finding: Finding) -> tuple[NextPosition, ...]:
-        """Positions that tell the two most probable of the credible set apart."""
-        if finding.posterior is None or finding.verdict not in ("named", "narrowed", "unknown"):
-            return ()
-        weighed = zip(finding.credible_set, finding.posterior.all, strict=False)
-        rivals = [one.best for explanation, one in weighed if of_effects(explanation)]
-        if len(rivals) < 2:
-            return ()
-        return tuple(next_positions(self.search.setting.frame, *rivals[:2]))
+        return Gap(before, after, held.gap, confirmed, held.reason, held.statement)

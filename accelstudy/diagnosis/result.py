@@ -11,6 +11,7 @@ from accelstudy.adjustment.quality import GlobalTest, Solution, global_test
 from accelstudy.adjustment.quality.whole_model import REFUTED
 from accelstudy.approaches import Approach
 from accelstudy.campaign.format import Campaign
+from accelstudy.diagnosis.beside import Beside
 from accelstudy.diagnosis.decision.explanations import Explanation
 from accelstudy.diagnosis.evidence.detection import Detection
 from accelstudy.diagnosis.evidence.noise import NoiseTest
@@ -70,7 +71,6 @@ class Gap:
     before: float
     after: float | None = None
     held_out: HeldOutGap | None = None
-    leveling: tuple[float, float] | None = None
     confirmed: bool = False
     reason: str = ""
     statement: str | None = None
@@ -97,14 +97,10 @@ class Diagnosis:
     noise_tests : tuple of NoiseTest
     screening : Detection, of all candidates
     probabilities : dict of name to posterior probability, given that something is missing
-    location : dict of group to share of the excess χ²
     gap : Gap
-    changes : tuple of Change, of the parameters of the base model by effects that were added
-    upper_limits : tuple of UpperLimit, of the effects that were not found
-    next_positions : tuple of NextPosition, that would separate what is left best
+    beside : Beside, all else that follows
     simulations : int, of residuals without any effect
     recognised : Recognised or None, a gross error of unit, axes or order
-    suspects : tuple of (label, p-value), positions that the calibration marks, on their own
     reason : str, why the verdict is what it is
     """
 
@@ -124,15 +120,41 @@ class Diagnosis:
     noise_tests: tuple[NoiseTest, ...]
     screening: Detection
     probabilities: Mapping[str, float]
-    location: Mapping[str, float]
     gap: Gap
-    changes: tuple[Change, ...]
-    upper_limits: tuple[UpperLimit, ...]
-    next_positions: tuple[NextPosition, ...]
+    beside: Beside
     simulations: int
     recognised: Recognised | None
-    suspects: tuple[tuple[int, float], ...]
     reason: str
+
+    @property
+    def location(self) -> Mapping[str, float]:
+        """Share of the excess χ² in each group."""
+        return self.beside.location
+
+    @property
+    def leveling(self) -> tuple[float, float] | None:
+        """Tilt error without and with the effects that were found, rad; None if there is none."""
+        return self.beside.leveling
+
+    @property
+    def changes(self) -> tuple[Change, ...]:
+        """Changes of the parameters of the base model by effects that were added."""
+        return self.beside.changes
+
+    @property
+    def upper_limits(self) -> tuple[UpperLimit, ...]:
+        """Limits of the effects that were not found."""
+        return self.beside.upper_limits
+
+    @property
+    def next_positions(self) -> tuple[NextPosition, ...]:
+        """Positions that would separate what is left best."""
+        return self.beside.next_positions
+
+    @property
+    def suspects(self) -> tuple[tuple[int, float], ...]:
+        """Label and p-value of positions that the calibration marks, on their own."""
+        return tuple((int(self.campaign.positions[i]), p) for i, p in self.beside.suspects)
 
     @property
     def level(self) -> float:

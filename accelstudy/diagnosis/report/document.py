@@ -144,7 +144,7 @@ def _effect(named: Named) -> dict[str, Any]:
 
 def _gap(d: Diagnosis) -> dict[str, Any]:
     gap, held = d.gap, d.gap.held_out
-    roll_pitch = None if gap.leveling is None else [value / MGON for value in gap.leveling]
+    roll_pitch = None if d.leveling is None else [value / MGON for value in d.leveling]
     return {
         "sigma0_squared": {"before": number(gap.before), "after": number(gap.after)},
         "held_out_mse": {

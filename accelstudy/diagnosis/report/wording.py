@@ -106,8 +106,8 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
             "A position that disagrees with all others was moved, or the sensor had not settled. "
             f"The final parameters are those {changed(d)}."
         )
-    if d.gap.leveling is not None:
-        before, after = (amount(value, "rad") for value in d.gap.leveling)
+    if d.leveling is not None:
+        before, after = (amount(value, "rad") for value in d.leveling)
         unit = display_unit("rad")
         lines.append(
             f"Tilt error of the calibrated sensor: {before} {unit} as it is, {after} {unit} "

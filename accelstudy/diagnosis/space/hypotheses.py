@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import takewhile
 from typing import TypeAlias, overload
 
@@ -340,20 +341,64 @@ class Frame:
 
 @dataclass(frozen=True)
 class Setting:
-    """A calibrated session and the hypotheses about it.
+    """A calibrated session and the hypotheses about it, evaluated when they are asked for first.
 
     Attributes
     ----------
     frame : Frame
-    candidates : dict of name to shapes
-    invisible : tuple of str, effects of rank 0
-    untestable : dict of name to the reason why it cannot be tested
     """
 
     frame: Frame
-    candidates: Mapping[str, Shapes]
-    invisible: tuple[str, ...]
-    untestable: Mapping[str, str]
+
+    @property
+    def candidates(self) -> Mapping[str, Shapes]:
+        """Shapes of what may be missing, by its name."""
+        return self._catalogue[0]
+
+    @property
+    def invisible(self) -> tuple[str, ...]:
+        """Effects of rank 0."""
+        return self._catalogue[1]
+
+    @property
+    def untestable(self) -> Mapping[str, str]:
+        """Why an effect cannot be tested, by its name."""
+        return self._catalogue[2]
+
+    @cached_property
+    def _catalogue(self) -> tuple[dict[str, Shapes], tuple[str, ...], dict[str, str]]:
+        """Evaluate the effects that are not in the model, and bumped positions."""
+        frame, solution = self.frame, self.frame.solution
+        residuals = frame.residuals
+        known = {effect.name for effect in solution.model.effects}
+        candidates: dict[str, Shapes] = {}
+        invisible, untestable = [], {}
+        for name in effect_names():
+            if name in known:
+                continue
+            try:
+                effects = get_effect(name).candidates(frame.hold, frame.forces, solution.gravity)
+                size = max(1, AT_ONCE // residuals.design.size)
+                parts = [effects[i : i + size] for i in range(0, len(effects), size)]
+                shapes = [shape for part in parts for shape in frame.hypotheses(part)]
+            except InputError as error:
+                untestable[name] = str(error)
+                continue
+            seen = [shape for shape in shapes if shape is not None]
+            fitting = [shape for shape in seen if shape.dim < residuals.positions.redundancy]
+            if fitting:
+                candidates[name] = EffectShapes.of(fitting)
+            elif seen:
+                untestable[name] = (
+                    f"its {seen[0].dim} parameters need more than the "
+                    f"{residuals.positions.redundancy} redundant conditions there are"
+                )
+            else:
+                invisible.append(name)
+        bumped = BumpedPositions.of(residuals)
+        if len(bumped):
+            candidates[OUTLIER] = bumped
+        return candidates, tuple(invisible), untestable
 
     def hypothesis(self, effect: Effect) -> Hypothesis | None:
         """Return what an effect would leave in the residuals; None if nothing."""
@@ -381,51 +426,9 @@ def implied_hold(solution: Solution, angles: Array) -> Hold:
     return replace(hold, roll=angles[:, 0], pitch=angles[:, 1], yaw=yaw)
 
 
-def setting_of(solution: Solution, names: Iterable[str] | None = None) -> Setting:
-    """Evaluate the catalogue for a calibrated session.
-
-    Parameters
-    ----------
-    solution : Solution
-    names : effects to look at; all that are not in the model by default
-    """
-    frame = Frame.of(solution)
-    residuals, hold, forces = frame.residuals, frame.hold, frame.forces
-    known = {effect.name for effect in solution.model.effects}
-    candidates: dict[str, Shapes] = {}
-    invisible, untestable = [], {}
-    for name in effect_names() if names is None else names:
-        if name in known:
-            continue
-        try:
-            effects = get_effect(name).candidates(hold, forces, solution.gravity)
-            size = max(1, AT_ONCE // residuals.design.size)
-            parts = [effects[i : i + size] for i in range(0, len(effects), size)]
-            shapes = [shape for part in parts for shape in frame.hypotheses(part)]
-        except InputError as error:
-            untestable[name] = str(error)
-            continue
-        seen = [shape for shape in shapes if shape is not None]
-        fitting = [shape for shape in seen if shape.dim < residuals.positions.redundancy]
-        if fitting:
-            candidates[name] = EffectShapes.of(fitting)
-        elif seen:
-            untestable[name] = (
-                f"its {seen[0].dim} parameters need more than the "
-                f"{residuals.positions.redundancy} redundant "
-                "conditions there are"
-            )
-        else:
-            invisible.append(name)
-    bumped = BumpedPositions.of(residuals)
-    if len(bumped):
-        candidates[OUTLIER] = bumped
-    return Setting(
-        frame=frame,
-        candidates=candidates,
-        invisible=tuple(invisible),
-        untestable=untestable,
-    )
+def setting_of(solution: Solution) -> Setting:
+    """Return the setting of a calibrated session."""
+    return Setting(Frame.of(solution))
 
 
 def same_space(a: Hypothesis, b: Hypothesis) -> bool:

@@ -113,7 +113,7 @@ def close_loop(diagnosis: Diagnosis, replicates: int = REPLICATES, seed: int = 1
     simulated sessions of a kind have no solution.
     """
     d = diagnosis
-    if d.extended is d.model or d.gap.leveling is None:
+    if d.extended is d.model or d.leveling is None:
         return None
     fits, hold = {"base": d.base, "extended": d.final.frame.solution}, d.setting.frame.hold
     kept = np.flatnonzero(kept_positions(d))
