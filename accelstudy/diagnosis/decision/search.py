@@ -23,7 +23,6 @@ from accelstudy.diagnosis.evidence.pairs import all_pairs
 from accelstudy.diagnosis.evidence.size import Evidence, Level, log_mean
 from accelstudy.diagnosis.evidence.unknown import unknown_beside
 from accelstudy.diagnosis.space.hypotheses import (
-    EffectShapes,
     Hypothesis,
     Setting,
     Shapes,
@@ -162,16 +161,22 @@ class Search:
         }
 
     @cached_property
+    def logs(self) -> dict[str, Array]:
+        """Log density of the residuals under each shape of each candidate."""
+        if not self.shapes:
+            return {}
+        z, shapes = self.residuals.z, self.shapes.values()
+        parts = np.concatenate([one.parts(z) for one in shapes])
+        dims = np.concatenate([one.dims for one in shapes])
+        ends = np.cumsum([len(one) for one in shapes])[:-1]
+        each = np.split(self.evidence.of_spaces(parts, dims, z @ z), ends)
+        return dict(zip(self.shapes, each, strict=True))
+
+    @cached_property
     def densities(self) -> dict[str, float]:
         """Log density of the residuals under each candidate, over its shapes."""
-        z = self.residuals.z
         return {
-            name: float(
-                log_mean(
-                    self.evidence.of_spaces(shapes.parts(z), shapes.dims, z @ z),
-                    shape_weights(shapes),
-                )
-            )
+            name: float(log_mean(self.logs[name], shape_weights(shapes)))
             for name, shapes in self.shapes.items()
         }
 
@@ -206,12 +211,8 @@ class Search:
             return (hypothesis.name,)
         if hypothesis.name not in self._members:
             own = self.probable_shapes(hypothesis.name)
-            names = {
-                name
-                for name, shapes in self.setting.candidates.items()
-                if isinstance(shapes, EffectShapes) and shapes.include(own)
-            }
-            self._members[hypothesis.name] = tuple(sorted(names | {hypothesis.name}))
+            names = self.setting.alike(own)
+            self._members[hypothesis.name] = tuple(sorted({*names, hypothesis.name}))
         return self._members[hypothesis.name]
 
     @cached_property
@@ -220,8 +221,7 @@ class Search:
 
     def probable_shapes(self, name: str) -> list[Hypothesis]:
         """Shapes of a candidate between which the residuals do not decide."""
-        shapes, z = self.shapes[name], self.residuals.z
-        logs = self.evidence.of_spaces(shapes.parts(z), shapes.dims, z @ z)
+        shapes, logs = self.shapes[name], self.logs[name]
         return [shapes[int(i)] for i in np.flatnonzero(logs > logs.max() - UNDECIDED)]
 
     def rivals(self, best: Hypothesis, members: Sequence[str]) -> tuple[tuple[str, float], ...]:

@@ -15,8 +15,8 @@ so that a hypothesis with many parameters pays for them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -88,7 +88,6 @@ class Evidence:
 
     level: Level
     redundancy: int
-    _tables: dict[tuple[int, float], Array] = field(default_factory=dict, repr=False)
 
     @cached_property
     def _constants(self) -> Array:
@@ -132,25 +131,29 @@ class Evidence:
         (..., s) array
         """
         dims, squares = np.asarray(dims), np.asarray(squares, dtype=float)
-        noise, total = self.of_noise(squares), np.full(parts.shape, -np.inf)
+        noise, gain = self.of_noise(squares), np.empty(parts.shape)
+        alike = [(int(d), np.flatnonzero(dims == d)) for d in np.unique(dims)]
+        total = None
         for c, nu in enumerate(self.level.freedoms):
             share = np.minimum(parts / (nu + squares)[..., None], 1 - 1e-14)
             at = -(nu + self.redundancy) / 2 * np.log1p(-share)
-            for d in np.unique(dims):
-                chosen = dims == d
-                gain = np.interp(at[..., chosen], _LOGS, self._table(int(d), nu))
-                total[..., chosen] = np.logaddexp(total[..., chosen], noise[..., c, None] + gain)
+            for d, places in alike:
+                table = _table(d, nu, self.redundancy)
+                gain[..., places] = np.interp(at[..., places], _LOGS, table)
+            logs = noise[..., c, None] + gain
+            total = logs if total is None else np.logaddexp(total, logs)
+        assert total is not None
         return total
 
-    def _table(self, dim: int, nu: float) -> Array:
-        """Log of the mean over λ at `_LOGS`, beside noise alone."""
-        if (dim, nu) not in self._tables:
-            half = (nu + self.redundancy) / 2
-            share = -np.expm1(-_LOGS / half)
-            g = SIZES[:, None] / dim
-            logs = -dim / 2 * np.log1p(g) - half * np.log1p(-g / (1 + g) * share)
-            self._tables[dim, nu] = log_mean(logs.T, SIZE_WEIGHTS)
-        return self._tables[dim, nu]
+
+@lru_cache(maxsize=1024)
+def _table(dim: int, nu: float, redundancy: int) -> Array:
+    """Log of the mean over λ at `_LOGS`, beside noise alone."""
+    half = (nu + redundancy) / 2
+    share = -np.expm1(-_LOGS / half)
+    g = SIZES[:, None] / dim
+    logs = -dim / 2 * np.log1p(g) - half * np.log1p(-g / (1 + g) * share)
+    return log_mean(logs.T, SIZE_WEIGHTS)
 
 
 def log_mean(logs: Array, weights: ArrayLike | None = None) -> Array:

@@ -103,31 +103,16 @@ class EffectShapes(Bases, Sequence[Hypothesis]):
     Attributes
     ----------
     hypotheses : tuple of Hypothesis, whose bases are columns of `together`
-    ideals : Bases, their spaces for an ideal sensor
     """
 
     hypotheses: tuple[Hypothesis, ...]
-    ideals: Bases
 
     @classmethod
     def of(cls, hypotheses: Sequence[Hypothesis]) -> EffectShapes:
         """Gather shapes."""
         own = Bases.beside_each_other([h.basis for h in hypotheses])
-        ideals = Bases.beside_each_other([h.ideal for h in hypotheses])
-        shared = tuple(
-            replace(h, basis=basis, ideal=ideal)
-            for h, basis, ideal in zip(hypotheses, own.split(), ideals.split(), strict=True)
-        )
-        return cls(own.together, own.dims, shared, ideals)
-
-    def include(self, others: Sequence[Hypothesis]) -> bool:
-        """Whether one of the shapes cannot be told from one of other hypotheses."""
-        dims = np.array([other.dim for other in others])
-        products = self.ideals.parts(np.concatenate([other.ideal.T for other in others]))
-        # The squares of the cosines sum to those of all products: most need no decomposition.
-        squares = np.add.reduceat(products, np.cumsum(dims) - dims, axis=0)
-        likely = np.argwhere(squares > dims[:, None] * ALIKE**2)
-        return any(same_space(others[i], self.hypotheses[k]) for i, k in likely)
+        shared = zip(hypotheses, own.split(), strict=True)
+        return cls(own.together, own.dims, tuple(replace(h, basis=q) for h, q in shared))
 
     def drawn(self, places: NDArray[np.int_], amounts: Sequence[Array]) -> Array:
         """Sums of the columns of some bases by amounts (l,) of each, (b, m)."""
@@ -404,14 +389,44 @@ class Setting:
         """Return what an effect would leave in the residuals; None if nothing."""
         return self.frame.hypotheses((effect,))[0]
 
+    def alike(self, others: Sequence[Hypothesis]) -> set[str]:
+        """Effects of which a shape cannot be told from one of other hypotheses."""
+        dims = np.array([other.dim for other in others])
+        products = self._ideals.parts(np.concatenate([other.ideal.T for other in others]))
+        # The squares of the cosines sum to those of all products: most need no decomposition.
+        squares = np.add.reduceat(products, np.cumsum(dims) - dims, axis=0)
+        found: set[str] = set()
+        for i, k in np.argwhere(squares > dims[:, None] * ALIKE**2).tolist():
+            shape = self._shapes[k]
+            if shape.name not in found and same_space(others[i], shape):
+                found.add(shape.name)
+        return found
+
     def nearest(self, hypothesis: Hypothesis) -> tuple[tuple[str, float], ...]:
         """Other effects and their largest canonical cosines, nearest first."""
-        near = {
-            name: max(float(cosines(hypothesis.ideal, h.ideal)[0]) for h in shapes)
-            for name, shapes in self.candidates.items()
-            if name not in (OUTLIER, hypothesis.name)
-        }
+        products = hypothesis.ideal.T @ self._ideals.together
+        largest = np.zeros(len(self._shapes))
+        for d in np.unique(self._ideals.dims):
+            own = np.flatnonzero(self._ideals.dims == d)
+            blocks = products[:, self._ideals.ends[own][:, None] + np.arange(d)]
+            values = np.linalg.svd(np.swapaxes(blocks, 0, 1), compute_uv=False)[:, 0]
+            largest[own] = np.minimum(values, 1.0)
+        near: dict[str, float] = {}
+        for shape, cosine in zip(self._shapes, largest.tolist(), strict=True):
+            if shape.name != hypothesis.name:
+                near[shape.name] = max(near.get(shape.name, 0.0), cosine)
         return tuple(sorted(near.items(), key=lambda item: -item[1]))
+
+    @cached_property
+    def _shapes(self) -> list[Hypothesis]:
+        """All shapes of all effects."""
+        effects = (one for one in self.candidates.values() if isinstance(one, EffectShapes))
+        return [shape for shapes in effects for shape in shapes]
+
+    @cached_property
+    def _ideals(self) -> Bases:
+        """Their spaces for an ideal sensor."""
+        return Bases.beside_each_other([shape.ideal for shape in self._shapes])
 
 
 def cosines(a: Array, b: Array) -> Array:
