@@ -74,7 +74,7 @@ lint: $(READY) ## check style, types and the workflow
 
 lock: $(READY) ## lock the newest versions that pyproject.toml allows
 	uv lock --upgrade --default-index https://pypi.org/simple
-	uv export --quiet --frozen --no-emit-project --all-groups --output-file requirements.lock
+	uv export --quiet --frozen --no-emit-project --all-groups --all-extras --output-file requirements.lock
 	uv export --quiet --frozen --no-emit-project --only-group build --output-file requirements-build.lock
 
 clean: ## remove the environment and all caches, but no results

@@ -22,8 +22,8 @@ PACKAGES = [package for package in UV_LOCK["package"] if package["name"] != "acc
 
 def declared():
     """All requirements in pyproject.toml, those of the project first."""
-    groups = PROJECT["dependency-groups"].values()
-    entries = [entry for group in groups for entry in group if isinstance(entry, str)]
+    groups = PROJECT["project"]["optional-dependencies"] | PROJECT["dependency-groups"]
+    entries = [entry for group in groups.values() for entry in group if isinstance(entry, str)]
     return [Requirement(entry) for entry in PROJECT["project"]["dependencies"] + entries]
 
 
