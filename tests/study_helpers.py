@@ -1,8 +1,9 @@
 """A small study without Snakemake: configured, simulated and summarised as the workflow does it."""
 
+from accelstudy.adjustment.block import joined
 from accelstudy.study.cells import batches, study_cells
 from accelstudy.study.config import parse_study
-from accelstudy.study.simulate import blocks, joined, n_blocks, simulate_batch
+from accelstudy.study.simulate import blocks, n_blocks, simulate_batch
 from accelstudy.study.summary import summarise_batch
 from accelstudy.study.tables import TABLES, collect, read_table
 from accelstudy.units import MGON

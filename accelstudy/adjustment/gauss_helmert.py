@@ -27,6 +27,8 @@ Array = NDArray[np.float64]
 MAX_ITERATIONS = 30
 STEP_TOLERANCE = 1e-6
 """Convergence: the last step is below this fraction of a standard deviation."""
+ROUNDING = 64
+"""The last step is not asked to be below so many roundings of the largest observation."""
 PIVOT_TOLERANCE = 1e-12
 """A normal matrix, scaled to unit diagonal, is singular when a Cholesky pivot is below this."""
 
@@ -209,7 +211,7 @@ def adjust(
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         for iteration in range(1, max_iterations + 1):
             at = equations.linearise(x, observed + v, latent)
-            redundancy = _redundancy(at.psi, weights)
+            redundancy = redundancy_of(at.psi.shape[0] * at.psi.shape[2], weights)
             step = _step(at, v, q, weights, direct - x)
             x, v, latent = x + step.dx, step.v, at.latent
             converged = step.size <= tolerance[active]
@@ -317,9 +319,15 @@ def _normal_equations(a: Array, w: Array) -> tuple[Array, Array]:
     return normal, -np.einsum("curn,crn->ur", a, w)
 
 
-def _redundancy(psi: Array, weights: Array) -> int:
-    """Redundancy r = conditions (direct observations of parameters included) − unknowns."""
-    n_conditions = psi.shape[0] * psi.shape[2] + int(np.count_nonzero(weights))
+def redundancy_of(conditions: int, weights: Array) -> int:
+    """Redundancy r = conditions (direct observations of parameters included) − unknowns.
+
+    Raises
+    ------
+    InputError
+        If there are fewer conditions than unknowns.
+    """
+    n_conditions = conditions + int(np.count_nonzero(weights))
     if n_conditions < len(weights):
         raise InputError(
             f"{n_conditions} condition equations cannot determine {len(weights)} parameters"
@@ -336,4 +344,4 @@ def _sigma(q: Array) -> Array:
 def _tolerance(observed: Array, q: Array) -> Array:
     """Step at which each replicate stops, in standard deviations: never finer than rounding."""
     largest = np.max(np.abs(observed) / _sigma(q)[:, None], axis=(0, 2), initial=0.0)
-    return np.asarray(np.maximum(STEP_TOLERANCE, 64 * np.finfo(float).eps * largest))
+    return np.asarray(np.maximum(STEP_TOLERANCE, ROUNDING * np.finfo(float).eps * largest))

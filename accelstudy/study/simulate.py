@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,8 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from accelstudy.adjustment import Adjustment, calibrate
+from accelstudy.adjustment import calibrate
+from accelstudy.adjustment.block import Block, joined
 from accelstudy.design import diagnose
 from accelstudy.simulation import session
 from accelstudy.study.cells import Cell
@@ -27,29 +27,6 @@ BLOCKS_PER_CHUNK = 20
 """Blocks that are held and written together, as one row group: memory follows it, not the count."""
 
 log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class Block:
-    """Calibrations of R replicates of one cell; NaN where one did not converge.
-
-    Attributes
-    ----------
-    estimates, sigma_priori : (R, u) arrays, SI; gravity is the last parameter if it is observed
-    omega : (R,) array
-    redundancy : int
-    iterations : (R,) int array
-    converged : (R,) bool array
-    correlation_sum : (u, u) array, sum over the converged replicates of the correlations from Σ_xx
-    """
-
-    estimates: Array
-    sigma_priori: Array
-    omega: Array
-    redundancy: int
-    iterations: NDArray[np.int_]
-    converged: NDArray[np.bool_]
-    correlation_sum: Array
 
 
 def n_blocks(cell: Cell) -> int:
@@ -81,40 +58,7 @@ def blocks(cell: Cell, seed: int, first: int, count: int) -> Iterator[Block]:
     for block in range(first, min(first + count, n_blocks(cell))):
         rng = np.random.default_rng(cell.seed(seed, block))
         drawn = ideal.draw(cell.noise, BLOCK, rng).first(cell.replicates - block * BLOCK)
-        result = calibrate(estimated, cell.conditions, drawn)
-        yield Block(
-            estimates=result.parameters,
-            sigma_priori=result.sigma_priori,
-            omega=result.omega,
-            redundancy=result.redundancy,
-            iterations=result.iterations,
-            converged=result.converged,
-            correlation_sum=_correlation_sum(result),
-        )
-
-
-def _correlation_sum(result: Adjustment) -> Array:
-    q = result.cofactors[result.converged]
-    sigma = np.sqrt(np.diagonal(q, axis1=1, axis2=2))
-    return (q / (sigma[:, :, None] * sigma[:, None, :])).sum(axis=0)
-
-
-def joined(parts: Iterable[Block]) -> Block:
-    """Join blocks that follow each other."""
-    parts = list(parts)
-
-    def together(name: str) -> Any:
-        return np.concatenate([getattr(part, name) for part in parts])
-
-    return Block(
-        estimates=together("estimates"),
-        sigma_priori=together("sigma_priori"),
-        omega=together("omega"),
-        redundancy=parts[0].redundancy,
-        iterations=together("iterations"),
-        converged=together("converged"),
-        correlation_sum=np.sum([part.correlation_sum for part in parts], axis=0),
-    )
+        yield Block.of(calibrate(estimated, cell.conditions, drawn))
 
 
 _NAME = pa.dictionary(pa.int32(), pa.string())

@@ -1,0 +1,419 @@
+"""The code of a calibration of many replicates: what `gauss_helmert.adjust` does, in lanes.
+
+It follows `accelstudy.adjustment.gauss_helmert`, which explains it, step by step and name by name.
+The conditions come from the traced expressions of `CalibrationEquations`. A group of replicates
+goes through its iterations together; a lane that has ended keeps what it ended with, and what is
+computed in it from then on goes nowhere.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from accelstudy.adjustment.calibration import CalibrationEquations
+from accelstudy.adjustment.gauss_helmert import (
+    MAX_ITERATIONS,
+    PIVOT_TOLERANCE,
+    ROUNDING,
+    STEP_TOLERANCE,
+)
+from accelstudy.kernel.cholesky import Rows, backward, dot, factor, forward, inverse
+from accelstudy.kernel.formulas import Formulas
+from accelstudy.kernel.lanes import LANES, Code, Lanes, Mask, Term, Variable, absolute, fma, larger
+from accelstudy.kernel.lanes import sqrt as root
+from accelstudy.tracing import TracedFunction, symbols
+
+NAME = "calibrate"
+INTEGERS = ("positions", "replicates")
+POINTERS = ("known", "observations", "initial", "weights", "work", "results", "correlations")
+"""Arguments of the function, in order; `KernelCode` says what they hold."""
+
+
+@dataclass(frozen=True)
+class KernelCode:
+    """The code that calibrates the replicates of one kind of sensor model with one approach.
+
+    The function takes, of n positions and R replicates, with u parameters (gravity is the last one
+    if it is estimated), o observations per position and k known numbers:
+
+        known         (n, 2 o + k)  variances of the observations, their 1/σ (0 where σ = 0),
+                                    and the numbers of `known`
+        observations  (R, n, o)
+        initial       (R, u)        of the parameters; the last is observed if it is gravity
+        weights       (u,)          of the observations of parameters: of gravity, or none
+        work          (n, work, LANES)
+        results       (2 u + 3, R') estimates, sigmas, Ω, iterations, converged (1 or 0); R' is R
+                                    rounded up to a multiple of LANES
+        correlations  (u (u − 1)/2, LANES)  sums over the converged replicates, below the diagonal
+                                    row by row; added to what is there
+
+    Parameters
+    ----------
+    equations : CalibrationEquations
+    """
+
+    equations: CalibrationEquations
+
+    @property
+    def unknowns(self) -> int:
+        """Parameters u."""
+        return len(self.equations.parameters)
+
+    @property
+    def observed(self) -> int:
+        """Observations o per position."""
+        return len(self.equations.observations)
+
+    @property
+    def conditions(self) -> int:
+        """Conditions c per position."""
+        return int(self.equations.linear.expressions.shape[0])
+
+    @cached_property
+    def _latent(self) -> tuple[sp.Symbol, ...]:
+        return () if self.equations.told is not None else symbols("a_x", "a_y", "a_z")
+
+    @cached_property
+    def _same(self) -> frozenset[sp.Symbol]:
+        lanes = {*self.equations.parameters, *self.equations.observations, *self._latent}
+        return frozenset(self.equations.trace.arguments) - lanes - set(self.equations.trace.force)
+
+    @cached_property
+    def _sensitive(self) -> Formulas:
+        """f_a of what was told, or of that of the iteration before."""
+        eq, trace = self.equations, self.equations.trace
+        if not self._latent:
+            return Formulas(list(eq.sensitive.expressions), self._same)
+        before = dict(zip(trace.force, self._latent, strict=True))
+        step = trace.newton_step.expressions.xreplace(before)
+        return Formulas([a + s for a, s in zip(self._latent, step, strict=True)], self._same)
+
+    @cached_property
+    def _linear(self) -> Formulas:
+        """[ψ | A | B], row by row."""
+        return Formulas(list(self.equations.linear.expressions), self._same)
+
+    @cached_property
+    def known(self) -> TracedFunction:
+        """What is known of the positions, (k, 1)."""
+        expressions = [*self._sensitive.known.values(), *self._linear.known.values()]
+        return TracedFunction(
+            self.equations.trace.arguments, sp.Matrix(len(expressions), 1, expressions)
+        )
+
+    @property
+    def columns(self) -> int:
+        """Numbers of `known` per position."""
+        return 2 * self.observed + len(self.known.expressions)
+
+    @cached_property
+    def text(self) -> str:
+        """The function, as LLVM's text."""
+        return str(_Writer(self).code)
+
+    @property
+    def work(self) -> int:
+        """Vectors of `work` per position."""
+        c, u, o = self.conditions, self.unknowns, self.observed
+        return 2 * o + len(self._latent) + c * (u + 1 + o)
+
+
+class _Writer:
+    """Writes the function."""
+
+    def __init__(self, of: KernelCode) -> None:
+        self.of = of
+        self.u, self.o = of.unknowns, of.observed
+        self.c = of.conditions
+        self.with_gravity = of.equations.estimates_gravity
+        self.code = code = Code(NAME, INTEGERS, POINTERS)
+        self.slots: dict[tuple[str, int, int], Term] = {}
+
+        padded = code.integer("add", "%replicates", LANES - 1)
+        groups = code.integer("sdiv", padded, LANES)
+        self.stride = code.integer("mul", groups, LANES)
+        self.weight = code.load_same("weights", str(self.u - 1)) if self.with_gravity else 0.0
+        with code.loop(groups) as group:
+            self.group(code.integer("mul", group, LANES))
+
+    # Memory ------------------------------------------------------------------------------------
+
+    def known(self, i: str, column: int) -> Lanes:
+        row = self.code.integer("mul", i, self.of.columns)
+        return self.code.load_same("known", self.code.integer("add", row, column))
+
+    def slot(self, i: str, vector: int) -> str:
+        """Offset of a vector of a position in `work`."""
+        row = self.code.integer("mul", i, self.of.work * LANES)
+        return self.code.integer("add", row, vector * LANES)
+
+    def read(self, i: str, first: int, count: int) -> list[Lanes]:
+        return [self.code.load("work", self.slot(i, first + k)) for k in range(count)]
+
+    def write(self, i: str, first: int, values: list[Term]) -> None:
+        for k, value in enumerate(values):
+            self.code.store(value, "work", self.slot(i, first + k))
+
+    # A group of replicates -----------------------------------------------------------------------
+
+    def group(self, first: str) -> None:
+        code, u = self.code, self.u
+        last = code.integer("sub", "%replicates", 1)
+        # The lanes beyond the last replicate repeat it.
+        rows = [code.smaller(code.integer("add", first, lane), last) for lane in range(LANES)]
+        tolerance = self.observe(rows)
+        starts = [code.integer("mul", row, u) for row in rows]
+        initial = [
+            code.load_each("initial", [code.integer("add", start, k) for start in starts])
+            for k in range(u)
+        ]
+        x = [Variable(code, value) for value in initial]
+        kept = _Kept.of(code, u)
+        numbers = code.of_integer(first) + code.lane_numbers()
+        active = Variable(code, 1.0)
+        with code.loop(str(MAX_ITERATIONS)) as iteration:
+            step = self.step(x, initial[-1])
+            going = active.get() > 0.0
+            converged = going & step.within(code, tolerance)
+            number = code.of_integer(code.integer("add", iteration, 1))
+            kept.iterations.set(going.select(number, kept.iterations.get()))
+            with code.when(converged.any()):
+                kept.keep(converged, step, x)
+            still = going & step.finite(code) & ~converged
+            active.set(still.select(1.0, 0.0))
+            code.leave_unless(still.any())
+        self.results(first, kept, numbers < code.of_integer("%replicates"))
+
+    def observe(self, rows: list[str]) -> Term:
+        """Take the observations into `work`; returns the tolerance of the step."""
+        code, o = self.code, self.o
+        largest = Variable(code, 0.0)
+        session = code.integer("mul", "%positions", o)
+        starts = [code.integer("mul", row, session) for row in rows]
+        with code.loop("%positions") as i:
+            own = code.integer("mul", i, o)
+            values: list[Term] = []
+            for k in range(o):
+                at = code.integer("add", own, k)
+                offsets = [code.integer("add", start, at) for start in starts]
+                values.append(code.load_each("observations", offsets))
+            size: Term = largest.get()
+            for k, value in enumerate(values):
+                size = larger(absolute(value) * self.known(i, o + k), size)
+            largest.set(size)
+            self.write(i, 0, values)
+            self.write(i, o, [0.0] * o)
+            if self.of._latent:
+                self.write(i, 2 * o, values[:3])
+        return larger(largest.get() * (ROUNDING * np.finfo(float).eps), STEP_TOLERANCE)
+
+    def step(self, x: list[Variable], direct: Term) -> _Step:
+        """Write one iteration; it changes x and, in `work`, v and f_a."""
+        code, u = self.code, self.u
+        at = [variable.get() for variable in x]
+        normal = {(i, j): Variable(code, 0.0) for i in range(u) for j in range(i + 1)}
+        right = [Variable(code, 0.0) for _ in range(u)]
+        size_psi, size_v, omega = (Variable(code, 0.0) for _ in range(3))
+        with code.loop("%positions") as i:
+            self.condition(i, at, normal, right, size_psi)
+
+        n = {key: variable.get() for key, variable in normal.items()}
+        r: list[Term] = [variable.get() for variable in right]
+        if self.with_gravity:
+            prior_misclosure = direct - at[-1]
+            n[u - 1, u - 1] = n[u - 1, u - 1] + self.weight
+            r[-1] = fma(self.weight, prior_misclosure, r[-1])
+        scale = [root(n[k, k]) for k in range(u)]
+        unit = [1.0 / s for s in scale]
+        scaled = [[n[i, j] * unit[i] * unit[j] for j in range(i + 1)] for i in range(u)]
+        lower, pivots = factor(scaled, PIVOT_TOLERANCE)
+        half = forward(lower, pivots, [r[k] * unit[k] for k in range(u)])
+        dx = [d * s for d, s in zip(backward(lower, pivots, half), unit, strict=True)]
+
+        with code.loop("%positions") as i:
+            self.residuals(i, dx, size_v, omega)
+        total: Term = omega.get()
+        if self.with_gravity:
+            rest = prior_misclosure - dx[-1]
+            total = fma(self.weight * rest, rest, total)
+        for variable, present, change in zip(x, at, dx, strict=True):
+            variable.set(present + change)
+        size_x = root(dot(half, half))
+        return _Step(lower, pivots, unit, total, (size_x, size_v.get(), size_psi.get()))
+
+    def condition(
+        self,
+        i: str,
+        x: list[Lanes],
+        normal: dict[tuple[int, int], Variable],
+        right: list[Variable],
+        size_psi: Variable,
+    ) -> None:
+        """Linearise the conditions of a position, and add them to the normal equations."""
+        c, u, o, eq = self.c, self.u, self.o, self.of.equations
+        l, v = self.read(i, 0, o), self.read(i, o, o)
+        table: dict[Any, Term] = dict(zip(eq.parameters, x, strict=True))
+        table |= zip(eq.observations, (a + b for a, b in zip(l, v, strict=True)), strict=True)
+        if self.of._latent:
+            table |= zip(self.of._latent, self.read(i, 2 * o, 3), strict=True)
+        column = 2 * o
+        for formulas in (self.of._sensitive, self.of._linear):
+            for symbol in formulas.known:
+                table[symbol] = self.known(i, column)
+                column += 1
+        f_a = self.of._sensitive.write(self.code, table)
+        if self.of._latent:
+            self.write(i, 2 * o, f_a)
+        table |= zip(eq.trace.force, f_a, strict=True)
+        values = self.of._linear.write(self.code, table)
+        rows = [values[k * (1 + u + o) : (k + 1) * (1 + u + o)] for k in range(c)]
+        psi = [row[0] for row in rows]
+        a = [row[1 : 1 + u] for row in rows]
+        b = [row[1 + u :] for row in rows]
+
+        q = [self.known(i, k) for k in range(o)]
+        bq = [[value * variance for value, variance in zip(row, q, strict=True)] for row in b]
+        m = [[dot(bq[j], b[k]) for k in range(j + 1)] for j in range(c)]
+        whitening, pivots = factor(m, 0.0)
+        w = [p - dot(row, v) for p, row in zip(psi, b, strict=True)]
+
+        def white(columns: Rows) -> Rows:
+            solved = [forward(whitening, pivots, list(k)) for k in zip(*columns, strict=True)]
+            return [list(row) for row in zip(*solved, strict=True)]
+
+        psi_white = forward(whitening, pivots, psi)
+        w_white = forward(whitening, pivots, w)
+        a_white = white(a)
+        bq_white = white(bq)
+        size: Term = size_psi.get()
+        for value in psi_white:
+            size = larger(absolute(value), size)
+        size_psi.set(size)
+        for (j, k), variable in normal.items():
+            total: Term = variable.get()
+            for row in a_white:
+                total = fma(row[j], row[k], total)
+            variable.set(total)
+        for k, variable in enumerate(right):
+            total = variable.get()
+            for row, misclosure in zip(a_white, w_white, strict=True):
+                total = fma(-row[k], misclosure, total)
+            variable.set(total)
+
+        self.slots.clear()
+        first = 2 * o + len(self.of._latent)
+        for j in range(c):
+            for k, value in enumerate((*a_white[j], w_white[j], *bq_white[j])):
+                self.slots["row", j, k] = value
+                if isinstance(value, Lanes):
+                    self.write(i, first + j * (u + 1 + o) + k, [value])
+
+    def residuals(self, i: str, dx: list[Term], size_v: Variable, omega: Variable) -> None:
+        """Residuals of a position after a step, v = −(B Q)ᵀ L⁻ᵀ (A dx + w)."""
+        u, o = self.u, self.o
+        first = 2 * o + len(self.of._latent)
+        v_new: list[Term] = [0.0] * o
+        total: Term = omega.get()
+        for j in range(self.c):
+            row = [
+                self.read(i, first + j * (u + 1 + o) + k, 1)[0]
+                if isinstance(constant := self.slots["row", j, k], Lanes)
+                else constant
+                for k in range(u + 1 + o)
+            ]
+            misclosure = row[u]
+            for value, change in zip(row[:u], dx, strict=True):
+                misclosure = fma(value, change, misclosure)
+            total = fma(misclosure, misclosure, total)
+            v_new = [
+                fma(-misclosure, value, v) for value, v in zip(row[u + 1 :], v_new, strict=True)
+            ]
+        omega.set(total)
+        size: Term = size_v.get()
+        for k, (new, before) in enumerate(zip(v_new, self.read(i, o, o), strict=True)):
+            size = larger(absolute(new - before) * self.known(i, o + k), size)
+        size_v.set(size)
+        self.write(i, o, v_new)
+
+    def results(self, first: str, kept: _Kept, valid: Mask) -> None:
+        """Write what a group ended with."""
+        code, u = self.code, self.u
+        lower: Rows = [[variable.get() for variable in row] for row in kept.lower]
+        pivots: list[Term] = [variable.get() for variable in kept.pivots]
+        unit = [variable.get() for variable in kept.unit]
+        q = inverse(lower, pivots)
+        sigma = [root(q[k, k]) for k in range(u)]
+        rows: list[Term] = [variable.get() for variable in kept.x]
+        rows += [s * k for s, k in zip(sigma, unit, strict=True)]
+        rows += [kept.omega.get(), kept.iterations.get(), kept.converged.get()]
+        for k, value in enumerate(rows):
+            row = code.integer("mul", self.stride, k)
+            code.store(value, "results", code.integer("add", row, first))
+        counted = valid & (kept.converged.get() > 0.0)
+        reciprocal = [1.0 / s for s in sigma]
+        pairs = [(j, k) for j in range(u) for k in range(j)]
+        for number, (j, k) in enumerate(pairs):
+            correlation = q[j, k] * reciprocal[j] * reciprocal[k]
+            at = str(number * LANES)
+            before = code.load("correlations", at)
+            code.store(before + counted.select(correlation, 0.0), "correlations", at)
+
+
+@dataclass(frozen=True)
+class _Step:
+    """One iteration: the factor of the scaled normal matrix, 1/scale, Ω and sizes of the step."""
+
+    lower: Rows
+    pivots: list[Term]
+    unit: list[Term]
+    omega: Term
+    sizes: tuple[Term, Lanes, Lanes]
+
+    def within(self, code: Code, tolerance: Term) -> Mask:
+        x, v, psi = (code.compare("ole", size, tolerance) for size in self.sizes)
+        return x & v & psi
+
+    def finite(self, code: Code) -> Mask:
+        x, v, psi = (code.compare("olt", size, math.inf) for size in self.sizes)
+        return x & v & psi
+
+
+@dataclass(frozen=True)
+class _Kept:
+    """What the lanes ended with."""
+
+    x: list[Variable]
+    lower: list[list[Variable]]
+    pivots: list[Variable]
+    unit: list[Variable]
+    omega: Variable
+    iterations: Variable
+    converged: Variable
+
+    @classmethod
+    def of(cls, code: Code, u: int) -> _Kept:
+        def unknown(count: int) -> list[Variable]:
+            return [Variable(code, math.nan) for _ in range(count)]
+
+        lower = [unknown(k) for k in range(u)]
+        counts = (Variable(code, 0.0) for _ in range(2))
+        return cls(unknown(u), lower, unknown(u), unknown(u), *unknown(1), *counts)
+
+    def keep(self, ended: Mask, step: _Step, x: list[Variable]) -> None:
+        pairs: list[tuple[Variable, Term]] = [
+            (self.omega, step.omega),
+            (self.converged, 1.0),
+            *zip(self.x, (variable.get() for variable in x), strict=True),
+            *zip(self.pivots, step.pivots, strict=True),
+            *zip(self.unit, step.unit, strict=True),
+        ]
+        for own, row in zip(self.lower, step.lower, strict=True):
+            pairs += zip(own, row, strict=True)
+        for variable, value in pairs:
+            variable.set(ended.select(value, variable.get()))

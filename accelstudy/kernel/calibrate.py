@@ -1,0 +1,102 @@
+"""Calibrations of many replicates by compiled code."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.adjustment.block import Block
+from accelstudy.adjustment.calibration import (
+    CalibrationEquations,
+    CalibrationProblem,
+    Observations,
+)
+from accelstudy.adjustment.gauss_helmert import redundancy_of
+from accelstudy.approaches import Approach
+from accelstudy.kernel.adjustment import INTEGERS, NAME, POINTERS, KernelCode
+from accelstudy.kernel.compiled import Compiled
+from accelstudy.kernel.lanes import LANES
+from accelstudy.sensor import SensorModel
+
+Array = NDArray[np.float64]
+
+
+class Kernel:
+    """Compiled code for one kind of sensor model and one approach.
+
+    Parameters
+    ----------
+    equations : CalibrationEquations
+    """
+
+    def __init__(self, equations: CalibrationEquations) -> None:
+        self.code = KernelCode(equations)
+        self._function = Compiled(self.code.text, NAME, len(INTEGERS), len(POINTERS))
+
+    def calibrate(self, problem: CalibrationProblem) -> Block:
+        """Calibrate the sessions of a problem; result and errors as of `calibrate`."""
+        code = self.code
+        count, n, _ = problem.observations.shape
+        u = code.unknowns
+        redundancy = redundancy_of(code.conditions * n, problem.weights)
+        padded = -(-count // LANES) * LANES
+        results = np.empty((2 * u + 3, padded))
+        correlations = np.zeros((u * (u - 1) // 2, LANES))
+        arrays = [
+            self._known(problem),
+            np.ascontiguousarray(problem.observations),
+            np.ascontiguousarray(problem.initial),
+            problem.weights,
+            _aligned(n * code.work * LANES),
+            results,
+            correlations,
+        ]
+        self._function.call(n, count, *(array.ctypes.data for array in arrays))
+        correlation = np.diag(np.full(u, results[2 * u + 2, :count].sum()))
+        below = np.tril_indices(u, -1)
+        correlation[below] = correlation.T[below] = correlations.sum(axis=1)
+        return Block(
+            estimates=results[:u, :count].T,
+            sigma_priori=results[u : 2 * u, :count].T,
+            omega=results[2 * u, :count],
+            redundancy=redundancy,
+            iterations=results[2 * u + 1, :count].astype(int),
+            converged=results[2 * u + 2, :count] > 0,
+            correlation_sum=correlation,
+        )
+
+    def _known(self, problem: CalibrationProblem) -> Array:
+        """Numbers of the positions that are the same in all replicates, (n, columns)."""
+        conditions, known = problem.conditions, self.code.known
+        trace, n = conditions.equations.trace, len(problem.cofactors)
+        variances = problem.cofactors
+        unit = np.sqrt(np.divide(1.0, variances, out=np.zeros_like(variances), where=variances > 0))
+        columns = [variances, unit]
+        if len(known.expressions):
+            unused, p = np.zeros((3, 1, n)), np.zeros((len(trace.p), 1))
+            g = np.array([conditions.gravity], dtype=float)
+            values = trace.evaluate(
+                known, unused, unused, p, conditions.settings, g, conditions.hold
+            )
+            columns.append(values[:, 0, 0].T)
+        return np.concatenate(columns, axis=1)
+
+
+@cache
+def kernel_of(equations: CalibrationEquations) -> Kernel:
+    """Return the compiled code for some equations; it takes seconds the first time, so once."""
+    return Kernel(equations)
+
+
+def calibrate(model: SensorModel, approach: Approach, observed: Observations) -> Block:
+    """Calibrate R sessions; parameters, numbers and errors as of `adjustment.calibrate`."""
+    problem = CalibrationProblem.of(model, approach, observed)
+    return kernel_of(problem.conditions.equations).calibrate(problem)
+
+
+def _aligned(count: int) -> Array:
+    """Memory for numbers that begins where a vector may begin."""
+    memory = np.empty(count + LANES)
+    return memory[-(memory.ctypes.data // 8) % LANES :][:count]

@@ -1,0 +1,111 @@
+"""From LLVM's text to a function, compiled for this processor once and kept on disk."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import hashlib
+import os
+import tempfile
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import llvmlite
+import llvmlite.binding as llvm
+
+_DIGEST = hashlib.sha256().digest_size
+
+
+class Compiled:
+    """A compiled function.
+
+    Parameters
+    ----------
+    text : str, of one function, as LLVM reads it
+    name : str, of the function
+    integers, pointers : int, how many arguments of either kind it takes, integers first
+    """
+
+    def __init__(self, text: str, name: str, integers: int, pointers: int) -> None:
+        machine = _machine()
+        described = (text, machine.triple, *_processor(), llvmlite.__version__)
+        key = hashlib.sha256("\n".join(described).encode()).hexdigest()
+        compiled = _kept(key)
+        if compiled is None:
+            compiled = _compiled(text, machine)
+            _keep(key, compiled)
+        self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+        self._engine.add_object_file(llvm.ObjectFileRef.from_data(compiled))
+        self._engine.finalize_object()
+        kinds = [ctypes.c_int64] * integers + [ctypes.c_void_p] * pointers
+        address = self._engine.get_function_address(name)
+        self._function = ctypes.CFUNCTYPE(None, *kinds)(address)
+
+    def call(self, *arguments: int) -> None:
+        """Call the function; a pointer is the address of an array."""
+        # As a method, so that the engine lives until the function returns.
+        self._function(*arguments)
+
+
+def _processor() -> tuple[str, str]:
+    return llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
+
+
+@cache
+def _target() -> Any:
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    return llvm.Target.from_default_triple()
+
+
+def _machine() -> Any:
+    cpu, features = _processor()
+    # An engine takes the machine that it is given, so each has its own.
+    return _target().create_target_machine(
+        cpu=cpu, features=features, opt=2, reloc="pic", codemodel="jitdefault"
+    )
+
+
+def _compiled(text: str, machine: Any) -> bytes:
+    module = llvm.parse_assembly(text)
+    options = llvm.create_pipeline_tuning_options(speed_level=2)
+    # The text has the vectors already, and its loops are long.
+    options.loop_vectorization = options.slp_vectorization = options.loop_unrolling = False
+    builder = llvm.create_pass_builder(machine, options)
+    builder.getModulePassManager().run(module, builder)
+    return bytes(machine.emit_object(module))
+
+
+def folder() -> Path:
+    """Where compiled functions are kept: `accelstudy` in the user's folder of caches."""
+    caches = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(caches) / "accelstudy" / "kernels"
+
+
+def _kept(key: str) -> bytes | None:
+    """Return what was compiled before, if it is there and whole."""
+    try:
+        content = (folder() / key).read_bytes()
+    except (OSError, RuntimeError):  # there is no home folder
+        return None
+    digest, compiled = content[:_DIGEST], content[_DIGEST:]
+    return compiled if hashlib.sha256(compiled).digest() == digest else None
+
+
+def _keep(key: str, compiled: bytes) -> None:
+    """Keep it for the next process, where that can be written.
+
+    It appears whole or not at all: processes that start together each write their own file and
+    give it the name.
+    """
+    with contextlib.suppress(OSError, RuntimeError):
+        folder().mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=folder())
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(hashlib.sha256(compiled).digest() + compiled)
+            os.replace(name, folder() / key)
+        except OSError:
+            os.unlink(name)
+            raise

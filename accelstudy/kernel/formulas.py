@@ -1,0 +1,199 @@
+"""From formulas to lanes: traced expressions, freed of what they have in common, as code."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial, reduce
+from typing import Any
+
+import sympy as sp
+
+from accelstudy.kernel.lanes import Code, Mask, Term, absolute, fma, sqrt
+
+Table = dict[sp.Symbol, Term]
+
+
+class Formulas:
+    """Expressions in what differs between replicates and in what does not.
+
+    What depends on the position alone (temperatures, settings, functions of them) is the same in
+    all replicates and iterations. It gets symbols of its own, whose values `known` are computed
+    once.
+
+    Parameters
+    ----------
+    expressions : sequence of expressions
+    same : symbols of what is the same in all replicates
+
+    Attributes
+    ----------
+    known : dict of symbol to the expression, in symbols of `same`, whose value it stands for
+    """
+
+    def __init__(self, expressions: Sequence[Any], same: frozenset[sp.Symbol]) -> None:
+        shared, self._results = sp.cse(expressions, symbols=sp.numbered_symbols("c_"), list=True)
+        self.known: dict[sp.Symbol, Any] = {}
+        self._same = same
+        self._expanded: dict[sp.Symbol, Any] = {}
+        self._shared: list[tuple[sp.Symbol, Any]] = []
+        for symbol, expression in shared:
+            if expression.free_symbols <= same | self._expanded.keys():
+                self._expanded[symbol] = expression.xreplace(self._expanded)
+            else:
+                self._shared.append((symbol, self._named(expression)))
+        self._results = [self._named(expression) for expression in self._results]
+
+    def _named(self, expression: Any) -> Any:
+        """Replace the largest parts that are the same in all replicates by symbols."""
+        if expression.is_number:
+            return expression
+        if expression.free_symbols <= self._same | self._expanded.keys():
+            whole = expression.xreplace(self._expanded)
+            if whole.is_Symbol:
+                self.known[whole] = whole
+                return whole
+            names = {value: symbol for symbol, value in self.known.items()}
+            symbol = names.get(whole) or sp.Dummy(real=True)
+            self.known[symbol] = whole
+            return symbol
+        if expression.is_Symbol:
+            return expression
+        return expression.func(*(self._named(part) for part in expression.args))
+
+    def write(self, code: Code, table: Mapping[sp.Symbol, Term]) -> list[Term]:
+        """Write the expressions at values of all symbols, those of `known` included."""
+        values = dict(table)
+        for symbol, expression in self._shared:
+            values[symbol] = _value(code, expression, values)
+        return [_value(code, expression, values) for expression in self._results]
+
+
+def _value(code: Code, e: Any, values: Table) -> Term:
+    if e.is_Symbol:
+        return values[e]
+    if e.is_number:
+        return float(e)
+    if e.is_Add:
+        return _sum(code, e.args, values)
+    if e.is_Mul:
+        first, second = _factors(code, e, values)
+        return first * second
+    if e.is_Pow:
+        return _power(code, _value(code, e.base, values), e.exp)
+    write = _FUNCTIONS.get(e.func)
+    if write is None:
+        raise NotImplementedError(f"no code for {e.func}")
+    return write(code, *(_value(code, part, values) for part in e.args))
+
+
+def _sum(code: Code, terms: Sequence[Any], values: Table) -> Term:
+    """Sum, with fused multiply-adds; what is no product comes first."""
+    total: Term = 0.0
+    for term in sorted(terms, key=lambda term: bool(term.is_Mul)):
+        if term.is_Mul:
+            total = fma(*_factors(code, term, values), total)
+        else:
+            total = _value(code, term, values) + total
+    return total
+
+
+def _factors(code: Code, product: Any, values: Table) -> tuple[Term, Term]:
+    """Two factors of a product."""
+    coefficient, parts = product.as_coeff_mul()
+    factors = [_value(code, part, values) for part in parts]
+    first: Term = float(coefficient)
+    for factor in factors[:-1]:
+        first = first * factor
+    return first, factors[-1]
+
+
+def _power(code: Code, base: Term, exponent: Any) -> Term:
+    if exponent.is_negative:
+        return 1.0 / _power(code, base, -exponent)
+    if exponent.is_Integer:
+        half = int(exponent) // 2
+        root = base if exponent == 1 or half == 1 else _power(code, base, sp.Integer(half))
+        square = root * root if half else root
+        return square * base if half and int(exponent) % 2 else square
+    if (2 * exponent).is_Integer:
+        return _power(code, sqrt(base), 2 * exponent)
+    return code.library("pow", base, float(exponent))
+
+
+_HALF_PI = (math.pi / 2, 6.123233995736766e-17, -1.4973849048591833e-33)
+"""π/2 in parts, each of which goes on where the one before ends."""
+_SINE = (
+    *(1.58969099521155010221e-10, -2.50507602534068634195e-08, 2.75573137070700676789e-06),
+    *(-1.98412698298579493134e-04, 8.33333333332248946124e-03, -1.66666666666666324348e-01),
+)
+_COSINE = (
+    *(-1.13596475577881948265e-11, 2.08757232129817482790e-09, -2.75573143513906633035e-07),
+    *(2.48015872894767294178e-05, -1.38888888888741095749e-03, 4.16666666666666019037e-02),
+)
+"""The polynomials of the C library FDLIBM, error below 2⁻⁵⁷ up to π/4, highest power first."""
+
+
+def _turned(code: Code, a: Term, quarters: int) -> Term:
+    """sin(a + quarters π/2).
+
+    The C library's sine takes one number at a time, and takes longer than all the rest together.
+    """
+    count = code.intrinsic("rint", a * (2 / math.pi))
+    rest = a
+    for part in _HALF_PI:
+        rest = fma(count, -part, rest)
+    square = rest * rest
+    sine, cosine = _polynomial(_SINE, square), _polynomial(_COSINE, square)
+    sine = fma(rest * square, sine, rest)
+    cosine = fma(square * square, cosine, fma(square, -0.5, 1.0))
+
+    turns = count + float(quarters)
+    pairs = code.intrinsic("floor", turns * 0.5)
+    odd = code.compare("one", turns, pairs * 2.0)
+    negative = code.compare("one", pairs, code.intrinsic("floor", pairs * 0.5) * 2.0)
+    value = odd.select(cosine, sine)
+    return negative.select(-value, value)
+
+
+def _polynomial(coefficients: Sequence[float], x: Term) -> Term:
+    result: Term = coefficients[0]
+    for coefficient in coefficients[1:]:
+        result = fma(result, x, coefficient)
+    return result
+
+
+def _tangent(code: Code, a: Term) -> Term:
+    return _turned(code, a, 0) / _turned(code, a, 1)
+
+
+def _sign(code: Code, a: Term) -> Term:
+    return _above(code, a).select(1.0, code.compare("olt", a, 0.0).select(-1.0, a))
+
+
+def _step(code: Code, a: Term, at_zero: Term = 0.5) -> Term:
+    zero = code.compare("oeq", a, 0.0).select(at_zero, a)
+    return _above(code, a).select(1.0, code.compare("olt", a, 0.0).select(0.0, zero))
+
+
+def _above(code: Code, a: Term) -> Mask:
+    return code.compare("ogt", a, 0.0)
+
+
+def _extreme(name: str) -> Callable[..., Term]:
+    return lambda code, *values: reduce(partial(code.intrinsic, name), values)
+
+
+_FUNCTIONS: dict[Any, Callable[..., Term]] = {
+    sp.sin: lambda code, a: _turned(code, a, 0),
+    sp.cos: lambda code, a: _turned(code, a, 1),
+    sp.tan: _tangent,
+    sp.exp: lambda code, a: code.library("exp", a),
+    sp.atan2: lambda code, a, b: code.library("atan2", a, b),
+    sp.Abs: lambda code, a: absolute(a),
+    sp.sign: _sign,
+    sp.Heaviside: _step,
+    sp.Max: _extreme("maximum"),
+    sp.Min: _extreme("minimum"),
+}
+"""What `accelstudy.tracing.symbolic` has, and what its derivatives bring."""
