@@ -1,21 +1,27 @@
 """The evidence of hypotheses: densities, the test that is read off them, and the posterior."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from diagnosis_helpers import GRAVITY, ROBOT, design, shuffled
+from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, design, shuffled
 from scipy import stats
 
+from accelstudy.adjustment.quality import solve
 from accelstudy.diagnosis.decision.explanations import Explanation, credible_set
 from accelstudy.diagnosis.decision.posterior import Posterior, Weighed
+from accelstudy.diagnosis.decision.search import Search
+from accelstudy.diagnosis.decision.verdict import _misfit
 from accelstudy.diagnosis.evidence.axes import UnequalAxes
 from accelstudy.diagnosis.evidence.chance import Chance
 from accelstudy.diagnosis.evidence.detection import detect
 from accelstudy.diagnosis.evidence.field import Field
-from accelstudy.diagnosis.evidence.noise import most_evidence
+from accelstudy.diagnosis.evidence.noise import NOISES, most_evidence
 from accelstudy.diagnosis.evidence.pairs import all_pairs
 from accelstudy.diagnosis.evidence.size import SIZE_WEIGHTS, SIZES, Evidence, Level
 from accelstudy.diagnosis.space.location import groups
-from accelstudy.simulation import Noise
+from accelstudy.schemes import get_scheme
+from accelstudy.simulation import Noise, session
 
 R = 40
 LEVELS = {"given": Level.given(), "not given": Level((1.0,), (0.5,), known=False)}
@@ -151,10 +157,71 @@ def test_the_posterior_merges_what_means_the_same():
     assert posterior.probabilities == pytest.approx((0.6, 0.2, 0.2))
     assert posterior.explanations[0].names == ("a",)
     assert sum(one.posterior for one in posterior.credible_set) == pytest.approx(1.0)
-    assert posterior.of_single("z") == pytest.approx(0.6)
+
+
+def weighed(*names_and_probabilities):
+    """Explanations with a shape for each effect, as a search would give them."""
+    shape = object()
+    return [
+        Weighed(names, tuple((n,) for n in names), np.log(p), (shape,) * (names[0] not in NOISES))
+        for names, p in names_and_probabilities
+    ]
+
+
+def test_where_one_effect_is_more_probable_a_pair_counts_for_its_better_half():
+    one, other = ("bias_drift",), ("hysteresis",)
+    posterior = Posterior.of(
+        weighed((one, 0.5), (other, 0.2), (one + other, 0.1), ((*other, "bias"), 0.2))
+    )
+    assert [e.names for e in posterior.explanations] == [one, other]
+    assert [e.posterior for e in posterior.explanations] == pytest.approx([0.6, 0.4])
+    assert posterior.probabilities == pytest.approx((0.5, 0.2, 0.2, 0.1))
+
+
+def test_a_pair_that_is_more_probable_than_its_parts_stands():
+    pair = ("bias_drift", "hysteresis")
+    posterior = Posterior.of(weighed((pair, 0.3), (pair[:1], 0.25), (("bias",), 0.45)))
+    assert [e.names for e in posterior.explanations] == [("bias",), pair, pair[:1]]
+
+
+def test_where_two_effects_are_more_probable_all_pairs_stand():
+    pairs = [("bias", "hysteresis"), ("bias", "settling"), ("bias", "warm_up")]
+    posterior = Posterior.of(weighed(*((pair, 0.2) for pair in pairs), (("bias",), 0.4)))
+    assert {e.names for e in posterior.explanations} == {*pairs, ("bias",)}
+
+
+def test_wrong_noise_of_all_kinds_is_one_explanation():
+    posterior = Posterior.of(
+        weighed((("bias",), 0.4), (("axis_noise",), 0.2), (("heavy_tails",), 0.4 - 1e-9))
+    )
+    assert posterior.explanations[0].names == ("heavy_tails",)
+    assert posterior.of_noise == pytest.approx(0.6)
 
 
 def test_a_credible_set_is_the_smallest():
     p = [0.05, 0.5, 0.1, 0.35]
     found = credible_set(Explanation((str(x),), ((str(x),),), x) for x in p)
     assert [one.posterior for one in found] == [0.5, 0.35, 0.1]
+
+
+@pytest.mark.parametrize(
+    ("level", "spread", "said"),
+    [
+        (Level.unknown(), 0.02, "times what repeated positions differ by"),
+        (Level.given(), 0.02, "times the stated noise"),
+        (Level.unknown(), 0.0, ""),
+        (Level.given(), 0.0, ""),
+    ],
+)
+def test_a_fit_that_misses_more_than_the_noise_is_no_explanation(level, spread, said):
+    rng = np.random.default_rng(8)
+    attitudes = get_scheme("fibonacci-24").directions
+    ideal = session(NINE, np.zeros(9), np.tile(attitudes, (2, 1)), G)
+    observed = ideal.draw(Noise(), 1, rng)
+    # Each attitude misses by an amount of its own, which its repeat has, too.
+    missed = np.tile(spread * rng.standard_normal((24, 3)), (2, 1))
+    observed = replace(observed, forces=observed.forces + missed)
+    search = Search(solve(NINE, GRAVITY, observed), np.random.SeedSequence(9), level)
+    found = _misfit(search, search.first)
+    assert found.endswith(said)
+    assert bool(found) == bool(said)

@@ -283,6 +283,7 @@ def test_the_oracle_keeps_its_level_and_knows_what_is_large():
         truth = generate(case, seeded(15, i))[1]
         (told,) = truth.oracle["told"]
         right.append(bool({*told} & {*truth.classes[0]}))
+        assert truth.oracle["alternatives"] <= 2
         assert truth.oracle["detected"]
         assert truth.oracle["best"] == truth.oracle["told"]
     assert np.mean(right) > 0.85

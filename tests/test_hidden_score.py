@@ -30,6 +30,7 @@ def truth(set_, classes=(), size=np.nan, oracle=None, **more):
         "classes": json.dumps(list(classes)), "effects": "[]", "noise": "null", "gross": "{}",
         "gross_name": "", "oracle_detected": None if oracle is None else oracle != "nothing",
         "oracle_best": json.dumps(list(best)), "oracle_told": json.dumps(list(classes)),
+        "oracle_alternatives": 1,
         "left": "[]", "sensor": "null", "seed": "[]", "failed": "", **more,
     }  # fmt: skip
 

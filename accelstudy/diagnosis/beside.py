@@ -93,7 +93,7 @@ class Beside:
         finding = self.finding
         if finding.posterior is None or finding.verdict not in ("named", "narrowed", "unknown"):
             return ()
-        weighed = zip(finding.credible_set, finding.posterior.all, strict=False)
+        weighed = zip(finding.credible_set, finding.posterior.told, strict=False)
         rivals = [one.best for explanation, one in weighed if of_effects(explanation)]
         if len(rivals) < 2:
             return ()

@@ -147,11 +147,11 @@ class _Run:
             return self.search.probabilities
         first: dict[tuple[str, ...], str] = {}
         found: dict[str, float] = defaultdict(float)
-        for one in finding.posterior.explanations:
+        for one, p in zip(finding.posterior.all, finding.posterior.probabilities, strict=True):
             # Two bumped positions have one name.
             named = zip(one.classes, one.names, strict=True)
             for name in {first.setdefault(members, name): None for members, name in named}:
-                found[name] += one.posterior
+                found[name] += p
         return dict(sorted(found.items(), key=lambda item: -item[1]))
 
     def finding(self) -> tuple[Finding, tuple[NoiseTest, ...]]:
@@ -180,7 +180,7 @@ class _Run:
             top = next(e.names[0] for e in posterior.explanations if e.names[0] in noises.NOISES)
             name = top if worst is None else worst.name
             p = search.detection.p_value if worst is None else worst.p_value
-            return (Named(name, name, (name,), p, posterior.of_single(name)),)
+            return (Named(name, name, (name,), p, posterior.of_noise),)
         solution = finding.setting.frame.solution
         sigma = np.sqrt(np.diag(solution.cofactors) * self.noise.unit_variance(finding.setting))
         columns = {name: i for i, name in enumerate(solution.model.parameter_names)}

@@ -155,6 +155,9 @@ def sets(tables: Tables) -> Figure:
         if len(mean):
             error = 1.96 * mean["sem"].fillna(0)
             right.errorbar(mean["size"], mean["mean"], error, elinewidth=0.8, **style)
+    one = campaigns[(campaigns["set"] == "one") & campaigns["set_given"].eq(True)]
+    ideal = one.groupby("size")["oracle_alternatives"].mean()
+    right.plot(ideal.index, ideal.astype(float), label="oracle, one effect", **ORACLE)
     right.plot([*MOST_NAMES], [*MOST_NAMES.values()], "_", color=INK, markersize=12,
                label="wanted at most of one effect")  # fmt: skip
     right.set_ylim(bottom=0)

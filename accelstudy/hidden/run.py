@@ -147,6 +147,7 @@ def _truth(cell: Cell, truth: Truth | None, error: str) -> Row:
         "oracle_detected": oracle.get("detected"),
         "oracle_best": json.dumps(oracle.get("best", [])),
         "oracle_told": json.dumps(oracle.get("told", [])),
+        "oracle_alternatives": oracle.get("alternatives"),
         "left": json.dumps(known.get("left", [])),
         "sensor": json.dumps(known.get("sensor")),
         "seed": json.dumps(known.get("seed")),

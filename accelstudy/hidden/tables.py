@@ -19,7 +19,9 @@ SCHEMA: dict[str, dict[str, str]] = {
         **dict.fromkeys(("design", "approach", "sigma", "classes", "effects", "noise"), _TEXT),
         **dict.fromkeys(("gross", "gross_name"), _TEXT),
         "oracle_detected": _FLAG,
-        **dict.fromkeys(("oracle_best", "oracle_told", "left", "sensor", "seed", "failed"), _TEXT),
+        **dict.fromkeys(("oracle_best", "oracle_told"), _TEXT),
+        "oracle_alternatives": "Int64",
+        **dict.fromkeys(("left", "sensor", "seed", "failed"), _TEXT),
     },
     "outcomes": {
         **_KEYS,

@@ -112,8 +112,7 @@ def _sets(one: pd.DataFrame) -> Iterator[Target]:
         yield _share("90 % set holds the truth", cases, part, part["set_holds"], 0.90, 1)
     for size, part in _by_size(given):
         if size in MOST_NAMES:
-            yield _mean("names in a 90 % set", f"one effect, λ = {size:g}", part["set_names"],
-                        MOST_NAMES[size])  # fmt: skip
+            yield _mean("names in a 90 % set", f"one effect, λ = {size:g}", part, MOST_NAMES[size])
 
 
 def _by_size(part: pd.DataFrame) -> Iterator[tuple[float, pd.DataFrame]]:
@@ -147,9 +146,11 @@ def _oracle(figure: str, cases: str, part: pd.DataFrame, below: float) -> Target
     return Target(**{**vars(target), "wanted": wanted, "least": best - below})
 
 
-def _mean(figure: str, cases: str, values: pd.Series, most: float) -> Target:
-    x = values.to_numpy(float)
+def _mean(figure: str, cases: str, part: pd.DataFrame, most: float) -> Target:
+    """Mean number of names, beside how many the oracle needs for the same campaigns."""
+    x = part["set_names"].to_numpy(float)
+    best = part["oracle_alternatives"].mean()
     spread = 1.96 * x.std(ddof=1) / np.sqrt(len(x)) if len(x) > 1 else np.nan
     mean = x.mean() if len(x) else np.nan
-    wanted = f"≤ {number(most)}"
+    wanted = f"≤ {number(most)} (oracle {best:.1f})"
     return Target(figure, cases, wanted, 0, most, mean, mean - spread, mean + spread, len(x))

@@ -90,7 +90,7 @@ class NoiseJudge:
         if worst.name != noises.LEVEL or worst.estimate[0] < 1:
             return Finding("noise_model", setting, worst.remark, posterior=posterior)
         # Larger residuals may be an effect that the test for a pattern could not see.
-        noise = sum(e.posterior for e in posterior.explanations if e.names[0] in noises.NOISES)
+        noise = posterior.of_noise
         if noise >= priors.MORE_PROBABLE:
             return Finding("noise_model", setting, worst.remark, posterior=posterior)
         name = next(n for e in posterior.explanations for n in e.names if n not in noises.NOISES)

@@ -1,14 +1,21 @@
-"""One posterior over everything that could be the case once something is missing."""
+"""One posterior over everything that could be the case once something is missing.
+
+What is said of it are fewer explanations than were weighed (`Posterior.told`). The kinds of wrong
+noise count as one, named by the most probable of them. Where one effect is more probable than two,
+a pair counts for the more probable of its two effects: "this one is missing" then leaves open
+whether something beside it is, too, that is too small to be told.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from accelstudy.diagnosis.decision.explanations import Explanation, credible_set
+from accelstudy.diagnosis.evidence.noise import NOISES
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.effects import effect_names
 
@@ -57,18 +64,38 @@ class Posterior:
         return cls(tuple(sorted(merged.values(), key=lambda one: -one.log_weight)))
 
     @cached_property
+    def told(self) -> tuple[Weighed, ...]:
+        """What is said of them, most probable first."""
+        noise = next((i for i, one in enumerate(self.all) if one.names[0] in NOISES), None)
+        single = {
+            one.classes[0]: i for i, one in enumerate(self.all) if len(one.names) == 1 and one.best
+        }
+        pairs = [i for i, one in enumerate(self.all) if len(one.names) == 2]
+        p = self.probabilities
+        alone = sum(p[i] for i in single.values()) > sum(p[i] for i in pairs)
+        counted = {i: float(one.log_weight) for i, one in enumerate(self.all)}
+        for i, one in enumerate(self.all):
+            into = None
+            if one.names[0] in NOISES:
+                into = noise
+            elif len(one.names) == 2 and alone:
+                into = min((single[c] for c in one.classes if c in single), default=None)
+            if into is not None and into < i:
+                counted[into] = float(np.logaddexp(counted[into], counted.pop(i)))
+        told = [replace(self.all[i], log_weight=log) for i, log in counted.items()]
+        return tuple(sorted(told, key=lambda one: -one.log_weight))
+
+    @cached_property
     def probabilities(self) -> tuple[float, ...]:
-        """Posterior of each, largest first."""
-        logs = np.array([one.log_weight for one in self.all])
-        weights = np.exp(logs - logs.max())
-        return tuple((weights / weights.sum()).tolist())
+        """Posterior of each that was weighed, in the order of `all`."""
+        return _shares(self.all)
 
     @cached_property
     def explanations(self) -> tuple[Explanation, ...]:
-        """All of them as explanations, most probable first."""
+        """What is said, most probable first."""
         return tuple(
             Explanation(one.names, one.classes, p)
-            for one, p in zip(self.all, self.probabilities, strict=True)
+            for one, p in zip(self.told, _shares(self.told), strict=True)
         )
 
     @property
@@ -78,15 +105,20 @@ class Posterior:
 
     @property
     def top(self) -> Weighed:
-        """The most probable."""
-        return self.all[0]
+        """The most probable of what is said."""
+        return self.told[0]
 
-    def of_single(self, name: str) -> float:
-        """Probability that something alone, or its class, is the case."""
-        return next(
-            (e.posterior for e in self.explanations if len(e.names) == 1 and name in e.classes[0]),
-            0.0,
-        )
+    @property
+    def of_noise(self) -> float:
+        """Probability that nothing is wrong but the noise."""
+        return sum(one.posterior for one in self.explanations if one.names[0] in NOISES)
+
+
+def _shares(weighed: Sequence[Weighed]) -> tuple[float, ...]:
+    """Probabilities of what excludes each other."""
+    logs = np.array([one.log_weight for one in weighed])
+    weights = np.exp(logs - logs.max())
+    return tuple((weights / weights.sum()).tolist())
 
 
 def of_effects(explanation: Explanation) -> bool:

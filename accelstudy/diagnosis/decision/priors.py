@@ -4,8 +4,8 @@ Beside "one effect is missing", which weighs 1 and is shared evenly by the class
 bumped position. The probability that a given sigma is wrong is with the level (`evidence.size`).
 """
 
-TWO = 0.06
-"""Two effects are missing: where a model was chosen with care that is rare."""
+TWO = 0.15
+"""Two effects are missing: of the models that lack something one in eight lacks more."""
 UNKNOWN = 0.04
 """Something is missing that is no effect of the catalogue, which has what is usual."""
 COLOUR = 0.06

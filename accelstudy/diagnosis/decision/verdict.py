@@ -85,7 +85,7 @@ def find(search: Search) -> Finding:
     left = _misfit(search, solution)
     if left:
         said = joined([words(name) for name in top.names])
-        reason = f"with {said} added, the residuals are still {left:.2g} times the stated noise"
+        reason = f"with {said} added, the residuals are still {left}"
         return Finding("unknown", search.setting, reason, posterior=posterior)
     return _with_a_fit(search, posterior, best, solution)
 
@@ -94,7 +94,7 @@ def _with_a_fit(
     search: Search, posterior: Posterior, best: Sequence[Hypothesis], solution: Solution
 ) -> Finding:
     """Judge the most probable explanation, which has a fit."""
-    top, probability = posterior.top, posterior.probabilities[0]
+    top, probability = posterior.top, posterior.explanations[0].posterior
     chosen = tuple(
         sorted(
             (Choice(h, m, probability) for h, m in zip(best, top.classes, strict=True)),
@@ -118,15 +118,10 @@ def _of_effects(credible: Sequence[Explanation]) -> float:
 
 def _without_a_fit(search: Search, posterior: Posterior) -> Finding:
     """Judge where no effect or set of effects is probable enough."""
-    noise = [
-        (one.names[0], one.posterior)
-        for one in posterior.explanations
-        if one.names[0] in NOISES
-    ]  # fmt: skip
-    if sum(p for _, p in noise) >= priors.SURE:
-        name = noise[0][0]
-        return Finding("noise_model", search.setting, NOISES[name], posterior=posterior)
     first = posterior.explanations[0]
+    if first.names[0] in NOISES and first.posterior >= priors.SURE:
+        reason = NOISES[first.names[0]]
+        return Finding("noise_model", search.setting, reason, posterior=posterior)
     if UNKNOWN in first.names:
         reason = "no effect or pair of effects of the catalogue explains it"
     else:
@@ -206,24 +201,28 @@ def _beside(search: Search, alone: Weighed, solution: Solution) -> list[Weighed]
     return found
 
 
-def _misfit(search: Search, solution: Solution) -> float:
-    """By how much residuals are still larger than a sigma that holds; 0 if they are not.
+def _misfit(search: Search, solution: Solution) -> str:
+    """By how much residuals are still larger than a sigma that holds; empty if they are not.
 
-    Where repeated positions refute sigma after the refit, too, it is no measure: then they are
+    Where sigma is not given, or where repeated positions refute it after the refit, too, they are
     themselves the measure of what is left.
     """
-    p = float(special.chdtrc(solution.redundancy, solution.omega))
-    if not search.level.known or 2 * p >= REFUTED:
-        return 0.0
+    known = search.level.known
+    if known and 2 * float(special.chdtrc(solution.redundancy, solution.omega)) >= REFUTED:
+        return ""
     ratio = float(np.sqrt(solution.omega / solution.redundancy))
+    than_stated = f"{ratio:.2g} times the stated noise" if known else ""
     left = Residuals.of(solution)
     labels = clusters(search.setting.frame.forces)
     if len(labels) != len(solution.misclosures) or len(np.unique(labels)) == len(labels):
-        return ratio
+        return than_stated
     square, freedom = _of_repeats(left, LackOfFit.of(left, labels))
-    if not freedom or special.chdtrc(freedom, square) >= REFUTED / 2:
-        return ratio
-    return ratio if _of_fit(left, square, freedom) < REFUTED else 0.0
+    if not freedom or (known and special.chdtrc(freedom, square) >= REFUTED / 2):
+        return than_stated
+    if _of_fit(left, square, freedom) >= REFUTED:
+        return ""
+    ratio = float(np.sqrt(solution.omega / solution.redundancy / (square / freedom)))
+    return than_stated or f"{ratio:.2g} times what repeated positions differ by"
 
 
 def lack_of_fit(search: Search) -> float:

@@ -149,7 +149,7 @@ def _is_the_name(search: Search, part: Search, finding: Finding, split: LinearSp
     left, missed = split.beside(search.residuals.errors[None])
     variance = 1.0 if part.level.known else part.residuals.variance
     logs = []
-    for one in finding.posterior.all[: BESIDE + 1]:
+    for one in finding.posterior.told[: BESIDE + 1]:
         if len(one.best) == 1 and one.best[0].effect is not None:
             rest = missed - split.corrections(one.best[0], left)
             logs.append(-float(np.sum(rest**2)) / (2 * variance))

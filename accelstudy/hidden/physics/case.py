@@ -58,7 +58,7 @@ class Truth:
     noise : dict with kind, name (in the catalogue) and settings
     gross : dict with name (empty for none) and settings
     sensor : dict with the parameters of the sensor
-    oracle : dict with detected, best and told
+    oracle : dict with detected, best, told and alternatives
     left : tuple of float, for the set "outside": how much of the noncentrality the best effect of
         the catalogue leaves, and the best two
     """

@@ -89,6 +89,7 @@ def generate(case: Case, seed: np.random.SeedSequence) -> tuple[Campaign, Truth]
             "detected": verdict.detected,
             "best": plain(verdict.best),
             "told": plain(verdict.told),
+            "alternatives": verdict.alternatives,
         },
         left=left,
     )

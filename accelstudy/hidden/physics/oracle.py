@@ -14,7 +14,7 @@ from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtrc, logsumexp
+from scipy.special import chdtrc, logsumexp, softmax
 
 from accelstudy.hidden.physics.atlas import Atlas, Shape, atlas
 from accelstudy.hidden.physics.outside import OUTSIDE
@@ -27,6 +27,8 @@ OUTSIDE_SHARE = 0.15
 DRAWS = 7
 """Draws of what may be outside the catalogue, most of which must be."""
 LEVEL = 0.05
+CREDIBLE = 0.9
+"""Probability with which a set of alternatives holds the truth."""
 SIMULATIONS = 4000
 """Misclosures without any effect, for the level of the smallest p-value."""
 
@@ -40,11 +42,14 @@ class Verdict:
     detected : bool, something is missing, at a level of 5 %
     best : tuple of classes of names, what is missing; empty if nothing is detected
     told : tuple of classes of names, likewise if it is told that something is missing
+    alternatives : int, how many effects it needs, if told, to hold the truth with `CREDIBLE`;
+        of one effect only, 0 else
     """
 
     detected: bool
     best: tuple[Class, ...]
     told: tuple[Class, ...]
+    alternatives: int = 0
 
 
 @dataclass(frozen=True)
@@ -90,13 +95,16 @@ class Oracle:
         sizes : sequence of float, true noncentralities of what is missing
         """
         detected = bool(np.min(self._p_values(z)) < self.threshold)
-        told = self._two(z, float(sum(sizes))) if len(sizes) == 2 else self._one(z, sizes)
-        return Verdict(detected, told if detected else (), told)
+        if len(sizes) == 2:
+            told, alternatives = self._two(z, float(sum(sizes))), 0
+        else:
+            told, alternatives = self._one(z, sizes)
+        return Verdict(detected, told if detected else (), told, alternatives)
 
     def _p_values(self, z: Array) -> Array:
         return np.asarray(chdtrc(self.atlas.dims, self.atlas.parts(z)))
 
-    def _one(self, z: Array, sizes: Sequence[float]) -> tuple[Class, ...]:
+    def _one(self, z: Array, sizes: Sequence[float]) -> tuple[tuple[Class, ...], int]:
         # Where nothing or something unheard of is missing, its size is as good as unknown.
         size = sizes[0] if sizes else 25.0
         evidence = _evidence(self.atlas.parts(z), self.atlas.dims, size)
@@ -104,10 +112,18 @@ class Oracle:
         by_name: dict[str, list[int]] = {}
         for i, name in enumerate(names):
             by_name.setdefault(name, []).append(i)
-        best = max(
-            by_name.values(), key=lambda own: logsumexp(evidence[own]) - float(np.log(len(own)))
-        )
-        return (self.classes[max(best, key=lambda i: evidence[i])],)
+        logs = {
+            name: logsumexp(evidence[own]) - float(np.log(len(own)))
+            for name, own in by_name.items()
+        }
+        best = by_name[max(logs, key=lambda name: logs[name])]
+        told = self.classes[max(best, key=lambda i: evidence[i])]
+        by_class: dict[Class, float] = {}
+        for name, log in logs.items():
+            own = self.classes[by_name[name][0]]
+            by_class[own] = float(np.logaddexp(by_class.get(own, -np.inf), log))
+        p = np.sort(softmax([*by_class.values()]))[::-1]
+        return (told,), int(np.searchsorted(np.cumsum(p), CREDIBLE)) + 1
 
     def _two(self, z: Array, size: float) -> tuple[Class, ...]:
         pairs = self.pairs
