@@ -1,5 +1,6 @@
 PYTHON ?= python3
 CORES ?= 2
+CONFIG ?= config/config.yaml
 CAMPAIGNS ?= config/campaigns.yaml
 HIDDEN ?= config/hidden-effects.yaml
 
@@ -23,11 +24,12 @@ export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: help env test smoke reproduce report campaigns diagnose-example hidden-effects hidden-docs lint lock clean
+.PHONY: help env test smoke reproduce anew unlock report campaigns diagnose-example hidden-effects hidden-docs lint lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-18s%s\n", $$1, $$2 }' Makefile
 	@echo 'PYTHON=python3.12 chooses the interpreter of a new environment, CORES=8 the cores used,'
+	@echo 'CONFIG=config/smoke.yaml the study of `make anew`,'
 	@echo 'CAMPAIGNS=my.yaml the batch of `make campaigns`, HIDDEN=my.yaml the study of `make hidden-effects`.'
 
 env: $(READY) ## make the environment, from locked versions, in .venv
@@ -41,6 +43,12 @@ smoke: $(READY) ## run the whole workflow on a small configuration
 
 reproduce: $(READY) ## reproduce the paper
 	snakemake --cores $(CORES)
+
+anew: $(READY) ## make all results of a study again, whatever is there of them
+	snakemake --cores $(CORES) --configfile $(CONFIG) --forceall
+
+unlock: $(READY) ## remove the lock of a run that was killed
+	snakemake --unlock
 
 report: reproduce ## make results/paper/report.zip, to be opened in a browser
 	snakemake --cores $(CORES) --report results/paper/report.zip

@@ -150,6 +150,15 @@ def whole_file(path: str | Path) -> Iterator[Path]:
             (stage / path.name).replace(path)
 
 
+def cannot_write(error: OSError, out: Path) -> str:
+    """Say that `out` cannot be written and why, with the place that is meant if it is another."""
+    where = Path(str(error.filename)) if error.filename is not None else out
+    inside = where.is_relative_to(out) or any(p.startswith(_PREFIX) for p in where.parts)
+    place = "" if inside else f"{where}: "
+    reason = str(error.strerror or error).rpartition("] ")[2]  # Arrow puts more before it
+    return f"{out}: cannot be written: {place}{reason}"
+
+
 @contextmanager
 def _staging(near: Path) -> Iterator[Path]:
     """A private folder in `near` or, if that is not there, in the nearest folder above it.
@@ -206,11 +215,7 @@ def _reported(out: Path) -> Iterator[list[Path]]:
     except BrokenPipeError:  # of the terminal
         raise
     except OSError as error:
-        where = Path(str(error.filename)) if error.filename is not None else out
-        inside = where.is_relative_to(out) or any(p.startswith(_PREFIX) for p in where.parts)
-        place = "" if inside else f"{where}: "
-        reason = str(error.strerror or error).rpartition("] ")[2]  # Arrow puts more before it
-        raise InputError(f"{out}: cannot be written: {place}{reason}") from None
+        raise InputError(cannot_write(error, out)) from None
     except InputError as error:
         text = str(error)
         for stage in stages:

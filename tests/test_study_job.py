@@ -1,24 +1,34 @@
 """What every job of the workflow does: its log, and how it ends on bad input and on a defect."""
 
+import errno
 import logging
 import shlex
 import sys
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from types import SimpleNamespace
 
+import pandas as pd
 import pytest
 from study_helpers import content, make_study
 
 from accelstudy.errors import InputError
-from accelstudy.study.job import job, quote_python
+from accelstudy.study.job import job, killed_notice, quote_python, setup_digest
+from accelstudy.study.tables import write_table
 
 
 @contextmanager
-def a_job(log, **config):
+def a_job(log, inputs=(), spec=None, **config):
     """A job in a process that has not set up its logging."""
     handlers, level = logging.root.handlers, logging.root.level
     logging.root.handlers = []
-    snakemake = SimpleNamespace(log=[str(log)], config=content(**config), rule="simulate")
+    snakemake = SimpleNamespace(
+        log=[str(log)],
+        config=content(**config),
+        rule="simulate",
+        input=[str(path) for path in inputs],
+        output=["results/tiny/summary.parquet"],
+        params={} if spec is None else {"spec": spec},
+    )
     try:
         with job(snakemake) as given:
             yield given
@@ -58,6 +68,67 @@ def test_a_bad_configuration_ends_with_one_line(log, capsys):
         pytest.fail("the body must not run")
     assert ended.value.code == 2
     assert capsys.readouterr().err.startswith("error: config: seed: ")
+
+
+@pytest.mark.parametrize(
+    ("error", "message"),
+    [
+        (MemoryError(), "simulate: not enough memory; run fewer jobs at once (--cores 1, or"),
+        (
+            OSError(errno.ENOSPC, "Error writing. Detail: [errno 28] No space left on device"),
+            "results/tiny/summary.parquet: cannot be written: No space left on device; free some "
+            "space and run again",
+        ),
+        (
+            OSError(errno.EROFS, "Read-only file system", "results/tiny/.accelstudy-1.part"),
+            "results/tiny/summary.parquet: cannot be written: Read-only file system; make it",
+        ),
+    ],
+)
+def test_what_the_machine_lacks_is_one_line(error, message, log, capsys):
+    with pytest.raises(SystemExit) as ended, a_job(log):
+        raise error
+    assert ended.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"error: {message}")
+    assert "Traceback" not in log.read_text()
+
+
+@pytest.mark.parametrize("said", ["died with <Signals.SIGKILL: 9>.", "exit status 137."])
+def test_a_killed_job_is_one_line(said, tmp_path):
+    log = tmp_path / "snakemake.log"
+    log.write_text(f"Command 'python tmp1.simulate.py' returned non-zero {said}\n")
+    assert "--cores 1" in killed_notice(log)
+    log.write_text("Command 'python tmp1.simulate.py' returned non-zero exit status 2.\n")
+    assert killed_notice(log) is None
+
+
+# --- what comes in -------------------------------------------------------------------------------
+
+
+def test_the_set_up_of_a_batch_is_recorded(log):
+    with a_job(log, spec={"seed": 1, "cells": []}) as (_, provenance):
+        assert provenance["setup"] == setup_digest({"cells": [], "seed": 1})
+    assert setup_digest({"seed": 2, "cells": []}) != provenance["setup"]
+
+
+@pytest.mark.parametrize(
+    ("made", "refused"),
+    [
+        ({"seed": 1}, False),
+        ({"seed": 2}, True),
+        ({"seed": 1, "setup": setup_digest("this")}, False),
+        ({"seed": 1, "setup": setup_digest("other")}, True),
+    ],
+)
+def test_a_table_of_another_configuration_is_refused(made, refused, log, tmp_path, capsys):
+    """As a job leaves it that outlived its run, and ended after that of the next run."""
+    path = tmp_path / "estimates.parquet"
+    write_table(path, pd.DataFrame({"a": [1]}), {"config_hash": "", **made})
+    with pytest.raises(SystemExit) if refused else nullcontext(), a_job(log, [path], "this"):
+        pass
+    expected = f"error: {path}: is of another configuration; delete it and run again\n"
+    assert capsys.readouterr().err == (expected if refused else "")
 
 
 def test_a_defect_leaves_its_traceback_in_the_log(log):

@@ -8,6 +8,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+import scipy
 from study_helpers import (
     NINE,
     PAPER_TRUTH,
@@ -126,6 +127,8 @@ def test_origin_is_in_every_file(tmp_path):
             **PROVENANCE,
             "version": accelstudy.__version__,
             "commit": git_commit(),
+            "numpy": np.__version__,
+            "scipy": scipy.__version__,
         }
         assert json.loads(pq.read_schema(path).metadata[b"accelstudy"]) == read_origin(path)
 

@@ -2,15 +2,28 @@
 
 from __future__ import annotations
 
+import errno
+import hashlib
+import json
 import logging
 import shlex
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from accelstudy.errors import InputError
+from accelstudy.outputs import cannot_write
 from accelstudy.study.config import StudyConfig, parse_study
+from accelstudy.study.tables import REMEDY, read_origin
+
+_NOT_OURS = {
+    **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), "free some space"),
+    **dict.fromkeys((errno.EACCES, errno.EPERM, errno.EROFS), "make it writable"),
+    errno.EIO: "look after the disk",
+}
+"""Errors of the system that are no defect of the program, and what a person must do."""
 
 
 def quote_python() -> None:
@@ -21,32 +34,84 @@ def quote_python() -> None:
     sys.executable = shlex.quote(sys.executable)
 
 
+def setup_digest(spec: Any) -> str:
+    """Digest of all on which the numbers of a batch depend, given as plain data."""
+    return hashlib.sha256(json.dumps(spec, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def killed_notice(log: str | Path) -> str | None:
+    """Return a line on what to do where Snakemake's log says that a job was killed; else None."""
+    text = Path(log).read_text(encoding="utf-8", errors="replace")
+    if "<Signals.SIGKILL: 9>" not in text and "exit status 137" not in text:
+        return None
+    return (
+        "A job was killed: by somebody, or by the system as the memory did not suffice. The same "
+        "command goes on where this run stopped; --cores 1 (make CORES=1) needs the least memory."
+    )
+
+
 @contextmanager
 def job(snakemake: Any) -> Iterator[tuple[StudyConfig, Mapping[str, Any]]]:
     """Run the body of a rule's script.
 
-    Gives the study and the provenance of what the job writes (`config_hash` and `seed`).
+    Gives the study and the provenance of what the job writes: `config_hash` and `seed`, and where
+    the rule has the parameter `spec`, its digest as `setup`.
+
+    A table that comes in must have the same seed and, if it has one and the job too, the same
+    set-up. Only who replaced it while the study ran, such as a job that outlived the run that
+    started it, leaves another one.
     """
     with logged(snakemake):
         study = parse_study(snakemake.config)
-        yield study, {"config_hash": study.fingerprint, "seed": study.seed}
+        provenance = {"config_hash": study.fingerprint, "seed": study.seed}
+        spec = snakemake.params.get("spec")
+        if spec is not None:
+            provenance["setup"] = setup_digest(spec)
+        for path in snakemake.input:
+            if Path(path).suffix == ".parquet":
+                _check_origin(path, provenance)
+        yield study, provenance
+
+
+def _check_origin(path: str, provenance: Mapping[str, Any]) -> None:
+    made = read_origin(path)
+    for key, value in made.items():
+        if key in ("seed", "setup") and value != provenance.get(key, value):
+            raise InputError(f"{path}: is of another configuration; {REMEDY}")
 
 
 @contextmanager
 def logged(snakemake: Any) -> Iterator[None]:
     """Run the body of a script of any workflow."""
-    logging.basicConfig(
-        filename=snakemake.log[0],
-        filemode="w",
-        level=logging.INFO,
-        format="%(asctime)s %(levelname)s %(message)s",
-    )
+    # On a full disk the log ends early; what the job itself could not write is said all the same.
+    logging.raiseExceptions = False
     try:
+        logging.basicConfig(
+            filename=snakemake.log[0],
+            filemode="w",
+            level=logging.INFO,
+            format="%(asctime)s %(levelname)s %(message)s",
+        )
         yield
     except InputError as error:
-        logging.error("%s", error)
-        print(f"error: {error}", file=sys.stderr)
-        sys.exit(2)
+        _end(str(error))
+    except MemoryError:
+        _end(
+            f"{snakemake.rule}: not enough memory; run fewer jobs at once (--cores 1, or "
+            "make CORES=1), or on a machine that has more"
+        )
+    except OSError as error:
+        if error.errno not in _NOT_OURS:
+            logging.exception("%s failed", snakemake.rule)
+            raise
+        message = cannot_write(error, Path(snakemake.output[0]))
+        _end(f"{message}; {_NOT_OURS[error.errno]} and run again")
     except Exception:
         logging.exception("%s failed", snakemake.rule)
         raise
+
+
+def _end(message: str) -> None:
+    logging.error("%s", message)
+    print(f"error: {message}", file=sys.stderr)
+    sys.exit(2)

@@ -7,6 +7,7 @@ import subprocess
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import pandas as pd
 import pyarrow as pa
 
 from accelstudy import __version__
+from accelstudy.errors import InputError
 from accelstudy.outputs import whole_file
 from accelstudy.parquet import parquet_file, read_parquet, whole_parquet, write_parquet
 
@@ -45,13 +47,15 @@ def git_commit() -> str:
 def origin(provenance: Mapping[str, Any]) -> dict[str, Any]:
     """What is written into each file: where its numbers come from.
 
-    `provenance` holds `config_hash` and `seed`; version and commit are added.
+    `provenance` holds `config_hash` and `seed`, and `setup` where the file is of a batch (see
+    `accelstudy.study.job`). Commit and versions of what numbers depend on are added.
     """
     return {
-        "config_hash": provenance["config_hash"],
-        "seed": provenance["seed"],
+        **provenance,
         "version": __version__,
         "commit": git_commit(),
+        "numpy": version("numpy"),
+        "scipy": version("scipy"),
     }
 
 
@@ -95,14 +99,32 @@ def read_table(path: str | Path | Sequence[str | Path], **options: Any) -> pd.Da
     Raises
     ------
     InputError
-        If the file is missing, or is not whole as it was written.
+        If a file is missing, or is not whole as it was written, or a folder holds files that were
+        made with different seeds.
     """
     if not isinstance(path, str | Path):
         return pd.concat([read_table(each, **options) for each in path], ignore_index=True)
     path = Path(path)
     if path.is_dir():
-        return read_table(sorted(path.glob("*.parquet")), **options)
+        paths = sorted(path.glob("*.parquet"))
+        if not paths:
+            raise InputError(f"{path}: holds no tables")
+        _check_seeds(paths)
+        return read_table(paths, **options)
     return read_parquet(path, REMEDY, **options).to_pandas()
+
+
+def _check_seeds(paths: Sequence[Path]) -> None:
+    """Check that files are of one study; a run that was stopped leaves some of an earlier one."""
+    seeds: dict[Any, Path] = {}
+    for path in paths:
+        seeds.setdefault(read_origin(path)["seed"], path)
+    if len(seeds) > 1:
+        (one, first), (other, second) = list(seeds.items())[:2]
+        raise InputError(
+            f"{second.parent}: holds files of different studies, {first.name} of seed {one} and "
+            f"{second.name} of seed {other}; run the study again, to its end"
+        )
 
 
 def collect(parts: Sequence[str | Path], output: str | Path, provenance: Mapping[str, Any]) -> None:
@@ -111,9 +133,18 @@ def collect(parts: Sequence[str | Path], output: str | Path, provenance: Mapping
 
 
 def read_origin(path: str | Path) -> dict[str, Any]:
-    """Origin of a file: config hash, seed, package version and commit."""
+    """Origin of a file: config hash, seed, and the software that made it; see `origin`.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, is not whole, or was not written by this package.
+    """
     with whole_parquet(path, REMEDY) as file:
-        return json.loads(file.schema_arrow.metadata[METADATA_KEY])
+        metadata = file.schema_arrow.metadata or {}
+    if METADATA_KEY not in metadata:
+        raise InputError(f"{path}: does not say where it comes from; it is no table of a study")
+    return json.loads(metadata[METADATA_KEY])
 
 
 def read_estimates(

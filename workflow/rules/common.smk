@@ -34,10 +34,6 @@ FINAL_TABLES = [
 ]
 
 
-onstart:
-    logger.info(f"{STUDY.study}: {EFFORT}")
-
-
 wildcard_constraints:
     batch=r"\d{4}",
     analysis="|".join(ANALYSES),
