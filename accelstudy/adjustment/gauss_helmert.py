@@ -224,7 +224,8 @@ def adjust(
             result.parameters[ended] = x[:, converged].T
             result.residuals[ended] = np.moveaxis(v[:, converged], 0, -1)
             result.omega[ended] = step.omega[converged]
-            result.cofactors[ended] = step.cofactors(converged)
+            if len(ended):
+                result.cofactors[ended] = step.cofactors(converged)
 
             if not going_on.any():
                 break

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from accelstudy.diagnosis.evidence.chance import Chance
 from accelstudy.diagnosis.evidence.field import Field
-from accelstudy.diagnosis.evidence.size import Evidence
+from accelstudy.diagnosis.evidence.size import Evidence, log_mean
 from accelstudy.diagnosis.space.residuals import Residuals
 
 Array = NDArray[np.float64]
@@ -116,7 +116,7 @@ def detect(field: Field, evidence: Evidence, residuals: Residuals, chance: Chanc
 
 def total_odds(each: Array) -> Array:
     """S of log odds of each candidate, (b, K): that one of them is missing, whichever, (b,)."""
-    return np.asarray(np.logaddexp.reduce(each, axis=1) - np.log(each.shape[1]))
+    return log_mean(each)
 
 
 def tail(values: Array, weights: Array, value: float, count: int = 1) -> float:

@@ -53,26 +53,29 @@ def all_pairs(
     order = {name: i for i, name in enumerate(dict.fromkeys(names))}
     number = np.array([order[name] for name in names])
     dims = np.array([h.dim for h in tried])
-    gram, seen = _products(tried, z)
+    products = _Products.of(tried, z)
     one, other = np.triu_indices(len(tried), 1)
     # Shapes of one effect are alternatives, but two positions may both be bumped.
     apart = (number[one] != number[other]) | (number[one] == order.get(OUTLIER, -1))
     apart &= dims[one] + dims[other] < r
     one, other = one[apart], other[apart]
-    parts, kept = [], []
-    for some in np.array_split(np.arange(len(one)), len(one) // ROWS + 1):
-        part, independent = _parts_of_both(gram, seen, one[some], other[some])
-        parts.append(part)
-        kept.append(independent)
-    part, independent = np.concatenate(parts), np.concatenate(kept)
+    part, independent = np.zeros(len(one)), np.zeros(len(one), dtype=bool)
+    # Of two spaces the smaller one is looked at beside the larger one, which is less to compute.
+    large = np.where(dims[one] < dims[other], other, one)
+    small = one + other - large
+    sizes = dims[large] * r + dims[small]
+    for size in np.unique(sizes):
+        alike = np.flatnonzero(sizes == size)
+        for some in np.array_split(alike, len(alike) // ROWS + 1):
+            part[some], independent[some] = products.of_both(large[some], small[some])
+    if not independent.any():
+        return []
     one, other, part = one[independent], other[independent], part[independent]
     logs = evidence.of_spaces(part, dims[one] + dims[other], float(z @ z))
     weighted = logs + np.log(weights[one]) + np.log(weights[other])
     keys = number[one] * len(order) + number[other]
     sequence = np.argsort(keys, kind="stable")
     starts = np.flatnonzero(np.diff(keys[sequence], prepend=-1))
-    if not len(starts):
-        return []
     totals = np.logaddexp.reduceat(weighted[sequence], starts)
     pairs = []
     for k, total in enumerate(totals):
@@ -81,21 +84,6 @@ def all_pairs(
         twice = np.log(2.0) if number[one[best]] == number[other[best]] else 0.0
         pairs.append(Pair((tried[one[best]], tried[other[best]]), float(total + twice)))
     return pairs
-
-
-def _parts_of_both(
-    gram: Array, seen: Array, one: NDArray[np.int_], other: NDArray[np.int_]
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Squares of what residuals have in the space of two spaces, and whether these are two."""
-    cross = gram[one, :, other, :]
-    left = np.eye(seen.shape[1]) - np.swapaxes(cross, 1, 2) @ cross
-    values, vectors = np.linalg.eigh(left)
-    # Padding has eigenvalue 1 and no share in the residuals.
-    rest = seen[other] - np.einsum("jab,ja->jb", cross, seen[one])
-    along = np.einsum("jab,ja->jb", vectors, rest) ** 2
-    part = np.sum(seen[one] ** 2, axis=1)
-    part += np.sum(along / np.maximum(values, COLLINEAR), axis=1)
-    return part, values[:, 0] > COLLINEAR
 
 
 def _tried(candidates: Mapping[str, Shapes], z: Array) -> tuple[list[Hypothesis], Array]:
@@ -111,17 +99,55 @@ def _tried(candidates: Mapping[str, Shapes], z: Array) -> tuple[list[Hypothesis]
     return tried, np.concatenate(weights) if weights else np.zeros(0)
 
 
-def _products(hypotheses: Sequence[Hypothesis], z: Array) -> tuple[Array, Array]:
-    """Products of all bases, (h, w, h, w), and of each with residuals, (h, w); padded by zeros."""
-    width = max((h.dim for h in hypotheses), default=1)
-    gram = np.zeros((len(hypotheses) * width,) * 2)
-    seen = np.zeros(len(gram))
-    # Some conditions after the other: all bases side by side would need the memory once more.
-    for rows in np.array_split(np.arange(len(z)), len(z) // ROWS + 1):
-        part = np.zeros((len(rows), len(hypotheses), width))
-        for k, h in enumerate(hypotheses):
-            part[:, k, : h.dim] = h.basis[rows[0] : rows[-1] + 1]
-        flat = part.reshape(len(rows), -1)
-        gram += flat.T @ flat
-        seen += z[rows] @ flat
-    return gram.reshape(len(hypotheses), width, -1, width), seen.reshape(-1, width)
+@dataclass(frozen=True)
+class _Products:
+    """Products of the columns of the bases of hypotheses.
+
+    Attributes
+    ----------
+    gram : (Σ l, Σ l) array, of each with each
+    seen : (Σ l,) array, of each with residuals
+    starts, dims : (h,) int arrays, where the columns of each hypothesis begin, and their number l
+    """
+
+    gram: Array
+    seen: Array
+    starts: NDArray[np.int_]
+    dims: NDArray[np.int_]
+
+    @classmethod
+    def of(cls, hypotheses: Sequence[Hypothesis], z: Array) -> _Products:
+        """Multiply the bases of hypotheses (m, l) with each other and with residuals z (m,)."""
+        dims = np.array([h.dim for h in hypotheses])
+        starts = np.cumsum(dims) - dims
+        gram = np.zeros((dims.sum(),) * 2)
+        seen = np.zeros(len(gram))
+        # Some conditions after the other: all bases together would need the memory once more.
+        for rows in np.array_split(np.arange(len(z)), len(z) // ROWS + 1):
+            part = np.concatenate([h.basis[rows[0] : rows[-1] + 1] for h in hypotheses], axis=1)
+            gram += part.T @ part
+            seen += z[rows] @ part
+        return cls(gram, seen, starts, dims)
+
+    def of_both(
+        self, large: NDArray[np.int_], small: NDArray[np.int_]
+    ) -> tuple[Array, NDArray[np.bool_]]:
+        """Squares of what residuals have in two spaces together, and whether these are two.
+
+        All of one dimension, (j,) each, the first of either is not the smaller one.
+        """
+        a, b = (
+            self.starts[places][:, None] + np.arange(self.dims[places[0]])
+            for places in (large, small)
+        )
+        cross = self.gram[a[:, :, None], b[:, None, :]]
+        left = np.eye(b.shape[1]) - np.swapaxes(cross, 1, 2) @ cross
+        if b.shape[1] == 1:
+            values, vectors = left[:, 0], np.ones_like(left)
+        else:
+            values, vectors = np.linalg.eigh(left)
+        rest = self.seen[b] - np.einsum("jab,ja->jb", cross, self.seen[a])
+        along = np.einsum("jab,ja->jb", vectors, rest) ** 2
+        part = np.sum(self.seen[a] ** 2, axis=1)
+        part += np.sum(along / np.maximum(values, COLLINEAR), axis=1)
+        return part, values[:, 0] > COLLINEAR

@@ -41,7 +41,8 @@ MORE_THAN_WITHIN = 0.5
 """Prior probability that means scatter more than white noise within the holds explains, where the
 holds alone say how large the noise is."""
 
-_LOGS = np.concatenate([np.linspace(0.0, 60.0, 241), np.geomspace(61.0, 1e5, 120)])
+_EVEN = np.linspace(0.0, 60.0, 241)
+_LOGS = np.concatenate([_EVEN, np.geomspace(61.0, 1e5, 120)])
 """Where the integral over λ is tabulated: −(ν + r)/2 · log(1 − x), x = ‖Qᵀz‖²/(ν + ‖z‖²)."""
 
 
@@ -131,19 +132,36 @@ class Evidence:
         (..., s) array
         """
         dims, squares = np.asarray(dims), np.asarray(squares, dtype=float)
-        noise, gain = self.of_noise(squares), np.empty(parts.shape)
-        alike = [(int(d), np.flatnonzero(dims == d)) for d in np.unique(dims)]
-        total = None
+        noise, total = self.of_noise(squares), None
+        known, table_of = np.unique(dims, return_inverse=True)
         for c, nu in enumerate(self.level.freedoms):
             share = np.minimum(parts / (nu + squares)[..., None], 1 - 1e-14)
-            at = -(nu + self.redundancy) / 2 * np.log1p(-share)
-            for d, places in alike:
-                table = _table(d, nu, self.redundancy)
-                gain[..., places] = np.interp(at[..., places], _LOGS, table)
-            logs = noise[..., c, None] + gain
+            at = -(nu + self.redundancy) / 2 * np.log(1 - share)
+            tables = np.stack([_table(int(d), nu, self.redundancy) for d in known])
+            logs = noise[..., c, None] + _looked_up(tables, table_of, at)
             total = logs if total is None else np.logaddexp(total, logs)
         assert total is not None
         return total
+
+
+def _looked_up(tables: Array, which: NDArray[np.int_], at: Array) -> Array:
+    """Interpolate tables (t, k) at some of `_LOGS`, (..., s), each of s with a table of its own."""
+    # Evenly spaced, so that no place has to be searched for.
+    steps = np.minimum(at, _EVEN[-1]) * (1 / _EVEN[1])
+    place = np.minimum(steps.astype(np.int32), len(_EVEN) - 2)
+    steps -= place
+    place += which.astype(np.int32) * tables.shape[1]
+    flat = tables.ravel()
+    found = np.diff(flat)[place]
+    found *= steps
+    found += flat[place]
+    if np.any(far := at > _EVEN[-1]):
+        beyond = np.nonzero(far)
+        own = which[beyond[-1]]
+        for k in np.unique(own):
+            some = tuple(index[own == k] for index in beyond)
+            found[some] = np.interp(at[some], _LOGS, tables[k])
+    return found
 
 
 @lru_cache(maxsize=1024)

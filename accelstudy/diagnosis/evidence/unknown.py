@@ -9,7 +9,7 @@ import numpy as np
 from accelstudy.diagnosis.evidence.size import Evidence, log_mean
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.diagnosis.space.residuals import Residuals
-from accelstudy.diagnosis.space.spaces import ABSORBED, Bases, Spaces, span
+from accelstudy.diagnosis.space.spaces import ABSORBED, Bases, Spaces
 
 
 def unknown_beside(
@@ -23,13 +23,20 @@ def unknown_beside(
     left = residuals.z - q @ (q.T @ residuals.z)
     rest = Evidence(evidence.level, residuals.redundancy - hypothesis.dim)
     alone = np.logaddexp.reduce(rest.of_noise(left @ left))
-    logs = []
+    parts: list[float] = []
+    dims: list[int] = []
     for space in groups.values():
         if not isinstance(space, Bases):
             continue
-        beside = space.together - q @ (q.T @ space.together)
-        basis = span(beside, np.ones(beside.shape[1]), ABSORBED**0.5)[1]
-        if 0 < basis.shape[1] < rest.redundancy:
-            part = np.array([np.sum((left @ basis) ** 2)])
-            logs.append(float(rest.of_spaces(part, [basis.shape[1]], left @ left)[0] - alone))
-    return float(log_mean(np.array(logs))) if logs else None
+        # The squares of what is left of each direction beside the hypothesis.
+        common = q.T @ space.together
+        squares, directions = np.linalg.eigh(np.eye(common.shape[1]) - common.T @ common)
+        seen = squares > ABSORBED
+        if 0 < np.count_nonzero(seen) < rest.redundancy:
+            along = left @ space.together @ directions[:, seen]
+            parts.append(float(np.sum(along**2 / squares[seen])))
+            dims.append(int(np.count_nonzero(seen)))
+    if not parts:
+        return None
+    logs = rest.of_spaces(np.array(parts), dims, left @ left) - alone
+    return float(log_mean(logs))

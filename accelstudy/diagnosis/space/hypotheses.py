@@ -245,7 +245,7 @@ class Frame:
             forces=forces,
             sensed=np.asarray(np.linalg.solve(t, forces.T).T),
             angles=angles,
-            moments=Moments(implied_hold(solution, angles)),
+            moments=Moments(implied_hold(solution, angles), rates=observed.slope is not None),
         )
         return frame.with_slopes()
 
@@ -260,13 +260,14 @@ class Frame:
 
     def with_slopes(self) -> Frame:
         """Add the slopes within the holds, as far as they add to what the means say."""
+        without = replace(self, moments=Moments(self.hold, rates=False))
         slopes = Slopes.of(self.solution.observed, self.forces)
         if slopes is None:
-            return self
+            return without
         own = [self.signature(effect) for effect in self.solution.model.effects]
         rows = slopes.beside(self.residuals, self.solution.parameters, own, self.of_time())
         if rows is None:
-            return self
+            return without
         return replace(
             self,
             residuals=self.residuals.with_slopes(rows),

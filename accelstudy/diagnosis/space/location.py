@@ -41,7 +41,7 @@ def groups(setting: Setting) -> dict[str, Spaces]:
     def add(name: str, course: Callable[[Moment], Array]) -> None:
         """Enter a group given by changes of the sensor's output, (n, 3, k), in some holds."""
         change = residuals.by_observations[..., :3] @ course(Moment(hold))
-        rate = None if hold.time is None else rate_of(course, hold)
+        rate = rate_of(course, hold) if residuals.slopes else None
         add_rows(name, residuals.stacked(change, rate))
 
     def add_rows(name: str, rows: Array) -> None:

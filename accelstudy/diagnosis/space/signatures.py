@@ -106,12 +106,13 @@ class Moments:
     ----------
     hold : Hold
     now : Moment
-    around : tuple of Moment, `MOMENT` and twice that before and after; empty without a time
+    around : tuple of Moment, `MOMENT` and twice that before and after; empty without a time, or
+        where no rates are wanted
     """
 
-    def __init__(self, hold: Hold) -> None:
+    def __init__(self, hold: Hold, rates: bool = True) -> None:
         self.hold, self.now = hold, Moment(hold, axes=2)
-        steps = () if hold.time is None else (-2, -1, 1, 2)
+        steps = (-2, -1, 1, 2) if rates and hold.time is not None else ()
         self.around = tuple(Moment(hold, step * MOMENT, axes=2) for step in steps)
 
 
@@ -162,13 +163,22 @@ def signatures(
     force, rate = output(now), np.zeros((n, 3, s * k))
     if moments.around and now.used & {"time", "temperature"}:
         rate = _rate(*map(output, moments.around))
-    axes = np.zeros((3, 3, k))
-    for i, row in enumerate(effect.axes(p, np)):
-        for j, value in enumerate(row):
-            axes[i, j] = value
-    if axes.any():
+    if (axes := _axes(effect, k)).any():
         force -= np.tile(np.einsum("nb,abk->nak", forces, axes), s)
-    return Signature(force, filled(effect.reading(attitude, p, now, np), 2), rate)
+    turned = np.zeros((n, 2, s * k))
+    if type(effect).reading is not Effect.reading:
+        turned = filled(effect.reading(attitude, p, now, np), 2)
+    return Signature(force, turned, rate)
+
+
+def _axes(effect: Effect, k: int) -> Array:
+    """What an effect adds to T, for the unit vectors of its parameters, (3, 3, k)."""
+    axes = np.zeros((3, 3, k))
+    if type(effect).axes is not Effect.axes:
+        for i, row in enumerate(effect.axes(tuple(np.eye(k)), np)):
+            for j, value in enumerate(row):
+                axes[i, j] = value
+    return axes
 
 
 def _together(shapes: Sequence[Effect]) -> Effect:

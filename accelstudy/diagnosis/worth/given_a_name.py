@@ -18,7 +18,7 @@ from accelstudy.diagnosis.decision.priors import MANY, SURE
 from accelstudy.diagnosis.decision.search import Search
 from accelstudy.diagnosis.evidence.detection import total_odds
 from accelstudy.diagnosis.evidence.field import UNKNOWN
-from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis
+from accelstudy.diagnosis.space.hypotheses import OUTLIER
 from accelstudy.diagnosis.worth.gap import SIGNIFICANT
 from accelstudy.diagnosis.worth.linear import LinearSplit
 
@@ -87,37 +87,41 @@ def _on_the_part(
     """What the fitted positions choose of noise (b, m), and the held-out statistic, (b,)."""
     own = noise[:, split.rows[0]]
     slopes = rng.standard_normal((len(noise), part.residuals.slopes))
-    choices = _choices(part, part.residuals.project(np.concatenate([own, slopes], axis=1).T).T)
+    z = part.residuals.project(np.concatenate([own, slopes], axis=1).T).T
+    candidate, shape = _choices(part, z)
     left, missed = split.beside(noise)
     variance = np.ones(len(noise))
     if not part.level.known:
         variance = np.sum(left**2, axis=1) / (own.shape[1] - len(split.cofactors))
-    values = np.zeros(len(noise))
-    for chosen in {h.spec: h for h in choices}.values():
-        if chosen.effect is None:
+    names, values = part.field.names, np.zeros(len(noise))
+    for k in np.unique(candidate):
+        if names[k] == OUTLIER:
             continue
-        some = np.array([h.spec == chosen.spec for h in choices])
-        change = split.corrections(chosen, left[some])
-        slope = change @ split.designs[1]
-        size = np.sum(change**2, axis=1) + np.sum((slope @ split.cofactors) * slope, axis=1)
-        scale = np.sqrt(size * variance[some])
-        # An effect that does not show in the held-out positions says nothing there.
-        shown = scale > 0
-        values[some] = np.sum(change * missed[some], axis=1) / np.where(shown, scale, np.inf)
-    return [h.name for h in choices], values
+        places, which = np.unique(shape[candidate == k], return_inverse=True)
+        hypotheses = [part.setting.candidates[names[k]][int(place)] for place in places]
+        rows = np.flatnonzero(candidate == k)
+        for i, (fit, rest) in enumerate(split.predictors(hypotheses)):
+            some = rows[which == i]
+            change = left[some] @ fit @ rest
+            slope = change @ split.designs[1]
+            size = np.sum(change**2, axis=1) + np.sum((slope @ split.cofactors) * slope, axis=1)
+            scale = np.sqrt(size * variance[some])
+            # An effect that does not show in the held-out positions says nothing there.
+            shown = scale > 0
+            values[some] = np.sum(change * missed[some], axis=1) / np.where(shown, scale, np.inf)
+    return [names[k] for k in candidate], values
 
 
-def _choices(part: Search, z: Array) -> list[Hypothesis]:
-    """Shape of the effect that explains most, for each of residuals (b, m)."""
+def _choices(part: Search, z: Array) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+    """Candidate that explains most, and which of its shapes, for each of residuals (b, m)."""
     field = part.field
-    squares = np.sum(z**2, axis=-1)
-    logs = part.evidence.of_spaces(field.parts(z), field.dims, squares)
+    logs = part.evidence.of_spaces(field.parts(z), field.dims, np.sum(z**2, axis=-1))
     total = field.combined(logs)
-    allowed = [k for k, name in enumerate(field.names) if name != UNKNOWN]
+    total[:, [k for k, name in enumerate(field.names) if name == UNKNOWN]] = -np.inf
+    candidate = np.argmax(total, axis=1)
+    shape = np.zeros(len(z), dtype=int)
     ends = [*field.starts[1:], len(field.dims)]
-    found = []
-    for each, own in zip(total[:, allowed], logs, strict=True):
-        k = allowed[int(np.argmax(each))]
-        place = int(np.argmax(own[field.starts[k] : ends[k]]))
-        found.append(part.setting.candidates[field.names[k]][place])
-    return found
+    for k in np.unique(candidate):
+        rows = np.flatnonzero(candidate == k)
+        shape[rows] = np.argmax(logs[rows, field.starts[k] : ends[k]], axis=1)
+    return candidate, shape

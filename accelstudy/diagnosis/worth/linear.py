@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -71,7 +72,21 @@ class LinearSplit:
         hypothesis : Hypothesis, about an effect
         left : (b, f c) array, what the base model leaves of the fitted part
         """
-        assert hypothesis.effect is not None
-        shown = self.frame.residuals.positions.whitened(self.frame.signature(hypothesis.effect))
-        own, rest = self.beside((shown @ hypothesis.directions).T)
-        return left @ np.linalg.pinv(own) @ rest
+        ((fit, rest),) = self.predictors([hypothesis])
+        return np.asarray(left @ fit @ rest)
+
+    def predictors(self, hypotheses: Sequence[Hypothesis]) -> list[tuple[Array, Array]]:
+        """Matrices (f c, l) and (l, h c), whose product makes such corrections.
+
+        Parameters
+        ----------
+        hypotheses : shapes of one effect
+        """
+        effects = [one.effect for one in hypotheses if one.effect is not None]
+        shown = self.frame.residuals.positions.whitened(self.frame.signatures(effects))
+        found = []
+        columns = np.split(shown, len(effects), axis=1)
+        for one, own in zip(hypotheses, columns, strict=True):
+            fitted, rest = self.beside((own @ one.directions).T)
+            found.append((np.asarray(np.linalg.pinv(fitted), dtype=float), rest))
+        return found
