@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.special import softmax
 
 from accelstudy.diagnosis.decision.explanations import Explanation, credible_set
 from accelstudy.diagnosis.evidence.noise import NOISES
@@ -116,9 +117,7 @@ class Posterior:
 
 def _shares(weighed: Sequence[Weighed]) -> tuple[float, ...]:
     """Probabilities of what excludes each other."""
-    logs = np.array([one.log_weight for one in weighed])
-    weights = np.exp(logs - logs.max())
-    return tuple((weights / weights.sum()).tolist())
+    return tuple(softmax([one.log_weight for one in weighed]).tolist())
 
 
 def of_effects(explanation: Explanation) -> bool:

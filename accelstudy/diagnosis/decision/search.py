@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import softmax
 
 from accelstudy.adjustment.quality import Solution, solve
 from accelstudy.diagnosis.decision import priors
@@ -297,11 +298,9 @@ class Search:
     def probabilities(self) -> dict[str, float]:
         """Probability of each candidate if just one of them is missing, largest first."""
         logs = self.detection.densities
-        top = max(logs.values(), default=0.0)
-        weights = {name: float(np.exp(log - top)) for name, log in logs.items()}
-        total = sum(weights.values())
-        ranked = sorted(weights, key=lambda name: -weights[name])
-        return {name: weights[name] / total for name in ranked}
+        ranked = sorted(logs, key=lambda name: -logs[name])
+        shares = softmax([logs[name] for name in ranked]).tolist() if ranked else []
+        return dict(zip(ranked, shares, strict=True))
 
     @cached_property
     def posterior(self) -> Posterior:

@@ -68,11 +68,6 @@ class Detection:
     p_family: Mapping[str, float]
     by_chance: Simulated
 
-    @property
-    def smallest(self) -> float:
-        """Probability of the whole by chance."""
-        return self.p_value
-
 
 def detect(field: Field, evidence: Evidence, residuals: Residuals, chance: Chance) -> Detection:
     """Test whether anything is missing.

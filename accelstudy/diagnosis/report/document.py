@@ -42,7 +42,7 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
             ],
         },
         "screening": {
-            "p_value": number(d.screening.smallest),
+            "p_value": number(d.screening.p_value),
             "simulations": d.simulations,
             "candidates": [
                 {

@@ -188,7 +188,7 @@ def _effect_line(named: Named) -> str:
 def _agreement(d: Diagnosis) -> str:
     test = d.global_test
     if d.screening.p_family:
-        pattern = f"no pattern ({p_value(d.screening.smallest)})"
+        pattern = f"no pattern ({p_value(d.screening.p_value)})"
     else:
         pattern = f"too little redundancy ({d.base.redundancy}) to show a pattern"
     if test is None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import softmax
 
 from accelstudy.adjustment.quality import Solution, solve
 from accelstudy.diagnosis.decision.priors import SURE
@@ -153,5 +154,4 @@ def _is_the_name(search: Search, part: Search, finding: Finding, split: LinearSp
         if len(one.best) == 1 and one.best[0].effect is not None:
             rest = missed - split.corrections(one.best[0], left)
             logs.append(-float(np.sum(rest**2)) / (2 * variance))
-    weights = np.exp(np.array(logs) - max(logs))
-    return bool(weights[0] >= SURE * weights.sum())
+    return bool(softmax(logs)[0] >= SURE)
