@@ -81,27 +81,29 @@ class Session:
             hold=self.hold,
         )
 
-    def draw(self, noise: Noise, replicates: int, rng: np.random.Generator) -> Observations:
+    def draw(
+        self, noise: Noise, replicates: int, rng: np.random.Generator, angles: bool = True
+    ) -> Observations:
         """Draw the observations of `replicates` sessions.
 
         The draws are made in a fixed order (forces, angles, gravity, then what noise effects draw)
-        whatever is used of them. The adjustment knows nothing of the noise effects.
+        whatever is used of them; without `angles`, the readings of the robot are not drawn where
+        nothing follows them. The adjustment knows nothing of the noise effects.
         """
         n = len(self.forces)
         error = noise.sigma_force * rng.standard_normal((replicates, n, 3))
-        angles = self.angles + noise.sigma_angle * rng.standard_normal((replicates, n, 2))
-        gravity = (
-            self.gravity
-            + noise.gravity_error
-            + noise.sigma_gravity * rng.standard_normal(replicates)
-        )
+        read = None
+        gravity = np.full(replicates, self.gravity + noise.gravity_error)
+        if angles or noise.sigma_gravity > 0 or noise.effects:
+            read = self.angles + noise.sigma_angle * rng.standard_normal((replicates, n, 2))
+            gravity += noise.sigma_gravity * rng.standard_normal(replicates)
         effects = [get_noise_effect(spec) for spec in noise.effects]
         for effect in effects:
             error = effect.disturb(error, noise.sigma_force, self.hold, rng)
         forces = self.forces + error
         for effect in effects:
             forces = effect.read(forces)
-        return replace(self.observations(noise), forces=forces, angles=angles, gravity=gravity)
+        return replace(self.observations(noise), forces=forces, angles=read, gravity=gravity)
 
 
 def session(

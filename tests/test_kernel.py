@@ -1,9 +1,10 @@
 """The compiled adjustment against the NumPy path: the same numbers, whoever shares the lanes."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from study_helpers import grid, make_cells, simulated
 
 from accelstudy import adjustment
 from accelstudy.adjustment.block import Block
@@ -15,6 +16,9 @@ from accelstudy.models import get_model
 from accelstudy.schemes import get_scheme
 from accelstudy.sensor import SensorModel
 from accelstudy.simulation import Noise, session
+from accelstudy.study import compiling
+from accelstudy.study.compiling import POSITIONS_PER_PARAMETER
+from accelstudy.study.simulate import BLOCK, blocks
 
 pytest.importorskip("llvmlite")
 
@@ -173,3 +177,34 @@ def test_what_is_compiled_is_kept_whole_or_not_at_all(tmp_path, monkeypatch):
     closed.write_text("no folder", encoding="utf-8")
     before = len(made)
     assert doubled(closed) == before + 1
+
+
+@pytest.mark.parametrize("approach", ["gravity", "robot"])
+def test_a_compiled_cell_of_a_study(approach):
+    (cell,) = make_cells(grid(approaches=approach, replicates=BLOCK + 30)).values()
+    cell = replace(cell, compiled=True)
+    found = simulated(cell)
+    assert_same(found, simulated(replace(cell, compiled=False)))
+    (second,) = blocks(cell, 1, 1, 1)
+    assert second.estimates.tobytes() == found.estimates[BLOCK:].tobytes()
+
+
+def test_which_cells_are_compiled(monkeypatch):
+    """Those of a code that takes NumPy longer than the compiler, over all cells that share it."""
+    pays = -(-9 * POSITIONS_PER_PARAMETER // 24)
+
+    def compiled_cells(*replicates):
+        grids = [
+            grid(schemes=["mclaren-24"], approaches="gravity", replicates=replicates[0]),
+            grid(schemes=["mclaren-24"], approaches="robot", replicates=replicates[1]),
+            grid(schemes=["rings-24"], approaches="gravity", replicates=replicates[2]),
+        ]
+        return [cell.compiled for cell in make_cells(*grids).values()]
+
+    assert compiled_cells(pays - 1, pays, 1) == [True, True, True]
+    assert compiled_cells(pays - 2, pays - 1, 1) == [False, False, False]
+    monkeypatch.setattr(compiling, "find_spec", lambda name: None)
+    assert compiled_cells(pays, pays, pays) == [False, False, False]
+    (cell,) = make_cells(grid(approaches="gravity")).values()
+    with pytest.raises(InputError, match=r"install accelstudy\[kernel\]"):
+        next(blocks(replace(cell, compiled=True), 1, 0, 1))

@@ -92,6 +92,19 @@ def test_what_is_drawn_does_not_depend_on_the_sizes():
     np.testing.assert_array_equal(large.angles, np.broadcast_to(IDEAL.angles, (4, 24, 2)))
 
 
+def test_the_readings_of_the_robot_are_not_drawn_where_nothing_needs_them():
+    for noise in (Noise(), Noise(sigma_gravity=0.01), Noise(effects=("coloured_noise",))):
+        whole = IDEAL.draw(noise, 3, np.random.default_rng(1))
+        rng = np.random.default_rng(1)
+        part = IDEAL.draw(noise, 3, rng, angles=False)
+        assert part.forces.tobytes() == whole.forces.tobytes()
+        assert part.gravity.tobytes() == whole.gravity.tobytes()
+        if noise == Noise():
+            after = np.random.default_rng(1)
+            after.standard_normal((3, 24, 3))
+            assert rng.standard_normal() == after.standard_normal()
+
+
 def test_order_of_the_draws():
     rng = np.random.default_rng(1)
     forces = rng.standard_normal((4, 24, 3))

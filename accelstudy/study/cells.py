@@ -19,6 +19,7 @@ from accelstudy.noise_effects import get_noise_effect
 from accelstudy.schemes import Scheme, get_scheme, scheme_names
 from accelstudy.sensor import SensorModel
 from accelstudy.simulation import Noise
+from accelstudy.study.compiling import with_compiled
 from accelstudy.study.config import Grid, StudyConfig
 from accelstudy.units import MGON
 
@@ -44,6 +45,7 @@ class Cell:
     gravity : float, true local gravity, m/s²
     truth : dict of parameter name to true value, SI
     holds : HoldPlan, conditions of the holds
+    compiled : bool, whether compiled code calibrates it; see `accelstudy.study.compiling`
     """
 
     name: str
@@ -57,6 +59,7 @@ class Cell:
     gravity: float
     truth: dict[str, float]
     holds: HoldPlan
+    compiled: bool = False
 
     @property
     def estimated_model(self) -> SensorModel:
@@ -141,7 +144,7 @@ def study_cells(study: StudyConfig) -> list[Cell]:
             known = cells.get(cell.name)
             if known is None or cell.replicates > known.replicates:
                 cells[cell.name] = cell
-    return list(cells.values())
+    return with_compiled(list(cells.values()))
 
 
 def _grid_cells(study: StudyConfig, grid: Grid) -> Iterable[Cell]:

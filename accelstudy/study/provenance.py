@@ -28,7 +28,9 @@ _TABLES = ("study/summary.py", "leveling_error.py", "closed_forms.py")
 _CONFIG = ("study/config/",)
 _STUDY = (
     "study/claims",
-    *(f"study/{name}.py" for name in ("analysis", "cells", "simulate", "summary")),
+    "kernel/",
+    "adjustment/block.py",
+    *(f"study/{name}.py" for name in ("analysis", "cells", "compiling", "simulate", "summary")),
 )
 _SCORED = tuple(
     f"hidden/{name}.py"

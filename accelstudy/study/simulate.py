@@ -12,11 +12,11 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from accelstudy.adjustment import calibrate
 from accelstudy.adjustment.block import Block, joined
 from accelstudy.design import diagnose
 from accelstudy.simulation import session
 from accelstudy.study.cells import Cell
+from accelstudy.study.compiling import calibrator
 from accelstudy.study.tables import parquet_writer
 
 Array = NDArray[np.float64]
@@ -48,6 +48,7 @@ def blocks(cell: Cell, seed: int, first: int, count: int) -> Iterator[Block]:
         no more than `n_blocks`
     """
     simulated, estimated = cell.simulated_model, cell.estimated_model
+    calibrate = calibrator(cell)
     ideal = session(
         simulated,
         simulated.vector(cell.truth),
@@ -57,8 +58,8 @@ def blocks(cell: Cell, seed: int, first: int, count: int) -> Iterator[Block]:
     )
     for block in range(first, min(first + count, n_blocks(cell))):
         rng = np.random.default_rng(cell.seed(seed, block))
-        drawn = ideal.draw(cell.noise, BLOCK, rng).first(cell.replicates - block * BLOCK)
-        yield Block.of(calibrate(estimated, cell.conditions, drawn))
+        drawn = ideal.draw(cell.noise, BLOCK, rng, angles=cell.conditions.uses_angles)
+        yield calibrate(estimated, cell.conditions, drawn.first(cell.replicates - block * BLOCK))
 
 
 _NAME = pa.dictionary(pa.int32(), pa.string())
