@@ -98,10 +98,12 @@ def test_of_many_estimates_the_ends_are_read(finished, monkeypatch):
 
 def test_another_configuration_is_said(finished):
     (line,) = lines(seed=2)
-    assert line.startswith(f"{RESULTS}: 4 of 4 tables are of another configuration.")
+    assert line.startswith(f"{RESULTS}: 4 of 4 tables are of another configuration: {NAMES[0]} ")
     assert "`make anew`" in line
     (line,) = lines(setups={**SETUPS, NAMES[0]: "another"})
-    assert "1 of 4 tables" in line
+    assert f"1 of 4 tables are of another configuration: {NAMES[0]}. " in line
+    (line,) = earlier_run(RESULTS, OUTPUTS[1:], {name: SETUPS[name] for name in NAMES[1:]}, 1)
+    assert f"1 of 4 tables are of another configuration: {NAMES[0]}. " in line
 
 
 def test_other_software_is_said(finished, monkeypatch):
@@ -152,6 +154,7 @@ def test_files_of_a_user_stay_among_the_estimates(finished):
     folder = finished / RESULTS / "estimates"
     pd.DataFrame({"a": [1]}).to_parquet(folder / "mine.parquet")
     (folder / "notes.txt").touch()
+    assert lines() == []
     assert remove_foreign(folder, {}) is not None
     assert sorted(path.name for path in folder.iterdir()) == ["mine.parquet", "notes.txt"]
     with pytest.raises(InputError, match=r"mine\.parquet: does not say where it comes from"):

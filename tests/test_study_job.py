@@ -98,9 +98,10 @@ def test_what_the_machine_lacks_is_one_line(error, message, log, capsys):
 def test_a_killed_job_is_one_line(said, tmp_path):
     log = tmp_path / "snakemake.log"
     log.write_text(f"Command 'python tmp1.simulate.py' returned non-zero {said}\n")
-    assert "--cores 1" in killed_notice(log)
+    assert "--cores 1" in killed_notice([str(log)])
     log.write_text("Command 'python tmp1.simulate.py' returned non-zero exit status 2.\n")
-    assert killed_notice(log) is None
+    assert killed_notice([str(log)]) is None
+    assert killed_notice([]) is None  # Snakemake could write none
 
 
 # --- what comes in -------------------------------------------------------------------------------

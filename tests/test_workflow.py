@@ -310,10 +310,13 @@ def test_results_cannot_be_written(tmp_path, monkeypatch):
     closed.mkdir(mode=0o500)
     if os.geteuid() == 0:  # whom permission bits do not bind
         monkeypatch.setattr(provenance.os, "access", lambda path, mode: Path(path) != closed)
-    expected = re.escape(f"{closed}/a/b: cannot hold results: {closed} is not writable")
-    with pytest.raises(InputError, match=f"^{expected}$"):
-        check_writable(closed / "a" / "b")
+    for folder in (closed / "a" / "b", closed, tmp_path):
+        expected = re.escape(f"{folder}: cannot hold results: {closed} is not writable")
+        with pytest.raises(InputError, match=f"^{expected}$"):
+            check_writable(folder)
     check_writable(tmp_path / "a" / "b")
+    closed.rmdir()
+    check_writable(tmp_path)
     assert not (tmp_path / "a").exists()
 
 

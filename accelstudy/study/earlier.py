@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +51,9 @@ def earlier_run(
             "going on: `make unlock`, or the same command with --unlock."
         )
     origins = _origins([path for path in outputs if Path(path).is_file()], setups)
+    for path in sorted(map(str, Path(results, "estimates").glob("*.parquet"))):
+        with suppress(InputError):  # what has no origin is a user's
+            origins.setdefault(path, read_origin(path))
     kept = "What this run does not make anew stays; `make anew`, or --forceall, makes all anew."
     other = [
         path
@@ -58,7 +62,8 @@ def earlier_run(
     ]
     if other:
         yield (
-            f"{results}: {len(other)} of {len(origins)} tables are of another configuration. {kept}"
+            f"{results}: {len(other)} of {len(origins)} tables are of another configuration: "
+            f"{_named(other)}. {kept}"
         )
     if changed := _other_software(origins.values()):
         yield f"{results}: has tables made by {joined(changed)}. {kept}"
@@ -108,9 +113,14 @@ def _origins(paths: Sequence[str], estimates: Container[str]) -> dict[str, dict[
     if len(damaged) == 1:
         raise next(iter(damaged.values()))
     if damaged:
-        names = " ".join([*damaged][:LISTED]) + (" …" if len(damaged) > LISTED else "")
-        raise InputError(f"{len(damaged)} files are damaged; delete them and run again: {names}")
+        raise InputError(
+            f"{len(damaged)} files are damaged; delete them and run again: {_named([*damaged])}"
+        )
     return origins
+
+
+def _named(paths: Sequence[str]) -> str:
+    return " ".join(paths[:LISTED]) + (" …" if len(paths) > LISTED else "")
 
 
 def _check_end(path: Path) -> None:

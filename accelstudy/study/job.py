@@ -8,7 +8,7 @@ import json
 import logging
 import shlex
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -39,9 +39,9 @@ def setup_digest(spec: Any) -> str:
     return hashlib.sha256(json.dumps(spec, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def killed_notice(log: str | Path) -> str | None:
-    """Return a line on what to do where Snakemake's log says that a job was killed; else None."""
-    text = Path(log).read_text(encoding="utf-8", errors="replace")
+def killed_notice(logs: Iterable[str]) -> str | None:
+    """Return a line on what to do where Snakemake's logs say that a job was killed; else None."""
+    text = "".join(Path(log).read_text(encoding="utf-8", errors="replace") for log in logs)
     if "<Signals.SIGKILL: 9>" not in text and "exit status 137" not in text:
         return None
     return (

@@ -77,16 +77,19 @@ def code_hash(stage: str) -> str:
 
 
 def check_writable(folder: str | Path) -> None:
-    """Check that a folder can be made and written to, without making it.
+    """Check that a folder and those in it can be written to, or that it can be made.
 
     Raises
     ------
     InputError
-        If it, or the nearest folder above it that exists, is no folder or is not writable.
+        If it, a folder in it, or the nearest folder above it that exists, is not writable, or is no
+        folder.
     """
     folder = Path(folder)
     nearest = next(path for path in (folder, *folder.absolute().parents) if path.exists())
     if not nearest.is_dir():
         raise InputError(f"{folder}: cannot hold results: {nearest} is not a folder")
-    if not os.access(nearest, os.W_OK | os.X_OK):
-        raise InputError(f"{folder}: cannot hold results: {nearest} is not writable")
+    inside = (Path(path) for path, _, _ in os.walk(folder))  # of the folder itself, if it is there
+    for path in (nearest, *inside):
+        if not os.access(path, os.W_OK | os.X_OK):
+            raise InputError(f"{folder}: cannot hold results: {path} is not writable")

@@ -123,7 +123,8 @@ def _check_seeds(paths: Sequence[Path]) -> None:
         (one, first), (other, second) = list(seeds.items())[:2]
         raise InputError(
             f"{second.parent}: holds files of different studies, {first.name} of seed {one} and "
-            f"{second.name} of seed {other}; run the study again, to its end"
+            f"{second.name} of seed {other}; run the study again: it removes or names those that "
+            "are not its own"
         )
 
 
