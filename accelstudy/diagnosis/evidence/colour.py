@@ -37,7 +37,8 @@ def quadratic_forms(v: Array) -> Array:
     n = v.shape[-2]
     size = 2 ** int(np.ceil(np.log2(2 * n)))
     lag = np.minimum(np.arange(size), size - np.arange(size))
-    power = np.sum(np.abs(np.fft.rfft(v, size, axis=-2)) ** 2, axis=-1)
+    spectrum = np.fft.rfft(v, size, axis=-2)
+    power = np.sum(spectrum.real**2 + spectrum.imag**2, axis=-1)
     # Of the spectrum of a real sequence, all but the ends stand for two frequencies.
     twice = np.where((np.arange(power.shape[-1]) % (size // 2)) == 0, 1.0, 2.0) / size
     forms = []

@@ -139,14 +139,14 @@ class Field:
         sizes = rng.choice(PROPOSED, size=len(noise))
         dims = self.dims[drawn]
         amounts = rng.standard_normal(dims.sum()) * np.repeat(np.sqrt(sizes / dims), dims)
-        each = np.split(amounts, np.cumsum(dims)[:-1])
         candidate = np.searchsorted(self.starts, drawn, side="right") - 1
+        of_amount = np.repeat(candidate, dims)
         changed = noise.copy()
         for k in np.unique(candidate):
             own = np.flatnonzero(candidate == k)
             shapes = self.spaces[k][0]
             assert isinstance(shapes, EffectShapes | BumpedPositions)
-            changed[own] += shapes.drawn(drawn[own] - self.starts[k], [each[i] for i in own])
+            changed[own] += shapes.drawn(drawn[own] - self.starts[k], amounts[of_amount == k])
         return changed
 
     def proposal(self, parts: Array) -> Array:

@@ -114,11 +114,13 @@ class EffectShapes(Bases, Sequence[Hypothesis]):
         shared = zip(hypotheses, own.split(), strict=True)
         return cls(own.together, own.dims, tuple(replace(h, basis=q) for h, q in shared))
 
-    def drawn(self, places: NDArray[np.int_], amounts: Sequence[Array]) -> Array:
-        """Sums of the columns of some bases by amounts (l,) of each, (b, m)."""
+    def drawn(self, places: NDArray[np.int_], amounts: Array) -> Array:
+        """Sums of the columns of some bases by amounts (Σ l,) of one after the other, (b, m)."""
+        dims = self.dims[places]
+        rows = np.repeat(np.arange(len(places)), dims)
+        first = np.repeat(self.ends[places] - (np.cumsum(dims) - dims), dims)
         columns = np.zeros((len(places), self.together.shape[1]))
-        for row, place, amount in zip(columns, places, amounts, strict=True):
-            row[self.ends[place] : self.ends[place + 1]] = amount
+        columns[rows, first + np.arange(len(rows))] = amounts
         return np.asarray(columns @ self.together.T)
 
     def __len__(self) -> int:
@@ -181,12 +183,17 @@ class BumpedPositions(Sequence[Hypothesis]):
         basis = self.residuals.project(rows)
         return Hypothesis(OUTLIER, f"{OUTLIER}({place})", None, directions, basis, basis)
 
-    def drawn(self, places: NDArray[np.int_], amounts: Sequence[Array]) -> Array:
-        """Sums of the columns of some bases by amounts (l,) of each, (b, m), but for R."""
+    def drawn(self, places: NDArray[np.int_], amounts: Array) -> Array:
+        """Sums of the columns of some bases by amounts (Σ l,) of each, (b, m), but for R."""
+        n, c = len(self.residuals.whitening), self.root.shape[-1]
+        each = np.zeros((len(places), c))
+        # The columns of H that are zero are the first ones.
+        each[np.arange(c) >= c - self.dims[places, None]] = amounts
         sums = np.zeros((len(places), len(self.residuals.design)))
-        for row, place, amount in zip(sums, places, amounts, strict=True):
-            where, directions = self.rows_of(int(place))
-            row[where] = directions @ amount
+        blocks = sums[:, : n * c].reshape(-1, n, c)
+        blocks[np.arange(len(places)), self.places[places]] = np.einsum(
+            "bij,bj->bi", self.root[places], each
+        )
         return sums
 
     def rows_of(self, index: int) -> tuple[slice, Array]:
