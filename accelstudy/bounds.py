@@ -62,7 +62,7 @@ DURATION = Range(1e-6, 1e7, "s")
 RATE = Range(1e-6, 1e9, "per second")
 
 CELLS = Range(1, 100_000)
-REPLICATES = Range(1, 10_000_000)
+REPLICATES = Range(1, 10**11)
 SESSIONS = Range(100, 100_000)
 ATTITUDES = Range(1, 100_000)
 BASE_SAMPLES = Range(2, 2**20)

@@ -40,6 +40,80 @@ def holds_in_use(hold: Hold, n: int, f_b: Array) -> Hold:
 
 
 @dataclass(frozen=True)
+class TiltError:
+    """Errors of roll and pitch as a function of the estimates, about a reference calibration.
+
+    The mean over attitudes of the squared error of an estimate x is, with δ = x − reference,
+    constant + 2 linear δ + δᵀ quadratic δ: the reference is propagated exactly, and what is left
+    linearly.
+
+    Attributes
+    ----------
+    reference : (u,) array, SI
+    constant : (2,) array, rad², of roll and of pitch
+    linear : (2, u) array
+    quadratic : (2, u, u) array
+    """
+
+    reference: Array
+    constant: Array
+    linear: Array
+    quadratic: Array
+
+    def rms(self, estimates: Array) -> Array:
+        """Rms over attitudes of the errors of roll and of pitch, (R, 2), of estimates (R, u)."""
+        delta = estimates - self.reference
+        scattered = [
+            np.einsum("ru,uw,rw->r", delta, q, delta, optimize=True) for q in self.quadratic
+        ]
+        square = self.constant + 2 * delta @ self.linear.T + np.stack(scattered, -1)
+        return np.sqrt(np.maximum(square, 0.0))
+
+    def rms_of_all(self, covariance: Array) -> Array:
+        """Rms over attitudes and over calibrations whose mean is the reference, (2,)."""
+        return np.sqrt(self.constant + np.einsum("auw,uw->a", self.quadratic, covariance))
+
+
+def tilt_error(
+    simulated: SensorModel,
+    truth: Array,
+    estimated: SensorModel,
+    reference: Array,
+    f_b: Array,
+    g: float = STANDARD_GRAVITY,
+    hold: Hold | None = None,
+) -> TiltError:
+    """Propagate calibration errors to roll and pitch, without noise of the leveled reading.
+
+    Effects that the estimated model lacks count in full. Effects of the rig, estimated or not, do
+    not count: the sensor has left it.
+
+    Parameters
+    ----------
+    simulated, estimated : SensorModel, what the sensor is and what is estimated of it
+    truth : (u',) array, SI, of the simulated model
+    reference : (u,) array, SI, of the estimated model, near the estimates: their mean, say
+    f_b : (k, 3) array, m/s², attitudes
+    g : float, m/s²
+    hold : Hold, optional
+        What else is known of the attitudes, where effects depend on it.
+    """
+    reference = np.where(estimated.stays, reference, 0.0)
+    output = simulated.sense(f_b, np.where(simulated.stays, truth, 0.0), g, hold)
+    corrected = estimated.correct(output, reference, g, hold)
+    offset = np.stack(roll_pitch(tuple(corrected.T)), -1) - np.stack(roll_pitch(tuple(f_b.T)), -1)
+    offset = (offset + np.pi) % (2 * np.pi) - np.pi
+    slope = jacobian(corrected) @ estimated.correction_jacobian(output, reference, g, hold)
+    slope = np.where(estimated.stays, slope, 0.0)
+    return TiltError(
+        reference,
+        constant=np.mean(offset**2, axis=0),
+        linear=np.einsum("ka,kau->au", offset, slope) / len(f_b),
+        quadratic=np.einsum("kau,kaw->auw", slope, slope) / len(f_b),
+    )
+
+
+@dataclass(frozen=True)
 class LevelingError:
     """Errors of roll and pitch after calibration, rms over attitudes, in rad.
 
@@ -55,10 +129,6 @@ class LevelingError:
         """Rms of roll and of pitch over attitudes and calibrations, (2,)."""
         return np.sqrt(np.mean(self.per_replicate**2, axis=0))
 
-    def quantile(self, probability: float) -> Array:
-        """Rms of roll and of pitch that a calibration stays below with `probability`, (2,)."""
-        return np.quantile(self.per_replicate, probability, axis=0)
-
 
 def leveling_error(
     simulated: SensorModel,
@@ -69,40 +139,12 @@ def leveling_error(
     g: float = STANDARD_GRAVITY,
     hold: Hold | None = None,
 ) -> LevelingError:
-    """Propagate calibration errors to roll and pitch, without noise of the leveled reading.
-
-    The mean calibration is propagated exactly and the scatter about it linearly; effects that the
-    estimated model lacks therefore count in full. Effects of the rig, estimated or not, do not
-    count: the sensor has left it.
+    """Propagate the errors of R calibrations about their mean; the rest is as in `tilt_error`.
 
     Parameters
     ----------
-    simulated, estimated : SensorModel, what the sensor is and what is estimated of it
-    truth : (u',) array, SI, of the simulated model
     estimates : (R, u) array, SI, of the estimated model
-    f_b : (k, 3) array, m/s², attitudes
-    g : float, m/s²
-    hold : Hold, optional
-        What else is known of the attitudes, where effects depend on it.
     """
-    estimates = np.where(estimated.stays, estimates, 0.0)
     mean = estimates.mean(axis=0)
-    output = simulated.sense(f_b, np.where(simulated.stays, truth, 0.0), g, hold)
-    corrected = estimated.correct(output, mean, g, hold)
-    offset = np.stack(roll_pitch(tuple(corrected.T)), -1) - np.stack(roll_pitch(tuple(f_b.T)), -1)
-    offset = (offset + np.pi) % (2 * np.pi) - np.pi
-    slope = jacobian(corrected) @ estimated.correction_jacobian(output, mean, g, hold)
-
-    # Mean over attitudes of (offset + slope δ)², as a quadratic form in δ.
-    delta = estimates - mean
-    constant = np.mean(offset**2, axis=0)
-    linear = np.einsum("ka,kau->au", offset, slope) / len(f_b)
-    quadratic = np.einsum("kau,kaw->auw", slope, slope) / len(f_b)
-    square = (
-        constant
-        + 2 * delta @ linear.T
-        + np.stack(
-            [np.einsum("ru,uw,rw->r", delta, q, delta, optimize=True) for q in quadratic], -1
-        )
-    )
-    return LevelingError(np.sqrt(np.maximum(square, 0.0)))
+    error = tilt_error(simulated, truth, estimated, mean, f_b, g, hold)
+    return LevelingError(error.rms(estimates))

@@ -1,9 +1,10 @@
 """A small study without Snakemake: configured, simulated and summarised as the workflow does it."""
 
 from accelstudy.adjustment.block import joined
-from accelstudy.study.cells import batches, study_cells
+from accelstudy.study.batches import Share, batches
+from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study
-from accelstudy.study.simulate import blocks, n_blocks, simulate_batch
+from accelstudy.study.simulate import blocks, simulate_batch
 from accelstudy.study.summary import summarise_batch
 from accelstudy.study.tables import TABLES, collect, read_table
 from accelstudy.units import MGON
@@ -40,41 +41,66 @@ def make_cells(*grids, **keys):
     return {cell.name: cell for cell in study_cells(make_study(grids=list(grids), **keys))}
 
 
-def specification(cells, seed=1):
-    return {"seed": seed, "cells": [cell.to_dict() for cell in cells]}
-
-
 def simulated(cell, seed=1):
     """All replicates of a cell in one block."""
-    return joined(blocks(cell, seed, 0, n_blocks(cell)))
+    return joined(blocks(cell, seed, 0, cell.n_blocks))
 
 
-def simulate(folder, cells, seed=1):
-    """Run the first stage; the paths of the estimates and of the correlations."""
-    paths = folder / "estimates.parquet", folder / "correlations_adjustment.parquet"
-    simulate_batch(specification(cells, seed), *paths, PROVENANCE)
+def simulate(folder, shares, seed=1, leveling=None):
+    """Run the first stage; the paths of what it wrote. With `leveling` no replicates are kept."""
+    kept = "sketches" if leveling else "estimates"
+    paths = {name: folder / f"{name}.parquet" for name in ("moments", kept)}
+    spec = {"seed": seed, "shares": [share.to_dict() for share in shares], "leveling": leveling}
+    simulate_batch(spec, paths, PROVENANCE)
     return paths
 
 
-def run_study(folder, batch_size=100_000, **keys):
-    """Run all stages up to the collected tables; {name: DataFrame}, estimates included."""
+def simulate_cells(folder, cells, seed=1):
+    """Path of the estimates of whole cells."""
+    return simulate(folder, [Share(cell, 0, cell.n_chunks) for cell in cells], seed)["estimates"]
+
+
+def run_study(folder, batch_size=None, **keys):
+    """Run all stages up to the collected tables.
+
+    Returns
+    -------
+    tables : {name: DataFrame}, estimates included, if they are kept
+    """
     study = make_study(**keys)
-    parts = {name: [] for name in (*TABLES, "estimates")}
-    for number, cells in enumerate(batches(study_cells(study), batch_size)):
+    leveling = study.leveling.model_dump()
+    wholes = {name: [] for name in (*TABLES, "moments", "sketches")}
+    estimates = []
+    for number, batch in enumerate(batches(study_cells(study), batch_size)):
         place = folder / f"{number:04d}"
-        paths = {name: place / f"{name}.parquet" for name in TABLES}
-        estimates, correlations = simulate(place, cells, study.seed)
+        parts = [
+            simulate(
+                place / f"{i:04d}",
+                job,
+                study.seed,
+                None if study.keep == "replicates" else leveling,
+            )
+            for i, job in enumerate(batch.jobs)
+        ]
+        paths = {name: place / f"{name}.parquet" for name in wholes}
         summarise_batch(
-            specification(cells, study.seed),
-            estimates,
-            correlations,
-            study.leveling.model_dump(),
+            {"cells": [cell.to_dict() for cell in batch.cells]},
+            {name: [part[name] for part in parts] for name in parts[0]},
+            leveling,
             paths,
             PROVENANCE,
         )
-        for name, path in {**paths, "estimates": estimates}.items():
-            parts[name].append(path)
+        estimates += [part["estimates"] for part in parts if "estimates" in part]
+        for name, path in paths.items():
+            wholes[name].append(path)
     for name in TABLES:
-        collect(parts[name], folder / f"{name}.parquet", PROVENANCE)
+        collect(wholes[name], folder / f"{name}.parquet", PROVENANCE)
     tables = {name: read_table(folder / f"{name}.parquet") for name in TABLES}
-    return {**tables, "estimates": read_table(parts["estimates"])}
+    return {**tables, **({"estimates": read_table(estimates)} if estimates else {})}
+
+
+def parts_in(folder):
+    """What the claims take from the folder of `run_study`."""
+    names = {"moments": "*/moments.parquet", "sketches": "*/sketches.parquet"}
+    names["estimates"] = "*/*/estimates.parquet"
+    return {name: sorted(folder.glob(pattern)) for name, pattern in names.items()}

@@ -8,7 +8,15 @@ import pandas as pd
 import pytest
 from page_helpers import text_of
 from scipy.special import gammaln
-from study_helpers import NINE, PAPER_TRUTH, PROVENANCE, grid, make_study, run_study
+from study_helpers import (
+    NINE,
+    PAPER_TRUTH,
+    PROVENANCE,
+    grid,
+    make_study,
+    parts_in,
+    run_study,
+)
 
 from accelstudy.figures import figure_tables
 from accelstudy.models import get_model
@@ -16,6 +24,7 @@ from accelstudy.sensitivity import leveling_sensitivity
 from accelstudy.study.analysis import draw_figure, judge_claims
 from accelstudy.study.cells import study_cells
 from accelstudy.study.claims import NOT_REPRODUCED, REPRODUCED, SLIP, evidence_from, judge
+from accelstudy.study.distributions import Sample
 from accelstudy.study.report import claims_markdown, claims_page, interval, number
 from accelstudy.study.tables import read_table, write_table
 from accelstudy.units import MGON
@@ -54,10 +63,10 @@ def tables(folder):
 
 
 @pytest.fixture(scope="module")
-def evidence(tables):
+def evidence(tables, folder):
     return evidence_from(
         study_cells(make_study(**KEYS)),
-        tables["estimates"],
+        parts_in(folder),
         scheme="mclaren-24",
         correlations=tables["correlations"],
         sensitivity=tables["sensitivity"],
@@ -156,22 +165,23 @@ def test_sensitivity(judged):
 # --- verdicts ------------------------------------------------------------------------------------
 
 
-def with_reduction(evidence, effect_columns, percent, replicates=500, spread=0.05):
-    """Evidence in which the robot reduces the sd of some parameters by a known amount."""
+def with_reduction(evidence, percent, replicates=500, spread=0.05):
+    """Evidence in which the robot reduces the sd of the biases by a known amount."""
     rng = np.random.default_rng(1)
-    fits = {}
-    for (scheme, approach), real in evidence.fits.items():
-        sigma = np.tile(real.sigma_priori[0], (replicates, 1))
-        if approach == "robot":
-            gravity = evidence.fits[scheme, "gravity"].sigma_priori[0]
-            sigma[:, effect_columns] = (1 - percent / 100) * gravity[effect_columns]
-        fits[scheme, approach] = replace(
-            real,
-            estimates=real.estimates[:replicates],
-            sigma_priori=sigma,
-            variance=np.exp(spread * rng.standard_normal(replicates)),
-        )
-    return replace(evidence, fits=fits)
+    statistics, ratios = dict(evidence.statistics), dict(evidence.ratios)
+    for scheme in evidence.schemes:
+        sigma0 = np.exp(spread / 2 * rng.standard_normal((2, replicates)))
+        robot, gravity = sigma0 * [[1 - percent / 100], [1]]
+        ratios[scheme, "bias"] = Sample(robot / gravity)
+        for approach, values in (("gravity", gravity), ("robot", robot)):
+            real = statistics[scheme, approach]
+            at = real.followed.keys.index(("sd_of_effect", "bias"))
+            mean, comoment = real.moments.mean.copy(), real.moments.comoment.copy()
+            mean[at] = values.mean()
+            comoment[at, at] = values.var() * real.converged
+            moments = replace(real.moments, mean=mean, comoment=comoment)
+            statistics[scheme, approach] = replace(real, moments=moments)
+    return replace(evidence, statistics=statistics, ratios=ratios)
 
 
 @pytest.mark.parametrize(
@@ -187,7 +197,7 @@ def with_reduction(evidence, effect_columns, percent, replicates=500, spread=0.0
     ],
 )
 def test_verdict_on_a_reduction(evidence, percent, spread, verdict):
-    changed = with_reduction(evidence, [0, 1, 2], percent, spread=spread)
+    changed = with_reduction(evidence, percent, spread=spread)
     claims, by_scheme = judge(changed)
     claim = claims.set_index("claim").loc["reduction-bias"]
     assert claim["verdict"] == verdict
@@ -230,13 +240,8 @@ def test_verdict_on_the_correlation(evidence):
 
 
 def test_a_scheme_without_redundancy_has_no_reduction(evidence):
-    fits = {
-        key: replace(real, redundancy=0, variance=np.full(len(real.variance), np.nan))
-        if key == ("rings-24", "gravity")
-        else real
-        for key, real in evidence.fits.items()
-    }
-    claims, by_scheme = judge(replace(evidence, fits=fits))
+    ratios = {key: its for key, its in evidence.ratios.items() if key[0] != "rings-24"}
+    claims, by_scheme = judge(replace(evidence, ratios=ratios))
     rows = by_scheme[by_scheme["claim"].str.startswith("reduction")]
     assert set(rows["scheme"]) == {"mclaren-24"}
     assert "of 1 schemes" in claims.set_index("claim").loc["reduction-bias", "sentence"]
@@ -306,7 +311,7 @@ def test_claims_as_the_workflow_judges_them(tables, folder, judged, tmp_path):
     }
     judge_claims(
         make_study(**KEYS),
-        [folder / "0000" / "estimates.parquet"],
+        parts_in(folder),
         folder / "correlations.parquet",
         folder / "sensitivity.parquet",
         outputs,
@@ -319,9 +324,9 @@ def test_claims_as_the_workflow_judges_them(tables, folder, judged, tmp_path):
 
 
 def test_a_figure_as_the_workflow_draws_it(tables, folder, tmp_path):
-    """Figure 7 takes the estimates of the paper's two cells out of files with others in them."""
-    assert set(figure_tables("figure-7")) == {"estimates"}
-    paths = {"estimates": [folder / "0000" / "estimates.parquet"]}
+    """Figure 7 takes the paper's two cells out of tables with others in them."""
+    assert set(figure_tables("figure-7")) == {"summary", "quantiles"}
+    paths = {name: folder / f"{name}.parquet" for name in figure_tables("figure-7")}
     svg, png = tmp_path / "figure-7.svg", tmp_path / "figure-7.png"
     draw_figure(make_study(**KEYS), "figure-7", paths, svg, png)
     assert "<svg" in svg.read_text(encoding="utf-8")

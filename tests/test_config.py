@@ -18,7 +18,8 @@ from accelstudy.effects import effect_names
 from accelstudy.errors import InputError
 from accelstudy.models import MODELS
 from accelstudy.schemes import scheme_names
-from accelstudy.study.cells import Cell, batches, study_cells
+from accelstudy.study.batches import batches
+from accelstudy.study.cells import Cell, study_cells
 from accelstudy.study.config import (
     StudyConfig,
     config_schema,
@@ -254,7 +255,11 @@ BAD = {
     "infinite": ({"gravity_mps2": math.inf}, "gravity_mps2", "finite"),
     "not a number, NaN": ({"noise": {"gravity": {"error_mps2": math.nan}}}, "noise.gravity.error"),
     "NaN in a list": ({"grids": [grid(gravity_error_mps2=[0, math.nan])]}, "gravity_error_mps2.1"),
-    "no replicates": ({"grids": [grid(replicates=0)]}, "grids.0.replicates", "from 1 to 10000000"),
+    "no replicates": (
+        {"grids": [grid(replicates=0)]},
+        "grids.0.replicates",
+        "from 1 to 100000000000",
+    ),
     "no models": ({"grids": [grid(models=[])]}, "grids.0.models", "at least 1 item"),
     "no schemes": ({"grids": [grid(schemes=[])]}, "grids.0.schemes", "at least 1 item"),
     "no approaches": ({"grids": [grid(approaches=[])]}, "grids.0.approaches", "at least 1"),
@@ -595,9 +600,12 @@ def test_cells_of_any_valid_study(keys, size):
     assert len(setups) == len(cells)
 
     divided = batches(cells, size)
-    assert [cell for batch in divided for cell in batch] == cells
+    assert [cell for batch in divided for cell in batch.cells] == cells
     for batch in divided:
-        assert len(batch) == 1 or sum(cell.replicates for cell in batch) <= size
+        assert len(batch.cells) == 1 or sum(cell.replicates for cell in batch.cells) <= size
+        shares = [share for job in batch.jobs for share in job]
+        assert [share.cell for share in shares if share.first == 0] == [*batch.cells]
+        assert sum(share.count for share in shares) == sum(cell.n_chunks for cell in batch.cells)
 
 
 def test_aliases_cannot_make_a_file_huge(tmp_path):
@@ -626,7 +634,10 @@ def test_aliases_cannot_make_a_file_huge(tmp_path):
         ({"study": "x" * 101}, "study: string should have at most 100 characters"),
         ({"gravity_mps2": 1e10}, "gravity_mps2: must be from 0.001 to 1000 m/s², not 1e+10"),
         ({"seed": 10**400}, "seed: must be from 0 to 18446744073709551615, not a huge number"),
-        ({"grids": [grid(replicates=10**400)]}, "grids.0.replicates: must be from 1 to 10000000"),
+        (
+            {"grids": [grid(replicates=10**400)]},
+            "grids.0.replicates: must be from 1 to 100000000000",
+        ),
         ({"leveling": {"attitudes": 10**9}}, "leveling.attitudes: must be from 1 to 100000, not"),
         (
             {"sensitivity": {"roll_gon": 0, "pitch_gon": 0, "base_samples": 2**40}},

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+from study_helpers import run_study
 
 from accelstudy.effects import effect_names
 from accelstudy.errors import InputError
@@ -23,11 +24,8 @@ from accelstudy.figures import (
 from accelstudy.figures.factors import FACTORS
 from accelstudy.models import MODELS
 from accelstudy.study.analysis import analyse_sensitivity
-from accelstudy.study.cells import study_cells
 from accelstudy.study.config import StudyConfig, parse_study
-from accelstudy.study.simulate import simulate_batch
-from accelstudy.study.summary import summarise_batch
-from accelstudy.study.tables import TABLES, read_estimates, read_table
+from accelstudy.study.tables import read_table
 
 CAPTIONS = Path(__file__).parents[1] / "workflow" / "report" / "figures"
 PROVENANCE = {"config_hash": "test", "seed": 1}
@@ -57,24 +55,16 @@ PAPER = {
 }
 
 
-def run(study: StudyConfig, folder: Path) -> dict[str, pd.DataFrame]:
+def run(keys: dict, folder: Path) -> dict[str, pd.DataFrame]:
     """All tables of a study."""
-    spec = {"seed": study.seed, "cells": [cell.to_dict() for cell in study_cells(study)]}
-    estimates, correlations = folder / "estimates.parquet", folder / "adjusted.parquet"
-    paths = {name: str(folder / f"{name}.parquet") for name in TABLES}
-    simulate_batch(spec, estimates, correlations, PROVENANCE)
-    summarise_batch(spec, estimates, correlations, study.leveling.model_dump(), paths, PROVENANCE)
-    tables = {name: read_table(path) for name, path in paths.items()}
+    study, tables = parse_study(keys), run_study(folder, **keys)
     if study.sensitivity:
         parts = []
         for analysis in ("forces", "gravity", "robot"):
             path = folder / f"sensitivity-{analysis}.parquet"
-            analyse_sensitivity(study, analysis, paths["summary"], path, PROVENANCE)
+            analyse_sensitivity(study, analysis, folder / "summary.parquet", path, PROVENANCE)
             parts.append(read_table(path))
         tables["sensitivity"] = pd.concat(parts, ignore_index=True)
-        setting = study.sensitivity
-        cells = [f"{setting.model}/{setting.scheme}/{name}" for name in ("gravity", "robot")]
-        tables["estimates"] = read_estimates(estimates, cells)
     return tables
 
 
@@ -89,8 +79,8 @@ def paper() -> StudyConfig:
 
 
 @pytest.fixture(scope="module")
-def tables(paper, tmp_path_factory) -> dict[str, pd.DataFrame]:
-    return run(paper, tmp_path_factory.mktemp("paper"))
+def tables(tmp_path_factory) -> dict[str, pd.DataFrame]:
+    return run(PAPER, tmp_path_factory.mktemp("paper"))
 
 
 def paint(drawn: Figure) -> None:
@@ -221,13 +211,17 @@ def test_the_tilt_overview_shows_rms_quantile_and_the_noise_of_a_reading(tables,
 
 
 def test_figure_7_draws_the_mean_sd_and_the_first_simulation(tables, paper):
-    rows = tables["estimates"]
-    rows = rows[(rows["parameter"] == "b_x") & rows["cell"].str.endswith("gravity")]
+    rows = tables["estimates"].astype({"cell": str})
+    rows = rows[(rows["parameter"] == "b_x") & (rows["cell"] == f"{NINE}/mclaren-24/gravity")]
+    rows = rows.assign(error=rows["estimate"] - rows["truth"])
+    sigma = np.sqrt(rows["omega"] / rows["redundancy"]) * rows["sigma_priori"]
     axes = draw("figure-7", tables, paper).axes
     bars = [patch.get_height() for patch in axes[1].patches]
-    assert 1e3 * rows["sigma_posteriori"].mean() == pytest.approx(bars[0])
+    assert 1e3 * sigma.mean() == pytest.approx(bars[0])
     errors = [y for line in axes[0].get_lines() for y in np.atleast_1d(line.get_ydata())]
     assert np.isclose(errors, 1e3 * rows.loc[rows["replicate"] == 0, "error"].iloc[0]).any()
+    ends = axes[0].collections[0].get_segments()[0][:, 1]
+    np.testing.assert_allclose(ends, 1e3 * np.quantile(rows["error"], [0.025, 0.975]))
 
 
 def test_figure_8_has_no_diagonal(tables, paper):
@@ -261,7 +255,7 @@ def test_a_study_without_estimable_cells_draws(name, tables, paper):
         "summary": summary,
         "leveling": pd.DataFrame(),
         "correlations": pd.DataFrame(),
-        "estimates": tables["estimates"].iloc[:0],
+        "quantiles": tables["quantiles"].iloc[:0],
         "sensitivity": tables["sensitivity"].iloc[:0],
     }
     needed = {key: nothing[key] for key in figure_tables(name)}

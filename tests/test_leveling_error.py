@@ -5,7 +5,7 @@ import pytest
 from study_helpers import NINE, PAPER_TRUTH
 
 from accelstudy.leveling import roll_pitch
-from accelstudy.leveling_error import LevelingError, cap_forces, leveling_error
+from accelstudy.leveling_error import cap_forces, leveling_error, tilt_error
 from accelstudy.models import compose, get_model
 from accelstudy.units import GON, MGON, STANDARD_GRAVITY
 
@@ -143,8 +143,15 @@ def test_roll_wraps():
     np.testing.assert_allclose(error.rms[0], 2e-3 / G, rtol=1e-3)
 
 
-def test_rms_and_quantile():
-    error = LevelingError(np.array([[3.0, 0.0], [4.0, 1.0]]))
-    np.testing.assert_allclose(error.rms, [np.sqrt(12.5), np.sqrt(0.5)])
-    np.testing.assert_allclose(error.quantile(0.5), [3.5, 0.5])
-    np.testing.assert_allclose(error.quantile(1.0), [4.0, 1.0])
+def test_rms_of_all_follows_from_the_covariance_alone():
+    """That is how it is known of calibrations that nobody kept."""
+    truth = CUBIC.vector(PAPER_TRUTH) + np.array([0] * 9 + [1e-4, 2e-4, -1e-4])
+    estimates = estimates_about(TRUTH, SIGMA)
+    f_b = cap_forces(0.8, 40)
+    error = tilt_error(CUBIC, truth, MODEL, estimates.mean(axis=0), f_b)
+    found = error.rms_of_all(np.cov(estimates.T, bias=True))
+    expected = leveling_error(CUBIC, truth, MODEL, estimates, f_b).rms
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    # About another reference, a few standard deviations away, it is the same in the fourth digit.
+    elsewhere = tilt_error(CUBIC, truth, MODEL, estimates[0], f_b).rms(estimates)
+    np.testing.assert_allclose(elsewhere, error.rms(estimates), rtol=1e-3)

@@ -10,8 +10,9 @@ from study_helpers import NINE, PAPER_TRUTH, grid, make_cells, make_study, run_s
 
 from accelstudy.models import MODELS, PRESETS
 from accelstudy.simulation import Noise
-from accelstudy.study.cells import batches, study_cells
-from accelstudy.study.simulate import BLOCK, blocks
+from accelstudy.study.batches import batches
+from accelstudy.study.cells import BLOCK, study_cells
+from accelstudy.study.simulate import blocks
 from accelstudy.units import MGON
 
 GRAVITY, ROBOT = f"{NINE}/mclaren-24/gravity", f"{NINE}/mclaren-24/robot"
@@ -126,8 +127,10 @@ def test_presets_are_the_rows_of_table_1():
 def test_batches():
     cells = [*make_cells(grid(schemes="all", replicates=40)).values()]
     cells[3] = replace(cells[3], replicates=1000)
-    sizes = [[cell.replicates for cell in batch] for batch in batches(cells[:8], 100)]
+    shared = batches(cells[:8], 100)
+    sizes = [[cell.replicates for cell in batch.cells] for batch in shared]
     assert sizes == [[40, 40], [40], [1000], [40, 40], [40, 40]]
+    assert all(len(batch.jobs) == 1 for batch in shared)  # none has more than a chunk
     assert batches([], 100) == []
 
 

@@ -17,7 +17,7 @@ from accelstudy.study.tables import write_table
 
 
 @contextmanager
-def a_job(log, inputs=(), spec=None, **config):
+def a_job(log, inputs=(), params=None, **config):
     """A job in a process that has not set up its logging."""
     handlers, level = logging.root.handlers, logging.root.level
     logging.root.handlers = []
@@ -27,7 +27,7 @@ def a_job(log, inputs=(), spec=None, **config):
         rule="simulate",
         input=[str(path) for path in inputs],
         output=["results/tiny/summary.parquet"],
-        params={} if spec is None else {"spec": spec},
+        params=params or {},
     )
     try:
         with job(snakemake) as given:
@@ -108,7 +108,7 @@ def test_a_killed_job_is_one_line(said, tmp_path):
 
 
 def test_the_set_up_of_a_batch_is_recorded(log):
-    with a_job(log, spec={"seed": 1, "cells": []}) as (_, provenance):
+    with a_job(log, params={"spec": {"seed": 1, "cells": []}}) as (_, provenance):
         assert provenance["setup"] == setup_digest({"cells": [], "seed": 1})
     assert setup_digest({"seed": 2, "cells": []}) != provenance["setup"]
 
@@ -126,7 +126,8 @@ def test_a_table_of_another_configuration_is_refused(made, refused, log, tmp_pat
     """As a job leaves it that outlived its run, and ended after that of the next run."""
     path = tmp_path / "estimates.parquet"
     write_table(path, pd.DataFrame({"a": [1]}), {"config_hash": "", **made})
-    with pytest.raises(SystemExit) if refused else nullcontext(), a_job(log, [path], "this"):
+    params = {"setups": [setup_digest("this")]}
+    with pytest.raises(SystemExit) if refused else nullcontext(), a_job(log, [path], params):
         pass
     expected = f"error: {path}: is of another configuration; delete it and run again\n"
     assert capsys.readouterr().err == (expected if refused else "")

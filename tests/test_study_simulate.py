@@ -16,7 +16,7 @@ from study_helpers import (
     grid,
     make_cells,
     run_study,
-    simulate,
+    simulate_cells,
     simulated,
 )
 
@@ -25,7 +25,8 @@ from accelstudy.design import diagnose
 from accelstudy.errors import InputError
 from accelstudy.study import simulate as module
 from accelstudy.study import tables
-from accelstudy.study.simulate import CORRELATIONS, ESTIMATES, blocks
+from accelstudy.study.moments import MOMENTS
+from accelstudy.study.simulate import ESTIMATES, blocks
 from accelstudy.study.tables import (
     collect,
     git_commit,
@@ -43,17 +44,18 @@ GRAVITY, ROBOT = f"{NINE}/mclaren-24/gravity", f"{NINE}/mclaren-24/robot"
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     cells = make_cells(grid(schemes=["faces-6", "mclaren-24"], approaches="gravity"), grid())
-    estimates, correlations = simulate(tmp_path_factory.mktemp("batch"), cells.values())
-    return cells, estimates, correlations
+    folder = tmp_path_factory.mktemp("batch")
+    estimates = simulate_cells(folder, cells.values())
+    return cells, estimates, folder / "moments.parquet"
 
 
 # --- content -------------------------------------------------------------------------------------
 
 
 def test_schema(written):
-    _, estimates, correlations = written
+    _, estimates, moments = written
     assert pq.read_schema(estimates).equals(ESTIMATES)
-    assert pq.read_schema(correlations).equals(CORRELATIONS)
+    assert pq.read_schema(moments).equals(MOMENTS)
     assert not read_table(estimates).drop(columns="omega").isna().any().any()
 
 
@@ -90,7 +92,7 @@ def test_what_follows_from_the_stored_columns(written):
 
 def test_observed_gravity_is_a_parameter(tmp_path):
     cells = make_cells(grid(approaches="robot", gravity_sigma_mps2=1e-4))
-    table = read_estimates(simulate(tmp_path, cells.values())[0])
+    table = read_estimates(simulate_cells(tmp_path, cells.values()))
     g = table[table["parameter"] == "g"]
     assert set(g["unit"]) == {"m/s^2"}
     assert set(g["truth"]) == {9.80665}
@@ -99,20 +101,20 @@ def test_observed_gravity_is_a_parameter(tmp_path):
 
 
 def test_a_cell_that_is_not_estimable_leaves_no_rows(written):
-    cells, estimates, correlations = written
+    cells, estimates, moments = written
     assert f"{NINE}/faces-6/gravity" in cells
-    for path in (estimates, correlations):
+    for path in (estimates, moments):
         assert set(read_table(path)["cell"].astype(str)) == {GRAVITY, ROBOT}
 
 
-def test_correlations(written):
-    table = read_table(written[2])
-    one = table[table["cell"] == GRAVITY]
-    matrix = one["adjustment"].to_numpy().reshape(9, 9)
+def test_correlations_of_a_block(written):
+    result = simulated(written[0][GRAVITY])
+    matrix = result.correlation_sum / 60
     np.testing.assert_allclose(np.diag(matrix), 1, rtol=1e-12)
     np.testing.assert_allclose(matrix, matrix.T, atol=1e-12)
-    scales = one[(one["parameter_1"] == "s_x") & (one["parameter_2"] == "s_y")]
-    assert scales["adjustment"].item() == pytest.approx(-0.25, abs=2e-3)  # −3m/(1 − 3m), m = 1/15
+    names = [*PAPER_TRUTH]
+    scales = matrix[names.index("s_x"), names.index("s_y")]
+    assert scales == pytest.approx(-0.25, abs=2e-3)  # −3m/(1 − 3m), m = 1/15
 
 
 # --- origin --------------------------------------------------------------------------------------
@@ -121,7 +123,7 @@ def test_correlations(written):
 def test_origin_is_in_every_file(tmp_path):
     run_study(tmp_path, grids=[grid()])
     paths = sorted(tmp_path.rglob("*.parquet"))
-    assert len(paths) == 2 + 4 + 4
+    assert len(paths) == 2 + (5 + 2) + 5
     for path in paths:
         assert read_origin(path) == {
             **PROVENANCE,
@@ -129,7 +131,6 @@ def test_origin_is_in_every_file(tmp_path):
             "commit": git_commit(),
             "numpy": np.__version__,
             "scipy": scipy.__version__,
-            "llvmlite": tables._version("llvmlite"),
         }
         assert json.loads(pq.read_schema(path).metadata[b"accelstudy"]) == read_origin(path)
 
@@ -159,7 +160,7 @@ def files(folder):
 
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt, SystemExit])
 def test_nothing_is_left_of_an_interrupted_file(error, tmp_path):
-    table = simulate(tmp_path / "source", make_cells(grid(replicates=3)).values())[0]
+    table = simulate_cells(tmp_path / "source", make_cells(grid(replicates=3)).values())
     content = pq.read_table(table)
     path = tmp_path / "target" / "estimates.parquet"
 
@@ -206,17 +207,6 @@ def test_a_whole_file_appears_at_once_and_overwrites_remains(tmp_path):
     assert path.read_text() == "new"
 
 
-def test_a_long_cell_is_written_chunk_by_chunk(monkeypatch, tmp_path):
-    cells = make_cells(grid(approaches="gravity", replicates=3 * module.BLOCK + 7)).values()
-    whole, correlations = simulate(tmp_path / "whole", cells)
-    monkeypatch.setattr(module, "BLOCKS_PER_CHUNK", 2)
-    parts, summed = simulate(tmp_path / "parts", cells)
-    sizes = [pq.ParquetFile(path).num_row_groups for path in (whole, parts)]
-    assert sizes == [1, 2]
-    pd.testing.assert_frame_equal(read_table(parts), read_table(whole), check_exact=True)
-    pd.testing.assert_frame_equal(read_table(summed), read_table(correlations), rtol=1e-13)
-
-
 def test_nothing_is_left_of_an_interrupted_batch(monkeypatch, tmp_path):
     calls = []
 
@@ -228,7 +218,7 @@ def test_nothing_is_left_of_an_interrupted_batch(monkeypatch, tmp_path):
 
     monkeypatch.setattr(module, "blocks", broken)
     with pytest.raises(KeyboardInterrupt):
-        simulate(tmp_path, make_cells(grid()).values())
+        simulate_cells(tmp_path, make_cells(grid()).values())
     assert calls == [GRAVITY, ROBOT]
     assert files(tmp_path) == []
 

@@ -47,9 +47,9 @@ TABLE_PATHS = [f"results/tiny/{name}.parquet" for name in TABLES]
 IN_BATCHES = f"""\
 from functools import partial
 
-from accelstudy.study import cells
+from accelstudy.study import batches
 
-cells.batches = partial(cells.batches, size=130)
+batches.batches = partial(batches.batches, size=130)
 
 
 include: "{ROOT}/workflow/Snakefile"
@@ -243,8 +243,9 @@ SEVERAL = {*STAGES}
         ("noise_effects/base.py", SEVERAL),
         ("hold_plan.py", SEVERAL),
         ("study/simulate.py", SEVERAL),
-        ("leveling_error.py", {"summarise", "claims", "figures"}),
+        ("leveling_error.py", {"simulate", "summarise", "claims", "figures"}),
         ("closed_forms.py", {"summarise", "claims", "figures"}),
+        ("study/distributions.py", {"summarise", "claims", "figures"}),
         ("sensitivity.py", {"sensitivity", "claims", "figures"}),
         ("figures/style.py", {"figures"}),
         ("study/claims/base.py", {"claims"}),

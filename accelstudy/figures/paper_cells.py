@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
@@ -24,12 +25,13 @@ from accelstudy.figures.style import (
     in_order,
     new_figure,
     say_empty,
+    shown,
     symbol,
     unit_label,
 )
 from accelstudy.models import get_model
 from accelstudy.study.config import StudyConfig
-from accelstudy.units import display_unit, to_display
+from accelstudy.units import display_unit
 
 APPROACHES = ("gravity", "robot")
 ANNOTATED = 0.005
@@ -42,7 +44,7 @@ WIDTH = 0.36
     "figure-7",
     title="Figure 7: errors and standard deviations of the two calibrations",
     category="Paper",
-    tables=("estimates",),
+    tables=("summary", "quantiles"),
     when=lambda study: study.paper,
 )
 def errors_and_sigmas(tables: Tables, study: StudyConfig) -> Figure:
@@ -64,9 +66,10 @@ def errors_and_sigmas(tables: Tables, study: StudyConfig) -> Figure:
         drawn = False
         for cell, approach in _cells(study):
             for x, name in enumerate(names):
-                rows = tables["estimates"]
-                rows = rows[(rows["cell"] == cell) & (rows["parameter"] == name)]
-                drawn |= _draw_parameter(row, x, rows[rows["converged"]], approach, unit)
+                found = _single_runs(tables, cell, name)
+                if found is not None:
+                    drawn = True
+                    _draw_parameter(row, x, found, approach)
         if not drawn:
             for ax in row:
                 say_empty(ax)
@@ -104,15 +107,48 @@ def _cells(study: StudyConfig) -> list[tuple[str, str]]:
     return [(f"{setting.model}/{setting.scheme}/{name}", name) for name in APPROACHES]
 
 
-def _draw_parameter(
-    axes: NDArray[np.object_], x: int, rows: pd.DataFrame, approach: str, unit: str
-) -> bool:
-    """Draw one parameter of one approach into the panels of errors and of sds; False if none."""
-    if rows.empty:
-        return False
+@dataclass(frozen=True)
+class _SingleRuns:
+    """One parameter of one cell as shown: what single simulations give.
+
+    Attributes
+    ----------
+    errors, sds : the first calibration, and the ends of the middle 95 %
+    mean_sd : float; NaN without redundancy, and so are the sds
+    """
+
+    errors: tuple[float, float, float]
+    sds: tuple[float, float, float]
+    mean_sd: float
+
+
+def _single_runs(tables: Tables, cell: str, name: str) -> _SingleRuns | None:
+    """Numbers of one parameter; None if there is no calibration."""
+    rows = tables["summary"]
+    rows = rows[(rows["cell"] == cell) & (rows["parameter"] == name)]
+    if rows.empty or not rows["n_converged"].iloc[0]:
+        return None
+    row = rows.iloc[0]
+    table = tables["quantiles"]
+    table = table[(table["cell"] == cell) & (table["name"] == name)]
+
+    def three(first: str, quantity: str) -> tuple[float, float, float]:
+        its = table[table["quantity"] == quantity]
+        ends = [its["value"][np.isclose(its["probability"], p)].max() for p in (0.025, 0.975)]
+        values = shown([row[first], *ends], row["unit"])[0]
+        return float(values[0]), float(values[1]), float(values[2])
+
+    return _SingleRuns(
+        three("first_error", "error"),
+        three("first_sd_posteriori", "sd_posteriori"),
+        float(shown(row["sd_posteriori_mean"], row["unit"])[0]),
+    )
+
+
+def _draw_parameter(axes: NDArray[np.object_], x: int, its: _SingleRuns, approach: str) -> None:
+    """Draw one parameter of one approach into the panels of errors and of sds."""
     colour, marker = approach_colour(approach), approach_marker(approach)
     at = x + (APPROACHES.index(approach) - 0.5) * (WIDTH + 0.04)
-    first = rows["replicate"] == rows["replicate"].min()
     one: Style = {
         "marker": marker,
         "markersize": 4,
@@ -120,24 +156,18 @@ def _draw_parameter(
         "markerfacecolor": "white",
         "zorder": 4,
     }
-
-    errors = to_display(rows["error"], unit)
-    _draw_range(axes[0], at, errors, colour)
-    axes[0].plot(at, errors[first], **one)
-
-    sigmas = to_display(rows["sigma_posteriori"], unit)
-    if np.isfinite(sigmas).all():
-        axes[1].bar(at, sigmas.mean(), WIDTH, color=colour, alpha=0.4)
-        _draw_range(axes[1], at, sigmas, colour)
-        axes[1].plot(at, sigmas[first], **one)
+    _draw_range(axes[0], at, *its.errors[1:], colour)
+    axes[0].plot(at, its.errors[0], **one)
+    if np.isfinite(its.mean_sd):
+        axes[1].bar(at, its.mean_sd, WIDTH, color=colour, alpha=0.4)
+        _draw_range(axes[1], at, *its.sds[1:], colour)
+        axes[1].plot(at, its.sds[0], **one)
     else:
         axes[1].text(at, 0, "no redundancy ", rotation=90, ha="center", va="bottom", fontsize=7)
-    return True
 
 
-def _draw_range(ax: Axes, at: float, values: NDArray[np.float64], colour: str) -> None:
-    """Bar with caps over the middle 95 % of the values."""
-    low, high = np.quantile(values, (0.025, 0.975))
+def _draw_range(ax: Axes, at: float, low: float, high: float, colour: str) -> None:
+    """Bar with caps from low to high."""
     ax.errorbar(
         at, (low + high) / 2, yerr=(high - low) / 2, color=colour, elinewidth=1.2, capsize=3
     )

@@ -23,8 +23,8 @@ ANGLE_UNIT_VARIABLE = "ACCELSTUDY_ANGLE_UNIT"
 Tables = Mapping[str, pd.DataFrame]
 Draw = Callable[[Tables, StudyConfig], Figure]
 
-TABLES = ("cells", "summary", "correlations", "leveling", "sensitivity", "estimates")
-"""What a figure may ask for; of the estimates it gets those of the paper's two cells only."""
+TABLES = ("cells", "summary", "correlations", "leveling", "quantiles", "sensitivity")
+"""What a figure may ask for."""
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from accelstudy.outputs import whole_file
 from accelstudy.sensitivity import leveling_sensitivity
 from accelstudy.study.cells import study_cells
 from accelstudy.study.config import StudyConfig
-from accelstudy.study.tables import read_estimates, read_table, write_table
+from accelstudy.study.tables import read_table, write_table
 from accelstudy.units import to_si
 
 
@@ -74,7 +74,7 @@ def _empirical_sigma(study: StudyConfig, approach: str, summary: Any) -> np.ndar
 
 def judge_claims(
     study: StudyConfig,
-    estimates: Sequence[str | Path],
+    parts: Mapping[str, Sequence[str | Path]],
     correlations: str | Path,
     sensitivity: str | Path,
     outputs: Mapping[str, str],
@@ -85,7 +85,8 @@ def judge_claims(
     Parameters
     ----------
     study : StudyConfig, with `sensitivity`
-    estimates, correlations, sensitivity : paths of the tables
+    parts : see `accelstudy.study.claims.evidence.evidence_from`
+    correlations, sensitivity : paths of the tables
     outputs : paths of `claims`, `by_scheme` and `html`
     provenance : see `accelstudy.study.tables.origin`
     """
@@ -101,7 +102,7 @@ def judge_claims(
     ]
     evidence = evidence_from(
         cells,
-        read_table(list(estimates), filters=[("cell", "in", [cell.name for cell in cells])]),
+        parts,
         scheme=settings.scheme,
         correlations=read_table(correlations),
         sensitivity=read_table(sensitivity),
@@ -128,17 +129,8 @@ def draw_figure(
 
     render(
         name,
-        {key: _figure_table(study, key, path) for key, path in tables.items()},
+        {key: read_table(path) for key, path in tables.items()},
         study,
         svg,
         png,
     )
-
-
-def _figure_table(study: StudyConfig, name: str, path: Any) -> Any:
-    if name != "estimates":
-        return read_table(path)
-    settings = study.sensitivity
-    assert settings is not None
-    cells = ["/".join([settings.model, settings.scheme, a]) for a in ("gravity", "robot")]
-    return read_estimates(path, cells)

@@ -23,10 +23,10 @@ from accelstudy.study.compiling import with_compiled
 from accelstudy.study.config import Grid, StudyConfig
 from accelstudy.units import MGON
 
-REPLICATES_PER_BATCH = 100_000
-"""Calibrations in one job: long enough that starting Python does not matter."""
-CELLS_PER_BATCH = 100
-"""Cells in one job, however few their replicates, so that small studies use all cores too."""
+BLOCK = 500
+"""Replicates that are drawn and adjusted together, from one seed; small enough for the cache."""
+CHUNK = 20
+"""Blocks that are held, summed up and written together: memory follows it, not the count."""
 
 
 @dataclass(frozen=True)
@@ -87,6 +87,22 @@ class Cell:
     def hold(self) -> Hold:
         """What is known of the holds, without what follows from their attitudes."""
         return self.holds.hold(self.positions.n_positions)
+
+    @property
+    def parameter_units(self) -> dict[str, str]:
+        """SI unit of each parameter that is estimated; gravity is the last one if observed."""
+        units = {p.name: p.unit for p in self.estimated_model.parameters}
+        return {**units, "g": "m/s^2"} if self.noise.sigma_gravity > 0 else units
+
+    @property
+    def n_blocks(self) -> int:
+        """Number of blocks; the last one may have fewer replicates."""
+        return -(-self.replicates // BLOCK)
+
+    @property
+    def n_chunks(self) -> int:
+        """Number of chunks; the last one may have fewer blocks."""
+        return -(-self.n_blocks // CHUNK)
 
     def seed(self, seed: int, block: int) -> np.random.SeedSequence:
         """Seed of one block of replicates.
@@ -203,19 +219,3 @@ def _shown(value: float) -> str:
     """Show a number briefly, but never two numbers alike."""
     short = f"{value:g}"
     return short if float(short) == value else repr(value)
-
-
-def batches(cells: Iterable[Cell], size: int = REPLICATES_PER_BATCH) -> list[list[Cell]]:
-    """Divide cells into batches of at most `size` calibrations (or one cell), in order.
-
-    What a cell computes does not depend on its batch.
-    """
-    result: list[list[Cell]] = []
-    room = 0
-    for cell in cells:
-        if not result or cell.replicates > room or len(result[-1]) == CELLS_PER_BATCH:
-            result.append([])
-            room = size
-        result[-1].append(cell)
-        room -= cell.replicates
-    return result

@@ -13,12 +13,15 @@ from dataclasses import dataclass
 
 from accelstudy.errors import InputError
 from accelstudy.models import get_model
-from accelstudy.study.cells import Cell, batches
+from accelstudy.study.batches import batches
+from accelstudy.study.cells import BLOCK, Cell
 from accelstudy.study.config import StudyConfig
+from accelstudy.study.distributions import EXACT
 
-SECONDS_PER_CALIBRATION = 60e-6
-"""To write and to summarise it; to this comes the adjustment, per position and parameter:"""
-SECONDS_BY_GRAVITY, SECONDS_WITH_ROBOT = 0.11e-6, 0.26e-6
+SECONDS_TO_KEEP, SECONDS_TO_SUM = 9e-6, 4e-6
+"""To write a calibration and to summarise it, or only that; to this comes the adjustment, per
+position and parameter, by gravity and with the robot, and by compiled code:"""
+SECONDS_BY_GRAVITY, SECONDS_WITH_ROBOT, SECONDS_COMPILED = 0.11e-6, 0.26e-6, 0.03e-6
 SECONDS_PER_RESAMPLED_VALUE = 0.18e-6
 """Sensitivity: per base sample, input, bootstrap resample and attitude."""
 SECONDS_PER_JOB = 3.0
@@ -26,13 +29,16 @@ SECONDS_PER_JOB = 3.0
 OTHER_JOBS = 15
 
 BYTES_ON_DISK = 16
-"""Per calibration and parameter."""
-BYTES_IN_MEMORY = 300e6
-"""Of a job; cells run one by one, so that to this comes for each calibration of one cell:"""
-BYTES_PER_CALIBRATION, BYTES_PER_POSITION = 1600, 100
+"""Per calibration and parameter that is kept."""
+BYTES_OF_SKETCHES = 1e6
+"""Of a cell in a job that keeps none."""
+BYTES_IN_MEMORY = 350e6
+"""Of a job, however many calibrations it has: they go by in chunks. To this come the positions of a
+block that is drawn, and what is held of kept calibrations for exact quantiles:"""
+BYTES_PER_POSITION, BYTES_PER_VALUE = 200, 8
 
-MOST_HOURS, MOST_MEMORY, MOST_DISK = 50_000, 64e9, 10e12
-"""Six years on one core, bytes, bytes: what a well-equipped group could still have."""
+MOST_HOURS, MOST_DISK = 50_000, 10e12
+"""Six years on one core, bytes: what a well-equipped group could still have."""
 
 
 @dataclass(frozen=True)
@@ -75,18 +81,12 @@ def study_effort(study: StudyConfig, cells: Sequence[Cell]) -> Effort:
     effort = Effort(
         cells=len(cells),
         calibrations=sum(cell.replicates for cell in cells),
-        seconds=sum(map(_seconds, cells))
+        seconds=sum(_seconds(study, cell) for cell in cells)
         + _seconds_of_sensitivity(study)
-        + SECONDS_PER_JOB * (2 * len(batches(cells)) + OTHER_JOBS),
-        memory=max(map(_memory, cells), default=0.0),
-        disk=sum(BYTES_ON_DISK * cell.replicates * _parameters(cell) for cell in cells),
+        + SECONDS_PER_JOB * (sum(1 + len(batch.jobs) for batch in batches(cells)) + OTHER_JOBS),
+        memory=max((_memory(study, cell) for cell in cells), default=0.0),
+        disk=_disk(study, cells),
     )
-    if effort.memory > MOST_MEMORY:
-        worst = max(cells, key=_memory)
-        raise InputError(
-            f"grids: replicates: {worst.replicates} of the cell {worst.name} need about "
-            f"{_size(effort.memory)} of memory; {_size(MOST_MEMORY)} is the most"
-        )
     hours = effort.seconds / 3600
     if _seconds_of_sensitivity(study) / 3600 > MOST_HOURS:
         raise InputError(
@@ -97,20 +97,42 @@ def study_effort(study: StudyConfig, cells: Sequence[Cell]) -> Effort:
         raise InputError(
             f"grids: {effort.calibrations} calibrations take about {hours:.2g} h on one core and "
             f"{_size(effort.disk)} on disk; {MOST_HOURS} h and {_size(MOST_DISK)} are the most: "
-            "lower replicates, or take fewer cells"
+            f"lower replicates, or take fewer cells{_without_keeping(study)}"
         )
     return effort
 
 
-def _seconds(cell: Cell) -> float:
+def _without_keeping(study: StudyConfig) -> str:
+    return ", or keep: summary" if _keeps(study) else ""
+
+
+def _keeps(study: StudyConfig) -> bool:
+    return study.keep == "replicates"
+
+
+def _seconds(study: StudyConfig, cell: Cell) -> float:
     rate = SECONDS_WITH_ROBOT if cell.conditions.uses_angles else SECONDS_BY_GRAVITY
+    if cell.compiled:
+        rate = SECONDS_COMPILED
     terms = cell.positions.n_positions * _parameters(cell)
-    return cell.replicates * (SECONDS_PER_CALIBRATION + rate * terms)
+    around = SECONDS_TO_KEEP if _keeps(study) else SECONDS_TO_SUM
+    return cell.replicates * (around + rate * terms)
 
 
-def _memory(cell: Cell) -> float:
-    per_calibration = BYTES_PER_CALIBRATION + BYTES_PER_POSITION * cell.positions.n_positions
-    return BYTES_IN_MEMORY + cell.replicates * per_calibration
+def _memory(study: StudyConfig, cell: Cell) -> float:
+    memory = BYTES_IN_MEMORY + BLOCK * cell.positions.n_positions * BYTES_PER_POSITION
+    if _keeps(study):
+        values = 3 * _parameters(cell) + 2  # errors, sds, those of effects, tilt errors
+        memory += min(cell.replicates, EXACT) * values * BYTES_PER_VALUE
+    return memory
+
+
+def _disk(study: StudyConfig, cells: Sequence[Cell]) -> float:
+    """Of the calibrations that are kept; of sketches, which hardly grow with the calibrations."""
+    if _keeps(study):
+        return sum(BYTES_ON_DISK * cell.replicates * _parameters(cell) for cell in cells)
+    jobs = sum(len(batch.jobs) for batch in batches(cells))
+    return BYTES_OF_SKETCHES * (len(cells) + jobs)
 
 
 def _parameters(cell: Cell) -> int:

@@ -8,7 +8,7 @@ import json
 import logging
 import shlex
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -50,6 +50,13 @@ def killed_notice(logs: Iterable[str]) -> str | None:
     )
 
 
+def lists(named: Any) -> dict[str, list[str]]:
+    """Input files by name, as lists; Snakemake makes a list of one file the file itself."""
+    return {
+        name: [files] if isinstance(files, str) else list(files) for name, files in named.items()
+    }
+
+
 @contextmanager
 def job(snakemake: Any) -> Iterator[tuple[StudyConfig, Mapping[str, Any]]]:
     """Run the body of a rule's script.
@@ -57,9 +64,9 @@ def job(snakemake: Any) -> Iterator[tuple[StudyConfig, Mapping[str, Any]]]:
     Gives the study and the provenance of what the job writes: `config_hash` and `seed`, and where
     the rule has the parameter `spec`, its digest as `setup`.
 
-    A table that comes in must have the same seed and, if it has one and the job too, the same
-    set-up. Only who replaced it while the study ran, such as a job that outlived the run that
-    started it, leaves another one.
+    A table that comes in must have the same seed and, if it has a set-up and the rule the parameter
+    `setups`, one of these. Only who replaced it while the study ran, such as a job that outlived
+    the run that started it, leaves another one.
     """
     with logged(snakemake):
         study = parse_study(snakemake.config)
@@ -69,15 +76,15 @@ def job(snakemake: Any) -> Iterator[tuple[StudyConfig, Mapping[str, Any]]]:
             provenance["setup"] = setup_digest(spec)
         for path in snakemake.input:
             if Path(path).suffix == ".parquet":
-                _check_origin(path, provenance)
+                _check_origin(path, study.seed, snakemake.params.get("setups"))
         yield study, provenance
 
 
-def _check_origin(path: str, provenance: Mapping[str, Any]) -> None:
+def _check_origin(path: str, seed: int, setups: Container[str] | None) -> None:
     made = read_origin(path)
-    for key, value in made.items():
-        if key in ("seed", "setup") and value != provenance.get(key, value):
-            raise InputError(f"{path}: is of another configuration; {REMEDY}")
+    other = setups is not None and "setup" in made and made["setup"] not in setups
+    if made["seed"] != seed or other:
+        raise InputError(f"{path}: is of another configuration; {REMEDY}")
 
 
 @contextmanager

@@ -24,13 +24,18 @@ _FRONT = (
     "wording.py",
     *_MEASURED,
 )
-_TABLES = ("study/summary.py", "leveling_error.py", "closed_forms.py")
+_TABLES = (
+    *(f"study/{name}.py" for name in ("distributions", "kept", "statistics", "summary")),
+    "closed_forms.py",
+)
 _CONFIG = ("study/config/",)
 _STUDY = (
     "study/claims",
     "kernel/",
     "adjustment/block.py",
-    *(f"study/{name}.py" for name in ("analysis", "cells", "compiling", "simulate", "summary")),
+    *(f"study/{name}.py" for name in ("analysis", "batches", "cells", "compiling")),
+    *(f"study/{name}.py" for name in ("distributions", "followed", "kept", "moments")),
+    *(f"study/{name}.py" for name in ("simulate", "sketch", "statistics", "summary")),
 )
 _SCORED = tuple(
     f"hidden/{name}.py"
@@ -41,7 +46,7 @@ _NOT_HIDDEN = (*_COMMANDS, "campaign/overview", "diagnosis/report/", "pages/", *
 _UNUSED = {
     "simulate": (*_FRONT, *_TABLES, "sensitivity.py", *_CONFIG),
     "summarise": (*_FRONT, "sensitivity.py", *_CONFIG),
-    "sensitivity": (*_FRONT, *_TABLES),
+    "sensitivity": (*_FRONT, *_TABLES, "leveling_error.py"),
     "claims": (*_COMMANDS, "figures/", "plausibility.py", *_MEASURED),
     "figures": (*_COMMANDS, "study/claims", "pages/", "plausibility.py", "wording.py", *_MEASURED),
     "campaign": (*_COMMANDS, "campaign/overview", "diagnosis/", "hidden/", *_STUDY),

@@ -1,9 +1,10 @@
-"""The Monte Carlo itself: simulate and calibrate the replicates of a cell."""
+"""The Monte Carlo itself: simulate and calibrate the replicates of a cell, chunk by chunk."""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -14,24 +15,19 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment.block import Block, joined
 from accelstudy.design import diagnose
+from accelstudy.leveling_error import TiltError
 from accelstudy.simulation import session
-from accelstudy.study.cells import Cell
+from accelstudy.study.batches import Share
+from accelstudy.study.cells import BLOCK, CHUNK, Cell
 from accelstudy.study.compiling import calibrator
+from accelstudy.study.followed import CellSketches, Followed, cell_tilt_error
+from accelstudy.study.moments import MOMENTS, Node, Tree, moments_table
+from accelstudy.study.sketch import SKETCHES, sketch_table
 from accelstudy.study.tables import parquet_writer
 
 Array = NDArray[np.float64]
 
-BLOCK = 500
-"""Replicates that are drawn and adjusted together, from one seed; small enough for the cache."""
-BLOCKS_PER_CHUNK = 20
-"""Blocks that are held and written together, as one row group: memory follows it, not the count."""
-
 log = logging.getLogger(__name__)
-
-
-def n_blocks(cell: Cell) -> int:
-    """Number of blocks of a cell; the last one may have fewer replicates."""
-    return -(-cell.replicates // BLOCK)
 
 
 def blocks(cell: Cell, seed: int, first: int, count: int) -> Iterator[Block]:
@@ -45,7 +41,7 @@ def blocks(cell: Cell, seed: int, first: int, count: int) -> Iterator[Block]:
     cell : Cell
     seed : int, of the study
     first, count : int, number of the first block, from 0 on, and how many are asked for; there are
-        no more than `n_blocks`
+        no more than `Cell.n_blocks`
     """
     simulated, estimated = cell.simulated_model, cell.estimated_model
     calibrate = calibrator(cell)
@@ -56,7 +52,7 @@ def blocks(cell: Cell, seed: int, first: int, count: int) -> Iterator[Block]:
         cell.gravity,
         cell.hold,
     )
-    for block in range(first, min(first + count, n_blocks(cell))):
+    for block in range(first, min(first + count, cell.n_blocks)):
         rng = np.random.default_rng(cell.seed(seed, block))
         drawn = ideal.draw(cell.noise, BLOCK, rng, angles=cell.conditions.uses_angles)
         yield calibrate(estimated, cell.conditions, drawn.first(cell.replicates - block * BLOCK))
@@ -83,36 +79,35 @@ ESTIMATES = pa.schema(
 is estimate − truth, σ̂0² = omega / redundancy, and sigma_posteriori = σ̂0 · sigma_priori
 (`read_estimates` adds them). Columns that repeat within a replicate cost next to nothing."""
 
-CORRELATIONS = pa.schema(
-    {"cell": _NAME, "parameter_1": _NAME, "parameter_2": _NAME, "adjustment": pa.float64()}
-)
-"""Mean over the replicates of the correlations from Σ_xx."""
-
 
 def simulate_batch(
-    spec: Mapping[str, Any],
-    estimates: str | Path,
-    correlations: str | Path,
-    provenance: Mapping[str, Any],
+    spec: Mapping[str, Any], outputs: Mapping[str, str | Path], provenance: Mapping[str, Any]
 ) -> None:
-    """Simulate the cells of a batch and write two Parquet files, cell by cell.
+    """Simulate what a job has of the cells of a batch, chunk by chunk.
 
     Cells that are not estimable leave no rows; the table of cells says why.
 
     Parameters
     ----------
-    spec : mapping with `seed` and `cells` (plain data of `Cell`)
-    estimates, correlations : paths of the files to write
+    spec : mapping with `seed`, `shares` (plain data of `accelstudy.study.batches.Share`) and, for
+        `sketches`, `leveling` (max_tilt_gon and attitudes)
+    outputs : paths of `moments`, and of `estimates`, where replicates are kept, or of `sketches`
     provenance : see `accelstudy.study.tables.origin`
     """
-    cells = [Cell.from_dict(data) for data in spec["cells"]]
-    with (
-        parquet_writer(
-            estimates, ESTIMATES, provenance, measured=("estimate", "sigma_priori")
-        ) as write_estimates,
-        parquet_writer(correlations, CORRELATIONS, provenance) as write_correlations,
-    ):
-        for number, cell in enumerate(cells, 1):
+    shares = [Share.from_dict(data) for data in spec["shares"]]
+    measured = ("estimate", "sigma_priori")
+    with ExitStack() as files:
+
+        def opened(name: str, schema: pa.Schema, **options: Any) -> Callable[[pa.Table], None]:
+            if name not in outputs:
+                return lambda table: None
+            return files.enter_context(parquet_writer(outputs[name], schema, provenance, **options))
+
+        write_moments = opened("moments", MOMENTS)
+        write_sketches = opened("sketches", SKETCHES)
+        write_estimates = opened("estimates", ESTIMATES, measured=measured)
+        for number, share in enumerate(shares, 1):
+            cell = share.cell
             design = diagnose(
                 cell.positions,
                 cell.estimated_model,
@@ -122,39 +117,54 @@ def simulate_batch(
                 hold=cell.hold,
             )
             if not design.estimable:
-                log.info("%d/%d %s: %s", number, len(cells), cell.name, design.reason)
+                log.info("%d/%d %s: %s", number, len(shares), cell.name, design.reason)
                 continue
-            failed, correlation = 0, np.zeros(())
-            drawn = blocks(cell, spec["seed"], 0, n_blocks(cell))
-            for first in range(0, n_blocks(cell), BLOCKS_PER_CHUNK):
-                chunk = joined(islice(drawn, BLOCKS_PER_CHUNK))
-                write_estimates(_estimates_table(cell, chunk, first * BLOCK))
-                failed += int(np.count_nonzero(~chunk.converged))
-                correlation = correlation + chunk.correlation_sum
-            if failed < cell.replicates:
-                correlation /= cell.replicates - failed
-            else:
-                correlation[:] = np.nan
-            write_correlations(_correlations_table(cell, correlation))
+            followed, tree = Followed.of(cell), Tree()
+            sketches = None
+            if "sketches" in outputs:
+                sketches = CellSketches(followed, _pilot_tilt(cell, spec["seed"], spec["leveling"]))
+            for index, chunk in _chunks(share, spec["seed"]):
+                values = followed.values(chunk)
+                tree.add(Node(index, 1, followed.moments(chunk, values)))
+                if sketches is not None:
+                    sketches.add(chunk, values)
+                if "estimates" in outputs:
+                    write_estimates(_estimates_table(cell, chunk, index * CHUNK * BLOCK))
+            write_moments(moments_table(cell.name, tree))
+            if sketches is not None:
+                write_sketches(sketch_table(cell.name, sketches.found))
+            counts = tree.nodes
             log.info(
                 "%d/%d %s: %d replicates, %d not converged",
                 number,
-                len(cells),
+                len(shares),
                 cell.name,
-                cell.replicates,
-                failed,
+                sum(node.moments.simulated for node in counts),
+                sum(node.moments.simulated - node.moments.converged for node in counts),
             )
 
 
-def parameter_units(cell: Cell) -> dict[str, str]:
-    """SI unit of each parameter that the cell estimates."""
-    units = {p.name: p.unit for p in cell.estimated_model.parameters}
-    return {**units, "g": "m/s^2"} if cell.noise.sigma_gravity > 0 else units
+def _chunks(share: Share, seed: int) -> Iterator[tuple[int, Block]]:
+    """Number and content of each chunk of a share."""
+    drawn = blocks(share.cell, seed, share.first * CHUNK, share.count * CHUNK)
+    for index in range(share.first, share.first + share.count):
+        yield index, joined(islice(drawn, CHUNK))
+
+
+def _pilot_tilt(cell: Cell, seed: int, leveling: Mapping[str, Any]) -> TiltError | None:
+    """Tilt error about the mean of the first block of a cell in which a calibration converged.
+
+    Whichever job asks, it is the same. Without one in the first chunk, there is none.
+    """
+    for block in blocks(cell, seed, 0, CHUNK):
+        if block.converged.any():
+            return cell_tilt_error(cell, block.estimates[block.converged].mean(axis=0), leveling)
+    return None
 
 
 def _estimates_table(cell: Cell, chunk: Block, first: int) -> pa.Table:
     """Rows of a chunk whose first replicate has the number `first`."""
-    units = parameter_units(cell)
+    units = cell.parameter_units
     n_replicates, u = chunk.estimates.shape
     truth = {**cell.truth, "g": cell.gravity}
 
@@ -178,18 +188,6 @@ def _estimates_table(cell: Cell, chunk: Block, first: int) -> pa.Table:
         "converged": per_replicate(chunk.converged),
     }
     return pa.table(columns, schema=ESTIMATES)
-
-
-def _correlations_table(cell: Cell, correlation: Array) -> pa.Table:
-    names = list(parameter_units(cell))
-    u = len(names)
-    columns = {
-        "cell": _coded(np.zeros(u * u), [cell.name]),
-        "parameter_1": _coded(np.repeat(np.arange(u), u), names),
-        "parameter_2": _coded(np.tile(np.arange(u), u), names),
-        "adjustment": correlation.ravel(),
-    }
-    return pa.table(columns, schema=CORRELATIONS)
 
 
 def _coded(codes: Any, names: list[str]) -> pa.DictionaryArray:

@@ -1,9 +1,9 @@
-"""From estimates to tables: what each cell determines how well, and what tilt error it leaves."""
+"""From calibrations to tables: what a cell determines how well, and what tilt error it leaves."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -15,117 +15,79 @@ from scipy import stats
 from accelstudy import closed_forms
 from accelstudy.design import Design, diagnose
 from accelstudy.effects import get_effect
-from accelstudy.leveling_error import cap_forces, leveling_error
+from accelstudy.leveling_error import TiltError
 from accelstudy.study.cells import Cell
-from accelstudy.study.simulate import parameter_units
-from accelstudy.study.tables import TABLES, read_table, write_table
+from accelstudy.study.distributions import Distribution, cell_distributions
+from accelstudy.study.followed import ANGLES, ERROR, POSTERIORI, PRIORI, TILT, cell_tilt_error
+from accelstudy.study.moments import MOMENTS, moments_table
+from accelstudy.study.sketch import RELATIVE_ERROR, SKETCHES, Key, Sketch, sketch_table
+from accelstudy.study.statistics import Statistics, read_statistics
+from accelstudy.study.tables import TABLES, parquet_writer, write_table
 from accelstudy.units import GON, MGON, recorded_unit, to_recorded
 
 Array = NDArray[np.float64]
 
 Z95 = float(stats.norm.ppf(0.975))
 
+LOWER = (1e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.025, 0.05, 0.25)
+PROBABILITIES = np.array([*LOWER, 0.5, *(1 - p for p in reversed(LOWER))])
+"""Of the quantiles; those beyond the central 95 % only where a calibration can lie there."""
+
 
 def summarise_batch(
     spec: Mapping[str, Any],
-    estimates: str | Path,
-    correlations: str | Path,
+    parts: Mapping[str, Sequence[str | Path]],
     leveling: Mapping[str, Any],
-    outputs: Mapping[str, str],
+    outputs: Mapping[str, str | Path],
     provenance: Mapping[str, Any],
 ) -> None:
     """Summarise the cells of a batch.
 
     Parameters
     ----------
-    spec : as in `simulate_batch`
-    estimates, correlations : paths that `simulate_batch` wrote
+    spec : mapping with `cells` (plain data of `Cell`)
+    parts : what the jobs of the batch wrote, in order: `moments`, and `estimates` or `sketches`
     leveling : mapping with max_tilt_gon and attitudes
-    outputs : path of each of `TABLES`
+    outputs : path of each of `TABLES`, and of `moments` and `sketches` of whole cells
     provenance : see `accelstudy.study.tables.origin`
     """
-    found: dict[Any, pd.DataFrame] = dict(
-        iter(read_table(estimates).groupby("cell", observed=True))
-    )
-    from_adjustment = read_table(correlations)
+    cells = [Cell.from_dict(data) for data in spec["cells"]]
+    known = read_statistics(parts["moments"], cells)
     rows: dict[str, list[pd.DataFrame]] = {name: [] for name in TABLES}
-    for data in spec["cells"]:
-        cell = Cell.from_dict(data)
-        design = diagnose(
-            cell.positions,
-            cell.estimated_model,
-            cell.conditions,
-            cell.noise,
-            cell.estimated_model.vector(cell.truth),
-            cell.gravity,
-            cell.hold,
+    with ExitStack() as files:
+        write_moments, write_sketches = (
+            files.enter_context(parquet_writer(outputs[name], schema, provenance))
+            for name, schema in (("moments", MOMENTS), ("sketches", SKETCHES))
         )
-        fits = Fits.of(cell, found.get(cell.name))
-        rows["cells"].append(_cell_row(cell, design, fits))
-        rows["summary"].append(_summary_rows(cell, design, fits))
-        row = _leveling_row(cell, fits, leveling)
-        rows["leveling"].append(row if design.estimable else row[:0])
-        adjusted = from_adjustment[from_adjustment["cell"] == cell.name]
-        rows["correlations"].append(_correlation_rows(adjusted, fits))
-    for name, path in outputs.items():
-        write_table(path, pd.concat(rows[name], ignore_index=True), provenance)
-
-
-@dataclass(frozen=True)
-class Fits:
-    """The converged calibrations of a cell as arrays.
-
-    Attributes
-    ----------
-    names : tuple of str; units : tuple of str, SI; truth : (u,) array
-    estimates, sigma_priori : (R, u) arrays
-    variance : (R,) array, σ̂0²; NaN without redundancy
-    redundancy : int
-    simulated : int, number of calibrations, those that did not converge included
-    """
-
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    truth: Array
-    estimates: Array
-    sigma_priori: Array
-    variance: Array
-    redundancy: int
-    simulated: int
-
-    @classmethod
-    def of(cls, cell: Cell, rows: pd.DataFrame | None) -> Fits:
-        """Take the rows of one cell of the table of estimates; None if it was not simulated."""
-        units = parameter_units(cell)
-        u = len(units)
-        truth = {**cell.truth, "g": cell.gravity}
-
-        def column(name: str) -> Any:
-            return np.empty(0) if rows is None else rows[name].to_numpy()
-
-        converged = column("converged")[::u].astype(bool)
-        redundancy = 0 if rows is None else int(rows["redundancy"].iloc[0])
-        omega = column("omega")[::u][converged]
-        return cls(
-            names=tuple(units),
-            units=tuple(units.values()),
-            truth=np.array([truth[name] for name in units]),
-            estimates=column("estimate").reshape(-1, u)[converged],
-            sigma_priori=column("sigma_priori").reshape(-1, u)[converged],
-            variance=omega / redundancy if redundancy > 0 else np.full(len(omega), np.nan),
-            redundancy=redundancy,
-            simulated=len(converged),
-        )
-
-    @property
-    def errors(self) -> Array:
-        """Estimation errors, (R, u), SI."""
-        return self.estimates - self.truth
-
-    @property
-    def sigma_posteriori(self) -> Array:
-        """Standard deviations a posteriori, (R, u), SI."""
-        return np.sqrt(self.variance)[:, None] * self.sigma_priori
+        for cell in cells:
+            design = diagnose(
+                cell.positions,
+                cell.estimated_model,
+                cell.conditions,
+                cell.noise,
+                cell.estimated_model.vector(cell.truth),
+                cell.gravity,
+                cell.hold,
+            )
+            statistics, tree = known.get(cell.name, (Statistics.of_none(cell), None))
+            tilt: TiltError | None = None
+            found: Mapping[Key, Distribution] = {}
+            if tree is not None and statistics.converged:
+                mean = statistics.followed.truth + statistics.mean(ERROR)
+                tilt = cell_tilt_error(cell, mean, leveling)
+                found = cell_distributions(cell, parts, statistics, tilt)
+            if tree is not None:
+                write_moments(moments_table(cell.name, tree))
+                sketches = {key: its for key, its in found.items() if isinstance(its, Sketch)}
+                write_sketches(sketch_table(cell.name, sketches))
+            rows["cells"].append(_cell_row(cell, design, statistics))
+            rows["summary"].append(_summary_rows(cell, design, statistics))
+            rows["correlations"].append(_correlation_rows(cell, statistics))
+            rows["quantiles"].append(_quantile_rows(cell, statistics, found))
+            row = _leveling_row(cell, statistics, tilt, found)
+            rows["leveling"].append(row if design.estimable else row[:0])
+    for name in TABLES:
+        write_table(outputs[name], pd.concat(rows[name], ignore_index=True), provenance)
 
 
 def _labels(cell: Cell) -> dict[str, Any]:
@@ -142,7 +104,7 @@ def _labels(cell: Cell) -> dict[str, Any]:
     }
 
 
-def _cell_row(cell: Cell, design: Design, fits: Fits) -> pd.DataFrame:
+def _cell_row(cell: Cell, design: Design, statistics: Statistics) -> pd.DataFrame:
     return pd.DataFrame(
         {
             **_labels(cell),
@@ -156,26 +118,33 @@ def _cell_row(cell: Cell, design: Design, fits: Fits) -> pd.DataFrame:
             "estimable": design.estimable,
             "not_estimable": ", ".join(design.not_estimable),
             "reason": design.reason,
-            "n_replicates": fits.simulated,
-            "n_converged": len(fits.estimates),
+            "n_replicates": statistics.moments.simulated,
+            "n_converged": statistics.converged,
         },
         index=[0],
     )
 
 
-def _summary_rows(cell: Cell, design: Design, fits: Fits) -> pd.DataFrame:
+def _summary_rows(cell: Cell, design: Design, statistics: Statistics) -> pd.DataFrame:
     """Statistics of each parameter, in the units shown to people; NaN where there are none."""
     exact = _closed_forms(cell)
+    followed = statistics.followed
+    mean = {name: statistics.mean(name) for name in (ERROR, PRIORI, POSTERIORI)}
+    first = {name: statistics.first(name) for name in (ERROR, POSTERIORI)}
+    sd = {name: statistics.sd(name) for name in (ERROR, POSTERIORI)}
+    n = statistics.converged
     rows = []
-    for i, (name, unit) in enumerate(zip(fits.names, fits.units, strict=True)):
+    for i, (name, unit) in enumerate(followed.units.items()):
         in_si = {
-            "truth": fits.truth[i],
-            **_bias(fits.errors[:, i]),
-            "sd_empirical": _sd(fits.errors[:, i]),
-            "sd_posteriori_mean": _mean(fits.sigma_posteriori[:, i]),
-            "sd_priori_mean": _mean(fits.sigma_priori[:, i]),
+            "truth": followed.truth[i],
+            **_bias(n, mean[ERROR][i], sd[ERROR][i]),
+            "sd_empirical": sd[ERROR][i],
+            "sd_posteriori_mean": mean[POSTERIORI][i],
+            "sd_priori_mean": mean[PRIORI][i],
             "sd_linear": design.sigma[i],
             "sd_closed_form": exact.get(name, np.nan),
+            "first_error": first[ERROR][i],
+            "first_sd_posteriori": first[POSTERIORI][i],
         }
         rows.append(
             {
@@ -183,10 +152,10 @@ def _summary_rows(cell: Cell, design: Design, fits: Fits) -> pd.DataFrame:
                 "parameter": name,
                 "unit": recorded_unit(unit),
                 **{key: float(to_recorded(value, unit)) for key, value in in_si.items()},
-                **_ratio(fits.sigma_posteriori[:, i], fits.errors[:, i]),
-                **_coverage(fits, i),
-                "n_replicates": fits.simulated,
-                "n_converged": len(fits.estimates),
+                **_ratio(n, mean[POSTERIORI][i], sd[POSTERIORI][i], sd[ERROR][i]),
+                **_coverage(statistics, i),
+                "n_replicates": statistics.moments.simulated,
+                "n_converged": n,
                 "estimable": name not in design.not_estimable,
                 "reason": design.reason,
             }
@@ -194,32 +163,21 @@ def _summary_rows(cell: Cell, design: Design, fits: Fits) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _mean(values: Array) -> float:
-    return float(np.mean(values)) if len(values) else np.nan
-
-
-def _sd(values: Array) -> float:
-    return float(np.std(values, ddof=1)) if len(values) > 1 else np.nan
-
-
-def _bias(errors: Array) -> dict[str, float]:
+def _bias(n: int, mean: float, sd: float) -> dict[str, float]:
     """Mean error with its 95 % confidence interval."""
-    n = len(errors)
-    mean = _mean(errors)
-    half = stats.t.ppf(0.975, n - 1) * _sd(errors) / np.sqrt(n) if n > 1 else np.nan
+    half = stats.t.ppf(0.975, n - 1) * sd / np.sqrt(n) if n > 1 else np.nan
     return {"bias": mean, "bias_ci95_low": mean - half, "bias_ci95_high": mean + half}
 
 
-def _ratio(sigma: Array, errors: Array) -> dict[str, float]:
+def _ratio(n: int, mean: float, sd: float, sd_of_errors: float) -> dict[str, float]:
     """Mean sigma a posteriori over empirical sd, with its 95 % confidence interval.
 
     The relative error of an empirical sd of n values is 1/√(2(n − 1)).
     """
-    n = len(errors)
-    ratio = _mean(sigma) / _sd(errors)
+    ratio = mean / sd_of_errors
     spread = np.nan
     if n > 1:
-        spread = np.sqrt(1 / (2 * (n - 1)) + (_sd(sigma) / _mean(sigma)) ** 2 / n)
+        spread = np.sqrt(1 / (2 * (n - 1)) + (sd / mean) ** 2 / n)
     return {
         "sd_ratio": ratio,
         "sd_ratio_ci95_low": ratio * np.exp(-Z95 * spread),
@@ -227,17 +185,16 @@ def _ratio(sigma: Array, errors: Array) -> dict[str, float]:
     }
 
 
-def _coverage(fits: Fits, i: int) -> dict[str, float]:
+def _coverage(statistics: Statistics, i: int) -> dict[str, float]:
     """Share of the nominal 95 % intervals that hold the truth, with its 95 % (Wilson) interval.
 
     The intervals are estimate ± t σ a posteriori, t of Student's distribution with r degrees of
     freedom; without redundancy there are none.
     """
-    n = len(fits.estimates)
-    if fits.redundancy <= 0 or n == 0:
+    n, moments = statistics.converged, statistics.moments
+    if moments.redundancy <= 0 or n == 0:
         return dict.fromkeys(("coverage_95", "coverage_95_low", "coverage_95_high"), np.nan)
-    half = stats.t.ppf(0.975, fits.redundancy) * fits.sigma_posteriori[:, i]
-    inside = int(np.count_nonzero(np.abs(fits.errors[:, i]) <= half))
+    inside = int(moments.inside[i])
     interval = stats.binomtest(inside, n).proportion_ci(method="wilson")
     return {
         "coverage_95": inside / n,
@@ -269,31 +226,68 @@ def _closed_forms(cell: Cell) -> dict[str, float]:
     }
 
 
-def _correlation_rows(from_adjustment: pd.DataFrame, fits: Fits) -> pd.DataFrame:
+def _correlation_rows(cell: Cell, statistics: Statistics) -> pd.DataFrame:
     """Mean correlation from Σ_xx beside the empirical one over the calibrations."""
-    rows = from_adjustment.astype({"cell": str, "parameter_1": str, "parameter_2": str})
-    enough = len(fits.errors) > len(fits.names)
-    rows["empirical"] = np.corrcoef(fits.errors.T).ravel() if enough else np.nan
-    return rows
+    names = list(statistics.followed.units) if statistics.moments.simulated else []
+    mean, empirical = statistics.correlations()
+    pairs = len(names) ** 2
+    return pd.DataFrame(
+        {
+            "cell": np.full(pairs, cell.name, object),
+            "parameter_1": np.repeat(np.array(names, object), len(names)),
+            "parameter_2": np.tile(np.array(names, object), len(names)),
+            "adjustment": mean.ravel()[:pairs],
+            "empirical": empirical.ravel()[:pairs],
+        }
+    )
 
 
-def _leveling_row(cell: Cell, fits: Fits, settings: Mapping[str, Any]) -> pd.DataFrame:
-    rms = q95 = np.full(2, np.nan)
-    if len(fits.estimates):
-        simulated, estimated = cell.simulated_model, cell.estimated_model
-        forces = cap_forces(settings["max_tilt_gon"] * GON, settings["attitudes"], cell.gravity)
-        error = leveling_error(
-            simulated,
-            simulated.vector(cell.truth),
-            estimated,
-            fits.estimates[:, : estimated.n_parameters],
-            forces,
-            cell.gravity,
-            cell.holds.use(forces, cell.positions.n_positions),
+def _quantile_rows(
+    cell: Cell, statistics: Statistics, found: Mapping[Key, Distribution]
+) -> pd.DataFrame:
+    """Quantiles of the errors and sds of each parameter and of the tilt error, in shown units."""
+    units = {**statistics.followed.units, **dict.fromkeys(ANGLES, "rad")}
+    n = statistics.converged
+    tail = np.minimum(PROBABILITIES, 1 - PROBABILITIES)
+    shown = PROBABILITIES[(tail >= 0.0249) | (n * tail >= 0.999)]
+    parts = []
+    for (quantity, name), distribution in found.items():
+        if name not in units:
+            continue
+        values = to_recorded(distribution.quantile(shown), units[name])
+        parts.append(
+            pd.DataFrame(
+                {
+                    "quantity": quantity,
+                    "name": name,
+                    "unit": recorded_unit(units[name]),
+                    "probability": shown,
+                    "value": values,
+                    "relative_error": RELATIVE_ERROR if isinstance(distribution, Sketch) else 0.0,
+                }
+            )
         )
-        rms, q95 = error.rms, error.quantile(0.95)
+    columns = ["quantity", "name", "unit", "probability", "value", "relative_error"]
+    rows = pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=columns)
+    return pd.DataFrame({**dict.fromkeys(_labels(cell)), **rows}).assign(
+        **_labels(cell), n_converged=n
+    )
+
+
+def _leveling_row(
+    cell: Cell, statistics: Statistics, tilt: TiltError | None, found: Mapping[Key, Distribution]
+) -> pd.DataFrame:
+    """Rms of the tilt error over all calibrations, and what 95 % of them stay below."""
+    rms = q95 = np.full(2, np.nan)
+    n = statistics.converged
+    if tilt is not None:
+        u = len(tilt.reference)
+        columns = statistics.followed.columns(ERROR)
+        rms = tilt.rms_of_all(statistics.moments.comoment[columns, columns][:u, :u] / n)
+    if (TILT, ANGLES[0]) in found:
+        q95 = np.array([float(found[TILT, angle].quantile(0.95)) for angle in ANGLES])
     row = _labels(cell)
-    for i, angle in enumerate(("roll", "pitch")):
+    for i, angle in enumerate(ANGLES):
         row[f"{angle}_rms_mgon"] = rms[i] / MGON
         row[f"{angle}_rms_q95_mgon"] = q95[i] / MGON
-    return pd.DataFrame({**row, "n_converged": len(fits.estimates)}, index=[0])
+    return pd.DataFrame({**row, "n_converged": n}, index=[0])

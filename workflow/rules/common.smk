@@ -4,9 +4,11 @@ from snakemake.exceptions import WorkflowError
 
 from accelstudy.errors import InputError
 from accelstudy.figures import angle_unit, caption, figure_names, figure_tables, get_figure
-from accelstudy.study.cells import batches, study_cells
+from accelstudy.study.batches import batches
+from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study, read_layer
 from accelstudy.study.effort import study_effort
+from accelstudy.study.job import setup_digest
 from accelstudy.study.provenance import check_writable, code_hash
 from accelstudy.study.tables import TABLES
 
@@ -22,9 +24,29 @@ try:
 except InputError as error:
     raise WorkflowError(str(error)) from None
 
-# Cells run in batches, so that starting Python does not dominate; a batch is a job.
-BATCHES = {f"{i:04d}": cells for i, cells in enumerate(batches(CELLS))}
-PARTS = f"{RESULTS}/batches/{{batch}}"
+# Cells run in batches, so that starting Python does not dominate. A batch is a job or, where it is
+# one large cell, several, each of which simulates a part of it.
+BATCHES = {f"{i:04d}": batch for i, batch in enumerate(batches(CELLS))}
+PARTS_OF = {
+    name: [name] if len(batch.jobs) == 1 else [f"{name}-{i:04d}" for i in range(len(batch.jobs))]
+    for name, batch in BATCHES.items()
+}
+PARTS = {
+    part: shares
+    for name, batch in BATCHES.items()
+    for part, shares in zip(PARTS_OF[name], batch.jobs)
+}
+BATCH = f"{RESULTS}/batches/{{batch}}"
+KEPT = STUDY.keep == "replicates"
+WRITTEN = {
+    "moments": f"{RESULTS}/parts/{{part}}/moments.parquet",
+    **(
+        {"estimates": f"{RESULTS}/estimates/{{part}}.parquet"}
+        if KEPT
+        else {"sketches": f"{RESULTS}/parts/{{part}}/sketches.parquet"}
+    ),
+}
+WHOLE = ("moments", "sketches")
 CAPTIONS = Path(str(workflow.current_basedir)).parent / "report/figures"
 ANALYSES = ["forces", "gravity", "robot"]
 FINAL_TABLES = [
@@ -35,22 +57,47 @@ FINAL_TABLES = [
 
 
 wildcard_constraints:
-    batch=r"\d{4}",
+    batch=r"\d+",
+    part=r"\d+(-\d+)?",
     analysis="|".join(ANALYSES),
 
 
-def batch_spec(wildcards):
-    """All on which the numbers of a batch depend, as plain data."""
-    return {"seed": STUDY.seed, "cells": [cell.to_dict() for cell in BATCHES[wildcards.batch]]}
+def part_spec(part):
+    """All on which the numbers of a part depend, as plain data."""
+    shares = [share.to_dict() for share in PARTS[part]]
+    leveling = {} if KEPT else {"leveling": STUDY.leveling.model_dump()}
+    return {"seed": STUDY.seed, "shares": shares, **leveling}
 
 
-def estimates_of(choose):
-    """Files that hold the estimates of the chosen cells."""
-    return [
-        f"{RESULTS}/estimates/{batch}.parquet"
-        for batch, cells in BATCHES.items()
-        if any(map(choose, cells))
+def setup_of(part):
+    """What a part is made of, in brief."""
+    return setup_digest(part_spec(part))
+
+
+def parts_of_batch(wildcards):
+    """What the jobs of a batch wrote, in order."""
+    return {
+        kind: [path.format(part=part) for part in PARTS_OF[wildcards.batch]]
+        for kind, path in WRITTEN.items()
+    }
+
+
+def parts_of_claims():
+    """What the cells of the claims come to, and their estimates."""
+    chosen = [
+        name
+        for name, batch in BATCHES.items()
+        if any(cell.model == STUDY.sensitivity.model for cell in batch.cells)
     ]
+    whole = {
+        kind: [f"{RESULTS}/batches/{name}/{kind}.parquet" for name in chosen] for kind in WHOLE
+    }
+    kept = (
+        [WRITTEN["estimates"].format(part=part) for b in chosen for part in PARTS_OF[b]]
+        if KEPT
+        else []
+    )
+    return {**whole, "estimates": kept}
 
 
 def figure_caption(wildcards):
@@ -61,14 +108,5 @@ def figure_caption(wildcards):
 
 
 def figure_inputs(wildcards):
-    """Tables that a figure needs; of the estimates only the files with the paper's two cells."""
-    inputs = {}
-    for table in figure_tables(wildcards.figure):
-        if table == "estimates":
-            inputs[table] = estimates_of(
-                lambda cell: (cell.model, cell.scheme)
-                == (STUDY.sensitivity.model, STUDY.sensitivity.scheme)
-            )
-        else:
-            inputs[table] = f"{RESULTS}/{table}.parquet"
-    return inputs
+    """Tables that a figure needs."""
+    return {table: f"{RESULTS}/{table}.parquet" for table in figure_tables(wildcards.figure)}

@@ -15,7 +15,7 @@ rule figure:
         f"{RESULTS}/benchmarks/figures/{{figure}}.tsv"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=1000,
     params:
         study=STUDY.model_dump(mode="json"),
         caption=figure_caption,

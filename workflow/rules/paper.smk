@@ -9,7 +9,7 @@ rule sensitivity_analysis:
         f"{RESULTS}/benchmarks/sensitivity/{{analysis}}.tsv"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=1000,
     params:
         settings=STUDY.sensitivity.model_dump() if STUDY.sensitivity else None,
         sensor=STUDY.model_dump(include={"seed", "gravity_mps2", "noise", "sensor"}),
@@ -31,7 +31,7 @@ rule sensitivity:
         f"{RESULTS}/benchmarks/sensitivity.tsv"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=1000,
     message:
         "Collect the table of sensitivity"
     script:
@@ -40,9 +40,7 @@ rule sensitivity:
 
 rule claims:
     input:
-        estimates=(
-            estimates_of(lambda cell: cell.model == STUDY.sensitivity.model) if STUDY.paper else []
-        ),
+        **(parts_of_claims() if STUDY.paper else {}),
         correlations=f"{RESULTS}/correlations.parquet",
         sensitivity=f"{RESULTS}/sensitivity.parquet",
     output:
@@ -60,7 +58,7 @@ rule claims:
         f"{RESULTS}/benchmarks/claims.tsv"
     threads: 1
     resources:
-        mem_mb=4000,
+        mem_mb=1000,
     params:
         code=code_hash("claims"),
     message:

@@ -1,18 +1,17 @@
 rule simulate:
     output:
-        estimates=f"{RESULTS}/estimates/{{batch}}.parquet",
-        correlations=f"{PARTS}/correlations_adjustment.parquet",
+        **WRITTEN,
     log:
-        f"{RESULTS}/logs/simulate/{{batch}}.log",
+        f"{RESULTS}/logs/simulate/{{part}}.log",
     benchmark:
-        f"{RESULTS}/benchmarks/simulate/{{batch}}.tsv"
+        f"{RESULTS}/benchmarks/simulate/{{part}}.tsv"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=1000,
     params:
-        spec=batch_spec,
+        spec=lambda wildcards: part_spec(wildcards.part),
         code=code_hash("simulate"),
     message:
-        "Simulate and calibrate batch {wildcards.batch}"
+        "Simulate and calibrate batch {wildcards.part}"
     script:
         "../scripts/simulate.py"

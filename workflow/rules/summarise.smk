@@ -1,18 +1,20 @@
 rule summarise:
     input:
-        estimates=f"{RESULTS}/estimates/{{batch}}.parquet",
-        correlations=f"{PARTS}/correlations_adjustment.parquet",
+        unpack(parts_of_batch),
     output:
-        **{table: f"{PARTS}/{table}.parquet" for table in TABLES},
+        **{name: f"{BATCH}/{name}.parquet" for name in (*TABLES, *WHOLE)},
     log:
         f"{RESULTS}/logs/summarise/{{batch}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/summarise/{{batch}}.tsv"
     threads: 1
     resources:
-        mem_mb=4000,
+        mem_mb=1000,
     params:
-        spec=batch_spec,
+        spec=lambda wildcards: {
+            "cells": [cell.to_dict() for cell in BATCHES[wildcards.batch].cells]
+        },
+        setups=lambda wildcards: [setup_of(part) for part in PARTS_OF[wildcards.batch]],
         leveling=STUDY.leveling.model_dump(),
         code=code_hash("summarise"),
     message:
@@ -23,7 +25,7 @@ rule summarise:
 
 rule collect:
     input:
-        **{table: expand(f"{PARTS}/{table}.parquet", batch=BATCHES) for table in TABLES},
+        **{table: expand(f"{BATCH}/{table}.parquet", batch=BATCHES) for table in TABLES},
     output:
         **{table: f"{RESULTS}/{table}.parquet" for table in TABLES},
     log:
@@ -32,7 +34,7 @@ rule collect:
         f"{RESULTS}/benchmarks/collect.tsv"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=1000,
     params:
         code=code_hash("summarise"),
     message:

@@ -1,10 +1,10 @@
 from accelstudy.study.analysis import judge_claims
-from accelstudy.study.job import job
+from accelstudy.study.job import job, lists
 
 with job(snakemake) as (study, provenance):
     judge_claims(
         study,
-        snakemake.input.estimates,
+        lists(snakemake.input),
         snakemake.input.correlations,
         snakemake.input.sensitivity,
         dict(snakemake.output.items()),

@@ -2,9 +2,4 @@ from accelstudy.study.job import job
 from accelstudy.study.simulate import simulate_batch
 
 with job(snakemake) as (_, provenance):
-    simulate_batch(
-        snakemake.params.spec,
-        snakemake.output.estimates,
-        snakemake.output.correlations,
-        provenance,
-    )
+    simulate_batch(snakemake.params.spec, dict(snakemake.output.items()), provenance)

@@ -1,11 +1,10 @@
-from accelstudy.study.job import job
+from accelstudy.study.job import job, lists
 from accelstudy.study.summary import summarise_batch
 
 with job(snakemake) as (_, provenance):
     summarise_batch(
         snakemake.params.spec,
-        snakemake.input.estimates,
-        snakemake.input.correlations,
+        lists(snakemake.input),
         snakemake.params.leveling,
         dict(snakemake.output.items()),
         provenance,

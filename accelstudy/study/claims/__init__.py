@@ -17,9 +17,9 @@ from accelstudy.study.claims.base import (
     Claim,
     Evidence,
     SchemeClaim,
-    evidence_from,
 )
 from accelstudy.study.claims.calibration import calibration_claims, claims_by_scheme
+from accelstudy.study.claims.evidence import evidence_from
 from accelstudy.study.claims.leveling import leveling_claims
 from accelstudy.study.claims.sensitivity import sensitivity_claims
 from accelstudy.study.claims.slips import slips

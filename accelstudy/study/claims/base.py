@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from accelstudy.study.cells import Cell
-from accelstudy.study.summary import Fits
+from accelstudy.study.distributions import Distribution
+from accelstudy.study.statistics import Statistics
 
 Array = NDArray[np.float64]
 
@@ -64,7 +64,9 @@ class Evidence:
 
     Attributes
     ----------
-    fits : (scheme, approach) -> calibrations with the model of the claims
+    statistics : (scheme, approach) -> what the calibrations with the model of the claims come to
+    ratios : (scheme, effect) -> distribution over single simulations of the mean sigma a posteriori
+        of the effect's parameters, robot-aided over gravity-based; where both have redundancy
     cells : (scheme, approach) -> Cell
     scheme : str, the default scheme
     correlations : DataFrame, see `accelstudy.study.summary`
@@ -72,7 +74,8 @@ class Evidence:
     base_samples, resamples, seed : of the sensitivity analysis
     """
 
-    fits: Mapping[tuple[str, str], Fits]
+    statistics: Mapping[tuple[str, str], Statistics]
+    ratios: Mapping[tuple[str, str], Distribution]
     cells: Mapping[tuple[str, str], Cell]
     scheme: str
     correlations: pd.DataFrame
@@ -89,17 +92,13 @@ class Evidence:
     @property
     def schemes(self) -> list[str]:
         """Schemes in which both approaches were simulated."""
-        return [
-            s for s, approach in self.fits if approach == "gravity" and (s, "robot") in self.fits
-        ]
+        return schemes_with_both(self.statistics)
 
 
-def evidence_from(cells: Iterable[Cell], estimates: pd.DataFrame, **rest: Any) -> Evidence:
-    """Collect the evidence from cells and the table of their estimates; `rest` as in `Evidence`."""
-    groups = dict(iter(estimates.groupby("cell", observed=True)))
-    by_key = {(cell.scheme, cell.approach): cell for cell in cells if cell.name in groups}
-    fits = {key: Fits.of(cell, groups[cell.name]) for key, cell in by_key.items()}
-    return Evidence(fits=fits, cells=by_key, **rest)
+def schemes_with_both(known: Iterable[tuple[str, str]]) -> list[str]:
+    """Schemes that occur with both approaches, in order."""
+    known = list(known)
+    return [s for s, approach in known if approach == "gravity" and (s, "robot") in known]
 
 
 def verdict(holds: bool) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from accelstudy.effects import get_effect
 from accelstudy.study.claims.base import Array, Claim, Evidence, SchemeClaim, verdict
-from accelstudy.study.summary import Fits
+from accelstudy.study.followed import EFFECT, POSTERIORI
 from accelstudy.units import recorded_unit, to_recorded
 
 EFFECTS = {"bias": "bias", "scale": "scale", "nonorthogonality": "misalignment"}
@@ -39,10 +39,10 @@ def calibration_claims(evidence: Evidence, by_scheme: list[SchemeClaim]) -> Iter
 
 def _mean_sigma(evidence: Evidence, effect: str) -> tuple[Array, Array, Array]:
     """Mean sigma a posteriori of each gravity-based parameter, its standard error, the truth."""
-    fits = evidence.fits[evidence.scheme, "gravity"]
-    columns = _columns(fits, effect)
-    sigma = fits.sigma_posteriori[:, columns]
-    return sigma.mean(axis=0), sigma.std(axis=0) / np.sqrt(len(sigma)), np.abs(fits.truth[columns])
+    statistics = evidence.statistics[evidence.scheme, "gravity"]
+    columns = statistics.followed.effects[effect]
+    mean, error = statistics.mean(POSTERIORI), statistics.error_of_mean(POSTERIORI)
+    return mean[columns], error[columns], np.abs(statistics.followed.truth[columns])
 
 
 def _bias_claim(evidence: Evidence) -> Claim:
@@ -90,12 +90,8 @@ def _reduction_claim(
 ) -> Claim:
     rows = [row for row in by_scheme if row.claim == f"reduction-{effect}"]
     row = next(row for row in rows if row.scheme == evidence.scheme)
-    gravity, robot = _single_runs(evidence, evidence.scheme, effect)
-    relative = np.hypot(
-        robot.std() / robot.mean() / np.sqrt(len(robot)),
-        gravity.std() / gravity.mean() / np.sqrt(len(gravity)),
-    )
-    half = 1.96 * (100 - row.mean) * relative
+    (gravity, error_gravity), (robot, error_robot) = _mean_sigmas(evidence, row.scheme, effect)
+    half = 1.96 * (100 - row.mean) * np.hypot(error_robot / robot, error_gravity / gravity)
     inside = row.single_low <= paper <= row.single_high
     others = sorted(r.scheme for r in rows if r.single_low <= paper <= r.single_high)
     return Claim(
@@ -172,13 +168,13 @@ def _correlation_claims(evidence: Evidence, by_scheme: list[SchemeClaim]) -> Ite
 def _reductions_by_scheme(evidence: Evidence) -> Iterable[SchemeClaim]:
     for effect, paper in PAPER_REDUCTIONS.items():
         for scheme in evidence.schemes:
-            gravity, robot = _single_runs(evidence, scheme, effect)
-            if not np.isfinite(gravity).all():
+            if (scheme, effect) not in evidence.ratios:
                 continue  # no redundancy, no sigma a posteriori
-            single = 100 * (1 - robot / gravity)
-            low, median, high = np.quantile(single, [0.025, 0.5, 0.975]).tolist()
-            mean = float(100 * (1 - robot.mean() / gravity.mean()))
-            percentile = float(100 * np.mean(single < paper))
+            ratio = evidence.ratios[scheme, effect]
+            low, median, high = (100 * (1 - ratio.quantile([0.975, 0.5, 0.025]))).tolist()
+            (gravity, _), (robot, _) = _mean_sigmas(evidence, scheme, effect)
+            mean = 100 * (1 - robot / gravity)
+            percentile = float(100 * (1 - ratio.share_below(1 - paper / 100)))
             yield SchemeClaim(
                 f"reduction-{effect}", scheme, paper, mean, low, median, high, percentile
             )
@@ -212,18 +208,12 @@ def _correlations_by_scheme(evidence: Evidence) -> Iterable[SchemeClaim]:
             )
 
 
-def _columns(fits: Fits, effect: str) -> list[int]:
-    return [fits.names.index(p.name) for p in get_effect(effect).parameters]
-
-
-def _single_runs(evidence: Evidence, scheme: str, effect: str) -> tuple[Array, Array]:
-    """Mean sigma a posteriori of an effect's parameters per simulation: gravity, robot (SI).
-
-    The two are sessions of their own, paired by number.
-    """
-    pair = []
+def _mean_sigmas(evidence: Evidence, scheme: str, effect: str) -> list[tuple[float, float]]:
+    """Mean sigma a posteriori of an effect with its standard error (SI): gravity, robot."""
+    found = []
     for approach in ("gravity", "robot"):
-        fits = evidence.fits[scheme, approach]
-        pair.append(fits.sigma_posteriori[:, _columns(fits, effect)].mean(axis=1))
-    n = min(map(len, pair))
-    return pair[0][:n], pair[1][:n]
+        statistics = evidence.statistics[scheme, approach]
+        at = list(statistics.followed.effects).index(effect)
+        error = statistics.error_of_mean(EFFECT)[at]
+        found.append((float(statistics.mean(EFFECT)[at]), float(error)))
+    return found

@@ -28,7 +28,9 @@ def slips(evidence: Evidence) -> Iterable[Claim]:
         f"σ_φ = σ/(g cos θ): it falls with pitch ({pitched:.1f} mgon at 50 gon), as section 3.1 "
         "says, and not with roll.",
     )
-    gravity, robot = (evidence.fits[evidence.scheme, a].redundancy for a in ("gravity", "robot"))
+    gravity, robot = (
+        evidence.statistics[evidence.scheme, a].moments.redundancy for a in ("gravity", "robot")
+    )
     yield Claim(
         "degree-of-freedom",
         "4.2",

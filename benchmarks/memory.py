@@ -1,0 +1,131 @@
+"""Peak memory and CPU time of each rule of a study over the replicates of a cell.
+
+    python benchmarks/memory.py [replicates ...]
+
+Runs each rule as a process of its own on one job's share of a cell, 10⁵ and 10⁶ replicates if none
+are given: once with `keep: replicates` and once with `keep: summary`. The cell is the paper's, of 9
+parameters and 24 positions. The table gives the largest resident memory, and the CPU time with that
+of starting Python. The folder of temporary files (TMPDIR says which) needs 150 bytes per replicate.
+"""
+
+import json
+import os
+import sys
+import tempfile
+from pathlib import Path
+from subprocess import Popen
+
+from accelstudy.study.config import read_study
+
+CONFIG = Path(__file__).parents[1] / "config" / "config.yaml"
+MODEL = "bias-scale-nonorthogonality"
+TABLES = ("cells", "summary", "correlations", "leveling", "quantiles")
+PROVENANCE = {"config_hash": "", "seed": 1}
+
+
+def study_of(replicates, keep):
+    """The study: the paper's two cells, all that its claims and figures need."""
+    content = {
+        **read_study(CONFIG).model_dump(mode="json", exclude_none=True),
+        "grids": [
+            {"models": [MODEL], "schemes": ["mclaren-24"], "replicates": int(replicates)},
+        ],
+        "keep": keep,
+    }
+    content.pop("presets")
+    content["sensitivity"].update(base_samples=64, resamples=10, roll_gon=[0, 50], pitch_gon=[0])
+    return content
+
+
+def run(step, content, folder):
+    """One rule, on files in a folder."""
+    from accelstudy.figures import figure_names, figure_tables, render
+    from accelstudy.study import analysis
+    from accelstudy.study.batches import Share
+    from accelstudy.study.cells import study_cells
+    from accelstudy.study.config import parse_study
+    from accelstudy.study.simulate import simulate_batch
+    from accelstudy.study.summary import summarise_batch
+    from accelstudy.study.tables import collect, read_table
+
+    study = parse_study(content)
+    cells = study_cells(study)
+    leveling = study.leveling.model_dump()
+    kept = "estimates" if study.keep == "replicates" else "sketches"
+    rule, _, part = step.partition(" ")
+    names = {name: str(folder / part / f"{name}.parquet") for name in ("moments", kept)}
+    if rule == "simulate":
+        shares = [Share(c, 0, c.n_chunks).to_dict() for c in cells if c.approach == part]
+        simulate_batch({"seed": 1, "shares": shares, "leveling": leveling}, names, PROVENANCE)
+    elif rule == "summarise":
+        spec = {"cells": [cell.to_dict() for cell in cells if cell.approach == part]}
+        whole = folder / "whole" / part
+        outputs = {name: whole / f"{name}.parquet" for name in (*TABLES, "moments", "sketches")}
+        parts = {name: [path] for name, path in names.items()}
+        summarise_batch(spec, parts, leveling, outputs, PROVENANCE)
+    elif rule == "collect":
+        for name in TABLES:
+            parts = [folder / "whole" / cell.approach / f"{name}.parquet" for cell in cells]
+            collect(parts, folder / f"{name}.parquet", PROVENANCE)
+    elif rule == "sensitivity":
+        tables = []
+        for name in ("forces", "gravity", "robot"):
+            tables.append(folder / f"{name}.parquet")
+            summary = folder / "summary.parquet"
+            analysis.analyse_sensitivity(study, name, summary, tables[-1], PROVENANCE)
+        collect(tables, folder / "sensitivity.parquet", PROVENANCE)
+    elif rule == "claims":
+        parts = {
+            name: [folder / "whole" / cell.approach / f"{name}.parquet" for cell in cells]
+            for name in ("moments", "sketches")
+        }
+        if kept == "estimates":
+            parts[kept] = [folder / cell.approach / "estimates.parquet" for cell in cells]
+        outputs = {name: folder / f"{name}.parquet" for name in ("claims", "by_scheme", "html")}
+        tables = (folder / "correlations.parquet", folder / "sensitivity.parquet")
+        analysis.judge_claims(study, parts, *tables, outputs, PROVENANCE)
+    else:
+        for name in figure_names(study):
+            tables = {key: read_table(folder / f"{key}.parquet") for key in figure_tables(name)}
+            render(name, tables, study, folder / "figure.svg", folder / "figure.png")
+
+
+STEPS = [
+    *(f"{rule} {part}" for rule in ("simulate", "summarise") for part in ("gravity", "robot")),
+    "collect",
+    "sensitivity",
+    "claims",
+    "figures",
+]
+
+
+def measure(*arguments):
+    """CPU seconds and largest resident memory, MB, of this script with arguments."""
+    process = Popen([sys.executable, __file__, *arguments])
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)  # as nobody else can wait for it now
+    if process.returncode:
+        raise SystemExit(f"{arguments[1]} failed")
+    # ru_maxrss is in kB, but in bytes on macOS.
+    peak = usage.ru_maxrss * (1 if sys.platform == "darwin" else 1024) / 1e6
+    return usage.ru_utime + usage.ru_stime, peak
+
+
+def main(sizes):
+    """Print a row for each way to keep, number of replicates and rule."""
+    print(f"{'keep':12}{'replicates':>12}  {'rule':20}{'CPU / s':>9}{'peak / MB':>11}")
+    for keep in ("replicates", "summary"):
+        for size in sizes:
+            with tempfile.TemporaryDirectory() as name:
+                content = json.dumps(study_of(size, keep))
+                for step in STEPS:
+                    seconds, peak = measure("--step", step, content, name)
+                    row = f"{keep:12}{size:12.0e}  {step:20}{seconds:9.1f}{peak:11.0f}"
+                    print(row, flush=True)
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["--step"]:
+        run(sys.argv[2], json.loads(sys.argv[3]), Path(sys.argv[4]))
+    else:
+        main([float(text) for text in sys.argv[1:]] or [1e5, 1e6])
