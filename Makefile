@@ -24,7 +24,7 @@ export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: help env test test-cluster smoke reproduce anew unlock report campaigns diagnose-example hidden-effects hidden-docs lint lock clean
+.PHONY: help env test test-cluster test-faults smoke reproduce anew unlock report campaigns diagnose-example hidden-effects hidden-docs lint lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-18s%s\n", $$1, $$2 }' Makefile
@@ -39,6 +39,9 @@ test: lint ## check and test the package, with coverage
 
 test-cluster: $(READY) ## run the small configuration by a SLURM on this machine, and compare
 	python tests/cluster.py
+
+test-faults: $(READY) ## kill jobs and runs, fill a disk, and compare what comes out in the end
+	pytest tests/faults.py
 
 smoke: $(READY) ## run the whole workflow on a small configuration
 	snakemake --cores $(CORES) --configfile config/smoke.yaml

@@ -107,7 +107,7 @@ def test_another_configuration_is_said(finished):
 
 
 def test_other_software_is_said(finished, monkeypatch):
-    monkeypatch.setattr(tables, "version", {"numpy": "9.9.9", "scipy": "0.0.1"}.get)
+    monkeypatch.setattr(tables, "_version", {"numpy": "9.9.9", "llvmlite": "0.0.1"}.get)
     monkeypatch.setattr(tables, "git_commit", lambda: "0123456" + 33 * "0" + "+")
     write(NAMES[0])
     monkeypatch.undo()
@@ -116,8 +116,9 @@ def test_other_software_is_said(finished, monkeypatch):
     now = tables.origin({})
     commit = now["commit"][:7] + ("+" if now["commit"].endswith("+") else "")
     assert line.startswith(
-        f"{RESULTS}: has tables made by commit 0123456+ (now {commit}), NumPy 9.9.9 (now "
-        f"{now['numpy']}) and SciPy 0.0.1 (now {now['scipy']}). What this run does not make anew "
+        f"{RESULTS}: has tables made by commit 0123456+ (now {commit}), numpy 9.9.9 (now "
+        f"{now['numpy']}), scipy none (now {now['scipy']}) and llvmlite 0.0.1 (now "
+        f"{now['llvmlite'] or 'none'}). What this run does not make anew "
     )
     assert "`make anew`" in line
 

@@ -131,6 +131,7 @@ def test_origin_is_in_every_file(tmp_path):
             "commit": git_commit(),
             "numpy": np.__version__,
             "scipy": scipy.__version__,
+            "llvmlite": tables._version("llvmlite"),
         }
         assert json.loads(pq.read_schema(path).metadata[b"accelstudy"]) == read_origin(path)
 

@@ -14,7 +14,7 @@ from typing import Any
 
 from accelstudy.errors import InputError
 from accelstudy.parquet import read_row_groups
-from accelstudy.study.tables import REMEDY, origin, read_origin
+from accelstudy.study.tables import LIBRARIES, REMEDY, origin, read_origin
 from accelstudy.wording import joined
 
 READ_AT_START = 1_000_000_000
@@ -25,7 +25,7 @@ LISTED = 10
 LOCKS = Path(".snakemake/locks")
 
 _ENDS = {".png": b"IEND\xaeB`\x82", ".svg": b"</svg>", ".html": b"</html>"}
-_SOFTWARE = {"version": "accelstudy", "commit": "commit", "numpy": "NumPy", "scipy": "SciPy"}
+_SOFTWARE = {"version": "accelstudy", "commit": "commit", **{name: name for name in LIBRARIES}}
 
 
 def earlier_run(
@@ -90,7 +90,7 @@ def _other_software(origins: Iterable[Mapping[str, Any]]) -> list[str]:
 
 def _brief(value: object) -> str:
     """Version or beginning of a commit; `+` marks uncommitted changes."""
-    text = "unknown" if value is None else str(value)
+    text = "none" if value is None else str(value)
     return text[:7] + ("+" if text.endswith("+") else "") if len(text) >= 40 else text
 
 

@@ -7,7 +7,7 @@ import subprocess
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,9 @@ METADATA_KEY = b"accelstudy"
 
 REMEDY = "delete it and run again"
 """What to do with a damaged file; Snakemake then makes it anew."""
+
+LIBRARIES = ("numpy", "scipy", "llvmlite")
+"""Libraries on whose versions the last bits of the numbers depend."""
 
 TABLES = ("cells", "summary", "correlations", "leveling", "quantiles")
 """Tables that each batch of cells contributes to."""
@@ -54,9 +57,16 @@ def origin(provenance: Mapping[str, Any]) -> dict[str, Any]:
         **provenance,
         "version": __version__,
         "commit": git_commit(),
-        "numpy": version("numpy"),
-        "scipy": version("scipy"),
+        **{name: _version(name) for name in LIBRARIES},
     }
+
+
+def _version(name: str) -> str | None:
+    """Version of an installed library; None if it is not installed."""
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None
 
 
 @contextmanager
