@@ -225,6 +225,19 @@ def test_what_a_killed_run_left_is_removed(tmp_path):
     assert content(tmp_path) == {"file": b"whole", "beside/calibration.json": b"1"}
 
 
+def test_two_runs_that_write_one_file_do_not_meet(tmp_path):
+    """As a job of a killed run and the same job of the next one."""
+    target = tmp_path / "table"
+    with whole_file(target) as late:
+        late.write_text("a long beginning")
+        with whole_file(target) as early:
+            early.write_text("whole")
+        assert target.read_text() == "whole"
+        with late.open("a") as file:
+            file.write(", and its end")
+    assert content(tmp_path) == {"table": b"a long beginning, and its end"}
+
+
 # --- the commands --------------------------------------------------------------------------------
 
 
