@@ -279,11 +279,14 @@ def whitened_jacobian(
 
 @dataclass(frozen=True)
 class CalibrationProblem:
-    """Observed sessions in the form in which `adjust` takes them."""
+    """Observed sessions in the form in which `adjust` takes them.
+
+    `observed` holds the forces (R, n, 3) and, if the approach uses them, the angles (R, n, 2).
+    """
 
     model: SensorModel
     conditions: CalibrationConditions
-    observations: Array
+    observed: tuple[Array, ...]
     cofactors: Array
     initial: Array
     weights: Array
@@ -295,11 +298,11 @@ class CalibrationProblem:
         """Arrange what was observed."""
         forces = np.asarray(observed.forces, dtype=float)
         n = forces.shape[1]
-        observations, sigmas = [forces], [np.broadcast_to(observed.sigma_force, (n, 3))]
+        values, sigmas = [forces], [np.broadcast_to(observed.sigma_force, (n, 3))]
         if approach.uses_angles:
             if observed.angles is None:
                 raise InputError(f"approach {approach.name!r} needs the robot's roll and pitch")
-            observations.append(np.asarray(observed.angles, dtype=float))
+            values.append(np.asarray(observed.angles, dtype=float))
             sigmas.append(np.broadcast_to(observed.sigma_angle, (n, 2)))
 
         with_gravity = observed.sigma_gravity > 0
@@ -320,11 +323,16 @@ class CalibrationProblem:
         return cls(
             model=model,
             conditions=equations.at(model.settings, fixed, observed.hold),
-            observations=np.concatenate(observations, axis=-1),
+            observed=tuple(values),
             cofactors=np.concatenate(sigmas, axis=-1) ** 2,
             initial=initial,
             weights=weights,
         )
+
+    @cached_property
+    def observations(self) -> Array:
+        """All observations, (R, n, o)."""
+        return np.concatenate(self.observed, axis=-1)
 
     def linearised(self, parameters: Array, adjusted: Array) -> Linearisation:
         """Linearise one session at parameters (u',) and observations (n, o)."""

@@ -31,7 +31,10 @@ from accelstudy.tracing import TracedFunction, symbols
 
 NAME = "calibrate"
 INTEGERS = ("positions", "replicates")
-POINTERS = ("known", "observations", "initial", "weights", "work", "results", "correlations")
+POINTERS = (
+    *("known", "forces", "angles", "initial", "weights"),
+    *("work", "results", "correlations"),
+)
 """Arguments of the function, in order; `KernelCode` says what they hold."""
 
 
@@ -44,7 +47,8 @@ class KernelCode:
 
         known         (n, 2 o + k)  variances of the observations, their 1/σ (0 where σ = 0),
                                     and the numbers of `known`
-        observations  (R, n, o)
+        forces        (R, n, 3)
+        angles        (R, n, 2)     if the approach uses them
         initial       (R, u)        of the parameters; the last is observed if it is gravity
         weights       (u,)          of the observations of parameters: of gravity, or none
         work          (n, work, LANES)
@@ -133,7 +137,7 @@ class _Writer:
         self.c = of.conditions
         self.with_gravity = of.equations.estimates_gravity
         self.code = code = Code(NAME, INTEGERS, POINTERS)
-        self.slots: dict[tuple[str, int, int], Term] = {}
+        self.stored: Rows = []
 
         padded = code.integer("add", "%replicates", LANES - 1)
         groups = code.integer("sdiv", padded, LANES)
@@ -194,15 +198,20 @@ class _Writer:
         """Take the observations into `work`; returns the tolerance of the step."""
         code, o = self.code, self.o
         largest = Variable(code, 0.0)
-        session = code.integer("mul", "%positions", o)
-        starts = [code.integer("mul", row, session) for row in rows]
+        widths = {"forces": 3, "angles": 2} if o > 3 else {"forces": 3}
+        starts = {
+            width: [
+                code.integer("mul", row, code.integer("mul", "%positions", width)) for row in rows
+            ]
+            for width in widths.values()
+        }
         with code.loop("%positions") as i:
-            own = code.integer("mul", i, o)
             values: list[Term] = []
-            for k in range(o):
-                at = code.integer("add", own, k)
-                offsets = [code.integer("add", start, at) for start in starts]
-                values.append(code.load_each("observations", offsets))
+            for pointer, width in widths.items():
+                for k in range(width):
+                    at = code.integer("add", code.integer("mul", i, width), k)
+                    offsets = [code.integer("add", start, at) for start in starts[width]]
+                    values.append(code.load_each(pointer, offsets))
             size: Term = largest.get()
             for k, value in enumerate(values):
                 size = larger(absolute(value) * self.known(i, o + k), size)
@@ -306,27 +315,26 @@ class _Writer:
                 total = fma(-row[k], misclosure, total)
             variable.set(total)
 
-        self.slots.clear()
-        first = 2 * o + len(self.of._latent)
-        for j in range(c):
-            for k, value in enumerate((*a_white[j], w_white[j], *bq_white[j])):
-                self.slots["row", j, k] = value
-                if isinstance(value, Lanes):
-                    self.write(i, first + j * (u + 1 + o) + k, [value])
+        self.stored = [
+            [*row, misclosure, *cofactors]
+            for row, misclosure, cofactors in zip(a_white, w_white, bq_white, strict=True)
+        ]
+        for number, value in enumerate(value for row in self.stored for value in row):
+            if isinstance(value, Lanes):  # a constant needs no place
+                self.write(i, 2 * o + len(self.of._latent) + number, [value])
 
     def residuals(self, i: str, dx: list[Term], size_v: Variable, omega: Variable) -> None:
         """Residuals of a position after a step, v = −(B Q)ᵀ L⁻ᵀ (A dx + w)."""
         u, o = self.u, self.o
-        first = 2 * o + len(self.of._latent)
+        number = 2 * o + len(self.of._latent)
         v_new: list[Term] = [0.0] * o
         total: Term = omega.get()
-        for j in range(self.c):
+        for stored in self.stored:
             row = [
-                self.read(i, first + j * (u + 1 + o) + k, 1)[0]
-                if isinstance(constant := self.slots["row", j, k], Lanes)
-                else constant
-                for k in range(u + 1 + o)
+                self.read(i, number + k, 1)[0] if isinstance(value, Lanes) else value
+                for k, value in enumerate(stored)
             ]
+            number += len(row)
             misclosure = row[u]
             for value, change in zip(row[:u], dx, strict=True):
                 misclosure = fma(value, change, misclosure)

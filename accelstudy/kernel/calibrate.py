@@ -38,15 +38,18 @@ class Kernel:
     def calibrate(self, problem: CalibrationProblem) -> Block:
         """Calibrate the sessions of a problem; result and errors as of `calibrate`."""
         code = self.code
-        count, n, _ = problem.observations.shape
+        count, n, _ = problem.observed[0].shape
         u = code.unknowns
         redundancy = redundancy_of(code.conditions * n, problem.weights)
         padded = -(-count // LANES) * LANES
         results = np.empty((2 * u + 3, padded))
         correlations = np.zeros((u * (u - 1) // 2, LANES))
+        # The last of the observations stands for the angles where there are none.
+        forces, angles = (np.ascontiguousarray(problem.observed[k]) for k in (0, -1))
         arrays = [
             self._known(problem),
-            np.ascontiguousarray(problem.observations),
+            forces,
+            angles,
             np.ascontiguousarray(problem.initial),
             problem.weights,
             _aligned(n * code.work * LANES),
