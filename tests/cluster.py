@@ -22,12 +22,13 @@ STUDY = [
 ]
 # It needs all the others.
 ALL_TABLES = "results/smoke/claims.parquet"
-# What the profile cannot know of this SLURM: it has no accounts, and jobs are short. With one batch
+# What the profile cannot know of this SLURM: it has no accounts, and jobs are short. With one job
 # in a submission, several of them run at once.
 BY_SLURM = [
     *("--profile", ROOT / "profiles" / "slurm", "--slurm-no-account"),
     *("--slurm-status-command", "squeue", "--slurm-init-seconds-before-status-checks", "3"),
-    *("--slurm-keep-successful-logs", "--group-components", "batch=1", "results=100000"),
+    *("--slurm-keep-successful-logs", "--group-components"),
+    *("simulate=1", "summarise=1", "results=100000"),
     *("--cores", str(min(2, os.cpu_count() or 1))),
 ]
 
