@@ -69,7 +69,7 @@ def run(command: list[str | Path], folder: Path, environment: dict[str, str]) ->
 
 
 def differences(one: Path, other: Path) -> list[str]:
-    """Tables that only one of the folders has, or whose rows or origins are not those of the other.
+    """Tables that only one of the folders has, or whose rows are not those of the other.
 
     Numbers are compared bit by bit.
     """
@@ -80,10 +80,10 @@ def differences(one: Path, other: Path) -> list[str]:
 
 
 def bits(path: Path) -> bytes | None:
-    """A table and its metadata as bytes, however it is cut and compressed; None if absent."""
+    """The rows of a table as bytes, however it is cut and compressed; None if absent."""
     if not path.is_file():
         return None
-    table = pq.read_table(path, partitioning=None).combine_chunks()
+    table = pq.read_table(path, partitioning=None).combine_chunks().replace_schema_metadata()
     sink = pa.BufferOutputStream()
     with pa.ipc.new_stream(sink, table.schema) as stream:
         stream.write_table(table)
