@@ -47,6 +47,7 @@ WRITTEN = {
     ),
 }
 WHOLE = ("moments", "sketches")
+MEMORY = max(1000, round(EFFORT.memory / 1e6))
 CAPTIONS = Path(str(workflow.current_basedir)).parent / "report/figures"
 ANALYSES = ["forces", "gravity", "robot"]
 FINAL_TABLES = [

@@ -9,7 +9,7 @@ rule sensitivity_analysis:
         f"{RESULTS}/benchmarks/sensitivity/{{analysis}}.tsv"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=2000,
     params:
         settings=STUDY.sensitivity.model_dump() if STUDY.sensitivity else None,
         sensor=STUDY.model_dump(include={"seed", "gravity_mps2", "noise", "sensor"}),

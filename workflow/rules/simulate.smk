@@ -7,7 +7,7 @@ rule simulate:
         f"{RESULTS}/benchmarks/simulate/{{part}}.tsv"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=MEMORY,
     params:
         spec=lambda wildcards: part_spec(wildcards.part),
         code=code_hash("simulate"),

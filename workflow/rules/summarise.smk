@@ -9,7 +9,7 @@ rule summarise:
         f"{RESULTS}/benchmarks/summarise/{{batch}}.tsv"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=MEMORY,
     params:
         spec=lambda wildcards: {
             "cells": [cell.to_dict() for cell in BATCHES[wildcards.batch].cells]
