@@ -78,7 +78,7 @@ def started(folder, *arguments):
 
 
 def caught_job(process, writing):
-    """A job of simulation, stopped; `writing` is whether it must have begun to write."""
+    """A job of simulation, stopped; `writing` is whether it must be at its estimates."""
     while process.poll() is None:
         for job in psutil.Process(process.pid).children(recursive=True):
             try:
@@ -86,7 +86,9 @@ def caught_job(process, writing):
                 if words[0].endswith("bash") or not words[-1].endswith(".simulate.py"):
                     continue
                 job.suspend()
-                if not writing or any(".accelstudy-" in f.path for f in job.open_files()):
+                if not writing or any(
+                    "/estimates/.accelstudy-" in f.path for f in job.open_files()
+                ):
                     return job
                 job.resume()
             except (psutil.Error, IndexError):
@@ -169,7 +171,7 @@ def test_a_job_that_outlives_its_run_and_its_configuration(fewer, orphans, tmp_p
     one_line(again.stdout, f"tables are of another configuration: {ESTIMATES / late}.")
     if f"estimates/{late}" in fewer:
         assert again.returncode != 0
-        one_line(again.stdout, f"error: {ESTIMATES / late}: is of another configuration; delete it")
+        one_line(again.stdout, "error: results/tiny/", "is of another configuration; delete it")
     (tmp_path / ESTIMATES / late).unlink()
     succeed(
         tmp_path,

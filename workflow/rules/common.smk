@@ -1,3 +1,4 @@
+from functools import cache
 from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
@@ -63,6 +64,7 @@ wildcard_constraints:
     analysis="|".join(ANALYSES),
 
 
+@cache
 def part_spec(part):
     """All on which the numbers of a part depend, as plain data."""
     shares = [share.to_dict() for share in PARTS[part]]
@@ -70,6 +72,7 @@ def part_spec(part):
     return {"seed": STUDY.seed, "shares": shares, **leveling}
 
 
+@cache
 def setup_of(part):
     """What a part is made of, in brief."""
     return setup_digest(part_spec(part))
