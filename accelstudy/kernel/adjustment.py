@@ -271,16 +271,12 @@ class _Writer:
         table |= zip(eq.observations, (a + b for a, b in zip(l, v, strict=True)), strict=True)
         if self.of._latent:
             table |= zip(self.of._latent, self.read(i, 2 * o, 3), strict=True)
-        column = 2 * o
-        for formulas in (self.of._sensitive, self.of._linear):
-            for symbol in formulas.known:
-                table[symbol] = self.known(i, column)
-                column += 1
-        f_a = self.of._sensitive.write(self.code, table)
+        sensitive, linear = self.of._sensitive, self.of._linear
+        f_a = self.evaluate(sensitive, table, i, 2 * o)
         if self.of._latent:
             self.write(i, 2 * o, f_a)
         table |= zip(eq.trace.force, f_a, strict=True)
-        values = self.of._linear.write(self.code, table)
+        values = self.evaluate(linear, table, i, 2 * o + len(sensitive.known))
         rows = [values[k * (1 + u + o) : (k + 1) * (1 + u + o)] for k in range(c)]
         psi = [row[0] for row in rows]
         a = [row[1 : 1 + u] for row in rows]
@@ -322,6 +318,13 @@ class _Writer:
         for number, value in enumerate(value for row in self.stored for value in row):
             if isinstance(value, Lanes):  # a constant needs no place
                 self.write(i, 2 * o + len(self.of._latent) + number, [value])
+
+    def evaluate(
+        self, formulas: Formulas, table: dict[Any, Term], i: str, column: int
+    ) -> list[Term]:
+        """Write formulas at a position; what is known begins at a column."""
+        known = {symbol: self.known(i, column + k) for k, symbol in enumerate(formulas.known)}
+        return formulas.write(self.code, {**table, **known})
 
     def residuals(self, i: str, dx: list[Term], size_v: Variable, omega: Variable) -> None:
         """Residuals of a position after a step, v = −(B Q)ᵀ L⁻ᵀ (A dx + w)."""

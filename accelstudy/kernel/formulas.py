@@ -32,7 +32,9 @@ class Formulas:
     """
 
     def __init__(self, expressions: Sequence[Any], same: frozenset[sp.Symbol]) -> None:
-        shared, self._results = sp.cse(expressions, symbols=sp.numbered_symbols("c_"), list=True)
+        shared, self._results = sp.cse(
+            expressions, symbols=sp.numbered_symbols("shared_"), list=True
+        )
         self.known: dict[sp.Symbol, Any] = {}
         self._same = same
         self._expanded: dict[sp.Symbol, Any] = {}
@@ -54,7 +56,8 @@ class Formulas:
                 self.known[whole] = whole
                 return whole
             names = {value: symbol for symbol, value in self.known.items()}
-            symbol = names.get(whole) or sp.Dummy(real=True)
+            # By number: a dummy's place in a sum would depend on what was traced before.
+            symbol = names.get(whole) or sp.Symbol(f"known_{len(self.known):03}", real=True)
             self.known[symbol] = whole
             return symbol
         if expression.is_Symbol:
