@@ -3,6 +3,8 @@
 Limits of single statistics are 4.5 standard errors.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -12,7 +14,7 @@ from study_helpers import NINE, PAPER_SENSOR, grid, run_study
 
 from accelstudy.schemes import get_scheme
 from accelstudy.study import simulate as module
-from accelstudy.study.simulate import calibrate
+from accelstudy.study.compiling import calibrator
 from accelstudy.study.tables import read_estimates
 
 STANDARD_ERRORS = 4.5
@@ -253,12 +255,15 @@ def test_some_replicates_fail(monkeypatch, tmp_path):
     """Replicates with a hopeless observation fail, and the others do not notice."""
     whole = run_study(tmp_path / "whole", grids=[grid(approaches="gravity")])
 
-    def spoilt(model, approach, observed):
-        forces = observed.forces.copy()
-        forces[[3, 50]] = np.nan
-        return calibrate(model, approach, type(observed)(**{**vars(observed), "forces": forces}))
+    def spoilt(cell):
+        def calibrate(model, approach, observed):
+            forces = observed.forces.copy()
+            forces[[3, 50]] = np.nan
+            return calibrator(cell)(model, approach, replace(observed, forces=forces))
 
-    monkeypatch.setattr(module, "calibrate", spoilt)
+        return calibrate
+
+    monkeypatch.setattr(module, "calibrator", spoilt)
     tables = run_study(tmp_path / "spoilt", grids=[grid(approaches="gravity")])
     assert_flagged(tables, f"{MCLAREN}/gravity", 2)
     kept = ~tables["estimates"]["replicate"].isin([3, 50])
