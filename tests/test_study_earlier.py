@@ -144,11 +144,16 @@ def test_estimates_of_different_runs_are_not_mixed(finished):
     ):
         read_estimates(folder)
     now = {NAMES[0]: "of seed 2", NAMES[1]: "is to come"}
-    assert remove_foreign(folder.relative_to(finished), now) == (
-        f"{RESULTS}/estimates: removed 2 files of estimates of another configuration"
+    estimates = folder.relative_to(finished)
+    assert remove_foreign(estimates, {**now, NAMES[2]: "is kept"}, set(NAMES[:2])) == (
+        f"{RESULTS}/estimates: removed estimates of another configuration, in 1 file(s)"
+    )
+    write(NAMES[1])
+    assert remove_foreign(estimates, now, set(NAMES[:2])) == (
+        f"{RESULTS}/estimates: removed estimates of another configuration, in 2 file(s)"
     )
     assert len(read_estimates(folder)) == 1000
-    assert remove_foreign(folder.relative_to(finished), now) is None
+    assert remove_foreign(estimates, now, set(NAMES[:2])) is None
 
 
 def test_files_of_a_user_stay_among_the_estimates(finished):
@@ -156,7 +161,7 @@ def test_files_of_a_user_stay_among_the_estimates(finished):
     pd.DataFrame({"a": [1]}).to_parquet(folder / "mine.parquet")
     (folder / "notes.txt").touch()
     assert lines() == []
-    assert remove_foreign(folder, {}) is not None
+    assert remove_foreign(folder, {}, set()) is not None
     assert sorted(path.name for path in folder.iterdir()) == ["mine.parquet", "notes.txt"]
     with pytest.raises(InputError, match=r"mine\.parquet: does not say where it comes from"):
         read_estimates(folder)

@@ -131,13 +131,19 @@ def _check_end(path: Path) -> None:
             raise InputError(f"{path}: is not whole; {REMEDY}")
 
 
-def remove_foreign(folder: str | Path, setups: Mapping[str, str]) -> str | None:
+def remove_foreign(
+    folder: str | Path, setups: Mapping[str, str], to_make: Container[str]
+) -> str | None:
     """Remove estimates that are not of the study as it is configured; a line if there were any.
 
-    Who reads the whole folder would get them too. What has no origin is not ours and stays.
+    Who reads the whole folder would get them too. What has no origin is not ours and stays. So does
+    a file of this study that is not in `to_make`, what the run makes: the job that reads it says
+    what to do.
     """
     removed = 0
     for path in Path(folder).glob("*.parquet"):
+        if str(path) in setups and str(path) not in to_make:
+            continue
         try:
             setup = read_origin(path).get("setup")
         except InputError:
@@ -147,4 +153,4 @@ def remove_foreign(folder: str | Path, setups: Mapping[str, str]) -> str | None:
             removed += 1
     if not removed:
         return None
-    return f"{folder}: removed {removed} files of estimates of another configuration"
+    return f"{folder}: removed estimates of another configuration, in {removed} file(s)"
