@@ -10,10 +10,11 @@ from accelstudy.errors import InputError
 from accelstudy.hidden.figures import figures
 from accelstudy.hidden.judging import all_true, judge, same_effects
 from accelstudy.hidden.page import score_page
-from accelstudy.hidden.rates import clopper_pearson, share_of
+from accelstudy.hidden.rates import share_of
 from accelstudy.hidden.score import score_tables
 from accelstudy.hidden.tables import SCHEMA
 from accelstudy.hidden.targets import targets
+from accelstudy.shares import clopper_pearson
 
 DRIFT, WARM, SQUARE, MOUNTED = (
     ["bias_drift"], ["warm_up"], ["quadratic_scale"],

@@ -7,7 +7,6 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from scipy import special
 
 from accelstudy.figures.registry import Tables, figure
 from accelstudy.figures.style import (
@@ -22,12 +21,12 @@ from accelstudy.figures.style import (
     shown,
     unit_label,
 )
+from accelstudy.shares import clopper_pearson
 from accelstudy.study.config import StudyConfig
 
 LINES: Style = {"roll": "-", "pitch": "--"}
 MOST = 3
 """Set-ups whose tails are drawn; a panel each."""
-HALF_LEVEL = 0.025
 NONE: Style = {"linestyle": "", "marker": "v", "markersize": 4, "fillstyle": "none"}
 
 
@@ -89,11 +88,7 @@ def _draw_failures(ax: Axes, cells: pd.DataFrame) -> None:
         its = its.sort_values("sensor_sigma_mps2")
         n = its["n_replicates"].to_numpy(float)
         failed = n - its["n_converged"].to_numpy(float)
-        # Clopper and Pearson.
-        low = np.where(failed > 0, special.betaincinv(np.maximum(failed, 1), n - failed + 1,
-                                                      HALF_LEVEL), 0.0)  # fmt: skip
-        rest = np.maximum(n - failed, 1)
-        high = np.where(failed < n, special.betaincinv(failed + 1, rest, 1 - HALF_LEVEL), 1.0)
+        low, high = clopper_pearson(failed, n)
         share, sigma = failed / n, its["sensor_sigma_mps2"].to_numpy(float)
         colour, some = approach_colour(str(approach)), failed > 0
         bars = np.stack([share - low, high - share])[:, some]

@@ -6,10 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
-from scipy import stats
 
-Array = NDArray[np.float64]
+from accelstudy.shares import clopper_pearson
 
 ALL = "all"
 """Stands in a column by which a share is not divided."""
@@ -27,18 +25,6 @@ SPLITS: tuple[tuple[str, ...], ...] = (
     ("set", "design", "approach", "sigma"),
 )
 """Divisions of the table of shares."""
-
-
-def clopper_pearson(count: ArrayLike, n: ArrayLike, level: float = 0.95) -> tuple[Array, Array]:
-    """Exact interval of shares, low (...) and high (...), of counts (...) in n (...).
-
-    Where n is 0 nothing is known: from 0 to 1.
-    """
-    count, n = np.asarray(count, dtype=float), np.asarray(n, dtype=float)
-    tail = (1 - level) / 2
-    low = stats.beta.ppf(tail, np.maximum(count, 1), n - count + 1)
-    high = stats.beta.isf(tail, count + 1, np.maximum(n - count, 1))
-    return np.where(count > 0, low, 0.0), np.where(count < n, high, 1.0)
 
 
 def with_intervals(table: pd.DataFrame) -> pd.DataFrame:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from accelstudy.hidden.rates import clopper_pearson
+from accelstudy.shares import clopper_pearson
 from accelstudy.study.report import number
 
 LARGE = 150.0
