@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
 from importlib import import_module
@@ -11,8 +12,9 @@ from typing import Any, TypeVar
 import click
 from click.shell_completion import CompletionItem
 
+from accelstudy.errors import InputError
 from accelstudy.progress import feedback
-from accelstudy.units import ANGLE_UNIT_VARIABLE, angles_in
+from accelstudy.units import ANGLE_UNIT_VARIABLE, angles_in, parse_quantity
 
 PATH = click.Path(path_type=Path)
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -56,6 +58,32 @@ class ModelName(Name):
             found += EFFECT.shell_complete(ctx, param, last)
         items = [CompletionItem(f"{before}{plus}{item.value}") for item in found]
         return items or [CompletionItem(incomplete, type="file")]
+
+
+class Quantity(click.ParamType):  # type: ignore[type-arg]
+    """A number with its unit, as 10mgon or 0.01deg; the command gets it in SI.
+
+    Parameters
+    ----------
+    unit : str, SI unit, one of `accelstudy.units.UNITS`
+    least, most : float, SI, both allowed
+    """
+
+    name = "quantity"
+
+    def __init__(self, unit: str, least: float = 0.0, most: float = math.inf) -> None:
+        self.unit, self.least, self.most = unit, least, most
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Value in SI; raises `InputError` if it is none, or out of bounds."""
+        if not isinstance(value, str):
+            return float(value)
+        try:
+            return parse_quantity(value, self.unit, self.least, self.most)
+        except InputError as error:
+            raise InputError(f"{param.opts[0]}: {error}" if param else str(error)) from None
 
 
 ANGLE_UNIT = Name("angle_unit", "accelstudy.units", "ANGLE_UNITS")

@@ -6,12 +6,13 @@ This is the only place where conversion factors stand.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import TYPE_CHECKING
 
-from accelstudy.errors import UnknownNameError
+from accelstudy.errors import InputError, UnknownNameError, shown
 
 if TYPE_CHECKING:
     import numpy as np
@@ -35,6 +36,9 @@ UNITS: dict[str, dict[str, float]] = {
         "arcsec": math.pi / 648000.0,
     },
     "1": {"ppm": 1e-6, "%": 1e-2, "1": 1.0},
+    "m": {"mm": 1e-3, "cm": 1e-2, "m": 1.0},
+    "s": {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0},
+    "kg": {"kg": 1.0, "g": 1e-3},
     "m/s^2": {
         "mm/s^2": 1e-3,
         "m/s^2": 1.0,
@@ -146,6 +150,43 @@ def to_si(value: ArrayLike, given: str, unit: str) -> NDArray[np.float64]:
     if given not in known:
         raise UnknownNameError(f"unit of a quantity in {unit}", given, known)
     return _numbers(value) * known[given]
+
+
+_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S*)\s*")
+
+
+def parse_quantity(text: str, unit: str, least: float = -math.inf, most: float = math.inf) -> float:
+    """Read a number with its unit, as 10mgon or 0.01deg.
+
+    Parameters
+    ----------
+    text : str
+    unit : str, SI unit of the quantity
+    least, most : float, in that unit, both allowed
+
+    Returns
+    -------
+    float, in the SI `unit`
+
+    Raises
+    ------
+    InputError
+        If it is no such quantity, or out of bounds. Only 0 needs no unit.
+    """
+    match = _QUANTITY.fullmatch(text)
+    known = UNITS.get(unit, {unit: 1.0})
+    if match is None or not (match[2] or float(match[1]) == 0):
+        example = f"2{next(iter(known))}"
+        raise InputError(f"expected a number with its unit, as {example}, not {shown(text)}")
+    given = match[2] or next(iter(known))
+    if given not in known:
+        raise InputError(f"{shown(text)}: the unit must be one of {', '.join(known)}")
+    value = float(match[1]) * known[given]
+    if not least <= value <= most:
+        ends = [f"at least {least / known[given]:.6g}"] if least > -math.inf else []
+        ends += [f"at most {most / known[given]:.6g}"] if most < math.inf else []
+        raise InputError(f"{shown(text)}: must be {' and '.join(ends)} {given}")
+    return value
 
 
 def _numbers(value: ArrayLike) -> NDArray[np.float64]:

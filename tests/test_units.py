@@ -1,13 +1,14 @@
 """Units at the border, and what is said of a unit that is unknown."""
 
 import math
+import re
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from accelstudy.errors import UnknownNameError
+from accelstudy.errors import InputError, UnknownNameError
 from accelstudy.units import (
     GON,
     MGON,
@@ -16,6 +17,7 @@ from accelstudy.units import (
     angles_in,
     attitude_unit,
     display_unit,
+    parse_quantity,
     recorded_unit,
     to_attitude,
     to_display,
@@ -113,3 +115,33 @@ def test_an_unknown_unit_is_named_with_what_is_known():
 def test_a_unit_of_another_quantity_is_refused():
     with pytest.raises(UnknownNameError, match="unknown unit of a quantity in rad 'ppm'"):
         to_si(1.0, "ppm", "rad")
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "expected"),
+    [
+        ("10mgon", "rad", 10 * MGON),
+        ("0.01deg", "rad", math.radians(0.01)),
+        (" 2 m ", "m", 2.0),
+        ("1.5e1mm", "m", 0.015),
+        ("-3h", "s", -10800.0),
+        ("0", "m", 0.0),
+    ],
+)
+def test_a_number_with_its_unit_is_read(text, unit, expected):
+    assert parse_quantity(text, unit) == pytest.approx(expected, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("2", "expected a number with its unit, as 2mm, not '2'"),
+        ("two m", "expected a number with its unit"),
+        ("nan m", "expected a number with its unit"),
+        ("2gon", "the unit must be one of mm, cm, m"),
+        ("4000mm", "must be at least 100 and at most 3000 mm"),
+    ],
+)
+def test_what_is_no_such_quantity_is_refused(text, why):
+    with pytest.raises(InputError, match=re.escape(why)):
+        parse_quantity(text, "m", 0.1, 3.0)
