@@ -50,6 +50,7 @@ UNITS: dict[str, dict[str, float]] = {
         "mm/s^2/K": 1e-3,
         "m/s^2/K": 1.0,
         "mg/K": 1e-3 * STANDARD_GRAVITY,
+        "ug/K": 1e-6 * STANDARD_GRAVITY,
     },
     "m/s^2/K^2": {
         "mm/s^2/K^2": 1e-3,
@@ -67,6 +68,21 @@ UNITS: dict[str, dict[str, float]] = {
         "s^2/m": 1.0,
         "mg/g^2": 1e-3 / STANDARD_GRAVITY,
     },
+    "m/s^2/sqrt(Hz)": {
+        "ug/sqrt(Hz)": 1e-6 * STANDARD_GRAVITY,
+        "mg/sqrt(Hz)": 1e-3 * STANDARD_GRAVITY,
+        "mm/s^2/sqrt(Hz)": 1e-3,
+        "m/s^2/sqrt(Hz)": 1.0,
+        "m/s/sqrt(h)": 1.0 / 60,
+        "mm/s/sqrt(h)": 1e-3 / 60,
+    },
+    "m/s^2/sqrt(s)": {
+        "ug/sqrt(s)": 1e-6 * STANDARD_GRAVITY,
+        "mm/s^2/sqrt(s)": 1e-3,
+        "m/s^2/sqrt(s)": 1.0,
+        "mm/s^2/sqrt(h)": 1e-3 / 60,
+    },
+    "K": {"K": 1.0, "degC": 1.0},
 }
 """SI unit -> {unit that people use: its size in the SI unit}; the first is the one we record."""
 
@@ -152,11 +168,19 @@ def to_si(value: ArrayLike, given: str, unit: str) -> NDArray[np.float64]:
     return _numbers(value) * known[given]
 
 
+def quantity_text(value: float, unit: str) -> str:
+    """Write a quantity of the SI `unit` for people, with its unit: ``10 mgon``, ``30 gon``."""
+    if unit == "rad" and abs(to_attitude(value)) >= 1:
+        return f"{float(to_attitude(value)):.4g} {attitude_unit()}"
+    return f"{float(to_display(value, unit)):.4g} {display_unit(unit)}".removesuffix(" 1")
+
+
+_SPELLINGS = {"µ": "u", "μ": "u", "²": "^2", "°C": "degC", "°": "deg", "√Hz": "sqrt(Hz)"}
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S*)\s*")
 
 
 def parse_quantity(text: str, unit: str, least: float = -math.inf, most: float = math.inf) -> float:
-    """Read a number with its unit, as 10mgon or 0.01deg.
+    """Read a number with its unit, as a person writes it: 10mgon, 0.01°, 2 mm/s2, 22.5µg/√Hz.
 
     Parameters
     ----------
@@ -179,6 +203,9 @@ def parse_quantity(text: str, unit: str, least: float = -math.inf, most: float =
         example = f"2{next(iter(known))}"
         raise InputError(f"expected a number with its unit, as {example}, not {shown(text)}")
     given = match[2] or next(iter(known))
+    for spelling, plain in _SPELLINGS.items():
+        given = given.replace(spelling, plain)
+    given = re.sub(r"(?<=[a-zA-Z])2", "^2", given)
     if given not in known:
         raise InputError(f"{shown(text)}: the unit must be one of {', '.join(known)}")
     value = float(match[1]) * known[given]

@@ -12,12 +12,14 @@ from accelstudy.errors import InputError, UnknownNameError
 from accelstudy.units import (
     GON,
     MGON,
+    STANDARD_GRAVITY,
     UNITS,
     angle_note,
     angles_in,
     attitude_unit,
     display_unit,
     parse_quantity,
+    quantity_text,
     recorded_unit,
     to_attitude,
     to_display,
@@ -122,6 +124,11 @@ def test_a_unit_of_another_quantity_is_refused():
     [
         ("10mgon", "rad", 10 * MGON),
         ("0.01deg", "rad", math.radians(0.01)),
+        ("0.01°", "rad", math.radians(0.01)),
+        ("2mm/s2", "m/s^2", 2e-3),
+        ("2 mm/s²", "m/s^2", 2e-3),
+        ("50µg", "m/s^2", 50e-6 * STANDARD_GRAVITY),
+        (".5 %", "1", 0.005),
         (" 2 m ", "m", 2.0),
         ("1.5e1mm", "m", 0.015),
         ("-3h", "s", -10800.0),
@@ -145,3 +152,11 @@ def test_a_number_with_its_unit_is_read(text, unit, expected):
 def test_what_is_no_such_quantity_is_refused(text, why):
     with pytest.raises(InputError, match=re.escape(why)):
         parse_quantity(text, "m", 0.1, 3.0)
+
+
+def test_a_quantity_is_written_with_its_unit():
+    assert quantity_text(10 * MGON, "rad") == "10 mgon"
+    assert quantity_text(30 * GON, "rad") == "30 gon"
+    with angles_in("deg"):
+        assert quantity_text(math.radians(0.01), "rad") == "10 mdeg"
+    assert quantity_text(0.002, "m/s^2") == "2 mm/s^2"

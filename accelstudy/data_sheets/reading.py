@@ -1,0 +1,123 @@
+"""Data sheets from YAML: those that come along, and a user's own."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from accelstudy.data_sheets.sheet import QUANTITIES, DataSheet
+from accelstudy.errors import InputError, UnknownNameError, shown
+from accelstudy.units import parse_quantity
+
+TEXTS = ("name", "title", "source")
+DENSITY = "noise_density"
+"""Another way to write the white noise: the one-sided density of most data sheets."""
+
+
+def data_sheet_names() -> tuple[str, ...]:
+    """Names of the sensors that come along."""
+    return tuple(
+        sorted(f.name.removesuffix(".yaml") for f in _folder().iterdir() if ".yaml" in f.name)
+    )
+
+
+def get_data_sheet(name_or_path: str | Path) -> DataSheet:
+    """Return a sensor by its name, or from a YAML file of the user's.
+
+    A path has a separator or ends in .yaml or .yml.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such sensor.
+    InputError
+        If the file cannot be read, or holds no data sheet.
+    """
+    text = str(name_or_path)
+    if text.endswith((".yaml", ".yml")) or os.sep in text or "/" in text:
+        return read_data_sheet(text)
+    if text not in data_sheet_names():
+        raise UnknownNameError("sensor", text, data_sheet_names())
+    return _shipped(text)
+
+
+def read_data_sheet(path: str | Path) -> DataSheet:
+    """Read a data sheet from a YAML file.
+
+    Raises
+    ------
+    InputError
+        One line that names the file, the key, what is wrong and what would be right.
+    """
+    from accelstudy.study.config.layers import read_layer  # its package needs all models
+
+    return parse_data_sheet(read_layer(path), str(path))
+
+
+def parse_data_sheet(content: Mapping[str, Any], source: str = "data sheet") -> DataSheet:
+    """Make a data sheet of what a YAML file says.
+
+    Each quantity is a text with its unit, or a mapping with such a `value` and its `source`.
+
+    Raises
+    ------
+    InputError
+        See `read_data_sheet`.
+    """
+    known = (*TEXTS, DENSITY, *QUANTITIES)
+    values: dict[str, float] = {}
+    sources: dict[str, str] = {}
+    try:
+        for key, given in content.items():
+            if key not in known:
+                raise UnknownNameError("key", key, known)
+            if key not in TEXTS:
+                values[key], sources[key] = _quantity(key, given)
+        texts = {key: str(content[key]) for key in TEXTS if content.get(key) is not None}
+        if DENSITY in values:
+            if "velocity_random_walk" in values:
+                raise InputError(
+                    f"{DENSITY} and velocity_random_walk both say how large the white noise is; "
+                    "give one of them"
+                )
+            values["velocity_random_walk"] = values.pop(DENSITY) / math.sqrt(2)
+            sources["velocity_random_walk"] = sources.pop(DENSITY)
+        told: dict[str, Any] = {"name": Path(source).stem, **texts, **values}
+        return DataSheet(**told, sources=sources)
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from None
+
+
+def _quantity(key: str, given: Any) -> tuple[float, str]:
+    """Value and source of a quantity, in SI."""
+    unit = QUANTITIES["velocity_random_walk" if key == DENSITY else key][0]
+    text, where = given, ""
+    if isinstance(given, Mapping):
+        if extra := set(given) - {"value", "source"}:
+            raise UnknownNameError(f"key of {key}", min(map(str, extra)), ("value", "source"))
+        if "value" not in given:
+            raise InputError(f"{key}: value: missing")
+        text, where = given["value"], str(given.get("source") or "")
+    if not isinstance(text, str | int | float) or isinstance(text, bool):
+        raise InputError(f"{key}: must be a number with its unit, not {shown(text)}")
+    try:
+        size = parse_quantity(str(text), unit)
+    except InputError as error:
+        raise InputError(f"{key}: {error}") from None
+    if size < 0 or (size == 0 and key in (DENSITY, "velocity_random_walk", "position_sigma")):
+        raise InputError(f"{key}: must be more than 0, not {shown(text)}")
+    return size, where
+
+
+def _folder() -> Any:
+    return files("accelstudy.data_sheets")
+
+
+@cache
+def _shipped(name: str) -> DataSheet:
+    return read_data_sheet(str(_folder() / f"{name}.yaml"))

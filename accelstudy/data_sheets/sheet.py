@@ -1,0 +1,147 @@
+"""A sensor's data sheet as numbers, and what follows from it for a hold and for the time after."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from accelstudy.errors import InputError
+from accelstudy.units import STANDARD_GRAVITY
+
+FLICKER = math.sqrt(2 * math.log(2) / math.pi)
+"""Floor of the Allan deviation in parts of the bias instability B, 0.664 (IEEE Std 952)."""
+
+QUANTITIES: dict[str, tuple[str, str]] = {
+    "velocity_random_walk": ("m/s^2/sqrt(Hz)", "white noise: the mean of τ s has the sd N/√τ"),
+    "bias_instability": ("m/s^2", "floor of the Allan deviation, divided by 0.664"),
+    "acceleration_random_walk": ("m/s^2/sqrt(s)", "random walk of the bias"),
+    "position_sigma": ("m/s^2", "sd of the mean of a hold, where no more is known of the noise"),
+    "repeatability": ("m/s^2", "change of the bias from one switching-on to the next, sd"),
+    "bias_per_kelvin": ("m/s^2/K", "temperature coefficient of the bias"),
+    "scale_per_kelvin": ("1/K", "temperature coefficient of the scale"),
+    "bias": ("m/s^2", "bias before calibration"),
+    "scale": ("1", "scale error before calibration"),
+    "nonorthogonality": ("rad", "deviation of the angles between the axes from a right angle"),
+    "alignment": ("rad", "rotation of the axes against the housing"),
+    "nonlinearity": ("1", "largest deviation from a straight line, in parts of the full scale"),
+    "full_scale": ("m/s^2", "the sensor measures ± this"),
+}
+"""Quantities of a data sheet: SI unit and meaning."""
+
+
+@dataclass(frozen=True)
+class DataSheet:
+    """What is known of a sensor before it is calibrated; None where nothing is known.
+
+    Quantities are in SI, those of `QUANTITIES`. White noise follows the Allan deviation: a
+    one-sided noise density, as data sheets have it, is √2 times `velocity_random_walk`.
+
+    Attributes
+    ----------
+    name, title, source : str
+    sources : mapping of quantity to where its value comes from
+    """
+
+    name: str
+    title: str = ""
+    source: str = ""
+    velocity_random_walk: float | None = None
+    bias_instability: float | None = None
+    acceleration_random_walk: float | None = None
+    position_sigma: float | None = None
+    repeatability: float | None = None
+    bias_per_kelvin: float | None = None
+    scale_per_kelvin: float | None = None
+    bias: float | None = None
+    scale: float | None = None
+    nonorthogonality: float | None = None
+    alignment: float | None = None
+    nonlinearity: float | None = None
+    full_scale: float | None = None
+    sources: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.velocity_random_walk is None and self.position_sigma is None:
+            raise InputError(
+                "the noise is missing: give velocity_random_walk, noise_density or position_sigma"
+            )
+        if self.velocity_random_walk is not None and self.position_sigma is not None:
+            raise InputError(
+                "velocity_random_walk (or noise_density) and position_sigma both say how large "
+                "the noise is; give one of them"
+            )
+        if self.nonlinearity is not None and self.full_scale is None:
+            raise InputError("full_scale: missing; nonlinearity is in parts of it")
+
+    @property
+    def known(self) -> tuple[str, ...]:
+        """Quantities that have a value."""
+        return tuple(name for name in QUANTITIES if getattr(self, name) is not None)
+
+    @property
+    def unknown(self) -> tuple[str, ...]:
+        """Quantities without a value, of which none stands in for another."""
+        noise = ("velocity_random_walk", "position_sigma")
+        return tuple(n for n in QUANTITIES if n not in self.known and n not in noise)
+
+    def sigma_mean(self, seconds: float, session: float | None = None) -> float:
+        """Standard deviation of the mean of a hold, m/s².
+
+        By itself it is the Allan deviation, √(N²/τ + (0.664 B)² + K² τ/3). Holds of one session
+        scatter more about their common mean, since the bias wanders while the session lasts: by
+        the bias functions B1 = n ln n / (2 (n − 1) ln 2) for flicker noise and n/2 for a random
+        walk, with the n = session/τ means that follow one another (NIST SP 1065, section 5.2.4).
+
+        Parameters
+        ----------
+        seconds : float, s, of the hold
+        session : float, s, from the first hold to the end of the last, optional
+        """
+        if self.position_sigma is not None:
+            return self.position_sigma
+        flicker = walk = 1.0
+        if session is not None and session > 2 * seconds:
+            n = session / seconds
+            flicker, walk = n * math.log(n) / (2 * (n - 1) * math.log(2)), n / 2
+        white = (self.velocity_random_walk or 0.0) ** 2 / seconds
+        floor = (FLICKER * (self.bias_instability or 0.0)) ** 2
+        rising = (self.acceleration_random_walk or 0.0) ** 2 * seconds / 3
+        return math.sqrt(white + flicker * floor + walk * rising)
+
+    def bias_change(self, seconds: float, kelvin: float = 0.0, restarted: bool = False) -> float:
+        """Standard deviation of the bias's change since the calibration, m/s².
+
+        It is √(2 (0.664 B)² + K² t + (b_T ΔT)² + repeatability²); what is not known counts as
+        zero, and `unknown` tells what that is.
+
+        Parameters
+        ----------
+        seconds : float, s, since the calibration; 0 for none
+        kelvin : float, K, by which the temperature differs from that of the calibration
+        restarted : bool, whether the sensor was switched off in the meantime
+        """
+        floor = math.sqrt(2) * FLICKER * (self.bias_instability or 0.0) if seconds > 0 else 0.0
+        walk = (self.acceleration_random_walk or 0.0) * math.sqrt(seconds)
+        warm = (self.bias_per_kelvin or 0.0) * kelvin
+        again = (self.repeatability or 0.0) if restarted else 0.0
+        return math.hypot(floor, walk, warm, again)
+
+    @property
+    def quadratic_scale(self) -> float | None:
+        """Size of k2 if the whole nonlinearity is quadratic; a parabola leaves a line by half."""
+        if self.nonlinearity is None or self.full_scale is None:
+            return None
+        return 2 * self.nonlinearity * STANDARD_GRAVITY / self.full_scale
+
+    @property
+    def cubic_scale(self) -> float | None:
+        """Size of k3 if the whole nonlinearity is cubic; a cubic leaves a line by a quarter."""
+        if self.nonlinearity is None or self.full_scale is None:
+            return None
+        return 4 * self.nonlinearity * (STANDARD_GRAVITY / self.full_scale) ** 2
+
+
+def of_sigma(sigma: float) -> DataSheet:
+    """Sensor of which only the noise of a position's mean is known, m/s²."""
+    return DataSheet("sigma", "a sensor of which only the noise is known", position_sigma=sigma)
