@@ -24,7 +24,7 @@ export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: help env test test-cluster test-faults smoke reproduce anew unlock report campaigns diagnose-example hidden-effects hidden-docs lint lock clean
+.PHONY: help env test test-cluster test-faults smoke reproduce anew unlock report campaigns diagnose-example plan-example hidden-effects hidden-docs lint lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-18s%s\n", $$1, $$2 }' Makefile
@@ -66,6 +66,9 @@ diagnose-example: $(READY) ## simulate a campaign with a hidden effect, find it,
 	snakemake --cores $(CORES) --snakefile workflow/diagnose.smk --configfile config/diagnose-example.yaml
 	snakemake --cores $(CORES) --configfile config/config.yaml results/diagnose-example/diagnosis/model.yaml
 
+plan-example: $(READY) ## plan calibrations for a tilt accuracy: schemes, positions, minutes
+	snakemake --cores $(CORES) --snakefile workflow/plan.smk --configfile config/plan-example.yaml
+
 hidden-effects: $(READY) ## study how well the diagnosis finds what is hidden
 	snakemake --cores $(CORES) --snakefile workflow/hidden.smk --configfile $(HIDDEN)
 
@@ -85,6 +88,7 @@ lint: $(READY) ## check style, types and the workflow
 	snakemake --lint --snakefile workflow/campaigns.smk --configfile config/campaigns.yaml
 	snakemake --lint --snakefile workflow/diagnose.smk --configfile config/diagnose-example.yaml
 	snakemake --lint --snakefile workflow/hidden.smk --configfile config/hidden-effects.yaml
+	snakemake --lint --snakefile workflow/plan.smk --configfile config/plan-example.yaml
 
 lock: $(READY) ## lock the newest versions that pyproject.toml allows
 	uv lock --upgrade --default-index https://pypi.org/simple

@@ -12,7 +12,8 @@ from accelstudy.errors import InputError
 # Files that a stage does not use, so that an edit of them does not run it again. What is not named
 # counts: a new file runs everything again rather than nothing.
 _MEASURED = ("campaign/", "diagnosis/", "gross_errors/", "hidden/", "adjustment/quality/")
-_COMMANDS = ("cli.py", "catalogue.py", "study/earlier.py")
+_PLANNING = ("data_sheets/", "plan/", "sequential/", "pole/")
+_COMMANDS = ("cli.py", "catalogue.py", "study/earlier.py", *_PLANNING)
 _FRONT = (
     *_COMMANDS,
     "figures/",
@@ -62,6 +63,7 @@ _UNUSED = {
     ),
     "hidden": (*_NOT_HIDDEN, "figures/", "hidden/baselines.py", *_SCORED),
     "baselines": (*_NOT_HIDDEN, "figures/", *_DECIDED, *_SCORED),
+    "planning": ("cli.py", "catalogue.py", "study/earlier.py", "hidden/", "campaign/"),
     "score": (*_NOT_HIDDEN, "hidden/baselines.py", *_DECIDED),
 }
 

@@ -1,0 +1,61 @@
+"""The configuration of `workflow/plan.smk`: a section for each part, checked where that part is."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from typing import Annotated, Any, TypeVar
+
+from pydantic import BaseModel, Field, ValidationError
+
+from accelstudy.errors import InputError
+from accelstudy.study.config.errors import first_error
+from accelstudy.study.config.schema import Block
+from accelstudy.study.config.types import PathName, Seed
+
+Section = TypeVar("Section", bound=BaseModel)
+
+
+class Example(Block):
+    """All parts of a run; results go to ``results/<study>``."""
+
+    study: PathName = Field(description="name; results go to results/<study>/")
+    seed: Annotated[Seed, Field(description="of all random numbers")] = 1
+    plan: dict[str, Any] = Field(default_factory=dict, description="the cheapest calibration")
+    designs: dict[str, Any] = Field(default_factory=dict, description="optimal schemes")
+    sequential: dict[str, Any] = Field(default_factory=dict, description="one position at a time")
+    pole: dict[str, Any] = Field(default_factory=dict, description="tilt of a pole")
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """What tables say of where they come from."""
+        text = json.dumps(self.model_dump(mode="json"), sort_keys=True)
+        return {
+            "config_hash": hashlib.sha256(text.encode()).hexdigest()[:16],
+            "seed": self.seed,
+        }
+
+
+def parse_example(content: Mapping[str, Any], source: str = "config") -> Example:
+    """Check the configuration but for its sections.
+
+    Raises
+    ------
+    InputError
+        One line that names the source, the key, what is wrong and what would be right.
+    """
+    try:
+        return Example.model_validate(content)
+    except ValidationError as error:
+        raise InputError(f"{source}: {first_error(error, Example)}") from None
+
+
+def parse_section(
+    example: Example, name: str, block: type[Section], source: str = "config"
+) -> Section:
+    """Check one section by the class of its part; errors are as in `parse_example`."""
+    try:
+        return block.model_validate(getattr(example, name))
+    except ValidationError as error:
+        raise InputError(f"{source}: {name}.{first_error(error, block)}") from None

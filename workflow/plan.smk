@@ -1,0 +1,22 @@
+# What to measure, with what and how long, for a tilt accuracy that is asked for:
+# snakemake --cores 2 --snakefile workflow/plan.smk --configfile config/plan-example.yaml
+from snakemake.utils import min_version
+
+from accelstudy.study.job import quote_python
+
+min_version("9.10")
+quote_python()
+
+
+# The environment of the Makefile is what counts; this is for executors that want a container.
+container: "docker://python:3.13-slim"
+
+
+include: "rules/sections.smk"
+include: "rules/plan.smk"
+
+
+rule plan_example:
+    default_target: True
+    input:
+        PLAN_OUTPUTS,

@@ -1,0 +1,29 @@
+from snakemake.exceptions import WorkflowError
+
+from accelstudy.errors import InputError
+from accelstudy.plan.example import parse_example, parse_section
+from accelstudy.study.config import read_layer
+from accelstudy.study.provenance import check_writable, code_hash
+
+SOURCE = ", ".join(map(str, workflow.configfiles)) or "config"
+
+try:
+    if not config:
+        raise InputError("nothing to plan; name it with --configfile config/plan-example.yaml")
+    for path in workflow.configfiles:
+        read_layer(path)  # more strictly than Snakemake does
+    EXAMPLE = parse_example(config, SOURCE)
+    RESULTS = f"results/{EXAMPLE.study}"
+    check_writable(RESULTS)
+except InputError as error:
+    raise WorkflowError(str(error)) from None
+
+PROVENANCE = EXAMPLE.provenance
+
+
+def section(name, block):
+    """A section of the configuration, checked by the class of its part."""
+    try:
+        return parse_section(EXAMPLE, name, block, SOURCE)
+    except InputError as error:
+        raise WorkflowError(str(error)) from None
