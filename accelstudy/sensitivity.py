@@ -6,7 +6,7 @@ sensor model (figures 5 and 6 of Thalmann & Neuner 2018).
 
 The total effect of an input is the share of the output's variance that would remain if all others
 were known. The inputs are sampled independently, as classic indices assume; the parameters of a
-calibration are correlated, so for correlated ones the shares are an approximation.
+calibration are correlated, which `accelstudy.leveling_shares` takes into account.
 """
 
 from __future__ import annotations
@@ -93,6 +93,34 @@ def total_effects(
     return total, ci95, outputs.std(axis=0)
 
 
+def leveled(
+    attitude: Array, model: SensorModel | None, g: float = STANDARD_GRAVITY
+) -> Callable[[Array], Array]:
+    """Return the function of which leveling is the evaluation near an attitude.
+
+    Parameters
+    ----------
+    attitude : (2,) array, rad
+    model : SensorModel, or None if the output is the force itself
+    g : float, m/s²
+
+    Returns
+    -------
+    callable
+        Takes (N, 3 + u), the sensor's output and the parameters of the model; returns roll and
+        pitch less those of the attitude, (N, 2), rad, within half a turn.
+    """
+
+    def offset(inputs: Array) -> Array:
+        force = inputs[:, :3]
+        if model is not None:
+            force = model.correct(force[:, None, :], inputs[:, 3:], g)[:, 0]
+        angles = np.stack(roll_pitch(tuple(force.T)), axis=-1) - attitude
+        return (angles + np.pi) % (2 * np.pi) - np.pi
+
+    return offset
+
+
 def leveling_sensitivity(
     roll_gon: Sequence[float],
     pitch_gon: Sequence[float],
@@ -136,16 +164,14 @@ def leveling_sensitivity(
         f_s = np.array(specific_force(attitude[0], attitude[1], g))
         if model is not None:
             f_s = model.sense(f_s[None], x, g)[0]
-
-        def leveled(inputs: Array, attitude: Array = attitude) -> Array:
-            force = inputs[:, :3]
-            if model is not None:
-                force = model.correct(force[:, None, :], inputs[:, 3:], g)[:, 0]
-            angles = np.stack(roll_pitch(tuple(force.T)), axis=-1) - attitude
-            return (angles + np.pi) % (2 * np.pi) - np.pi
-
         total, ci95, sd = total_effects(
-            leveled, names, np.concatenate([f_s, x]), sigma, base_samples, resamples, seed
+            leveled(attitude, model, g),
+            names,
+            np.concatenate([f_s, x]),
+            sigma,
+            base_samples,
+            resamples,
+            seed,
         )
         for k, output in enumerate(OUTPUTS):
             columns: dict[str, Any] = {

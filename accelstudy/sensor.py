@@ -144,10 +144,30 @@ class SensorModel:
         hold: Hold | None = None,
     ) -> NDArray[np.float64]:
         """Derivative of `correct` with respect to the parameters, (..., n, 3, u)."""
+        return self._corrected_by(self.trace.body_jacobian, f_s, parameters, g, hold)
+
+    def output_jacobian(
+        self,
+        f_s: ArrayLike,
+        parameters: ArrayLike,
+        g: ArrayLike = STANDARD_GRAVITY,
+        hold: Hold | None = None,
+    ) -> NDArray[np.float64]:
+        """Derivative of `correct` with respect to the sensor's output, (..., n, 3, 3)."""
+        return self._corrected_by(self.trace.output_jacobian, f_s, parameters, g, hold)
+
+    def _corrected_by(
+        self,
+        derivatives: TracedFunction,
+        f_s: ArrayLike,
+        parameters: ArrayLike,
+        g: ArrayLike,
+        hold: Hold | None,
+    ) -> NDArray[np.float64]:
         f_a = np.moveaxis(self.sensitive_force(f_s, parameters, g, hold), -1, 0)
         x = np.moveaxis(np.asarray(parameters, dtype=float), -1, 0)
         jacobian = self.trace.evaluate(
-            self.trace.body_jacobian, f_a, f_a, x, self.settings, np.asarray(g, dtype=float), hold
+            derivatives, f_a, f_a, x, self.settings, np.asarray(g, dtype=float), hold
         )
         return np.moveaxis(jacobian, (0, 1), (-2, -1))
 
@@ -345,6 +365,11 @@ class SensorTrace:
     def body_jacobian(self) -> TracedFunction:
         """∂f_b/∂x for the parameters of the model, generated."""
         return TracedFunction(self.arguments, self.body_by(self.p))
+
+    @cached_property
+    def output_jacobian(self) -> TracedFunction:
+        """∂f_b/∂f_s, generated."""
+        return TracedFunction(self.arguments, self.body_by_output)
 
     @cached_property
     def newton_step(self) -> TracedFunction:

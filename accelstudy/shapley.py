@@ -1,0 +1,174 @@
+"""Shapley effects: how the variance of an output is shared out to inputs that are correlated.
+
+An input that is correlated with others has no variance of its own that could be its share. Owen
+(2014) lets all inputs divide the variance as players of a game divide their gain (Shapley 1953).
+The value of a set of inputs is the variance that it explains, v(u) = Var E(Y | X_u), and an input
+gets what it adds to v on average over all orders in which the inputs could become known. So the
+shares are not negative and sum to 1, whatever the correlations; of independent inputs of a linear
+function they are the classic Sobol indices.
+
+A linear function of normal inputs has them in closed form, since v(u) = g_uᵀ Σ_uu⁻¹ g_u with
+g = Cov(X, Y) (Owen & Prieur 2017; Iooss & Prieur 2019). Inputs that are independent of the others
+then are games of their own (Broto, Bachoc & Depecker 2019), so that what counts is not the number
+of all inputs but that of the largest group of correlated ones. A function that is not linear is
+sampled in random orders (Song, Nelson & Staum 2016).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from math import factorial
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse.csgraph import connected_components
+from scipy.special import ndtri
+
+Array = NDArray[np.float64]
+
+CHUNK = 1024
+"""Sets of inputs, or random orders, that are worked on at once."""
+SINGULAR = 1e-12
+"""Share of the largest eigenvalue of a correlation matrix below which one is zero."""
+
+
+def linear_shapley(slope: ArrayLike, covariance: ArrayLike) -> tuple[Array, Array]:
+    """Shapley effects of normal inputs on linear outputs, exactly.
+
+    The effort doubles with each input of the largest group of correlated ones.
+
+    Parameters
+    ----------
+    slope : (k, d) array, derivatives of k outputs by d inputs
+    covariance : (d, d) array, of the inputs
+
+    Returns
+    -------
+    shares : (k, d) array, each row sums to 1; NaN where an output has no variance
+    variance : (k,) array, of the outputs
+    """
+    slope, covariance = np.atleast_2d(np.asarray(slope, float)), np.asarray(covariance, float)
+    gained = np.zeros_like(slope)
+    for group in _groups(covariance):
+        own = covariance[np.ix_(group, group)]
+        gained[:, group] = _divided(own, slope[:, group] @ own)
+    variance = np.einsum("ki,ij,kj->k", slope, covariance, slope)
+    shares = gained / np.where(variance > 0, variance, np.nan)[:, None]
+    return shares, variance
+
+
+def _groups(covariance: Array) -> list[NDArray[np.int64]]:
+    """Indices of the groups of correlated inputs; inputs without variance are in none."""
+    varied = np.flatnonzero(np.diagonal(covariance) > 0)
+    n, label = connected_components(covariance[np.ix_(varied, varied)] != 0, directed=False)
+    return [varied[label == i] for i in range(n)]
+
+
+def _divided(covariance: Array, with_output: Array) -> Array:
+    """What each of p inputs gets of the variance, (k, p), of its covariances with k outputs."""
+    p = len(covariance)
+    # Correlations, so that units do not matter to how well the inverses can be computed.
+    sd = np.sqrt(np.diagonal(covariance))
+    correlation, g = covariance / np.outer(sd, sd), (with_output / sd).T
+    gained = np.zeros_like(g)
+    for size, members in _sets(p):
+        inside = np.zeros((len(members), p))
+        np.put_along_axis(inside, members, 1.0, axis=1)
+        own = g[members]
+        block = correlation[members[:, :, None], members[:, None, :]]
+        explained = np.linalg.pinv(block, rcond=SINGULAR, hermitian=True) @ own
+        value = np.einsum("spk,spk->sk", own, explained)
+        joins = factorial(size - 1) * factorial(p - size) / factorial(p)
+        misses = factorial(size) * factorial(p - size - 1) / factorial(p) if size < p else 0.0
+        gained += (inside * joins - (1 - inside) * misses).T @ value
+    return gained.T
+
+
+def _sets(p: int) -> Iterator[tuple[int, NDArray[np.int64]]]:
+    """All sets of p inputs but the empty one: their size, and their members by chunks."""
+    for start in range(1, 2**p, CHUNK):
+        numbers = np.arange(start, min(start + CHUNK, 2**p))
+        inside = (numbers[:, None] >> np.arange(p)) & 1
+        sizes = inside.sum(axis=1)
+        for size in np.unique(sizes):
+            _, members = np.nonzero(inside[sizes == size])
+            yield int(size), members.reshape(-1, size)
+
+
+def sampled_shapley(
+    function: Callable[[Array], Array],
+    mean: ArrayLike,
+    covariance: ArrayLike,
+    slope: ArrayLike,
+    orders: int,
+    rng: np.random.Generator,
+) -> tuple[Array, Array, Array]:
+    """Shapley effects of normal inputs on the outputs of any function, by Monte Carlo.
+
+    In each random order the inputs become known one after another, and what is not known yet is
+    drawn again: half the mean square of what the output then changes by is the variance that is
+    left. The Cholesky factor of the inputs in that order does it, as their first j depend on the
+    first j of its normal numbers only. The same numbers through the linear function, of which the
+    shares are known exactly, take out what the two have in common.
+
+    Parameters
+    ----------
+    function : takes (N, d), returns (N, k)
+    mean, covariance : (d,) and (d, d) arrays, of the inputs
+    slope : (k, d) array, derivatives of the function at the mean; zeros if it has none
+    orders : int, random orders
+    rng : Generator
+
+    Returns
+    -------
+    shares : (k, d) array, each row sums to 1; NaN where an output has no variance
+    ci95 : (k, d) array, half width of the 95 % confidence interval
+    variance : (k,) array, of the outputs
+    """
+    mean, covariance = np.asarray(mean, float), np.asarray(covariance, float)
+    slope = np.atleast_2d(np.asarray(slope, float))
+    values, vectors = np.linalg.eigh(covariance)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    sizes = [min(CHUNK, orders - start) for start in range(0, orders, CHUNK)]
+    chunks = [_gains(function, mean, root, slope, size, rng) for size in sizes]
+    gained, linear = (np.concatenate(parts) for parts in zip(*chunks, strict=True))
+
+    shares, variance = linear_shapley(slope, covariance)
+    expected = np.where(variance > 0, shares.T * variance, 0.0)
+    scatter = linear - linear.mean(axis=0)
+    own = np.sum(scatter**2, axis=(0, 1))
+    common = np.sum(scatter * gained, axis=(0, 1)) / np.where(own > 0, own, 1.0)
+    gained = gained - common * (linear - expected)
+    variance = gained.sum(axis=1).mean(axis=0)
+    shares = gained.mean(axis=0) / np.where(variance > 0, variance, np.nan)
+    apart = gained - shares * gained.sum(axis=1, keepdims=True)
+    ci95 = ndtri(0.975) * apart.std(axis=0, ddof=1) / np.sqrt(orders) / variance
+    return shares.T, ci95.T, variance
+
+
+def _gains(
+    function: Callable[[Array], Array],
+    mean: Array,
+    root: Array,
+    slope: Array,
+    orders: int,
+    rng: np.random.Generator,
+) -> tuple[Array, Array]:
+    """Variance that each input adds in each order, (orders, d, k): of the function, and linear."""
+    d = len(mean)
+    order = rng.permuted(np.tile(np.arange(d), (orders, 1)), axis=1)
+    known, drawn = rng.standard_normal((2, orders, 1, d))
+    factor = np.linalg.qr(np.swapaxes(root[order], 1, 2), mode="r")
+    is_known = np.arange(d) < np.arange(d + 1)[:, None]
+    in_order = np.where(is_known, known, drawn) @ factor
+    inputs = np.empty_like(in_order)
+    np.put_along_axis(inputs, order[:, None, :], in_order, axis=2)
+
+    def gains(outputs: Array) -> Array:
+        left = (outputs - outputs[:, -1:]) ** 2 / 2
+        result = np.empty((orders, d, outputs.shape[2]))
+        np.put_along_axis(result, order[:, :, None], left[:, :-1] - left[:, 1:], axis=1)
+        return result
+
+    outputs = function((mean + inputs).reshape(-1, d)).reshape(orders, d + 1, -1)
+    return gains(outputs), gains(inputs @ slope.T)
