@@ -109,7 +109,7 @@ def leveling_shares(
         shares[i], ci95[i], variance[i] = sampled_shapley(
             function, mean, whole, slopes[i], ORDERS, rng
         )
-        total[i], _, _ = total_effects(function, names, mean, sigma, base_samples, 2, seed)
+        total[i], _, _ = total_effects(function, mean, sigma, base_samples, 2, seed)
 
     defined = variance > NEGLIGIBLE_VARIANCE
     for values in (shares, ci95, total):

@@ -12,12 +12,14 @@ calibration are correlated, which `accelstudy.leveling_shares` takes into accoun
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from itertools import product
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
+from scipy import special
 
 from accelstudy.leveling import roll_pitch, specific_force
 from accelstudy.sensor import SensorModel
@@ -28,13 +30,14 @@ Array = NDArray[np.float64]
 FORCES = ("f_x", "f_y", "f_z")
 OUTPUTS = ("roll", "pitch")
 
+Z95 = float(special.ndtri(0.975))
+
 NEGLIGIBLE_VARIANCE = 1e-24
 """Variance in rad² below which an output does not vary: rounding, not an effect."""
 
 
 def total_effects(
     function: Callable[[Array], Array],
-    names: Sequence[str],
     mean: ArrayLike,
     sigma: ArrayLike,
     base_samples: int,
@@ -45,8 +48,7 @@ def total_effects(
 
     Parameters
     ----------
-    function : takes (N, d), returns (N, k)
-    names : names of the d inputs
+    function : takes (N, d), d inputs, and returns (N, k)
     mean, sigma : (d,) arrays; inputs with sigma 0 have total effect 0
     base_samples : int, a power of two
     resamples : int, bootstrap resamples of the confidence interval
@@ -58,39 +60,64 @@ def total_effects(
     ci95 : (k, d) array, half width of its 95 % confidence interval
     sd : (k,) array, standard deviation of the outputs
     """
-    # Slow to import, and figures need only the names of this module.
-    from SALib.analyze import sobol as sobol_analyze
-    from SALib.sample import sobol as sobol_sample
-
     mean, sigma = np.asarray(mean, dtype=float), np.asarray(sigma, dtype=float)
     varied = np.flatnonzero(sigma > 0)
-    problem = {
-        "num_vars": len(varied),
-        "names": [names[int(i)] for i in varied],
-        "bounds": [[0.0, 1.0]] * len(varied),
-        "dists": ["norm"] * len(varied),
-    }
-    seed += 1  # to SALib, the seed 0 is none
-    normal = sobol_sample.sample(problem, base_samples, calc_second_order=False, seed=seed)
+    normal = _standard_normal(len(varied), base_samples, seed + 1)
     inputs = np.tile(mean, (len(normal), 1))
     inputs[:, varied] += sigma[varied] * normal
     outputs = function(inputs)
 
     total = np.full((outputs.shape[1], len(mean)), np.nan)
     ci95 = np.full_like(total, np.nan)
+    resampled = np.random.default_rng(seed + 1).integers(
+        base_samples, size=(base_samples, resamples)
+    )
     for k, values in enumerate(outputs.T):
         if values.var() <= NEGLIGIBLE_VARIANCE:
             continue
-        result = sobol_analyze.analyze(
-            problem,
-            (values - values.mean()) / values.std(),
-            calc_second_order=False,
-            num_resamples=resamples,
-            seed=seed,
-        )
         total[k] = ci95[k] = 0.0
-        total[k, varied], ci95[k, varied] = result["ST"], result["ST_conf"]
+        total[k, varied], ci95[k, varied] = _total_effects(
+            (values - values.mean()) / values.std(), resampled
+        )
     return total, ci95, outputs.std(axis=0)
+
+
+@lru_cache(maxsize=1)  # the same at every attitude
+def _standard_normal(d: int, base_samples: int, seed: int) -> Array:
+    """Saltelli's samples of d standard normal inputs, (base_samples (d + 2), d)."""
+    # Slow to import, and figures need only the names of this module.
+    from SALib.sample import sobol
+
+    problem = {
+        "num_vars": d,
+        "names": [str(i) for i in range(d)],
+        "bounds": [[0.0, 1.0]] * d,
+        "dists": ["norm"] * d,
+    }
+    samples = sobol.sample(problem, base_samples, calc_second_order=False, seed=seed)
+    samples.flags.writeable = False
+    return samples
+
+
+def _total_effects(values: Array, resampled: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Total effects by Jansen's estimator, with the half widths of their 95 % intervals.
+
+    What SALib's `sobol.analyze` gives, in a thirtieth of its time: it makes first-order effects
+    too, and resamples the outputs anew for each input.
+
+    Parameters
+    ----------
+    values : (N (d + 2),) array, the output at each of `_standard_normal`, of mean 0 and sd 1
+    resampled : (N, b) array, which base samples each bootstrap resample has
+    """
+    values = (values - values.mean()) / values.std()  # once more, as SALib does: the last bits
+    base, *mixed, other = values.reshape(len(resampled), -1).T
+    variance = np.var(np.concatenate([base, other]))
+    variances = np.var(np.concatenate([base[resampled], other[resampled]]), axis=0)
+    squares = [(base - each) ** 2 for each in mixed]
+    total = [0.5 * each.mean() / variance for each in squares]
+    sd = [(0.5 * each[resampled].mean(axis=0) / variances).std(ddof=1) for each in squares]
+    return np.array(total), Z95 * np.array(sd)
 
 
 def leveled(
@@ -166,7 +193,6 @@ def leveling_sensitivity(
             f_s = model.sense(f_s[None], x, g)[0]
         total, ci95, sd = total_effects(
             leveled(attitude, model, g),
-            names,
             np.concatenate([f_s, x]),
             sigma,
             base_samples,

@@ -22,7 +22,7 @@ SECONDS_TO_KEEP, SECONDS_TO_SUM = 9e-6, 4e-6
 """To write a calibration and to summarise it, or only that; to this comes the adjustment, per
 position and parameter, by gravity and with the robot, and by compiled code:"""
 SECONDS_BY_GRAVITY, SECONDS_WITH_ROBOT, SECONDS_COMPILED = 0.11e-6, 0.26e-6, 0.03e-6
-SECONDS_PER_RESAMPLED_VALUE = 0.18e-6
+SECONDS_PER_RESAMPLED_VALUE = 0.01e-6
 """Sensitivity: per base sample, input, bootstrap resample and attitude."""
 SECONDS_PER_JOB = 3.0
 """To start Python, twice for each batch of cells, and once for each of the rest of the jobs."""
