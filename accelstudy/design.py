@@ -93,7 +93,7 @@ def diagnose(
     ideal = np.zeros(model.n_parameters)
     names = (*model.parameter_names, "g") if noise.sigma_gravity > 0 else model.parameter_names
     a = _design(scheme, model, approach, noise, ideal, gravity, hold)
-    rank, condition, free = _rank(a)
+    rank, condition, free = rank_of(a)
     not_estimable = tuple(name for name, is_free in zip(names, free, strict=True) if is_free)
     reason = ""
     cofactors = np.full((len(names), len(names)), np.nan)
@@ -144,10 +144,10 @@ def _is_blind(model: SensorModel, approach: Approach, noise: Noise, gravity: flo
     scheme = get_scheme("fibonacci-60")
     hold = EVERYTHING_VARIES.hold(scheme.n_positions)
     a = _design(scheme, model, approach, noise, ideal, gravity, hold)
-    return _rank(a)[0] < a.shape[1]
+    return rank_of(a)[0] < a.shape[1]
 
 
-def _rank(a: Array) -> tuple[int, float, NDArray[np.bool_]]:
+def rank_of(a: Array) -> tuple[int, float, NDArray[np.bool_]]:
     """Rank, condition and which columns lie in the null space of a design."""
     if not np.isfinite(a).all():
         return 0, np.inf, np.ones(a.shape[1], dtype=bool)

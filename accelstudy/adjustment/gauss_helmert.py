@@ -260,11 +260,8 @@ class _Step:
 
 def _step(at: Linearisation, v: Array, q: Array, weights: Array, prior_misclosure: Array) -> _Step:
     """Solve the linearised problem; `prior_misclosure` is observed minus present parameters."""
-    b = at.jac_observations
-    bq = _times(b, q)
-    whitening, a_white = _whiten(at, bq)
-    w_white = cholesky.forward(whitening, at.psi - np.einsum("corn,orn->crn", b, v))
-    normal, right = _normal_equations(a_white, w_white)
+    white = whitened(at, v, q)
+    normal, right = _normal_equations(white.design, white.misclosures)
     diagonal = np.einsum("uur->ur", normal)
     diagonal += weights[:, None]
     right += weights[:, None] * prior_misclosure
@@ -274,17 +271,52 @@ def _step(at: Linearisation, v: Array, q: Array, weights: Array, prior_misclosur
     half = cholesky.forward(lower, right / scale)
     dx = cholesky.backward(lower, half) / scale
 
-    misclosure = w_white + np.einsum("curn,ur->crn", a_white, dx)
-    v_new = np.einsum("crn,corn->orn", -cholesky.backward(whitening, misclosure), bq)
+    misclosure, v_new = white.solved(dx)
     omega = np.einsum("crn,crn->r", misclosure, misclosure)
     omega += (weights[:, None] * (prior_misclosure - dx) ** 2).sum(axis=0)
 
     # The three that must vanish: the step in x and in v, and ψ at the adjusted observations.
     size_x = np.sqrt((half**2).sum(axis=0))
     size_v = (np.abs(v_new - v) / _sigma(q)[:, None]).max(axis=(0, 2))
-    size_psi = np.abs(cholesky.forward(whitening, at.psi)).max(axis=(0, 2))
+    size_psi = np.abs(cholesky.forward(white.factor, at.psi)).max(axis=(0, 2))
     size = np.maximum(np.maximum(size_x, size_v), size_psi)
     return _Step(dx, v_new, omega, size, lower, scale)
+
+
+@dataclass(frozen=True)
+class Whitened:
+    """Linearised conditions scaled to unit weight: A dx + w = −B v has covariance I.
+
+    Attributes
+    ----------
+    factor : (c, c, R, n) array, L with B Q Bᵀ = L Lᵀ
+    design : (c, u, R, n) array, L⁻¹ A
+    misclosures : (c, R, n) array, L⁻¹ (ψ(l + v) − B v)
+    bq : (c, o, R, n) array, B Q
+    """
+
+    factor: Array
+    design: Array
+    misclosures: Array
+    bq: Array
+
+    def solved(self, dx: Array) -> tuple[Array, Array]:
+        """What a step (u, R) leaves: errors of unit weight (c, R, n) and residuals v (o, R, n)."""
+        errors = self.misclosures + np.einsum("curn,ur->crn", self.design, dx)
+        v = np.einsum("crn,corn->orn", -cholesky.backward(self.factor, errors), self.bq)
+        return errors, v
+
+
+def whitened(at: Linearisation, v: Array, q: Array) -> Whitened:
+    """Scale conditions linearised at l + v to unit weight.
+
+    v : (o, R, n); q : (o, n) variances or (o, o, n) matrices
+    """
+    b = at.jac_observations
+    bq = _times(b, q)
+    factor, design = _whiten(at, bq)
+    w = cholesky.forward(factor, at.psi - np.einsum("corn,orn->crn", b, v))
+    return Whitened(factor, design, w, bq)
 
 
 def whitened_design(at: Linearisation, q: Array) -> Array:

@@ -1,0 +1,296 @@
+"""A recursive Gauss–Helmert adjustment that takes one position at a time.
+
+A new position costs an update of a triangle, whatever the number of positions so far. That is exact
+where the conditions are linear. Where the estimate moves, the positions before it are linearised at
+the wrong place. What that costs is known from the last time that all were linearised anew: a
+movement of so many standard deviations left an error of so many. As soon as the error is more than
+a tolerance, all are linearised anew. By default the tolerance is so small that the result is that
+of the adjustment of all positions together. A tolerance that is coarser, but still nothing beside a
+standard deviation, leaves most positions without any pass over the others.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.adjustment import Observations
+from accelstudy.adjustment.calibration import CalibrationProblem
+from accelstudy.adjustment.gauss_helmert import MAX_ITERATIONS, ROUNDING, Whitened, whitened
+from accelstudy.approaches import Approach
+from accelstudy.design import rank_of
+from accelstudy.sensor import SensorModel
+from accelstudy.sequential.linearised import (
+    no_conditions,
+    of_sessions,
+    put,
+    rows,
+    seen_from,
+    with_next,
+)
+from accelstudy.sequential.prediction import Prediction
+from accelstudy.sequential.prior import NOTHING_KNOWN, Prior
+from accelstudy.sequential.triangle import (
+    absorb,
+    inverse_root,
+    length,
+    no_information,
+    omega,
+    solution,
+)
+
+Array = NDArray[np.float64]
+
+EXACT = 1e-10
+"""Standard deviations that the solution may be off by; that of all positions is not nearer."""
+
+
+class Recursion:
+    """R sessions of one set-up, calibrated position after position.
+
+    Parameters
+    ----------
+    model : SensorModel
+    approach : Approach
+    observed : Observations
+        The sessions as far as they go; they may have no positions yet.
+    prior : Prior, optional
+        What is known before the first position.
+    initial : (u,) array, SI, optional
+        Where to linearise as long as there is no solution; the mean of the prior by default.
+    tolerance : float
+        Standard deviations by which the estimate may be off the solution of all positions
+        together.
+
+    Attributes
+    ----------
+    n_positions : int, that were taken
+    solved : (R,) bool array, whether there is a solution
+    passes : (R,) int array, how often all positions were linearised anew for the last one
+
+    Raises
+    ------
+    InputError
+        As `accelstudy.adjustment.calibrate`, where something is missing.
+    """
+
+    def __init__(
+        self,
+        model: SensorModel,
+        approach: Approach,
+        observed: Observations,
+        prior: Prior = NOTHING_KNOWN,
+        initial: Array | None = None,
+        tolerance: float = EXACT,
+    ) -> None:
+        self.model, self.approach, self.tolerance = model, approach, tolerance
+        self.n_positions = 0
+        problem = CalibrationProblem.of(model, approach, observed.take(np.arange(0)))
+        sessions, u = problem.initial.shape
+        own, known = prior.rows_of(model), prior.start(model)
+        # Gravity that is observed is known beforehand as well.
+        seen = np.flatnonzero(problem.weights)
+        self._before = np.zeros((len(own) + len(seen), u))
+        self._before[: len(own), : model.n_parameters] = own
+        self._before[len(own) :, seen] = np.diag(np.sqrt(problem.weights[seen]))
+        self._mean, self._start = problem.initial.copy(), problem.initial.copy()
+        self._mean[:, : model.n_parameters] = known
+        self._start[:, : model.n_parameters] = known if initial is None else initial
+
+        self.solved = np.zeros(sessions, dtype=bool)
+        self.passes = np.zeros(sessions, dtype=int)
+        self._x, self._at = self._start.copy(), self._start.copy()
+        self._white = no_conditions(approach.n_conditions, u, problem.observations.shape)
+        self._latent = np.zeros((3, sessions, 0))
+        self._triangles = absorb(no_information(sessions, u), self._known(np.arange(sessions)))
+        self._n_rows = len(self._before)
+        self._bent, self._rate = np.zeros(sessions), np.ones(sessions)
+        self._solve_first(problem)
+        self.add(observed)
+
+    def add(self, observed: Observations) -> None:
+        """Take what is new in sessions, one position after the other.
+
+        Parameters
+        ----------
+        observed : Observations
+            The sessions as far as they go, with the positions that were taken before.
+        """
+        for n in range(self.n_positions + 1, observed.forces.shape[1] + 1):
+            self._take(observed.take(np.arange(n)))
+
+    def predict(self, observed: Observations) -> Prediction:
+        """Predict the misclosures of the position after those that were taken.
+
+        Parameters
+        ----------
+        observed : Observations
+            The sessions with one position more than were taken; all of them are solved.
+        """
+        new, _ = self._newest(observed)
+        design = np.moveaxis(new.design[..., 0], -1, 0)
+        spread = design @ inverse_root(self._triangles)
+        covariance = np.eye(design.shape[1]) + spread @ np.swapaxes(spread, 1, 2)
+        return Prediction(np.moveaxis(new.misclosures[..., 0], -1, 0), covariance)
+
+    @property
+    def parameters(self) -> Array:
+        """Estimates, (R, u'), SI; NaN where there is no solution."""
+        return np.where(self.solved[:, None], self._x, np.nan)
+
+    @property
+    def root_information(self) -> Array:
+        """R of the parameters, (R, u', u'), with Q_xx⁻¹ = RᵀR; also where there is no solution."""
+        return self._triangles[:, :-1, :-1]
+
+    @property
+    def cofactors(self) -> Array:
+        """Q_xx, (R, u', u'); NaN where there is no solution."""
+        u = self._x.shape[1]
+        result = np.full((len(self._x), u, u), np.nan)
+        root = inverse_root(self._triangles[self.solved])
+        result[self.solved] = root @ np.swapaxes(root, 1, 2)
+        return result
+
+    @property
+    def omega(self) -> Array:
+        """Ω, (R,); NaN where there is no solution."""
+        return np.where(self.solved, omega(self._triangles), np.nan)
+
+    @property
+    def redundancy(self) -> int:
+        """Conditions, with what is known beforehand, less unknowns; negative at first."""
+        return self._n_rows - self._x.shape[1]
+
+    @property
+    def residuals(self) -> Array:
+        """Residuals v of all positions, (R, n, o); NaN where there is no solution."""
+        v = self._white.solved((self._x - self._at).T)[1]
+        return np.where(self.solved[:, None, None], np.moveaxis(v, 0, -1), np.nan)
+
+    def _known(self, chosen: NDArray[np.int_]) -> Array:
+        """Rows of what is known beforehand, at the place of linearisation, (R, m, u' + 1)."""
+        right = (self._mean - self._at)[chosen] @ self._before.T
+        left = np.broadcast_to(self._before, (len(right), *self._before.shape))
+        return np.concatenate([left, right[..., None]], axis=-1)
+
+    def _take(self, observed: Observations) -> None:
+        """Take the last position of sessions."""
+        problem = CalibrationProblem.of(self.model, self.approach, observed)
+        new, f_a = self._newest(observed)
+        # It is linearised at the estimate, the others where that was before it moved.
+        new = seen_from(new, (self._at - self._x).T)
+        self._white = with_next(self._white, new)
+        self._latent = np.concatenate([self._latent, f_a], axis=-1)
+        self._triangles = absorb(self._triangles, rows(new))
+        self._n_rows += len(new.misclosures)
+        self.n_positions += 1
+        self.passes[:] = 0
+
+        known = np.flatnonzero(self.solved)
+        self._x[known] = self._at[known] + solution(self._triangles[known])
+        errors = new.solved((self._x - self._at).T)[0]
+        self._bent += np.sum(errors**2, axis=(0, 2))
+        self._solve_first(problem)
+        way = length(self._triangles[known], (self._x - self._at)[known])
+        self._relinearise(problem, known, np.hypot(way, np.sqrt(self._bent[known])))
+
+    def _newest(self, observed: Observations) -> tuple[Whitened, Array]:
+        """Linearise the position after those taken, at the estimate and its raw observations."""
+        last = observed.take(np.array([self.n_positions]))
+        problem = CalibrationProblem.of(self.model, self.approach, last)
+        raw = np.moveaxis(problem.observations, -1, 0)
+        f_a = self._sensitive(problem, np.arange(len(self._x)))
+        at = problem.conditions.linearise(self._x.T, raw, f_a)
+        f_a = f_a if at.latent is None else at.latent
+        return whitened(at, np.zeros_like(raw), problem.cofactors.T), f_a
+
+    def _sensitive(self, problem: CalibrationProblem, chosen: NDArray[np.int_]) -> Array:
+        """f_a of sessions at their estimates, (3, R, n)."""
+        u, x = self.model.n_parameters, self._x[chosen]
+        g = x[:, -1] if x.shape[1] > u else problem.conditions.gravity
+        hold = problem.conditions.hold
+        f_a = self.model.sensitive_force(problem.observed[0][chosen], x[:, :u], g, hold)
+        return np.moveaxis(f_a, -1, 0)
+
+    def _solve_first(self, problem: CalibrationProblem) -> None:
+        """Solve the sessions in which all parameters are determined now for the first time."""
+        u = self._x.shape[1]
+        if self._n_rows < u:
+            return
+        waiting = np.flatnonzero(~self.solved)
+        chosen = waiting[[rank_of(self._triangles[i, :u, :u])[0] == u for i in waiting]]
+        self._x[chosen] += solution(self._triangles[chosen])
+        self.solved[chosen] = True
+        self._rate[chosen] = 1.0
+        self._relinearise(problem, chosen, np.full(len(chosen), np.inf))
+
+    def _relinearise(
+        self, problem: CalibrationProblem, chosen: NDArray[np.int_], moved: Array
+    ) -> None:
+        """Linearise all positions of sessions anew, if and as often as that matters.
+
+        moved : (len(chosen),) array, how far the estimate is from where it was linearised, in
+            standard deviations
+        """
+        if not self.n_positions:
+            return
+        with np.errstate(invalid="ignore"):
+            due = ~(self._rate[chosen] * moved <= self.tolerance)
+        active, moved = chosen[due], moved[due]
+        observations, q = np.moveaxis(problem.observations, -1, 0), problem.cofactors.T
+        sigma = _sigma(problem)
+        largest = np.abs(observations / sigma[:, None]).max(axis=(0, 2))
+        least = np.maximum(self.tolerance, ROUNDING * np.finfo(float).eps * largest)
+        first = True
+        for _ in range(MAX_ITERATIONS):
+            if not len(active):
+                return
+            x, before = self._x[active], of_sessions(self._white, active)
+            v = before.solved((x - self._at[active]).T)[1]
+            with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+                at = problem.conditions.linearise(
+                    x.T, observations[:, active] + v, self._latent[:, active]
+                )
+                white = whitened(at, v, q)
+                self._at[active] = x
+                put(self._white, active, white)
+                known = absorb(no_information(*x.shape), self._known(active))
+                self._triangles[active] = absorb(known, rows(white))
+                step = solution(self._triangles[active])
+                change = (white.solved(step.T)[1] - v) / sigma[:, None]
+                size = np.linalg.norm(change, axis=(0, 2))
+                size = np.maximum(size, length(self._triangles[active], step))
+                rate = np.where(np.isfinite(moved) & (moved > 0), size / moved, 1.0)
+                done = np.maximum(rate, 0.1) * size <= least[active]
+            self._x[active] = x + step
+            if at.latent is not None:
+                self._latent[:, active] = at.latent
+            if first:  # what a movement by a new position leaves wrong
+                self._rate[active], first = rate, False
+            self._bent[active] = 0.0
+            self.passes[active] += 1
+            self._give_up(problem, active[~np.isfinite(size)])
+            going_on = ~done & np.isfinite(size)
+            active, moved = active[going_on], size[going_on]
+        self._give_up(problem, active)
+
+    def _give_up(self, problem: CalibrationProblem, failed: NDArray[np.int_]) -> None:
+        """Go back to the start where no solution was found; a further position may bring one."""
+        if not len(failed):
+            return
+        self.solved[failed] = False
+        self._x[failed] = self._at[failed] = self._start[failed]
+        self._latent[:, failed] = self._sensitive(problem, failed)
+        raw = np.moveaxis(problem.observations[failed], -1, 0)
+        at = problem.conditions.linearise(self._x[failed].T, raw, self._latent[:, failed])
+        white = whitened(at, np.zeros_like(raw), problem.cofactors.T)
+        put(self._white, failed, white)
+        nothing = no_information(len(failed), self._x.shape[1])
+        self._triangles[failed] = absorb(absorb(nothing, self._known(failed)), rows(white))
+
+
+def _sigma(problem: CalibrationProblem) -> Array:
+    """Standard deviations (o, n) of the observations; infinite where one is held fixed."""
+    q = problem.cofactors.T
+    return np.sqrt(np.where(q > 0, q, np.inf))
