@@ -8,26 +8,19 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.optimize import check_grad, least_squares, minimize
+from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from accelstudy.schemes import (
     Scheme,
     UnknownSchemeError,
     get_scheme,
-    optimal_directions,
     register,
     registry,
     scheme_families,
     scheme_names,
 )
 from accelstudy.schemes.mclaren import mclaren_orbit
-from accelstudy.schemes.optimal import (
-    LEVELING_WEIGHT,
-    _on_sphere,
-    design_criterion,
-    gravity_design,
-)
 from accelstudy.schemes.polyhedra import generic
 
 SHARED = Path(os.environ.get("ACCELSTUDY_SHARED", Path(__file__).parents[2] / "shared"))
@@ -50,6 +43,12 @@ def angles(directions):
 def condition(design):
     """Condition number of a design with columns scaled to unit length."""
     return np.linalg.cond(design / np.linalg.norm(design, axis=0))
+
+
+def gravity_design(u):
+    """Design of the nine parameters under the gravity norm, in units of g."""
+    x, y, z = u.T
+    return np.column_stack([u, u**2, x * y, x * z, y * z])
 
 
 def sphere_moment(*powers):
@@ -349,89 +348,6 @@ def test_random_positions_are_faces_and_free_in_turn():
     np.testing.assert_allclose(
         directions[1::2].T @ directions[1::2] / 600, np.eye(3) / 3, atol=0.05
     )
-
-
-# Optimal designs
-
-
-def test_d_optimal_beats_random_designs():
-    best = design_criterion(get_scheme("d-optimal-9").directions)
-    rng = np.random.default_rng(1)
-    for points in rng.standard_normal((5000, 9, 3)):
-        assert design_criterion(scheme(points).directions) > best
-
-
-def test_d_optimal_cannot_be_improved():
-    stored = get_scheme("d-optimal-9").directions
-    best = design_criterion(stored)
-    assert design_criterion(optimal_directions(9, starts=20)) == pytest.approx(best, abs=1e-6)
-    rng = np.random.default_rng(2)
-
-    def criterion(points):
-        return design_criterion(scheme(points.reshape(9, 3)).directions)
-
-    for size in (0, 1e-3, 1e-1):
-        moved = stored + size * rng.standard_normal((9, 3))
-        assert minimize(criterion, moved.ravel()).fun > best - 1e-9
-
-
-def test_d_criterion_is_that_of_the_design_and_knows_no_orientation():
-    directions = get_scheme("d-optimal-9").directions
-    design = gravity_design(directions)
-    log_determinant = np.linalg.slogdet(design)[1]
-    assert design_criterion(directions) == pytest.approx(-2 * log_determinant)
-    for euler_xyz in np.random.default_rng(3).uniform(-3, 3, (5, 3)):
-        turned = scheme(directions).rotated(euler_xyz).directions
-        assert design_criterion(turned) == pytest.approx(-2 * log_determinant)
-
-
-def test_spherical_4_designs_reach_the_d_bound():
-    """With the sphere's moments the information of n positions cannot be larger."""
-    per_position = -design_criterion(get_scheme("icosahedron-12").directions) - 9 * np.log(12)
-    for name in ("mclaren-24", "dodecahedron-20", "icosidodecahedron-30", "d-optimal-16"):
-        directions = get_scheme(name).directions
-        information = -design_criterion(directions) - 9 * np.log(len(directions))
-        assert information == pytest.approx(per_position, abs=1e-5)
-    for name in ("faces-edges-18", "rings-24", "xsens-38", "i-optimal-24"):
-        directions = get_scheme(name).directions
-        assert -design_criterion(directions) - 9 * np.log(len(directions)) < per_position - 0.05
-
-
-def test_leveling_weight_is_the_mean_error_across_gravity():
-    """The error is of degree 4 in u squared, so the 7-design integrates it exactly."""
-    rng = np.random.default_rng(4)
-    parameters = rng.standard_normal(9)
-    bias, scale, (xy, xz, yz) = parameters[:3], parameters[3:6], parameters[6:]
-    matrix = np.array([[scale[0], xy, xz], [0, scale[1], yz], [0, 0, scale[2]]])
-    u = mclaren_orbit()
-    error = bias + u @ matrix.T
-    across = error - np.sum(error * u, axis=1, keepdims=True) * u
-    mean_square = np.mean(np.sum(across**2, axis=1))
-    assert parameters @ LEVELING_WEIGHT @ parameters == pytest.approx(mean_square)
-
-
-@pytest.mark.parametrize("criterion", ["D", "I"])
-def test_gradient(criterion):
-    points = np.random.default_rng(5).standard_normal(36)
-    error = check_grad(
-        lambda x: _on_sphere(x, criterion)[0], lambda x: _on_sphere(x, criterion)[1], points
-    )
-    assert error < 1e-5
-
-
-def test_i_optimal_levels_best():
-    best = design_criterion(get_scheme("i-optimal-24").directions, "I")
-    for name in ("mclaren-24", "fibonacci-24", "rings-24", "rhombicuboctahedron-24"):
-        assert design_criterion(get_scheme(name).directions, "I") > best + 0.02
-
-
-def test_optimal_directions_are_deterministic():
-    np.testing.assert_array_equal(optimal_directions(10, "I"), optimal_directions(10, "I"))
-
-
-def test_fewer_positions_than_parameters_have_no_optimum():
-    with pytest.raises(ValueError, match="at least 9 positions, not 8"):
-        get_scheme("d-optimal-8")
 
 
 # The Xsens log

@@ -4,7 +4,6 @@ To add one, write a module next to this file with a function under `register`.
 """
 
 from accelstudy.registry import import_modules
-from accelstudy.schemes.optimal import optimal_directions
 from accelstudy.schemes.registry import (
     Scheme,
     Status,
@@ -20,7 +19,6 @@ __all__ = [
     "Status",
     "UnknownSchemeError",
     "get_scheme",
-    "optimal_directions",
     "register",
     "scheme_families",
     "scheme_names",

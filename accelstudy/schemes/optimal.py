@@ -1,24 +1,10 @@
 """Positions that minimise the variances of the nine parameters, or of leveling with them."""
 
-from typing import Literal
-
 import numpy as np
 
-from accelstudy.errors import InputError
-from accelstudy.schemes.fibonacci import fibonacci
 from accelstudy.schemes.registry import Array, register
 
-Criterion = Literal["D", "I"]
-
-# Mean squared error of the leveled direction over the sphere, as a quadratic form in the errors
-# of bias / g, scale and the triangular non-orthogonality: the part of b + E u across u, where a
-# common scale error does not count.
-LEVELING_WEIGHT = np.zeros((9, 9))
-LEVELING_WEIGHT[:3, :3] = np.eye(3) * 2 / 3
-LEVELING_WEIGHT[3:6, 3:6] = np.eye(3) / 5 - np.ones((3, 3)) / 15
-LEVELING_WEIGHT[6:, 6:] = np.eye(3) * 4 / 15
-
-_PAIRS = np.array([[0, 1], [0, 2], [1, 2]])
+MODEL = "bias-scale-nonorthogonality"
 
 
 @register(
@@ -42,112 +28,31 @@ def d_optimal_9() -> Array:
     return np.vstack([triangle, [x, 0, 0] - r * triangle, [-x, 0, 0] - r * triangle])
 
 
-@register("d-optimal-N", title="D-optimal", status="generated", source="optimal_directions")
+@register("d-optimal-N", title="D-optimal", status="generated", source="accelstudy.optimal")
 def d_optimal(n: int) -> Array:
-    """The n positions of the largest determinant."""
-    return optimal_directions(n, "D")
+    """The n positions of the largest determinant for a calibration by the norm of gravity.
+
+    From 16 positions on they are many, all as good as the sphere.
+    """
+    return _optimal(n, "D")
 
 
-@register("i-optimal-N", title="I-optimal", status="generated", source="optimal_directions")
+@register("i-optimal-N", title="I-optimal", status="generated", source="accelstudy.optimal")
 def i_optimal(n: int) -> Array:
-    """The n positions of the best leveling."""
-    return optimal_directions(n, "I")
+    """The n positions after which roll and pitch are best, for tilts up to 50 gon.
 
-
-def optimal_directions(n: int, criterion: Criterion = "D", starts: int = 8) -> Array:
-    """Optimal positions for a calibration by the norm of gravity.
-
-    Parameters
-    ----------
-    n : int
-        Number of positions, at least 9.
-    criterion : {"D", "I"}
-        What to minimise, see `design_criterion`.
-    starts : int
-        Number of starting values: the Fibonacci lattice and `starts` - 1 random sets.
-
-    Returns
-    -------
-    ndarray, shape (n, 3)
-        Unit vectors. From 16 positions on D-optimal sets are many, all as good as the sphere.
-
-    Raises
-    ------
-    InputError
-        If n is less than the number of parameters.
+    They are for a calibration by the norm of gravity; `accelstudy design` makes others.
     """
-    from scipy.optimize import minimize  # slow to import, and only optimal schemes need it
-
-    if n < 9:
-        raise InputError(f"9 parameters need at least 9 positions, not {n}")
-    rng = np.random.default_rng(np.random.SeedSequence(n))
-    best, smallest = np.empty((n, 3)), np.inf
-    for start in range(starts):
-        first = rng.standard_normal((n, 3)) if start else fibonacci(n)
-        found = minimize(_on_sphere, first.ravel(), (criterion,), "L-BFGS-B", jac=True)
-        # Where optima tie, rounding must not choose between them.
-        if found.fun < smallest - 1e-6 * (1 + abs(found.fun)):
-            best, smallest = found.x.reshape(n, 3), found.fun
-    return best / np.linalg.norm(best, axis=1, keepdims=True)
+    return _optimal(n, "I")
 
 
-def gravity_design(directions: Array) -> Array:
-    """Design matrix of the nine-parameter model under the gravity norm, in units of g.
+def _optimal(n: int, criterion: str) -> Array:
+    # Only these schemes need models and their adjustment, which need schemes themselves.
+    from accelstudy.approaches import get_approach
+    from accelstudy.models import get_model
+    from accelstudy.optimal.criteria import get_criterion
+    from accelstudy.optimal.search import optimal_design
+    from accelstudy.optimal.task import Task
 
-    Parameters
-    ----------
-    directions : ndarray, shape (n, 3)
-        Unit vectors u; their sign is that of the bias only.
-
-    Returns
-    -------
-    ndarray, shape (n, 9)
-        u_i of the biases, u_i² of the scale errors, u_i u_j of the non-orthogonalities.
-    """
-    i, j = _PAIRS.T
-    return np.hstack([directions, directions**2, directions[:, i] * directions[:, j]])
-
-
-def design_criterion(directions: Array, criterion: Criterion = "D") -> float:
-    """What an optimal design minimises.
-
-    Parameters
-    ----------
-    directions : ndarray, shape (n, 3)
-        Unit vectors, a design of full rank.
-    criterion : {"D", "I"}
-        D: the log-determinant of the cofactor matrix of the nine parameters. I: the log of the
-        mean cofactor of a leveled direction, over all attitudes.
-
-    Returns
-    -------
-    float
-    """
-    return _value_and_gradient(directions, criterion)[0]
-
-
-def _value_and_gradient(directions: Array, criterion: Criterion) -> tuple[float, Array]:
-    design = gravity_design(directions)
-    cofactor = np.linalg.inv(design.T @ design)
-    if criterion == "D":
-        value = float(np.linalg.slogdet(cofactor)[1])
-        by_design = -2 * design @ cofactor
-    else:
-        trace = np.sum(LEVELING_WEIGHT * cofactor)
-        value = float(np.log(trace))
-        by_design = -2 * design @ cofactor @ LEVELING_WEIGHT @ cofactor / trace
-    gradient = by_design[:, :3] + 2 * directions * by_design[:, 3:6]
-    for column, (i, j) in enumerate(_PAIRS, start=6):
-        gradient[:, i] += by_design[:, column] * directions[:, j]
-        gradient[:, j] += by_design[:, column] * directions[:, i]
-    return value, gradient
-
-
-def _on_sphere(coordinates: Array, criterion: Criterion) -> tuple[float, Array]:
-    """Value and gradient in coordinates that are free because their length does not count."""
-    points = coordinates.reshape(-1, 3)
-    length = np.linalg.norm(points, axis=1, keepdims=True)
-    directions = points / length
-    value, gradient = _value_and_gradient(directions, criterion)
-    radial = np.sum(gradient * directions, axis=1, keepdims=True)
-    return value, ((gradient - radial * directions) / length).ravel()
+    task = Task(get_model(MODEL), get_approach("gravity"))
+    return optimal_design(task, get_criterion(criterion, task), n, bounded=False).directions

@@ -1,0 +1,139 @@
+"""The search for the best positions: exchange and refinement from several starts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.errors import InputError
+from accelstudy.optimal.constraints import Constraints
+from accelstudy.optimal.continuous import allowed, continuous_optimum
+from accelstudy.optimal.criteria import Criterion
+from accelstudy.optimal.exchange import Candidates, exchange
+from accelstudy.optimal.refinement import refine
+from accelstudy.optimal.spaces import Space, Sphere
+from accelstudy.optimal.task import Task
+
+Array = NDArray[np.float64]
+
+CANDIDATES = 600
+STARTS = 8
+TIED = 1e-6
+"""Relative difference below which two designs are equally good, and the first one is taken."""
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """Positions that were found.
+
+    Attributes
+    ----------
+    directions : (n, 3) array of unit vectors, gravity in the body frame
+    value : float, of the criterion
+    bound : float, below which no positions are; NaN where the criterion has none
+    efficiency : float, against the bound; NaN likewise
+    """
+
+    directions: Array
+    value: float
+    bound: float
+    efficiency: float
+
+
+def optimal_design(
+    task: Task,
+    criterion: Criterion,
+    n: int,
+    space: Space | None = None,
+    constraints: Constraints | None = None,
+    seed: int = 1,
+    starts: int = STARTS,
+    bounded: bool = True,
+) -> Design:
+    """Find the n positions that are best by a criterion.
+
+    The same arguments give the same positions.
+
+    Parameters
+    ----------
+    task : Task
+    criterion : Criterion
+    n : int
+    space : Space, optional; all attitudes by default
+    constraints : Constraints, optional
+    seed : int
+    starts : int, random sets to begin with, of each part of the space
+    bounded : bool, whether the bound, and with it the efficiency, is wanted
+
+    Raises
+    ------
+    InputError
+        If no attitude is allowed, the allowed ones do not determine the model, or are too few.
+    """
+    space, constraints = space or Sphere(), constraints or Constraints()
+    everything = allowed(space, constraints, CANDIDATES)
+    if not len(everything):
+        raise InputError(f"no attitude is left of {space.text} with {_shown(constraints)}")
+    _check_determined(task, criterion, everything, n)
+    parts = space.parts(np.random.default_rng(np.random.SeedSequence([seed, 0])))
+    # Many parts share out the starts; the best few of them then have all of theirs.
+    found = [
+        _best(task, criterion, part, constraints, n, seed, 1 if len(parts) > 1 else starts)
+        for part in parts
+    ]
+    if len(parts) > 1:
+        order = np.argsort([value for _, value in found], kind="stable")[:3]
+        found = [_best(task, criterion, parts[i], constraints, n, seed, starts) for i in order]
+    directions, value = _first_best(found)
+    bound = efficiency = np.nan
+    if bounded and criterion.convex:
+        bound = continuous_optimum(task, criterion, space, constraints, n).bound
+        efficiency = min(1.0, criterion.efficiency(value, bound))
+    return Design(directions, value, bound, efficiency)
+
+
+def _best(
+    task: Task,
+    criterion: Criterion,
+    space: Space,
+    constraints: Constraints,
+    n: int,
+    seed: int,
+    starts: int,
+) -> tuple[Array, float]:
+    directions = allowed(space, constraints, CANDIDATES)
+    if not len(directions):
+        return np.zeros((n, 3)), np.inf
+    informations = task.informations(directions)
+    candidates = Candidates(directions, informations, task.prior, constraints)
+    found = []
+    for start in range(1, starts + 1):
+        rng = np.random.default_rng(np.random.SeedSequence([seed, start]))
+        chosen = exchange(candidates, candidates.random(n, rng), criterion)
+        refined = refine(task, criterion, space, constraints, directions[chosen])
+        found.append((refined, float(criterion.value(task.normal(refined)))))
+    return _first_best(found)
+
+
+def _first_best(found: list[tuple[Array, float]]) -> tuple[Array, float]:
+    """Where designs tie, rounding must not choose between them."""
+    smallest = min(value for _, value in found)
+    return next(pair for pair in found if pair[1] <= smallest + TIED)
+
+
+def _check_determined(task: Task, criterion: Criterion, directions: Array, n: int) -> None:
+    if reason := task.missing(directions):
+        raise InputError(f"the allowed attitudes do not determine the model: {reason}")
+    unknowns = int(np.count_nonzero(task.estimated)) - np.linalg.matrix_rank(task.prior)
+    least = -(-unknowns // task.approach.n_conditions)
+    if n < least:
+        raise InputError(
+            f"{n} positions do not determine {int(np.count_nonzero(task.estimated))} parameters; "
+            f"at least {least} are needed"
+        )
+
+
+def _shown(constraints: Constraints) -> str:
+    return ", ".join(constraints.texts) or "no constraints"
