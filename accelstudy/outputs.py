@@ -153,10 +153,15 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 def cannot_write(error: OSError, out: Path) -> str:
     """Say that `out` cannot be written and why, with the place that is meant if it is another."""
     where = Path(str(error.filename)) if error.filename is not None else out
-    inside = where.is_relative_to(out) or any(p.startswith(_PREFIX) for p in where.parts)
+    inside = where.is_relative_to(out) or is_temporary(where)
     place = "" if inside else f"{where}: "
     reason = str(error.strerror or error).rpartition("] ")[2]  # Arrow puts more before it
     return f"{out}: cannot be written: {place}{reason}"
+
+
+def is_temporary(path: Path) -> bool:
+    """Whether a file belongs to a run that has not finished it."""
+    return any(part.startswith(_PREFIX) for part in path.parts)
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 import hashlib
 import os
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
@@ -39,7 +40,8 @@ def data(url, content=CONTENT):
 
 
 class Server(BaseHTTPRequestHandler):
-    """Serves CONTENT; the path says how badly: /plain without ranges, /broken only half of it."""
+    """Serves CONTENT; the path says how badly: /plain without ranges, /broken only half of
+    it, /slow half of it, and to the first who asks the rest when it is told to."""
 
     def do_GET(self):
         wanted = self.headers.get("Range")
@@ -58,7 +60,13 @@ class Server(BaseHTTPRequestHandler):
         length = "many" if self.path.startswith("/odd") else str(len(body))
         self.send_header("Content-Length", length)
         self.end_headers()
-        self.wfile.write(body[: len(body) // 2] if self.path.startswith("/broken") else body)
+        half = len(body) // 2
+        self.wfile.write(body[:half])
+        if len(self.server.ranges) == 1 and self.path.startswith("/slow"):
+            self.server.half_sent.set()
+            self.server.go_on.wait(60)
+        if not self.path.startswith("/broken"):
+            self.wfile.write(body[half:])
 
     def log_message(self, *arguments):
         pass
@@ -69,6 +77,7 @@ def server(monkeypatch):
     monkeypatch.setenv("no_proxy", "127.0.0.1")
     with ThreadingHTTPServer(("127.0.0.1", 0), Server) as running:
         running.ranges = []
+        running.half_sent, running.go_on = threading.Event(), threading.Event()
         running.url = f"http://127.0.0.1:{running.server_port}"
         thread = threading.Thread(target=running.serve_forever, args=(0.01,))
         thread.start()
@@ -198,6 +207,18 @@ def test_a_broken_connection_keeps_what_has_come(tmp_path, server):
     assert server.ranges[:2] == [None, f"bytes={len(CONTENT) // 2}-"]
     assert server.ranges[-1] == f"bytes={len(CONTENT) - 1}-"
     assert fetch(data(f"{server.url}/ranges/file.log"), tmp_path, tmp_path).exists()
+
+
+def test_two_downloads_at_once(tmp_path, server):
+    slow = data(f"{server.url}/slow/file.log")
+    with ThreadPoolExecutor(1) as pool:
+        first = pool.submit(fetch, slow, tmp_path, tmp_path)
+        assert server.half_sent.wait(60)
+        second = fetch(slow, tmp_path, tmp_path)
+        server.go_on.set()
+        assert first.result() == second
+    assert second.read_bytes() == CONTENT
+    assert left(tmp_path) == ["file.log"]
 
 
 @pytest.mark.parametrize("part", [b"", b"wrong", b"too long" * len(CONTENT)])

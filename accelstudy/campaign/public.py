@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import cache
 from http.client import HTTPException
 from pathlib import Path
@@ -17,7 +18,7 @@ from pydantic import Field, ValidationError
 
 from accelstudy.campaign.import_settings import ImportSettings
 from accelstudy.errors import InputError, UnknownNameError
-from accelstudy.outputs import whole_file
+from accelstudy.outputs import is_temporary, whole_file
 from accelstudy.progress import stage
 from accelstudy.study.config.errors import first_error
 from accelstudy.study.config.layers import read_layer
@@ -148,7 +149,8 @@ def fetch(data: PublicData, searched: Path, target: Path) -> Path:
     """Find a file below the folder `searched`, or download it to the folder `target`.
 
     A download that breaks off goes on as long as each try brings something. What is left of it in
-    the end, a `.part` file, is continued by the next call.
+    the end, a `.part` file, is continued by the next call. Two calls at once do not meet: each
+    writes to a file of its own.
 
     Raises
     ------
@@ -157,22 +159,19 @@ def fetch(data: PublicData, searched: Path, target: Path) -> Path:
     """
     try:
         for path in sorted(searched.rglob(data.file_name)):
-            if path.is_file() and _sha256(path) == data.sha256:
+            if path.is_file() and not is_temporary(path) and _sha256(path) == data.sha256:
                 return path
         target.mkdir(parents=True, exist_ok=True)
         path = target / data.file_name
-        part = path.with_name(f"{path.name}.part")
-        if part.is_symlink():  # no download of ours: it would be written to another place
-            part.unlink()
-        _download_with_retries(data.url, part)
-        found = _sha256(part)
-        if found != data.sha256:
-            part.unlink()  # it cannot be continued to something right
-            raise InputError(
-                f"{data.url}: the sha256 is {found}, not {data.sha256}: damaged on the way or "
-                "changed at its source; try again"
-            )
-        return part.replace(path)
+        with whole_file(path) as temporary:
+            _download_after_earlier(data.url, temporary, path.with_name(f"{path.name}.part"))
+            found = _sha256(temporary)
+            if found != data.sha256:
+                raise InputError(
+                    f"{data.url}: the sha256 is {found}, not {data.sha256}: damaged on the way or "
+                    "changed at its source; try again"
+                )
+        return path
     except (OSError, HTTPException) as error:
         reason = getattr(error, "reason", None) or error
         reason = getattr(reason, "strerror", None) or reason
@@ -182,30 +181,44 @@ def fetch(data: PublicData, searched: Path, target: Path) -> Path:
         ) from None
 
 
-def _download_with_retries(url: str, part: Path) -> None:
+def _download_after_earlier(url: str, path: Path, left: Path) -> None:
+    """Go on with what an earlier call has left, which nobody else can take then; leave it again."""
+    if left.is_symlink():  # no download of ours: it would be written to another place
+        left.unlink()
+    with suppress(FileNotFoundError):
+        left.replace(path)
+    try:
+        _download_with_retries(url, path)
+    except BaseException:
+        if path.exists():
+            path.replace(left)
+        raise
+
+
+def _download_with_retries(url: str, path: Path) -> None:
     while True:
-        have = _size(part)
+        have = _size(path)
         try:
-            return _download(url, part, have)
+            return _download(url, path, have)
         except (OSError, HTTPException):
-            if _size(part) <= have:
+            if _size(path) <= have:
                 raise
 
 
-def _download(url: str, part: Path, have: int) -> None:
-    """Download to `part`, after the `have` bytes that it holds already."""
+def _download(url: str, path: Path, have: int) -> None:
+    """Download to `path`, after the `have` bytes that it holds already."""
     request = Request(url, headers={"Range": f"bytes={have}-"} if have else {})
     try:
         with urlopen(request, timeout=TIMEOUT) as response:
             # A server that does not know ranges sends the whole file, with another status.
             resumed = response.headers.get("Content-Range", "").startswith(f"bytes {have}-")
-            with part.open("ab" if resumed else "wb") as file:
+            with path.open("ab" if resumed else "wb") as file:
                 start = file.tell()
                 # Only a server that says how much there is can be held to it.
                 expected = response.headers.get("Content-Length", "").strip()
                 known = expected.isascii() and expected.isdigit()
                 total = int(expected[:18]) if known else None
-                with stage(f"download of {part.stem}", total) as advance:
+                with stage(f"download of {path.name}", total) as advance:
                     while block := response.read(BLOCK):
                         advance(file.write(block))
                 came = file.tell() - start
