@@ -25,6 +25,7 @@ from accelstudy.options import (
     model_option,
     quiet_option,
 )
+from accelstudy.pole.command import pole_command
 from accelstudy.progress import say, stage, track
 from accelstudy.units import ANGLE_UNIT_VARIABLE, angles_in
 
@@ -39,6 +40,7 @@ SECTIONS = {
         "apply",
         "export",
     ),
+    "What a calibration is worth": ("pole",),
     "What there is to choose from": ("models", "effects", "schemes", "scheme"),
     "Studies": ("cells", "claims", "config-schema"),
 }
@@ -293,6 +295,7 @@ for command in (
     public_command,
     simulate_campaign_command,
     diagnose_command,
+    pole_command,
     *COMMANDS,
 ):
     main.add_command(command)

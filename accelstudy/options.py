@@ -93,6 +93,7 @@ GROSS_ERROR = Name("gross_error", "accelstudy.gross_errors", "gross_error_names"
 MODEL = ModelName("model", "accelstudy.models", "MODELS")
 NOISE_EFFECT = Name("noise_effect", "accelstudy.noise_effects", "noise_effect_names")
 SCHEME = Name("scheme", "accelstudy.schemes", "scheme_names")
+SENSOR = Name("sensor", "accelstudy.data_sheets", "data_sheet_names")
 
 model_option = click.option(
     "--model",

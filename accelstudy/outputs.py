@@ -78,7 +78,12 @@ BATCH_JOB = Kind(
     ("calibration.json", "positions.parquet", "report.html"),
     ("figures", "campaign"),
 )
-_KINDS = (BATCH_JOB, DIAGNOSIS, CALIBRATION, CAMPAIGN)
+POLE = Kind(
+    "budget of a pole",
+    "pole.json",
+    ("budget.parquet", "monte-carlo.parquet", "budget.svg", "budget.png"),
+)
+_KINDS = (BATCH_JOB, DIAGNOSIS, CALIBRATION, CAMPAIGN, POLE)
 
 
 @contextmanager

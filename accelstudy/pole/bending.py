@@ -1,0 +1,40 @@
+"""How far the foot of a bent pole lies beside the straight line that the sensor takes for it.
+
+Small deflections of a beam of the same stiffness all along (Euler and Bernoulli). The foot stands
+on its tip, the hand holds against the weight by a force across the pole, and the top is free. Only
+the part of the weight across the pole bends it, which grows with the sine of the tilt.
+"""
+
+from __future__ import annotations
+
+from accelstudy.pole.setup import Setup
+from accelstudy.units import STANDARD_GRAVITY
+
+
+def flexibility(setup: Setup, g: float = STANDARD_GRAVITY) -> float:
+    """Distance of the foot from the straight line through the top, for a pole that lies level, m.
+
+    With the bending moment M(x) = P (L − x) + w (L − x)²/2 − R (h − x) of the weight P of the top,
+    the weight w of a metre and the force R of the hand at h, whose last term counts below the hand
+    only, and the direction of the pole measured at s, the distance is
+
+        (∫₀ᴸ M x dx − L ∫ₛᴸ M dx) / (E I),        R = (P L + w L²/2) / h.
+
+    With h = 0 the pole is a cantilever that is clamped at its foot. The sensor turns with the pole
+    where it sits, so the foot that is computed is this much too far from where the top leans to;
+    a negative distance means the other side.
+
+    Parameters
+    ----------
+    setup : Setup
+    g : float, m/s²
+    """
+    length, hand, sensor = setup.length, setup.hand_at, setup.sensor_at
+    head, metre = setup.head_mass * g, setup.pole_mass * g
+    free = length - sensor
+    moment = head * length + metre * length**2 / 2  # at the foot, were it clamped: R h
+    first = head * length**3 / 6 + metre * length**4 / 24 - moment * hand**2 / 6
+    above = head * free**2 / 2 + metre * free**3 / 6
+    if sensor < hand:
+        above -= moment / hand * (hand - sensor) ** 2 / 2
+    return (first - length * above) / setup.stiffness

@@ -1,0 +1,174 @@
+"""The command that tells what a tilt sensor is worth on a pole."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+from click.core import ParameterSource
+
+from accelstudy.errors import InputError
+from accelstudy.options import (
+    PATH,
+    SCHEME,
+    SENSOR,
+    Quantity,
+    Sectioned,
+    angle_unit_option,
+    approach_option,
+    example,
+    force_option,
+    model_option,
+    quiet_option,
+    seed_option,
+)
+from accelstudy.pole.setup import quantities
+from accelstudy.progress import say, stage, warn
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+_SECTIONS: dict[str, list[str]] = {
+    "The sensor": ["sensor", "calibration", "mounting"],
+    "Its calibration, if there is none yet": ["model", "scheme", "approach", "hold", "robot_sigma"],
+}
+for _name, _given in quantities().items():
+    _SECTIONS.setdefault(_given.section, []).append(_name)
+_SECTIONS["What is worked out"] = ["tilt_range", "replicates", "seed", "out"]
+LINEAR = ("model", "scheme", "approach", "hold", "robot_sigma")
+"""Options of a calibration that is not made yet."""
+
+
+def _setup_options(command: Command) -> Command:
+    """Add an option for each quantity of a pole."""
+    for name, given in reversed(quantities().items()):
+        command = click.option(
+            f"--{name.replace('_', '-')}",
+            type=Quantity(given.unit, given.least, given.most),
+            default=given.usual or None,
+            show_default=bool(given.usual),
+            help=given.help,
+        )(command)
+    return command
+
+
+@click.command(
+    "pole",
+    cls=Sectioned,
+    sections=_SECTIONS,
+    epilog=example(
+        "accelstudy pole --length 2m --sensor adxl355 --scheme mclaren-24 --approach gravity "
+        "--tilt-range 50gon --out pole"
+    ),
+)
+@click.option(
+    "--sensor", type=SENSOR, required=True, help="A data sheet: its name, or a YAML file."
+)
+@click.option("--calibration", type=PATH, help="A calibration.json of the sensor.")
+@click.option(
+    "--mounting",
+    default="frd",
+    show_default=True,
+    help="Where x, y, z of the sensor point on the upright pole: d is down along it, f and r are "
+    "forward and right.",
+)
+@model_option
+@click.option(
+    "--scheme",
+    type=SCHEME,
+    default="mclaren-24",
+    show_default=True,
+    help="Positions; `accelstudy schemes` lists them.",
+)
+@approach_option("gravity")
+@click.option(
+    "--hold",
+    type=Quantity("s", 1e-3, 1e6),
+    default="10s",
+    show_default=True,
+    help="Time at each position.",
+)
+@click.option(
+    "--robot-sigma",
+    type=Quantity("rad", 1e-9, 0.1),
+    default="3.2mgon",
+    show_default=True,
+    help="Sd of the robot's roll and of its pitch.",
+)
+@_setup_options
+@click.option(
+    "--tilt-range",
+    type=Quantity("rad", 1e-3, 1.5),
+    default="50gon",
+    show_default=True,
+    help="Largest tilt.",
+)
+@click.option(
+    "--replicates",
+    default=1000,
+    show_default=True,
+    type=click.IntRange(min=2, max=1_000_000),
+    help="Readings of the Monte Carlo at each of 3 tilts in 16 directions.",
+)
+@seed_option
+@click.option("--out", type=PATH, required=True, help="Folder to write to.")
+@force_option
+@angle_unit_option
+@quiet_option
+def pole_command(
+    sensor: str,
+    calibration: Path | None,
+    mounting: str,
+    model: str,
+    scheme: str,
+    approach: str,
+    hold: float,
+    robot_sigma: float,
+    tilt_range: float,
+    replicates: int,
+    seed: int,
+    out: Path,
+    force: bool,
+    **given: Any,
+) -> None:
+    """Tell how wrong the foot of a tilted pole is, and why.
+
+    A GNSS antenna or a prism sits on top of a pole, which leans while its foot stands on the point.
+    Roll and pitch of the sensor and a heading lead from the top to the foot. Each source of error
+    is told apart over the tilt: the calibration, noise, drift and temperature of the sensor, its
+    mounting, the heading, the bending and the length of the pole, the position of the top. A
+    quantity of 0 leaves its source out.
+    """
+    from accelstudy.data_sheets import get_data_sheet
+    from accelstudy.frames import parse_frame
+    from accelstudy.outputs import POLE, result_folder
+    from accelstudy.pole.output import write_pole
+    from accelstudy.pole.sensor import from_calibration, from_linear_theory
+    from accelstudy.pole.setup import Setup
+    from accelstudy.pole.statement import budget_text
+
+    setup, frame, sheet = Setup(**given), parse_frame(mounting), get_data_sheet(sensor)
+    if calibration is not None:
+        source_of = click.get_current_context().get_parameter_source
+        if typed := [name for name in LINEAR if source_of(name) is ParameterSource.COMMANDLINE]:
+            raise InputError(
+                f"--calibration and --{typed[0].replace('_', '-')} exclude each other: the file "
+                "says how it was calibrated"
+            )
+    inputs = [] if calibration is None else [calibration]
+    with result_folder(out, POLE, inputs, force) as folder, stage("budget of the pole"):
+        calibrated = (
+            from_linear_theory(model, scheme, approach, sheet, hold, robot_sigma, frame)
+            if calibration is None
+            else from_calibration(calibration, sheet, frame)
+        )
+        result = write_pole(setup, calibrated, tilt_range, replicates, seed, folder)
+    for warning in calibrated.warnings:
+        warn(warning)
+    say(f"sensor {sheet.name}; {calibrated.origin}\n")
+    click.echo(budget_text(result.shown))
+    say("")
+    for sentence in result.said:
+        click.echo(sentence)
+    say(f"figure: {out / 'budget.png'}")

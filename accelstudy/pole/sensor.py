@@ -1,0 +1,180 @@
+"""The calibrated sensor on a pole: from a calibration of one's own, or from linear theory."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.approaches import get_approach
+from accelstudy.campaign.applying import read_calibration
+from accelstudy.data_sheets import DataSheet
+from accelstudy.design import diagnose
+from accelstudy.effects import Hold
+from accelstudy.effects.base import REFERENCE_TEMPERATURE
+from accelstudy.effects.lag import Course
+from accelstudy.errors import InputError
+from accelstudy.frames import FRD, Frame
+from accelstudy.hold_plan import check_needs_no_plan
+from accelstudy.leveling import roll_pitch
+from accelstudy.models import compose, get_model
+from accelstudy.schemes import get_scheme
+from accelstudy.sensor import SensorModel
+from accelstudy.simulation import Noise
+from accelstudy.units import MGON, STANDARD_GRAVITY
+from accelstudy.wording import joined
+
+Array = NDArray[np.float64]
+
+ROBOT_SIGMA = 3.2 * MGON
+"""rad, of a robot's roll and of its pitch, as in Thalmann & Neuner (2018)."""
+
+
+@dataclass(frozen=True)
+class CalibratedSensor:
+    """A sensor with what is known of it.
+
+    Attributes
+    ----------
+    model : SensorModel
+    parameters : (u,) array, SI
+    covariance : (u, u) array, SI, of the parameters
+    sheet : DataSheet
+    gravity : float, m/s²
+    mounting : Frame, where its axes point when the pole stands upright
+    temperature : float, °C, of the calibration
+    time : float, s, at which its session ended
+    origin : str, where the calibration comes from, in words
+    warnings : tuple of str
+    """
+
+    model: SensorModel
+    parameters: Array
+    covariance: Array
+    sheet: DataSheet
+    gravity: float = STANDARD_GRAVITY
+    mounting: Frame = FRD
+    temperature: float = REFERENCE_TEMPERATURE
+    time: float = 0.0
+    origin: str = ""
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def knows_temperature(self) -> bool:
+        """Whether the calibration corrects what the temperature does."""
+        return "temperature" in self.model.hold_columns
+
+    def conditions(self, forces: Array, temperature_change: float) -> Hold | None:
+        """What effects depend on beside the force, in attitudes with forces (k, 3), m/s².
+
+        All columns are (k, 1). The sensor has the temperature of the air and does not vibrate, and
+        nothing is left of the position before. Drifts stay as they were when the session ended.
+        """
+        if not self.model.hold_columns:
+            return None
+        roll, pitch = (angle[:, None] for angle in roll_pitch(tuple(forces.T)))
+        zero = np.zeros_like(roll)
+        then, warmth = zero + self.time, zero + self.temperature + temperature_change
+        return Hold(
+            temperature=warmth,
+            time=then,
+            vibration=zero,
+            roll=roll,
+            pitch=pitch,
+            yaw=zero,
+            step_x=zero,
+            step_y=zero,
+            step_z=zero,
+            order=then + 1.0,
+            course=Course(then[0], warmth[0]),
+        )
+
+
+def from_calibration(path: str | Path, sheet: DataSheet, mounting: Frame = FRD) -> CalibratedSensor:
+    """Sensor of a calibration.json.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or does not say how accurate its parameters are.
+    """
+    calibration = read_calibration(path)
+    unknown = [
+        name
+        for name, variance in zip(
+            calibration.model.parameter_names, np.diag(calibration.covariance), strict=True
+        )
+        if not np.isfinite(variance)
+    ]
+    if unknown or not np.isfinite(calibration.covariance).all():
+        raise InputError(
+            f"{path}: covariance: unknown for {joined(unknown) or 'some parameters'}; calibrate a "
+            "campaign with more positions, or give the sigma of the sensor in it"
+        )
+    quality = calibration.content["quality"]
+    doubts = (
+        []
+        if quality["plausible"]
+        else [f"do not use this calibration: {w}" for w in quality["warnings"]]
+    )
+    return CalibratedSensor(
+        calibration.model,
+        calibration.parameters,
+        calibration.covariance,
+        sheet,
+        calibration.gravity,
+        mounting,
+        float(np.mean(calibration.ranges.get("temperature_degC", [REFERENCE_TEMPERATURE]))),
+        calibration.ranges.get("time_s", [0.0])[-1],
+        f"the calibration {path} ({calibration.content['model']})",
+        tuple(doubts),
+    )
+
+
+def from_linear_theory(
+    model: str,
+    scheme: str,
+    approach: str,
+    sheet: DataSheet,
+    seconds: float,
+    robot_sigma: float = ROBOT_SIGMA,
+    mounting: Frame = FRD,
+) -> CalibratedSensor:
+    """Sensor as a calibration would leave it, by linear theory at the ideal sensor.
+
+    Parameters
+    ----------
+    model, scheme, approach : str, names
+    sheet : DataSheet
+    seconds : float, s, at each position
+    robot_sigma : float, rad, of the robot's roll and of its pitch
+    mounting : Frame
+
+    Raises
+    ------
+    InputError
+        If the scheme does not determine the model.
+    """
+    chosen, positions = get_model(model), get_scheme(scheme)
+    check_needs_no_plan(chosen)
+    sigma = sheet.sigma_mean(seconds, positions.n_positions * seconds)
+    noise = Noise(sigma_force=sigma, sigma_angle=robot_sigma)
+    design = diagnose(positions, chosen, get_approach(approach), noise)
+    if not design.estimable:
+        raise InputError(f"scheme {positions.name}, model {chosen.name}: {design.reason}")
+    stays = np.flatnonzero(chosen.stays)
+    own = tuple(effect.spec for effect in chosen.effects if effect.part == "sensor")
+    used = compose(chosen.name, own)
+    return CalibratedSensor(
+        used,
+        np.zeros(used.n_parameters),
+        design.cofactors[np.ix_(stays, stays)],
+        sheet,
+        mounting=mounting,
+        origin=(
+            f"{chosen.name} in {positions.n_positions} positions ({positions.name}), {approach}, "
+            f"{seconds:g} s each, by linear theory"
+        ),
+    )

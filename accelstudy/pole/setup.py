@@ -1,0 +1,143 @@
+"""A pole, how it is used and how well all that belongs to it is known, as numbers.
+
+Commands and configurations take each quantity from here: its unit, its usual value, its bounds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import Field, dataclass, field, fields
+from typing import Any
+
+from accelstudy.errors import InputError, UnknownNameError
+from accelstudy.units import parse_quantity
+
+POLE, USE, ERRORS = "The pole", "Its use", "How well it is known (standard deviations)"
+"""Sections of the quantities."""
+HAND = 0.6
+"""Height of the hand in parts of the length, unless it is given."""
+
+
+@dataclass(frozen=True)
+class Given:
+    """What may be given for a quantity.
+
+    Attributes
+    ----------
+    section : str
+    unit : str, SI
+    usual : str, with its unit; empty if another quantity tells it
+    help : str
+    least, most : float, SI, both allowed
+    """
+
+    section: str
+    unit: str
+    usual: str
+    help: str
+    least: float = 0.0
+    most: float = math.inf
+
+
+def _given(*arguments: Any, **options: Any) -> Any:
+    given = Given(*arguments, **options)
+    usual = parse_quantity(given.usual, given.unit) if given.usual else None
+    return field(default=usual, metadata={"given": given})
+
+
+@dataclass(frozen=True)
+class Setup:
+    """A pole and its use, in SI.
+
+    The pole's own axes are forward, right and down along it, from the top to the foot; heading is
+    that of forward. Lengths along the pole count to the centre of the antenna or prism.
+    """
+
+    length: float = _given(POLE, "m", "2m", "From the foot to the antenna or prism.", 0.1, 30.0)
+    offset_forward: float = _given(
+        POLE, "m", "0", "Antenna or prism before the axis of the pole.", -1.0, 1.0
+    )
+    offset_right: float = _given(
+        POLE, "m", "0", "Antenna or prism to the right of the axis.", -1.0, 1.0
+    )
+    sensor_height: float | None = _given(
+        POLE, "m", "", "Of the sensor above the foot.  [default: the length]"
+    )
+    hand_height: float | None = _given(
+        POLE, "m", "", f"Of the hand that holds the pole.  [default: {HAND:g} of the length]"
+    )
+    head_mass: float = _given(POLE, "kg", "1.1kg", "Of what sits on top.", 0.0, 50.0)
+    pole_mass: float = _given(POLE, "kg/m", "0.6kg/m", "Of a metre of the pole.", 0.0, 50.0)
+    stiffness: float = _given(
+        POLE, "Nm^2", "1500Nm2", "Of the pole against bending, E·I.", 1.0, 1e9
+    )
+
+    averaging: float = _given(USE, "s", "2s", "Time over which a reading is averaged.", 1e-3, 1e6)
+    age: float = _given(
+        USE, "s", "8h", "Time since the calibration, the sensor being switched off.", 0.0, 1e9
+    )
+    temperature_change: float = _given(
+        USE, "K", "10K", "Against the temperature of the calibration.", 0.0, 200.0
+    )
+
+    heading_sigma: float = _given(ERRORS, "rad", "0.3gon", "Of the heading.", 0.0, 0.5)
+    mounting_sigma: float = _given(
+        ERRORS, "rad", "20mgon", "Of the sensor's axes against the pole, each.", 0.0, 0.2
+    )
+    length_sigma: float = _given(ERRORS, "m", "0.5mm", "Of the length.", 0.0, 1.0)
+    top_sigma: float = _given(
+        ERRORS, "m", "8mm", "Of the antenna's or prism's position, horizontal.", 0.0, 10.0
+    )
+    top_sigma_vertical: float = _given(ERRORS, "m", "15mm", "Of its height.", 0.0, 10.0)
+
+    def __post_init__(self) -> None:
+        for name in ("sensor_height", "hand_height"):
+            height = getattr(self, name)
+            if height is not None and height > self.length:
+                raise InputError(
+                    f"{name}: {height:g} m is above the top of the pole; its length is "
+                    f"{self.length:g} m"
+                )
+
+    @property
+    def sensor_at(self) -> float:
+        """Height of the sensor above the foot along the pole, m."""
+        return self.length if self.sensor_height is None else self.sensor_height
+
+    @property
+    def hand_at(self) -> float:
+        """Height of the hand above the foot along the pole, m."""
+        return HAND * self.length if self.hand_height is None else self.hand_height
+
+
+def quantities() -> dict[str, Given]:
+    """What may be given for each quantity, by its name."""
+    return {each.name: _of(each) for each in fields(Setup)}
+
+
+def setup_of(texts: Mapping[str, Any]) -> Setup:
+    """Pole and use of texts with units, as a configuration has them.
+
+    Raises
+    ------
+    InputError
+        If there is no such quantity, or a text is none.
+    """
+    known = quantities()
+    values = {}
+    for name, text in texts.items():
+        if name not in known:
+            raise UnknownNameError("quantity of a pole", name, known)
+        given = known[name]
+        try:
+            values[name] = parse_quantity(str(text), given.unit, given.least, given.most)
+        except InputError as error:
+            raise InputError(f"{name}: {error}") from None
+    return Setup(**values)
+
+
+def _of(each: Field[Any]) -> Given:
+    given = each.metadata["given"]
+    assert isinstance(given, Given)
+    return given

@@ -1,0 +1,203 @@
+"""What makes the foot of a pole wrong: a registry, in which each source is one small function.
+
+To add one, write a function of a `Situation` that says of what it makes wrong by how much, and
+register it with a title and with what would make it smaller.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.pole.bending import flexibility
+from accelstudy.pole.situation import FORCE, PARAMETERS, Situation
+from accelstudy.registry import Registry
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Wrong:
+    """What a source makes wrong: a normal error of some inputs.
+
+    Attributes
+    ----------
+    on : tuple of str, as in `Situation.slope`
+    covariance : (k, m, m) array
+    shift : (k, m) array, mean of the error, which is the same each time
+    """
+
+    on: tuple[str, ...]
+    covariance: Array
+    shift: Array
+
+
+def scatter(situation: Situation, on: tuple[str, ...], *sigma: Array | float) -> Wrong:
+    """Independent errors, of each input with its standard deviation, a number or (k,)."""
+    variance = np.stack(np.broadcast_arrays(*sigma, situation.tilt)[:-1], axis=-1) ** 2
+    return Wrong(on, variance[..., None] * np.eye(len(sigma)), np.zeros_like(variance))
+
+
+@dataclass(frozen=True)
+class Source:
+    """A source of error.
+
+    Attributes
+    ----------
+    name : str, of tables
+    title : str, of figures and sentences
+    remedy : str, what would make it smaller
+    colour, hatch : str, in figures; colours keep apart with red-green blind eyes, too
+    sensor : bool, whether it is a matter of the tilt sensor
+    wrong : function of a `Situation`
+    """
+
+    name: str
+    title: str
+    remedy: str
+    colour: str
+    hatch: str
+    sensor: bool
+    wrong: Callable[[Situation], Wrong]
+
+
+_REGISTRY: Registry[Source] = Registry("source of error")
+Function = Callable[[Situation], Wrong]
+
+
+def source(
+    name: str, title: str, remedy: str, colour: str, hatch: str = "", sensor: bool = False
+) -> Callable[[Function], Function]:
+    """Register a source of error."""
+
+    def add(function: Function) -> Function:
+        _REGISTRY.add(name, Source(name, title, remedy, colour, hatch, sensor, function))
+        return function
+
+    return add
+
+
+def sources() -> tuple[Source, ...]:
+    """All sources, in order."""
+    return tuple(_REGISTRY.get(name) for name in _REGISTRY.names())
+
+
+@source(
+    "calibration",
+    "calibration",
+    "Calibrate in more positions, longer in each, or with a robot.",
+    "#0072B2",
+    sensor=True,
+)
+def calibration(situation: Situation) -> Wrong:
+    """Parameters with their full covariance, the same error until the next calibration."""
+    k, u = len(situation.tilt), situation.sensor.model.n_parameters
+    covariance = np.broadcast_to(situation.sensor.covariance, (k, u, u))
+    return Wrong((PARAMETERS,), covariance, np.zeros((k, u)))
+
+
+@source(
+    "noise",
+    "noise of the reading",
+    "Average longer, or take a quieter sensor.",
+    "#56B4E9",
+    hatch="....",
+    sensor=True,
+)
+def noise(situation: Situation) -> Wrong:
+    """Noise of the mean of a reading, alike on all axes."""
+    sigma = situation.sensor.sheet.sigma_mean(situation.setup.averaging)
+    return scatter(situation, (FORCE,), sigma, sigma, sigma)
+
+
+@source(
+    "drift",
+    "drift since the calibration",
+    "Calibrate shortly before the work, or take a sensor of a more stable bias.",
+    "#009E73",
+    sensor=True,
+)
+def drift(situation: Situation) -> Wrong:
+    """Change of the bias with time, and as the sensor was switched off in the meantime."""
+    age = situation.setup.age
+    sigma = situation.sensor.sheet.bias_change(age, restarted=True) if age > 0 else 0.0
+    return scatter(situation, (FORCE,), sigma, sigma, sigma)
+
+
+@source(
+    "temperature",
+    "temperature",
+    "Calibrate at the temperature of the work, or estimate thermal effects (thermal_bias).",
+    "#E69F00",
+    hatch="////",
+    sensor=True,
+)
+def temperature(situation: Situation) -> Wrong:
+    """Change of the bias and of the scales with the temperature, unless the calibration has it."""
+    sensor = situation.sensor
+    kelvin = 0.0 if sensor.knows_temperature else situation.setup.temperature_change
+    bias = sensor.sheet.bias_change(0.0, kelvin)
+    scale = (sensor.sheet.scale_per_kelvin or 0.0) * kelvin
+    return scatter(situation, (FORCE,), *np.hypot(bias, scale * situation.sensor_forces.T))
+
+
+@source(
+    "mounting",
+    "mounting of the sensor",
+    "Determine how the sensor sits on the pole by turning the pole about itself on a fixed point.",
+    "#CC79A7",
+)
+def mounting(situation: Situation) -> Wrong:
+    """Angles between the axes of the sensor and the pole; the same error until it is taken off."""
+    sigma = situation.setup.mounting_sigma
+    return scatter(situation, ("mounting_forward", "mounting_right"), sigma, sigma)
+
+
+@source(
+    "heading",
+    "heading",
+    "Tilt less, or get a better heading: move before the measurement, or sight it.",
+    "#D55E00",
+)
+def heading(situation: Situation) -> Wrong:
+    """The direction of the lean turns with the heading; a pole that stands upright has none."""
+    return scatter(situation, ("yaw",), situation.setup.heading_sigma)
+
+
+@source(
+    "bending",
+    "bending of the pole",
+    "Tilt less, hold the pole higher, or take a stiffer or shorter pole or a lighter antenna.",
+    "#7F5539",
+    hatch="\\\\\\\\",
+)
+def bending(situation: Situation) -> Wrong:
+    """The foot lies beside the straight line by the flexibility times the sine of the tilt.
+
+    The same tilt gives the same error each time, and it is not corrected.
+    """
+    across = situation.forces[:, :2] / situation.sensor.gravity
+    # The foot that is computed lacks the bending that the true one has, whose sign is that of −f.
+    shift = across * flexibility(situation.setup, situation.sensor.gravity)
+    return Wrong(("bend_forward", "bend_right"), np.zeros((len(shift), 2, 2)), shift)
+
+
+@source("length", "length of the pole", "Measure the length of the pole.", "#999999")
+def length(situation: Situation) -> Wrong:
+    """Length from the foot to the centre of the antenna or prism."""
+    return scatter(situation, ("length",), situation.setup.length_sigma)
+
+
+@source(
+    "top",
+    "position of the top",
+    "Measure the top better: longer, under an open sky, or by a total station.",
+    "#332288",
+)
+def top(situation: Situation) -> Wrong:
+    """Position of the antenna or prism, alike in north and in east."""
+    each, up = situation.setup.top_sigma / np.sqrt(2), situation.setup.top_sigma_vertical
+    return scatter(situation, ("top_north", "top_east", "top_down"), each, each, up)
