@@ -14,9 +14,11 @@ container: "docker://python:3.13-slim"
 
 include: "rules/sections.smk"
 include: "rules/plan.smk"
+include: "rules/pole.smk"
 
 
 rule plan_example:
     default_target: True
     input:
         PLAN_OUTPUTS,
+        POLE_OUTPUTS,

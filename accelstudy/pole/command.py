@@ -24,7 +24,7 @@ from accelstudy.options import (
     quiet_option,
     seed_option,
 )
-from accelstudy.pole.setup import quantities
+from accelstudy.pole.setup import HOLD, ROBOT_SIGMA, TILT_RANGE, Given, quantities
 from accelstudy.progress import say, stage, warn
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -40,16 +40,21 @@ LINEAR = ("model", "scheme", "approach", "hold", "robot_sigma")
 """Options of a calibration that is not made yet."""
 
 
+def _option(name: str, given: Given) -> Callable[[Command], Command]:
+    """Add the option of a quantity."""
+    return click.option(
+        f"--{name.replace('_', '-')}",
+        type=Quantity(given.unit, given.least, given.most),
+        default=given.usual or None,
+        show_default=bool(given.usual),
+        help=given.help,
+    )
+
+
 def _setup_options(command: Command) -> Command:
     """Add an option for each quantity of a pole."""
-    for name, given in reversed(quantities().items()):
-        command = click.option(
-            f"--{name.replace('_', '-')}",
-            type=Quantity(given.unit, given.least, given.most),
-            default=given.usual or None,
-            show_default=bool(given.usual),
-            help=given.help,
-        )(command)
+    for name, given in quantities().items():
+        command = _option(name, given)(command)
     return command
 
 
@@ -82,28 +87,10 @@ def _setup_options(command: Command) -> Command:
     help="Positions; `accelstudy schemes` lists them.",
 )
 @approach_option("gravity")
-@click.option(
-    "--hold",
-    type=Quantity("s", 1e-3, 1e6),
-    default="10s",
-    show_default=True,
-    help="Time at each position.",
-)
-@click.option(
-    "--robot-sigma",
-    type=Quantity("rad", 1e-9, 0.1),
-    default="3.2mgon",
-    show_default=True,
-    help="Sd of the robot's roll and of its pitch.",
-)
+@_option("hold", HOLD)
+@_option("robot_sigma", ROBOT_SIGMA)
 @_setup_options
-@click.option(
-    "--tilt-range",
-    type=Quantity("rad", 1e-3, 1.5),
-    default="50gon",
-    show_default=True,
-    help="Largest tilt.",
-)
+@_option("tilt_range", TILT_RANGE)
 @click.option(
     "--replicates",
     default=1000,

@@ -23,13 +23,10 @@ from accelstudy.models import compose, get_model
 from accelstudy.schemes import get_scheme
 from accelstudy.sensor import SensorModel
 from accelstudy.simulation import Noise
-from accelstudy.units import MGON, STANDARD_GRAVITY
+from accelstudy.units import STANDARD_GRAVITY
 from accelstudy.wording import joined
 
 Array = NDArray[np.float64]
-
-ROBOT_SIGMA = 3.2 * MGON
-"""rad, of a robot's roll and of its pitch, as in Thalmann & Neuner (2018)."""
 
 
 @dataclass(frozen=True)
@@ -139,7 +136,7 @@ def from_linear_theory(
     approach: str,
     sheet: DataSheet,
     seconds: float,
-    robot_sigma: float = ROBOT_SIGMA,
+    robot_sigma: float = Noise.sigma_angle,
     mounting: Frame = FRD,
 ) -> CalibratedSensor:
     """Sensor as a calibration would leave it, by linear theory at the ideal sensor.

@@ -39,11 +39,22 @@ class Given:
     least: float = 0.0
     most: float = math.inf
 
+    def read(self, text: str) -> float:
+        """Value of a text with its unit, SI; raises `InputError` if it is none."""
+        return parse_quantity(text, self.unit, self.least, self.most)
+
 
 def _given(*arguments: Any, **options: Any) -> Any:
     given = Given(*arguments, **options)
-    usual = parse_quantity(given.usual, given.unit) if given.usual else None
-    return field(default=usual, metadata={"given": given})
+    return field(
+        default=given.read(given.usual) if given.usual else None, metadata={"given": given}
+    )
+
+
+HOLD = Given("", "s", "10s", "Time at each position.", 1e-3, 1e6)
+ROBOT_SIGMA = Given("", "rad", "3.2mgon", "Sd of the robot's roll and of its pitch.", 1e-9, 0.1)
+TILT_RANGE = Given("", "rad", "50gon", "Largest tilt.", 1e-3, 1.5)
+"""What may be given beside a pole: of the calibration of its sensor, and how far it is tilted."""
 
 
 @dataclass(frozen=True)
@@ -129,9 +140,8 @@ def setup_of(texts: Mapping[str, Any]) -> Setup:
     for name, text in texts.items():
         if name not in known:
             raise UnknownNameError("quantity of a pole", name, known)
-        given = known[name]
         try:
-            values[name] = parse_quantity(str(text), given.unit, given.least, given.most)
+            values[name] = known[name].read(str(text))
         except InputError as error:
             raise InputError(f"{name}: {error}") from None
     return Setup(**values)

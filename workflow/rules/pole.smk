@@ -1,0 +1,33 @@
+from accelstudy.pole.config import PoleConfig
+
+POLES = section("pole", PoleConfig).cases
+POLE_FILES = {
+    "summary": "pole.json",
+    "budget": "budget.parquet",
+    "simulated": "monte-carlo.parquet",
+    "svg": "budget.svg",
+    "png": "budget.png",
+}
+POLE_OUTPUTS = [f"{RESULTS}/pole/{name}/{path}" for name in POLES for path in POLE_FILES.values()]
+
+
+rule pole:
+    input:
+        lambda wildcards: POLES[wildcards.pole].files,
+    output:
+        **{kind: f"{RESULTS}/pole/{{pole}}/{path}" for kind, path in POLE_FILES.items()},
+    log:
+        f"{RESULTS}/logs/pole/{{pole}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/pole/{{pole}}.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        case=lambda wildcards: POLES[wildcards.pole].model_dump(exclude_unset=True),
+        provenance=PROVENANCE,
+        code=code_hash("planning"),
+    message:
+        "Work out the pole {wildcards.pole}"
+    script:
+        "../scripts/pole.py"
