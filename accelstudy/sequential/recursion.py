@@ -11,6 +11,8 @@ standard deviation, leaves most positions without any pass over the others.
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -118,6 +120,15 @@ class Recursion:
         """
         for n in range(self.n_positions + 1, observed.forces.shape[1] + 1):
             self._take(observed.take(np.arange(n)))
+
+    def only(self, chosen: NDArray[np.int_]) -> Recursion:
+        """Return some of the sessions, to go on with them alone."""
+        part = copy(self)
+        for name in ("solved", "passes", "_bent", "_rate", "_x", "_at", "_mean", "_start"):
+            setattr(part, name, getattr(self, name)[chosen])
+        part._triangles, part._latent = self._triangles[chosen], self._latent[:, chosen]
+        part._white = of_sessions(self._white, chosen)
+        return part
 
     def predict(self, observed: Observations) -> Prediction:
         """Predict the misclosures of the position after those that were taken.

@@ -1,0 +1,74 @@
+"""Attitudes from which the next position is chosen."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.errors import InputError, UnknownNameError
+from accelstudy.optimal.constraints import Constraint, Constraints, OffPole, PitchRange, RollRange
+from accelstudy.optimal.spaces import by_eye, cube, listed_in
+from accelstudy.units import GON
+
+Array = NDArray[np.float64]
+
+STEP = 25 * GON
+"""Of roll and pitch in the grid."""
+SETS = {"cube": "faces, edges and corners of a cube", "grid": "roll and pitch in steps of 25 gon"}
+DEFAULTS = {"gravity": "cube", "robot": "grid"}
+"""Attitudes by approach: of a block on a table, of a robot."""
+SAME = 5 * GON
+"""A position within this of the last one is the same once more."""
+
+
+def candidates(
+    name: str,
+    pole_distance: float = 0.0,
+    max_roll: float = np.pi,
+    max_pitch: float = np.pi / 2,
+) -> Array:
+    """Directions of gravity in the body frame, (k, 3), of the attitudes to choose from.
+
+    Parameters
+    ----------
+    name : str
+        One of `SETS`, or the path of a CSV file with the columns x, y, z or roll and pitch.
+    pole_distance : float, rad, least angle between the x axis and the vertical
+    max_roll, max_pitch : float, rad, largest roll and pitch either way
+
+    Raises
+    ------
+    InputError
+        If there is no such set, the file cannot be read, or nothing is left.
+    """
+    if name == "cube":
+        directions = cube().directions(0)
+    elif name == "grid":
+        directions = by_eye(STEP).directions(0)
+    elif name.endswith(".csv"):
+        directions = listed_in(Path(name)).directions(0)
+    else:
+        raise UnknownNameError("set of attitudes", name, (*SETS, "FILE.csv"))
+    limits: list[Constraint] = []
+    if pole_distance > 0:
+        limits.append(OffPole(pole_distance))
+    if max_roll < np.pi:
+        limits.append(RollRange(-max_roll, max_roll))
+    if max_pitch < np.pi / 2:
+        limits.append(PitchRange(-max_pitch, max_pitch))
+    left = Constraints(tuple(limits)).keep(directions)
+    if not len(left):
+        raise InputError(f"attitudes: none of {name} is within the limits that are given")
+    # Simple ones first: axes that are vertical, then such that are horizontal.
+    axes = np.count_nonzero(np.abs(left) > 1e-9, axis=1)
+    return left[np.argsort(axes, kind="stable")]
+
+
+def apart_from(directions: Array, last: Array) -> NDArray[np.bool_]:
+    """Which of directions (k, 3) are others than the last ones (R, 3), (R, k).
+
+    The same attitude at once again shows the same errors of it again.
+    """
+    return np.asarray(last @ directions.T < np.cos(SAME))

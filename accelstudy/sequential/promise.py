@@ -1,0 +1,81 @@
+"""The tilt accuracy that is promised, and the one that there is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.effects import Hold
+from accelstudy.leveling_error import TiltError, cap_forces, holds_in_use, tilt_error
+from accelstudy.sensor import SensorModel
+from accelstudy.units import STANDARD_GRAVITY
+
+Array = NDArray[np.float64]
+
+ATTITUDES = 200
+"""Attitudes, spread evenly over the tilt range, in which the tilt accuracy is taken."""
+
+
+@dataclass(frozen=True)
+class Promise:
+    """Rms of roll and of pitch, each, that a calibration shall leave.
+
+    Over all tilts up to `tilt_range`, and over all calibrations that could have come out; without
+    the noise of the leveled reading.
+
+    Attributes
+    ----------
+    accuracy : float, rad
+    tilt_range : float, rad
+    """
+
+    accuracy: float
+    tilt_range: float
+
+    def tilt_error(
+        self,
+        model: SensorModel,
+        parameters: Array | None = None,
+        gravity: float = STANDARD_GRAVITY,
+        hold: Hold | None = None,
+    ) -> TiltError:
+        """Tilt error of a calibration as a function of the errors of its parameters.
+
+        Parameters
+        ----------
+        model : SensorModel
+        parameters : (u,) array, SI; those of an ideal sensor by default
+        gravity : float, m/s²
+        hold : Hold, optional
+            Conditions of the positions, where effects depend on them; those in use are like them.
+        """
+        at = np.zeros(model.n_parameters) if parameters is None else parameters
+        f_b = cap_forces(self.tilt_range, ATTITUDES, gravity)
+        if hold is not None and hold.order is not None:
+            hold = holds_in_use(hold, len(hold.order), f_b)
+        return tilt_error(model, at, model, at, f_b, gravity, hold)
+
+    def reached(self, rms: Array) -> NDArray[np.bool_]:
+        """Whether rms of roll and of pitch, (..., 2), are both as promised."""
+        return np.asarray(np.all(rms <= self.accuracy, axis=-1))
+
+    def weight(self, error: TiltError, rms: Array) -> Array:
+        """W of the next choice, (R, u, u): mean variance of the angles not yet as promised.
+
+        rms : (R, 2) array, of roll and pitch so far
+        """
+        missing = (rms > self.accuracy) | self.reached(rms)[..., None]
+        share = missing / missing.sum(axis=-1, keepdims=True)
+        return np.einsum("ra,auw->ruw", share, error.quadratic)
+
+
+def rms_of(error: TiltError, cofactors: Array, variance: Array | float = 1.0) -> Array:
+    """Rms of roll and of pitch, (R, 2), rad, by cofactors (R, u', u') and variances of unit weight.
+
+    Gravity, where it is estimated, has no part in it.
+    """
+    u = len(error.reference)
+    covariance = cofactors[:, :u, :u] * np.reshape(variance, (-1, 1, 1))
+    return np.array([error.rms_of_all(each) for each in covariance]).reshape(-1, 2)

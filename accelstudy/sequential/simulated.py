@@ -1,0 +1,244 @@
+"""Simulated sessions that choose their positions and stop when the promise is kept."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy import special
+
+from accelstudy.adjustment import Observations
+from accelstudy.approaches import Approach, get_approach
+from accelstudy.design import diagnose
+from accelstudy.errors import InputError
+from accelstudy.leveling import roll_pitch
+from accelstudy.leveling_error import TiltError, tilt_error
+from accelstudy.models import get_model
+from accelstudy.optimal.information import position_rows
+from accelstudy.schemes import get_scheme
+from accelstudy.sensor import SensorModel
+from accelstudy.sequential.attitudes import DEFAULTS, candidates
+from accelstudy.sequential.chooser import Chooser
+from accelstudy.sequential.choosing import typical_sizes
+from accelstudy.sequential.config import SequentialConfig
+from accelstudy.sequential.promise import Promise, rms_of
+from accelstudy.sequential.recursion import Recursion
+from accelstudy.simulation import Noise
+from accelstudy.units import GON, MGON, STANDARD_GRAVITY
+
+Array = NDArray[np.float64]
+
+TOLERANCE = 1e-3
+"""Standard deviations by which estimates may be off: nothing beside what is counted here."""
+AT_ONCE = 500
+"""Sessions that are simulated together; more would only take memory."""
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class SetUp:
+    """Sessions of one kind.
+
+    Attributes
+    ----------
+    config : SequentialConfig
+    approach : str
+    rule : str, what the variance of unit weight is taken for
+    multiple : float, promised accuracy over that of the fixed scheme
+    """
+
+    config: SequentialConfig
+    approach: str
+    rule: str
+    multiple: float
+
+    @cached_property
+    def model(self) -> SensorModel:
+        """Model of the sensor and of the calibration."""
+        return get_model(self.config.model)
+
+    @cached_property
+    def equipment(self) -> Approach:
+        """The approach itself."""
+        return get_approach(self.approach)
+
+    @cached_property
+    def noise(self) -> Noise:
+        """Noise of the observations."""
+        return Noise(self.config.sigma_mps2, self.config.robot_sigma_mgon * MGON)
+
+    @cached_property
+    def fixed_rms(self) -> Array:
+        """Rms of roll and of pitch that the fixed scheme leaves, (2,), rad; linear theory.
+
+        Raises
+        ------
+        InputError
+            If it does not determine the model.
+        """
+        scheme = get_scheme(self.config.instead_of)
+        design = diagnose(scheme, self.model, self.equipment, self.noise)
+        if not design.estimable:
+            raise InputError(f"sequential.instead_of: {scheme.name}: {design.reason}")
+        error = Promise(np.inf, self.config.tilt_range_gon * GON).tilt_error(self.model)
+        return error.rms_of_all(design.cofactors)
+
+    @cached_property
+    def promise(self) -> Promise:
+        """What is promised."""
+        accuracy = self.multiple * float(self.fixed_rms.max())
+        return Promise(accuracy, self.config.tilt_range_gon * GON)
+
+    @cached_property
+    def chooser(self) -> Chooser:
+        """What positions are chosen by."""
+        directions = candidates(DEFAULTS.get(self.approach, "grid"))
+        return Chooser(
+            directions,
+            position_rows(self.model, self.equipment, self.noise, directions),
+            self.promise.tilt_error(self.model),
+            self.promise,
+            self.rule,
+            typical_sizes(self.model, self.model.n_parameters),
+        )
+
+    @cached_property
+    def attitudes(self) -> list[TiltError]:
+        """Attitudes in which intervals are checked: level, and leant by the tilt range."""
+        sin, cos = np.sin(self.promise.tilt_range), np.cos(self.promise.tilt_range)
+        down = [(0, 0, 1), (sin, 0, cos), (-sin, 0, cos), (0, sin, cos), (0, -sin, cos)]
+        ideal = np.zeros(self.model.n_parameters)
+        return [
+            tilt_error(self.model, ideal, self.model, ideal, -STANDARD_GRAVITY * np.array([d]))
+            for d in down
+        ]
+
+    def rng(self, seed: int, part: int) -> np.random.Generator:
+        """Random numbers of a part of the sessions; rules share them, so that they compare."""
+        name = f"{self.config.model} {self.approach} {self.multiple}"
+        digest = int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "big")
+        return np.random.default_rng(np.random.SeedSequence([seed, digest], spawn_key=(part,)))
+
+
+def simulate(set_up: SetUp, seed: int) -> pd.DataFrame:
+    """Simulate all sessions of a set-up.
+
+    Returns
+    -------
+    DataFrame
+        A row for each session, angles in rad: how many positions it took; what it claims of roll
+        and pitch, what holds by the true noise, and the error that its calibration has; whether
+        intervals contain what they should; how often all positions were linearised anew.
+    """
+    sizes = [AT_ONCE] * (set_up.config.sessions // AT_ONCE)
+    sizes += [rest] if (rest := set_up.config.sessions % AT_ONCE) else []
+    parts = [_simulate(set_up, size, set_up.rng(seed, i)) for i, size in enumerate(sizes)]
+    return pd.concat(parts, ignore_index=True)
+
+
+def _simulate(set_up: SetUp, sessions: int, rng: np.random.Generator) -> pd.DataFrame:
+    model, chooser = set_up.model, set_up.chooser
+    truth = _sensors(model, sessions, rng)
+    nothing = np.zeros((sessions, 0, 3)), np.zeros((sessions, 0, 2))
+    going, (forces, angles) = np.arange(sessions), nothing
+    recursion = Recursion(
+        model, set_up.equipment, _observed(set_up, forces, angles), tolerance=TOLERANCE
+    )
+    rms, last = np.full((sessions, 2), np.inf), None
+    passes = np.zeros((sessions, 2), dtype=int)
+    ended: list[pd.DataFrame] = []
+    for n in range(1, set_up.config.most_positions + 1):
+        chosen = chooser.choose(recursion.root_information, recursion.solved, rms, last)
+        # For all sessions, so that those that go on do not depend on those that have ended.
+        off = set_up.config.placing_gon * GON * rng.standard_normal((sessions, 3))
+        errors = rng.standard_normal((sessions, 3)), rng.standard_normal((sessions, 2))
+        last = chooser.directions[chosen] + off[going]
+        last /= np.linalg.norm(last, axis=1, keepdims=True)
+        read = _measure(set_up, truth[going], last, *(error[going] for error in errors))
+        forces, angles = (
+            np.concatenate([before, new], axis=1)
+            for before, new in zip((forces, angles), read, strict=True)
+        )
+        before = recursion.solved.copy()
+        recursion.add(_observed(set_up, forces, angles))
+        passes[going, 0] += (recursion.passes > 0) & before
+        passes[going, 1] += before
+
+        rms = np.full((len(going), 2), np.inf)
+        ok = np.flatnonzero(recursion.solved)
+        rms[ok] = chooser.rms(
+            recursion.root_information[ok], recursion.omega[ok], recursion.redundancy
+        )
+        done = set_up.promise.reached(rms)
+        if done.any() or n == set_up.config.most_positions:
+            over = done | (n == set_up.config.most_positions)
+            row = _outcome(set_up, recursion.only(np.flatnonzero(over)), truth[going[over]])
+            row.insert(0, "session", going[over])
+            row["kept"] = done[over]
+            row[["claimed_roll", "claimed_pitch"]] = rms[over]
+            row[["passes", "updates"]] = passes[going[over]]
+            ended.append(row)
+            left = np.flatnonzero(~over)
+            if not len(left):
+                break
+            recursion, going = recursion.only(left), going[left]
+            forces, angles, rms, last = forces[left], angles[left], rms[left], last[left]
+    return pd.concat(ended).sort_values("session", ignore_index=True).drop(columns="session")
+
+
+def _sensors(model: SensorModel, count: int, rng: np.random.Generator) -> Array:
+    """Parameters of sensors, (R, u), anywhere between typical sizes, of either sign."""
+    low, high = np.log([e.typical for e in model.effects for _ in e.parameters]).T
+    sizes = np.exp(rng.uniform(low, high, (count, len(low))))
+    return np.asarray(sizes * rng.choice([-1.0, 1.0], sizes.shape))
+
+
+def _measure(
+    set_up: SetUp, truth: Array, directions: Array, noise: Array, angle_noise: Array
+) -> tuple[Array, Array]:
+    """Readings of one position each, forces (R, 1, 3) and the robot's angles (R, 1, 2)."""
+    f_b = -STANDARD_GRAVITY * directions[:, None]
+    force = set_up.model.sense(f_b, truth) + set_up.noise.sigma_force * noise[:, None]
+    angles = np.stack(roll_pitch(tuple(np.moveaxis(f_b, -1, 0))), axis=-1)
+    angles = angles + set_up.model.reading_errors(angles, truth)
+    return force, angles + set_up.noise.sigma_angle * angle_noise[:, None]
+
+
+def _observed(set_up: SetUp, forces: Array, angles: Array) -> Observations:
+    noise = set_up.noise
+    return Observations(forces, noise.sigma_force, angles, noise.sigma_angle, STANDARD_GRAVITY)
+
+
+def _outcome(set_up: SetUp, recursion: Recursion, truth: Array) -> pd.DataFrame:
+    """What came of sessions that have ended, one row each."""
+    error, cofactors = set_up.chooser.error, recursion.cofactors
+    delta = recursion.parameters - truth
+    true_rms, actual = rms_of(error, cofactors), error.rms(delta)
+    r = recursion.redundancy
+    # Intervals as people make them: by the noise that is known, or by Student's t.
+    if set_up.rule == "known":
+        width = np.full(len(truth), special.ndtri((1 + CONFIDENCE) / 2))
+    else:
+        sigma0 = np.sqrt(recursion.omega / r) if r > 0 else np.full(len(truth), np.nan)
+        width = special.stdtrit(max(r, 1), (1 + CONFIDENCE) / 2) * sigma0
+    sigma = np.sqrt(np.diagonal(cofactors, axis1=1, axis2=2))
+    inside = np.abs(delta) <= width[:, None] * sigma
+    angles = np.stack([each.rms(delta) for each in set_up.attitudes], axis=1)
+    spread = np.stack([rms_of(each, cofactors) for each in set_up.attitudes], axis=1)
+    return pd.DataFrame(
+        {
+            "positions": recursion.n_positions,
+            "redundancy": r,
+            "omega": recursion.omega,
+            "true_roll": true_rms[:, 0],
+            "true_pitch": true_rms[:, 1],
+            "actual_roll": actual[:, 0],
+            "actual_pitch": actual[:, 1],
+            "parameters_inside": inside.mean(axis=1),
+            "angles_inside": np.mean(angles <= width[:, None, None] * spread, axis=(1, 2)),
+        }
+    )

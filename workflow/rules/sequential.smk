@@ -1,0 +1,56 @@
+from accelstudy.sequential.config import SequentialConfig
+
+SEQUENTIAL = section("sequential", SequentialConfig)
+SEQUENTIAL_OUTPUTS = [
+    f"{RESULTS}/sequential/{name}" for name in ("summary.parquet", "positions.svg", "positions.png")
+]
+
+
+wildcard_constraints:
+    approach="|".join(SEQUENTIAL.approaches),
+
+
+rule sequential_sessions:
+    output:
+        f"{RESULTS}/sequential/sessions/{{approach}}.parquet",
+    log:
+        f"{RESULTS}/logs/sequential/{{approach}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/sequential/{{approach}}.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        config=SEQUENTIAL.model_dump(mode="json"),
+        provenance=PROVENANCE,
+        code=code_hash("planning"),
+    message:
+        "Simulate sessions that choose their positions: {wildcards.approach}"
+    script:
+        "../scripts/sequential_sessions.py"
+
+
+rule sequential:
+    input:
+        expand(
+            f"{RESULTS}/sequential/sessions/{{approach}}.parquet", approach=SEQUENTIAL.approaches
+        ),
+    output:
+        table=f"{RESULTS}/sequential/summary.parquet",
+        svg=f"{RESULTS}/sequential/positions.svg",
+        png=f"{RESULTS}/sequential/positions.png",
+    log:
+        f"{RESULTS}/logs/sequential/summary.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/sequential/summary.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        config=SEQUENTIAL.model_dump(mode="json"),
+        provenance=PROVENANCE,
+        code=code_hash("planning"),
+    message:
+        "Sum up how many positions a promised accuracy takes, and whether it is kept"
+    script:
+        "../scripts/sequential_summary.py"

@@ -1,0 +1,11 @@
+from accelstudy.sequential.config import SequentialConfig
+from accelstudy.sequential.tables import sessions_table
+from accelstudy.study.job import logged
+from accelstudy.study.tables import write_table
+
+with logged(snakemake):
+    config, provenance = snakemake.params.config, snakemake.params.provenance
+    table = sessions_table(
+        SequentialConfig(**config), snakemake.wildcards.approach, provenance["seed"]
+    )
+    write_table(snakemake.output[0], table, provenance)

@@ -1,0 +1,13 @@
+from accelstudy.figures.saving import save
+from accelstudy.figures.style import DPI
+from accelstudy.sequential.config import SequentialConfig
+from accelstudy.sequential.figure import sequential_figure
+from accelstudy.sequential.tables import summary_table
+from accelstudy.study.job import logged
+from accelstudy.study.tables import read_table, write_table
+
+with logged(snakemake):
+    config, out = SequentialConfig(**snakemake.params.config), snakemake.output
+    summary = summary_table(config, read_table(list(snakemake.input)))
+    write_table(out.table, summary, snakemake.params.provenance)
+    save(sequential_figure(summary, config.instead_of), out.svg, out.png, "Positions", DPI)
