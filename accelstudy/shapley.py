@@ -9,7 +9,7 @@ function they are the classic Sobol indices.
 
 A linear function of normal inputs has them in closed form, since v(u) = g_uᵀ Σ_uu⁻¹ g_u with
 g = Cov(X, Y) (Owen & Prieur 2017; Iooss & Prieur 2019). Inputs that are independent of the others
-then are games of their own (Broto, Bachoc & Depecker 2019), so that what counts is not the number
+then are games of their own (Broto et al. 2019), so that what counts is not the number
 of all inputs but that of the largest group of correlated ones. A function that is not linear is
 sampled in random orders (Song, Nelson & Staum 2016).
 """

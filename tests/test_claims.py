@@ -21,7 +21,7 @@ from study_helpers import (
 from accelstudy.figures import figure_tables
 from accelstudy.models import get_model
 from accelstudy.sensitivity import leveling_sensitivity
-from accelstudy.study.analysis import draw_figure, judge_claims
+from accelstudy.study.analysis import analyse_shapley, draw_figure, judge_claims
 from accelstudy.study.cells import study_cells
 from accelstudy.study.claims import NOT_REPRODUCED, REPRODUCED, SLIP, evidence_from, judge
 from accelstudy.study.distributions import Sample
@@ -59,7 +59,11 @@ def tables(folder):
     )  # fmt: skip
     sensitivity.insert(0, "analysis", "gravity")
     write_table(folder / "sensitivity.parquet", sensitivity, PROVENANCE)
-    return {**found, "sensitivity": sensitivity}
+    path = folder / "shapley.parquet"
+    keys = {**KEYS, "sensitivity": {**KEYS["sensitivity"], "pitch_gon": [0, 25]}}
+    named = (folder / f"{name}.parquet" for name in ("summary", "correlations"))
+    analyse_shapley(make_study(**keys), *named, path, PROVENANCE)
+    return {**found, "sensitivity": sensitivity, "shapley": read_table(path)}
 
 
 @pytest.fixture(scope="module")
@@ -70,6 +74,7 @@ def evidence(tables, folder):
         scheme="mclaren-24",
         correlations=tables["correlations"],
         sensitivity=tables["sensitivity"],
+        shapley=tables["shapley"],
         base_samples=BASE_SAMPLES,
         resamples=RESAMPLES,
         seed=1,
@@ -160,6 +165,20 @@ def test_sensitivity(judged):
     assert claims.loc["f_z-small-tilt", "ours"] == pytest.approx(20.6, abs=2)
     assert claims.loc["f_z-small-tilt", "verdict"] == NOT_REPRODUCED
     assert claims.loc["alpha_zx-roll", "ours"] == pytest.approx(35.7, abs=4)
+
+
+def test_order_of_the_inputs(evidence, judged):
+    """At a roll of 50 gon and a pitch of 25 s_y and s_z overtake b_y and b_z; elsewhere none."""
+    claim = judged[0].loc["order-of-inputs"]
+    assert claim["verdict"] == NOT_REPRODUCED
+    assert claim["ours"] == pytest.approx(100 / 12)  # of 6 attitudes, roll and pitch
+    assert "s_y, s_z overtake b_y, b_z, from rank 4 down" in claim["sentence"]
+    assert "With the robot no input overtakes another" in claim["sentence"]
+
+    shapley = evidence.shapley
+    same = shapley.assign(shapley_effect=shapley["total_effect"])
+    claim = judge(replace(evidence, shapley=same))[0].set_index("claim").loc["order-of-inputs"]
+    assert (claim["verdict"], claim["ours"]) == (REPRODUCED, 0)
 
 
 # --- verdicts ------------------------------------------------------------------------------------
@@ -314,6 +333,7 @@ def test_claims_as_the_workflow_judges_them(tables, folder, judged, tmp_path):
         parts_in(folder),
         folder / "correlations.parquet",
         folder / "sensitivity.parquet",
+        folder / "shapley.parquet",
         outputs,
         PROVENANCE,
     )

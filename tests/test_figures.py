@@ -23,7 +23,7 @@ from accelstudy.figures import (
 )
 from accelstudy.figures.factors import FACTORS
 from accelstudy.models import MODELS
-from accelstudy.study.analysis import analyse_sensitivity
+from accelstudy.study.analysis import analyse_sensitivity, analyse_shapley
 from accelstudy.study.config import StudyConfig, parse_study
 from accelstudy.study.tables import read_table
 
@@ -65,6 +65,9 @@ def run(keys: dict, folder: Path) -> dict[str, pd.DataFrame]:
             analyse_sensitivity(study, analysis, folder / "summary.parquet", path, PROVENANCE)
             parts.append(read_table(path))
         tables["sensitivity"] = pd.concat(parts, ignore_index=True)
+        named = (folder / f"{name}.parquet" for name in ("summary", "correlations", "shapley"))
+        analyse_shapley(study, *named, PROVENANCE)
+        tables["shapley"] = read_table(folder / "shapley.parquet")
     return tables
 
 
@@ -105,7 +108,7 @@ OTHERS = [*(f"sweep-{factor.name}" for factor in FACTORS), "rare-events"]
 
 def test_a_paper_study_has_the_figures_of_the_paper_and_of_every_study():
     expected = [f"figure-{n}" for n in range(2, 9)] + ["figure-5-robot", "figure-6-robot"]
-    expected += ["closed-forms", "leveling-overview", "table-1"]
+    expected += ["closed-forms", "leveling-overview", "shapley", "table-1"]
     assert sorted(ALL) == sorted(expected)
 
 
@@ -193,6 +196,21 @@ def test_total_effects_are_labelled_and_their_lines_go_through_zero(tables, pape
     assert all(np.isfinite(line.get_ydata()).all() for line in f_z)
 
 
+def test_shapley_effects_name_what_overtakes(tables, paper):
+    table = tables["shapley"].assign(shapley_effect=tables["shapley"]["total_effect"])
+    drawn = draw("shapley", {"shapley": table}, paper)
+    assert len(drawn.axes) == 2  # one row, as no order changes
+
+    at = table["output"].eq("roll") & table["roll_gon"].eq(50) & table["pitch_gon"].eq(25)
+    table.loc[at & table["input"].eq("s_y"), "shapley_effect"] = 0.9
+    drawn = draw("shapley", {"shapley": table}, paper)
+    roll, pitch = drawn.axes
+    text, _ = (each for each in roll.texts if each.get_position()[1] > 1.25)  # before the label
+    assert (text.get_text(), text.get_position()[0]) == ("$s_y$", 50)
+    assert text.get_color() == style.group_colour("scale")
+    assert not [each for each in pitch.texts if each.get_position()[1] > 1.25]
+
+
 def test_numbers_stand_in_table_1(tables, paper):
     drawn = draw("table-1", tables, paper)
     written = {text.get_text() for ax in drawn.axes for text in ax.texts}
@@ -257,6 +275,7 @@ def test_a_study_without_estimable_cells_draws(name, tables, paper):
         "correlations": pd.DataFrame(),
         "quantiles": tables["quantiles"].iloc[:0],
         "sensitivity": tables["sensitivity"].iloc[:0],
+        "shapley": tables["shapley"].iloc[:0],
     }
     needed = {key: nothing[key] for key in figure_tables(name)}
     paint(draw(name, needed, paper))
@@ -311,7 +330,7 @@ def test_colours_of_causes_keep_apart(eye):
 def test_parameters_of_one_colour_differ_in_line_and_marker():
     names = ["b_x", "b_y", "b_z", "k_xy", "k_xz", "k_yx", "k_yz", "k_zx", "k_zy"]
     names += ["k_abs_x", "k_abs_y", "k_abs_z"]
-    styles = [tuple(s.values()) for s in total_effects._styles(names).values()]
+    styles = [tuple(s.values()) for s in total_effects.styles_of(names).values()]
     assert len(set(styles)) == len(names)
 
 

@@ -23,7 +23,7 @@ ANGLE_UNIT_VARIABLE = "ACCELSTUDY_ANGLE_UNIT"
 Tables = Mapping[str, pd.DataFrame]
 Draw = Callable[[Tables, StudyConfig], Figure]
 
-TABLES = ("cells", "summary", "correlations", "leveling", "quantiles", "sensitivity")
+TABLES = ("cells", "summary", "correlations", "leveling", "quantiles", "sensitivity", "shapley")
 """What a figure may ask for."""
 
 

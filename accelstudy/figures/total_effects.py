@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -76,9 +78,9 @@ def _effects_over_roll(table: pd.DataFrame, output: str) -> Figure:
     inputs = list(dict.fromkeys(table["input"]))
     highest = table.groupby("input")["share"].max()
     drawn = [name for name in inputs if highest[name] >= SMALLEST]
-    styles = _styles(drawn)
+    styles = styles_of(drawn)
     for ax, pitch in zip(axes, pitches, strict=False):
-        _draw_pitch(ax, table[table["pitch_gon"] == pitch], styles)
+        draw_pitch(ax, table[table["pitch_gon"] == pitch], styles)
         angle = to_attitude(pitch * GON)
         ax.set_title(f"pitch $\\theta$ = {angle:g} {attitude_unit()}")
     for ax in axes[len(pitches) :]:
@@ -91,10 +93,7 @@ def _effects_over_roll(table: pd.DataFrame, output: str) -> Figure:
         if i % columns == 0:
             ax.set_ylabel(f"total effect on {output}")
     if drawn:
-        groups = in_order(group_of(name) for name in drawn)
-        handles = [
-            Line2D([], [], color=group_colour(group), label=group_label(group)) for group in groups
-        ]
+        handles = group_handles(drawn)
         if small := [symbol(name) for name in inputs if name not in drawn]:
             text = f"below {SMALLEST:.0%} everywhere: {', '.join(small)}".replace("%", " %")
             handles.append(Line2D([], [], linestyle="", label=text))
@@ -102,7 +101,13 @@ def _effects_over_roll(table: pd.DataFrame, output: str) -> Figure:
     return fig
 
 
-def _styles(inputs: list[str]) -> dict[str, Style]:
+def group_handles(inputs: Iterable[str]) -> list[Line2D]:
+    """Entries of a legend, one for each group of the inputs."""
+    groups = in_order(group_of(name) for name in inputs)
+    return [Line2D([], [], color=group_colour(group), label=group_label(group)) for group in groups]
+
+
+def styles_of(inputs: list[str]) -> dict[str, Style]:
     """Colour of the group; line and marker by the position among all that have the colour."""
     count: dict[str, int] = {}
     styles = {}
@@ -118,10 +123,10 @@ def _styles(inputs: list[str]) -> dict[str, Style]:
     return styles
 
 
-def _draw_pitch(ax: Axes, table: pd.DataFrame, styles: dict[str, Style]) -> None:
+def draw_pitch(ax: Axes, table: pd.DataFrame, styles: dict[str, Style], top: float = 1.25) -> None:
     """Draw the effects at one pitch, each with its symbol; what never reaches 1 % is left out."""
     ax.set_yscale("log")
-    ax.set_ylim(BOTTOM, 1.25)
+    ax.set_ylim(BOTTOM, top)
     ax.set_yticks(
         [SMALL_AT, 0.01, 0.03, 0.1, 0.3, 1], ["less", "1 %", "3 %", "10 %", "30 %", "100 %"]
     )

@@ -7,11 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from accelstudy.errors import InputError
+from accelstudy.leveling_shares import leveling_shares
 from accelstudy.models import get_model
 from accelstudy.outputs import whole_file
 from accelstudy.sensitivity import leveling_sensitivity
+from accelstudy.sensor import SensorModel
 from accelstudy.study.cells import study_cells
 from accelstudy.study.config import StudyConfig
 from accelstudy.study.tables import read_table, write_table
@@ -40,8 +43,7 @@ def analyse_sensitivity(
     assert settings is not None
     calibrated: dict[str, Any] = {}
     if analysis != "forces":
-        model = get_model(settings.model, study.models)
-        truth = model.vector(study.truth(e.spec for e in model.effects))
+        model, truth = _sensor(study)
         sigma = _empirical_sigma(study, analysis, summary)
         calibrated = {"model": model, "parameters": truth, "sigma_parameters": sigma}
     table = leveling_sensitivity(
@@ -58,12 +60,69 @@ def analyse_sensitivity(
     write_table(output, table, provenance)
 
 
-def _empirical_sigma(study: StudyConfig, approach: str, summary: Any) -> np.ndarray:
-    """Standard deviations of the parameters over the Monte Carlo, (u,), SI."""
+def analyse_shapley(
+    study: StudyConfig,
+    summary: str | Path,
+    correlations: str | Path,
+    output: str | Path,
+    provenance: Mapping[str, Any],
+) -> None:
+    """Share out the variance of roll and pitch to correlated parameters, and write the table.
+
+    The covariance matrix of a calibration has the sds that the total effects have, of the Monte
+    Carlo, and the mean correlations of the adjustment's Σ_xx.
+
+    Parameters
+    ----------
+    study : StudyConfig, with `sensitivity`
+    summary, correlations : paths of the tables of those names
+    output : path of the table to write
+    provenance : see `accelstudy.study.tables.origin`
+    """
+    settings = study.sensitivity
+    assert settings is not None
+    model, truth = _sensor(study)
+    names, pairs = list(model.parameter_names), read_table(correlations)
+    tables = []
+    for approach in ("gravity", "robot"):
+        sigma = _empirical_sigma(study, approach, summary)
+        own = pairs[pairs["cell"] == _cell(study, approach)]
+        matrix = own.pivot_table("adjustment", "parameter_1", "parameter_2", observed=True)
+        table = leveling_shares(
+            settings.roll_gon,
+            settings.pitch_gon,
+            study.sigma_force,
+            model,
+            truth,
+            matrix.loc[names, names].to_numpy() * np.outer(sigma, sigma),
+            settings.base_samples,
+            study.seed,
+            study.gravity_mps2,
+        )
+        table.insert(0, "analysis", approach)
+        tables.append(table)
+    write_table(output, pd.concat(tables, ignore_index=True), provenance)
+
+
+def _sensor(study: StudyConfig) -> tuple[SensorModel, np.ndarray]:
+    """Model of the sensitivity analysis, and its true parameters, (u,), SI."""
     settings = study.sensitivity
     assert settings is not None
     model = get_model(settings.model, study.models)
-    cell = "/".join([settings.model, settings.scheme, approach])
+    return model, model.vector(study.truth(e.spec for e in model.effects))
+
+
+def _cell(study: StudyConfig, approach: str) -> str:
+    """Name of the cell whose calibrations count in the sensitivity analysis."""
+    settings = study.sensitivity
+    assert settings is not None
+    return "/".join([settings.model, settings.scheme, approach])
+
+
+def _empirical_sigma(study: StudyConfig, approach: str, summary: Any) -> np.ndarray:
+    """Standard deviations of the parameters over the Monte Carlo, (u,), SI."""
+    model, _ = _sensor(study)
+    cell = _cell(study, approach)
     rows = read_table(summary)
     rows = rows[rows["cell"] == cell].set_index("parameter")
     if rows.empty or rows["sd_empirical"].isna().any():
@@ -77,6 +136,7 @@ def judge_claims(
     parts: Mapping[str, Sequence[str | Path]],
     correlations: str | Path,
     sensitivity: str | Path,
+    shapley: str | Path,
     outputs: Mapping[str, str],
     provenance: Mapping[str, Any],
 ) -> None:
@@ -86,7 +146,7 @@ def judge_claims(
     ----------
     study : StudyConfig, with `sensitivity`
     parts : see `accelstudy.study.claims.evidence.evidence_from`
-    correlations, sensitivity : paths of the tables
+    correlations, sensitivity, shapley : paths of the tables
     outputs : paths of `claims`, `by_scheme` and `html`
     provenance : see `accelstudy.study.tables.origin`
     """
@@ -106,6 +166,7 @@ def judge_claims(
         scheme=settings.scheme,
         correlations=read_table(correlations),
         sensitivity=read_table(sensitivity),
+        shapley=read_table(shapley),
         base_samples=settings.base_samples,
         resamples=settings.resamples,
         seed=study.seed,

@@ -30,6 +30,7 @@ _TABLES = (
     "closed_forms.py",
 )
 _CONFIG = ("study/config/",)
+_SENSITIVITY = ("sensitivity.py", "leveling_shares.py", "shapley.py")
 _STUDY = (
     "study/claims",
     "kernel/",
@@ -45,8 +46,8 @@ _SCORED = tuple(
 _DECIDED = tuple(f"diagnosis/{name}" for name in ("evidence/", "decision/", "pipeline.py"))
 _NOT_HIDDEN = (*_COMMANDS, "campaign/overview", "diagnosis/report/", "pages/", *_STUDY)
 _UNUSED = {
-    "simulate": (*_FRONT, *_TABLES, "sensitivity.py", *_CONFIG),
-    "summarise": (*_FRONT, "sensitivity.py", *_CONFIG),
+    "simulate": (*_FRONT, *_TABLES, *_SENSITIVITY, *_CONFIG),
+    "summarise": (*_FRONT, *_SENSITIVITY, *_CONFIG),
     "sensitivity": (*_FRONT, *_TABLES, "leveling_error.py"),
     "claims": (*_COMMANDS, "figures/", "plausibility.py", *_MEASURED),
     "figures": (*_COMMANDS, "study/claims", "pages/", "plausibility.py", "wording.py", *_MEASURED),

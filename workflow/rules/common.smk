@@ -53,7 +53,7 @@ CAPTIONS = Path(str(workflow.current_basedir)).parent / "report/figures"
 ANALYSES = ["forces", "gravity", "robot"]
 FINAL_TABLES = [
     *TABLES,
-    *(["sensitivity"] if STUDY.sensitivity else []),
+    *(["sensitivity", "shapley"] if STUDY.sensitivity else []),
     *(["claims", "claims_by_scheme"] if STUDY.paper else []),
 ]
 

@@ -43,6 +43,7 @@ rule claims:
         **(parts_of_claims() if STUDY.paper else {}),
         correlations=f"{RESULTS}/correlations.parquet",
         sensitivity=f"{RESULTS}/sensitivity.parquet",
+        shapley=f"{RESULTS}/shapley.parquet",
     output:
         claims=f"{RESULTS}/claims.parquet",
         by_scheme=f"{RESULTS}/claims_by_scheme.parquet",

@@ -7,6 +7,7 @@ with job(snakemake) as (study, provenance):
         lists(snakemake.input),
         snakemake.input.correlations,
         snakemake.input.sensitivity,
+        snakemake.input.shapley,
         dict(snakemake.output.items()),
         provenance,
     )

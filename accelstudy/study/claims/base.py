@@ -71,6 +71,7 @@ class Evidence:
     scheme : str, the default scheme
     correlations : DataFrame, see `accelstudy.study.summary`
     sensitivity : DataFrame, see `accelstudy.sensitivity`, with a column `analysis`
+    shapley : DataFrame, see `accelstudy.leveling_shares`, with a column `analysis`
     base_samples, resamples, seed : of the sensitivity analysis
     """
 
@@ -80,6 +81,7 @@ class Evidence:
     scheme: str
     correlations: pd.DataFrame
     sensitivity: pd.DataFrame
+    shapley: pd.DataFrame
     base_samples: int
     resamples: int
     seed: int

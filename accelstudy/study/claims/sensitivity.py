@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 
+from accelstudy.leveling_shares import overtaken
 from accelstudy.sensitivity import leveling_sensitivity
 from accelstudy.study.claims.base import Claim, Evidence, verdict
 
@@ -113,6 +114,41 @@ def sensitivity_claims(evidence: Evidence) -> Iterable[Claim]:
         *ours,
         verdict(ours[1] < 3),
         f"The largest share of a scale is {ours[0]:.1f} % up to {TILT:.0f} gon of roll and pitch.",
+    )
+    yield _order_of_inputs(evidence.shapley)
+
+
+def _order_of_inputs(table: pd.DataFrame) -> Claim:
+    """Judge whether total effects rank the inputs as Shapley effects do."""
+    output = ["output", "roll_gon", "pitch_gon"]
+
+    def changes(approach: str) -> tuple[float, str]:
+        rows = table[(table["analysis"] == approach) & table["defined"].astype(bool)]
+        points = 100 * float((rows["shapley_effect"] - rows["total_effect"]).abs().max())
+        text = f"no share changes by more than {points:.2g} percentage points"
+        pairs = overtaken(rows)
+        if pairs.empty:
+            return 0.0, f"no input overtakes another; {text}"
+        rank = rows.groupby(output)["total_effect"].rank(ascending=False, method="first")
+        ranked = rows.assign(over=rows["input"], rank=rank)[[*output, "over", "rank"]]
+        first = pairs.merge(ranked, on=[*output, "over"])["rank"].min()
+        winners, losers = (", ".join(sorted(set(pairs[its]))) for its in ("input", "over"))
+        share = len(pairs[output].drop_duplicates()) / len(rows[output].drop_duplicates())
+        return 100 * share, f"{winners} overtake {losers}, from rank {first:.0f} down; {text}"
+
+    ours, sentence = changes("gravity")
+    return Claim(
+        "order-of-inputs",
+        "3.2",
+        "total effects rank the inputs as Shapley effects do, which count the correlations of the "
+        "parameters (share of attitudes at which they do not)",
+        "%",
+        np.nan,
+        ours,
+        np.nan,
+        np.nan,
+        verdict(ours == 0),
+        f"With gravity alone {sentence}. With the robot {changes('robot')[1]}.",
     )
 
 
