@@ -303,6 +303,9 @@ def test_errors_of_nothing_are_zero(sensor):
 def test_the_source_that_limits_is_named(sensor):
     said = " ".join(sentences(budget(Setup(), sensor, TILTS)))
     assert "The position of the top limits it: 8.0 mm." in said
+    said = " ".join(sentences(budget(Setup(top_sigma=7e-3), sensor, TILTS)))
+    assert "The position of the top limits it: 7.0 mm." in said
+    assert "of that the heading makes most: 6.7 mm" in said
     said = " ".join(sentences(budget(Setup(top_sigma=1e-4), sensor, TILTS)))
     assert "The heading limits it: 6.7 mm" in said
     known = budget(

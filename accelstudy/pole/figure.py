@@ -12,8 +12,8 @@ from accelstudy.pole.budget import TOTAL, Budget
 from accelstudy.pole.sources import sources
 from accelstudy.units import GON, attitude_unit, to_attitude
 
-DECADES = 1000.0
-"""Ratio of the largest error to the smallest that is shown."""
+WIDEST = 1e4
+"""Largest ratio of the largest error to the smallest that is shown."""
 NAMED = 8.0
 """Per cent at the largest tilt from which on an area has room for its name."""
 
@@ -51,9 +51,10 @@ def budget_figure(budget: Budget, simulated: pd.DataFrame) -> Figure:
             color=INK, marker="o", linestyle="", markerfacecolor="white", label="Monte Carlo",
             clip_on=False, zorder=4,
         )  # fmt: skip
-        top = 1.3 * float(total.max())
-        curves.set(yscale="log", xlim=(0, tilts[-1]), ylim=(top / DECADES, top))
-        log_ticks(curves.yaxis, top / DECADES, top)
+        high = 1.3 * float(total.max())
+        low = max(0.7 * float(np.sqrt(min(square[-1] for square in squares))), high / WIDEST)
+        curves.set(yscale="log", xlim=(0, tilts[-1]), ylim=(low, high))
+        log_ticks(curves.yaxis, low, high)
         curves.set(xlabel=f"tilt / {attitude_unit()}", ylabel="horizontal error, rms / mm")
         shares = 100 * np.array(squares) / np.maximum(np.sum(squares, axis=0), 1e-300)
         areas = parts.stackplot(

@@ -170,7 +170,7 @@ def heading(situation: Situation) -> Wrong:
 @source(
     "bending",
     "bending of the pole",
-    "Tilt less, hold the pole higher, or take a stiffer or shorter pole or a lighter antenna.",
+    "Tilt less, hold the pole higher, move the sensor towards its middle, or take a stiffer one.",
     "#7F5539",
     hatch="\\\\\\\\",
 )

@@ -60,7 +60,7 @@ def sentences(budget: Budget) -> list[str]:
     own = {each.name: float(budget.horizontal(each.name)[-1]) for each in sources()}
     rest = np.sqrt(max(total**2 - own[TOP] ** 2, 0.0))
     worst = max((each for each in sources() if each.name != TOP), key=lambda each: own[each.name])
-    if own[TOP] > rest:
+    if own[TOP] > own[worst.name]:
         top = next(each for each in sources() if each.name == TOP)
         said.append(f"The {top.title} limits it: {_mm(own[TOP])}. {top.remedy}")
         said.append(
