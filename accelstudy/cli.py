@@ -15,6 +15,7 @@ from accelstudy.campaign.importing_cli import import_command, public_command
 from accelstudy.campaign.simulating_cli import simulate_campaign_command
 from accelstudy.diagnosis.command import diagnose_command
 from accelstudy.errors import InputError
+from accelstudy.optimal.command import design_command
 from accelstudy.options import (
     ANGLE_UNIT,
     PATH,
@@ -41,7 +42,7 @@ SECTIONS = {
         "export",
     ),
     "What a calibration is worth": ("pole",),
-    "What there is to choose from": ("models", "effects", "schemes", "scheme"),
+    "What there is to choose from": ("models", "effects", "schemes", "scheme", "design"),
     "Studies": ("cells", "claims", "config-schema"),
 }
 """Commands in the order of use."""
@@ -296,6 +297,7 @@ for command in (
     simulate_campaign_command,
     diagnose_command,
     pole_command,
+    design_command,
     *COMMANDS,
 ):
     main.add_command(command)

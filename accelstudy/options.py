@@ -86,13 +86,24 @@ class Quantity(click.ParamType):  # type: ignore[type-arg]
             raise InputError(f"{param.opts[0]}: {error}" if param else str(error)) from None
 
 
+class SchemeName(Name):
+    """A scheme: a name, or a file, of which the shell completes paths if no name fits."""
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """Schemes, or files if no name begins with what was typed."""
+        found = super().shell_complete(ctx, param, incomplete)
+        return found or [CompletionItem(incomplete, type="file")]
+
+
 ANGLE_UNIT = Name("angle_unit", "accelstudy.units", "ANGLE_UNITS")
 APPROACH = Name("approach", "accelstudy.approaches", "approach_names")
 EFFECT = Name("effect", "accelstudy.effects", "effect_names")
 GROSS_ERROR = Name("gross_error", "accelstudy.gross_errors", "gross_error_names")
 MODEL = ModelName("model", "accelstudy.models", "MODELS")
 NOISE_EFFECT = Name("noise_effect", "accelstudy.noise_effects", "noise_effect_names")
-SCHEME = Name("scheme", "accelstudy.schemes", "scheme_names")
+SCHEME = SchemeName("scheme", "accelstudy.schemes", "scheme_names")
 SENSOR = Name("sensor", "accelstudy.data_sheets", "data_sheet_names")
 
 model_option = click.option(

@@ -266,7 +266,7 @@ def test_claims(tmp_path):
     ("arguments", "expected"),
     [
         (["scheme", "mclaren-42"], "unknown scheme 'mclaren-42'"),
-        (["scheme", "../etc"], "unknown scheme"),
+        (["scheme", "../etc"], "../etc: No such file"),
         (["schemes", "faces-6", "nothing"], "unknown scheme 'nothing'"),
         (["schemes", "--model", "bias-scales"], "did you mean 'bias-scale'?"),
         (["schemes", "--approach", "robots"], "did you mean 'robot'?"),

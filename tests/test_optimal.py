@@ -260,7 +260,7 @@ def test_attitudes_of_a_cube_of_a_hand_and_of_a_file(tmp_path):
     )
     task = Task(NINE, get_approach("robot"))
     criterion = get_criterion("I", task)
-    with pytest.raises(InputError, match=r"the allowed attitudes do not determine the model: rank"):
+    with pytest.raises(InputError, match=r"the allowed attitudes do not suffice: rank"):
         optimal_design(task, criterion, 9, Listed(listed.points[:2], "two"))
     for text, wrong in {
         "a,b\n1,2\n": "expected x, y, z; roll_gon, pitch_gon",
@@ -280,7 +280,9 @@ def test_what_cannot_be_is_said_in_one_line():
     ):
         optimal_design(task, criterion, 9, constraints=Constraints((), LeastAngle(150 * GON)))
     nowhere = Constraints((PitchRange(90 * GON, 100 * GON), OffPole(30 * GON)))
-    with pytest.raises(InputError, match="no attitude is left of all attitudes with pitch from 90"):
+    with pytest.raises(
+        InputError, match="no attitude is left of all attitudes with pitch from 90 gon"
+    ):
         optimal_design(task, criterion, 9, constraints=nowhere)
     with pytest.raises(InputError, match=r"depends on the order of the positions \(step_x\)"):
         Task(get_model("bias-scale+hysteresis"), GRAVITY)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.optimal.spaces import attitudes
-from accelstudy.units import GON
+from accelstudy.units import attitude_unit, to_attitude
 
 Array = NDArray[np.float64]
 
@@ -47,7 +47,7 @@ class RollRange(Constraint):
     @property
     def text(self) -> str:  # type: ignore[override]
         """Ends of the range."""
-        return f"roll from {self.least / GON:g} to {self.most / GON:g} gon"
+        return f"roll from {_shown(self.least)} to {_shown(self.most)}"
 
     def margins(self, directions: Array) -> Array:
         """Angles to both ends."""
@@ -65,7 +65,7 @@ class PitchRange(Constraint):
     @property
     def text(self) -> str:  # type: ignore[override]
         """Ends of the range."""
-        return f"pitch from {self.least / GON:g} to {self.most / GON:g} gon"
+        return f"pitch from {_shown(self.least)} to {_shown(self.most)}"
 
     def margins(self, directions: Array) -> Array:
         """Angles to both ends."""
@@ -82,7 +82,7 @@ class OffPole(Constraint):
     @property
     def text(self) -> str:  # type: ignore[override]
         """Least distance."""
-        return f"at least {self.angle / GON:g} gon from the roll pole"
+        return f"at least {_shown(self.angle)} from the roll pole"
 
     def margins(self, directions: Array) -> Array:
         """Angle to the nearer pole, beyond the least one."""
@@ -99,7 +99,7 @@ class LeastAngle:
     @property
     def text(self) -> str:
         """The angle."""
-        return f"at least {self.angle / GON:g} gon between positions"
+        return f"at least {_shown(self.angle)} between positions"
 
     def apart(self, directions: Array, others: Array) -> NDArray[np.bool_]:
         """Which of k directions are far enough from which of the others, (k, j)."""
@@ -142,3 +142,7 @@ class Constraints:
         near = ~self.pair.apart(directions, directions)
         np.fill_diagonal(near, False)
         return not near.any()
+
+
+def _shown(angle: float) -> str:
+    return f"{float(to_attitude(angle)):.6g} {attitude_unit()}"

@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 
 RIDGE = 1e-12
 """Added to scaled normal matrices, so that a singular one has a huge variance instead of none."""
+INVISIBLE = 1e-8
+"""Scaled information below which an effect does not show."""
 
 
 class Criterion(ABC):
@@ -31,11 +33,13 @@ class Criterion(ABC):
     name : str
     text : str, what it minimises, for people
     convex : bool
+    estimated : (u,) array of bool, which parameters the model has
     """
 
     name: ClassVar[str]
     text: ClassVar[str]
     convex: ClassVar[bool] = True
+    estimated: NDArray[np.bool_]
 
     @abstractmethod
     def value(self, normal: Array) -> Array:
@@ -48,6 +52,15 @@ class Criterion(ABC):
     def efficiency(self, value: float, best: float) -> float:
         """How much of the number of positions would suffice if the best were reached."""
         return float(np.exp(best - value))
+
+    @property
+    def unknowns(self) -> int:
+        """Number of parameters that the positions must determine."""
+        return int(np.count_nonzero(self.estimated))
+
+    def blind(self, normal: Array) -> str:
+        """What else a normal matrix leaves undetermined; empty if nothing."""
+        return ""
 
 
 @dataclass(frozen=True)
@@ -177,11 +190,11 @@ class Rivals(Criterion):
 
     Attributes
     ----------
-    model : (u,) array of bool, parameters of the model
+    estimated : (u,) array of bool
     first, second : (u,) arrays of bool, parameters of the rivals
     """
 
-    model: NDArray[np.bool_]
+    estimated: NDArray[np.bool_]
     first: NDArray[np.bool_]
     second: NDArray[np.bool_]
 
@@ -215,9 +228,20 @@ class Rivals(Criterion):
         v = np.concatenate(vectors, axis=1)
         return np.asarray(-(v * weights) @ v.T / np.sum(np.sqrt(weights)))
 
+    @property
+    def unknowns(self) -> int:
+        """The model's, those of the larger rival, and one of the other."""
+        rival = max(np.count_nonzero(self.first), np.count_nonzero(self.second))
+        return int(np.count_nonzero(self.estimated) + rival + 1)
+
+    def blind(self, normal: Array) -> str:
+        """Whether a parameter of one effect is the other, or nothing."""
+        left = self.left(normal)
+        return "they do not tell the two effects apart" if left.min() < INVISIBLE else ""
+
     def _parts(self) -> list[tuple[NDArray[np.int_], NDArray[np.int_]]]:
         pairs = ((self.first, self.second), (self.second, self.first))
-        return [(np.flatnonzero(a), np.flatnonzero(self.model | b)) for a, b in pairs]
+        return [(np.flatnonzero(a), np.flatnonzero(self.estimated | b)) for a, b in pairs]
 
 
 def get_criterion(name: str, task: Task) -> Criterion:

@@ -87,6 +87,8 @@ def optimal_design(
         order = np.argsort([value for _, value in found], kind="stable")[:3]
         found = [_best(task, criterion, parts[i], constraints, n, seed, starts) for i in order]
     directions, value = _first_best(found)
+    if reason := undetermined(task, criterion, directions):
+        raise InputError(f"no {n} positions of {space.text} were found that suffice: {reason}")
     bound = efficiency = np.nan
     if bounded and criterion.convex:
         bound = continuous_optimum(task, criterion, space, constraints, n).bound
@@ -124,15 +126,20 @@ def _first_best(found: list[tuple[Array, float]]) -> tuple[Array, float]:
 
 
 def _check_determined(task: Task, criterion: Criterion, directions: Array, n: int) -> None:
-    if reason := task.missing(directions):
-        raise InputError(f"the allowed attitudes do not determine the model: {reason}")
-    unknowns = int(np.count_nonzero(task.estimated)) - np.linalg.matrix_rank(task.prior)
-    least = -(-unknowns // task.approach.n_conditions)
+    if reason := undetermined(task, criterion, directions):
+        raise InputError(f"the allowed attitudes do not suffice: {reason}")
+    known = int(np.linalg.matrix_rank(task.prior))
+    least = -(-(criterion.unknowns - known) // task.approach.n_conditions)
     if n < least:
         raise InputError(
-            f"{n} positions do not determine {int(np.count_nonzero(task.estimated))} parameters; "
+            f"{n} positions do not determine {criterion.unknowns} parameters; "
             f"at least {least} are needed"
         )
+
+
+def undetermined(task: Task, criterion: Criterion, directions: Array) -> str:
+    """Why positions do not determine what is wanted; empty if they do."""
+    return task.missing(directions) or criterion.blind(task.normal(directions))
 
 
 def _shown(constraints: Constraints) -> str:

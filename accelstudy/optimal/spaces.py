@@ -117,9 +117,9 @@ class Mountings(Space):
 
     @property
     def text(self) -> str:  # type: ignore[override]
-        """What is turned about what."""
-        shown = "; ".join(" ".join(f"{c:g}" for c in axis) for axis in self.axes)
-        return f"{self.count} mountings, each turned about one horizontal axis ({shown})"
+        """How many of them."""
+        one = self.count == 1
+        return f"{self.count} {'mounting' if one else 'mountings, each'} turned about one axis"
 
     def directions(self, count: int) -> Array:
         """Even steps about each axis."""

@@ -4,6 +4,7 @@ To add one, write a module next to this file with a function under `register`.
 """
 
 from accelstudy.registry import import_modules
+from accelstudy.schemes.files import is_scheme_file
 from accelstudy.schemes.registry import (
     Scheme,
     Status,
@@ -19,6 +20,7 @@ __all__ = [
     "Status",
     "UnknownSchemeError",
     "get_scheme",
+    "is_scheme_file",
     "register",
     "scheme_families",
     "scheme_names",

@@ -174,14 +174,14 @@ def register(
     return decorate
 
 
-@lru_cache
 def get_scheme(name: str) -> Scheme:
-    """Look up a scheme by its name.
+    """Look up a scheme by its name, or read it from a file.
 
     Parameters
     ----------
     name : str
-        One of `scheme_names()`, or a member of a family such as "fibonacci-60".
+        One of `scheme_names()`, a member of a family such as "fibonacci-60", the path of a YAML
+        file with a scheme, or the name that such a scheme has got when it was read.
 
     Returns
     -------
@@ -191,7 +191,18 @@ def get_scheme(name: str) -> Scheme:
     ------
     UnknownSchemeError
         If there is no such scheme. The message lists what there is.
+    InputError
+        If a file cannot be read, or holds no scheme.
     """
+    from accelstudy.schemes.files import is_scheme_file, known_scheme, scheme_of_file
+
+    if is_scheme_file(name):
+        return scheme_of_file(name)
+    return known_scheme(name) or _registered(name)
+
+
+@lru_cache
+def _registered(name: str) -> Scheme:
     # A scheme registered under its very name goes before a family that the name fits.
     for entry in sorted(_entries.values(), key=lambda entry: _is_family(entry.template)):
         if scheme := entry.scheme(name):

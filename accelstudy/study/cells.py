@@ -17,6 +17,7 @@ from accelstudy.hold_plan import HoldPlan
 from accelstudy.models import compose, get_model
 from accelstudy.noise_effects import get_noise_effect
 from accelstudy.schemes import Scheme, get_scheme, scheme_names
+from accelstudy.schemes.files import known_scheme
 from accelstudy.sensor import SensorModel
 from accelstudy.simulation import Noise
 from accelstudy.study.compiling import with_compiled
@@ -45,6 +46,7 @@ class Cell:
     gravity : float, true local gravity, m/s²
     truth : dict of parameter name to true value, SI
     holds : HoldPlan, conditions of the holds
+    directions : tuple of (x, y, z), of a scheme that was read from a file; None of any other
     compiled : bool, whether compiled code calibrates it; see `accelstudy.study.compiling`
     """
 
@@ -60,6 +62,7 @@ class Cell:
     truth: dict[str, float]
     holds: HoldPlan
     compiled: bool = False
+    directions: tuple[tuple[float, ...], ...] | None = None
 
     @property
     def estimated_model(self) -> SensorModel:
@@ -76,7 +79,9 @@ class Cell:
     @property
     def positions(self) -> Scheme:
         """The scheme."""
-        return get_scheme(self.scheme)
+        if self.directions is None:
+            return get_scheme(self.scheme)
+        return Scheme(self.scheme, self.scheme, np.array(self.directions), "generated", "")
 
     @property
     def conditions(self) -> Approach:
@@ -127,7 +132,9 @@ class Cell:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data, from which `from_dict` makes the cell again."""
-        return json.loads(json.dumps(asdict(self)))
+        data = json.loads(json.dumps(asdict(self)))
+        # What few set-ups have is no part of the others, so that their results stay up to date.
+        return {key: value for key, value in data.items() if value is not None}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Cell:
@@ -139,6 +146,7 @@ class Cell:
                 "simulated_effects": tuple(data["simulated_effects"]),
                 "noise": Noise(**_tuples(data["noise"])),
                 "holds": HoldPlan(**_tuples(data["holds"])),
+                "directions": _rows(data.get("directions")),
             }
         )
 
@@ -146,6 +154,10 @@ class Cell:
 def _tuples(data: Mapping[str, Any]) -> dict[str, Any]:
     """Plain data with tuples for lists."""
     return {k: tuple(v) if isinstance(v, list) else v for k, v in data.items()}
+
+
+def _rows(data: Any) -> tuple[tuple[float, ...], ...] | None:
+    return None if data is None else tuple(map(tuple, data))
 
 
 def study_cells(study: StudyConfig) -> list[Cell]:
@@ -212,6 +224,7 @@ def _grid_cells(study: StudyConfig, grid: Grid) -> Iterable[Cell]:
             gravity=study.gravity_mps2,
             truth=study.truth(dict.fromkeys([*effects, *simulated])),
             holds=study.hold_plan,
+            directions=_rows(own.directions.tolist()) if (own := known_scheme(scheme)) else None,
         )
 
 

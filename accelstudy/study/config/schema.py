@@ -41,6 +41,7 @@ from accelstudy.study.config.types import (
     Rate,
     Replicates,
     Resamples,
+    SchemeName,
     Seed,
     SigmaAngle,
     SigmaForce,
@@ -141,7 +142,9 @@ class Grid(Block):
         description="models: names, compositions as bias-scale+warm_up(tau=300), YAML files with a "
         "model; or all"
     )
-    schemes: OneOrMore[str] = Field(description="names of schemes, or all")
+    schemes: OneOrMore[SchemeName] = Field(
+        description="schemes: names, YAML files as `accelstudy design` writes them; or all"
+    )
     approaches: OneOrMore[str] = Field(
         default=["gravity", "robot"], description="names of approaches, or all"
     )
@@ -184,7 +187,7 @@ class SensitivityConfig(Block):
     roll_gon: OneOrMore[Angle] = Field(description="rolls of the grid")
     pitch_gon: OneOrMore[Pitch] = Field(description="pitches of the grid")
     model: ModelName = Field("bias-scale-nonorthogonality", description="model of figures 5 and 6")
-    scheme: str = Field("mclaren-24", description="scheme whose calibration gives the sds")
+    scheme: SchemeName = Field("mclaren-24", description="scheme whose calibration gives the sds")
 
 
 _NAME = "[A-Za-z0-9][A-Za-z0-9_-]*"

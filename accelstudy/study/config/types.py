@@ -33,8 +33,16 @@ def _model_name(text: str) -> str:
     return text if re.fullmatch(r"[\w-]+", text) else get_model(text).name
 
 
+def _scheme_name(text: str) -> str:
+    from accelstudy.schemes import get_scheme, is_scheme_file  # as above
+
+    return get_scheme(text).name if is_scheme_file(text) else text
+
+
 ModelName = Annotated[str, AfterValidator(_model_name)]
 """A model by its name; a composition and a file have the name that their effects give them."""
+SchemeName = Annotated[str, AfterValidator(_scheme_name)]
+"""A scheme by its name; that of a file has a name that tells of its content."""
 PathName = Annotated[str, AfterValidator(check_path_name)]
 Number = BeforeValidator(_no_truth_value)
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False), Number]

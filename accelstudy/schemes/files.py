@@ -1,0 +1,102 @@
+"""Schemes in YAML files, such as `accelstudy design` writes.
+
+A scheme of a file has the name that stands in it, with a digest of its directions: what is computed
+with it depends on what the file holds, and not on where it lies.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from accelstudy.errors import InputError, UnknownNameError
+from accelstudy.names import check_path_name
+from accelstudy.schemes.registry import Scheme
+
+KEYS = ("scheme", "title", "source", "directions", "positions", "design")
+"""Of a file; only `directions` must be there, and the last two are for people."""
+
+_read: dict[str, Scheme] = {}
+
+
+def is_scheme_file(text: str) -> bool:
+    """Whether a text that names a scheme is a path: it has a separator or ends in .yaml or .yml."""
+    return re.fullmatch(rf".*(?:\.ya?ml|[/{re.escape(os.sep)}].*)", text) is not None
+
+
+def scheme_of_file(path: str | Path) -> Scheme:
+    """Read a scheme; from then on `known_scheme` knows it by its name.
+
+    Raises
+    ------
+    InputError
+        One line that names the file, the key, what is wrong and what would be right.
+    """
+    from accelstudy.study.config.layers import read_layer  # its package needs all schemes
+
+    content = read_layer(path)
+    try:
+        scheme = parse_scheme(content, Path(path).stem)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    return _read.setdefault(scheme.name, scheme)
+
+
+def known_scheme(name: str) -> Scheme | None:
+    """Return a scheme that was read from a file before, by its name with the digest."""
+    return _read.get(name)
+
+
+def parse_scheme(content: Mapping[str, Any], name: str) -> Scheme:
+    """Make a scheme of what a file holds.
+
+    Parameters
+    ----------
+    content : mapping
+    name : str, of a scheme that does not say its own
+    """
+    for key in content:
+        if key not in KEYS:
+            raise UnknownNameError("key", key, KEYS)
+    texts = {
+        "scheme": re.sub(r"[^\w.-]+", "-", name).lstrip(".-") or "scheme",
+        "title": "of a file",
+        "source": "",
+        **{key: content[key] for key in KEYS[:3] if content.get(key) is not None},
+    }
+    for key, text in texts.items():
+        if not isinstance(text, str):
+            raise InputError(f"{key}: must be a text")
+    try:
+        check_path_name(texts["scheme"])
+    except InputError as error:
+        raise InputError(f"scheme: {error}") from None
+    directions = _directions(content.get("directions"))
+    unnamed = Scheme("", "", directions, "generated", "")
+    digest = hashlib.sha256(unnamed.directions.tobytes()).hexdigest()[:8]
+    return Scheme(
+        name=f"{texts['scheme']}@{digest}",
+        title=f"{len(directions)} {texts['title']}",
+        directions=unnamed.directions,
+        status="generated",
+        source=texts["source"],
+    )
+
+
+def _directions(given: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
+    wrong = "directions: must be a list of rows of three numbers, gravity in the body frame"
+    if not isinstance(given, Sequence) or isinstance(given, str) or not given:
+        raise InputError(wrong)
+    for number, row in enumerate(given, start=1):
+        numbers = isinstance(row, Sequence) and all(
+            isinstance(x, int | float) and not isinstance(x, bool) for x in row
+        )
+        if not numbers or len(row) != 3 or not 0 < np.linalg.norm(row) < np.inf:
+            raise InputError(f"{wrong}; row {number} is not")
+    return np.asarray(given, dtype=float)
