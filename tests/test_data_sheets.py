@@ -13,6 +13,7 @@ from accelstudy.data_sheets import (
     of_sigma,
     parse_data_sheet,
 )
+from accelstudy.data_sheets.flicker import FLICKER, flicker_change
 from accelstudy.errors import InputError
 from accelstudy.units import STANDARD_GRAVITY
 
@@ -64,6 +65,27 @@ def test_the_bias_changes_with_time_temperature_and_switching_on():
     assert sheet.bias_change(3600.0) == pytest.approx(6e-4)
     assert sheet.bias_change(3600.0, 10.0) == pytest.approx(math.hypot(6e-4, 1e-2))
     assert sheet.bias_change(0.0, restarted=True) == pytest.approx(5e-3)
+
+
+def test_flicker_noise_carries_the_bias_ever_farther():
+    """Against the integral over its density, of two means of τ that begin m τ apart."""
+    instability, tau = 2e-4, 50.0
+    white = FLICKER * instability * math.sqrt(tau)
+    f = np.geomspace(1e-9, 1e2, 2_000_001)
+    mean = 2 * np.sinc(f * tau) ** 2 * instability**2 / (2 * np.pi * f)  # of ±f
+    for m in (1, 3, 100):
+        variance = np.trapezoid(mean * 4 * np.sin(np.pi * f * m * tau) ** 2, f)
+        change = flicker_change(instability, white, m * tau)
+        assert change == pytest.approx(math.sqrt(variance), rel=2e-3)
+    # Next to each other two means differ by the Allan deviation; shorter ones by no less.
+    beside = math.sqrt(2) * FLICKER * instability
+    assert flicker_change(instability, white, tau) == pytest.approx(beside)
+    assert flicker_change(instability, white, 1e-3) == pytest.approx(beside)
+    far = flicker_change(instability, white, 1e9)
+    assert far == pytest.approx(instability * math.sqrt((2 * math.log(2e7) + 3) / math.pi))
+    sheet = DataSheet("s", velocity_random_walk=white, bias_instability=instability)
+    assert sheet.bias_change(100 * tau) == flicker_change(instability, white, 100 * tau)
+    assert sheet.bias_change(0.0) == 0
 
 
 def test_a_nonlinearity_is_taken_as_a_parabola_or_a_cubic_of_the_same_deviation():

@@ -6,11 +6,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from accelstudy.data_sheets.flicker import FLICKER, flicker_change
 from accelstudy.errors import InputError
 from accelstudy.units import STANDARD_GRAVITY
-
-FLICKER = math.sqrt(2 * math.log(2) / math.pi)
-"""Floor of the Allan deviation in parts of the bias instability B, 0.664 (IEEE Std 952)."""
 
 QUANTITIES: dict[str, tuple[str, str]] = {
     "velocity_random_walk": ("m/s^2/sqrt(Hz)", "white noise: the mean of τ s has the sd N/√τ"),
@@ -112,8 +110,8 @@ class DataSheet:
     def bias_change(self, seconds: float, kelvin: float = 0.0, restarted: bool = False) -> float:
         """Standard deviation of the bias's change since the calibration, m/s².
 
-        It is √(2 (0.664 B)² + K² t + (b_T ΔT)² + repeatability²); what is not known counts as
-        zero, and `unknown` tells what that is.
+        It is √(F² + K² t + (b_T ΔT)² + repeatability²) with F of `flicker_change`; what is not
+        known counts as zero, and `unknown` tells what that is.
 
         Parameters
         ----------
@@ -121,7 +119,9 @@ class DataSheet:
         kelvin : float, K, by which the temperature differs from that of the calibration
         restarted : bool, whether the sensor was switched off in the meantime
         """
-        floor = math.sqrt(2) * FLICKER * (self.bias_instability or 0.0) if seconds > 0 else 0.0
+        floor = flicker_change(
+            self.bias_instability or 0.0, self.velocity_random_walk or 0.0, seconds
+        )
         walk = (self.acceleration_random_walk or 0.0) * math.sqrt(seconds)
         warm = (self.bias_per_kelvin or 0.0) * kelvin
         again = (self.repeatability or 0.0) if restarted else 0.0
