@@ -145,6 +145,11 @@ def display_unit(unit: str) -> str:
     return ANGLE_UNITS[attitude_unit()] if unit == "rad" else recorded_unit(unit)
 
 
+def unit_label(unit: str) -> str:
+    """Return a unit as it is printed."""
+    return unit.replace("^2", "²").replace("ug", "µg")
+
+
 def to_display(value: ArrayLike, unit: str) -> NDArray[np.float64]:
     """Convert `value` from the SI `unit` into the unit shown to people."""
     return _converted(value, unit, display_unit(unit))

@@ -21,7 +21,7 @@ from study_helpers import (
 from accelstudy.figures import figure_tables
 from accelstudy.models import get_model
 from accelstudy.sensitivity import leveling_sensitivity
-from accelstudy.study.analysis import analyse_shapley, draw_figure, judge_claims
+from accelstudy.study.analysis import analyse_shapley, draw_figures, judge_claims
 from accelstudy.study.cells import study_cells
 from accelstudy.study.claims import NOT_REPRODUCED, REPRODUCED, SLIP, evidence_from, judge
 from accelstudy.study.distributions import Sample
@@ -348,6 +348,6 @@ def test_a_figure_as_the_workflow_draws_it(tables, folder, tmp_path):
     assert set(figure_tables("figure-7")) == {"summary", "quantiles"}
     paths = {name: folder / f"{name}.parquet" for name in figure_tables("figure-7")}
     svg, png = tmp_path / "figure-7.svg", tmp_path / "figure-7.png"
-    draw_figure(make_study(**KEYS), "figure-7", paths, svg, png)
+    draw_figures(make_study(**KEYS), ["figure-7"], paths, tmp_path)
     assert "<svg" in svg.read_text(encoding="utf-8")
     assert png.read_bytes().startswith(b"\x89PNG")

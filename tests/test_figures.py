@@ -1,5 +1,7 @@
 """Figures draw from the tables of a study, small or incomplete, and show the right numbers."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +15,6 @@ from accelstudy.effects import effect_names
 from accelstudy.errors import InputError
 from accelstudy.figures import (
     draw,
-    figure,
     figure_names,
     figure_tables,
     get_figure,
@@ -21,9 +22,10 @@ from accelstudy.figures import (
     style,
     total_effects,
 )
+from accelstudy.figures.entries import TABLES
 from accelstudy.figures.factors import FACTORS
 from accelstudy.models import MODELS
-from accelstudy.study.analysis import analyse_sensitivity, analyse_shapley
+from accelstudy.study.analysis import analyse_sensitivity, analyse_shapley, draw_figures
 from accelstudy.study.config import StudyConfig, parse_study
 from accelstudy.study.tables import read_table
 
@@ -73,7 +75,7 @@ def run(keys: dict, folder: Path) -> dict[str, pd.DataFrame]:
 
 @pytest.fixture(autouse=True)
 def _few_pixels(monkeypatch):
-    monkeypatch.setattr("accelstudy.figures.registry.DPI", 40)
+    monkeypatch.setattr("accelstudy.figures.style.DPI", 40)
 
 
 @pytest.fixture(scope="module")
@@ -114,10 +116,14 @@ def test_a_paper_study_has_the_figures_of_the_paper_and_of_every_study():
 
 @pytest.mark.parametrize("name", [*ALL, *OTHERS])
 def test_every_figure_has_a_caption_and_a_title(name):
-    caption = CAPTIONS / f"{get_figure(name).caption}.rst"
-    assert len(caption.read_text(encoding="utf-8").split()) > 20
-    assert get_figure(name).title
-    assert get_figure(name).category
+    entry = get_figure(name)
+    caption = (CAPTIONS / f"{entry.caption}.rst").read_text(encoding="utf-8")
+    assert len(caption.split()) > 20
+    assert caption.endswith(f'\n{{{{ snakemake.params.notes["{entry.caption}"] }}}}\n')
+    assert entry.title
+    assert entry.category
+    assert set(entry.tables) <= set(TABLES)
+    assert callable(entry.draw)
 
 
 def test_every_caption_has_a_figure():
@@ -366,8 +372,25 @@ def test_an_unknown_figure_is_an_input_error_that_names_a_near_one():
         get_figure("figure-22")
 
 
-def test_a_name_is_registered_once_and_needs_known_tables():
-    with pytest.raises(ValueError, match="twice"):
-        figure("figure-2", title="", category="")
-    with pytest.raises(ValueError, match="no such tables: nothing"):
-        figure("new", title="", category="", tables=("nothing",))
+def test_a_figure_that_cannot_be_drawn_is_named(tables, paper, tmp_path):
+    tables["summary"].to_parquet(tmp_path / "summary.parquet")
+    tables["quantiles"].iloc[:, :3].to_parquet(tmp_path / "quantiles.parquet")
+    paths = {name: tmp_path / f"{name}.parquet" for name in ("summary", "quantiles")}
+    with pytest.raises(KeyError) as error:
+        draw_figures(paper, ["closed-forms", "figure-7"], paths, tmp_path)
+    assert "the figure 'figure-7'" in error.value.__notes__[0]
+    assert {path.stem for path in tmp_path.glob("*.svg")} == {"closed-forms"}
+
+
+IMPORTED = """\
+import sys
+import accelstudy.figures, accelstudy.study.earlier, accelstudy.study.effort, accelstudy.study.job
+print([name for name in ("matplotlib", "pandas", "scipy.stats") if name in sys.modules])
+"""
+
+
+def test_the_start_of_the_workflow_loads_nothing_that_draws():
+    ran = subprocess.run(
+        [sys.executable, "-c", IMPORTED], capture_output=True, text=True, check=True
+    )
+    assert ran.stdout.strip() == "[]"

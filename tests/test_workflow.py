@@ -18,6 +18,7 @@ from study_helpers import NINE, grid
 
 import accelstudy
 from accelstudy.errors import InputError
+from accelstudy.figures import get_figure
 from accelstudy.study import provenance
 from accelstudy.study.provenance import check_writable, code_hash
 from accelstudy.study.tables import TABLES, read_origin, read_table
@@ -201,9 +202,7 @@ def planned(folder, environment=ENVIRONMENT, config=TINY):
 
 def test_dry_run(tmp_path):
     plan = planned(tmp_path)
-    figures = plan.pop("figure", 0)
-    assert plan == {"simulate": 1, "summarise": 1, "collect": 1}
-    assert figures >= 1
+    assert plan == {"simulate": 1, "summarise": 1, "collect": 1, "figures": 1}
     assert not (tmp_path / "results").exists()
 
 
@@ -224,8 +223,8 @@ def test_an_edit_of_the_package_runs_what_depends_on_it(finished, tmp_path):
         return planned(finished, environment)
 
     drawn = edit("figures/style.py")
-    assert [*drawn] == ["figure"]
-    assert edit("effects/bias.py").keys() >= {"simulate", "summarise", "collect", "figure"}
+    assert [*drawn] == ["figures"]
+    assert edit("effects/bias.py").keys() >= {"simulate", "summarise", "collect", "figures"}
 
 
 STAGES = ("simulate", "summarise", "sensitivity", "claims", "figures")
@@ -353,5 +352,11 @@ def test_report(finished):
         names = archive.namelist()
         (page,) = (name for name in names if name.endswith("report.html"))
         text = archive.read(page).decode()
-    for figure in (finished / "results" / "tiny" / "figures").glob("*.svg"):
+    figures = [*(finished / "results" / "tiny" / "figures").glob("*.svg")]
+    for figure in figures:
         assert figure.name in text
+        assert get_figure(figure.stem).title in text
+        assert get_figure(figure.stem).category in text
+    assert "closed-forms" in {figure.stem for figure in figures}
+    assert "Empirical standard deviation of each parameter" in text  # its caption
+    assert "1 mgon = 0.0009" in text  # what a caption says of the study

@@ -14,11 +14,10 @@ from accelstudy.campaign.figures import correlation_figure, residual_figure
 from accelstudy.campaign.fit import CampaignFit
 from accelstudy.campaign.verdict import next_steps, verdict_lines
 from accelstudy.figures.saving import save_all
-from accelstudy.figures.style import unit_label
 from accelstudy.outputs import whole_file
 from accelstudy.pages import write_page
 from accelstudy.study.report import number
-from accelstudy.units import display_unit, to_display
+from accelstudy.units import display_unit, to_display, unit_label
 
 LISTED = 200
 """Positions up to which the page lists all of them; of more, those that fit worst."""

@@ -1,15 +1,14 @@
 """Figures: each draws tables of a study.
 
-To add one, write a module next to this file with a function under `figure`.
+To add one, write a function that draws it in a module next to this file, an entry in `entries`, and
+a caption in `workflow/report/figures`.
 """
 
+from accelstudy.figures.entries import FigureEntry, Tables
 from accelstudy.figures.registry import (
-    FigureEntry,
-    Tables,
     angle_unit,
-    caption,
+    caption_notes,
     draw,
-    figure,
     figure_names,
     figure_tables,
     get_figure,
@@ -20,9 +19,8 @@ __all__ = [
     "FigureEntry",
     "Tables",
     "angle_unit",
-    "caption",
+    "caption_notes",
     "draw",
-    "figure",
     "figure_names",
     "figure_tables",
     "get_figure",

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MultipleLocator
 from numpy.typing import ArrayLike, NDArray
 
-from accelstudy.figures.registry import Tables, figure
+from accelstudy.figures.entries import Tables
 from accelstudy.figures.style import ANGLE_COLOURS, COLUMN, FULL, new_figure
 from accelstudy.leveling import sigma_roll_pitch, specific_force
 from accelstudy.study.config import StudyConfig
@@ -33,12 +33,6 @@ def shown_sigma(
     return to_display(sigma_roll_pitch(force, sigma[..., None, None] ** 2 * np.eye(3)), "rad")
 
 
-@figure(
-    "figure-2",
-    title="Figure 2: accuracy of roll and pitch over the attitude",
-    category="Paper",
-    when=lambda study: study.paper,
-)
 def accuracy_over_attitude(tables: Tables, study: StudyConfig) -> Figure:
     """Two maps of the standard deviation over roll and pitch."""
     roll, pitch = np.meshgrid(ROLL, PITCH)
@@ -92,12 +86,6 @@ def _contours(ax: Axes, roll: Array, pitch: Array, values: Array) -> None:
     ax.clabel(lines, fmt="%g", fontsize=7, manual=places)
 
 
-@figure(
-    "figure-3",
-    title="Figure 3: accuracy of roll and pitch over the sensor noise",
-    category="Paper",
-    when=lambda study: study.paper,
-)
 def accuracy_over_noise(tables: Tables, study: StudyConfig) -> Figure:
     """Standard deviations in a tilted attitude, with those at the study's noise marked."""
     fig = new_figure(COLUMN, 62)

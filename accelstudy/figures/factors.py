@@ -5,14 +5,16 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
-from accelstudy.figures.style import unit_label
 from accelstudy.study.cells import study_cells
 from accelstudy.study.config import StudyConfig
-from accelstudy.units import MGON, display_unit, to_display
+from accelstudy.units import MGON, display_unit, to_display, unit_label
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -93,6 +95,8 @@ class Block:
 
 def cell_table(study: StudyConfig) -> pd.DataFrame:
     """One row per cell of a study; the robot's noise is NaN where no robot is used."""
+    import pandas as pd  # slow, and studies that vary nothing do without
+
     rows = [
         {
             "cell": cell.name,
@@ -128,6 +132,8 @@ def blocks(study: StudyConfig, factor: Factor) -> list[Block]:
     """
     if not (_names_sizes(study) if factor is POSITIONS else _lists_values(study, factor)):
         return []
+    import pandas as pd
+
     table = cell_table(study)
     by = "family" if factor is POSITIONS else "scheme"
     usual = {
@@ -185,6 +191,13 @@ def _hold(
     rest = tuple(float(value) for value in counts.index if value != chosen)
     levels[other.column] = Level(chosen, rest, usual=bool(at.any()))
     return rows[(rows[other.column] == chosen) | rows[other.column].isna()]
+
+
+def factor_note(study: StudyConfig, factor: Factor) -> str:
+    """Say in a caption what a study holds fixed where it varies a factor."""
+    found = blocks(study, factor)
+    held = list(dict.fromkeys(text for block in found if (text := levels_text(block.levels))))
+    return f"Over the {factor.title}, held fixed: " + "; or ".join(held) + "."
 
 
 def levels_text(levels: Mapping[str, Level]) -> str:

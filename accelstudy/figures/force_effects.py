@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patheffects import Normal, Stroke
 from numpy.typing import ArrayLike, NDArray
 
-from accelstudy.figures.registry import Tables, figure
+from accelstudy.figures.entries import Tables
 from accelstudy.figures.style import FULL, INK, Style, new_figure, say_empty, symbol
 from accelstudy.figures.total_effects import NO_DATA, read_shares
 from accelstudy.leveling import jacobian, specific_force
@@ -30,13 +30,6 @@ HALF: Style = {
 }
 
 
-@figure(
-    "figure-4",
-    title="Figure 4: total effects of the forces on roll and pitch",
-    category="Paper",
-    tables=("sensitivity",),
-    when=lambda study: study.paper,
-)
 def effects_of_forces(tables: Tables, study: StudyConfig) -> Figure:
     """Maps over roll and pitch, one for each output and force, by linear theory and by Sobol."""
     table = read_shares(tables["sensitivity"], "forces")

@@ -12,8 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 from numpy.typing import NDArray
 
-from accelstudy.figures.factors import NOISES, varies
-from accelstudy.figures.registry import Tables, figure
+from accelstudy.figures.entries import Tables
 from accelstudy.figures.style import (
     FULL,
     HATCH,
@@ -42,13 +41,6 @@ NOT_ESTIMABLE: Style = {
 }
 
 
-@figure(
-    "leveling-overview",
-    title="Tilt error that each calibration leaves",
-    category="Study",
-    tables=("cells", "leveling"),
-    when=lambda study: not any(varies(study, noise) for noise in NOISES),
-)
 def tilt_errors(tables: Tables, study: StudyConfig) -> Figure:
     """Matrices of scheme × model, one for each angle and approach, with the rms and its q95."""
     table = _with_tilt(tables["cells"], tables["leveling"])

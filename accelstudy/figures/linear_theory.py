@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from scipy import special
 
-from accelstudy.figures.registry import Tables, figure
+from accelstudy.figures.entries import Tables
 from accelstudy.figures.style import (
     FULL,
     INK,
@@ -31,13 +31,6 @@ GAP = 0.25
 """Between two groups of parameters, which are 1 wide each."""
 
 
-@figure(
-    "closed-forms",
-    title="Monte Carlo against closed forms and linear theory",
-    category="Study",
-    tables=("summary",),
-    angles=False,
-)
 def monte_carlo_against_theory(tables: Tables, study: StudyConfig) -> Figure:
     """Ratios of the empirical to the expected sd: where a closed form exists, and all others."""
     rows = tables["summary"]

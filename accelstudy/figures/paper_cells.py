@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from accelstudy.figures.registry import Tables, figure
+from accelstudy.figures.entries import Tables
 from accelstudy.figures.style import (
     FULL,
     INK,
@@ -27,11 +27,10 @@ from accelstudy.figures.style import (
     say_empty,
     shown,
     symbol,
-    unit_label,
 )
 from accelstudy.models import get_model
 from accelstudy.study.config import StudyConfig
-from accelstudy.units import display_unit
+from accelstudy.units import display_unit, unit_label
 
 APPROACHES = ("gravity", "robot")
 ANNOTATED = 0.005
@@ -40,13 +39,6 @@ WIDTH = 0.36
 """Width of a bar; the parameters are 1 apart."""
 
 
-@figure(
-    "figure-7",
-    title="Figure 7: errors and standard deviations of the two calibrations",
-    category="Paper",
-    tables=("summary", "quantiles"),
-    when=lambda study: study.paper,
-)
 def errors_and_sigmas(tables: Tables, study: StudyConfig) -> Figure:
     """One simulation before the distribution of all, a row of panels for each unit."""
     parameters = _parameters(study)
@@ -173,14 +165,6 @@ def _draw_range(ax: Axes, at: float, low: float, high: float, colour: str) -> No
     )
 
 
-@figure(
-    "figure-8",
-    title="Figure 8: correlations of the parameters of the two calibrations",
-    category="Paper",
-    tables=("correlations",),
-    angles=False,
-    when=lambda study: study.paper,
-)
 def correlations(tables: Tables, study: StudyConfig) -> Figure:
     """Absolute correlations less the identity, from the cofactors of the adjustment."""
     names = [name for name, _ in _parameters(study)]

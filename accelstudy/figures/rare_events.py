@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from accelstudy.figures.registry import Tables, figure
+from accelstudy.figures.entries import Tables
 from accelstudy.figures.style import (
     FULL,
     INK,
@@ -19,10 +19,10 @@ from accelstudy.figures.style import (
     new_figure,
     say_empty,
     shown,
-    unit_label,
 )
 from accelstudy.shares import clopper_pearson
 from accelstudy.study.config import StudyConfig
+from accelstudy.units import unit_label
 
 LINES: Style = {"roll": "-", "pitch": "--"}
 MOST = 3
@@ -30,13 +30,6 @@ MOST = 3
 NONE: Style = {"linestyle": "", "marker": "v", "markersize": 4, "fillstyle": "none"}
 
 
-@figure(
-    "rare-events",
-    title="Tails of the tilt error, and calibrations that fail",
-    category="Study",
-    tables=("cells", "quantiles"),
-    when=lambda study: study.keep == "summary",
-)
 def rare_events(tables: Tables, study: StudyConfig) -> Figure:
     """Tilt error over the share of calibrations that leave more, and shares that do not converge.
 

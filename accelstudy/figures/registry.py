@@ -1,113 +1,46 @@
-"""The registry of figures, and how one is drawn and written."""
+"""The figures by their names, and how one is drawn and written."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
-
-import matplotlib as mpl
-import pandas as pd
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING
 
 from accelstudy.errors import InputError
-from accelstudy.figures.saving import save
-from accelstudy.figures.style import DPI, STYLE
-from accelstudy.registry import Registry, import_modules
+from accelstudy.figures.entries import FigureEntry, Tables, all_figures
+from accelstudy.registry import Registry
 from accelstudy.study.config import StudyConfig
 from accelstudy.units import ANGLE_UNITS, angle_note, angles_in
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 ANGLE_UNIT_VARIABLE = "ACCELSTUDY_ANGLE_UNIT"
-Tables = Mapping[str, pd.DataFrame]
-Draw = Callable[[Tables, StudyConfig], Figure]
-
-TABLES = ("cells", "summary", "correlations", "leveling", "quantiles", "sensitivity", "shapley")
-"""What a figure may ask for."""
-
-
-@dataclass(frozen=True)
-class FigureEntry:
-    """A registered figure.
-
-    Attributes
-    ----------
-    name, title, category : str
-    tables : tuple of str, those of `TABLES` that it draws
-    when : callable, whether a study has this figure
-    caption : str, name of the caption; figures of one kind share one
-    note : callable, what the caption says of this study beside that
-    angles : bool, whether it shows angles, whose unit the caption then explains
-    draw : callable, takes the tables and the study
-    """
-
-    name: str
-    title: str
-    category: str
-    tables: tuple[str, ...]
-    when: Callable[[StudyConfig], bool]
-    caption: str
-    note: Callable[[StudyConfig], str]
-    angles: bool
-    draw: Draw
-
-
-_registry: Registry[FigureEntry] = Registry("figure")
 
 
 @cache
-def _all_figures() -> Registry[FigureEntry]:
-    """All figures; a module registers its own when it is imported, which takes a while."""
-    import_modules(__package__, [str(Path(__file__).parent)])
-    return _registry
+def _registry() -> Registry[FigureEntry]:
+    registry: Registry[FigureEntry] = Registry("figure")
+    for entry in all_figures():
+        registry.add(entry.name, entry)
+    return registry
 
 
 def get_figure(name: str) -> FigureEntry:
     """Return the figure of that name; raise `UnknownNameError` if there is none."""
-    return _all_figures().get(name)
-
-
-def figure(
-    name: str,
-    *,
-    title: str,
-    category: str,
-    tables: tuple[str, ...] = (),
-    when: Callable[[StudyConfig], bool] = lambda study: True,
-    caption: str | None = None,
-    note: Callable[[StudyConfig], str] = lambda study: "",
-    angles: bool = True,
-) -> Callable[[Draw], Draw]:
-    """Register the decorated function as a figure; the arguments are those of `FigureEntry`.
-
-    Raises
-    ------
-    ValueError
-        If the name is taken or a table is not one of `TABLES`.
-    """
-    _registry.check_free(name)
-    if unknown := set(tables) - set(TABLES):
-        raise ValueError(f"figure {name!r}: no such tables: {', '.join(sorted(unknown))}")
-
-    def decorate(function: Draw) -> Draw:
-        entry = FigureEntry(
-            name, title, category, tables, when, caption or name, note, angles, function
-        )
-        _registry.add(name, entry)
-        return function
-
-    return decorate
+    return _registry().get(name)
 
 
 def figure_names(study: StudyConfig) -> tuple[str, ...]:
     """Names of the figures that a study has."""
-    return tuple(sorted(name for name in _all_figures().names() if get_figure(name).when(study)))
+    return tuple(sorted(name for name in _registry().names() if get_figure(name).when(study)))
 
 
-def figure_tables(name: str) -> tuple[str, ...]:
-    """Names of the tables that a figure needs."""
-    return get_figure(name).tables
+def figure_tables(*names: str) -> tuple[str, ...]:
+    """Names of the tables that some figures need."""
+    return tuple(dict.fromkeys(table for name in names for table in get_figure(name).tables))
 
 
 def draw(name: str, tables: Tables, study: StudyConfig) -> Figure:
@@ -119,23 +52,31 @@ def draw(name: str, tables: Tables, study: StudyConfig) -> Figure:
     tables : mapping of table name to table, at least those of `figure_tables`
     study : StudyConfig
     """
+    import matplotlib as mpl
+
+    from accelstudy.figures.style import STYLE
+
+    entry = get_figure(name)
     with mpl.rc_context(STYLE), angles_in(angle_unit(study)):  # type: ignore[arg-type]
-        return get_figure(name).draw(tables, study)
+        return entry.draw(tables, study, **entry.settings)
 
 
-def caption(name: str, text: str, study: StudyConfig) -> str:
-    """Complete the caption of a figure by what it says of this study and by the unit of angles.
+def caption_notes(names: Iterable[str], study: StudyConfig) -> dict[str, str]:
+    """What captions say of a study, by their names: what it varies, and the unit of angles.
 
     Parameters
     ----------
-    name : str
-    text : str, what the caption says of the figure in every study
+    names : names of figures; the notes of those that share a caption are joined
     study : StudyConfig
     """
-    entry = get_figure(name)
+    notes: dict[str, list[str]] = {}
+    angles: dict[str, str] = {}
     with angles_in(angle_unit(study)):
-        parts = [text.strip(), entry.note(study), f"{angle_note()}." if entry.angles else ""]
-    return " ".join(filter(None, parts)) + "\n"
+        for entry in map(get_figure, names):
+            notes.setdefault(entry.caption, []).append(entry.note(study))
+            if entry.angles:
+                angles[entry.caption] = f"{angle_note()}."
+    return {name: " ".join(filter(None, [*its, angles.get(name)])) for name, its in notes.items()}
 
 
 def angle_unit(study: StudyConfig) -> str | None:
@@ -160,4 +101,7 @@ def render(
 
     The same tables give the same bytes. Parameters as in `draw`.
     """
+    from accelstudy.figures.saving import save
+    from accelstudy.figures.style import DPI
+
     save(draw(name, tables, study), svg_path, png_path, get_figure(name).title, DPI)

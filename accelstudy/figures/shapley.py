@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from accelstudy.figures.registry import Tables, figure
+from accelstudy.figures.entries import Tables
 from accelstudy.figures.style import FULL, INK, Style, new_figure, say_empty, symbol
 from accelstudy.figures.total_effects import (
     NO_DATA,
@@ -27,13 +27,6 @@ BAND, TOP = 1.3, 4.5
 PALE: Style = {"linewidth": 3.0, "alpha": 0.3, "solid_capstyle": "butt"}
 
 
-@figure(
-    "shapley",
-    title="Shapley effects on roll and pitch, gravity-based calibration",
-    category="Paper",
-    tables=("shapley",),
-    when=lambda study: study.paper,
-)
 def shapley(tables: Tables, study: StudyConfig) -> Figure:
     """Draw roll at the left and pitch at the right, a row for each pitch that changes an order.
 

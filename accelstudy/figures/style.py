@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.effects import Parameter, effect_names, get_effect
 from accelstudy.models import TITLES, compose
-from accelstudy.units import display_unit, recorded_unit, to_display, to_si
+from accelstudy.units import display_unit, recorded_unit, to_display, to_si, unit_label
 
 MM = 1 / 25.4
 """One millimetre in inches."""
@@ -148,11 +148,6 @@ def group_of(parameter: str) -> str:
 def symbol(parameter: str) -> str:
     """Return the symbol of a parameter (mathtext)."""
     return _parameters()[parameter][1].symbol
-
-
-def unit_label(unit: str) -> str:
-    """Return a unit as it is printed."""
-    return unit.replace("^2", "²").replace("ug", "µg")
 
 
 def shown(values: ArrayLike, unit: str) -> tuple[NDArray[np.float64], str]:

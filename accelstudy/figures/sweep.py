@@ -12,16 +12,14 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
+from accelstudy.figures.entries import Tables
 from accelstudy.figures.factors import (
-    FACTORS,
     POSITIONS,
     Block,
     Factor,
     blocks,
     levels_text,
-    varies,
 )
-from accelstudy.figures.registry import Tables, figure
 from accelstudy.figures.style import (
     FULL,
     INK,
@@ -38,11 +36,10 @@ from accelstudy.figures.style import (
     say_empty,
     shown,
     spread,
-    unit_label,
 )
 from accelstudy.schemes import get_scheme
 from accelstudy.study.config import StudyConfig
-from accelstudy.units import display_unit
+from accelstudy.units import display_unit, unit_label
 
 SYSTEMATIC = "gravity_error_mps2"
 """The quantity whose effect is a bias, which is drawn beside the sd."""
@@ -63,29 +60,9 @@ FAILED_STYLES: dict[str, Style] = {
 }
 
 
-def _register(factor: Factor) -> None:
-    def over_factor(tables: Tables, study: StudyConfig) -> Figure:
-        return _draw(tables, factor, blocks(study, factor))
-
-    figure(
-        f"sweep-{factor.name}",
-        title=f"Standard deviations and tilt error over the {factor.title}",
-        category="Study",
-        tables=("cells", "summary", "leveling"),
-        when=lambda study: varies(study, factor),
-        caption="sweep",
-        note=lambda study: _note(factor, blocks(study, factor)),
-    )(over_factor)
-
-
-for _factor in FACTORS:
-    _register(_factor)
-
-
-def _note(factor: Factor, found: list[Block]) -> str:
-    """Say in the caption what the figure is over and what it holds fixed."""
-    held = list(dict.fromkeys(text for block in found if (text := levels_text(block.levels))))
-    return f"Here the {factor.title} varies. Held fixed: " + "; or ".join(held) + "."
+def over_factor(tables: Tables, study: StudyConfig, factor: Factor) -> Figure:
+    """Panels for each group of parameters and for the tilt error, over one factor."""
+    return _draw(tables, factor, blocks(study, factor))
 
 
 def _draw(tables: Tables, factor: Factor, found: list[Block]) -> Figure:

@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullLocator
 
 from accelstudy.approaches import approach_names
-from accelstudy.figures.registry import Tables, figure
+from accelstudy.figures.entries import Tables
 from accelstudy.figures.style import (
     FULL,
     INK,
@@ -36,13 +36,6 @@ CROSS_AT = 0.9
 PALE = 0.3
 
 
-@figure(
-    "table-1",
-    title="Table 1: published calibrations and what they determine",
-    category="Paper",
-    tables=("summary", "leveling"),
-    when=lambda study: study.presets is not None,
-)
 def published_calibrations(tables: Tables, study: StudyConfig) -> Figure:
     """A row for each preset, a column for each group of parameters and one for the tilt error."""
     assert study.presets is not None

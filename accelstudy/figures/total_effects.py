@@ -13,7 +13,7 @@ from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import NullLocator
 from scipy.optimize import isotonic_regression
 
-from accelstudy.figures.registry import Tables, figure
+from accelstudy.figures.entries import Tables
 from accelstudy.figures.style import (
     FULL,
     HATCH,
@@ -41,24 +41,9 @@ LABEL_APART = 0.06
 NO_DATA = "no total effects"
 
 
-def _register(number: int, output: str, approach: str, suffix: str, kind: str) -> None:
-    """Register figure 5 or 6 for the standard deviations of one calibration."""
-
-    def effects_over_roll(tables: Tables, study: StudyConfig) -> Figure:
-        return _effects_over_roll(read_shares(tables["sensitivity"], approach), output)
-
-    figure(
-        f"figure-{number}{suffix}",
-        title=f"Figure {number}: total effects on {output}, {kind} calibration",
-        category="Paper",
-        tables=("sensitivity",),
-        when=lambda study: study.paper,
-    )(effects_over_roll)
-
-
-for _names in (("gravity", "", "gravity-based"), ("robot", "-robot", "robot-aided")):
-    _register(5, "roll", *_names)
-    _register(6, "pitch", *_names)
+def effects_over_roll(tables: Tables, study: StudyConfig, output: str, approach: str) -> Figure:
+    """Total effects on one output, with the standard deviations of one calibration."""
+    return _effects_over_roll(read_shares(tables["sensitivity"], approach), output)
 
 
 def read_shares(table: pd.DataFrame, analysis: str) -> pd.DataFrame:

@@ -178,20 +178,20 @@ def judge_claims(
         path.write_text(claims_page(claims, by_scheme), encoding="utf-8")
 
 
-def draw_figure(
-    study: StudyConfig,
-    name: str,
-    tables: Mapping[str, Any],
-    svg: str | Path,
-    png: str | Path,
+def draw_figures(
+    study: StudyConfig, names: Sequence[str], tables: Mapping[str, Any], folder: str | Path
 ) -> None:
-    """Draw one figure from tables given by their paths."""
-    from accelstudy.figures import render
+    """Draw figures from tables given by their paths, as SVG and PNG by their names in a folder.
 
-    render(
-        name,
-        {key: read_table(path) for key, path in tables.items()},
-        study,
-        svg,
-        png,
-    )
+    The first that cannot be drawn ends it; the error names that figure.
+    """
+    from accelstudy.figures import figure_tables, render
+
+    read = {name: read_table(tables[name]) for name in figure_tables(*names)}
+    for name in names:
+        path = Path(folder, name)
+        try:
+            render(name, read, study, path.with_suffix(".svg"), path.with_suffix(".png"))
+        except Exception as error:
+            error.add_note(f"This was the figure {name!r}, which a job draws with others.")
+            raise

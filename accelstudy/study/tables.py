@@ -9,15 +9,19 @@ from contextlib import contextmanager
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import pandas as pd
 import pyarrow as pa
 
 from accelstudy import __version__
 from accelstudy.errors import InputError
 from accelstudy.outputs import whole_file
 from accelstudy.parquet import parquet_file, read_parquet, whole_parquet, write_parquet
+
+if (
+    TYPE_CHECKING
+):  # else where it is needed: it is slow to import, and jobs that simulate do without
+    import pandas as pd
 
 METADATA_KEY = b"accelstudy"
 
@@ -112,6 +116,8 @@ def read_table(path: str | Path | Sequence[str | Path], **options: Any) -> pd.Da
         If a file is missing, or is not whole as it was written, or a folder holds files that were
         made with different seeds.
     """
+    import pandas as pd
+
     if not isinstance(path, str | Path):
         return pd.concat([read_table(each, **options) for each in path], ignore_index=True)
     path = Path(path)
@@ -140,6 +146,8 @@ def _check_seeds(paths: Sequence[Path]) -> None:
 
 def collect(parts: Sequence[str | Path], output: str | Path, provenance: Mapping[str, Any]) -> None:
     """Join the parts of a table into one."""
+    import pandas as pd
+
     write_table(output, pd.concat(map(read_table, parts), ignore_index=True), provenance)
 
 

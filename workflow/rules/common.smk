@@ -1,10 +1,15 @@
 from functools import cache
-from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
 
 from accelstudy.errors import InputError
-from accelstudy.figures import angle_unit, caption, figure_names, figure_tables, get_figure
+from accelstudy.figures import (
+    angle_unit,
+    caption_notes,
+    figure_names,
+    figure_tables,
+    get_figure,
+)
 from accelstudy.study.batches import batches
 from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study, read_layer
@@ -49,7 +54,9 @@ WRITTEN = {
 }
 WHOLE = ("moments", "sketches")
 MEMORY = max(1000, round(EFFORT.memory / 1e6))
-CAPTIONS = Path(str(workflow.current_basedir)).parent / "report/figures"
+FIGURES = figure_names(STUDY)
+CELL_FIGURES = [name for name in FIGURES if set(figure_tables(name)) <= {*TABLES}]
+SENSITIVITY_FIGURES = [name for name in FIGURES if name not in CELL_FIGURES]
 ANALYSES = ["forces", "gravity", "robot"]
 FINAL_TABLES = [
     *TABLES,
@@ -104,13 +111,22 @@ def parts_of_claims():
     return {**whole, "estimates": kept}
 
 
-def figure_caption(wildcards):
-    """Text below the figure in the report."""
-    name = wildcards.figure
-    text = (CAPTIONS / f"{get_figure(name).caption}.rst").read_text(encoding="utf-8")
-    return caption(name, text, STUDY)
+def in_report(name):
+    """A figure as the report shows it."""
+    entry = get_figure(name)
+    return report(
+        f"{RESULTS}/figures/{name}.svg",
+        caption=f"../report/figures/{entry.caption}.rst",
+        category=entry.category,
+        labels={"content": entry.title},
+    )
 
 
-def figure_inputs(wildcards):
-    """Tables that a figure needs."""
-    return {table: f"{RESULTS}/{table}.parquet" for table in figure_tables(wildcards.figure)}
+def files_of_figures(names):
+    """What is drawn of figures."""
+    return [*map(in_report, names), *(f"{RESULTS}/figures/{name}.png" for name in names)]
+
+
+def inputs_of_figures(names):
+    """Tables that figures need."""
+    return {table: f"{RESULTS}/{table}.parquet" for table in figure_tables(*names)}

@@ -1,26 +1,41 @@
-rule figure:
+# Many figures in a job, since starting one takes as long as drawing two of them; and two jobs, since
+# those of sensitivity have to wait for it.
+rule figures:
     input:
-        unpack(figure_inputs),
+        **inputs_of_figures(CELL_FIGURES),
     output:
-        svg=report(
-            f"{RESULTS}/figures/{{figure}}.svg",
-            caption="../report/figure.rst",
-            category=lambda wildcards: get_figure(wildcards.figure).category,
-            labels=lambda wildcards: {"content": get_figure(wildcards.figure).title},
-        ),
-        png=f"{RESULTS}/figures/{{figure}}.png",
+        *files_of_figures(CELL_FIGURES),
     log:
-        f"{RESULTS}/logs/figures/{{figure}}.log",
+        f"{RESULTS}/logs/figures.log",
     benchmark:
-        f"{RESULTS}/benchmarks/figures/{{figure}}.tsv"
+        f"{RESULTS}/benchmarks/figures.tsv"
     threads: 1
     resources:
         mem_mb=1000,
     params:
+        figures=CELL_FIGURES,
         study=STUDY.model_dump(mode="json"),
-        caption=figure_caption,
+        notes=caption_notes(CELL_FIGURES, STUDY),
         code=code_hash("figures"),
     message:
-        "Draw {wildcards.figure}"
+        "Draw the figures of the cells"
     script:
-        "../scripts/figure.py"
+        "../scripts/figures.py"
+
+
+use rule figures as sensitivity_figures with:
+    input:
+        **inputs_of_figures(SENSITIVITY_FIGURES),
+    output:
+        *files_of_figures(SENSITIVITY_FIGURES),
+    log:
+        f"{RESULTS}/logs/sensitivity_figures.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/sensitivity_figures.tsv"
+    params:
+        figures=SENSITIVITY_FIGURES,
+        study=STUDY.model_dump(mode="json"),
+        notes=caption_notes(SENSITIVITY_FIGURES, STUDY),
+        code=code_hash("figures"),
+    message:
+        "Draw the figures of sensitivity"

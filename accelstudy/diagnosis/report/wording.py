@@ -13,9 +13,8 @@ from accelstudy.diagnosis.report.missing import (
 )
 from accelstudy.diagnosis.result import Diagnosis, Named
 from accelstudy.effects import effect_names, get_effect
-from accelstudy.figures.style import unit_label
 from accelstudy.study.report import number
-from accelstudy.units import display_unit, to_display
+from accelstudy.units import display_unit, to_display, unit_label
 from accelstudy.wording import joined, p_value, words
 
 GROUPS = {
