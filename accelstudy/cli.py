@@ -26,6 +26,7 @@ from accelstudy.options import (
     model_option,
     quiet_option,
 )
+from accelstudy.plan.command import plan_command
 from accelstudy.pole.command import pole_command
 from accelstudy.progress import say, stage, track
 from accelstudy.units import ANGLE_UNIT_VARIABLE, angles_in
@@ -41,7 +42,7 @@ SECTIONS = {
         "apply",
         "export",
     ),
-    "What a calibration is worth": ("pole",),
+    "Before a calibration, and what it is worth": ("plan", "pole"),
     "What there is to choose from": ("models", "effects", "schemes", "scheme", "design"),
     "Studies": ("cells", "claims", "config-schema"),
 }
@@ -298,6 +299,7 @@ for command in (
     diagnose_command,
     pole_command,
     design_command,
+    plan_command,
     *COMMANDS,
 ):
     main.add_command(command)

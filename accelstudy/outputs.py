@@ -83,7 +83,8 @@ POLE = Kind(
     "pole.json",
     ("budget.parquet", "monte-carlo.parquet", "budget.svg", "budget.png"),
 )
-_KINDS = (BATCH_JOB, DIAGNOSIS, CALIBRATION, CAMPAIGN, POLE)
+PLAN = Kind("plan", "plan.parquet", ("plan.md", "study.yaml", "plan.svg", "plan.png"))
+_KINDS = (BATCH_JOB, DIAGNOSIS, CALIBRATION, CAMPAIGN, POLE, PLAN)
 
 
 @contextmanager

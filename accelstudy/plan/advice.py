@@ -1,0 +1,211 @@
+"""What a plan says beside its numbers: what the model needs, what spoils it, what use adds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.effects import get_effect
+from accelstudy.models import get_model
+from accelstudy.plan.candidates import PLANNED_MODELS, Candidate
+from accelstudy.plan.question import Question
+from accelstudy.plan.theory import OF_RIG, Theory, theory_of
+from accelstudy.sensor import SensorModel
+from accelstudy.simulation import Noise
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Need:
+    """Whether an effect of the sensor must be in the model.
+
+    Attributes
+    ----------
+    effect : str
+    size : float, SI, and where it comes from
+    source : str
+    in_model : bool
+    left : float, rad, rms that neglecting it adds; NaN if it cannot be told
+    cost : float, rad, rms that noise adds where it is estimated, too; NaN if it cannot be
+    verdict : "needed", "worth it", "of no use" or "not needed"
+    """
+
+    effect: str
+    size: float
+    source: str
+    in_model: bool
+    left: float
+    cost: float
+    verdict: str
+
+
+@dataclass(frozen=True)
+class Spoiler:
+    """Size of an effect that would by itself use up the target.
+
+    Attributes
+    ----------
+    effect : str
+    unit : str, SI
+    size : float, SI; inf if no size of it matters
+    usual : (float, float), SI, of good and of cheap equipment
+    verdict : "spoils it", "may spoil it" or "no matter"
+    """
+
+    effect: str
+    unit: str
+    size: float
+    usual: tuple[float, float]
+    verdict: str
+
+
+@dataclass(frozen=True)
+class InUse:
+    """What adds to a calibration's tilt error when the sensor is used; rad, roll or pitch.
+
+    Attributes
+    ----------
+    reading : float, of noise of one reading; NaN if its duration says nothing of it
+    seconds : float, s, duration of the reading
+    drift : float, of the bias since the calibration; NaN if nothing is known
+    hours : float, h
+    warmth : float, of the bias at another temperature; NaN if nothing is known
+    kelvin : float
+    restart : float, of the bias after switching off and on; NaN if nothing is known
+    """
+
+    reading: float
+    seconds: float
+    drift: float
+    hours: float
+    warmth: float
+    kelvin: float
+    restart: float
+
+
+def limits(question: Question, candidate: Candidate) -> str:
+    """What limits the accuracy of a candidate, in a few words."""
+    expected = candidate.expected
+    worse = int(np.argmax(expected.rms))
+    total = float(expected.rms[worse] ** 2)
+    parts = {
+        f"neglected {name.replace('_', ' ')}": float(square[worse]) / total
+        for name, square in expected.neglected.items()
+    }
+    noise = float(expected.noise[worse]) / total
+    if candidate.equipment.name == "robot":
+        quiet = _noise_square(question, candidate, sigma_angle=1e-12)[worse] / total
+        parts["noise of the robot's angles"] = noise - float(quiet)
+        noise = float(quiet)
+    sheet = question.sheet
+    if sheet.velocity_random_walk is not None:
+        white = sheet.velocity_random_walk**2 / candidate.hold / candidate.sigma**2
+        parts["wander of the sensor's bias"] = noise * max(0.0, 1 - white)
+        noise *= min(1.0, white)
+    parts["noise of the sensor"] = noise
+    return max(parts, key=lambda name: parts[name])
+
+
+def needs(question: Question, candidate: Candidate) -> list[Need]:
+    """Say of each effect of the sensor whether it must be in the model for the target."""
+    theory = theory_of(question.tilt_range)
+    rows = _rows(question, theory, candidate)
+    effects = [effect.name for effect in candidate.model.effects]
+    found = []
+    for effect, size in question.sizes.items():
+        if size.value == 0:
+            continue
+        inside = effect in effects
+        without = _model_with(effects, effect, False)
+        including = _model_with(effects, effect, True)
+        alone = theory.expected(rows, without, question.neglectable)
+        more = theory.expected(rows, including, question.neglectable)
+        left = cost = math.nan
+        if alone is not None:
+            left = float(np.sqrt(alone.neglected[effect].max()))
+        if more is not None:
+            quieter = np.zeros(2) if alone is None else alone.noise
+            cost = float(np.sqrt(np.maximum(more.noise - quieter, 0.0).max()))
+        if inside:
+            fails = alone is None or not replace(candidate, expected=alone).reaches(
+                question.target, question.confidence
+            )
+            verdict = "needed" if fails else "worth it" if left > cost else "of no use"
+        else:
+            verdict = "worth it" if left > cost else "not needed"
+        found.append(Need(effect, size.value, size.source, inside, left, cost, verdict))
+    return found
+
+
+def spoilers(question: Question, candidate: Candidate) -> list[Spoiler]:
+    """Sizes of what is not in the model that would by themselves use up the target."""
+    theory = theory_of(question.tilt_range)
+    rows = _rows(question, theory, candidate)
+    inside = {effect.name for effect in candidate.model.effects}
+    effects = [e for e in ("quadratic_scale", "cubic_scale") if e not in inside]
+    if candidate.equipment.name == "robot":
+        # Gravity alone never sees how the sensor is mounted, and is not misled by it either.
+        effects += [] if "cross_axis_misalignment" in inside else ["mounting_rotation"]
+        effects += OF_RIG
+    else:
+        effects.append("gravity_error")
+    found = []
+    for name in effects:
+        effect = get_effect(name)
+        each = float(theory.neglecting(rows, candidate.model, name).max())
+        # What does nothing leaves rounding errors only.
+        size = math.inf if each < 1e-6 else question.target / each
+        low, high = effect.typical
+        verdict = "no matter" if size > high else "may spoil it" if size > low else "spoils it"
+        unit = effect.parameters[0].unit
+        found.append(Spoiler(name, unit, size, (low, high), verdict))
+    return found
+
+
+def in_use(
+    question: Question, seconds: float = 1.0, hours: float = 8.0, kelvin: float = 10.0
+) -> InUse:
+    """What adds to the calibration's part when the sensor is used."""
+    sheet = question.sheet
+    theory = theory_of(question.tilt_range)
+    columns = theory.columns["bias"]
+    square = np.trace(theory.quadratic[:, columns][:, :, columns], axis1=1, axis2=2).max()
+    per_bias = float(np.sqrt(square))  # rad per m/s² of an error of each axis
+    steady = sheet.bias_instability is None and sheet.acceleration_random_walk is None
+    drift = math.nan if steady else sheet.bias_change(hours * 3600) * per_bias
+    warmth = math.nan
+    if sheet.bias_per_kelvin is not None:
+        warmth = sheet.bias_change(0.0, kelvin) * per_bias
+    restart = math.nan
+    if sheet.repeatability is not None:
+        restart = sheet.bias_change(0.0, restarted=True) * per_bias
+    reading = sheet.sigma_mean(seconds) * per_bias
+    return InUse(reading, seconds, drift, hours, warmth, kelvin, restart)
+
+
+def _rows(question: Question, theory: Theory, candidate: Candidate) -> Array:
+    noise = Noise(candidate.sigma, question.sigma_angle)
+    return theory.rows(candidate.scheme.directions, candidate.equipment.name, noise)
+
+
+def _noise_square(question: Question, candidate: Candidate, sigma_angle: float) -> Array:
+    """Mean square that noise leaves, (2,), rad², with another robot."""
+    theory = theory_of(question.tilt_range)
+    noise = Noise(candidate.sigma, sigma_angle)
+    rows = theory.rows(candidate.scheme.directions, candidate.equipment.name, noise)
+    expected = theory.expected(rows, candidate.model, {})
+    return np.zeros(2) if expected is None else expected.noise
+
+
+def _model_with(effects: list[str], effect: str, inside: bool) -> SensorModel:
+    """Model of these effects, with or without one of them."""
+    kept = [name for name in effects if name != effect] + ([effect] if inside else [])
+    for name in PLANNED_MODELS:
+        model = get_model(name)
+        if {e.name for e in model.effects} == set(kept):
+            return model
+    return get_model("+".join(kept))

@@ -1,0 +1,122 @@
+"""Which of the candidates to take: the cheapest that reach the target, checked by simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from accelstudy.plan.candidates import Candidate, candidates
+from accelstudy.plan.question import Question
+from accelstudy.plan.simulated import Simulated, simulate, study_of
+from accelstudy.progress import track
+
+SHOWN = 8
+"""Candidates in the table."""
+SIMULATED = 5
+"""Of which are simulated."""
+OTHER_CONFIDENCE = 0.95
+"""Share of the calibrations that the plan also speaks of where the rms is asked for."""
+TRIES = 12
+"""Candidates of a kind that linear theory takes for good and simulation may refuse."""
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """A candidate in the table, simulated if it stands at the top."""
+
+    candidate: Candidate
+    simulated: Simulated | None = None
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a plan found.
+
+    Attributes
+    ----------
+    question : Question
+    compared : list of Candidate, all of them
+    ranked : list of Ranked, the cheapest of each equipment and model that reach the target, by the
+        time they take; empty if none does
+    stricter : Candidate, the cheapest with the equipment of the first that reaches the target by
+        the other measure (95 % of the calibrations, or the rms); None if there is none
+    seed, replicates : int, of the simulation
+    """
+
+    question: Question
+    compared: list[Candidate]
+    ranked: list[Ranked]
+    stricter: Candidate | None
+    seed: int
+    replicates: int
+
+    @property
+    def first(self) -> Ranked:
+        """What to do: by hand if that reaches the target, else with the robot."""
+        checked = [r for r in self.ranked if r.simulated is not None]
+        by_hand = [r for r in checked if r.candidate.equipment.name == "gravity"]
+        return (by_hand or checked)[0]
+
+    @property
+    def best(self) -> Candidate | None:
+        """The most accurate candidate, whatever it takes."""
+        return min(self.compared, key=self._accuracy, default=None)
+
+    def _accuracy(self, candidate: Candidate) -> float:
+        return candidate.accuracy(self.question.confidence)
+
+    @property
+    def study(self) -> dict[str, object]:
+        """Configuration of the study whose cells are the simulated candidates."""
+        chosen = [self.first, *(r for r in self.ranked if r.simulated and r is not self.first)]
+        return study_of(self.question, [r.candidate for r in chosen], self.seed, self.replicates)
+
+
+def answer(question: Question, seed: int = 1, replicates: int = 10_000) -> Answer:
+    """Compare all calibrations, rank those that reach the target, and simulate the first."""
+    compared = candidates(question)
+    kinds: dict[tuple[str, str], list[Candidate]] = {}
+    for c in by_time(c for c in compared if c.reaches(question.target, question.confidence)):
+        kinds.setdefault(c.kind[:2], []).append(c)
+    top = _in_front(list(kinds))[:SIMULATED]
+    ranked = [Ranked(good[0]) for kind, good in kinds.items() if kind not in top]
+    for kind in track(top, "simulated calibrations"):
+        if checked := _checked(question, kinds[kind], seed, replicates):
+            ranked.append(checked)
+    ranked.sort(key=lambda r: _effort(r.candidate))
+    found = Answer(question, compared, ranked[:SHOWN], None, seed, replicates)
+    if not any(r.simulated for r in ranked):
+        return Answer(question, compared, [], None, seed, replicates)
+    equipment = found.first.candidate.equipment
+    other = OTHER_CONFIDENCE if question.confidence is None else None
+    mine = by_time(c for c in compared if c.equipment == equipment)
+    stricter = next((c for c in mine if c.reaches(question.target, other)), None)
+    return Answer(question, compared, found.ranked, stricter, seed, replicates)
+
+
+def by_time(found: Iterable[Candidate]) -> list[Candidate]:
+    """Candidates by the time they take."""
+    return sorted(found, key=_effort)
+
+
+def _effort(candidate: Candidate) -> tuple[float, float, int]:
+    return candidate.seconds, candidate.rms, candidate.model.n_parameters
+
+
+def _checked(
+    question: Question, good: list[Candidate], seed: int, replicates: int
+) -> Ranked | None:
+    """Cheapest candidate of a kind that reaches the target when it is simulated, too."""
+    for candidate in good[:TRIES]:
+        (result,) = simulate(study_of(question, [candidate], seed, replicates))
+        if result.accuracy(question.confidence) <= question.target:
+            return Ranked(candidate, result)
+    return None
+
+
+def _in_front(kinds: list[tuple[str, str]]) -> list[tuple[str, str]]:
+    """Kinds, the first of each equipment before the others."""
+    first: dict[str, tuple[str, str]] = {}
+    for kind in kinds:
+        first.setdefault(kind[0], kind)
+    return [*first.values(), *(kind for kind in kinds if kind not in first.values())]

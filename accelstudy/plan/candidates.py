@@ -1,0 +1,149 @@
+"""All calibrations that a plan compares, by linear theory."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.models import MODELS, get_model
+from accelstudy.plan.question import Equipment, Question
+from accelstudy.plan.theory import Expected, Theory, theory_of
+from accelstudy.progress import track
+from accelstudy.schemes import Scheme, get_scheme, scheme_names
+from accelstudy.sensor import SensorModel
+from accelstudy.simulation import Noise
+
+Array = NDArray[np.float64]
+
+NINE = "bias-scale-nonorthogonality"
+PLANNED_MODELS = (
+    *MODELS,
+    f"{NINE}-crossaxis+quadratic_scale",
+    f"{NINE}-crossaxis+quadratic_scale+cubic_scale",
+)
+FAMILIES = {
+    "fibonacci": (*range(9, 61), *range(65, 121, 5), *range(140, 401, 20)),
+    "i-optimal": (9, 10, 11, 12, 14, 16, 18, 20, 22, 24, 27, 30, 33, 36, 40, 45, 50, 60),
+}
+"""Families of schemes, and the numbers of positions for which they are tried."""
+LEAST_REDUNDANCY = 0.25
+"""Part of the conditions that must be redundant, or a position in error would not be noticed."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One calibration.
+
+    Attributes
+    ----------
+    equipment : Equipment
+    model : SensorModel
+    scheme : Scheme
+    hold : float, s
+    sigma : float, m/s², of the mean of a position
+    expected : Expected
+    """
+
+    equipment: Equipment
+    model: SensorModel
+    scheme: Scheme
+    hold: float
+    sigma: float
+    expected: Expected
+
+    @property
+    def seconds(self) -> float:
+        """Time in the field, s."""
+        return self.equipment.seconds(self.scheme.n_positions, self.hold)
+
+    @property
+    def kind(self) -> tuple[str, str, str]:
+        """Equipment, model and family: what differs in more than effort."""
+        return self.equipment.name, self.model.name, family_of(self.scheme.name)
+
+    @cached_property
+    def rms(self) -> float:
+        """Larger rms of roll and pitch, rad."""
+        return float(self.expected.rms.max())
+
+    def accuracy(self, confidence: float | None) -> float:
+        """Tilt accuracy by the measure that is asked for, rad."""
+        if confidence is None:
+            return self.rms
+        return float(self.expected.quantile(confidence).max())
+
+    def reaches(self, target: float, confidence: float | None) -> bool:
+        """Whether the tilt accuracy is reached."""
+        # No quantile of interest lies below the rms by much, and the rms is worked out faster.
+        if confidence is not None and confidence >= 0.7 and self.rms > target:
+            return False
+        return self.accuracy(confidence) <= target
+
+
+def family_of(scheme: str) -> str:
+    """Name of a scheme without its number of positions if it is of a family that is tried."""
+    found = re.fullmatch(r"(.+)-\d+", scheme)
+    return found[1] if found and found[1] in FAMILIES else scheme
+
+
+def schemes_for(most_positions: int) -> list[Scheme]:
+    """Schemes of the literature, and members of the families, in the order of their size."""
+    members = (f"{family}-{n}" for family, sizes in FAMILIES.items() for n in sizes)
+    names = {*scheme_names(), *members}
+    schemes = [get_scheme(name) for name in sorted(names)]
+    fitting = [scheme for scheme in schemes if scheme.n_positions <= most_positions]
+    return sorted(fitting, key=lambda scheme: (scheme.n_positions, scheme.name))
+
+
+def candidates(question: Question) -> list[Candidate]:
+    """All calibrations whose positions determine their model and check it."""
+    theory = theory_of(question.tilt_range)
+    schemes = schemes_for(question.most_positions)
+    models = [get_model(name) for name in PLANNED_MODELS]
+    work = [(equipment, scheme) for equipment in question.equipment for scheme in schemes]
+    found: list[Candidate] = []
+    for equipment, scheme in track(work, "calibrations"):
+        found += _of_scheme(question, theory, equipment, scheme, models)
+    return found
+
+
+def _of_scheme(
+    question: Question,
+    theory: Theory,
+    equipment: Equipment,
+    scheme: Scheme,
+    models: list[SensorModel],
+) -> Iterator[Candidate]:
+    directions, n = scheme.directions, scheme.n_positions
+    at_unit: dict[str, Expected | None] = {}
+    for hold in question.holds:
+        if equipment.seconds(n, hold) > question.most_seconds:
+            continue
+        sigma = _tidy(question.sheet.sigma_mean(hold, n * (hold + equipment.moving)))
+        rows: Array | None = None
+        for model in models:
+            if equipment.name == "gravity":  # scales with its only noise
+                if model.name not in at_unit:
+                    if rows is None:
+                        rows = theory.rows(directions, "gravity", Noise(sigma_force=1.0))
+                    at_unit[model.name] = theory.expected(rows, model, question.neglectable)
+                unit = at_unit[model.name]
+                expected = None if unit is None else unit.with_noise(sigma)
+            else:
+                if rows is None:
+                    noise = Noise(sigma, question.sigma_angle)
+                    rows = theory.rows(directions, equipment.name, noise)
+                expected = theory.expected(rows, model, question.neglectable)
+            if expected is None or expected.redundancy < LEAST_REDUNDANCY * expected.conditions:
+                continue
+            yield Candidate(equipment, model, scheme, hold, sigma, expected)
+
+
+def _tidy(sigma: float) -> float:
+    """Four digits, so that the names of cells stay short."""
+    return float(f"{sigma:.4g}")

@@ -1,0 +1,122 @@
+"""A plan as files: its table, its words, its figure, and the study that makes its numbers again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+import yaml
+
+from accelstudy.outputs import PLAN, result_folder
+from accelstudy.plan.advice import limits
+from accelstudy.plan.answer import Answer
+from accelstudy.plan.candidates import Candidate
+from accelstudy.plan.wording import (
+    answer_lines,
+    assumption_lines,
+    how_to,
+    reason_lines,
+    table_lines,
+)
+from accelstudy.units import MGON
+
+STUDY_HEAD = """\
+# The simulated candidates of a plan as a study, made by `accelstudy plan`. It makes their numbers
+# again: snakemake --cores 2 --configfile {path}
+"""
+ANGLES = ("roll", "pitch")
+
+
+def write_plan(
+    answer: Answer,
+    out: str | Path,
+    provenance: Mapping[str, Any],
+    inputs: Iterable[str | Path] = (),
+    force: bool = False,
+) -> None:
+    """Write the files of a plan that reaches its target to a folder.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written, or holds what must not be overwritten.
+    """
+    from accelstudy.figures.saving import save
+    from accelstudy.figures.style import DPI, STYLE
+    from accelstudy.plan.figure import plan_figure
+    from accelstudy.study.tables import write_table
+
+    with result_folder(out, PLAN, inputs, force) as folder:
+        write_table(folder / "plan.parquet", plan_table(answer), provenance)
+        study = STUDY_HEAD.format(path=f"{Path(out) / 'study.yaml'}")
+        study += yaml.safe_dump(answer.study, sort_keys=False, allow_unicode=True)
+        (folder / "study.yaml").write_text(study, encoding="utf-8")
+        (folder / "plan.md").write_text(plan_page(answer), encoding="utf-8")
+        with mpl.rc_context(STYLE):  # type: ignore[arg-type]
+            figure = plan_figure(answer)
+        save(figure, folder / "plan.svg", folder / "plan.png", "Plan", DPI)
+
+
+def plan_page(answer: Answer) -> str:
+    """The plan as a page in Markdown."""
+    parts = [
+        "# " + answer_lines(answer)[0],
+        "\n".join(answer_lines(answer)[1:]),
+        "\n".join(how_to(answer)),
+        "```\n" + "\n".join(table_lines(answer)) + "\n```",
+        "![Tilt accuracy over effort](plan.svg)",
+        "```\n" + "\n".join(reason_lines(answer)) + "\n```",
+        "\n".join(f"* {line}" for line in assumption_lines(answer.question)),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def plan_table(answer: Answer) -> pd.DataFrame:
+    """All candidates that were compared, and of those in the table of the plan their rank.
+
+    Angles are in mgon, whatever unit is shown.
+    """
+    ranks = {id(r.candidate): (i, r) for i, r in enumerate(answer.ranked, 1)}
+    rows = []
+    for candidate in answer.compared:
+        rank, ranked = ranks.get(id(candidate), (0, None))
+        row = _row(candidate)
+        row["reaches"] = candidate.reaches(answer.question.target, answer.question.confidence)
+        row["rank"] = rank or None
+        row["limited_by"] = limits(answer.question, candidate) if rank else None
+        simulated = None if ranked is None else ranked.simulated
+        row["cell"] = None if simulated is None else simulated.cell
+        empty = np.full(2, np.nan)
+        of_cell = {
+            "rms": empty if simulated is None else simulated.rms,
+            "rms_error": empty if simulated is None else simulated.error,
+            "rms_q95": empty if simulated is None else simulated.quantile(0.95),
+        }
+        for key, values in of_cell.items():
+            for angle, value in zip(ANGLES, values, strict=True):
+                row[f"{angle}_{key}_simulated_mgon"] = float(value) / MGON
+        rows.append(row)
+    table = pd.DataFrame(rows)
+    return table.astype({"rank": "Int64"})
+
+
+def _row(candidate: Candidate) -> dict[str, Any]:
+    row: dict[str, Any] = {
+        "equipment": candidate.equipment.name,
+        "model": candidate.model.name,
+        "n_parameters": candidate.model.n_parameters,
+        "scheme": candidate.scheme.name,
+        "n_positions": candidate.scheme.n_positions,
+        "hold_s": candidate.hold,
+        "sensor_sigma_mps2": candidate.sigma,
+        "minutes": candidate.seconds / 60,
+        "redundancy": candidate.expected.redundancy,
+    }
+    for i, angle in enumerate(ANGLES):
+        row[f"{angle}_rms_mgon"] = float(candidate.expected.rms[i]) / MGON
+        row[f"{angle}_noise_mgon"] = float(np.sqrt(candidate.expected.noise[i])) / MGON
+    return row

@@ -1,0 +1,141 @@
+"""What is asked of a plan, and what it takes for granted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from accelstudy.data_sheets import DataSheet
+from accelstudy.effects import get_effect
+from accelstudy.units import MGON, STANDARD_GRAVITY
+
+HOLDS = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0)
+"""Durations of a hold that are tried, s."""
+USUAL_HOLD = 10.0
+"""s, of a sensor of which only the noise of a position is known."""
+
+
+@dataclass(frozen=True)
+class Equipment:
+    """With what positions are made, and how long that takes.
+
+    Attributes
+    ----------
+    name : "gravity" or "robot", which is the approach, too
+    moving : float, s from the end of a hold to the begin of the next
+    setup : float, s, before the first hold
+    """
+
+    name: str
+    moving: float
+    setup: float
+
+    def seconds(self, positions: int, hold: float) -> float:
+        """Time in the field, s."""
+        return self.setup + positions * (hold + self.moving)
+
+
+BY_HAND = Equipment("gravity", moving=20.0, setup=0.0)
+ROBOT = Equipment("robot", moving=10.0, setup=1800.0)
+
+
+@dataclass(frozen=True)
+class Size:
+    """Usual size of the parameters of an effect, SI: their standard deviation over sensors.
+
+    Attributes
+    ----------
+    value : float
+    source : "data sheet", "assumed" or "typical"
+    """
+
+    value: float
+    source: str
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked of a plan, in SI.
+
+    Attributes
+    ----------
+    target : float, rad, tilt accuracy, of roll and of pitch
+    tilt_range : float, rad
+    sheet : DataSheet
+    equipment : tuple of Equipment
+    confidence : float, share of the calibrations that must reach the target; None for the rms
+    holds : tuple of float, s, durations that are tried
+    sigma_angle : float, rad, of the robot's roll and pitch
+    most_seconds : float, s in the field
+    most_positions : int
+    """
+
+    target: float
+    tilt_range: float
+    sheet: DataSheet
+    equipment: tuple[Equipment, ...] = (BY_HAND, ROBOT)
+    confidence: float | None = None
+    holds: tuple[float, ...] = ()
+    sigma_angle: float = 3.2 * MGON
+    most_seconds: float = math.inf
+    most_positions: int = 200
+    sizes: Mapping[str, Size] = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "sizes", sizes_of(self.sheet))
+        if not self.holds:
+            fixed = self.sheet.position_sigma is not None
+            object.__setattr__(self, "holds", (USUAL_HOLD,) if fixed else HOLDS)
+
+    @property
+    def neglectable(self) -> dict[str, float]:
+        """Sizes of the effects that count where a model lacks them."""
+        return {name: size.value for name, size in self.sizes.items()}
+
+
+def sizes_of(sheet: DataSheet) -> dict[str, Size]:
+    """How large the effects of a sensor are: by its data sheet, else as is usual.
+
+    A nonlinearity is shared alike by a quadratic and a cubic part. The rotation of the axes against
+    the housing is not among them: it is no matter of the sensor's own tilt.
+    """
+    shared = math.sqrt(0.5)
+    stated = {
+        "nonorthogonality": sheet.nonorthogonality,
+        "quadratic_scale": _times(sheet.quadratic_scale, shared),
+        "cubic_scale": _times(sheet.cubic_scale, shared),
+    }
+    kinds = {"nonorthogonality": "nonorthogonality"}
+    sizes = {}
+    for effect, value in stated.items():
+        if value is None:
+            low, high = get_effect(effect).typical
+            sizes[effect] = Size(math.sqrt(low * high), "typical")
+            continue
+        told = sheet.sources.get(kinds.get(effect, "nonlinearity"), "")
+        sizes[effect] = Size(value, "assumed" if told == ASSUMED else "data sheet")
+    return sizes
+
+
+ASSUMED = "assumed"
+"""Source of a value that a plan takes for granted."""
+
+
+def sensor_of_sigma(sigma: float) -> DataSheet:
+    """Sensor of which a person knows the noise of a position's mean only, m/s².
+
+    It is taken to be linear, as the paper's is.
+    """
+    return DataSheet(
+        "sigma",
+        "a sensor of which only the noise is known",
+        position_sigma=sigma,
+        nonlinearity=0.0,
+        full_scale=STANDARD_GRAVITY,
+        sources={"nonlinearity": ASSUMED, "full_scale": ASSUMED},
+    )
+
+
+def _times(value: float | None, factor: float) -> float | None:
+    return None if value is None else value * factor

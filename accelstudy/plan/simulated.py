@@ -1,0 +1,148 @@
+"""The candidates at the top of a plan as cells of a study, and what their simulation says."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.adjustment.block import joined
+from accelstudy.effects import get_effect
+from accelstudy.plan.candidates import Candidate
+from accelstudy.plan.question import Question
+from accelstudy.plan.theory import ATTITUDES
+from accelstudy.study.cells import Cell, study_cells
+from accelstudy.study.config import parse_study
+from accelstudy.study.followed import cell_tilt_error
+from accelstudy.study.simulate import blocks
+from accelstudy.units import GON, MGON, STANDARD_GRAVITY, recorded_unit, to_recorded
+
+Array = NDArray[np.float64]
+
+SIGNS = (1.0, -1.0, 1.0)
+"""Of the parameters of the three axes of the simulated sensor, which all have the usual size."""
+ALWAYS = ("bias", "scale", "nonorthogonality")
+"""Effects that every simulated sensor has."""
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """What simulated calibrations left, of roll and of pitch.
+
+    Attributes
+    ----------
+    cell : str, name of the cell in the study of the plan
+    rms : (2,) array, rad, over attitudes and calibrations
+    error : (2,) array, rad, standard error of `rms`
+    per_calibration : (R, 2) array, rad, rms over attitudes that each calibration left
+    simulated : int, calibrations, of which R converged
+    """
+
+    cell: str
+    rms: Array
+    error: Array
+    per_calibration: Array
+    simulated: int
+
+    def quantile(self, probability: float) -> Array:
+        """What a share of the calibrations stayed below, (2,), rad."""
+        return np.quantile(self.per_calibration, probability, axis=0)
+
+    def accuracy(self, confidence: float | None) -> float:
+        """Tilt accuracy by the measure that is asked for, rad."""
+        return float((self.rms if confidence is None else self.quantile(confidence)).max())
+
+
+def study_of(
+    question: Question, chosen: Sequence[Candidate], seed: int, replicates: int, name: str = "plan"
+) -> dict[str, Any]:
+    """Configuration of a study whose cells are the chosen candidates.
+
+    It overlays `config/config.yaml`, and stands by itself, too.
+    """
+    sigma = chosen[0].sigma
+    planned = ("cross_axis_misalignment", "quadratic_scale", "cubic_scale")
+    sensor = {effect: _quantity(question, effect) for effect in (*ALWAYS, *planned)}
+    has = [effect for effect in planned if any(sensor[effect]["value"])]
+    return {
+        "study": name,
+        "seed": seed,
+        "gravity_mps2": STANDARD_GRAVITY,
+        "noise": {
+            "sensor": {"sigma_mps2": sigma, "per": "position"},
+            "robot": {"sigma_mgon": _tidy(question.sigma_angle / MGON)},
+            "gravity": {"sigma_mps2": 0.0, "error_mps2": 0.0},
+            "effects": [],
+        },
+        "sensor": sensor,
+        "simulated_effects": [*ALWAYS, *has],
+        "leveling": {"max_tilt_gon": _tidy(question.tilt_range / GON), "attitudes": ATTITUDES},
+        "presets": None,
+        "sensitivity": None,
+        "paper": False,
+        "grids": [
+            {
+                "models": candidate.model.name,
+                "schemes": candidate.scheme.name,
+                "approaches": candidate.equipment.name,
+                "replicates": replicates,
+                **({} if candidate.sigma == sigma else {"sensor_sigma_mps2": candidate.sigma}),
+            }
+            for candidate in chosen
+        ],
+    }
+
+
+def simulate(config: dict[str, Any]) -> list[Simulated]:
+    """Simulate the cells of a study of `study_of`, in the order of its candidates.
+
+    The same cells give the same numbers in the workflow.
+    """
+    study = parse_study(config)
+    leveling = study.leveling.model_dump()
+    found: dict[str, Simulated] = {}
+    order = []
+    for grid in config["grids"]:
+        (cell,) = study_cells(parse_study({**config, "grids": [grid]}))
+        order.append(cell.name)
+        if cell.name not in found:
+            found[cell.name] = _simulated(cell, study.seed, leveling)
+    return [found[name] for name in order]
+
+
+def _simulated(cell: Cell, seed: int, leveling: dict[str, Any]) -> Simulated:
+    block = joined(blocks(cell, seed, 0, cell.n_blocks))
+    estimates = block.estimates[block.converged]
+    tilt = cell_tilt_error(cell, estimates.mean(axis=0), leveling)
+    per_calibration = tilt.rms(estimates)
+    square = per_calibration**2
+    rms = np.sqrt(square.mean(axis=0))
+    error = square.std(axis=0) / np.sqrt(len(square)) / (2 * rms)
+    return Simulated(cell.name, rms, error, per_calibration, len(block.converged))
+
+
+def _quantity(question: Question, effect: str) -> dict[str, Any]:
+    """True parameters of an effect as a configuration has them."""
+    unit = get_effect(effect).parameters[0].unit
+    size = true_size(question, effect)
+    value = [_tidy(sign * float(to_recorded(size, unit))) for sign in SIGNS]
+    return {"value": value, "unit": recorded_unit(unit)}
+
+
+def true_size(question: Question, effect: str) -> float:
+    """Size of an effect of the simulated sensor, SI; 0 for what it has not."""
+    if effect == "cross_axis_misalignment":  # its own axes are what its tilt refers to
+        return 0.0
+    if effect in question.sizes:
+        return question.sizes[effect].value
+    stated: float | None = getattr(question.sheet, effect)
+    low, high = get_effect(effect).typical
+    return math.sqrt(low * high) if stated is None else stated
+
+
+def _tidy(value: float) -> float:
+    return float(f"{value:.6g}") + 0.0

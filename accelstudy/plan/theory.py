@@ -1,0 +1,207 @@
+"""Linear theory of what a calibration leaves, for all models of a plan at once.
+
+One model has every effect that matters. Its rows for a scheme are worked out once; a calibration
+with fewer effects estimates some of its columns, A, and neglects others, N. With the noise n and
+the sizes p of what is neglected, the estimates are off by
+
+    δx = (AᵀA)⁻¹Aᵀ (n + N p),        and what is neglected by −p,
+
+so that the mean square of the tilt error is tr(Q C), C the covariance of both together and Q the
+quadratic form of `accelstudy.leveling_error`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaincinv
+
+from accelstudy.approaches import get_approach
+from accelstudy.design import SINGULAR
+from accelstudy.effects import Hold, get_effect
+from accelstudy.leveling_error import cap_forces, tilt_error
+from accelstudy.models import get_model
+from accelstudy.optimal.information import position_rows
+from accelstudy.sensor import SensorModel
+from accelstudy.simulation import Noise
+
+Array = NDArray[np.float64]
+
+ATTITUDES = 200
+"""Over which the tilt error is averaged, as in a study."""
+OF_SENSOR = (
+    "bias",
+    "scale",
+    "nonorthogonality",
+    "cross_axis_misalignment",
+    "quadratic_scale",
+    "cubic_scale",
+    "mounting_rotation",
+)
+OF_RIG = ("base_tilt", "encoder_scale", "encoder_offset", "gravity_error")
+"""Effects that a plan thinks of."""
+
+
+@dataclass(frozen=True)
+class Expected:
+    """What one calibration after another would leave, by linear theory.
+
+    Attributes
+    ----------
+    noise : (2,) array, rad², mean square of the error of roll and of pitch that noise leaves
+    neglected : dict of effect to (2,) array, rad², what neglecting it adds
+    quadratic : (2, u, u) array, rad² per SI², mean square of an error of all parameters
+    scatter : (u, s) array, errors of all parameters per unit of s independent normal variables,
+        of which the first are the noise's
+    of_noise : int, how many of them are the noise's
+    redundancy, conditions : int
+    """
+
+    noise: Array
+    neglected: dict[str, Array]
+    quadratic: Array
+    scatter: Array
+    of_noise: int
+    redundancy: int
+    conditions: int
+
+    def with_noise(self, factor: float) -> Expected:
+        """The same with so many times the noise, in all observations alike."""
+        scatter = self.scatter.copy()
+        scatter[:, : self.of_noise] *= factor
+        return replace(self, noise=self.noise * factor**2, scatter=scatter)
+
+    @property
+    def rms(self) -> Array:
+        """Rms over attitudes, calibrations and sensors, (2,), rad."""
+        return np.sqrt(self.noise + sum(self.neglected.values(), np.zeros(2)))
+
+    def quantile(self, probability: float) -> Array:
+        """What a share of the calibrations stays below in roll and in pitch, (2,), rad.
+
+        The mean square is a sum of χ² with weights, taken as a χ² of the same mean and variance.
+        """
+        form = np.einsum("uj,auw,wk->ajk", self.scatter, self.quadratic, self.scatter)
+        mean = np.trace(form, axis1=1, axis2=2)
+        variance = 2 * np.sum(form**2, axis=(1, 2))
+        freedom = 2 * mean**2 / variance
+        return np.sqrt(2 * mean / freedom * gammaincinv(freedom / 2, probability))
+
+    def at(self, probability: float | None) -> Array:
+        """Rms, or the quantile if a probability is given, (2,), rad."""
+        return self.rms if probability is None else self.quantile(probability)
+
+
+class Theory:
+    """Linear theory up to a tilt range, rad."""
+
+    def __init__(self, tilt_range: float) -> None:
+        self.model = get_model("+".join((*OF_SENSOR, *OF_RIG)))
+        carried = get_model("+".join(OF_SENSOR))
+        zeros = np.zeros(carried.n_parameters)
+        forces = cap_forces(tilt_range, ATTITUDES)
+        error = tilt_error(carried, zeros, carried, zeros, forces)
+        u, k = self.model.n_parameters, carried.n_parameters
+        self.quadratic = np.zeros((2, u, u))
+        self.quadratic[:, :k, :k] = error.quadratic
+        names = list(self.model.parameter_names)
+        self.columns = {
+            effect: [names.index(p.name) for p in get_effect(effect).parameters]
+            for effect in (*OF_SENSOR, *OF_RIG)
+        }
+
+    def of_model(self, model: SensorModel) -> list[int]:
+        """Columns of what a model estimates."""
+        return [i for effect in model.effects for i in self.columns[effect.name]]
+
+    def rows(self, directions: Array, approach: str, noise: Noise) -> Array:
+        """Whitened rows of the model with every effect, (conditions, u)."""
+        hold = Hold(yaw=np.zeros(len(directions)))
+        rows = position_rows(self.model, get_approach(approach), noise, directions, hold=hold)
+        return rows.reshape(-1, rows.shape[-1])
+
+    def expected(
+        self, rows: Array, model: SensorModel, sizes: Mapping[str, float]
+    ) -> Expected | None:
+        """What a calibration with a model leaves.
+
+        Parameters
+        ----------
+        rows : (n, u) array, of `rows`
+        model : SensorModel, that is estimated
+        sizes : mapping of effect to the sd of its parameters over sensors, SI; where the model
+            has the effect it is estimated, else neglected
+
+        Returns
+        -------
+        Expected, or None if the positions do not determine the model
+        """
+        estimated = self.of_model(model)
+        solved = _solved(rows[:, estimated])
+        if solved is None:
+            return None
+        cofactors, solve = solved
+        quadratic = self.quadratic[:, estimated][:, :, estimated]
+        noise = np.einsum("auw,uw->a", quadratic, cofactors)
+        scatter = [np.zeros((self.model.n_parameters, len(estimated)))]
+        scatter[0][estimated] = np.linalg.cholesky(cofactors)
+        neglected: dict[str, Array] = {}
+        for effect, size in sizes.items():
+            columns = self.columns[effect]
+            if size == 0 or set(columns) <= set(estimated):
+                continue
+            response = self.response(rows, estimated, solve, columns) * size
+            neglected[effect] = np.einsum("uj,auw,wj->a", response, self.quadratic, response)
+            scatter.append(response)
+        return Expected(
+            noise,
+            neglected,
+            self.quadratic,
+            np.hstack(scatter),
+            len(estimated),
+            len(rows) - len(estimated),
+            len(rows),
+        )
+
+    def response(
+        self, rows: Array, estimated: Sequence[int], solve: Array, columns: Sequence[int]
+    ) -> Array:
+        """Errors of all parameters per unit of those that are neglected, (u, j)."""
+        error = np.zeros((self.model.n_parameters, len(columns)))
+        error[list(estimated)] = solve @ rows[:, list(columns)]
+        error[list(columns), range(len(columns))] = -1.0
+        return error
+
+    def neglecting(self, rows: Array, model: SensorModel, effect: str) -> Array:
+        """Rms of the tilt error that a neglected effect of unit size leaves, (2,), rad per SI."""
+        estimated = self.of_model(model)
+        solved = _solved(rows[:, estimated])
+        assert solved is not None
+        columns = self.columns[effect]
+        response = self.response(rows, estimated, solved[1], columns)
+        square = np.einsum("uj,auw,wj->a", response, self.quadratic, response)
+        return np.sqrt(np.maximum(square, 0.0))
+
+
+@cache
+def theory_of(tilt_range: float) -> Theory:
+    """Theory up to a tilt range, rad; worked out once."""
+    return Theory(tilt_range)
+
+
+def _solved(design: Array) -> tuple[Array, Array] | None:
+    """Cofactors (AᵀA)⁻¹ and the solution (AᵀA)⁻¹Aᵀ of a design; None if it is singular."""
+    if len(design) < design.shape[1]:
+        return None
+    length = np.linalg.norm(design, axis=0)
+    if not np.all(length > SINGULAR * length.max()):
+        return None
+    left, values, right = np.linalg.svd(design / length, full_matrices=False)
+    if values[-1] <= SINGULAR * values[0]:
+        return None
+    solve = (right.T / values) @ left.T / length[:, None]
+    return solve @ solve.T, solve

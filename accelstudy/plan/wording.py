@@ -1,0 +1,305 @@
+"""A plan in words: the answer first, as everybody understands it, then its table and reasons."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from accelstudy.effects import get_effect
+from accelstudy.plan.advice import InUse, Need, Spoiler, in_use, limits, needs, spoilers
+from accelstudy.plan.answer import OTHER_CONFIDENCE, Answer, Ranked
+from accelstudy.plan.candidates import Candidate
+from accelstudy.plan.question import Equipment, Question
+from accelstudy.sensor import SensorModel
+from accelstudy.study.report import number
+from accelstudy.units import angle_note, display_unit, quantity_text, to_display
+from accelstudy.wording import joined, words
+
+PLAIN = {
+    "nonorthogonality": "angles between the axes",
+    "cross_axis_misalignment": "rotation against the housing",
+    "quadratic_scale": "quadratic nonlinearity",
+    "cubic_scale": "cubic nonlinearity",
+    "mounting_rotation": "rotation of the sensor in its mount",
+    "base_tilt": "tilt of the robot's base",
+    "encoder_scale": "scale error of the robot's angles",
+    "encoder_offset": "zero error of the robot's angles",
+    "gravity_error": "wrong value of gravity",
+}
+"""Effects in words that a newcomer knows."""
+VERDICTS = {
+    "needed": "must be in the model",
+    "worth it": "worth having in the model",
+    "of no use": "in the model, of little use",
+    "not needed": "need not be in the model",
+}
+
+
+def answer_lines(answer: Answer) -> list[str]:
+    """What to do, in sentences."""
+    if not answer.ranked:
+        return [unreachable(answer)]
+    question, first = answer.question, answer.first
+    candidate, simulated = first.candidate, first.simulated
+    assert simulated is not None
+    by_hand = candidate.equipment.name == "gravity"
+    opening = "You need no robot. " if by_hand else "You need a robot. "
+    if len(question.equipment) == 1:
+        opening = ""
+    share = OTHER_CONFIDENCE if question.confidence is None else question.confidence
+    lines = [
+        f"{opening}{effort(candidate, imperative=True)}.",
+        f"Roll and pitch are then right to {_angles(simulated.rms)} (rms) at tilts up to "
+        f"{quantity_text(question.tilt_range, 'rad')}; of 100 such calibrations, "
+        f"{100 * share:g} stay below {_angle(simulated.quantile(share).max())}.",
+    ]
+    target = quantity_text(question.target, "rad")
+    if question.confidence is None:
+        wanted = f"For {100 * OTHER_CONFIDENCE:g} of 100 calibrations to stay below {target}"
+    else:
+        wanted = f"For {target} in the rms only"
+    other = answer.stricter
+    lines.append(
+        f"{wanted}: {effort(other)}."
+        if other is not None
+        else f"{wanted}: nothing tried here would do."
+    )
+    others = [r for r in answer.ranked if r.candidate.equipment != candidate.equipment]
+    if others:
+        lines.append(f"The other way: {effort(others[0].candidate)}.")
+    elif not by_hand and len(question.equipment) > 1:
+        best = _most_accurate(answer, "gravity")
+        if best is not None:
+            leaves = _angle(best.accuracy(question.confidence))
+            lines.append(f"By hand the best leaves {leaves}: {effort(best)}.")
+    use = in_use(question)
+    more = [f"{_angle(use.reading)} of noise for one reading {_like(question, use)}"]
+    if not math.isnan(use.drift):
+        more.append(f"{_angle(use.drift)} after {number_of(use.hours)} h")
+    if not math.isnan(use.warmth):
+        more.append(f"{_angle(use.warmth)} where it is {number_of(use.kelvin)} K warmer or colder")
+    lines.append(f"In use comes on top: {joined(more)}.")
+    return lines
+
+
+def unreachable(answer: Answer) -> str:
+    """One line: that nothing reaches the target, and what would be reachable."""
+    question, best = answer.question, answer.best
+    within = []
+    if question.most_seconds < math.inf:
+        within.append(f"within {number(question.most_seconds / 60)} minutes")
+    if question.most_positions < 200:
+        within.append(f"with at most {question.most_positions} positions")
+    within.append({1: _equipment(question.equipment[0])}.get(len(question.equipment), ""))
+    limit = " ".join(filter(None, within))
+    if best is None:
+        return f"No calibration fits: none has positions enough for its parameters {limit}.".strip()
+    measure = "rms" if question.confidence is None else f"{100 * question.confidence:g} % of them"
+    target = quantity_text(question.target, "rad")
+    return (
+        f"No calibration tried here reaches {target} ({measure}) {limit}".rstrip()
+        + f"; the best leaves {_angle(best.accuracy(question.confidence))}: {effort(best)}, "
+        f"limited by the {limits(question, best)}."
+    )
+
+
+def effort(candidate: Candidate, imperative: bool = False) -> str:
+    """Positions and time of a candidate: ``28 positions by hand, 10 s each, about 14 minutes``."""
+    n = candidate.scheme.n_positions
+    how = _equipment(candidate.equipment)
+    text = f"{n} positions {how}, {number_of(candidate.hold)} s each"
+    setup = candidate.equipment.setup / 60
+    extra = f", {setup:.0f} of them to set it up" if setup else ""
+    link = ": about" if imperative else ", about"
+    verb = "Measure " if imperative else ""
+    return f"{verb}{text}{link} {minutes(candidate.seconds)}{extra}"
+
+
+def minutes(seconds: float) -> str:
+    """A time in the field, for people."""
+    if seconds < 5400:
+        return f"{math.ceil(seconds / 60)} minutes"
+    return f"{number(seconds / 3600)} hours"
+
+
+def number_of(value: float) -> str:
+    """A number without digits that say nothing."""
+    return f"{value:g}"
+
+
+def table_lines(answer: Answer) -> list[str]:
+    """The ranked candidates as a table, and what its columns mean."""
+    unit = display_unit("rad")
+    head = [
+        "", "equipment", "model", "scheme", "positions", "s each", "minutes",
+        f"roll/{unit}", f"pitch/{unit}", "limited by",
+    ]  # fmt: skip
+    rows = [head, *(_row(answer, i, r) for i, r in enumerate(answer.ranked, 1))]
+    widths = [max(len(row[i]) for row in rows) for i in range(len(head))]
+    right = {4, 5, 6, 7, 8}
+    lines = [
+        "  ".join(
+            text.rjust(width) if i in right else text.ljust(width)
+            for i, (text, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in rows
+    ]
+    return [
+        *lines,
+        "model: number of parameters, and what it has beside bias, scale and angles between axes;",
+        "roll, pitch: rms, and between what 95 of 100 calibrations lie, from "
+        f"{answer.replicates} simulated ones each; ~ by linear theory",
+    ]
+
+
+def _row(answer: Answer, rank: int, ranked: Ranked) -> list[str]:
+    candidate = ranked.candidate
+    low, mean, high = interval_of(ranked)
+    cells = [
+        f"{'' if ranked.simulated else '~'}{number(m)} ({number(a)} … {number(b)})"
+        for a, m, b in zip(*(to_display(v, "rad") for v in (low, mean, high)), strict=True)
+    ]
+    return [
+        f"{rank}.",
+        _equipment(candidate.equipment),
+        model_words(candidate.model),
+        candidate.scheme.name,
+        str(candidate.scheme.n_positions),
+        number_of(candidate.hold),
+        f"{candidate.seconds / 60:.1f}",
+        *cells,
+        limits(answer.question, candidate),
+    ]
+
+
+def interval_of(ranked: Ranked) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rms of roll and pitch between the ends of where 95 of 100 calibrations lie, (2,), rad."""
+    expected, simulated = ranked.candidate.expected, ranked.simulated
+    source = expected if simulated is None else simulated
+    return source.quantile(0.025), source.rms, source.quantile(0.975)
+
+
+def model_words(model: SensorModel) -> str:
+    """A model by its number of parameters and what it has beside the usual nine."""
+    nine = {"bias", "scale", "nonorthogonality"}
+    effects = [effect.name for effect in model.effects]
+    more = [words(name.removesuffix("_scale")) for name in effects if name not in nine]
+    less = [] if nine <= set(effects) else ["no angles between axes"]
+    short = [name.replace("cross axis misalignment", "cross-axis") for name in (*more, *less)]
+    return " + ".join([str(model.n_parameters), *short])
+
+
+def reason_lines(answer: Answer) -> Iterator[str]:
+    """What the model needs, what would spoil it, and what comes in use, of the first candidate."""
+    question, candidate = answer.question, answer.first.candidate
+    unit_note = f"({angle_note()})"
+    yield f"The calibration's model: {candidate.model.name} {unit_note}"
+    for need in needs(question, candidate):
+        yield f"  {_need(need)}"
+    target = quantity_text(question.target, "rad")
+    yield f"What is not in the model, and the size that by itself would leave {target}:"
+    for spoiler in spoilers(question, candidate):
+        yield f"  {_spoiler(spoiler)}"
+    if candidate.equipment.name == "gravity":
+        yield "Gravity does not tell how the sensor sits in its housing: put it on a flat surface,"
+        yield "turn it there by 180°; it is off by half of the difference of the two tilts."
+    yield "In use, to be added to what the calibration leaves (rms of the worse angle):"
+    for line in use_lines(question, in_use(question)):
+        yield f"  {line}"
+
+
+def _need(need: Need) -> str:
+    effect = PLAIN[need.effect]
+    unit = get_effect(need.effect).parameters[0].unit
+    size = f"{quantity_text(need.size, unit)}, {need.source}"
+    what = []
+    if not math.isnan(need.left):
+        what.append(
+            f"neglected it {'would leave' if need.in_model else 'leaves'} {_angle(need.left)}"
+        )
+    if not math.isnan(need.cost):
+        what.append(
+            f"to estimate it {'costs' if need.in_model else 'would cost'} {_angle(need.cost)}"
+        )
+    elif not need.in_model:
+        what.append("these positions cannot tell it")
+    return f"{effect} ({size}): {VERDICTS[need.verdict]}; {joined(what)}"
+
+
+def _spoiler(spoiler: Spoiler) -> str:
+    low, high = (quantity_text(v, spoiler.unit) for v in spoiler.usual)
+    if math.isinf(spoiler.size):
+        return f"{PLAIN[spoiler.effect]}: no matter, of whatever size"
+    size = quantity_text(spoiler.size, spoiler.unit)
+    return f"{PLAIN[spoiler.effect]}: {size} (usual: {low} to {high}): {spoiler.verdict}"
+
+
+def use_lines(question: Question, use: InUse) -> list[str]:
+    """What adds to the calibration's part in use."""
+    like = _like(question, use)
+
+    def told(value: float) -> str:
+        return "not known" if math.isnan(value) else _angle(value)
+
+    return [
+        f"noise of one reading {like}: {told(use.reading)}",
+        f"drift of the bias within {number_of(use.hours)} h: {told(use.drift)}",
+        f"temperature {number_of(use.kelvin)} K off that of the calibration: {told(use.warmth)}",
+        f"switched off and on again: {told(use.restart)}",
+    ]
+
+
+def _like(question: Question, use: InUse) -> str:
+    """How long the reading is of which the noise is told."""
+    if question.sheet.position_sigma is not None:
+        return "like a position"
+    return f"of {number_of(use.seconds)} s"
+
+
+def assumption_lines(question: Question) -> list[str]:
+    """What was taken for granted."""
+    lines = [f"Sensor: {question.sheet.name}, {question.sheet.title}."]
+    assumed = [PLAIN[e] for e, size in question.sizes.items() if size.source == "typical"]
+    if assumed:
+        lines.append(f"Of a usual size, as nothing is known of it: {joined(assumed)}.")
+    if any(size.source == "assumed" for size in question.sizes.values()):
+        lines.append("Taken to be linear, as only its noise is known.")
+    for equipment in question.equipment:
+        setup = f", {number_of(equipment.setup / 60)} minutes to set up" if equipment.setup else ""
+        lines.append(
+            f"Time {_equipment(equipment)}: {number_of(equipment.moving)} s to move from position "
+            f"to position{setup}."
+        )
+    if any(equipment.name == "robot" for equipment in question.equipment):
+        lines.append(f"Robot: roll and pitch to {_angle(question.sigma_angle)}.")
+    return lines
+
+
+def how_to(answer: Answer) -> list[str]:
+    """Where the positions are, and how numbers are made again."""
+    candidate = answer.first.candidate
+    lines = [f"The positions: accelstudy scheme {candidate.scheme.name}"]
+    if candidate.equipment.name == "gravity":
+        lines.append("By hand they need not be exact, only still: gravity itself is the reference.")
+    return lines
+
+
+def _equipment(equipment: Equipment) -> str:
+    return {"gravity": "by hand", "robot": "with a robot"}.get(equipment.name, equipment.name)
+
+
+def _most_accurate(answer: Answer, equipment: str) -> Candidate | None:
+    confidence = answer.question.confidence
+    mine = [c for c in answer.compared if c.equipment.name == equipment]
+    return min(mine, key=lambda c: c.accuracy(confidence), default=None)
+
+
+def _angle(value: float) -> str:
+    return f"{number(float(to_display(value, 'rad')))} {display_unit('rad')}"
+
+
+def _angles(values: Sequence[float] | np.ndarray) -> str:
+    shown = [number(float(v)) for v in to_display(values, "rad")]
+    return f"{joined(list(dict.fromkeys(shown)))} {display_unit('rad')}"
