@@ -165,7 +165,7 @@ def plan_command(
     out: Path | None,
     force: bool,
 ) -> None:
-    """Find the cheapest calibration that reaches a tilt accuracy.
+    """Find the cheapest calibration for a tilt accuracy.
 
     Compares models, position schemes, numbers of positions and durations by linear theory, and
     simulates those at the top. The sensor is --sensor or, if only its noise is known, --sigma. If
