@@ -14,6 +14,7 @@ container: "docker://python:3.13-slim"
 
 include: "rules/sections.smk"
 include: "rules/plan.smk"
+include: "rules/designs.smk"
 include: "rules/sequential.smk"
 include: "rules/pole.smk"
 
@@ -22,5 +23,6 @@ rule plan_example:
     default_target: True
     input:
         PLAN_OUTPUTS,
+        DESIGNS_OUTPUTS,
         SEQUENTIAL_OUTPUTS,
         POLE_OUTPUTS,

@@ -124,8 +124,8 @@ _TURN = 200 * GON
     "--attitudes",
     default="all",
     show_default=True,
-    help="Those to choose from: all; cube: on faces, edges and corners; hand: in steps of 30° that an eye can judge; or "
-    "a CSV file of those that are allowed.",
+    help="Those to choose from: all; cube: on faces, edges and corners; hand: in steps of 30° "
+    "that an eye can judge; or a CSV file of those that are allowed.",
 )
 @click.option(
     "--mountings",

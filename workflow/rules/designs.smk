@@ -1,0 +1,29 @@
+from accelstudy.optimal.config import DesignsConfig
+
+DESIGNS = section("designs", DesignsConfig)
+DESIGNS_FILES = {kind: f"{RESULTS}/designs/efficiency.{kind}" for kind in ("parquet", "svg", "png")}
+DESIGNS_OUTPUTS = list(DESIGNS_FILES.values())
+
+
+rule designs:
+    output:
+        table=DESIGNS_FILES["parquet"],
+        svg=DESIGNS_FILES["svg"],
+        png=DESIGNS_FILES["png"],
+    log:
+        f"{RESULTS}/logs/designs/efficiency.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/designs/efficiency.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        # As it is written, with paths of files, and as it is read, with what the files hold.
+        section=EXAMPLE.designs,
+        read=DESIGNS.model_dump(),
+        provenance=PROVENANCE,
+        code=code_hash("planning"),
+    message:
+        "Compare schemes with the best there can be"
+    script:
+        "../scripts/designs.py"

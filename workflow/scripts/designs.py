@@ -1,0 +1,21 @@
+from accelstudy.figures.saving import save
+from accelstudy.figures.style import DPI
+from accelstudy.optimal.config import DesignsConfig
+from accelstudy.optimal.efficiency import efficiency_table
+from accelstudy.optimal.figure import efficiency_figure
+from accelstudy.schemes import get_scheme
+from accelstudy.study.job import logged
+from accelstudy.study.tables import write_table
+
+with logged(snakemake):
+    config = DesignsConfig.model_validate(snakemake.params.section)
+    provenance = snakemake.params.provenance
+    table = efficiency_table(
+        [config.task(approach) for approach in config.chosen_approaches],
+        [get_scheme(name) for name in config.chosen_schemes],
+        config.positions,
+        provenance["seed"],
+    )
+    write_table(snakemake.output.table, table, provenance)
+    title = "Efficiency of position schemes"
+    save(efficiency_figure(table), snakemake.output.svg, snakemake.output.png, title, DPI)
