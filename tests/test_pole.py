@@ -16,7 +16,7 @@ from accelstudy.pole.bending import flexibility
 from accelstudy.pole.budget import TOTAL, budget, contribution, situation_at
 from accelstudy.pole.geometry import INPUTS, foot, jacobian, leaning
 from accelstudy.pole.radius import radius
-from accelstudy.pole.sensor import CalibratedSensor, from_linear_theory
+from accelstudy.pole.sensor import CalibratedSensor, from_linear_theory, from_tilt_sigma
 from accelstudy.pole.setup import Setup, setup_of
 from accelstudy.pole.simulation import draw, simulate
 from accelstudy.pole.situation import Situation
@@ -200,14 +200,32 @@ def test_a_calibration_that_knows_the_temperature_corrects_it(sensor):
     model = get_model("bias+thermal_bias(tau=300)")
     covariance = np.diag([0.0, 0.0, 0.0, 1e-8, 1e-8, 1e-8])
     thermal = CalibratedSensor(model, np.zeros(6), covariance, SHEET)
-    assert of("temperature", thermal)[0].max() == 0
+    assert thermal.corrected == ("bias",)
+    bias_only = replace(thermal, sheet=replace(SHEET, scale_per_kelvin=None))
+    assert of("temperature", bias_only)[0].max() == 0
+    assert of("temperature", thermal)[0][3].min() > 0  # it does not know of the scales
     # What the sigma of its coefficients leaves grows with the temperature.
     left = of("calibration", thermal, [0.0])[0]
     expected = 2.0 * np.sqrt(2) * 1e-4 * 10.0 / STANDARD_GRAVITY
     np.testing.assert_allclose(left, expected, rtol=1e-9)
     assert any(
-        "corrects for the temperature" in said for said in remarks(budget(Setup(), thermal, TILTS))
+        "the temperature does to the bias; that is" in said
+        for said in remarks(budget(Setup(), thermal, TILTS))
     )
+
+
+@pytest.mark.parametrize("direction", [0.0, 0.7, np.pi / 2])
+def test_sigmas_of_roll_and_pitch_may_be_given_instead(direction):
+    given = from_tilt_sigma(10 * MGON, SHEET)
+    tilt = 40 * GON
+    situation = Situation(Setup(), given, np.array([tilt]), np.array([direction]))
+    part = contribution(sources()[0], situation)
+    roll, pitch = (float(angle) for angle in roll_pitch(tuple(leaning(tilt, direction))))
+    # Roll moves the foot across forward, and pitch forward: by the rotations of the attitude.
+    by_roll = np.array([np.sin(pitch) * np.sin(roll), np.cos(roll), np.cos(pitch) * np.sin(roll)])
+    by_pitch = np.array([np.cos(pitch) * np.cos(roll), 0.0, np.sin(pitch) * np.cos(roll)])
+    expected = (2.0 * 10 * MGON) ** 2 * (by_roll**2 + by_pitch**2)
+    np.testing.assert_allclose(part.squares[0], expected, rtol=1e-9, atol=1e-20)
 
 
 # --- circles -------------------------------------------------------------------------------------

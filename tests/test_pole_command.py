@@ -11,6 +11,7 @@ from accelstudy.cli import main
 from accelstudy.pole import output
 from accelstudy.pole.geometry import leaning
 from accelstudy.study.tables import read_origin, read_table
+from accelstudy.units import MGON
 
 FILES = {"pole.json", "budget.parquet", "monte-carlo.parquet", "budget.svg", "budget.png"}
 QUICK = ("--sensor", "adxl355", "--replicates", "20")
@@ -69,6 +70,15 @@ def test_the_same_numbers_come_again_and_a_folder_of_others_is_left_alone(tmp_pa
 
 
 @pytest.mark.usefixtures("undrawn")
+def test_sigmas_of_roll_and_pitch_alone_will_do(tmp_path):
+    done = call("pole", *QUICK, "--tilt-sigma", "10mgon", "--out", tmp_path / "o")
+    assert "a calibration that leaves 10 mgon in roll and in pitch" in done.stdout
+    table = read_table(tmp_path / "o/budget.parquet")
+    upright = table[(table["tilt_gon"] == 0) & (table["source"] == "calibration")]
+    np.testing.assert_allclose(upright["horizontal_m"], 2.0 * np.sqrt(2) * 10 * MGON, rtol=1e-9)
+
+
+@pytest.mark.usefixtures("undrawn")
 def test_degrees_are_shown_where_they_are_wanted(tmp_path):
     done = call("pole", *QUICK, "--tilt-range", "30deg", "--angle-unit", "deg",
                 "--out", tmp_path / "o")  # fmt: skip
@@ -87,7 +97,8 @@ def test_degrees_are_shown_where_they_are_wanted(tmp_path):
         (("--sensor", "adxl356"), "did you mean 'adxl355'"),
         (("--scheme", "faces-6"), "scheme faces-6"),
         (("--calibration", "no/calibration.json"), "no/calibration.json: No such file"),
-        (("--calibration", "c.json", "--scheme", "faces-6"), "exclude each other"),
+        (("--calibration", "c.json", "--scheme", "faces-6"), "--calibration and --scheme exclude"),
+        (("--tilt-sigma", "9mgon", "--hold", "2s"), "--tilt-sigma and --hold exclude each other"),
         (("--model", "bias+warm_up"), "warm_up"),
     ],
 )

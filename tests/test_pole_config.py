@@ -11,6 +11,7 @@ from accelstudy.pole import output
 from accelstudy.pole.config import PoleConfig
 from accelstudy.study.config import read_layer
 from accelstudy.study.tables import read_origin
+from accelstudy.units import MGON
 
 ROOT = Path(__file__).parents[1]
 
@@ -42,6 +43,7 @@ def test_the_example_is_worked_out(tmp_path, monkeypatch):
         ({"setup": {"long": "2m"}}, "mine: setup: unknown quantity of a pole 'long'"),
         ({"hold": "2m"}, "mine: hold: '2m': the unit must be one of"),
         ({"calibration": "c.json", "hold": "2s"}, "calibration and hold exclude each other"),
+        ({"tilt_sigma": "10"}, "mine: tilt_sigma: expected a number with its unit"),
     ],
 )
 def test_what_cannot_be_used_is_said_in_a_line(content, message):
@@ -49,6 +51,11 @@ def test_what_cannot_be_used_is_said_in_a_line(content, message):
         cases(content)
     assert message in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_sigmas_of_roll_and_pitch_alone_will_do():
+    sensor = cases({"tilt_sigma": "10mgon"})["mine"].calibrated_sensor
+    assert sensor.tilt_sigma == pytest.approx(10 * MGON)
 
 
 def test_files_of_ones_own_are_inputs():

@@ -9,7 +9,6 @@ from typing import Any, TypeVar
 import click
 from click.core import ParameterSource
 
-from accelstudy.errors import InputError
 from accelstudy.options import (
     PATH,
     SCHEME,
@@ -24,20 +23,28 @@ from accelstudy.options import (
     quiet_option,
     seed_option,
 )
-from accelstudy.pole.setup import HOLD, ROBOT_SIGMA, TILT_RANGE, Given, quantities
+from accelstudy.pole.setup import (
+    HOLD,
+    KINDS,
+    LINEAR,
+    ROBOT_SIGMA,
+    TILT_RANGE,
+    TILT_SIGMA,
+    Given,
+    check_one_kind,
+    quantities,
+)
 from accelstudy.progress import say, stage, warn
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 _SECTIONS: dict[str, list[str]] = {
-    "The sensor": ["sensor", "calibration", "mounting"],
-    "Its calibration, if there is none yet": ["model", "scheme", "approach", "hold", "robot_sigma"],
+    "The sensor": ["sensor", "calibration", "tilt_sigma", "mounting"],
+    "Its calibration, if there is none yet": [*LINEAR],
 }
 for _name, _given in quantities().items():
     _SECTIONS.setdefault(_given.section, []).append(_name)
 _SECTIONS["What is worked out"] = ["tilt_range", "replicates", "seed", "out"]
-LINEAR = ("model", "scheme", "approach", "hold", "robot_sigma")
-"""Options of a calibration that is not made yet."""
 
 
 def _option(name: str, given: Given) -> Callable[[Command], Command]:
@@ -71,6 +78,7 @@ def _setup_options(command: Command) -> Command:
     "--sensor", type=SENSOR, required=True, help="A data sheet: its name, or a YAML file."
 )
 @click.option("--calibration", type=PATH, help="A calibration.json of the sensor.")
+@_option("tilt_sigma", TILT_SIGMA)
 @click.option(
     "--mounting",
     default="frd",
@@ -106,6 +114,7 @@ def _setup_options(command: Command) -> Command:
 def pole_command(
     sensor: str,
     calibration: Path | None,
+    tilt_sigma: float | None,
     mounting: str,
     model: str,
     scheme: str,
@@ -131,25 +140,24 @@ def pole_command(
     from accelstudy.frames import parse_frame
     from accelstudy.outputs import POLE, result_folder
     from accelstudy.pole.output import write_pole
-    from accelstudy.pole.sensor import from_calibration, from_linear_theory
+    from accelstudy.pole.sensor import from_calibration, from_linear_theory, from_tilt_sigma
     from accelstudy.pole.setup import Setup
     from accelstudy.pole.statement import budget_text
 
     setup, frame, sheet = Setup(**given), parse_frame(mounting), get_data_sheet(sensor)
-    if calibration is not None:
-        source_of = click.get_current_context().get_parameter_source
-        if typed := [name for name in LINEAR if source_of(name) is ParameterSource.COMMANDLINE]:
-            raise InputError(
-                f"--calibration and --{typed[0].replace('_', '-')} exclude each other: the file "
-                "says how it was calibrated"
-            )
+    source_of = click.get_current_context().get_parameter_source
+    typed = [n for kind in KINDS for n in kind if source_of(n) is ParameterSource.COMMANDLINE]
+    check_one_kind({name: f"--{name.replace('_', '-')}" for name in typed})
     inputs = [] if calibration is None else [calibration]
     with result_folder(out, POLE, inputs, force) as folder, stage("budget of the pole"):
-        calibrated = (
-            from_linear_theory(model, scheme, approach, sheet, hold, robot_sigma, frame)
-            if calibration is None
-            else from_calibration(calibration, sheet, frame)
-        )
+        if calibration is not None:
+            calibrated = from_calibration(calibration, sheet, frame)
+        elif tilt_sigma is not None:
+            calibrated = from_tilt_sigma(tilt_sigma, sheet, frame)
+        else:
+            calibrated = from_linear_theory(
+                model, scheme, approach, sheet, hold, robot_sigma, frame
+            )
         result = write_pole(setup, calibrated, tilt_range, replicates, seed, folder)
     for warning in calibrated.warnings:
         warn(warning)

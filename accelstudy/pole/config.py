@@ -14,21 +14,31 @@ from accelstudy.data_sheets import data_sheet_names, get_data_sheet
 from accelstudy.errors import InputError
 from accelstudy.frames import parse_frame
 from accelstudy.pole.output import PoleResult, write_pole
-from accelstudy.pole.sensor import CalibratedSensor, from_calibration, from_linear_theory
-from accelstudy.pole.setup import HOLD, ROBOT_SIGMA, TILT_RANGE, setup_of
+from accelstudy.pole.sensor import (
+    CalibratedSensor,
+    from_calibration,
+    from_linear_theory,
+    from_tilt_sigma,
+)
+from accelstudy.pole.setup import (
+    HOLD,
+    ROBOT_SIGMA,
+    TILT_RANGE,
+    TILT_SIGMA,
+    check_one_kind,
+    setup_of,
+)
 from accelstudy.schemes import get_scheme
 from accelstudy.study.config.schema import Block
 from accelstudy.study.config.types import ModelName, PathName, Replicates
-
-LINEAR = ("model", "scheme", "approach", "hold", "robot_sigma")
-"""Keys of a calibration that is not made yet."""
 
 
 class PoleCase(Block):
     """A pole with its sensor: the options of `accelstudy pole`."""
 
     sensor: str = Field("adxl355", description="data sheet: a name, or a path of one's own")
-    calibration: str | None = Field(None, description="calibration.json, instead of what follows")
+    calibration: str | None = Field(None, description="calibration.json, or one of these")
+    tilt_sigma: str | None = Field(None, description="of roll and pitch, if no more is known; or")
     model: ModelName = Field("bias-scale-nonorthogonality", description="what is calibrated")
     scheme: str = Field("mclaren-24", description="positions")
     approach: str = Field("gravity", description="gravity or robot")
@@ -51,17 +61,14 @@ class PoleCase(Block):
             "tilt_range": partial(TILT_RANGE.read, self.tilt_range),
             "setup": partial(setup_of, self.setup),
         }
+        if self.tilt_sigma is not None:
+            checks["tilt_sigma"] = partial(TILT_SIGMA.read, self.tilt_sigma)
         for key, check in checks.items():
             try:
                 check()
             except InputError as error:
                 raise ValueError(f"{key}: {error}") from None
-        linear = [key for key in LINEAR if key in self.model_fields_set]
-        if linear and self.calibration is not None:
-            raise ValueError(
-                f"calibration and {linear[0]} exclude each other: the file says how it was "
-                "calibrated"
-            )
+        check_one_kind({k: k for k in self.model_fields_set if getattr(self, k) is not None})
         return self
 
     @property
@@ -70,6 +77,8 @@ class PoleCase(Block):
         sheet, frame = get_data_sheet(self.sensor), parse_frame(self.mounting)
         if self.calibration is not None:
             return from_calibration(self.calibration, sheet, frame)
+        if self.tilt_sigma is not None:
+            return from_tilt_sigma(TILT_SIGMA.read(self.tilt_sigma), sheet, frame)
         return from_linear_theory(
             self.model,
             self.scheme,

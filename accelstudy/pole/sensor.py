@@ -23,10 +23,14 @@ from accelstudy.models import compose, get_model
 from accelstudy.schemes import get_scheme
 from accelstudy.sensor import SensorModel
 from accelstudy.simulation import Noise
-from accelstudy.units import STANDARD_GRAVITY
+from accelstudy.units import STANDARD_GRAVITY, quantity_text
 from accelstudy.wording import joined
 
 Array = NDArray[np.float64]
+
+
+COEFFICIENTS = {"bias": "m/s^2/K", "scale": "1/K"}
+"""What changes with the temperature, and the unit of the parameters by which it does."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +43,7 @@ class CalibratedSensor:
     parameters : (u,) array, SI
     covariance : (u, u) array, SI, of the parameters
     sheet : DataSheet
+    tilt_sigma : float, rad, of roll and of pitch, where no more is known than that
     gravity : float, m/s²
     mounting : Frame, where its axes point when the pole stands upright
     temperature : float, °C, of the calibration
@@ -51,6 +56,7 @@ class CalibratedSensor:
     parameters: Array
     covariance: Array
     sheet: DataSheet
+    tilt_sigma: float | None = None
     gravity: float = STANDARD_GRAVITY
     mounting: Frame = FRD
     temperature: float = REFERENCE_TEMPERATURE
@@ -59,9 +65,10 @@ class CalibratedSensor:
     warnings: tuple[str, ...] = ()
 
     @property
-    def knows_temperature(self) -> bool:
-        """Whether the calibration corrects what the temperature does."""
-        return "temperature" in self.model.hold_columns
+    def corrected(self) -> tuple[str, ...]:
+        """Which of bias and scale the calibration corrects for the temperature."""
+        units = {parameter.unit for parameter in self.model.parameters}
+        return tuple(name for name, unit in COEFFICIENTS.items() if unit in units)
 
     def conditions(self, forces: Array, temperature_change: float) -> Hold | None:
         """What effects depend on beside the force, in attitudes with forces (k, 3), m/s².
@@ -121,12 +128,14 @@ def from_calibration(path: str | Path, sheet: DataSheet, mounting: Frame = FRD) 
         calibration.parameters,
         calibration.covariance,
         sheet,
-        calibration.gravity,
-        mounting,
-        float(np.mean(calibration.ranges.get("temperature_degC", [REFERENCE_TEMPERATURE]))),
-        calibration.ranges.get("time_s", [0.0])[-1],
-        f"the calibration {path} ({calibration.content['model']})",
-        tuple(doubts),
+        gravity=calibration.gravity,
+        mounting=mounting,
+        temperature=float(
+            np.mean(calibration.ranges.get("temperature_degC", [REFERENCE_TEMPERATURE]))
+        ),
+        time=calibration.ranges.get("time_s", [0.0])[-1],
+        origin=f"the calibration {path} ({calibration.content['model']})",
+        warnings=tuple(doubts),
     )
 
 
@@ -174,4 +183,18 @@ def from_linear_theory(
             f"{chosen.name} in {positions.n_positions} positions ({positions.name}), {approach}, "
             f"{seconds:g} s each, by linear theory"
         ),
+    )
+
+
+def from_tilt_sigma(sigma: float, sheet: DataSheet, mounting: Frame = FRD) -> CalibratedSensor:
+    """Sensor of whose calibration only the sd that it leaves in roll and in pitch is known, rad."""
+    model = get_model("bias")
+    return CalibratedSensor(
+        model,
+        np.zeros(model.n_parameters),
+        np.zeros((model.n_parameters, model.n_parameters)),
+        sheet,
+        sigma,
+        mounting=mounting,
+        origin=f"a calibration that leaves {quantity_text(sigma, 'rad')} in roll and in pitch",
     )

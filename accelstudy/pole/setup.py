@@ -53,6 +53,7 @@ def _given(*arguments: Any, **options: Any) -> Any:
 
 HOLD = Given("", "s", "10s", "Time at each position.", 1e-3, 1e6)
 ROBOT_SIGMA = Given("", "rad", "3.2mgon", "Sd of the robot's roll and of its pitch.", 1e-9, 0.1)
+TILT_SIGMA = Given("", "rad", "", "Of roll and of pitch, if no more is known.", 1e-9, 0.5)
 TILT_RANGE = Given("", "rad", "50gon", "Largest tilt.", 1e-3, 1.5)
 """What may be given beside a pole: of the calibration of its sensor, and how far it is tilted."""
 
@@ -120,6 +121,29 @@ class Setup:
     def hand_at(self) -> float:
         """Height of the hand above the foot along the pole, m."""
         return HAND * self.length if self.hand_height is None else self.hand_height
+
+
+LINEAR = ("model", "scheme", "approach", "hold", "robot_sigma")
+"""What tells of a calibration that is not made yet."""
+KINDS = (("calibration",), ("tilt_sigma",), LINEAR)
+"""Ways to tell how the sensor is calibrated, of which one is taken."""
+
+
+def check_one_kind(given: Mapping[str, str]) -> None:
+    """Check that the calibration is told in one way.
+
+    Parameters
+    ----------
+    given : mapping of what is given, of the names of `KINDS`, to how a person writes it
+
+    Raises
+    ------
+    InputError
+        If two ways are mixed.
+    """
+    found = [next(given[n] for n in kind if n in given) for kind in KINDS if set(kind) & set(given)]
+    if len(found) > 1:
+        raise InputError(f"{found[0]} and {found[1]} exclude each other: give one of them")
 
 
 def quantities() -> dict[str, Given]:

@@ -94,6 +94,8 @@ def sources() -> tuple[Source, ...]:
 )
 def calibration(situation: Situation) -> Wrong:
     """Parameters with their full covariance, the same error until the next calibration."""
+    if (sigma := situation.sensor.tilt_sigma) is not None:
+        return scatter(situation, ("roll", "pitch"), sigma, sigma)
     k, u = len(situation.tilt), situation.sensor.model.n_parameters
     covariance = np.broadcast_to(situation.sensor.covariance, (k, u, u))
     return Wrong((PARAMETERS,), covariance, np.zeros((k, u)))
@@ -136,11 +138,11 @@ def drift(situation: Situation) -> Wrong:
     sensor=True,
 )
 def temperature(situation: Situation) -> Wrong:
-    """Change of the bias and of the scales with the temperature, unless the calibration has it."""
-    sensor = situation.sensor
-    kelvin = 0.0 if sensor.knows_temperature else situation.setup.temperature_change
-    bias = sensor.sheet.bias_change(0.0, kelvin)
-    scale = (sensor.sheet.scale_per_kelvin or 0.0) * kelvin
+    """Change of the bias and of the scales, of what the calibration does not correct."""
+    sensor, kelvin = situation.sensor, situation.setup.temperature_change
+    bias = 0.0 if "bias" in sensor.corrected else sensor.sheet.bias_change(0.0, kelvin)
+    per_kelvin = 0.0 if "scale" in sensor.corrected else sensor.sheet.scale_per_kelvin or 0.0
+    scale = per_kelvin * kelvin
     return scatter(situation, (FORCE,), *np.hypot(bias, scale * situation.sensor_forces.T))
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from accelstudy.pole.budget import Budget
+from accelstudy.pole.sensor import COEFFICIENTS
 from accelstudy.pole.sources import sources
 from accelstudy.units import GON, attitude_unit, quantity_text, to_attitude
 from accelstudy.wording import joined, words
@@ -86,16 +87,19 @@ def remarks(budget: Budget) -> list[str]:
     wanted = (
         {"bias_instability", "acceleration_random_walk", "repeatability"} if setup.age else set()
     )
-    if setup.temperature_change and not sensor.knows_temperature:
-        wanted |= {"bias_per_kelvin", "scale_per_kelvin"}
+    if setup.temperature_change:
+        wanted |= {f"{name}_per_kelvin" for name in COEFFICIENTS if name not in sensor.corrected}
     said = []
     if missing := [words(name) for name in sensor.sheet.unknown if name in wanted]:
         said.append(
             f"The data sheet {sensor.sheet.name!r} does not tell {joined(missing, 'or')}: counted "
             "as zero."
         )
-    if setup.temperature_change and sensor.knows_temperature:
-        said.append("The calibration corrects for the temperature, so its effect is not counted.")
+    if setup.temperature_change and sensor.corrected:
+        what = joined([f"the {name}" for name in sensor.corrected])
+        said.append(
+            f"The calibration corrects what the temperature does to {what}; that is not counted."
+        )
     return said
 
 
