@@ -122,7 +122,9 @@ def agreement(simulated: pd.DataFrame) -> str:
     )
     if worst > BEYOND_CHANCE:
         tilt = quantity_text(float(where["tilt_gon"]) * GON, "rad")
-        said += f" At {tilt} it differs from linear theory by more than chance: it is the one to trust."
+        said += (
+            f" At {tilt} it differs from linear theory by more than chance: it is the one to trust."
+        )
     return said
 
 
