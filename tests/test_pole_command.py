@@ -118,3 +118,13 @@ def test_a_calibration_without_sigmas_is_refused(calibrated, tmp_path):
     refused = call("pole", *QUICK, "--calibration", tmp_path / "c.json", "--out", tmp_path / "out")
     assert refused.exit_code == 2
     assert "covariance: unknown for b_x" in refused.stderr
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_calibration_that_was_rejected_is_doubted(calibrated, tmp_path):
+    content = json.loads(calibrated.read_text(encoding="utf-8"))
+    content["quality"]["state"] = "rejected"
+    (tmp_path / "c.json").write_text(json.dumps(content), encoding="utf-8")
+    done = call("pole", *QUICK, "--calibration", tmp_path / "c.json", "--out", tmp_path / "out")
+    assert done.exit_code == 0
+    assert "may be worse than its sigmas say" in done.stderr

@@ -171,6 +171,7 @@ class _Mended(BaseModel):
 
 
 class _Quality(BaseModel):
+    state: str = ""
     plausible: bool = True
     warnings: list[str] = []
 

@@ -118,11 +118,13 @@ def from_calibration(path: str | Path, sheet: DataSheet, mounting: Frame = FRD) 
             "campaign with more positions, or give the sigma of the sensor in it"
         )
     quality = calibration.content["quality"]
-    doubts = (
-        []
-        if quality["plausible"]
-        else [f"do not use this calibration: {w}" for w in quality["warnings"]]
-    )
+    faults = [] if quality["plausible"] else quality["warnings"]
+    doubts = [f"do not use this calibration: {fault}" for fault in faults]
+    if quality["state"] == "rejected":
+        doubts.append(
+            "the residuals of the calibration contradict its noise, so it may be worse than its "
+            f"sigmas say; `accelstudy diagnose` looks for what its model lacks ({path})"
+        )
     return CalibratedSensor(
         calibration.model,
         calibration.parameters,
