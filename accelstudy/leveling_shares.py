@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from accelstudy.effects import Hold
 from accelstudy.leveling import jacobian, specific_force
 from accelstudy.sensitivity import (
     FORCES,
@@ -40,20 +41,24 @@ Sds of 100 000 calibrations leave 0.6 % of it.
 """
 
 
-def leveling_slope(model: SensorModel, parameters: Array, f_s: Array, g: float) -> Array:
-    """Derivatives of roll and pitch by the sensor's output and the parameters, (k, 2, 3 + u).
+def leveling_slope(
+    model: SensorModel, parameters: Array, f_s: Array, g: float, hold: Hold | None = None
+) -> Array:
+    """Derivatives of roll and pitch by the sensor's output and the parameters, (..., 2, 3 + u).
 
     Parameters
     ----------
     model, parameters : sensor model and its (u,) parameters, SI
-    f_s : (k, 3) array, m/s², output of the sensor
+    f_s : (..., 3) array, m/s², output of the sensor
     g : float, m/s²
+    hold : Hold, optional
+        What else is known of the attitudes, where effects depend on it.
     """
     by_inputs = [
-        model.output_jacobian(f_s, parameters, g),
-        model.correction_jacobian(f_s, parameters, g),
+        model.output_jacobian(f_s, parameters, g, hold),
+        model.correction_jacobian(f_s, parameters, g, hold),
     ]
-    return jacobian(model.correct(f_s, parameters, g)) @ np.concatenate(by_inputs, axis=-1)
+    return jacobian(model.correct(f_s, parameters, g, hold)) @ np.concatenate(by_inputs, axis=-1)
 
 
 def leveling_shares(

@@ -54,7 +54,7 @@ def test_what_cannot_be_used_is_said_in_a_line(content, message):
 
 
 def test_sigmas_of_roll_and_pitch_alone_will_do():
-    sensor = cases({"tilt_sigma": "10mgon"})["mine"].calibrated_sensor
+    sensor = cases({"tilt_sigma": "10mgon"})["mine"].calibrated_sensor()
     assert sensor.tilt_sigma == pytest.approx(10 * MGON)
 
 

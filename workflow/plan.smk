@@ -17,6 +17,7 @@ include: "rules/plan.smk"
 include: "rules/designs.smk"
 include: "rules/sequential.smk"
 include: "rules/pole.smk"
+include: "rules/field.smk"
 
 
 rule plan_example:
@@ -26,3 +27,4 @@ rule plan_example:
         DESIGNS_OUTPUTS,
         SEQUENTIAL_OUTPUTS,
         POLE_OUTPUTS,
+        FIELD_OUTPUTS,

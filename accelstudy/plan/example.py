@@ -26,6 +26,7 @@ class Example(Block):
     designs: dict[str, Any] = Field(default_factory=dict, description="optimal schemes")
     sequential: dict[str, Any] = Field(default_factory=dict, description="one position at a time")
     pole: dict[str, Any] = Field(default_factory=dict, description="tilt of a pole")
+    field: dict[str, Any] = Field(default_factory=dict, description="what limits a sensor in use")
 
     @property
     def provenance(self) -> dict[str, Any]:

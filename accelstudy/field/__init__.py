@@ -1,0 +1,1 @@
+"""What makes roll and pitch uncertain in the field, when the calibration is some time ago."""

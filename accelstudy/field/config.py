@@ -1,0 +1,76 @@
+"""The section `field` of `config/plan-example.yaml`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from accelstudy.field.figure import field_figure
+from accelstudy.field.shares import Use, field_shares
+from accelstudy.figures.saving import save
+from accelstudy.figures.style import DPI
+from accelstudy.pole.case import SensorCase
+from accelstudy.pole.setup import quantities
+from accelstudy.study.config.schema import Block
+from accelstudy.study.config.types import Angle, Number, OneOrMore, PathName
+from accelstudy.study.tables import write_table
+
+USUAL = quantities()
+
+Pitch = Annotated[float, Field(ge=-80, le=80), Number]
+"""Pitch in gon, so far from the roll pole that leveling is linear."""
+
+
+class FieldCase(SensorCase):
+    """A calibrated sensor in use."""
+
+    averaging: str = Field(USUAL["averaging"].usual, description="time of a reading")
+    age: str = Field(USUAL["age"].usual, description="time since the calibration")
+    temperature_change: str = Field(
+        USUAL["temperature_change"].usual, description="against that of the calibration"
+    )
+    restarted: bool = Field(True, description="whether the sensor was switched off since")
+    roll_gon: OneOrMore[Angle] = Field(default=[-30, 0, 30], description="rolls of the grid")
+    pitch_gon: OneOrMore[Pitch] = Field(default=[-30, 0, 30], description="pitches of the grid")
+
+    @property
+    def checks(self) -> Mapping[str, tuple[Callable[[Any], Any], Any]]:
+        """See `SensorCase.checks`."""
+        names = ("averaging", "age", "temperature_change")
+        return {
+            **super().checks,
+            **{name: (USUAL[name].read, getattr(self, name)) for name in names},
+        }
+
+    @property
+    def use(self) -> Use:
+        """How the sensor is used."""
+        return Use(
+            USUAL["averaging"].read(self.averaging),
+            USUAL["age"].read(self.age),
+            USUAL["temperature_change"].read(self.temperature_change),
+            self.restarted,
+        )
+
+    def write(self, folder: Path, provenance: Mapping[str, Any]) -> None:
+        """Write `shares.parquet` and the figure `shares` into a folder."""
+        sensor = self.calibrated_sensor()
+        table = field_shares(sensor, self.use, self.roll_gon, self.pitch_gon)
+        folder.mkdir(parents=True, exist_ok=True)
+        write_table(folder / "shares.parquet", table, provenance)
+        save(
+            field_figure(table, sensor.sheet, self.use),
+            folder / "shares.svg",
+            folder / "shares.png",
+            "What makes roll and pitch uncertain in the field",
+            DPI,
+        )
+
+
+class FieldConfig(Block):
+    """Sensors in use; each has a folder of its name."""
+
+    cases: dict[PathName, FieldCase] = Field(default_factory=dict, description="by name")

@@ -1,0 +1,27 @@
+from accelstudy.field.config import FieldConfig
+
+FIELD = section("field", FieldConfig).cases
+FIELD_FILES = [f"shares.{kind}" for kind in ("parquet", "svg", "png")]
+FIELD_OUTPUTS = [f"{RESULTS}/field/{name}/{path}" for name in FIELD for path in FIELD_FILES]
+
+
+rule field:
+    input:
+        lambda wildcards: FIELD[wildcards.case].files,
+    output:
+        *(f"{RESULTS}/field/{{case}}/{path}" for path in FIELD_FILES),
+    log:
+        f"{RESULTS}/logs/field/{{case}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/field/{{case}}.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        case=lambda wildcards: FIELD[wildcards.case].model_dump(exclude_unset=True),
+        provenance=PROVENANCE,
+        code=code_hash("planning"),
+    message:
+        "Share out the variance of roll and pitch in use: {wildcards.case}"
+    script:
+        "../scripts/field.py"
