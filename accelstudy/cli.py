@@ -29,6 +29,7 @@ from accelstudy.options import (
 from accelstudy.plan.command import plan_command
 from accelstudy.pole.command import pole_command
 from accelstudy.progress import say, stage, track
+from accelstudy.sequential.command import advise_command
 from accelstudy.units import ANGLE_UNIT_VARIABLE, angles_in
 
 SECTIONS = {
@@ -36,6 +37,7 @@ SECTIONS = {
         "import",
         "public",
         "simulate-campaign",
+        "advise",
         "calibrate",
         "diagnose",
         "check-sigmas",
@@ -297,6 +299,7 @@ for command in (
     public_command,
     simulate_campaign_command,
     diagnose_command,
+    advise_command,
     pole_command,
     design_command,
     plan_command,

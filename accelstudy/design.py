@@ -100,7 +100,7 @@ def diagnose(
     if not np.isfinite(a).all():
         reason = "the sigmas differ too much: the conditions have no weights to compute with"
     elif not_estimable:
-        blind = _is_blind(model, approach, noise, gravity)
+        blind = is_blind(model, approach, noise, gravity)
         reason = (
             f"rank {rank} of {len(names)}: {', '.join(not_estimable)} cannot be told apart by "
             + (f"the {approach.name} approach in any scheme" if blind else "these positions")
@@ -138,7 +138,7 @@ def _design(
     return whitened_jacobian(model, approach, ideal.observations(noise), parameters)
 
 
-def _is_blind(model: SensorModel, approach: Approach, noise: Noise, gravity: float) -> bool:
+def is_blind(model: SensorModel, approach: Approach, noise: Noise, gravity: float) -> bool:
     """Whether not even many positions all around, in all conditions, determine the model."""
     ideal = np.zeros(model.n_parameters)
     scheme = get_scheme("fibonacci-60")

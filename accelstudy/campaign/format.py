@@ -73,16 +73,28 @@ def read_campaign(
             f"{folder}: no such folder; a campaign is a folder with {HEADER} and "
             f"{' or '.join(TABLES)}"
         )
-    content = overlay(read_layer(folder / HEADER), given or {})
-    header = _parse_header(content, folder / HEADER)
-    found = [folder / name for name in TABLES if (folder / name).exists()]
-    if len(found) != 1:
-        wrong = "two tables of positions" if found else "no table of positions"
-        raise InputError(f"{folder}: {wrong}; expected either {' or '.join(TABLES)}")
-    (path,) = found
+    header = read_header(folder, given)
+    path = table_of(folder)
+    if path is None:
+        raise InputError(f"{folder}: no table of positions; expected either {' or '.join(TABLES)}")
     columns, warnings = read_positions(path)
-    campaign = _parse_table(columns, header, path, plausible)
+    campaign = parse_table(columns, header, path, plausible)
     return replace(campaign, warnings=tuple(warnings), source=folder)
+
+
+def read_header(folder: Path, given: Mapping[str, Any] | None = None) -> Header:
+    """Header of a campaign folder, with `given` laid over it key by key; errors as above."""
+    return _parse_header(overlay(read_layer(folder / HEADER), given or {}), folder / HEADER)
+
+
+def table_of(folder: Path) -> Path | None:
+    """Table of positions in a campaign folder; None if there is none yet, an error for two."""
+    found = [folder / name for name in TABLES if (folder / name).exists()]
+    if len(found) > 1:
+        raise InputError(
+            f"{folder}: two tables of positions; expected either {' or '.join(TABLES)}"
+        )
+    return found[0] if found else None
 
 
 def write_campaign(
@@ -114,7 +126,7 @@ def write_campaign(
     path = folder / f"positions.{table}"
     header = _parse_header(_content_of(campaign), folder / HEADER)
     columns = _columns_of(campaign.whole, header)
-    _parse_table(columns, header, path, plausible)
+    parse_table(columns, header, path, plausible)
     try:
         with whole_file(path) as temporary:
             if table == "csv":
@@ -141,8 +153,8 @@ def _parse_header(content: dict[str, Any], path: Path) -> Header:
         raise InputError(f"{path}: {first_error(error, Header)}") from None
 
 
-def _parse_table(columns: Columns, header: Header, path: Path, plausible: bool) -> Campaign:
-    """Check the columns, and turn them and the header into a campaign."""
+def parse_table(columns: Columns, header: Header, path: Path, plausible: bool = True) -> Campaign:
+    """Check the columns of the table `path`, and turn them and the header into a campaign."""
     given: dict[str, Array] = {}
     labels: list[str] = []
     for attribute, names in COLUMNS.items():
@@ -171,8 +183,18 @@ def _parse_table(columns: Columns, header: Header, path: Path, plausible: bool) 
     for attribute in COUNTING:
         if attribute in values:
             values[attribute] = values[attribute].astype(np.int64)
+    campaign = campaign_of(header, values)
+    reasons = {entry.position: entry.reason for entry in header.excluded or ()}
+    try:
+        return campaign.without(reasons)
+    except InputError as error:
+        raise InputError(f"{path.with_name(HEADER)}: {error}") from None
+
+
+def campaign_of(header: Header, values: Mapping[str, Any]) -> Campaign:
+    """Campaign of a header and of columns in SI, by attribute."""
     nominal, noise, robot = header.nominal, header.sensor_noise, header.robot
-    campaign = Campaign(
+    return Campaign(
         name=header.name,
         sensor=header.sensor,
         unit=header.unit,
@@ -186,11 +208,6 @@ def _parse_table(columns: Columns, header: Header, path: Path, plausible: bool) 
         log=header.log,
         **values,
     )
-    reasons = {entry.position: entry.reason for entry in header.excluded or ()}
-    try:
-        return campaign.without(reasons)
-    except InputError as error:
-        raise InputError(f"{path.with_name(HEADER)}: {error}") from None
 
 
 def _numbers(columns: Columns, name: str, labels: Sequence[str], path: Path) -> Array:

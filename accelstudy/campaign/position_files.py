@@ -27,19 +27,36 @@ def read_positions(path: Path) -> tuple[Columns, list[str]]:
         If the file is missing or not whole, or a column stands twice.
     """
     columns, odd = (_read_csv if path.suffix == ".csv" else _read_parquet)(path)
-    return columns, odd + [_ignored(path, name) for name in columns if name not in KNOWN]
+    return columns, odd + ignored_in(columns, path)
+
+
+def ignored_in(columns: Columns, path: Path) -> list[str]:
+    """Warnings of the columns that the format does not know."""
+    return [_ignored(path, name) for name in columns if name not in KNOWN]
 
 
 def _read_csv(path: Path) -> tuple[Columns, list[str]]:
     """Columns of text, and what is odd about the file."""
     try:
         text = path.read_text(encoding="utf-8-sig")
-        reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
-        lines = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}") from None
-    except (csv.Error, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: not a whole CSV file in UTF-8 ({one_line(error)})") from None
+    except UnicodeDecodeError as error:
+        raise _not_whole(path, error) from None
+    columns = columns_of(text, path)
+    # Half a number is a number too, so a cut in the last one shows only in the missing line end.
+    whole = text.endswith(("\n", "\r"))
+    odd = [] if whole else [f"{path}: the last line does not end; check that it is whole"]
+    return columns, odd
+
+
+def columns_of(text: str, path: Path) -> Columns:
+    """Columns of the text of a CSV table; `path` is what messages call it."""
+    try:
+        reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
+        lines = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
+    except csv.Error as error:
+        raise _not_whole(path, error) from None
     if not lines:
         raise InputError(f"{path}: empty; expected a line of column names, position, fx, fy, fz …")
     names = [name.strip() for name in lines[0][1]]
@@ -52,11 +69,11 @@ def _read_csv(path: Path) -> tuple[Columns, list[str]]:
                 "is the file whole?"
             )
     check_names(names, path)
-    columns = {name: [row[i] for _, row in lines[1:]] for i, name in enumerate(names)}
-    # Half a number is a number too, so a cut in the last one shows only in the missing line end.
-    whole = text.endswith(("\n", "\r"))
-    odd = [] if whole else [f"{path}: the last line does not end; check that it is whole"]
-    return columns, odd
+    return {name: [row[i] for _, row in lines[1:]] for i, name in enumerate(names)}
+
+
+def _not_whole(path: Path, error: Exception) -> InputError:
+    return InputError(f"{path}: not a whole CSV file in UTF-8 ({one_line(error)})")
 
 
 def _read_parquet(path: Path) -> tuple[Columns, list[str]]:

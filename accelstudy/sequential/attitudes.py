@@ -25,9 +25,9 @@ SAME = 5 * GON
 
 def candidates(
     name: str,
-    pole_distance: float = 0.0,
-    max_roll: float = np.pi,
-    max_pitch: float = np.pi / 2,
+    pole_distance: float | None = None,
+    max_roll: float | None = None,
+    max_pitch: float | None = None,
 ) -> Array:
     """Directions of gravity in the body frame, (k, 3), of the attitudes to choose from.
 
@@ -35,8 +35,8 @@ def candidates(
     ----------
     name : str
         One of `SETS`, or the path of a CSV file with the columns x, y, z or roll and pitch.
-    pole_distance : float, rad, least angle between the x axis and the vertical
-    max_roll, max_pitch : float, rad, largest roll and pitch either way
+    pole_distance : float, rad, optional, least angle between the x axis and the vertical
+    max_roll, max_pitch : float, rad, optional, largest roll and pitch either way
 
     Raises
     ------
@@ -52,11 +52,11 @@ def candidates(
     else:
         raise UnknownNameError("set of attitudes", name, (*SETS, "FILE.csv"))
     limits: list[Constraint] = []
-    if pole_distance > 0:
+    if pole_distance is not None:
         limits.append(OffPole(pole_distance))
-    if max_roll < np.pi:
+    if max_roll is not None:
         limits.append(RollRange(-max_roll, max_roll))
-    if max_pitch < np.pi / 2:
+    if max_pitch is not None:
         limits.append(PitchRange(-max_pitch, max_pitch))
     left = Constraints(tuple(limits)).keep(directions)
     if not len(left):

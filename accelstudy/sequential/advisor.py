@@ -1,0 +1,185 @@
+"""Advice in a running session."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.adjustment import Observations
+from accelstudy.approaches import Approach
+from accelstudy.campaign.fit import campaign_noise, check_columns, initial_values
+from accelstudy.campaign.format import Campaign
+from accelstudy.design import is_blind, rank_of
+from accelstudy.errors import InputError
+from accelstudy.leveling_error import TiltError
+from accelstudy.sensor import SensorModel
+from accelstudy.sequential.advice import Advice, Agreement, NextPosition, NoiseTaken
+from accelstudy.sequential.chooser import Chooser
+from accelstudy.sequential.choosing import typical_sizes
+from accelstudy.sequential.conditions import next_holds, next_rows
+from accelstudy.sequential.forecast import positions_to_go
+from accelstudy.sequential.prior import NOTHING_KNOWN, Prior
+from accelstudy.sequential.promise import Promise
+from accelstudy.sequential.screening import Screening
+from accelstudy.sequential.stopping import LEAST_REDUNDANCY, get_rule
+
+Array = NDArray[np.float64]
+
+
+@dataclass
+class Advisor:
+    """Follows a session.
+
+    Parameters
+    ----------
+    model : SensorModel
+    approach : Approach
+    promise : Promise
+    directions : (k, 3) array, attitudes to choose from
+    prior : Prior, optional
+    """
+
+    model: SensorModel
+    approach: Approach
+    promise: Promise
+    directions: Array
+    prior: Prior = NOTHING_KNOWN
+
+    def __post_init__(self) -> None:
+        self._screening: Screening | None = None
+
+    def restart(self) -> None:
+        """Forget all positions: they are not what they were."""
+        self._screening = None
+
+    def check(self, campaign: Campaign) -> None:
+        """Raise `InputError` where no number of positions would be enough."""
+        if self.approach.uses_angles and campaign.angles is None:
+            raise InputError(
+                f"{campaign.name}: approach {self.approach.name!r} needs the block `robot` in the "
+                "header, and the columns roll_robot_gon and pitch_robot_gon"
+            )
+        if campaign.n_positions:
+            check_columns(campaign, self.model)
+        noise, known = campaign_noise(campaign), self.prior is not NOTHING_KNOWN
+        if not known and is_blind(self.model, self.approach, noise, campaign.gravity):
+            raise InputError(
+                f"the {self.approach.name} approach cannot determine the model "
+                f"{self.model.name!r} in any positions; take a simpler model, or a robot"
+            )
+
+    def advise(self, campaign: Campaign) -> Advice:
+        """Take what is new in a session, and advise.
+
+        Parameters
+        ----------
+        campaign : Campaign
+            The session as far as it goes; positions that were taken before are as they were.
+        """
+        observed = _observed(campaign)
+        if self._screening is None or not self._screening.recursion.solved[0]:
+            initial = None
+            if self.prior is NOTHING_KNOWN and campaign.n_positions:
+                initial = initial_values(self.model, campaign.forces, campaign.gravity)
+            known = campaign.sigma_force is not None
+            self._screening = Screening(
+                self.model, self.approach, observed, known, self.prior, initial
+            )
+        else:
+            self._screening.add(observed)
+        return self._advice(campaign, self._screening)
+
+    def _advice(self, campaign: Campaign, screening: Screening) -> Advice:
+        recursion, noise = screening.recursion, campaign_noise(campaign)
+        solved = bool(recursion.solved[0])
+        trusted = screening.sigma_known and not screening.refuted
+        root = recursion.root_information
+        chooser = Chooser(
+            self.directions,
+            next_rows(campaign, self.model, self.approach, noise, self.directions),
+            self._tilt_error(campaign, recursion.parameters[0] if solved else None),
+            self.promise,
+            "known" if trusted else "bound",
+            typical_sizes(self.model, root.shape[-1]),
+        )
+        rms = np.full((1, 2), np.inf)
+        if solved:
+            rms = chooser.rms(root, recursion.omega, recursion.redundancy)
+        told = bool(np.isfinite(rms).all())
+        enough = bool(self.promise.reached(rms)[0])
+
+        last, repeats = None, None
+        if campaign.n_positions:
+            last = -campaign.forces[-1] / np.linalg.norm(campaign.forces[-1])
+        latest = screening.last
+        if latest is not None and latest.agreement is Agreement.CONFLICT and not latest.repeats:
+            repeats = int(campaign.positions[latest.index])
+        to_go = None
+        if not enough and (trusted or recursion.redundancy >= LEAST_REDUNDANCY):
+            r = recursion.redundancy
+            variance = 1.0 if trusted else float(recursion.omega[0]) / r
+            to_go = positions_to_go(chooser, root[0], variance, r, rms[0], last)
+        if repeats is None or last is None:
+            before = None if last is None else last[None]
+            best = chooser.directions[chooser.choose(root, recursion.solved, rms, before)[0]]
+        else:
+            best = last
+        return Advice(
+            positions=campaign.positions,
+            last=latest,
+            set_aside=tuple(int(campaign.positions[i]) for i in screening.aside),
+            undetermined=self._undetermined(root[0], solved),
+            vague=self._vague(screening) if solved else (),
+            noise=_noise_taken(screening, campaign.sigma_force, noise.sigma_force),
+            rms=rms[0] if told else None,
+            next=NextPosition(best, repeats),
+            to_go=to_go,
+            enough=enough,
+        )
+
+    def _tilt_error(self, campaign: Campaign, parameters: Array | None) -> TiltError:
+        hold = campaign.hold if campaign.n_positions else next_holds(campaign, np.eye(3)[2:])
+        own = None if parameters is None else parameters[: self.model.n_parameters]
+        return self.promise.tilt_error(self.model, own, campaign.gravity, hold)
+
+    def _undetermined(self, root: Array, solved: bool) -> tuple[str, ...]:
+        if solved:
+            return ()
+        free = rank_of(root)[2][: self.model.n_parameters]
+        return tuple(
+            n for n, is_free in zip(self.model.parameter_names, free, strict=True) if is_free
+        )
+
+    def _vague(self, screening: Screening) -> tuple[str, ...]:
+        """Parameters that are known less well than they are of any cheap sensor."""
+        names = self.model.parameter_names
+        sigma = np.sqrt(np.diag(screening.recursion.cofactors[0]))[: len(names)]
+        sizes = typical_sizes(self.model, len(names))
+        return tuple(n for n, s, size in zip(names, sigma, sizes, strict=True) if s > size)
+
+
+def _observed(campaign: Campaign) -> Observations:
+    noise = campaign_noise(campaign)
+    return Observations(
+        forces=campaign.forces[None],
+        sigma_force=noise.sigma_force,
+        angles=None if campaign.angles is None else campaign.angles[None],
+        sigma_angle=noise.sigma_angle,
+        gravity=campaign.gravity,
+        sigma_gravity=campaign.sigma_gravity,
+        hold=campaign.hold,
+    )
+
+
+def _noise_taken(screening: Screening, stated: float | None, unit: float) -> NoiseTaken:
+    """By which noise of a position the accuracy is judged."""
+    recursion, refuted = screening.recursion, screening.refuted
+    r, seen, taken = recursion.redundancy, None, stated
+    if recursion.solved[0] and r > 0:
+        seen = unit * float(np.sqrt(recursion.omega[0] / r))
+    if stated is None or refuted:
+        bound = float(np.sqrt(get_rule("bound")(recursion.omega, r)[0]))
+        taken = unit * bound if np.isfinite(bound) else None
+    return NoiseTaken(stated, seen, taken, refuted, r)

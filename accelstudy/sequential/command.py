@@ -1,0 +1,167 @@
+"""The command that advises in a running session."""
+
+from __future__ import annotations
+
+import math
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from accelstudy.options import (
+    PATH,
+    Quantity,
+    Sectioned,
+    angle_unit_option,
+    approach_option,
+    example,
+    model_option,
+    quiet_option,
+)
+from accelstudy.progress import say, warn
+
+if TYPE_CHECKING:
+    from accelstudy.sequential.prior import Prior
+
+POLL = 1.0
+"""Seconds between two looks at a growing table."""
+SECTIONS = {
+    "What is wanted": ("tilt_accuracy", "tilt_range"),
+    "The calibration": ("approach", "model", "prior"),
+    "Positions to choose from": ("attitudes", "pole_distance", "max_roll", "max_pitch"),
+    "The session": ("watch",),
+}
+
+
+@click.command(
+    "advise",
+    cls=Sectioned,
+    sections=SECTIONS,
+    epilog=example("accelstudy advise my-campaign --tilt-accuracy 10mgon --tilt-range 30gon"),
+)
+@click.argument("campaign", type=PATH)
+@click.option(
+    "--tilt-accuracy",
+    type=Quantity("rad", 1e-9, math.pi / 2),
+    required=True,
+    help="Rms of roll and of pitch to reach, as 10mgon or 0.01deg.",
+)
+@click.option(
+    "--tilt-range",
+    type=Quantity("rad", 1e-3, math.pi / 2),
+    default="30gon",
+    show_default=True,
+    help="Tilts up to which it is to hold.",
+)
+@approach_option(None)
+@model_option
+@click.option("--prior", type=PATH, help="A calibration.json of before, with the same model.")
+@click.option(
+    "--attitudes",
+    help="Attitudes to choose from: cube (faces, edges, corners), grid (roll and pitch in steps of "
+    "25 gon) or a CSV file.  [default: cube, with a robot grid]",
+)
+@click.option(
+    "--pole-distance",
+    type=Quantity("rad", 0.0, 2.0),
+    help="Least angle between the x axis and the vertical.  [default: none]",
+)
+@click.option(
+    "--max-roll", type=Quantity("rad", 0.0, 4.0), help="Largest roll, either way.  [default: any]"
+)
+@click.option(
+    "--max-pitch", type=Quantity("rad", 0.0, 4.0), help="Largest pitch, either way.  [default: any]"
+)
+@click.option("--watch", is_flag=True, help="Wait for further positions, until Ctrl-C.")
+@angle_unit_option
+@quiet_option
+def advise_command(
+    campaign: Path,
+    tilt_accuracy: float,
+    tilt_range: float,
+    approach: str | None,
+    model: str,
+    prior: Path | None,
+    attitudes: str | None,
+    pole_distance: float | None,
+    max_roll: float | None,
+    max_pitch: float | None,
+    watch: bool,
+) -> None:
+    """Say after each position what is known, where to go next, and when to stop.
+
+    CAMPAIGN is the folder of a session that is still running. Its campaign.yaml is there; its
+    positions.csv may have few positions, none, or not be there yet.
+    """
+    from accelstudy.approaches import get_approach
+    from accelstudy.models import get_model
+    from accelstudy.sequential.advisor import Advisor
+    from accelstudy.sequential.attitudes import DEFAULTS, candidates
+    from accelstudy.sequential.promise import Promise
+    from accelstudy.sequential.watching import Watch
+    from accelstudy.sequential.wording import finished, heading, lines
+
+    session, promise = Watch(campaign), Promise(tilt_accuracy, tilt_range)
+    news = next(session.look())
+    name = approach or ("gravity" if news.campaign.angles is None else "robot")
+    chosen, sensor = get_approach(name), get_model(model)
+    directions = candidates(
+        attitudes or DEFAULTS.get(name, "grid"), pole_distance, max_roll, max_pitch
+    )
+    advisor = Advisor(sensor, chosen, promise, directions, *_prior(prior, model))
+    advisor.check(news.campaign)
+    for warning in news.campaign.warnings:
+        warn(warning)
+
+    def tell() -> None:
+        """Print the advice."""
+        advice = advisor.advise(news.campaign)
+        click.echo(heading(advice, news.campaign, sensor, name))
+        for line in lines(advice, news.campaign, sensor, promise):
+            click.echo(f"  {line}")
+        if advice.enough:
+            click.echo(f"  {finished(campaign, model, name)}")
+
+    tell()
+    if not watch:
+        if session.unfinished:
+            warn("the last line of the table is not whole yet, and is not counted")
+        return
+    say("\nwaiting for the next position; Ctrl-C ends")
+    try:
+        while True:
+            time.sleep(POLL)
+            for news in session.look():
+                click.echo("")
+                if news.remark:
+                    warn(news.remark)
+                if news.again:
+                    advisor.restart()
+                if news.again or not news.remark:
+                    advisor.check(news.campaign)
+                    tell()
+    except KeyboardInterrupt:
+        say("\nended")
+
+
+def _prior(path: Path | None, model: str) -> tuple[Prior, ...]:
+    """What an earlier calibration says; nothing without one."""
+    if path is None:
+        return ()
+    import numpy as np
+
+    from accelstudy.campaign.applying import read_calibration
+    from accelstudy.errors import InputError
+    from accelstudy.models import get_model
+    from accelstudy.sequential.prior import Prior
+
+    earlier, wanted = read_calibration(path), get_model(model)
+    if earlier.model.parameter_names != wanted.parameter_names:
+        raise InputError(
+            f"{path}: calibrates {', '.join(earlier.model.parameter_names)}, but the model "
+            f"{wanted.name!r} has {', '.join(wanted.parameter_names)}"
+        )
+    if not np.isfinite(earlier.covariance).all():
+        raise InputError(f"{path}: does not say how well its parameters are known")
+    return (Prior.of_covariance(earlier.parameters, earlier.covariance),)

@@ -1,0 +1,91 @@
+"""A campaign that is being measured: its folder may have few positions, or none yet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from accelstudy.campaign.format import (
+    Campaign,
+    campaign_of,
+    parse_table,
+    read_campaign,
+    read_header,
+    table_of,
+)
+from accelstudy.campaign.header import HEADER, Header
+from accelstudy.campaign.position_files import columns_of, ignored_in
+from accelstudy.errors import InputError
+
+
+@dataclass(frozen=True)
+class Running:
+    """What there is of a session.
+
+    Attributes
+    ----------
+    campaign : Campaign, with the positions that are whole
+    unfinished : str, a last line that is still being written; empty if there is none
+    """
+
+    campaign: Campaign
+    unfinished: str
+
+
+def read_running(folder: str | Path, settled: str = "") -> Running:
+    """Read what there is of a session.
+
+    Parameters
+    ----------
+    folder : path
+    settled : str
+        A last line without an end that is taken nevertheless, as it has not changed for a while.
+
+    Raises
+    ------
+    InputError
+        As `accelstudy.campaign.format.read_campaign`, but not for positions that are not there yet.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise InputError(
+            f"{folder}: no such folder; a running session has one with {HEADER}, and its positions "
+            "in positions.csv"
+        )
+    header, path = read_header(folder), table_of(folder)
+    if path is None:
+        return Running(_without_positions(header, folder), "")
+    if path.suffix != ".csv":
+        return Running(read_campaign(folder), "")
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from None
+    except UnicodeDecodeError as error:  # half a character, perhaps
+        raise InputError(f"{path}: not a CSV file in UTF-8 ({error.reason})") from None
+    whole, unfinished = _split(text)
+    if unfinished and unfinished == settled:
+        whole, unfinished = text, ""
+    if not whole.strip():
+        return Running(_without_positions(header, folder), unfinished)
+    columns = columns_of(whole, path)
+    if not any(map(len, columns.values())):
+        return Running(_without_positions(header, folder), unfinished)
+    campaign = parse_table(columns, header, path)
+    warnings = tuple(ignored_in(columns, path))
+    return Running(replace(campaign, warnings=warnings, source=folder), unfinished)
+
+
+def _split(text: str) -> tuple[str, str]:
+    """Whole lines, and what stands after them."""
+    end = max(text.rfind("\n"), text.rfind("\r")) + 1
+    return text[:end], text[end:]
+
+
+def _without_positions(header: Header, folder: Path) -> Campaign:
+    values = {"positions": np.zeros(0, dtype=np.int64), "forces": np.zeros((0, 3))}
+    if header.robot is not None:
+        values["angles"] = np.zeros((0, 2))
+    return replace(campaign_of(header, values), source=folder)

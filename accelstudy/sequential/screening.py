@@ -1,0 +1,135 @@
+"""Positions as they come in: each tested by those before it, and used unless it is in conflict."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.adjustment import Observations
+from accelstudy.adjustment.quality import global_test, suspects
+from accelstudy.approaches import Approach
+from accelstudy.errors import InputError
+from accelstudy.sensor import SensorModel
+from accelstudy.sequential.advice import Agreement, LastPosition
+from accelstudy.sequential.attitudes import apart_from
+from accelstudy.sequential.prior import NOTHING_KNOWN, Prior
+from accelstudy.sequential.recursion import Recursion
+
+Array = NDArray[np.float64]
+
+CONFLICT = 1e-3
+"""Level of the test of a new position, the usual one of Baarda (1968)."""
+ALL_ALIKE = 0.01
+"""Family-wise level of the tests of all positions by all others."""
+MANY = 0.2
+"""Share of positions in conflict above which it is not the positions that are wrong."""
+
+
+class Screening:
+    """One session, its positions sorted into those that agree and those in conflict.
+
+    One that is in conflict is set aside, and is to be repeated. If another one is in conflict, the
+    fault may be with those before, which nothing checked when they came in. So all positions are
+    tested by all others then, and those are set aside that the others do not bear. If these are too
+    many, the noise or the model is wrong and not the positions: then all are used.
+
+    Parameters
+    ----------
+    model : SensorModel
+    approach : Approach
+    observed : Observations, R = 1, as far as the session goes; of no positions, perhaps
+    sigma_known : bool, whether the noise is stated
+    prior : Prior, optional
+    initial : (u,) array, SI, optional, where to start, as in `Recursion`
+
+    Attributes
+    ----------
+    recursion : Recursion, of the positions that are used
+    used, aside : lists of int, indices of positions
+    last : LastPosition or None
+    """
+
+    def __init__(
+        self,
+        model: SensorModel,
+        approach: Approach,
+        observed: Observations,
+        sigma_known: bool,
+        prior: Prior = NOTHING_KNOWN,
+        initial: Array | None = None,
+    ) -> None:
+        self.model, self.approach, self.sigma_known = model, approach, sigma_known
+        self.prior, self.initial = prior, initial
+        self.used: list[int] = []
+        self.aside: list[int] = []
+        self.last: LastPosition | None = None
+        self.recursion = self._recursion(observed, [])
+        self.add(observed)
+
+    @property
+    def refuted(self) -> bool:
+        """Whether the residuals are larger than the stated noise allows."""
+        r, omega = self.recursion.redundancy, float(self.recursion.omega[0])
+        if not self.sigma_known or r <= 0 or not self.recursion.solved[0]:
+            return False
+        test = global_test(omega, r)
+        return test is not None and not test.accepted and omega > r
+
+    def add(self, observed: Observations) -> None:
+        """Take what is new in the session, with the positions that were taken before."""
+        for i in range(len(self.used) + len(self.aside), observed.forces.shape[1]):
+            self._take(i, observed)
+
+    def _recursion(self, observed: Observations, used: list[int]) -> Recursion:
+        chosen = observed.take(np.array(used, dtype=int))
+        return Recursion(self.model, self.approach, chosen, self.prior, self.initial)
+
+    def _take(self, i: int, observed: Observations) -> None:
+        p = self._p_value(i, observed)
+        before = self.aside[-1] if self.aside else None
+        again = before is not None and not _apart(observed, i, before)
+        conflict = p < CONFLICT
+        if conflict:
+            self.aside.append(i)
+            if before is not None and not again and self._sort_anew(observed, i):
+                conflict, p = i in self.aside, self._p_value(i, observed)
+        if not conflict:
+            self.used.append(i)
+            self.recursion.add(observed.take(np.array(self.used)))
+        agreement = Agreement.CONFLICT if conflict else Agreement.AGREES
+        if np.isnan(p):
+            agreement = Agreement.UNTESTED
+        self.last = LastPosition(i, agreement, p, again and conflict)
+
+    def _p_value(self, i: int, observed: Observations) -> float:
+        """P-value of position i by those that are used; NaN where they say nothing of it."""
+        recursion = self.recursion
+        if not recursion.solved[0]:
+            return np.nan
+        prediction = recursion.predict(observed.take(np.array([*self.used, i])))
+        known = self.sigma_known and not self.refuted
+        omega = None if known else recursion.omega
+        return float(prediction.p_value(omega, recursion.redundancy)[0])
+
+    def _sort_anew(self, observed: Observations, i: int) -> bool:
+        """Test all positions up to i by all others; whether that could be done.
+
+        Afterwards all are sorted but for i, if it is in no conflict.
+        """
+        whole, most = observed.take(np.arange(i + 1)), int(MANY * (i + 1))
+        try:
+            found = suspects(
+                self.model, self.approach, whole, ALL_ALIKE, self.sigma_known, most + 1
+            )
+        except InputError:  # together they have no solution
+            return False
+        self.aside = sorted(one.position for one in found) if len(found) <= most else []
+        self.used = [j for j in range(i) if j not in self.aside]
+        self.recursion = self._recursion(observed, self.used)
+        return True
+
+
+def _apart(observed: Observations, i: int, j: int) -> bool:
+    """Whether two positions are in different attitudes."""
+    first, second = (f / np.linalg.norm(f) for f in observed.forces[0, [i, j]])
+    return bool(apart_from(first[None], second[None])[0, 0])

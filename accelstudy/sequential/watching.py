@@ -1,0 +1,123 @@
+"""Following a campaign whose table of positions grows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from accelstudy.campaign.format import Campaign
+from accelstudy.campaign.header import COLUMNS
+from accelstudy.errors import InputError
+from accelstudy.sequential.running import read_running
+
+SETTLED = 3
+"""Looks after which a last line without an end is taken as it is: editors leave the end out."""
+
+
+@dataclass(frozen=True)
+class News:
+    """What is new in a session.
+
+    Attributes
+    ----------
+    campaign : Campaign, as far as it goes
+    remark : str, what else happened to the table; empty if positions were added and no more
+    again : bool, whether positions that were there before are gone or are not what they were
+    """
+
+    campaign: Campaign
+    remark: str
+    again: bool
+
+
+class Watch:
+    """Looks at a campaign folder again and again.
+
+    Parameters
+    ----------
+    folder : Path
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._seen: Campaign | None = None
+        self.unfinished, self._rested, self._settled = "", 0, ""
+        self._complaint = ""
+
+    def look(self) -> Iterator[News]:
+        """Yield what is new since the last look, position by position.
+
+        Raises
+        ------
+        InputError
+            At the first look, if the campaign cannot be read. Later on a table that cannot be read
+            is one that is just being written: what is wrong is told once, as a remark.
+        """
+        try:
+            running = read_running(self.folder, self._settled)
+        except InputError as error:
+            if self._seen is None:
+                raise
+            if str(error) != self._complaint:
+                self._complaint = str(error)
+                yield News(self._seen, f"waiting for a whole table: {error}", False)
+            return
+        self._complaint = ""
+        same = running.unfinished == self.unfinished
+        self._rested = self._rested + 1 if running.unfinished and same else 0
+        self.unfinished = running.unfinished
+        if self._rested >= SETTLED:  # from the next look on
+            self._settled = self.unfinished
+        yield from self._compare(running.campaign)
+
+    def _compare(self, now: Campaign) -> Iterator[News]:
+        before, self._seen = self._seen, now
+        if before is None:
+            yield News(now, "", False)
+            return
+        remark = _changes(before, now)
+        if remark:
+            yield News(now, f"{remark}; starting over", True)
+            return
+        for n in range(before.n_positions + 1, now.n_positions + 1):
+            yield News(_first(now, n), "", False)
+
+
+def _first(campaign: Campaign, n: int) -> Campaign:
+    """Return the campaign when it had n positions."""
+    if n == campaign.n_positions:
+        return campaign
+    later = {int(p): "later" for p in campaign.positions[n:]}
+    reasons, excluded = dict(campaign.reasons), campaign.excluded
+    part = campaign.without(later)
+    return replace(part, excluded=excluded, reasons=reasons)
+
+
+def _changes(before: Campaign, now: Campaign) -> str:
+    """What of the positions before is not as it was; empty if all is."""
+    if before.reasons != now.reasons:
+        return "campaign.yaml leaves out other positions"
+    gone = [str(p) for p in before.positions if p not in now.positions]
+    if gone:
+        return (
+            f"position {gone[0]} is gone"
+            if len(gone) == 1
+            else (f"positions {', '.join(gone)} are gone")
+        )
+    n = before.n_positions
+    if not np.array_equal(before.positions, now.positions[:n]):
+        return "a position came in before the last one"
+    for name in COLUMNS:
+        old, new = getattr(before, name), getattr(now, name)
+        if n and (old is None) != (new is None):
+            return f"the columns of {name} came or went"
+        if old is not None and new is not None and not np.array_equal(old, new[:n]):
+            changed = before.positions[np.any(np.reshape(old != new[:n], (n, -1)), axis=1)]
+            return f"position {changed[0]} was changed"
+    header = ("unit", "gravity", "sigma_gravity", "sigma_force", "sigma_angle", "full_range")
+    if any(getattr(before, name) != getattr(now, name) for name in header):
+        return "campaign.yaml was changed"
+    return ""
