@@ -89,10 +89,11 @@ def advise_command(
     max_pitch: float | None,
     watch: bool,
 ) -> None:
-    """Say after each position what is known, where to go next, and when to stop.
+    """In a running session: where to go next, when to stop.
 
-    CAMPAIGN is the folder of a session that is still running. Its campaign.yaml is there; its
-    positions.csv may have few positions, none, or not be there yet.
+    CAMPAIGN is the folder of the session. Its campaign.yaml is there; its positions.csv may have
+    few positions, none, or not be there yet. Each position is tested by those before it, and used
+    if it agrees with them. What is not determined yet is said, and the tilt accuracy so far.
     """
     from accelstudy.approaches import get_approach
     from accelstudy.models import get_model
