@@ -13,18 +13,9 @@ from pathlib import Path
 
 import psutil
 import pytest
+from snakemake_helpers import ENVIRONMENT, one_line, remains
 from study_helpers import NINE, grid
-from test_workflow import (
-    ENVIRONMENT,
-    TABLE_PATHS,
-    TINY,
-    command,
-    in_batches,
-    one_line,
-    remains,
-    run,
-    succeed,
-)
+from test_workflow import TABLE_PATHS, TINY, command, in_batches, run, succeed
 
 from accelstudy.errors import InputError
 from accelstudy.study.tables import read_estimates
@@ -49,7 +40,7 @@ def content(folder):
 def study(folder, config=STUDY):
     """Arguments of a run of the study in small batches."""
     path = in_batches(folder)
-    path.write_text(path.read_text().replace("size=130", "size=8100"))
+    path.write_text(path.read_text().replace("size=190", "size=8100"))
     return {"snakefile": path, "config": config}
 
 

@@ -15,7 +15,7 @@ import yaml
 from click.testing import CliRunner
 from jsonschema import Draft202012Validator
 from page_helpers import assert_sound, text_of
-from test_workflow import ROOT
+from snakemake_helpers import ROOT
 
 from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach

@@ -2,11 +2,10 @@
 
 import json
 import re
-import subprocess
 
 import pytest
 import yaml
-from test_workflow import ENVIRONMENT, ROOT, SNAKEMAKE, one_line, remains
+from snakemake_helpers import ROOT, one_line, remains, snakemake
 
 from accelstudy.study.config import read_study
 
@@ -25,14 +24,9 @@ TINY = {
 
 
 def run(folder, config):
-    """Run Snakemake in a folder; both streams together."""
     (folder / "tiny.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")
     fixed = ["--snakefile", ROOT / "workflow" / "diagnose.smk", "--cores", 2]
-    return subprocess.run(
-        [str(word) for word in (*SNAKEMAKE, *fixed, "--configfile", "tiny.yaml")],
-        cwd=folder, env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-        text=True, check=False, timeout=300,
-    )  # fmt: skip
+    return snakemake(folder, *fixed, "--configfile", "tiny.yaml")
 
 
 @pytest.fixture(scope="module")

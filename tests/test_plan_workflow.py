@@ -1,10 +1,8 @@
 """The workflow of a plan: what it makes, and what it says of a bad configuration."""
 
-import subprocess
-
 import pytest
 import yaml
-from test_workflow import ENVIRONMENT, ROOT, SNAKEMAKE, one_line
+from snakemake_helpers import ROOT, one_line, snakemake
 
 from accelstudy.errors import InputError
 from accelstudy.plan.config import PlanConfig
@@ -15,11 +13,7 @@ from accelstudy.study.config import read_layer
 def run(folder, config):
     (folder / "tiny.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")
     fixed = ["--snakefile", ROOT / "workflow" / "plan.smk", "--cores", 1]
-    return subprocess.run(
-        [str(word) for word in (*SNAKEMAKE, *fixed, "--configfile", "tiny.yaml")],
-        cwd=folder, env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-        text=True, check=False, timeout=300,
-    )  # fmt: skip
+    return snakemake(folder, *fixed, "--configfile", "tiny.yaml")
 
 
 def test_the_example_can_be_used():

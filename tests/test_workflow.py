@@ -5,7 +5,6 @@ import re
 import shutil
 import signal
 import subprocess
-import sys
 import time
 import zipfile
 from pathlib import Path
@@ -14,25 +13,17 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 import yaml
+from snakemake_helpers import ENVIRONMENT, ROOT, SNAKEMAKE, one_line, remains, snakemake
 from study_helpers import NINE, grid
 
 import accelstudy
 from accelstudy.errors import InputError
 from accelstudy.figures import get_figure
-from accelstudy.study import provenance
+from accelstudy.study import batches, provenance
 from accelstudy.study.provenance import check_writable, code_hash
 from accelstudy.study.tables import TABLES, read_origin, read_table
 
-ROOT = Path(__file__).parents[1]
 CONFIG = ROOT / "config" / "config.yaml"
-SNAKEMAKE = [sys.executable, "-m", "snakemake", "--workflow-profile", ROOT / "profiles" / "default"]
-ENVIRONMENT = {
-    **os.environ,
-    "PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]),
-    "OPENBLAS_NUM_THREADS": "1",
-    "NO_COLOR": "1",
-}
-ENVIRONMENT.pop("SNAKEMAKE_PROFILE", None)
 
 # Two models, two schemes, two approaches: eight cells, of which one cannot be estimated.
 TINY = {
@@ -50,7 +41,7 @@ from functools import partial
 
 from accelstudy.study import batches
 
-batches.batches = partial(batches.batches, size=130)
+batches.batches = partial(batches.batches, size=190)
 
 
 include: "{ROOT}/workflow/Snakefile"
@@ -61,23 +52,22 @@ rule study:
     input:
         rules.all.input,
 """
-"""The workflow with batches of two cells."""
+"""The workflow with batches of three cells."""
 
 
-def command(folder, *arguments, snakefile=ROOT / "Snakefile", cores=2, config=TINY):
+def words(folder, *arguments, snakefile=ROOT / "Snakefile", cores=2, config=TINY):
     path = folder / "tiny.yaml"
     path.write_text(config if isinstance(config, str) else yaml.safe_dump(config))
-    fixed = ["--snakefile", snakefile, "--cores", cores, "--configfile", CONFIG, path]
-    return [str(word) for word in (*SNAKEMAKE, *arguments, *fixed)]
+    return [*arguments, "--snakefile", snakefile, "--cores", cores, "--configfile", CONFIG, path]
 
 
-def run(folder, *arguments, environment=ENVIRONMENT, **options):
-    """Run Snakemake in a folder; both streams together."""
-    return subprocess.run(
-        command(folder, *arguments, **options),
-        cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-        text=True, check=False, timeout=300,
-    )  # fmt: skip
+def command(folder, *arguments, **options):
+    """Words of a command that runs Snakemake."""
+    return [str(word) for word in (*SNAKEMAKE, *words(folder, *arguments, **options))]
+
+
+def run(folder, *arguments, **options):
+    return snakemake(folder, *words(folder, *arguments, **options))
 
 
 def succeed(folder, *arguments, **options):
@@ -93,10 +83,6 @@ def refuse(folder, *arguments, **options):
     assert "Traceback" not in result.stdout
     assert remains(folder) == []
     return result.stdout
-
-
-def remains(folder):
-    return [str(path) for path in folder.rglob("*") if path.name.endswith(".part")]
 
 
 def in_batches(folder):
@@ -151,21 +137,15 @@ def test_all_is_made(single):
     assert remains(single) == []
 
 
-def test_cores_and_batches_change_nothing(single, tmp_path):
-    succeed(tmp_path, *TABLE_PATHS, snakefile=in_batches(tmp_path), cores=2)
-    assert len(list((tmp_path / "results" / "tiny" / "estimates").iterdir())) == 4
-    assert_same(content(tmp_path), content(single))
-    for path in TABLE_PATHS:
-        assert pq.read_schema(tmp_path / path).equals(pq.read_schema(single / path))
-
-
 def test_a_second_run_does_nothing(single):
     before = {path: path.stat().st_mtime_ns for path in (single / "results").rglob("*")}
     assert "Nothing to be done" in succeed(single)
     assert {path: path.stat().st_mtime_ns for path in (single / "results").rglob("*")} == before
 
 
-def test_killed_and_resumed(single, tmp_path):
+def test_killed_and_resumed(single, tmp_path, monkeypatch):
+    """In batches, on two cores, in two runs: what comes out is the same."""
+    monkeypatch.setattr(batches, "batches", batches.batches)  # which the workflow replaces
     snakefile = in_batches(tmp_path)
     estimates = tmp_path / "results" / "tiny" / "estimates"
     with subprocess.Popen(
@@ -186,16 +166,19 @@ def test_killed_and_resumed(single, tmp_path):
     one_line(locked.stdout, "results/tiny is locked", "`make unlock`")
     succeed(tmp_path, "--unlock", snakefile=snakefile)
     succeed(tmp_path, *TABLE_PATHS, snakefile=snakefile)
+    assert len(list(estimates.iterdir())) == 3
     assert_same(content(tmp_path), content(single))
+    for path in TABLE_PATHS:
+        assert pq.read_schema(tmp_path / path).equals(pq.read_schema(single / path))
     assert remains(tmp_path) == []
 
 
 # --- what runs again -----------------------------------------------------------------------------
 
 
-def planned(folder, environment=ENVIRONMENT, config=TINY):
+def planned(folder, config=TINY):
     """Rules that a dry run would run, with the number of jobs."""
-    text = succeed(folder, "--dry-run", environment=environment, config=config)
+    text = succeed(folder, "--dry-run", config=config)
     counts = re.findall(r"^(\w+) +(\d+)$", text.split("Reasons:")[0], re.MULTILINE)
     return {rule: int(count) for rule, count in counts if rule not in ("study", "total")}
 
@@ -212,19 +195,35 @@ def test_other_attitudes_do_not_simulate_again(finished):
     assert "simulate" not in plan
 
 
-def test_an_edit_of_the_package_runs_what_depends_on_it(finished, tmp_path):
-    """Snakemake run with a copy of the package."""
-    package = Path(shutil.copytree(accelstudy.__path__[0], tmp_path / "package" / "accelstudy"))
-    environment = {**ENVIRONMENT, "PYTHONPATH": str(package.parent)}
+@pytest.fixture(scope="module")
+def copied(tmp_path_factory):
+    """A copy of the package."""
+    copy = tmp_path_factory.mktemp("package") / "accelstudy"
+    no_caches = shutil.ignore_patterns("__pycache__")
+    return Path(shutil.copytree(accelstudy.__path__[0], copy, ignore=no_caches))
 
-    def edit(name):
-        path = package / name
-        path.write_text(path.read_text() + "\n# an edit\n")
-        return planned(finished, environment)
 
-    drawn = edit("figures/style.py")
-    assert [*drawn] == ["figures"]
-    assert edit("effects/bias.py").keys() >= {"simulate", "summarise", "collect", "figures"}
+@pytest.fixture
+def edit(copied, monkeypatch):
+    """Edit a file of the package, as far as what runs again is concerned."""
+    monkeypatch.setattr(accelstudy, "__file__", str(copied / "__init__.py"))
+    edited = {}
+
+    def append(name):
+        path = copied / name
+        edited[path] = path.read_text(encoding="utf-8")
+        path.write_text(edited[path] + "\n# an edit\n", encoding="utf-8")
+
+    yield append
+    for path, content in edited.items():
+        path.write_text(content, encoding="utf-8")
+
+
+def test_an_edit_of_the_package_runs_what_depends_on_it(finished, edit):
+    edit("figures/style.py")
+    assert [*planned(finished)] == ["figures"]
+    edit("effects/bias.py")
+    assert planned(finished).keys() >= {"simulate", "summarise", "collect", "figures"}
 
 
 STAGES = ("simulate", "summarise", "sensitivity", "claims", "figures")
@@ -255,31 +254,30 @@ SEVERAL = {*STAGES}
         ("gross_errors/base.py", set()),
     ],
 )
-def test_hash_of_the_code_that_a_stage_uses(name, stages, tmp_path, monkeypatch):
-    package = Path(shutil.copytree(accelstudy.__path__[0], tmp_path / "accelstudy"))
+def test_hash_of_the_code_that_a_stage_uses(name, stages, hashes, edit):
+    edit(name)
+    assert {stage for stage in STAGES if code_hash(stage) != hashes[stage]} == stages
+
+
+@pytest.fixture(scope="module")
+def hashes(copied):
+    """Of each stage, as the code is; where the package lies makes no difference."""
     before = {stage: code_hash(stage) for stage in STAGES}
-    monkeypatch.setattr(accelstudy, "__file__", str(package / "__init__.py"))
-    assert {stage: code_hash(stage) for stage in STAGES} == before
-    (package / name).write_text((package / name).read_text() + "\n# an edit\n")
-    assert {stage for stage in STAGES if code_hash(stage) != before[stage]} == stages
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(accelstudy, "__file__", str(copied / "__init__.py"))
+        assert {stage: code_hash(stage) for stage in STAGES} == before
+    return before
 
 
-def test_a_new_file_counts_everywhere(tmp_path, monkeypatch):
-    package = Path(shutil.copytree(accelstudy.__path__[0], tmp_path / "accelstudy"))
-    monkeypatch.setattr(accelstudy, "__file__", str(package / "__init__.py"))
-    before = [code_hash(stage) for stage in STAGES]
-    (package / "effects" / "new.py").write_text("")
-    after = [code_hash(stage) for stage in STAGES]
-    assert all(a != b for a, b in zip(after, before, strict=True))
+def test_a_new_file_counts_everywhere(hashes, copied, edit):
+    new = copied / "effects" / "new.py"
+    new.write_text("")
+    after = {stage: code_hash(stage) for stage in STAGES}
+    new.unlink()
+    assert all(after[stage] != hashes[stage] for stage in STAGES)
 
 
 # --- bad input -----------------------------------------------------------------------------------
-
-
-def one_line(text, *parts):
-    """The only line with all parts."""
-    (line,) = (line for line in text.splitlines() if all(part in line for part in parts))
-    return line
 
 
 def test_unknown_key_on_the_command_line(tmp_path):
