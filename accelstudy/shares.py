@@ -1,12 +1,19 @@
-"""Intervals of shares that were counted."""
+"""Intervals of shares that were counted.
+
+`scipy.stats` has them too, but takes a second to import, in every job.
+"""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
 Array = NDArray[np.float64]
+
+Z95 = float(special.ndtri(0.975))
 
 
 def clopper_pearson(count: ArrayLike, n: ArrayLike, level: float = 0.95) -> tuple[Array, Array]:
@@ -19,3 +26,12 @@ def clopper_pearson(count: ArrayLike, n: ArrayLike, level: float = 0.95) -> tupl
     low = special.betaincinv(np.maximum(count, 1), n - count + 1, tail)
     high = special.betainccinv(count + 1, np.maximum(n - count, 1), tail)
     return np.where(count > 0, low, 0.0), np.where(count < n, high, 1.0)
+
+
+def wilson(count: int, n: int) -> tuple[float, float]:
+    """Return Wilson's interval of 95 % of a share, low and high, of a count in n."""
+    share = count / n
+    denominator = 2 * (n + Z95**2)
+    middle = (2 * n * share + Z95**2) / denominator
+    half = Z95 / denominator * math.sqrt(4 * n * share * (1 - share) + Z95**2)
+    return (middle - half if count > 0 else 0.0, middle + half if count < n else 1.0)

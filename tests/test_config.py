@@ -460,6 +460,15 @@ def test_fingerprint_is_of_the_content():
     assert make_study().fingerprint != make_study(seed=2).fingerprint
 
 
+@pytest.mark.parametrize("overlay", [CONFIG, *OVERLAYS], ids=lambda path: path.stem)
+def test_a_checked_configuration_is_one_again(overlay):
+    """With all defaults written out, as jobs get it."""
+    study = read_study(CONFIG, overlay)
+    again = parse_study(study.model_dump(mode="json"))
+    assert again == study
+    assert again.fingerprint == study.fingerprint
+
+
 def test_paper_with_all_it_needs():
     study = make_study(paper=True, sensitivity=SENSITIVITY)
     assert study.paper

@@ -10,8 +10,8 @@ from typing import Any
 
 from accelstudy.study.cells import BLOCK, CHUNK, Cell
 
-LEAST_PER_JOB = 100_000
-"""Calibrations in one job: long enough that starting Python does not matter."""
+LEAST_PER_JOB = 400_000
+"""Calibrations in one job: some seconds of compiled code, as starting Python takes some too."""
 JOB_GROWTH = 100
 """A large study of N calibrations has jobs of 100 √N or somewhat more, and so about √N / 100 of
 them: some tens for 10⁸, some thousands for 10¹¹."""

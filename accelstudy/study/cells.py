@@ -7,7 +7,7 @@ import json
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from itertools import product
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,8 +21,10 @@ from accelstudy.schemes.files import known_scheme
 from accelstudy.sensor import SensorModel
 from accelstudy.simulation import Noise
 from accelstudy.study.compiling import with_compiled
-from accelstudy.study.config import Grid, StudyConfig
 from accelstudy.units import MGON
+
+if TYPE_CHECKING:
+    from accelstudy.study.config import Grid, StudyConfig
 
 BLOCK = 500
 """Replicates that are drawn and adjusted together, from one seed; small enough for the cache."""

@@ -26,7 +26,7 @@ SECONDS_PER_RESAMPLED_VALUE = 0.01e-6
 """Sensitivity: per base sample, input, bootstrap resample and attitude."""
 SECONDS_PER_JOB = 3.0
 """To start Python, twice for each batch of cells, and once for each of the rest of the jobs."""
-OTHER_JOBS = 15
+OTHER_JOBS = 10
 
 BYTES_ON_DISK = 16
 """Per calibration and parameter that is kept."""

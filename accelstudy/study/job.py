@@ -15,7 +15,7 @@ from typing import Any
 
 from accelstudy.errors import InputError
 from accelstudy.outputs import cannot_write
-from accelstudy.study.config import StudyConfig, parse_study
+from accelstudy.study.provenance import config_hash
 from accelstudy.study.tables import REMEDY, read_origin
 
 _NOT_OURS = {
@@ -58,26 +58,27 @@ def lists(named: Any) -> dict[str, list[str]]:
 
 
 @contextmanager
-def job(snakemake: Any) -> Iterator[tuple[StudyConfig, Mapping[str, Any]]]:
+def job(snakemake: Any) -> Iterator[Mapping[str, Any]]:
     """Run the body of a rule's script.
 
-    Gives the study and the provenance of what the job writes: `config_hash` and `seed`, and where
-    the rule has the parameter `spec`, its digest as `setup`.
+    Gives the provenance of what the job writes: `config_hash` and `seed` of the configuration,
+    which was checked when the workflow started, and where the rule has the parameter `spec`, its
+    digest as `setup`.
 
     A table that comes in must have the same seed and, if it has a set-up and the rule the parameter
     `setups`, one of these. Only who replaced it while the study ran, such as a job that outlived
     the run that started it, leaves another one.
     """
     with logged(snakemake):
-        study = parse_study(snakemake.config)
-        provenance = {"config_hash": study.fingerprint, "seed": study.seed}
+        seed = snakemake.config["seed"]
+        provenance = {"config_hash": config_hash(snakemake.config), "seed": seed}
         spec = snakemake.params.get("spec")
         if spec is not None:
             provenance["setup"] = setup_digest(spec)
         for path in snakemake.input:
             if Path(path).suffix == ".parquet":
-                _check_origin(path, study.seed, snakemake.params.get("setups"))
-        yield study, provenance
+                _check_origin(path, seed, snakemake.params.get("setups"))
+        yield provenance
 
 
 def _check_origin(path: str, seed: int, setups: Container[str] | None) -> None:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import accelstudy
 from accelstudy.errors import InputError
@@ -28,6 +31,7 @@ _FRONT = (
 _TABLES = (
     *(f"study/{name}.py" for name in ("distributions", "kept", "statistics", "summary")),
     "closed_forms.py",
+    "shares.py",
 )
 _CONFIG = ("study/config/",)
 _SENSITIVITY = ("sensitivity.py", "leveling_shares.py", "shapley.py")
@@ -67,6 +71,17 @@ _UNUSED = {
     "planning": ("cli.py", "catalogue.py", "study/earlier.py", "hidden/", "campaign/"),
     "score": (*_NOT_HIDDEN, "hidden/baselines.py", *_DECIDED),
 }
+
+
+def config_hash(config: Mapping[str, Any]) -> str:
+    """Hash of all that the numbers of a study depend on.
+
+    Parameters
+    ----------
+    config : mapping, the whole configuration with its defaults, as plain data
+    """
+    content = {key: value for key, value in config.items() if key != "angle_unit"}
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def code_hash(stage: str) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import special
 
 from accelstudy import closed_forms
 from accelstudy.design import Design, diagnose
 from accelstudy.effects import get_effect
 from accelstudy.leveling_error import TiltError
+from accelstudy.shares import wilson
 from accelstudy.study.cells import Cell
 from accelstudy.study.distributions import Distribution, cell_distributions
 from accelstudy.study.followed import ANGLES, ERROR, POSTERIORI, PRIORI, TILT, cell_tilt_error
@@ -27,7 +28,7 @@ from accelstudy.units import GON, MGON, recorded_unit, to_recorded
 
 Array = NDArray[np.float64]
 
-Z95 = float(stats.norm.ppf(0.975))
+Z95 = float(special.ndtri(0.975))
 
 LOWER = (1e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.025, 0.05, 0.25)
 PROBABILITIES = np.array([*LOWER, 0.5, *(1 - p for p in reversed(LOWER))])
@@ -165,7 +166,7 @@ def _summary_rows(cell: Cell, design: Design, statistics: Statistics) -> pd.Data
 
 def _bias(n: int, mean: float, sd: float) -> dict[str, float]:
     """Mean error with its 95 % confidence interval."""
-    half = stats.t.ppf(0.975, n - 1) * sd / np.sqrt(n) if n > 1 else np.nan
+    half = special.stdtrit(n - 1, 0.975) * sd / np.sqrt(n) if n > 1 else np.nan
     return {"bias": mean, "bias_ci95_low": mean - half, "bias_ci95_high": mean + half}
 
 
@@ -195,12 +196,8 @@ def _coverage(statistics: Statistics, i: int) -> dict[str, float]:
     if moments.redundancy <= 0 or n == 0:
         return dict.fromkeys(("coverage_95", "coverage_95_low", "coverage_95_high"), np.nan)
     inside = int(moments.inside[i])
-    interval = stats.binomtest(inside, n).proportion_ci(method="wilson")
-    return {
-        "coverage_95": inside / n,
-        "coverage_95_low": float(interval.low),
-        "coverage_95_high": float(interval.high),
-    }
+    low, high = wilson(inside, n)
+    return {"coverage_95": inside / n, "coverage_95_low": low, "coverage_95_high": high}
 
 
 def _closed_forms(cell: Cell) -> dict[str, float]:
@@ -250,28 +247,28 @@ def _quantile_rows(
     n = statistics.converged
     tail = np.minimum(PROBABILITIES, 1 - PROBABILITIES)
     shown = PROBABILITIES[(tail >= 0.0249) | (n * tail >= 0.999)]
-    parts = []
-    for (quantity, name), distribution in found.items():
-        if name not in units:
-            continue
-        values = to_recorded(distribution.quantile(shown), units[name])
-        parts.append(
-            pd.DataFrame(
-                {
-                    "quantity": quantity,
-                    "name": name,
-                    "unit": recorded_unit(units[name]),
-                    "probability": shown,
-                    "value": values,
-                    "relative_error": RELATIVE_ERROR if isinstance(distribution, Sketch) else 0.0,
-                }
-            )
-        )
-    columns = ["quantity", "name", "unit", "probability", "value", "relative_error"]
-    rows = pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=columns)
-    return pd.DataFrame({**dict.fromkeys(_labels(cell)), **rows}).assign(
-        **_labels(cell), n_converged=n
-    )
+    its = {key: distribution for key, distribution in found.items() if key[1] in units}
+    values = [
+        to_recorded(distribution.quantile(shown), units[name])
+        for (_, name), distribution in its.items()
+    ]
+    errors = [RELATIVE_ERROR if isinstance(each, Sketch) else 0.0 for each in its.values()]
+
+    def each(items: Iterable[Any]) -> NDArray[Any]:
+        return np.repeat(np.array([*items]), len(shown))
+
+    rows = {
+        "quantity": each(quantity for quantity, _ in its),
+        "name": each(name for _, name in its),
+        "unit": each(recorded_unit(units[name]) for _, name in its),
+        "probability": np.tile(shown, len(its)),
+        "value": np.ravel(values),
+        "relative_error": each(errors),
+    }
+    labels = _labels(cell)
+    if not its:
+        return pd.DataFrame(columns=[*labels, *rows]).assign(**labels, n_converged=n)
+    return pd.DataFrame({**labels, **rows, "n_converged": n})
 
 
 def _leveling_row(

@@ -30,6 +30,9 @@ try:
 except InputError as error:
     raise WorkflowError(str(error)) from None
 
+# Checked and with all defaults, so that jobs take it as it is.
+config.update(STUDY.model_dump(mode="json"))
+
 # Cells run in batches, so that starting Python does not dominate. A batch is a job or, where it is
 # one large cell, several, each of which simulates a part of it.
 BATCHES = {f"{i:04d}": batch for i, batch in enumerate(batches(CELLS))}

@@ -1,7 +1,7 @@
 from accelstudy.study.job import job, lists
 from accelstudy.study.summary import summarise_batch
 
-with job(snakemake) as (_, provenance):
+with job(snakemake) as provenance:
     summarise_batch(
         snakemake.params.spec,
         lists(snakemake.input),

@@ -5,8 +5,6 @@ The models below are the schema; `workflow/schemas/config.schema.json` is genera
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
 import re
 from collections.abc import Iterable, Sequence
@@ -50,6 +48,7 @@ from accelstudy.study.config.types import (
     Tilt,
     Vibration,
 )
+from accelstudy.study.provenance import config_hash
 from accelstudy.units import STANDARD_GRAVITY, to_si
 
 CLAIMED_EFFECTS = ("bias", "scale", "nonorthogonality")
@@ -438,8 +437,7 @@ class StudyConfig(Block):
     @property
     def fingerprint(self) -> str:
         """Hash of all that numbers depend on, defaults included."""
-        text = json.dumps(self.model_dump(mode="json", exclude={"angle_unit"}), sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()[:16]
+        return config_hash(self.model_dump(mode="json"))
 
 
 def _check_columns(plan: HoldPlan, effects: Iterable[Effect]) -> None:
