@@ -13,6 +13,7 @@ from accelstudy.diagnosis.space.signatures import signature
 from accelstudy.effects import Hold
 from accelstudy.leveling import roll_pitch
 from accelstudy.models import compose
+from accelstudy.optimal.separation import Explained, Separation
 from accelstudy.schemes import get_scheme
 
 Array = NDArray[np.float64]
@@ -23,6 +24,8 @@ LATER = (0.0, 0.5, 1.0)
 """How long after the session further positions may be measured, in lengths of the session."""
 ANYWHERE = 0.7
 """Ratio of the smallest to the largest gain of all attitudes from which on any of them will do."""
+DIFFERENT = 0.5
+"""Change of force, in parts of gravity, beyond which attitudes clearly differ."""
 
 Explanation = Sequence[Hypothesis]
 """Effects that may be missing: one, or several together."""
@@ -39,7 +42,7 @@ class NextPosition:
     later : float or None, s after the last position; None where it does not matter
     anywhere : bool, whether other attitudes would do nearly as well; this one is the session's own
     separates : names that only the one, and that only the other explanation has
-    gain : float, by how many sigmas of a position they differ
+    gain : float, in sigmas, root of what the position by itself adds to the separation
     """
 
     roll: float
@@ -52,14 +55,15 @@ class NextPosition:
 
 
 def next_positions(frame: Frame, first: Explanation, second: Explanation) -> list[NextPosition]:
-    """Positions in which two explanations of the same residuals predict most differently.
+    """Positions that separate two explanations of the same residuals best.
 
     Both are fitted to all positions, each together with the parameters of the model. Of a grid of
     attitudes, at the lowest, middle and highest temperature so far and right after the session or
-    later, those are chosen one after the other whose predictions differ by the largest multiple of
-    the noise of a position. Temperature and time vary only where one of the effects depends on
-    them. Where the attitude hardly matters, those from the start of the session are to be repeated,
-    so that readings can be compared without any model.
+    later, those are chosen one after the other that add most to the separation, in which the
+    explanation that is wrong may be fitted to them, too (`accelstudy.optimal.separation`).
+    Temperature and time vary only where one of the effects depends on them. Where the attitude
+    hardly matters, those from the start of the session are to be repeated, so that readings can be
+    compared without any model.
 
     Parameters
     ----------
@@ -71,13 +75,9 @@ def next_positions(frame: Frame, first: Explanation, second: Explanation) -> lis
     g = frame.solution.gravity
     own = frame.forces[_apart(frame.forces, range(len(frame.forces)), g)]
     attitudes = np.concatenate([own, -g * get_scheme(GRID).directions])
-    forces, hold, later = _grid(frame, attitudes, needed)
-    differences = _prediction(frame, first, forces, hold) - _prediction(frame, second, forces, hold)
-    sigma = float(np.mean(frame.residuals.sigmas[:, :3]))
-    if not frame.solution.approach.uses_angles:
-        unit = forces / np.linalg.norm(forces, axis=1, keepdims=True)
-        differences = np.sum(unit * differences, axis=1, keepdims=True)
-    gain = np.linalg.norm(differences / sigma, axis=1)
+    forces, hold, later = _grid(frame, attitudes, needed, frame.forces[-1])
+    rivals = _Rivals.of(frame, first, second)
+    gain = np.sqrt(rivals.separation.gains(rivals.columns(forces, hold)))
 
     start = int(np.argmax(gain)) // len(attitudes) * len(attitudes)
     there = gain[start : start + len(attitudes)]  # at the best temperature and time
@@ -85,7 +85,7 @@ def next_positions(frame: Frame, first: Explanation, second: Explanation) -> lis
     if anywhere:
         chosen = [start + i for i in range(len(own))]
     else:
-        chosen = _apart(forces, np.argsort(-gain, kind="stable").tolist(), g)
+        chosen = _one_after_the_other(rivals, attitudes, needed)
     roll, pitch = roll_pitch(tuple(forces.T))
     names = [tuple(one.name for one in explanation) for explanation in (first, second)]
     return [
@@ -105,22 +105,42 @@ def next_positions(frame: Frame, first: Explanation, second: Explanation) -> lis
     ]
 
 
+def _one_after_the_other(rivals: _Rivals, attitudes: Array, needed: set[str]) -> list[int]:
+    """Places that add most to the separation, each after those before it, in other attitudes."""
+    frame, separation = rivals.frame, rivals.separation
+    chosen: list[int] = []
+    taken = [frame.forces[-1]]  # steps are those from the position before
+    while len(chosen) < COUNT:
+        forces, hold, _ = _grid(frame, attitudes, needed, taken[-1])
+        columns = rivals.columns(forces, hold)
+        apart = [np.linalg.norm(forces - force, axis=1) for force in taken[1:]]
+        free = np.all(np.array(apart) > DIFFERENT * frame.solution.gravity, axis=0)
+        if not np.any(free):
+            break
+        chosen.append(int(np.argmax(np.where(free, separation.gains(columns), -np.inf))))
+        taken.append(forces[chosen[-1]])
+        separation = separation.taking((columns[0][chosen[-1]], columns[1][chosen[-1]]))
+    return chosen
+
+
 def _apart(forces: Array, order: Iterable[int], gravity: float) -> list[int]:
     """Return the first places, in an order, whose attitudes clearly differ."""
     chosen: list[int] = []
     for i in order:
-        if all(np.linalg.norm(forces[i] - forces[j]) > 0.5 * gravity for j in chosen):
+        if all(np.linalg.norm(forces[i] - forces[j]) > DIFFERENT * gravity for j in chosen):
             chosen.append(i)
         if len(chosen) == COUNT:
             break
     return chosen
 
 
-def _grid(frame: Frame, attitudes: Array, needed: set[str]) -> tuple[Array, Hold, Array | None]:
+def _grid(
+    frame: Frame, attitudes: Array, needed: set[str], before: Array
+) -> tuple[Array, Hold, Array | None]:
     """Forces (k, 3), holds and times after the session (k,) of the positions to choose from.
 
     All attitudes stand together for each time and temperature. The times are None where there is
-    nothing to choose.
+    nothing to choose. Steps are those from the force `before`, (3,).
     """
     measured, n, m = frame.hold, len(frame.forces), len(attitudes)
     delays, levels, later = np.zeros(1), np.zeros(1), None
@@ -139,7 +159,7 @@ def _grid(frame: Frame, attitudes: Array, needed: set[str]) -> tuple[Array, Hold
         later = delay
     vibration = measured.vibration
     roll, pitch = roll_pitch(tuple(grid.T))
-    step = grid - frame.forces[-1]
+    step = grid - before
     hold = Hold(
         temperature=(
             None if measured.temperature is None else np.tile(np.repeat(levels, m), len(delays))
@@ -158,30 +178,59 @@ def _grid(frame: Frame, attitudes: Array, needed: set[str]) -> tuple[Array, Hold
     return grid, hold, later
 
 
-def _prediction(frame: Frame, explanation: Explanation, forces: Array, hold: Hold) -> Array:
-    """Correction of the base prediction of the output that an explanation makes, (k, 3), m/s²."""
-    g = frame.solution.gravity
-    angles = np.column_stack([hold.column("roll"), hold.column("pitch")])
+@dataclass(frozen=True, eq=False)
+class _Rivals:
+    """Two explanations, each fitted together with the parameters of the model."""
+
+    frame: Frame
+    effects: tuple[Explanation, Explanation]
+    separation: Separation
+
+    @classmethod
+    def of(cls, frame: Frame, first: Explanation, second: Explanation) -> _Rivals:
+        return cls(frame, (first, second), Separation.of(_fit(frame, first), _fit(frame, second)))
+
+    def columns(self, forces: Array, hold: Hold) -> tuple[Array, Array]:
+        """Derivatives of what candidates show, in units of their noise, (k, c, p) of either."""
+        angles = np.column_stack([hold.column("roll"), hold.column("pitch")])
+        white = _whitening(self.frame, forces)
+        one, two = (_derivatives(self.frame, e, forces, angles, hold) for e in self.effects)
+        return np.asarray(white @ one), np.asarray(white @ two)
+
+
+def _fit(frame: Frame, explanation: Explanation) -> Explained:
     residuals = frame.residuals
-    model = frame.solution.model
-
-    def columns(at_forces: Array, at_angles: Array, at_hold: Hold) -> Array:
-        """Derivatives of the output by the parameters of the model and by those of the effects."""
-        base = [
-            signature(effect, at_forces, at_angles, g, at_hold).force for effect in model.effects
-        ]
-        turning = _force_by_angles(at_forces, g)
-        added = []
-        for one in explanation:
-            assert one.effect is not None
-            shown = signature(one.effect, at_forces, at_angles, g, at_hold).reduced(one.directions)
-            added.append(shown.force + np.einsum("nia,nak->nik", turning, shown.angles))
-        return np.concatenate([*base, *added], axis=2)
-
-    shown = columns(frame.forces, frame.angles, frame.hold)
+    shown = _derivatives(frame, explanation, frame.forces, frame.angles, frame.hold)
     rows = residuals.rows(residuals.jac_observations[..., :3] @ shown)
-    solution = np.linalg.lstsq(rows, residuals.errors, rcond=1e-10)[0]
-    return columns(forces, angles, hold) @ solution
+    inverse = np.linalg.pinv(rows, rcond=1e-10)
+    return Explained(inverse @ residuals.errors, inverse @ inverse.T)
+
+
+def _derivatives(
+    frame: Frame, explanation: Explanation, forces: Array, angles: Array, hold: Hold
+) -> Array:
+    """Derivatives of the output by the parameters of the model and by those of the effects."""
+    g, model = frame.solution.gravity, frame.solution.model
+    base = [signature(effect, forces, angles, g, hold).force for effect in model.effects]
+    turning = _force_by_angles(forces, g)
+    added = []
+    for one in explanation:
+        assert one.effect is not None
+        shown = signature(one.effect, forces, angles, g, hold).reduced(one.directions)
+        added.append(shown.force + np.einsum("nia,nak->nik", turning, shown.angles))
+    return np.concatenate([*base, *added], axis=2)
+
+
+def _whitening(frame: Frame, forces: Array) -> Array:
+    """Matrices (k, c, 3) that scale an output to the noise of what the approach sees of it."""
+    sigmas = np.mean(frame.residuals.sigmas, axis=0)
+    force = np.mean(sigmas[:3])
+    if not frame.solution.approach.uses_angles:
+        unit = forces / np.linalg.norm(forces, axis=1, keepdims=True)
+        return np.asarray(unit[:, None] / force)
+    turning = _force_by_angles(forces, frame.solution.gravity) * sigmas[3:5]
+    noise = force**2 * np.eye(3) + turning @ turning.swapaxes(1, 2)
+    return np.linalg.inv(np.linalg.cholesky(noise))
 
 
 def _force_by_angles(forces: Array, g: float) -> Array:
