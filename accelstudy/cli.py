@@ -13,6 +13,7 @@ import click
 from accelstudy.campaign.commands import COMMANDS
 from accelstudy.campaign.importing_cli import import_command, public_command
 from accelstudy.campaign.simulating_cli import simulate_campaign_command
+from accelstudy.data_sheets.command import data_sheet_command
 from accelstudy.diagnosis.command import diagnose_command
 from accelstudy.errors import InputError
 from accelstudy.optimal.command import design_command
@@ -44,7 +45,7 @@ SECTIONS = {
         "apply",
         "export",
     ),
-    "Before a calibration, and what it is worth": ("plan", "pole"),
+    "Before a calibration, and what it is worth": ("plan", "data-sheet", "pole"),
     "What there is to choose from": ("models", "effects", "schemes", "scheme", "design"),
     "Studies": ("cells", "claims", "config-schema"),
 }
@@ -303,6 +304,7 @@ for command in (
     pole_command,
     design_command,
     plan_command,
+    data_sheet_command,
     *COMMANDS,
 ):
     main.add_command(command)

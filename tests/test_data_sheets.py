@@ -4,7 +4,9 @@ import math
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from accelstudy.cli import main
 from accelstudy.data_sheets import (
     QUANTITIES,
     DataSheet,
@@ -15,6 +17,7 @@ from accelstudy.data_sheets import (
 )
 from accelstudy.data_sheets.flicker import FLICKER, flicker_change
 from accelstudy.errors import InputError
+from accelstudy.plan.sensors import get_sensor
 from accelstudy.units import STANDARD_GRAVITY
 
 
@@ -131,3 +134,70 @@ def test_a_users_file_is_read_and_an_unknown_sensor_names_those_there_are(tmp_pa
 
 def test_a_sensor_of_which_only_the_noise_is_known_keeps_it_however_long_the_hold():
     assert of_sigma(0.002).sigma_mean(1.0) == of_sigma(0.002).sigma_mean(100.0, 1000.0) == 0.002
+
+
+# --- from what was measured ----------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def still_log(tmp_path_factory):
+    """Ten minutes at rest with N = 1 mm/s²/√Hz and K = 0.05 mm/s²/√s."""
+    rng, rate, n = np.random.default_rng(1), 20, 20 * 600
+    walk = np.cumsum(5e-5 / np.sqrt(rate) * rng.standard_normal((n, 3)), axis=0)
+    samples = [0.1, 0.2, -9.8] + 1e-3 * np.sqrt(rate) * rng.standard_normal((n, 3)) + walk
+    path = tmp_path_factory.mktemp("still") / "still.csv"
+    np.savetxt(path, samples, "%.6f", delimiter=",")
+    return path
+
+
+READ = ("--rate", "20", "--columns", "fx=0,fy=1,fz=2")
+
+
+def call(*words):
+    return CliRunner().invoke(main, [str(word) for word in words])
+
+
+def test_a_log_at_rest_makes_a_data_sheet_that_can_be_read(still_log, tmp_path):
+    out = tmp_path / "mine.yaml"
+    result = call("data-sheet", still_log, *READ, "--out", out)
+    assert result.exit_code == 0, result.output
+    sheet = get_data_sheet(str(out))
+    assert sheet.velocity_random_walk == pytest.approx(1e-3, rel=0.05)
+    assert sheet.acceleration_random_walk == pytest.approx(5e-5, rel=0.5)
+    assert sheet.sigma_mean(10.0) == pytest.approx(math.hypot(1e-3 / 10**0.5, 9e-5), rel=0.05)
+    assert "still.csv" in sheet.sources["velocity_random_walk"]
+    assert "# repeatability:" in out.read_text(encoding="utf-8")
+    again = call("data-sheet", still_log, *READ, "--out", out)
+    assert again.exit_code == 2
+    assert "--force replaces it" in again.stderr
+
+
+def test_a_campaign_tells_the_noise_of_its_positions(still_log, tmp_path):
+    made = call("import", still_log, *READ, "--out", tmp_path / "c", "--no-figure")
+    assert made.exit_code == 0, made.output
+    result = call("data-sheet", tmp_path / "c", "--out", tmp_path / "mine.yaml")
+    assert result.exit_code == 0, result.output
+    sheet = get_data_sheet(str(tmp_path / "mine.yaml"))
+    assert sheet.position_sigma is not None
+    assert get_sensor(str(tmp_path / "c")).position_sigma == pytest.approx(
+        sheet.position_sigma, rel=1e-3
+    )
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [(40, "no static hold"), (2, "")],
+)
+def test_a_log_that_is_too_short_ends_with_one_line(rows, message, tmp_path):
+    path = tmp_path / "short.csv"
+    np.savetxt(path, np.random.default_rng(1).standard_normal((rows, 3)), delimiter=",")
+    result = call("data-sheet", path, *READ, "--out", tmp_path / "mine.yaml")
+    assert result.exit_code == 2
+    assert result.stderr.count("\n") == 1
+    assert message in result.stderr
+    assert not (tmp_path / "mine.yaml").exists()
+
+
+def test_a_log_is_no_sensor_and_says_how_to_make_one(still_log):
+    with pytest.raises(InputError, match=r"accelstudy data-sheet .*still\.csv --out still\.yaml"):
+        get_sensor(str(still_log))

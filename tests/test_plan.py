@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from accelstudy.approaches import get_approach
 from accelstudy.cli import main
 from accelstudy.closed_forms import gravity_sigma
-from accelstudy.data_sheets import DataSheet, data_sheet_names, get_data_sheet
+from accelstudy.data_sheets import DataSheet, data_sheet_names, get_data_sheet, of_sigma
 from accelstudy.design import diagnose
 from accelstudy.leveling_error import cap_forces, leveling_error, tilt_error
 from accelstudy.models import get_model
@@ -21,7 +21,7 @@ from accelstudy.plan import candidates as planned
 from accelstudy.plan.advice import in_use, limits, needs, spoilers
 from accelstudy.plan.answer import answer
 from accelstudy.plan.candidates import NINE, candidates
-from accelstudy.plan.question import BY_HAND, ROBOT, Question, sensor_of_sigma
+from accelstudy.plan.question import BY_HAND, ROBOT, Question
 from accelstudy.plan.simulated import simulate, study_of
 from accelstudy.plan.theory import theory_of
 from accelstudy.plan.wording import answer_lines, reason_lines, table_lines, unreachable
@@ -47,7 +47,7 @@ def few_schemes(monkeypatch):
 
 
 def asked(sheet=None, **options):
-    return Question(10 * MGON, 30 * GON, sheet or sensor_of_sigma(0.002), **options)
+    return Question(10 * MGON, 30 * GON, sheet or of_sigma(0.002), **options)
 
 
 # --- linear theory -------------------------------------------------------------------------------
@@ -235,7 +235,7 @@ def test_neglected_effects_decide_the_model():
 
 
 def test_what_would_spoil_a_plan_is_of_the_size_that_leaves_the_target():
-    question = asked(sensor_of_sigma(0.002))
+    question = asked(of_sigma(0.002))
     candidate = _candidate(question, equipment="robot")
     sizes = {s.effect: s for s in spoilers(question, candidate)}
     assert math.isinf(sizes["gravity_error"].size)
@@ -281,7 +281,7 @@ def test_the_answer_stands_in_the_first_line(found):
     ],
 )
 def test_what_cannot_be_reached_is_one_line_with_what_can(options, parts):
-    question = Question(0.1 * MGON, 30 * GON, sensor_of_sigma(0.002), **options)
+    question = Question(0.1 * MGON, 30 * GON, of_sigma(0.002), **options)
     result = answer(question, replicates=200)
     assert result.ranked == []
     (line,) = answer_lines(result)

@@ -142,6 +142,20 @@ class DataSheet:
         return 4 * self.nonlinearity * (STANDARD_GRAVITY / self.full_scale) ** 2
 
 
+ASSUMED = "assumed"
+"""Source of a value that is taken for granted."""
+
+
 def of_sigma(sigma: float) -> DataSheet:
-    """Sensor of which only the noise of a position's mean is known, m/s²."""
-    return DataSheet("sigma", "a sensor of which only the noise is known", position_sigma=sigma)
+    """Sensor of which only the noise of a position's mean is known, m/s².
+
+    It is taken to be linear, as the paper's is.
+    """
+    return DataSheet(
+        "sigma",
+        "a sensor of which only the noise is known",
+        position_sigma=sigma,
+        nonlinearity=0.0,
+        full_scale=STANDARD_GRAVITY,
+        sources={"nonlinearity": ASSUMED, "full_scale": ASSUMED},
+    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -91,10 +91,10 @@ def family_of(scheme: str) -> str:
     return found[1] if found and found[1] in FAMILIES else scheme
 
 
-def schemes_for(most_positions: int) -> list[Scheme]:
-    """Schemes of the literature, and members of the families, in the order of their size."""
+def schemes_for(most_positions: int, more: Sequence[str] = ()) -> list[Scheme]:
+    """Schemes of the literature, members of the families, and more, in the order of their size."""
     members = (f"{family}-{n}" for family, sizes in FAMILIES.items() for n in sizes)
-    names = {*scheme_names(), *members}
+    names = {*scheme_names(), *members, *more}
     schemes = [get_scheme(name) for name in sorted(names)]
     fitting = [scheme for scheme in schemes if scheme.n_positions <= most_positions]
     return sorted(fitting, key=lambda scheme: (scheme.n_positions, scheme.name))
@@ -103,7 +103,7 @@ def schemes_for(most_positions: int) -> list[Scheme]:
 def candidates(question: Question) -> list[Candidate]:
     """All calibrations whose positions determine their model and check it."""
     theory = theory_of(question.tilt_range)
-    schemes = schemes_for(question.most_positions)
+    schemes = schemes_for(question.most_positions, question.schemes)
     models = [get_model(name) for name in PLANNED_MODELS]
     work = [(equipment, scheme) for equipment in question.equipment for scheme in schemes]
     found: list[Candidate] = []

@@ -11,6 +11,7 @@ import click
 from accelstudy.errors import InputError
 from accelstudy.options import (
     PATH,
+    SCHEME,
     Name,
     Quantity,
     angle_unit_option,
@@ -102,6 +103,13 @@ class Confidence(click.ParamType):  # type: ignore[type-arg]
     help="Duration of a position, as 10s; may be repeated.  [default: 1 s to 120 s; 10 s for "
     "--sigma]",
 )
+@click.option(
+    "--scheme",
+    "schemes",
+    type=SCHEME,
+    multiple=True,
+    help="One more to compare: a name, or a file of `accelstudy design`; may be repeated.",
+)
 @click.option("--max-time", type=SECONDS, help="Time in the field at most, as 20min.")
 @click.option(
     "--max-positions", type=click.IntRange(4, 400), default=200, show_default=True, help="At most."
@@ -154,6 +162,7 @@ def plan_command(
     equipment: str,
     confidence: float | None,
     holds: tuple[float, ...],
+    schemes: tuple[str, ...],
     max_time: float | None,
     max_positions: int,
     moving_time: float,
@@ -176,8 +185,9 @@ def plan_command(
             "plan: give the sensor by --sensor, or its noise by --sigma"
             + (", not both" if sensor else "")
         )
+    from accelstudy.data_sheets import of_sigma
     from accelstudy.plan.answer import answer
-    from accelstudy.plan.question import Equipment, Question, sensor_of_sigma
+    from accelstudy.plan.question import Equipment, Question
     from accelstudy.plan.sensors import get_sensor
     from accelstudy.plan.wording import (
         answer_lines,
@@ -193,13 +203,14 @@ def plan_command(
     question = Question(
         tilt_accuracy,
         tilt_range,
-        sensor_of_sigma(sigma) if sigma is not None else get_sensor(str(sensor)),
+        of_sigma(sigma) if sigma is not None else get_sensor(str(sensor)),
         {"gravity": (by_hand,), "robot": (robot,), "both": (by_hand, robot)}[equipment],
         confidence,
         tuple(sorted(set(holds))),
         robot_accuracy,
         math.inf if max_time is None else max_time,
         max_positions,
+        schemes,
     )
     found = answer(question, seed, replicates)
     if not found.ranked:

@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from accelstudy.data_sheets import DataSheet
+from accelstudy.data_sheets import ASSUMED, DataSheet
 from accelstudy.effects import get_effect
-from accelstudy.units import MGON, STANDARD_GRAVITY
+from accelstudy.units import MGON
 
 HOLDS = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0)
 """Durations of a hold that are tried, s."""
@@ -69,6 +69,7 @@ class Question:
     sigma_angle : float, rad, of the robot's roll and pitch
     most_seconds : float, s in the field
     most_positions : int
+    schemes : tuple of str, names or files of schemes beside those that are always compared
     """
 
     target: float
@@ -80,6 +81,7 @@ class Question:
     sigma_angle: float = 3.2 * MGON
     most_seconds: float = math.inf
     most_positions: int = 200
+    schemes: tuple[str, ...] = ()
     sizes: Mapping[str, Size] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -116,25 +118,6 @@ def sizes_of(sheet: DataSheet) -> dict[str, Size]:
         told = sheet.sources.get(kinds.get(effect, "nonlinearity"), "")
         sizes[effect] = Size(value, "assumed" if told == ASSUMED else "data sheet")
     return sizes
-
-
-ASSUMED = "assumed"
-"""Source of a value that a plan takes for granted."""
-
-
-def sensor_of_sigma(sigma: float) -> DataSheet:
-    """Sensor of which a person knows the noise of a position's mean only, m/s².
-
-    It is taken to be linear, as the paper's is.
-    """
-    return DataSheet(
-        "sigma",
-        "a sensor of which only the noise is known",
-        position_sigma=sigma,
-        nonlinearity=0.0,
-        full_scale=STANDARD_GRAVITY,
-        sources={"nonlinearity": ASSUMED, "full_scale": ASSUMED},
-    )
 
 
 def _times(value: float | None, factor: float) -> float | None:

@@ -4,13 +4,28 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from accelstudy.data_sheets import DataSheet, get_data_sheet
+from accelstudy.data_sheets import DataSheet, get_data_sheet, read_data_sheet
+from accelstudy.errors import InputError
+
+LOGS = (".csv", ".txt", ".gz", ".mat", ".parquet", ".log", ".dat")
 
 
 def get_sensor(text: str) -> DataSheet:
-    """Return a sensor by name, or from a YAML file."""
-    if Path(text).is_file():
-        from accelstudy.data_sheets import read_data_sheet
+    """Return a sensor by its name, from a YAML file, or from the folder of a campaign.
 
-        return read_data_sheet(text)
-    return get_data_sheet(text)
+    Raises
+    ------
+    InputError
+        If there is none; of a log the message says how to make a data sheet of it.
+    """
+    path = Path(text)
+    if path.is_dir():
+        from accelstudy.data_sheets.measured import sheet_of_campaign
+
+        return sheet_of_campaign(path)
+    if path.suffix in LOGS:
+        raise InputError(
+            f"{text}: a log, not a data sheet; make one of it: accelstudy data-sheet {text} --out "
+            f"{path.stem}.yaml, with the options by which import reads it"
+        )
+    return read_data_sheet(path) if path.is_file() else get_data_sheet(text)

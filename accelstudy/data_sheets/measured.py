@@ -1,0 +1,112 @@
+"""A data sheet from what was measured: the Allan deviation of a log, or the noise of a campaign."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import yaml
+from scipy.optimize import nnls
+
+from accelstudy.campaign.allan import RELIABLE, AllanDeviation
+from accelstudy.campaign.format import read_campaign
+from accelstudy.campaign.import_settings import ImportSettings
+from accelstudy.campaign.importing import import_log
+from accelstudy.data_sheets.flicker import FLICKER
+from accelstudy.data_sheets.sheet import QUANTITIES, DataSheet
+from accelstudy.errors import InputError
+from accelstudy.units import recorded_unit, to_recorded
+
+SEEN = 0.02
+"""Part of the Allan variance, where it is largest, below which a kind of noise is not seen."""
+
+
+def sheet_of_log(path: str | Path, settings: ImportSettings) -> DataSheet:
+    """Data sheet of a sensor from a log in which it rests, once or in several positions.
+
+    Raises
+    ------
+    InputError
+        If the log cannot be read, has no static hold, or is too short for an Allan deviation.
+    """
+    _, report = import_log(path, settings)
+    assert report.holds is not None
+    holds = report.holds
+    curve = holds.allan.channels(slice(0, 1) if holds.directed else slice(0, 3))
+    return sheet_of_allan(curve, Path(path).stem, str(path))
+
+
+def sheet_of_allan(curve: AllanDeviation, name: str, source: str) -> DataSheet:
+    """Fit σ²(τ) = N²/τ + (0.664 B)² + K²τ/3 to an Allan deviation.
+
+    None of the three is negative, and each value counts by how well it is known: the relative
+    variance of σ² is two over the independent differences.
+
+    Raises
+    ------
+    InputError
+        If there are too few values.
+    """
+    usable = (curve.differences >= RELIABLE) & (curve.pooled > 0)
+    if np.count_nonzero(usable) < 3:
+        raise InputError(f"{source}: too short at rest for an Allan deviation")
+    tau, variance = curve.tau[usable], curve.pooled[usable] ** 2
+    kinds = np.column_stack([1 / tau, np.ones_like(tau), tau])
+    weight = np.sqrt(curve.differences[usable] / 2) / variance
+    found, _ = nnls(kinds * weight[:, None], variance * weight)
+    seen = np.max(kinds * found / variance[:, None], axis=0) > SEEN
+    longest = f"Allan deviation of {source} up to {tau[-1]:.3g} s"
+    values = {
+        "velocity_random_walk": math.sqrt(found[0]),
+        "bias_instability": math.sqrt(found[1]) / FLICKER if seen[1] else None,
+        "acceleration_random_walk": math.sqrt(3 * found[2]) if seen[2] else None,
+    }
+    if not seen[0]:
+        raise InputError(f"{source}: no white noise in its Allan deviation; is it filtered?")
+    sources = {key: longest for key, value in values.items() if value is not None}
+    return DataSheet(name, f"the sensor of {source}", longest, **values, sources=sources)
+
+
+def sheet_of_campaign(folder: str | Path) -> DataSheet:
+    """Data sheet of the sensor of a campaign: what its positions' noise is, and no more.
+
+    Raises
+    ------
+    InputError
+        If it is no campaign, or its noise is not known.
+    """
+    campaign = read_campaign(folder)
+    if campaign.sigma_force is None:
+        raise InputError(f"{folder}: says nothing of the noise of its positions (sigma)")
+    source = f"sigma of the campaign {campaign.name}"
+    return DataSheet(
+        campaign.name,
+        campaign.sensor or f"the sensor of the campaign {campaign.name}",
+        source,
+        position_sigma=campaign.sigma_force,
+        sources={"position_sigma": source},
+    )
+
+
+def yaml_of(sheet: DataSheet) -> str:
+    """Write a data sheet as the YAML that `read_data_sheet` takes; what is unknown as a comment."""
+    content: dict[str, object] = {
+        "name": sheet.name,
+        "title": sheet.title,
+        "source": sheet.source,
+    }
+    for key in sheet.known:
+        unit = QUANTITIES[key][0]
+        value = float(to_recorded(getattr(sheet, key), unit))
+        content[key] = {
+            "value": f"{value:.4g} {recorded_unit(unit)}",
+            "source": sheet.sources.get(key, ""),
+        }
+    lines = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=96)
+    rest = [
+        f"# {key}: {QUANTITIES[key][1]} (as in 1 {recorded_unit(QUANTITIES[key][0])})"
+        for key in sheet.unknown
+    ]
+    more = ["# Not known; add what the maker says:", *rest] if rest else []
+    return lines + "\n".join(more) + "\n"
