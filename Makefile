@@ -68,6 +68,7 @@ diagnose-example: $(READY) ## simulate a campaign with a hidden effect, find it,
 
 plan-example: $(READY) ## plan calibrations for a tilt accuracy: schemes, positions, minutes
 	snakemake --cores $(CORES) --snakefile workflow/plan.smk --configfile config/plan-example.yaml
+	snakemake --cores $(CORES) --configfile results/plan-example/plan/cases/readme/study.yaml
 
 hidden-effects: $(READY) ## study how well the diagnosis finds what is hidden
 	snakemake --cores $(CORES) --snakefile workflow/hidden.smk --configfile $(HIDDEN)

@@ -41,9 +41,9 @@ HAS = ("bias", "scale", "nonorthogonality", "quadratic_scale")
 
 @pytest.fixture(autouse=True)
 def few_schemes(monkeypatch):
-    """Some members of each family are enough."""
-    few = {"fibonacci": (9, 12, 20, 30, 40, 80), "i-optimal": (27,)}
-    monkeypatch.setattr(planned, "FAMILIES", few)
+    """A few schemes are enough, and optimal ones take long."""
+    monkeypatch.setattr(planned, "SIZES", (9, 12, 20, 30, 40, 80))
+    monkeypatch.setattr(planned, "OPTIMAL_SIZES", ())
 
 
 def asked(sheet=None, **options):
@@ -143,8 +143,8 @@ def test_a_rotation_that_gravity_cannot_see_makes_no_candidate():
 @pytest.fixture(scope="module")
 def found():
     with pytest.MonkeyPatch.context() as patch:
-        few = {"fibonacci": (9, 12, 20, 30, 40, 80, 120), "i-optimal": (27,)}
-        patch.setattr(planned, "FAMILIES", few)
+        patch.setattr(planned, "SIZES", (9, 12, 20, 30, 40, 80, 120))
+        patch.setattr(planned, "OPTIMAL_SIZES", (27,))
         return answer(asked(), replicates=1000)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -26,11 +26,13 @@ PLANNED_MODELS = (
     f"{NINE}-crossaxis+quadratic_scale",
     f"{NINE}-crossaxis+quadratic_scale+cubic_scale",
 )
-FAMILIES = {
-    "fibonacci": (*range(9, 61), *range(65, 121, 5), *range(140, 401, 20)),
-    "i-optimal": (9, 10, 11, 12, 14, 16, 18, 20, 22, 24, 27, 30, 33, 36, 40, 45, 50, 60),
-}
-"""Families of schemes, and the numbers of positions for which they are tried."""
+FAMILY = "fibonacci"
+SIZES = (*range(9, 61), *range(65, 121, 5), *range(140, 401, 20))
+"""Positions of its members, which are evenly spread, that are tried."""
+OPTIMAL = "i-optimal"
+OPTIMAL_SIZES = (9, 10, 11, 12, 13, 14, 15, 16, 18, 20, 22, 24, 27, 30, 33, 36, 40, 45, 50, 60)
+"""Likewise of positions that are the best for leveling, of which few are tried: each is the outcome
+of a search."""
 LEAST_REDUNDANCY = 0.25
 """Part of the conditions that must be redundant, or a position in error would not be noticed."""
 
@@ -88,13 +90,12 @@ class Candidate:
 def family_of(scheme: str) -> str:
     """Name of a scheme without its number of positions if it is of a family that is tried."""
     found = re.fullmatch(r"(.+)-\d+", scheme)
-    return found[1] if found and found[1] in FAMILIES else scheme
+    return found[1] if found and found[1] in (FAMILY, OPTIMAL) else scheme
 
 
 def schemes_for(most_positions: int, more: Sequence[str] = ()) -> list[Scheme]:
-    """Schemes of the literature, members of the families, and more, in the order of their size."""
-    members = (f"{family}-{n}" for family, sizes in FAMILIES.items() for n in sizes)
-    names = {*scheme_names(), *members, *more}
+    """Schemes of the literature, evenly spread ones, and more, in the order of their size."""
+    names = {*scheme_names(), *(f"{FAMILY}-{n}" for n in SIZES), *more}
     schemes = [get_scheme(name) for name in sorted(names)]
     fitting = [scheme for scheme in schemes if scheme.n_positions <= most_positions]
     return sorted(fitting, key=lambda scheme: (scheme.n_positions, scheme.name))
@@ -103,12 +104,49 @@ def schemes_for(most_positions: int, more: Sequence[str] = ()) -> list[Scheme]:
 def candidates(question: Question) -> list[Candidate]:
     """All calibrations whose positions determine their model and check it."""
     theory = theory_of(question.tilt_range)
-    schemes = schemes_for(question.most_positions, question.schemes)
     models = [get_model(name) for name in PLANNED_MODELS]
-    work = [(equipment, scheme) for equipment in question.equipment for scheme in schemes]
+
+    def of_scheme(scheme: Scheme) -> list[Candidate]:
+        return [
+            candidate
+            for equipment in question.equipment
+            for candidate in _of_scheme(question, theory, equipment, scheme, models)
+        ]
+
     found: list[Candidate] = []
-    for equipment, scheme in track(work, "calibrations"):
-        found += _of_scheme(question, theory, equipment, scheme, models)
+    for scheme in track(schemes_for(question.most_positions, question.schemes), "calibrations"):
+        found += of_scheme(scheme)
+    for equipment in track(question.equipment, "optimal positions"):
+        found += _with_optimal(question, equipment, found, of_scheme)
+    return found
+
+
+def _with_optimal(
+    question: Question,
+    equipment: Equipment,
+    known: Sequence[Candidate],
+    of_scheme: Callable[[Scheme], list[Candidate]],
+) -> list[Candidate]:
+    """Candidates with optimal positions; fewer of them than of the cheapest that is known.
+
+    The fewest that reach the target are found by halving.
+    """
+
+    def good(found: Iterable[Candidate]) -> list[Candidate]:
+        reaching = (c for c in found if c.reaches(question.target, question.confidence))
+        return sorted((c for c in reaching if c.equipment == equipment), key=lambda c: c.seconds)
+
+    reached = good(known)
+    most = reached[0].scheme.n_positions if reached else question.most_positions
+    done = {c.scheme.name for c in known}
+    sizes = [n for n in OPTIMAL_SIZES if n <= most and f"{OPTIMAL}-{n}" not in done]
+    low, high = (0, len(sizes)) if reached else (max(len(sizes) - 1, 0), len(sizes))
+    found: list[Candidate] = []
+    while low < high:
+        middle = (low + high) // 2
+        tried = of_scheme(get_scheme(f"{OPTIMAL}-{sizes[middle]}"))
+        found += tried
+        low, high = (low, middle) if good(tried) else (middle + 1, high)
     return found
 
 

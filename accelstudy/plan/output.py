@@ -45,20 +45,40 @@ def write_plan(
     InputError
         If the folder cannot be written, or holds what must not be overwritten.
     """
+    with result_folder(out, PLAN, inputs, force) as folder:
+        plan_files(answer, folder, provenance, shown=Path(out))
+
+
+def plan_files(
+    answer: Answer,
+    folder: Path,
+    provenance: Mapping[str, Any],
+    shown: Path,
+    study: str = "plan",
+) -> None:
+    """Write the files of a plan into a folder that is there.
+
+    Parameters
+    ----------
+    answer : Answer, that reaches its target
+    folder : Path
+    provenance : see `accelstudy.study.tables.origin`
+    shown : Path, what the folder is called in what is written
+    study : str, name of the study that makes the numbers again
+    """
     from accelstudy.figures.saving import save
     from accelstudy.figures.style import DPI, STYLE
     from accelstudy.plan.figure import plan_figure
     from accelstudy.study.tables import write_table
 
-    with result_folder(out, PLAN, inputs, force) as folder:
-        write_table(folder / "plan.parquet", plan_table(answer), provenance)
-        study = STUDY_HEAD.format(path=f"{Path(out) / 'study.yaml'}")
-        study += yaml.safe_dump(answer.study, sort_keys=False, allow_unicode=True)
-        (folder / "study.yaml").write_text(study, encoding="utf-8")
-        (folder / "plan.md").write_text(plan_page(answer), encoding="utf-8")
-        with mpl.rc_context(STYLE):  # type: ignore[arg-type]
-            figure = plan_figure(answer)
-        save(figure, folder / "plan.svg", folder / "plan.png", "Plan", DPI)
+    write_table(folder / "plan.parquet", plan_table(answer), provenance)
+    head = STUDY_HEAD.format(path=shown / "study.yaml")
+    content = yaml.safe_dump({**answer.study, "study": study}, sort_keys=False, allow_unicode=True)
+    (folder / "study.yaml").write_text(head + content, encoding="utf-8")
+    (folder / "plan.md").write_text(plan_page(answer), encoding="utf-8")
+    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
+        figure = plan_figure(answer)
+    save(figure, folder / "plan.svg", folder / "plan.png", "Plan", DPI)
 
 
 def plan_page(answer: Answer) -> str:

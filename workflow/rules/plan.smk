@@ -1,25 +1,52 @@
 from accelstudy.plan.config import PlanConfig
 
 PLAN = section("plan", PlanConfig)
-PLAN_OUTPUTS = [f"{RESULTS}/plan/sensors.parquet"]
+PLAN_FILES = ["plan.parquet", "plan.md", "plan.svg", "plan.png", "study.yaml"]
+PLAN_OUTPUTS = [
+    *[f"{RESULTS}/plan/cases/{name}/{path}" for name in PLAN.cases for path in PLAN_FILES],
+    *[f"{RESULTS}/plan/sensors.{kind}" for kind in ("parquet", "svg", "png")],
+]
 
 
-rule sensors:
+rule plan:
     output:
-        f"{RESULTS}/plan/sensors.parquet",
+        [f"{RESULTS}/plan/cases/{{plan}}/{path}" for path in PLAN_FILES],
+    log:
+        f"{RESULTS}/logs/plan/cases/{{plan}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/plan/cases/{{plan}}.tsv"
+    threads: 1
+    resources:
+        mem_mb=2000,
+    params:
+        case=lambda wildcards: PLAN.cases[wildcards.plan].model_dump(mode="json"),
+        replicates=PLAN.replicates,
+        folder=lambda wildcards: f"{RESULTS}/plan/cases/{wildcards.plan}",
+        provenance=PROVENANCE,
+        code=code_hash("planning"),
+    message:
+        "Plan {wildcards.plan}"
+    script:
+        "../scripts/plan.py"
+
+
+rule plan_sensors:
+    output:
+        table=f"{RESULTS}/plan/sensors.parquet",
+        svg=f"{RESULTS}/plan/sensors.svg",
+        png=f"{RESULTS}/plan/sensors.png",
     log:
         f"{RESULTS}/logs/plan/sensors.log",
     benchmark:
         f"{RESULTS}/benchmarks/plan/sensors.tsv"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=2000,
     params:
         sensors=PLAN.chosen_sensors,
-        seconds=PLAN.seconds,
         provenance=PROVENANCE,
         code=code_hash("planning"),
     message:
-        "Tabulate the sensors"
+        "Compare the sensors"
     script:
         "../scripts/plan_sensors.py"

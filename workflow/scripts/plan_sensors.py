@@ -1,7 +1,10 @@
-from accelstudy.plan.tables import sensor_table
-from accelstudy.study.job import logged
-from accelstudy.study.tables import write_table
+import os
 
-with logged(snakemake):
-    table = sensor_table(snakemake.params.sensors, snakemake.params.seconds)
-    write_table(snakemake.output[0], table, snakemake.params.provenance)
+from accelstudy.plan.jobs import compare_sensors
+from accelstudy.study.job import logged
+from accelstudy.units import ANGLE_UNIT_VARIABLE, angles_in
+
+with logged(snakemake), angles_in(os.environ.get(ANGLE_UNIT_VARIABLE)):
+    compare_sensors(
+        snakemake.params.sensors, dict(snakemake.output.items()), snakemake.params.provenance
+    )

@@ -1,0 +1,50 @@
+"""What the rules of `workflow/rules/plan.smk` do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+
+from accelstudy.errors import InputError
+from accelstudy.figures.saving import save
+from accelstudy.figures.style import DPI, STYLE
+from accelstudy.plan.answer import answer
+from accelstudy.plan.comparison import front_figure, front_table
+from accelstudy.plan.config import PlanCase
+from accelstudy.plan.output import plan_files
+from accelstudy.plan.wording import unreachable
+from accelstudy.study.tables import write_table
+
+
+def make_plan(
+    name: str,
+    case: Mapping[str, Any],
+    replicates: int,
+    folder: str | Path,
+    provenance: Mapping[str, Any],
+) -> None:
+    """Make one plan.
+
+    Raises
+    ------
+    InputError
+        If no calibration reaches its target; it says what would be reachable.
+    """
+    found = answer(PlanCase(**case).question, int(provenance["seed"]), replicates)
+    if not found.ranked:
+        raise InputError(f"plan.cases.{name}: {unreachable(found)}")
+    plan_files(found, Path(folder), provenance, Path(folder), f"plan-{name}")
+
+
+def compare_sensors(
+    sensors: Sequence[str], outputs: Mapping[str, str], provenance: Mapping[str, Any]
+) -> None:
+    """Compare sensors; `outputs` has the paths of `table`, `svg` and `png`."""
+    table = front_table(sensors)
+    write_table(outputs["table"], table, provenance)
+    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
+        figure = front_figure(table)
+    save(figure, outputs["svg"], outputs["png"], "Sensors", DPI)
