@@ -15,7 +15,7 @@ from accelstudy.errors import InputError
 # Files that a stage does not use, so that an edit of them does not run it again. What is not named
 # counts: a new file runs everything again rather than nothing.
 _MEASURED = ("campaign/", "diagnosis/", "gross_errors/", "hidden/", "adjustment/quality/")
-_PLANNING = ("data_sheets/", "plan/", "sequential/", "pole/")
+_PLANNING = ("data_sheets/", "field/", "plan/", "sequential/", "pole/")
 _COMMANDS = ("cli.py", "catalogue.py", "study/earlier.py", *_PLANNING)
 _FRONT = (
     *_COMMANDS,
