@@ -2,6 +2,8 @@
 
 import re
 import shutil
+import subprocess
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,6 +26,7 @@ from accelstudy.sequential.running import read_running
 from accelstudy.sequential.wording import attitude
 from accelstudy.units import GON, MGON, angles_in
 
+ROOT = Path(__file__).parents[1]
 MODEL = "bias-scale-nonorthogonality"
 WANTED = ("--tilt-accuracy", "10mgon", "--tilt-range", "30gon")
 
@@ -345,3 +348,47 @@ def test_attitudes_in_words(roll, pitch, frame, expected):
 def test_attitudes_in_degrees():
     with angles_in("deg"):
         assert attitude(-np.array(specific_force(np.pi / 4, 0.0, 1.0))).startswith("roll 45 deg")
+
+
+# --- the page ------------------------------------------------------------------------------------
+
+
+def test_the_page_can_be_followed_word_by_word(tmp_path, monkeypatch):
+    page = (ROOT / "docs/sequential.md").read_text(encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    blocks = re.findall(r"(?:^ {4}.*\n)+", page.partition("## To try it")[2], re.MULTILINE)
+    commands, answer, watch, arrive, last = (
+        [line[4:] for line in block.splitlines()] for block in blocks[:5]
+    )
+
+    def follow(line):
+        if not line.startswith("accelstudy "):
+            return subprocess.run(["bash", "-c", line], check=True).stdout
+        result = call(*line.split()[1:])
+        assert result.exit_code == 0, result.output
+        return result.output
+
+    assert [follow(line) for line in commands][-1].splitlines() == answer
+    arriving = [line.replace("sleep 5; ", "") for line in arrive]
+
+    def sleep(_):
+        if not arriving:
+            raise KeyboardInterrupt
+        follow(arriving.pop(0))
+
+    monkeypatch.setattr(command.time, "sleep", sleep)
+    told = follow(watch[0])
+    assert len(re.findall("so far", told)) == 1 + 26
+    enough = [b for b in told.split("\n\n") if "YOU CAN STOP" in b]
+    assert enough[0].startswith("whole: 16 positions so far")
+    assert "ACCEPTED" in follow(last[0])
+
+
+def test_the_python_of_the_page_runs(capsys):
+    page = (ROOT / "docs/sequential.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    exec(code, {})
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].split()[0] in ("9", "10")
+    assert lines[-1].split()[0] == "24"
+    assert lines[-1].split()[-1] == "15"
