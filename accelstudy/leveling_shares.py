@@ -29,7 +29,7 @@ from accelstudy.units import GON, MGON, STANDARD_GRAVITY
 Array = NDArray[np.float64]
 
 LINEAR_UP_TO = 0.01
-"""Sd of roll and pitch in rad up to which leveling is linear to 1e-4 of their variance."""
+"""Sd of roll and pitch in rad up to which linear theory is right to 3e-4 of their variance."""
 ORDERS = 8192
 """Random orders of the Monte Carlo where it is not."""
 NOTABLE = 0.01
