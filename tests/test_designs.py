@@ -122,6 +122,7 @@ def test_a_job_needs_no_file(tmp_path, monkeypatch):
     path = tmp_path / "some.yaml"
     path.write_text("directions: [[0, 0, 1], [0, 1, 0], [1, 0, 0]]\n")
     (cell,) = study_cells(study(path))
+    plain = study(path).model_dump(mode="json")
     path.unlink()
     monkeypatch.setattr(files, "_read", {})
     same = Cell.from_dict(cell.to_dict())
@@ -129,6 +130,13 @@ def test_a_job_needs_no_file(tmp_path, monkeypatch):
     np.testing.assert_array_equal(same.positions.directions, np.eye(3)[::-1])
     with pytest.raises(InputError, match="unknown scheme 'some@"):
         get_scheme(cell.scheme)
+    again = parse_study(plain)
+    assert study_cells(again) == [cell]
+    assert again.fingerprint == parse_study(plain).fingerprint
+    np.testing.assert_array_equal(get_scheme(cell.scheme).directions, same.positions.directions)
+    plain["schemes"][cell.scheme]["directions"][0] = [0, 1, 1]
+    with pytest.raises(InputError, match=r"schemes.*is the name of other positions"):
+        parse_study(plain)
     usual = parse_study(
         {"study": "s", "seed": 1, "grids": [{"models": "bias-scale", "schemes": "faces-6",
                                             "approaches": "robot", "replicates": 2}]}

@@ -202,10 +202,12 @@ def design_command(
             proposal = Proposal.of(request)
         extra = {"turn_about": proposal.axes} if proposal.axes else None
         name = re.sub(r"[^\w.-]+", "-", out.stem).lstrip(".-")[: LONGEST // 2] or "scheme"
+        kind = request.chosen.name
+        kind = f"{kind}-optimal" if len(kind) == 1 else kind
         write_design(
             path,
             name,
-            title(request.chosen.name),
+            f"{name} ({kind})",
             f"accelstudy design, seed {request.seed}",
             proposal.directions,
             proposal.made(),
@@ -215,11 +217,6 @@ def design_command(
     for line in summary(proposal):
         say(line)
     say(f"scheme: {out}")
-
-
-def title(criterion: str) -> str:
-    """Short form for figures."""
-    return f"{criterion}-optimal" if len(criterion) == 1 else f"to {criterion}"
 
 
 def table(proposal: Proposal) -> str:

@@ -22,7 +22,7 @@ from accelstudy.schemes.registry import Scheme
 KEYS = ("scheme", "title", "source", "directions", "positions", "design")
 """Of a file; only `directions` must be there, and the last two are for people."""
 
-_read: dict[str, Scheme] = {}
+_read: dict[str, tuple[Scheme, dict[str, Any]]] = {}
 
 
 def is_scheme_file(text: str) -> bool:
@@ -42,15 +42,27 @@ def scheme_of_file(path: str | Path) -> Scheme:
 
     content = read_layer(path)
     try:
-        scheme = parse_scheme(content, Path(path).stem)
+        return remember(content, Path(path).stem)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    return _read.setdefault(scheme.name, scheme)
+
+
+def remember(content: Mapping[str, Any], name: str) -> Scheme:
+    """Make a scheme of what a file holds, and know it from then on; see `parse_scheme`."""
+    scheme = parse_scheme(content, name)
+    held = {key: content[key] for key in KEYS[1:4] if content.get(key) is not None}
+    plain = {"scheme": scheme.name.partition("@")[0], **held}
+    return _read.setdefault(scheme.name, (scheme, plain))[0]
 
 
 def known_scheme(name: str) -> Scheme | None:
     """Return a scheme that was read from a file before, by its name with the digest."""
-    return _read.get(name)
+    return _read[name][0] if name in _read else None
+
+
+def held(name: str) -> dict[str, Any] | None:
+    """What the file of such a scheme holds, as plain data from which `remember` makes it again."""
+    return _read[name][1] if name in _read else None
 
 
 def parse_scheme(content: Mapping[str, Any], name: str) -> Scheme:

@@ -17,7 +17,7 @@ from accelstudy.hold_plan import HoldPlan
 from accelstudy.models import compose, get_model
 from accelstudy.noise_effects import get_noise_effect
 from accelstudy.schemes import Scheme, get_scheme, scheme_names
-from accelstudy.schemes.files import known_scheme
+from accelstudy.schemes.files import held
 from accelstudy.sensor import SensorModel
 from accelstudy.simulation import Noise
 from accelstudy.study.compiling import with_compiled
@@ -226,7 +226,7 @@ def _grid_cells(study: StudyConfig, grid: Grid) -> Iterable[Cell]:
             gravity=study.gravity_mps2,
             truth=study.truth(dict.fromkeys([*effects, *simulated])),
             holds=study.hold_plan,
-            directions=_rows(own.directions.tolist()) if (own := known_scheme(scheme)) else None,
+            directions=_rows((held(scheme) or {}).get("directions")),
         )
 
 

@@ -80,7 +80,8 @@ def config_hash(config: Mapping[str, Any]) -> str:
     ----------
     config : mapping, the whole configuration with its defaults, as plain data
     """
-    content = {key: value for key, value in config.items() if key != "angle_unit"}
+    unused = {"angle_unit"} if config.get("schemes") else {"angle_unit", "schemes"}
+    content = {key: value for key, value in config.items() if key not in unused}
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
 
 

@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from accelstudy import bounds
 from accelstudy.approaches import approach_names, get_approach
@@ -22,6 +22,7 @@ from accelstudy.models import MODELS, PRESETS, get_model
 from accelstudy.names import LONGEST
 from accelstudy.noise_effects import get_noise_effect
 from accelstudy.schemes import get_scheme, scheme_names
+from accelstudy.schemes.files import held, remember
 from accelstudy.sensor import SensorModel
 from accelstudy.simulation import Noise, sigma_of_mean
 from accelstudy.study.config.types import (
@@ -215,6 +216,11 @@ class StudyConfig(Block):
     models: dict[str, OneOrMore[str]] = Field(
         default_factory=dict, description="models of your own: name and effects"
     )
+    schemes: dict[str, dict[str, Any]] = Field(
+        default_factory=dict,
+        description="positions of the schemes that are read from files, as `scheme`, `title`, "
+        "`source` and `directions`; filled in when the configuration is read",
+    )
     grids: list[Grid] = Field(default_factory=list, description="sets of cells")
     presets: Presets | None = Field(None, description="Table 1 of the paper")
     keep: Literal["replicates", "summary"] = Field(
@@ -234,6 +240,15 @@ class StudyConfig(Block):
         description="draw the paper's figures and judge its claims; needs `sensitivity`, and the "
         "cells of its model and scheme with both approaches",
     )
+
+    @field_validator("schemes")
+    @classmethod
+    def _schemes_of_files(cls, given: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
+        """Know them before the grids name them."""
+        for name, content in given.items():
+            if (found := remember(content, name).name) != name:
+                raise InputError(f"{name}: is the name of other positions; these are {found}")
+        return dict(given)
 
     @model_validator(mode="after")
     def _names_exist(self) -> StudyConfig:
@@ -277,6 +292,9 @@ class StudyConfig(Block):
                 _known_approaches(grid.approaches)
             with _at(f"grids.{index}: number of cells"):
                 bounds.CELLS.check(self._n_cells(grid))
+        for name in (name for grid in self.grids for name in grid.schemes):
+            if (content := held(name)) is not None:
+                self.schemes[name] = content
         self._check_gravity()
         if self.presets is not None:
             with _at("presets.approaches"):
