@@ -100,6 +100,14 @@ def test_the_readme_has_what_a_reader_needs(steps):
     assert len(re.findall(r"\d", python["output"])) > 50  # three arrays of numbers
 
 
+def test_the_answer_that_the_readme_quotes_is_the_commands_own(steps):
+    text = README.read_text(encoding="utf-8").partition("## Do I need a robot?")[2]
+    quoted = re.search(r"```\n(.*?)```", text, re.DOTALL)[1]
+    run = [s for s in steps if s["source"] == "README" and "skipped" not in s]
+    (plan,) = (s for s in run if s["command"].startswith("accelstudy plan "))
+    assert plan["output"].startswith(quoted)
+
+
 def test_each_help_has_an_example(steps):
     found = {s["command"].split()[1] for s in steps if s["source"] == "help"}
     assert found == set(main.commands)

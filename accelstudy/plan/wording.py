@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from accelstudy.data_sheets import ASSUMED
 from accelstudy.effects import get_effect
 from accelstudy.plan.advice import InUse, Need, Spoiler, in_use, limits, needs, spoilers
 from accelstudy.plan.answer import OTHER_CONFIDENCE, Answer, Ranked
@@ -75,13 +76,25 @@ def answer_lines(answer: Answer) -> list[str]:
             leaves = _angle(best.accuracy(question.confidence))
             lines.append(f"By hand the best leaves {leaves}: {effort(best)}.")
     use = in_use(question)
-    more = [f"{_angle(use.reading)} of noise for one reading {_like(question, use)}"]
+    if any(size.source == ASSUMED for size in question.sizes.values()):
+        lines += _linear(question, candidate)
+    more = [f"{_angle(use.reading)} of noise in each reading {_like(question, use)}"]
     if not math.isnan(use.drift):
         more.append(f"{_angle(use.drift)} after {number_of(use.hours)} h")
     if not math.isnan(use.warmth):
         more.append(f"{_angle(use.warmth)} where it is {number_of(use.kelvin)} K warmer or colder")
     lines.append(f"In use comes on top: {joined(more)}.")
     return lines
+
+
+def _linear(question: Question, candidate: Candidate) -> list[str]:
+    """Say for what nonlinearity the answer holds, if the sensor was taken to be linear."""
+    found = [s for s in spoilers(question, candidate) if s.effect == "quadratic_scale"]
+    return [
+        f"That is for a linear sensor; a quadratic nonlinearity of {quantity_text(s.size, s.unit)} "
+        "would by itself leave as much, unless the calibration estimates it, too."
+        for s in found
+    ]
 
 
 def unreachable(answer: Answer) -> str:
@@ -244,7 +257,7 @@ def use_lines(question: Question, use: InUse) -> list[str]:
         return "not known" if math.isnan(value) else _angle(value)
 
     return [
-        f"noise of one reading {like}: {told(use.reading)}",
+        f"noise of a reading {like}: {told(use.reading)}",
         f"drift of the bias within {number_of(use.hours)} h: {told(use.drift)}",
         f"temperature {number_of(use.kelvin)} K off that of the calibration: {told(use.warmth)}",
         f"switched off and on again: {told(use.restart)}",
@@ -254,7 +267,7 @@ def use_lines(question: Question, use: InUse) -> list[str]:
 def _like(question: Question, use: InUse) -> str:
     """How long the reading is of which the noise is told."""
     if question.sheet.position_sigma is not None:
-        return "like a position"
+        return "as long as a position"
     return f"of {number_of(use.seconds)} s"
 
 
@@ -264,7 +277,7 @@ def assumption_lines(question: Question) -> list[str]:
     assumed = [PLAIN[e] for e, size in question.sizes.items() if size.source == "typical"]
     if assumed:
         lines.append(f"Of a usual size, as nothing is known of it: {joined(assumed)}.")
-    if any(size.source == "assumed" for size in question.sizes.values()):
+    if any(size.source == ASSUMED for size in question.sizes.values()):
         lines.append("Taken to be linear, as only its noise is known.")
     for equipment in question.equipment:
         setup = f", {number_of(equipment.setup / 60)} minutes to set up" if equipment.setup else ""
