@@ -591,6 +591,7 @@ VALID = st.fixed_dictionaries(
 )
 
 
+@settings(max_examples=25)
 @given(keys=VALID, size=st.integers(1, 20_000))
 def test_cells_of_any_valid_study(keys, size):
     study = make_study(**keys)

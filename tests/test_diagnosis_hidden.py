@@ -86,9 +86,7 @@ def test_wrong_names_are_rarer_than_the_posterior_says():
     names together; and of the campaigns less than 3 % get a wrong name. A credible set lacks the
     truth in one of ten.
     """
-    campaigns = [
-        (*case, size, 100 + k) for k, case in enumerate((CASES * 3)[:16]) for size in SIZES
-    ]
+    campaigns = [(*case, size, 100 + k) for k, case in enumerate(CASES * 2) for size in SIZES]
     outcomes, doubts = Counter(), []
     for design, approach, size, seed in campaigns:
         measured, classes = hidden(design, approach, size, 10 * seed + int(size))
@@ -120,7 +118,7 @@ def test_wrong_names_are_rarer_than_the_posterior_says():
 
 def test_odd_noise_is_no_effect():
     odd = ("heavy_tails(nu=4)", "coloured_noise", "coloured_noise(tau=60)", "axis_noise(kappa_z=4)")
-    noises = odd * 8
+    noises = odd * len(CASES)
     named = 0
     for k, noise in enumerate(noises):
         design, approach = CASES[(k // len(odd)) % len(CASES)]

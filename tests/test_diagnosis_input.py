@@ -22,6 +22,7 @@ from accelstudy.errors import InputError
 from accelstudy.leveling import specific_force
 
 N = 36
+pytestmark = pytest.mark.usefixtures("not_rendered")
 VERDICTS = {"no_effect", "named", "unknown", "noise_model", "gross_error"}
 
 
@@ -298,7 +299,7 @@ def exact(measured):
 
 
 @pytest.mark.parametrize("approach", ["robot", "gravity"])
-@pytest.mark.parametrize("digits", [16, 9, 6])
+@pytest.mark.parametrize("digits", [16, 6])
 def test_no_effect_is_named_in_what_is_its_own_model(robot, approach, digits, tmp_path):
     """Residuals of rounding only, in which sigma is known to be far larger."""
     measured = exact(robot)
@@ -308,7 +309,7 @@ def test_no_effect_is_named_in_what_is_its_own_model(robot, approach, digits, tm
     assert found["gap"]["sigma0_squared"]["before"] < 1e-6
 
 
-@pytest.mark.parametrize("sigma", [1e-6, 10.0, 1e3])
+@pytest.mark.parametrize("sigma", [1e-6, 1e3])
 @pytest.mark.parametrize("approach", ["robot", "gravity"])
 def test_a_sigma_out_of_all_bounds_is_the_noise(robot, sigma, approach, tmp_path):
     measured = replace(robot, sigma_force=sigma)

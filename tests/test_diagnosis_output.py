@@ -101,7 +101,7 @@ def written(tmp_path_factory):
         if case not in made:
             simulated(case, root / case)
             out = root / f"{case}-out"
-            result = run("diagnose", root / case, "--out", out, "--replicates", 300)
+            result = run("diagnose", root / case, "--out", out, "--replicates", 100)
             assert result.exit_code == 0, result.output
             content = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
             made[case] = out, content, result.output
@@ -347,7 +347,7 @@ def test_the_model_is_a_study(written, case):
 
 def test_same_seed_same_files(written, tmp_path):
     out, _, _ = written("named")
-    diagnose_folder(out.parent / "named", tmp_path / "again", replicates=300)
+    diagnose_folder(out.parent / "named", tmp_path / "again", replicates=100)
     for path in sorted(out.rglob("*.*")):
         if path.is_file() and path.suffix != ".parquet":
             again = tmp_path / "again" / path.relative_to(out)

@@ -11,7 +11,6 @@ from page_helpers import assert_sound, text_of
 
 from accelstudy.cli import main
 from accelstudy.effects import effect_names
-from accelstudy.figures import saving
 from accelstudy.gross_errors import gross_error_names
 from accelstudy.models import get_model
 from accelstudy.noise_effects import noise_effect_names
@@ -63,9 +62,9 @@ def read(path):
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_three_commands_end_well_and_agree(case, tmp_path, monkeypatch):
+def test_three_commands_end_well_and_agree(case, tmp_path, request):
     if case not in DRAWN:
-        monkeypatch.setattr(saving, "save", lambda *_: "<svg></svg>")
+        request.getfixturevalue("not_rendered")
     campaign, options = tmp_path / "c", CASES[case]
     scheme = () if "--scheme" in options else ("--scheme", "fibonacci-20")
     run("simulate-campaign", "--out", campaign, *scheme, *HOLDS, *options)

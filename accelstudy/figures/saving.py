@@ -95,8 +95,9 @@ def failure(what: str, error: Exception) -> str:
 
 def _simplify(figure: Figure) -> None:
     """Draw artists of very many points as images, or a page would have many megabytes."""
-    lines = [line for line in figure.findobj(Line2D) if np.size(line.get_xdata()) > MANY]
-    collections = [one for one in figure.findobj(LineCollection) if len(one.get_paths()) > MANY]
+    drawn = [artist for axes in figure.axes for artist in (*axes.lines, *axes.collections)]
+    lines = [a for a in drawn if isinstance(a, Line2D) and np.size(a.get_xdata()) > MANY]
+    collections = [a for a in drawn if isinstance(a, LineCollection) and len(a.get_paths()) > MANY]
     for artist in (*lines, *collections):
         artist.set_rasterized(True)
     if lines or collections:
