@@ -58,6 +58,7 @@ def sessions(tmp_path_factory):
         "gravity": ("--approach", "gravity"),
         "robot": ("--approach", "robot"),
         "quiet": ("--approach", "robot", "--sigma-unknown"),
+        "warm": ("--approach", "robot", "--temperature", "15:40", "--effect", "thermal_bias"),
     }.items():
         assert call("simulate-campaign", "--out", folder / name, *common, *options).exit_code == 0
     return folder
@@ -188,6 +189,20 @@ def test_a_noise_that_the_residuals_refute_is_not_trusted(begun):
     assert "YOU CAN STOP" not in text
 
 
+def test_what_depends_on_more_than_the_attitude(begun):
+    model = ("--model", f"{MODEL}+thermal_bias")
+    text = advise(begun(0, "warm"), *model)
+    assert "nonorthogonality and thermal bias [needs other temperatures]" in text
+    assert "to go: cannot be told, as it depends on the conditions" in text
+    text = advise(begun(30, "warm"), *model)
+    assert "YOU CAN STOP" in text
+    # Without the effect most positions disagree. It is not they that are wrong.
+    text = advise(begun(30, "warm"))
+    assert "set aside" not in text
+    assert "or the model lacks an effect" in text
+    assert "YOU CAN STOP" not in text
+
+
 # --- conflicts -----------------------------------------------------------------------------------
 
 
@@ -251,7 +266,10 @@ def test_bad_input_ends_with_a_line(begun, tmp_path):
     assert "--tilt-accuracy: expected a number with its unit" in error(
         folder, "--tilt-accuracy", "10"
     )
-    assert "needs the block `robot`" in error(folder, *WANTED, "--approach", "robot")
+    no_robot = error(folder, *WANTED, "--approach", "robot")
+    assert "needs the columns roll_robot_gon and pitch_robot_gon" in no_robot
+    assert "needs the block `robot`" in error(begun(0), *WANTED, "--approach", "robot")
+    folder = begun(5)
     blind = error(folder, *WANTED, "--model", f"{MODEL}-crossaxis")
     assert "cannot determine the model" in blind
     assert "needs the temperature" in error(folder, *WANTED, "--model", f"{MODEL}+thermal_bias")

@@ -157,6 +157,39 @@ def least_sigma(campaign: Campaign, approach: Approach) -> float:
     return LEAST_RATIO * campaign.gravity * (campaign.sigma_angle or 0.0) * approach.uses_angles
 
 
+def campaign_observations(campaign: Campaign) -> Observations:
+    """Return a campaign as the adjustment takes it, R = 1."""
+    noise, known = campaign_noise(campaign), campaign.sigma_force is not None
+    return Observations(
+        forces=campaign.forces[None],
+        sigma_force=noise.sigma_force,
+        angles=None if campaign.angles is None else campaign.angles[None],
+        sigma_angle=noise.sigma_angle,
+        gravity=campaign.gravity,
+        sigma_gravity=campaign.sigma_gravity,
+        hold=campaign.hold,
+        # Beside means of unknown noise nobody knows what slopes weigh.
+        slope=campaign.slope if known else None,
+        sd_slope=campaign.sd_slope if known else None,
+    )
+
+
+def check_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> None:
+    """Raise `InputError` if a campaign lacks what the approach or the model needs."""
+    if approach.uses_angles and campaign.angles is None:
+        raise InputError(
+            f"{campaign.name}: approach {approach.name!r} needs the columns roll_robot_gon and "
+            "pitch_robot_gon"
+        )
+    check_columns(campaign, model)
+    noise, least = campaign_noise(campaign), least_sigma(campaign, approach)
+    if noise.sigma_force < least:
+        raise InputError(
+            f"{campaign.name}: sensor_noise.sigma_mps2: {noise.sigma_force:g} is too small beside "
+            f"robot.angle_sigma_mgon: {noise.sigma_angle / MGON:g}; expected {least:.2g} or more"
+        )
+
+
 def check_columns(campaign: Campaign, model: SensorModel) -> None:
     """Raise `InputError` if a campaign lacks a column that an effect of the model needs."""
     hold = campaign.hold
@@ -186,19 +219,7 @@ def fit_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> 
         If the campaign lacks what the approach or the model needs, if its positions do not
         determine the model (says which parameters), or if the adjustment does not converge.
     """
-    if approach.uses_angles and campaign.angles is None:
-        raise InputError(
-            f"{campaign.name}: approach {approach.name!r} needs the columns roll_robot_gon and "
-            "pitch_robot_gon"
-        )
-    check_columns(campaign, model)
-    noise = campaign_noise(campaign)
-    least = least_sigma(campaign, approach)
-    if noise.sigma_force < least:
-        raise InputError(
-            f"{campaign.name}: sensor_noise.sigma_mps2: {noise.sigma_force:g} is too small beside "
-            f"robot.angle_sigma_mgon: {noise.sigma_angle / MGON:g}; expected {least:.2g} or more"
-        )
+    check_campaign(campaign, model, approach)
     start_of = partial(initial_values, forces=campaign.forces, gravity=campaign.gravity)
     design = campaign_design(campaign, model, approach)
     if not design.estimable:
@@ -206,19 +227,7 @@ def fit_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> 
             f"{campaign.name}: {campaign.n_positions} positions do not determine the model "
             f"{model.name!r}: {design.reason}"
         )
-    observed = Observations(
-        forces=campaign.forces[None],
-        sigma_force=noise.sigma_force,
-        angles=None if campaign.angles is None else campaign.angles[None],
-        sigma_angle=noise.sigma_angle,
-        gravity=campaign.gravity,
-        sigma_gravity=campaign.sigma_gravity,
-        hold=campaign.hold,
-        initial=start_of(model),
-        # Beside means of unknown noise nobody knows what slopes weigh.
-        slope=None if campaign.sigma_force is None else campaign.slope,
-        sd_slope=None if campaign.sigma_force is None else campaign.sd_slope,
-    )
+    observed = replace(campaign_observations(campaign), initial=start_of(model))
     adjustment = calibrate(model, approach, observed)
     if not adjustment.converged[0] and (unfit := not_affine(model)):
         # Of a model with large effects the affine part alone is a better start.

@@ -85,7 +85,8 @@ class Advice:
     noise : NoiseTaken
     rms : (2,) array, rad, of roll and of pitch; None as long as it is not known
     next : NextPosition
-    to_go : int or None, positions; None where it cannot be told
+    to_go : int or None, positions; None where it cannot be told, or where they are too many
+    foreseeable : bool, whether it can be told
     enough : bool, whether the promise is kept
     """
 
@@ -98,4 +99,5 @@ class Advice:
     rms: Array | None
     next: NextPosition
     to_go: int | None
+    foreseeable: bool
     enough: bool

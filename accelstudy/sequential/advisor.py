@@ -7,9 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.adjustment import Observations
 from accelstudy.approaches import Approach
-from accelstudy.campaign.fit import campaign_noise, check_columns, initial_values
+from accelstudy.campaign.fit import (
+    campaign_noise,
+    campaign_observations,
+    check_campaign,
+    initial_values,
+)
 from accelstudy.campaign.format import Campaign
 from accelstudy.design import is_blind, rank_of
 from accelstudy.errors import InputError
@@ -26,6 +30,9 @@ from accelstudy.sequential.screening import Screening
 from accelstudy.sequential.stopping import LEAST_REDUNDANCY, get_rule
 
 Array = NDArray[np.float64]
+
+CONDITIONS = {"time", "temperature", "vibration"}
+"""Columns of the holds that change by themselves from position to position."""
 
 
 @dataclass
@@ -56,18 +63,19 @@ class Advisor:
 
     def check(self, campaign: Campaign) -> None:
         """Raise `InputError` where no number of positions would be enough."""
-        if self.approach.uses_angles and campaign.angles is None:
+        if campaign.n_positions:
+            check_campaign(campaign, self.model, self.approach)
+        elif self.approach.uses_angles and campaign.angles is None:
             raise InputError(
                 f"{campaign.name}: approach {self.approach.name!r} needs the block `robot` in the "
-                "header, and the columns roll_robot_gon and pitch_robot_gon"
+                "header"
             )
-        if campaign.n_positions:
-            check_columns(campaign, self.model)
         noise, known = campaign_noise(campaign), self.prior is not NOTHING_KNOWN
         if not known and is_blind(self.model, self.approach, noise, campaign.gravity):
+            or_robot = "" if self.approach.uses_angles else ", or a robot"
             raise InputError(
                 f"the {self.approach.name} approach cannot determine the model "
-                f"{self.model.name!r} in any positions; take a simpler model, or a robot"
+                f"{self.model.name!r} in any positions; take a simpler model{or_robot}"
             )
 
     def advise(self, campaign: Campaign) -> Advice:
@@ -78,7 +86,7 @@ class Advisor:
         campaign : Campaign
             The session as far as it goes; positions that were taken before are as they were.
         """
-        observed = _observed(campaign)
+        observed = campaign_observations(campaign)
         if self._screening is None or not self._screening.recursion.solved[0]:
             initial = None
             if self.prior is NOTHING_KNOWN and campaign.n_positions:
@@ -116,8 +124,10 @@ class Advisor:
         latest = screening.last
         if latest is not None and latest.agreement is Agreement.CONFLICT and not latest.repeats:
             repeats = int(campaign.positions[latest.index])
-        to_go = None
-        if not enough and (trusted or recursion.redundancy >= LEAST_REDUNDANCY):
+        # Nobody knows the conditions of the positions to come.
+        to_go, varying = None, bool(CONDITIONS & {*self.model.hold_columns})
+        told_noise = trusted or recursion.redundancy >= LEAST_REDUNDANCY
+        if not enough and told_noise and not varying:
             r = recursion.redundancy
             variance = 1.0 if trusted else float(recursion.omega[0]) / r
             to_go = positions_to_go(chooser, root[0], variance, r, rms[0], last)
@@ -136,6 +146,7 @@ class Advisor:
             rms=rms[0] if told else None,
             next=NextPosition(best, repeats),
             to_go=to_go,
+            foreseeable=told_noise and not varying,
             enough=enough,
         )
 
@@ -158,19 +169,6 @@ class Advisor:
         sigma = np.sqrt(np.diag(screening.recursion.cofactors[0]))[: len(names)]
         sizes = typical_sizes(self.model, len(names))
         return tuple(n for n, s, size in zip(names, sigma, sizes, strict=True) if s > size)
-
-
-def _observed(campaign: Campaign) -> Observations:
-    noise = campaign_noise(campaign)
-    return Observations(
-        forces=campaign.forces[None],
-        sigma_force=noise.sigma_force,
-        angles=None if campaign.angles is None else campaign.angles[None],
-        sigma_angle=noise.sigma_angle,
-        gravity=campaign.gravity,
-        sigma_gravity=campaign.sigma_gravity,
-        hold=campaign.hold,
-    )
 
 
 def _noise_taken(screening: Screening, stated: float | None, unit: float) -> NoiseTaken:

@@ -61,8 +61,8 @@ class Recursion:
     initial : (u,) array, SI, optional
         Where to linearise as long as there is no solution; the mean of the prior by default.
     tolerance : float
-        Standard deviations by which the estimate may be off the solution of all positions
-        together.
+        Standard deviations by which the estimate is predicted to be off the solution of all
+        positions together, at most. By default it is not off at all.
 
     Attributes
     ----------

@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from accelstudy.campaign.format import Campaign
 from accelstudy.campaign.wording import counted
+from accelstudy.effects import Effect
 from accelstudy.frames import FRD, Frame
 from accelstudy.leveling import roll_pitch
+from accelstudy.models import compose
 from accelstudy.sensor import SensorModel
 from accelstudy.sequential.advice import Advice, Agreement
 from accelstudy.sequential.promise import Promise
@@ -27,13 +29,17 @@ LEVEL = np.radians(0.5)
 down."""
 
 
+CHANGING = {"time": "times", "temperature": "temperatures", "vibration": "vibration"}
+"""What else than the attitude effects depend on."""
+
+
 def lines(advice: Advice, campaign: Campaign, model: SensorModel, promise: Promise) -> list[str]:
     """Say it, most important last."""
     said = [*_last(advice), *_aside(advice), *_undetermined(advice, model), *_noise(advice)]
     said.append(_accuracy(advice, promise))
     frame = FRD if campaign.log is None else campaign.log.axes
     said.append(_next(advice, frame))
-    said.append(_to_go(advice, campaign, promise))
+    said.append(_to_go(advice, campaign))
     return said
 
 
@@ -131,8 +137,15 @@ def _by_effect(names: Sequence[str], model: SensorModel) -> str:
         found = [name for name in own if name in names]
         if found:
             some = "" if found == own else f" ({', '.join(found)})"
-            parts.append(f"{words(effect.name)}{some}")
+            parts.append(f"{words(effect.name)}{some}{_needs(effect)}")
     return joined(parts)
+
+
+def _needs(effect: Effect) -> str:
+    """What must change between positions for an effect to be seen, besides the attitude."""
+    columns = compose(effect.spec, (effect.spec,)).hold_columns
+    needed = [f"other {word}" for column, word in CHANGING.items() if column in columns]
+    return f" [needs {joined(needed)}]" if needed else ""
 
 
 def _noise(advice: Advice) -> list[str]:
@@ -177,14 +190,17 @@ def _next(advice: Advice, frame: Frame) -> str:
     return f"{'further' if advice.enough else 'next'} position: {where}"
 
 
-def _to_go(advice: Advice, campaign: Campaign, promise: Promise) -> str:
+def _to_go(advice: Advice, campaign: Campaign) -> str:
     if advice.enough:
         return "YOU CAN STOP: the accuracy is reached"
     if advice.to_go is not None:
         return f"to go: about {counted(advice.to_go, 'position')}"
     if advice.noise.taken is None:
         return "to go: cannot be told before the noise is known"
-    return "to go: hundreds of positions; a quieter reading (longer holds), or a robot, is needed"
+    if not advice.foreseeable:
+        return "to go: cannot be told, as it depends on the conditions of the positions to come"
+    robot = ", or a robot," if campaign.angles is None else ""
+    return f"to go: hundreds of positions; a quieter reading (a longer hold){robot} is needed"
 
 
 def finished(campaign: Path, model: str, approach: str) -> str:
