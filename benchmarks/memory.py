@@ -68,12 +68,12 @@ def run(step, content, folder):
             parts = [folder / "whole" / cell.approach / f"{name}.parquet" for cell in cells]
             collect(parts, folder / f"{name}.parquet", PROVENANCE)
     elif rule == "sensitivity":
-        tables = []
-        for name in ("forces", "gravity", "robot"):
-            tables.append(folder / f"{name}.parquet")
-            summary = folder / "summary.parquet"
-            analysis.analyse_sensitivity(study, name, summary, tables[-1], PROVENANCE)
-        collect(tables, folder / "sensitivity.parquet", PROVENANCE)
+        summary, correlations, sensitivity, shapley = (
+            folder / f"{name}.parquet"
+            for name in ("summary", "correlations", "sensitivity", "shapley")
+        )
+        analysis.analyse_sensitivity(study, summary, sensitivity, PROVENANCE)
+        analysis.analyse_shapley(study, summary, correlations, shapley, PROVENANCE)
     elif rule == "claims":
         parts = {
             name: [folder / "whole" / cell.approach / f"{name}.parquet" for cell in cells]
@@ -82,7 +82,7 @@ def run(step, content, folder):
         if kept == "estimates":
             parts[kept] = [folder / cell.approach / "estimates.parquet" for cell in cells]
         outputs = {name: folder / f"{name}.parquet" for name in ("claims", "by_scheme", "html")}
-        tables = (folder / "correlations.parquet", folder / "sensitivity.parquet")
+        tables = (folder / f"{name}.parquet" for name in ("correlations", "sensitivity", "shapley"))
         analysis.judge_claims(study, parts, *tables, outputs, PROVENANCE)
     else:
         for name in figure_names(study):

@@ -61,15 +61,13 @@ def run(keys: dict, folder: Path) -> dict[str, pd.DataFrame]:
     """All tables of a study."""
     study, tables = parse_study(keys), run_study(folder, **keys)
     if study.sensitivity:
-        parts = []
-        for analysis in ("forces", "gravity", "robot"):
-            path = folder / f"sensitivity-{analysis}.parquet"
-            analyse_sensitivity(study, analysis, folder / "summary.parquet", path, PROVENANCE)
-            parts.append(read_table(path))
-        tables["sensitivity"] = pd.concat(parts, ignore_index=True)
-        named = (folder / f"{name}.parquet" for name in ("summary", "correlations", "shapley"))
-        analyse_shapley(study, *named, PROVENANCE)
-        tables["shapley"] = read_table(folder / "shapley.parquet")
+        summary, correlations, *written = (
+            folder / f"{name}.parquet"
+            for name in ("summary", "correlations", "sensitivity", "shapley")
+        )
+        analyse_sensitivity(study, summary, written[0], PROVENANCE)
+        analyse_shapley(study, summary, correlations, written[1], PROVENANCE)
+        tables |= {path.stem: read_table(path) for path in written}
     return tables
 
 

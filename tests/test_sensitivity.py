@@ -185,14 +185,11 @@ def test_the_study_takes_the_sds_from_the_simulation(tmp_path):
     keys = {"grids": [grid(replicates=2000)], "sensitivity": sensitivity}
     run_study(tmp_path, **keys)
     study, summary = make_study(**keys), tmp_path / "summary.parquet"
-    tables = {}
-    for analysis in ("forces", "gravity", "robot"):
-        path = tmp_path / f"{analysis}.parquet"
-        source = None if analysis == "forces" else summary
-        analyse_sensitivity(study, analysis, source, path, PROVENANCE)
-        table = read_table(path)
-        assert set(table["analysis"]) == {analysis}
-        tables[analysis] = table[table["output"] == "roll"].set_index("input")["total_effect"]
+    analyse_sensitivity(study, summary, tmp_path / "sensitivity.parquet", PROVENANCE)
+    table = read_table(tmp_path / "sensitivity.parquet").query("output == 'roll'")
+    by_analysis = table.set_index("input").groupby("analysis")["total_effect"]
+    tables = {str(name): its for name, its in by_analysis}
+    assert [*tables] == ["forces", "gravity", "robot"]
     assert tables["forces"]["f_y"] == pytest.approx(1, abs=0.01)
     assert tables["gravity"]["f_y"] == pytest.approx(0.571, abs=0.03)
     assert tables["gravity"]["alpha_zx"] == pytest.approx(0.357, abs=0.03)
@@ -205,6 +202,4 @@ def test_a_cell_without_estimates_is_an_input_error(tmp_path):
     run_study(tmp_path, grids=[grid(schemes="rings-24", replicates=5)])
     study = make_study(sensitivity=sensitivity)
     with pytest.raises(InputError, match=f"no estimates of the cell {NINE}/mclaren-24/gravity"):
-        analyse_sensitivity(
-            study, "gravity", tmp_path / "summary.parquet", tmp_path / "out", PROVENANCE
-        )
+        analyse_sensitivity(study, tmp_path / "summary.parquet", tmp_path / "out", PROVENANCE)

@@ -20,44 +20,47 @@ from accelstudy.study.config import StudyConfig
 from accelstudy.study.tables import read_table, write_table
 from accelstudy.units import to_si
 
+APPROACHES = ("gravity", "robot")
+"""Those whose calibrations the sensitivity is analysed with."""
+
 
 def analyse_sensitivity(
-    study: StudyConfig,
-    analysis: str,
-    summary: str | Path | None,
-    output: str | Path,
-    provenance: Mapping[str, Any],
+    study: StudyConfig, summary: str | Path, output: str | Path, provenance: Mapping[str, Any]
 ) -> None:
     """Analyse the sensitivity of leveling and write the table.
+
+    Its `analysis` is "forces" for the parameter-free model (figure 4), or the approach whose
+    calibration gives the sds of the parameters (figures 5 and 6).
 
     Parameters
     ----------
     study : StudyConfig, with `sensitivity`
-    analysis : "forces" for the parameter-free model (figure 4), or the approach whose calibration
-        gives the sds of the parameters (figures 5 and 6)
-    summary : path of the table of that name; not needed for "forces"
+    summary : path of the table of that name
     output : path of the table to write
     provenance : see `accelstudy.study.tables.origin`
     """
     settings = study.sensitivity
     assert settings is not None
-    calibrated: dict[str, Any] = {}
-    if analysis != "forces":
-        model, truth = _sensor(study)
-        sigma = _empirical_sigma(study, analysis, summary)
-        calibrated = {"model": model, "parameters": truth, "sigma_parameters": sigma}
-    table = leveling_sensitivity(
-        settings.roll_gon,
-        settings.pitch_gon,
-        study.sigma_force,
-        settings.base_samples,
-        settings.resamples,
-        study.seed,
-        g=study.gravity_mps2,
-        **calibrated,
-    )
-    table.insert(0, "analysis", analysis)
-    write_table(output, table, provenance)
+    model, truth = _sensor(study)
+    tables = []
+    for analysis in ("forces", *APPROACHES):
+        calibrated: dict[str, Any] = {}
+        if analysis != "forces":
+            sigma = _empirical_sigma(study, analysis, summary)
+            calibrated = {"model": model, "parameters": truth, "sigma_parameters": sigma}
+        table = leveling_sensitivity(
+            settings.roll_gon,
+            settings.pitch_gon,
+            study.sigma_force,
+            settings.base_samples,
+            settings.resamples,
+            study.seed,
+            g=study.gravity_mps2,
+            **calibrated,
+        )
+        table.insert(0, "analysis", analysis)
+        tables.append(table)
+    write_table(output, pd.concat(tables, ignore_index=True), provenance)
 
 
 def analyse_shapley(
@@ -84,7 +87,7 @@ def analyse_shapley(
     model, truth = _sensor(study)
     names, pairs = list(model.parameter_names), read_table(correlations)
     tables = []
-    for approach in ("gravity", "robot"):
+    for approach in APPROACHES:
         sigma = _empirical_sigma(study, approach, summary)
         own = pairs[pairs["cell"] == _cell(study, approach)]
         matrix = own.pivot_table("adjustment", "parameter_1", "parameter_2", observed=True)

@@ -60,7 +60,6 @@ MEMORY = max(1000, round(EFFORT.memory / 1e6))
 FIGURES = figure_names(STUDY)
 CELL_FIGURES = [name for name in FIGURES if set(figure_tables(name)) <= {*TABLES}]
 SENSITIVITY_FIGURES = [name for name in FIGURES if name not in CELL_FIGURES]
-ANALYSES = ["forces", "gravity", "robot"]
 FINAL_TABLES = [
     *TABLES,
     *(["sensitivity", "shapley"] if STUDY.sensitivity else []),
@@ -71,7 +70,6 @@ FINAL_TABLES = [
 wildcard_constraints:
     batch=r"\d+",
     part=r"\d+(-\d+)?",
-    analysis="|".join(ANALYSES),
 
 
 @cache

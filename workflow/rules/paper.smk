@@ -1,12 +1,14 @@
-rule sensitivity_analysis:
+rule sensitivity:
     input:
-        lambda wildcards: [] if wildcards.analysis == "forces" else f"{RESULTS}/summary.parquet",
+        summary=f"{RESULTS}/summary.parquet",
+        correlations=f"{RESULTS}/correlations.parquet",
     output:
-        f"{RESULTS}/sensitivity/{{analysis}}.parquet",
+        sensitivity=f"{RESULTS}/sensitivity.parquet",
+        shapley=f"{RESULTS}/shapley.parquet",
     log:
-        f"{RESULTS}/logs/sensitivity/{{analysis}}.log",
+        f"{RESULTS}/logs/sensitivity.log",
     benchmark:
-        f"{RESULTS}/benchmarks/sensitivity/{{analysis}}.tsv"
+        f"{RESULTS}/benchmarks/sensitivity.tsv"
     threads: 1
     resources:
         mem_mb=2000,
@@ -15,27 +17,9 @@ rule sensitivity_analysis:
         sensor=STUDY.model_dump(include={"seed", "gravity_mps2", "noise", "sensor"}),
         code=code_hash("sensitivity"),
     message:
-        "Sensitivity of leveling: {wildcards.analysis}"
+        "Analyse what roll and pitch depend on"
     script:
         "../scripts/sensitivity.py"
-
-
-rule sensitivity:
-    input:
-        sensitivity=expand(f"{RESULTS}/sensitivity/{{analysis}}.parquet", analysis=ANALYSES),
-    output:
-        sensitivity=f"{RESULTS}/sensitivity.parquet",
-    log:
-        f"{RESULTS}/logs/sensitivity.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/sensitivity.tsv"
-    threads: 1
-    resources:
-        mem_mb=1000,
-    message:
-        "Collect the table of sensitivity"
-    script:
-        "../scripts/collect.py"
 
 
 rule claims:
