@@ -268,6 +268,14 @@ def test_a_campaign_that_got_worse_leaves_nothing_old(changed):
     assert remaining <= {"status.json", ".snakemake_timestamp"}
 
 
+def test_what_was_damaged_since_is_refused(changed):
+    folder = changed[0].parents[1]
+    (changed[0] / "campaigns/aided/status.json").unlink()
+    result = run(folder, BATCH)
+    assert result.returncode != 0
+    one_line(result.stdout, "results/bench/campaigns/aided: status.json is missing; delete it")
+
+
 def test_code_on_which_it_depends(tmp_path, monkeypatch):
     package = Path(shutil.copytree(accelstudy.__path__[0], tmp_path / "accelstudy"))
     stages = ("campaign", "overview", "simulate")

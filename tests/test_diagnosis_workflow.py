@@ -1,7 +1,10 @@
 """The workflow of a diagnosis: all is made, once, and what cannot be used is said in a line."""
 
 import json
+import os
 import re
+import shutil
+from pathlib import Path
 
 import pytest
 import yaml
@@ -23,10 +26,10 @@ TINY = {
 }
 
 
-def run(folder, config):
+def run(folder, config, *words):
     (folder / "tiny.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")
     fixed = ["--snakefile", ROOT / "workflow" / "diagnose.smk", "--cores", 2]
-    return snakemake(folder, *fixed, "--configfile", "tiny.yaml")
+    return snakemake(folder, *fixed, "--configfile", "tiny.yaml", *words)
 
 
 @pytest.fixture(scope="module")
@@ -73,6 +76,19 @@ def test_a_second_run_does_nothing(made):
     assert result.returncode == 0, result.stdout
     assert "Nothing to be done" in result.stdout
     assert {path: path.stat().st_mtime_ns for path in (made / "results").rglob("*")} == before
+
+
+def test_what_was_damaged_since_is_refused(made, tmp_path):
+    folder = Path(shutil.copytree(made, tmp_path / "copy"))
+    page = folder / "results/tiny/diagnosis/report.html"
+    stamp = page.stat().st_mtime_ns
+    page.write_text(page.read_text(encoding="utf-8")[:-100], encoding="utf-8")
+    os.utime(page, ns=(stamp, stamp))
+    result = run(folder, TINY)
+    assert result.returncode != 0
+    one_line(result.stdout, "results/tiny/diagnosis: report.html is damaged; delete it and run")
+    shutil.rmtree(page.parent)
+    assert "Diagnose the campaign" in run(folder, TINY, "--dry-run").stdout
 
 
 def test_a_campaign_that_is_too_small(tmp_path):

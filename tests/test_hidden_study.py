@@ -4,7 +4,9 @@ import shutil
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
+from snakemake_helpers import ROOT, one_line, snakemake
 
 import accelstudy
 from accelstudy.effects import effect_names, effects_without
@@ -18,9 +20,8 @@ from accelstudy.hidden.physics import Case
 from accelstudy.hidden.tables import KEY, TABLES
 from accelstudy.study.config import overlay, read_layer
 from accelstudy.study.provenance import code_hash
-from accelstudy.study.tables import read_table
+from accelstudy.study.tables import read_table, write_table
 
-ROOT = Path(__file__).parents[1]
 TINY = {
     "study": "tiny",
     "seed": 3,
@@ -300,3 +301,16 @@ def test_seeds_depend_on_the_seed_of_the_study():
     cell = Cell(Case("null", "snub-24", "robot", True), 2)
     states = [cell.seed(s, k).generate_state(2) for s in (1, 2) for k in (0, 1)]
     assert len(np.unique(states, axis=0)) == 4
+
+
+def test_what_an_earlier_run_left_is_looked_at(tmp_path):
+    layers = [ROOT / "config/hidden-effects.yaml", ROOT / "config/hidden-smoke.yaml"]
+    words = ["--snakefile", ROOT / "workflow/hidden.smk", "--configfile", *layers, "--dry-run"]
+    path = tmp_path / "results/hidden-smoke/outcomes/0000.parquet"
+    write_table(path, pd.DataFrame({"cell": ["a"]}), {"config_hash": "of another", "seed": 1})
+    text = snakemake(tmp_path, *words).stdout
+    one_line(text, "1 of 1 tables are of another configuration: results/hidden-smoke/outcomes/0000")
+    path.write_bytes(path.read_bytes()[:-1])
+    result = snakemake(tmp_path, *words)
+    assert result.returncode != 0
+    one_line(result.stdout, "results/hidden-smoke/outcomes/0000.parquet: not a whole Parquet file")

@@ -4,9 +4,12 @@ import os
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pytest
 
 from accelstudy.errors import InputError
+from accelstudy.outputs import DIAGNOSIS
+from accelstudy.parquet import write_parquet
 from accelstudy.study import earlier, tables
 from accelstudy.study.earlier import earlier_run, remove_foreign
 from accelstudy.study.tables import read_estimates, write_table
@@ -104,6 +107,44 @@ def test_another_configuration_is_said(finished):
     assert f"1 of 4 tables are of another configuration: {NAMES[0]}. " in line
     (line,) = earlier_run(RESULTS, OUTPUTS[1:], {name: SETUPS[name] for name in NAMES[1:]}, 1)
     assert f"1 of 4 tables are of another configuration: {NAMES[0]}. " in line
+
+
+def test_tables_of_which_any_change_makes_others_are_known_by_their_configuration(finished):
+    write(NAMES[0], setup=None, config_hash="old")
+    made_anew = {NAMES[0]: "old"}
+    assert list(earlier_run("results/none", NAMES[:1], made_anew, 1)) == []
+    (line,) = earlier_run("results/none", NAMES[:1], {NAMES[0]: "new"}, 1)
+    assert f"1 of 1 tables are of another configuration: {NAMES[0]}. " in line
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "words"),
+    [
+        ("calibration.json", lambda content: content[:-1], "calibration.json is damaged"),
+        ("figures/a.svg", lambda content: content[:-2], "figures/a.svg is damaged"),
+        ("positions.parquet", flipped, "positions.parquet is damaged"),
+        ("diagnosis.json", None, "diagnosis.json is missing"),
+    ],
+)
+def test_a_folder_is_whole_or_refused(name, change, words, tmp_path, monkeypatch):
+    """Of all that a job wrote together, Snakemake misses nothing but the folder."""
+    monkeypatch.chdir(tmp_path)
+    folders = {"results/tiny/diagnosis": DIAGNOSIS, "results/tiny/none": DIAGNOSIS}
+    folder = tmp_path / "results/tiny/diagnosis"
+    (folder / "figures").mkdir(parents=True)
+    for document in ("diagnosis.json", "calibration.json"):
+        (folder / document).write_text("{}")
+    (folder / "figures/a.svg").write_text("<svg></svg>\n")
+    (folder / "mine.svg").write_text("")
+    write_parquet(folder / "positions.parquet", pa.table({"force": np.arange(1000.0)}))
+    assert list(earlier_run(RESULTS, [], {}, None, folders)) == []
+    if change is None:
+        (folder / name).unlink()
+    else:
+        damage(folder / name, change)
+    with pytest.raises(InputError) as error:
+        list(earlier_run(RESULTS, [], {}, None, folders))
+    assert str(error.value) == f"results/tiny/diagnosis: {words}; delete it and run again"
 
 
 def test_other_software_is_said(finished, monkeypatch):

@@ -8,8 +8,10 @@ from snakemake.utils import min_version
 from accelstudy.campaign.batch_config import parse_batch
 from accelstudy.campaign.public import next_attempt
 from accelstudy.errors import InputError
+from accelstudy.outputs import BATCH_JOB
 from accelstudy.study.config import read_layer
-from accelstudy.study.job import quote_python
+from accelstudy.study.earlier import earlier_run
+from accelstudy.study.job import killed_notice, quote_python
 from accelstudy.study.provenance import check_writable, code_hash
 
 min_version("9.10")
@@ -32,6 +34,28 @@ except InputError as error:
     raise WorkflowError(str(error)) from None
 
 TASKS = {task.name: task for task in BATCH.tasks()}
+OUTPUTS = [
+    f"{RESULTS}/campaigns.parquet",
+    f"{RESULTS}/parameters.parquet",
+    f"{RESULTS}/overview.html",
+]
+RECORDS = [
+    f"{RESULTS}/public/{task.source}.json" for task in TASKS.values() if task.kind == "public"
+]
+
+# Before Snakemake decides what to make; jobs that read this file again leave it out.
+if workflow.is_main_process:
+    try:
+        of_tasks = {f"{RESULTS}/campaigns/{name}": BATCH_JOB for name in TASKS}
+        for line in earlier_run(RESULTS, OUTPUTS + RECORDS, {}, None, of_tasks):
+            logger.warning(line)
+    except InputError as error:
+        raise WorkflowError(str(error)) from None
+
+
+onerror:
+    if notice := killed_notice(log):
+        logger.error(notice)
 
 
 wildcard_constraints:
@@ -56,9 +80,7 @@ def braced_files(wildcards):
 rule campaigns:
     default_target: True
     input:
-        f"{RESULTS}/campaigns.parquet",
-        f"{RESULTS}/parameters.parquet",
-        f"{RESULTS}/overview.html",
+        OUTPUTS,
 
 
 # The file itself is no output, as Snakemake would delete it, whole or in part, before a second try.

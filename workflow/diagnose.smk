@@ -7,8 +7,10 @@ from snakemake.utils import min_version
 
 from accelstudy.diagnosis.round_trip import parse_round_trip
 from accelstudy.errors import InputError
+from accelstudy.outputs import CAMPAIGN, DIAGNOSIS
 from accelstudy.study.config import read_layer
-from accelstudy.study.job import quote_python
+from accelstudy.study.earlier import earlier_run
+from accelstudy.study.job import killed_notice, quote_python
 from accelstudy.study.provenance import check_writable, code_hash
 
 min_version("9.10")
@@ -27,8 +29,18 @@ try:
     TRIP = parse_round_trip(config, ", ".join(map(str, workflow.configfiles)) or "config")
     RESULTS = f"results/{TRIP.campaign.name}"
     check_writable(RESULTS)
+    # Before Snakemake decides what to make; jobs that read this file again leave it out.
+    if workflow.is_main_process:
+        made = {f"{RESULTS}/campaign": CAMPAIGN, f"{RESULTS}/diagnosis": DIAGNOSIS}
+        for line in earlier_run(RESULTS, [], {}, None, made):
+            logger.warning(line)
 except InputError as error:
     raise WorkflowError(str(error)) from None
+
+
+onerror:
+    if notice := killed_notice(log):
+        logger.error(notice)
 
 
 rule round_trip:

@@ -8,7 +8,8 @@ from accelstudy.hidden.cells import number_of_chunks
 from accelstudy.hidden.config import parse_hidden
 from accelstudy.hidden.tables import TABLES
 from accelstudy.study.config import read_layer
-from accelstudy.study.job import quote_python
+from accelstudy.study.earlier import earlier_run
+from accelstudy.study.job import killed_notice, quote_python
 from accelstudy.study.provenance import check_writable, code_hash
 
 min_version("9.10")
@@ -35,10 +36,34 @@ CONTENT = STUDY.model_dump(mode="json")
 ORIGIN = {"config_hash": STUDY.fingerprint, "seed": STUDY.seed}
 CHUNKS = number_of_chunks(STUDY)
 NUMBERS = [f"{i:04d}" for i in range(CHUNKS)]
+BY_CHUNK = expand(
+    f"{RESULTS}/{{table}}/{{chunk}}.parquet",
+    table=["truths", "outcomes", "seconds", "baselines"],
+    chunk=NUMBERS,
+)
+OUTPUTS = [
+    f"{RESULTS}/plan.json",
+    *BY_CHUNK,
+    *expand(f"{RESULTS}/{{table}}.parquet", table=TABLES),
+]
+
+# Before Snakemake decides what to make; jobs that read this file again leave it out.
+if workflow.is_main_process:
+    try:
+        of_this = dict.fromkeys(BY_CHUNK, STUDY.fingerprint)
+        for line in earlier_run(RESULTS, OUTPUTS, of_this, STUDY.seed):
+            logger.warning(line)
+    except InputError as error:
+        raise WorkflowError(str(error)) from None
 
 
 onstart:
     logger.info(f"{STUDY.study}: {STUDY.campaigns} campaigns at most, in {CHUNKS} jobs")
+
+
+onerror:
+    if notice := killed_notice(log):
+        logger.error(notice)
 
 
 wildcard_constraints:

@@ -1,4 +1,4 @@
-"""What an earlier run left in the folder of a study, looked at before a new one starts.
+"""What an earlier run left in the folder of its results, looked at before a new one starts.
 
 Snakemake goes by time stamps and by its own records. It sees no file that was damaged and kept its
 time, and where its records are gone, no other configuration either.
@@ -6,13 +6,16 @@ time, and where its records are gone, no other configuration either.
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from accelstudy.errors import InputError
+from accelstudy.outputs import Kind
 from accelstudy.parquet import read_row_groups
 from accelstudy.study.tables import LIBRARIES, REMEDY, origin, read_origin
 from accelstudy.wording import joined
@@ -29,16 +32,22 @@ _SOFTWARE = {"version": "accelstudy", "commit": "commit", **{name: name for name
 
 
 def earlier_run(
-    results: str, outputs: Sequence[str], setups: Mapping[str, str], seed: int
+    results: str,
+    outputs: Sequence[str],
+    setups: Mapping[str, str],
+    seed: int | None,
+    folders: Mapping[str, Kind] = MappingProxyType({}),
 ) -> Iterator[str]:
     """Give lines on what a person should know of an earlier run before the next one starts.
 
     Parameters
     ----------
-    results : folder of the study
-    outputs : paths of all that the study makes; they need not be there
-    setups : digest of the set-up by path, of the estimates (`accelstudy.study.job.setup_digest`)
-    seed : int
+    results : folder of the results
+    outputs : paths of all files that a run makes; they need not be there
+    setups : digest by path, of those that any change of it makes anew: the `setup` of estimates
+        (`accelstudy.study.job.setup_digest`), or the `config_hash`
+    seed : int; None where nothing is drawn
+    folders : kind of each folder that a run makes as a whole; they need not be there
 
     Raises
     ------
@@ -50,15 +59,19 @@ def earlier_run(
             f"{results} is locked, by a run that is going on or by one that was killed. If none is "
             "going on: `make unlock`, or the same command with --unlock."
         )
-    origins = _origins([path for path in outputs if Path(path).is_file()], setups)
+    there = [path for path in outputs if Path(path).is_file()]
+    origins = _origins(there, setups, {f: k for f, k in folders.items() if Path(f).is_dir()})
     for path in sorted(map(str, Path(results, "estimates").glob("*.parquet"))):
         with suppress(InputError):  # what has no origin is a user's
             origins.setdefault(path, read_origin(path))
-    kept = "What this run does not make anew stays; `make anew`, or --forceall, makes all anew."
+    kept = (
+        "What this run does not make anew stays; --forceall, which for a study is `make anew`, "
+        "makes all anew."
+    )
     other = [
         path
         for path, made in origins.items()
-        if (made["seed"], made.get("setup")) != (seed, setups.get(path))
+        if made["seed"] != seed or not _of_setup(made, setups.get(path))
     ]
     if other:
         yield (
@@ -75,6 +88,10 @@ def _locked(results: str) -> bool:
         for path in LOCKS.glob("*.lock")
         for line in path.read_text(encoding="utf-8", errors="replace").splitlines()
     )
+
+
+def _of_setup(made: Mapping[str, Any], digest: str | None) -> bool:
+    return made.get("setup") == digest or made["config_hash"] == digest
 
 
 def _other_software(origins: Iterable[Mapping[str, Any]]) -> list[str]:
@@ -94,20 +111,22 @@ def _brief(value: object) -> str:
     return text[:7] + ("+" if text.endswith("+") else "") if len(text) >= 40 else text
 
 
-def _origins(paths: Sequence[str], estimates: Container[str]) -> dict[str, dict[str, Any]]:
-    """Check that files are as they were written; where the tables among them come from."""
+def _origins(
+    paths: Sequence[str], estimates: Container[str], folders: Mapping[str, Kind]
+) -> dict[str, dict[str, Any]]:
+    """Check that all is as it was written; where the tables among the files come from."""
     size = sum(Path(path).stat().st_size for path in paths if path in estimates)
     origins = {}
     damaged = {}
-    for path in paths:
+    for path in (*paths, *folders):
         try:
+            if path in folders:
+                _check_folder(Path(path), folders[path])
+                continue
             if path.endswith(".parquet"):
                 origins[path] = read_origin(path)
-                if size <= READ_AT_START or path not in estimates:
-                    for _ in read_row_groups(path, REMEDY):
-                        pass
-            else:
-                _check_end(Path(path))
+            if size <= READ_AT_START or path not in estimates:
+                _check_file(Path(path))
         except InputError as error:
             damaged[path] = error
     if len(damaged) == 1:
@@ -123,12 +142,35 @@ def _named(paths: Sequence[str]) -> str:
     return " ".join(paths[:LISTED]) + (" …" if len(paths) > LISTED else "")
 
 
-def _check_end(path: Path) -> None:
-    """Check that a picture or a page does not end early."""
-    with path.open("rb") as file:
-        file.seek(max(0, file.seek(0, os.SEEK_END) - 100))
-        if not file.read().rstrip().endswith(_ENDS[path.suffix]):
-            raise InputError(f"{path}: is not whole; {REMEDY}")
+def _check_folder(folder: Path, kind: Kind) -> None:
+    """Check what a job wrote together; Snakemake does not miss a single file of it."""
+    for name in sorted(kind.of_earlier_run(folder)):
+        try:
+            _check_file(folder / name)
+        except InputError:
+            raise InputError(f"{folder}: {name} is damaged; {REMEDY}") from None
+    if not (folder / kind.marker).is_file():
+        raise InputError(f"{folder}: {kind.marker} is missing; {REMEDY}")
+
+
+def _check_file(path: Path) -> None:
+    """Check a table page by page, and that a picture, a page or a document does not end early."""
+    if path.suffix == ".parquet":
+        for _ in read_row_groups(path, REMEDY):
+            pass
+        return
+    whole = True
+    if path.suffix == ".json":
+        try:
+            json.loads(path.read_bytes())
+        except ValueError:
+            whole = False
+    elif path.suffix in _ENDS:
+        with path.open("rb") as file:
+            file.seek(max(0, file.seek(0, os.SEEK_END) - 100))
+            whole = file.read().rstrip().endswith(_ENDS[path.suffix])
+    if not whole:
+        raise InputError(f"{path}: is not whole; {REMEDY}")
 
 
 def remove_foreign(
