@@ -278,6 +278,20 @@ def test_bad_input_ends_with_a_line(begun, tmp_path):
     assert "positions.csv: fy: position 1: 'x' is no number" in error(folder, *WANTED)
 
 
+def test_a_last_line_without_an_end(begun):
+    folder = begun(5)
+    table = folder / "positions.csv"
+    whole = table.read_text(encoding="utf-8")
+    table.write_text(whole[:-1], encoding="utf-8")  # an editor may leave the end out
+    text = advise(folder)
+    assert "5 positions so far" in text
+    assert "the last line of the table does not end; check that it is whole" in text
+    table.write_text(whole + "6,12.", encoding="utf-8")
+    text = advise(folder)
+    assert "5 positions so far" in text
+    assert "the last line of the table is not whole; it is not counted" in text
+
+
 # --- a table that grows --------------------------------------------------------------------------
 
 

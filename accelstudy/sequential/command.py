@@ -22,6 +22,7 @@ from accelstudy.options import (
 from accelstudy.progress import say, warn
 
 if TYPE_CHECKING:
+    from accelstudy.campaign.format import Campaign
     from accelstudy.sequential.prior import Prior
 
 POLL = 1.0
@@ -100,34 +101,39 @@ def advise_command(
     from accelstudy.sequential.advisor import Advisor
     from accelstudy.sequential.attitudes import DEFAULTS, candidates
     from accelstudy.sequential.promise import Promise
+    from accelstudy.sequential.running import read_as_it_is
     from accelstudy.sequential.watching import Watch
     from accelstudy.sequential.wording import finished, heading, lines
 
     session, promise = Watch(campaign), Promise(tilt_accuracy, tilt_range)
-    news = next(session.look())
-    name = approach or ("gravity" if news.campaign.angles is None else "robot")
-    chosen, sensor = get_approach(name), get_model(model)
+    if watch:
+        now = next(session.look()).campaign
+    else:
+        running = read_as_it_is(campaign)
+        now = running.campaign
+        if running.unfinished:
+            warn(f"{campaign}: the last line of the table is not whole; it is not counted")
+    name = approach or ("gravity" if now.angles is None else "robot")
+    sensor = get_model(model)
     directions = candidates(
         attitudes or DEFAULTS.get(name, "grid"), pole_distance, max_roll, max_pitch
     )
-    advisor = Advisor(sensor, chosen, promise, directions, *_prior(prior, model))
-    advisor.check(news.campaign)
-    for warning in news.campaign.warnings:
-        warn(warning)
+    advisor = Advisor(sensor, get_approach(name), promise, directions, *_prior(prior, model))
 
-    def tell() -> None:
+    def tell(now: Campaign) -> None:
         """Print the advice."""
-        advice = advisor.advise(news.campaign)
-        click.echo(heading(advice, news.campaign, sensor, name))
-        for line in lines(advice, news.campaign, sensor, promise):
+        advisor.check(now)
+        advice = advisor.advise(now)
+        click.echo(heading(advice, now, sensor, name))
+        for line in lines(advice, now, sensor, promise):
             click.echo(f"  {line}")
         if advice.enough:
             click.echo(f"  {finished(campaign, model, name)}")
 
-    tell()
+    for warning in now.warnings:
+        warn(warning)
+    tell(now)
     if not watch:
-        if session.unfinished:
-            warn("the last line of the table is not whole yet, and is not counted")
         return
     say("\nwaiting for the next position; Ctrl-C ends")
     try:
@@ -140,8 +146,7 @@ def advise_command(
                 if news.again:
                     advisor.restart()
                 if news.again or not news.remark:
-                    advisor.check(news.campaign)
-                    tell()
+                    tell(news.campaign)
     except KeyboardInterrupt:
         say("\nended")
 

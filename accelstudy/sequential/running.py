@@ -78,6 +78,22 @@ def read_running(folder: str | Path, settled: str = "") -> Running:
     return Running(replace(campaign, warnings=warnings, source=folder), unfinished)
 
 
+def read_as_it_is(folder: str | Path) -> Running:
+    """Read a session that nobody follows: a last line without an end counts if it has all cells.
+
+    Errors are those of `read_running`.
+    """
+    running = read_running(folder)
+    if not running.unfinished:
+        return running
+    try:
+        whole = read_running(folder, running.unfinished).campaign
+    except InputError:  # it is half a line
+        return running
+    odd = f"{folder}: the last line of the table does not end; check that it is whole"
+    return Running(replace(whole, warnings=(*whole.warnings, odd)), "")
+
+
 def _split(text: str) -> tuple[str, str]:
     """Whole lines, and what stands after them."""
     end = max(text.rfind("\n"), text.rfind("\r")) + 1

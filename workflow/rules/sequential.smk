@@ -6,10 +6,6 @@ SEQUENTIAL_OUTPUTS = [
 ]
 
 
-wildcard_constraints:
-    approach="|".join(SEQUENTIAL.approaches),
-
-
 rule sequential_sessions:
     output:
         f"{RESULTS}/sequential/sessions/{{approach}}.parquet",
@@ -17,6 +13,8 @@ rule sequential_sessions:
         f"{RESULTS}/logs/sequential/{{approach}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/sequential/{{approach}}.tsv"
+    wildcard_constraints:
+        approach="|".join(SEQUENTIAL.approaches),
     threads: 1
     resources:
         mem_mb=1000,
