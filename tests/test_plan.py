@@ -273,8 +273,8 @@ def test_the_answer_stands_in_the_first_line(found):
     ("options", "parts"),
     [
         ({"equipment": (BY_HAND,)}, ("No calibration tried here reaches 0.1 mgon (rms) by hand",)),
-        ({"most_seconds": 600.0}, ("within 10.0 minutes",)),
-        ({"most_seconds": 60.0}, ("No calibration fits", "within 1.00 minutes")),
+        ({"most_seconds": 600.0}, ("within 10 minutes",)),
+        ({"most_seconds": 60.0}, ("No calibration fits", "within 1 minutes")),
         ({"most_positions": 5}, ("No calibration fits",)),
         ({"sigma_angle": 1 * GON, "equipment": (ROBOT,)}, ("the best leaves", "with a robot")),
         ({"confidence": 0.95}, ("(95 % of them)",)),
@@ -323,6 +323,28 @@ def test_the_command_writes_what_it_says(tmp_path):
     refused = call(*ASKED, "--equipment", "gravity", "--out", tmp_path / "full")
     assert refused.exit_code == 2
     assert "--force" in refused.stderr
+
+
+def test_a_scheme_of_a_file_is_compared_and_named_by_its_path(tmp_path):
+    path = tmp_path / "mine.yaml"
+    directions = (-get_scheme("fibonacci-20").directions).tolist()
+    path.write_text(yaml.safe_dump({"scheme": "mine", "directions": directions}))
+    question = asked(equipment=(BY_HAND,), schemes=(str(path),))
+    (mine,) = {c.scheme.name for c in candidates(question)} & {get_scheme(str(path)).name}
+    config = study_of(question, [_candidate(question, mine)], 1, 200)
+    assert config["grids"][0]["schemes"] == str(path)
+    (result,) = simulate(config)
+    assert mine in result.cell
+    assert result.simulated == 200
+
+
+def test_optimal_positions_are_as_few_as_suffice(monkeypatch):
+    monkeypatch.setattr(planned, "OPTIMAL_SIZES", (10, 27, 80))
+    question = asked(equipment=(BY_HAND,))
+    names = {c.scheme.name for c in candidates(question)}
+    assert "i-optimal-27" in names  # fewer than the 30 that are known to suffice
+    assert "i-optimal-10" not in names  # which would be far too few
+    assert "i-optimal-80" not in names
 
 
 def test_an_unreachable_target_has_an_exit_status_of_its_own():

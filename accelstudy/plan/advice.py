@@ -18,6 +18,19 @@ from accelstudy.simulation import Noise
 
 Array = NDArray[np.float64]
 
+PLAIN = {
+    "nonorthogonality": "angles between the axes",
+    "cross_axis_misalignment": "rotation against the housing",
+    "quadratic_scale": "quadratic nonlinearity",
+    "cubic_scale": "cubic nonlinearity",
+    "mounting_rotation": "rotation of the sensor in its mount",
+    "base_tilt": "tilt of the robot's base",
+    "encoder_scale": "scale error of the robot's angles",
+    "encoder_offset": "zero error of the robot's angles",
+    "gravity_error": "wrong value of gravity",
+}
+"""Effects in words that a newcomer knows."""
+
 
 @dataclass(frozen=True)
 class Need:
@@ -93,7 +106,7 @@ def limits(question: Question, candidate: Candidate) -> str:
     worse = int(np.argmax(expected.rms))
     total = float(expected.rms[worse] ** 2)
     parts = {
-        f"neglected {name.replace('_', ' ')}": float(square[worse]) / total
+        f"neglected {PLAIN[name]}": float(square[worse]) / total
         for name, square in expected.neglected.items()
     }
     noise = float(expected.noise[worse]) / total

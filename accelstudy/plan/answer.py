@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from accelstudy.plan.candidates import Candidate, candidates
+from accelstudy.plan.candidates import Candidate, candidates, with_optimal
 from accelstudy.plan.question import Question
 from accelstudy.plan.simulated import Simulated, simulate, study_of
 from accelstudy.progress import track
@@ -89,6 +89,7 @@ def answer(question: Question, seed: int = 1, replicates: int = 10_000) -> Answe
         return Answer(question, compared, [], None, seed, replicates)
     equipment = found.first.candidate.equipment
     other = OTHER_CONFIDENCE if question.confidence is None else None
+    compared += with_optimal(question, equipment, compared, other)
     mine = by_time(c for c in compared if c.equipment == equipment)
     stricter = next((c for c in mine if c.reaches(question.target, other)), None)
     return Answer(question, compared, found.ranked, stricter, seed, replicates)

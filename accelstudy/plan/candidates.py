@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from accelstudy.models import MODELS, get_model
 from accelstudy.plan.question import Equipment, Question
 from accelstudy.plan.theory import Expected, Theory, theory_of
-from accelstudy.progress import track
+from accelstudy.progress import stage, track
 from accelstudy.schemes import Scheme, get_scheme, scheme_names
 from accelstudy.sensor import SensorModel
 from accelstudy.simulation import Noise
@@ -30,9 +30,11 @@ FAMILY = "fibonacci"
 SIZES = (*range(9, 61), *range(65, 121, 5), *range(140, 401, 20))
 """Positions of its members, which are evenly spread, that are tried."""
 OPTIMAL = "i-optimal"
-OPTIMAL_SIZES = (9, 10, 11, 12, 13, 14, 15, 16, 18, 20, 22, 24, 27, 30, 33, 36, 40, 45, 50, 60)
+OPTIMAL_SIZES = (*range(9, 17), 18, 20, 22, 24, 27, 30, 33, 36, 40, 45, 50, 60, 70, 80, 100, 120)
 """Likewise of positions that are the best for leveling, of which few are tried: each is the outcome
 of a search."""
+LEAST_OPTIMAL = 0.6
+"""Part of the positions that optimal ones need at least of evenly spread ones; it is about 2/3."""
 LEAST_REDUNDANCY = 0.25
 """Part of the conditions that must be redundant, or a position in error would not be noticed."""
 
@@ -103,51 +105,55 @@ def schemes_for(most_positions: int, more: Sequence[str] = ()) -> list[Scheme]:
 
 def candidates(question: Question) -> list[Candidate]:
     """All calibrations whose positions determine their model and check it."""
-    theory = theory_of(question.tilt_range)
-    models = [get_model(name) for name in PLANNED_MODELS]
-
-    def of_scheme(scheme: Scheme) -> list[Candidate]:
-        return [
-            candidate
-            for equipment in question.equipment
-            for candidate in _of_scheme(question, theory, equipment, scheme, models)
-        ]
-
     found: list[Candidate] = []
     for scheme in track(schemes_for(question.most_positions, question.schemes), "calibrations"):
-        found += of_scheme(scheme)
-    for equipment in track(question.equipment, "optimal positions"):
-        found += _with_optimal(question, equipment, found, of_scheme)
+        found += _with_scheme(question, scheme)
+    for equipment in question.equipment:
+        found += with_optimal(question, equipment, found, question.confidence)
     return found
 
 
-def _with_optimal(
+def with_optimal(
     question: Question,
     equipment: Equipment,
     known: Sequence[Candidate],
-    of_scheme: Callable[[Scheme], list[Candidate]],
+    confidence: float | None,
 ) -> list[Candidate]:
     """Candidates with optimal positions; fewer of them than of the cheapest that is known.
 
-    The fewest that reach the target are found by halving.
+    The fewest that reach the target by the measure of `confidence` are found by halving.
     """
 
     def good(found: Iterable[Candidate]) -> list[Candidate]:
-        reaching = (c for c in found if c.reaches(question.target, question.confidence))
+        reaching = (c for c in found if c.reaches(question.target, confidence))
         return sorted((c for c in reaching if c.equipment == equipment), key=lambda c: c.seconds)
 
     reached = good(known)
     most = reached[0].scheme.n_positions if reached else question.most_positions
     done = {c.scheme.name for c in known}
-    sizes = [n for n in OPTIMAL_SIZES if n <= most and f"{OPTIMAL}-{n}" not in done]
+    least = LEAST_OPTIMAL * most if reached else 0.0
+    fitting = (n for n in OPTIMAL_SIZES if least <= n <= most)
+    sizes = [n for n in fitting if f"{OPTIMAL}-{n}" not in done]
     low, high = (0, len(sizes)) if reached else (max(len(sizes) - 1, 0), len(sizes))
     found: list[Candidate] = []
-    while low < high:
-        middle = (low + high) // 2
-        tried = of_scheme(get_scheme(f"{OPTIMAL}-{sizes[middle]}"))
-        found += tried
-        low, high = (low, middle) if good(tried) else (middle + 1, high)
+    with stage("optimal positions"):
+        while low < high:
+            middle = (low + high) // 2
+            tried = _with_scheme(question, get_scheme(f"{OPTIMAL}-{sizes[middle]}"))
+            found += tried
+            low, high = (low, middle) if good(tried) else (middle + 1, high)
     return found
+
+
+def _with_scheme(question: Question, scheme: Scheme) -> list[Candidate]:
+    """Candidates in one scheme, with each equipment."""
+    theory = theory_of(question.tilt_range)
+    models = [get_model(name) for name in PLANNED_MODELS]
+    return [
+        candidate
+        for equipment in question.equipment
+        for candidate in _of_scheme(question, theory, equipment, scheme, models)
+    ]
 
 
 def _of_scheme(

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from accelstudy.data_sheets import ASSUMED, DataSheet
 from accelstudy.effects import get_effect
+from accelstudy.schemes import Scheme, get_scheme, is_scheme_file
 from accelstudy.units import MGON
 
 HOLDS = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0)
@@ -94,6 +96,13 @@ class Question:
     def neglectable(self) -> dict[str, float]:
         """Sizes of the effects that count where a model lacks them."""
         return {name: size.value for name, size in self.sizes.items()}
+
+    def written(self, scheme: Scheme) -> str:
+        """How a scheme is asked for elsewhere: by its name, or by the path of its file."""
+        for text in self.schemes:
+            if is_scheme_file(text) and get_scheme(text).name == scheme.name:
+                return str(Path(text).resolve())
+        return scheme.name
 
 
 def sizes_of(sheet: DataSheet) -> dict[str, Size]:

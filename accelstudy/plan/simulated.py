@@ -87,7 +87,7 @@ def study_of(
         "grids": [
             {
                 "models": candidate.model.name,
-                "schemes": candidate.scheme.name,
+                "schemes": question.written(candidate.scheme),
                 "approaches": candidate.equipment.name,
                 "replicates": replicates,
                 **({} if candidate.sigma == sigma else {"sensor_sigma_mps2": candidate.sigma}),

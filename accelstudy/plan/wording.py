@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from accelstudy.data_sheets import ASSUMED
 from accelstudy.effects import get_effect
-from accelstudy.plan.advice import InUse, Need, Spoiler, in_use, limits, needs, spoilers
+from accelstudy.plan.advice import (
+    PLAIN,
+    InUse,
+    Need,
+    Spoiler,
+    in_use,
+    limits,
+    needs,
+    spoilers,
+)
 from accelstudy.plan.answer import OTHER_CONFIDENCE, Answer, Ranked
 from accelstudy.plan.candidates import Candidate
 from accelstudy.plan.question import Equipment, Question
@@ -18,18 +28,6 @@ from accelstudy.study.report import number
 from accelstudy.units import angle_note, display_unit, quantity_text, to_display
 from accelstudy.wording import joined, words
 
-PLAIN = {
-    "nonorthogonality": "angles between the axes",
-    "cross_axis_misalignment": "rotation against the housing",
-    "quadratic_scale": "quadratic nonlinearity",
-    "cubic_scale": "cubic nonlinearity",
-    "mounting_rotation": "rotation of the sensor in its mount",
-    "base_tilt": "tilt of the robot's base",
-    "encoder_scale": "scale error of the robot's angles",
-    "encoder_offset": "zero error of the robot's angles",
-    "gravity_error": "wrong value of gravity",
-}
-"""Effects in words that a newcomer knows."""
 VERDICTS = {
     "needed": "must be in the model",
     "worth it": "worth having in the model",
@@ -102,7 +100,7 @@ def unreachable(answer: Answer) -> str:
     question, best = answer.question, answer.best
     within = []
     if question.most_seconds < math.inf:
-        within.append(f"within {number(question.most_seconds / 60)} minutes")
+        within.append(f"within {number_of(question.most_seconds / 60)} minutes")
     if question.most_positions < 200:
         within.append(f"with at most {question.most_positions} positions")
     within.append({1: _equipment(question.equipment[0])}.get(len(question.equipment), ""))
@@ -138,7 +136,7 @@ def minutes(seconds: float) -> str:
 
 
 def number_of(value: float) -> str:
-    """A number without digits that say nothing."""
+    """Show a number without digits that say nothing."""
     return f"{value:g}"
 
 
@@ -229,13 +227,11 @@ def _need(need: Need) -> str:
     size = f"{quantity_text(need.size, unit)}, {need.source}"
     what = []
     if not math.isnan(need.left):
-        what.append(
-            f"neglected it {'would leave' if need.in_model else 'leaves'} {_angle(need.left)}"
-        )
+        leaves = "would leave" if need.in_model else "leaves"
+        what.append(f"left out, it {leaves} {_angle(need.left)}")
     if not math.isnan(need.cost):
-        what.append(
-            f"to estimate it {'costs' if need.in_model else 'would cost'} {_angle(need.cost)}"
-        )
+        costs = "costs" if need.in_model else "would cost"
+        what.append(f"to estimate it {costs} {_angle(need.cost)}")
     elif not need.in_model:
         what.append("these positions cannot tell it")
     return f"{effect} ({size}): {VERDICTS[need.verdict]}; {joined(what)}"
@@ -293,7 +289,8 @@ def assumption_lines(question: Question) -> list[str]:
 def how_to(answer: Answer) -> list[str]:
     """Where the positions are, and how numbers are made again."""
     candidate = answer.first.candidate
-    lines = [f"The positions: accelstudy scheme {candidate.scheme.name}"]
+    scheme = shlex.quote(answer.question.written(candidate.scheme))
+    lines = [f"The positions: accelstudy scheme {scheme}"]
     if candidate.equipment.name == "gravity":
         lines.append("By hand they need not be exact, only still: gravity itself is the reference.")
     return lines
