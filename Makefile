@@ -24,7 +24,7 @@ export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: help env test test-cluster test-faults smoke reproduce anew unlock report campaigns diagnose-example plan-example hidden-effects hidden-docs lint lock clean
+.PHONY: help env test test-cluster test-faults smoke reproduce anew unlock report campaigns diagnose-example plan-example hidden-effects hidden-docs benchmarks lint lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-18s%s\n", $$1, $$2 }' Makefile
@@ -79,6 +79,9 @@ hidden-docs: $(READY) ## study hidden effects, and take score and figures into d
 	cp results/hidden-effects/score.md docs/hidden-effects-score.md
 	for name in alarms naming methods sets calibration confusion outside limits; do \
 	  cp results/hidden-effects/figures/$$name.png docs/figures/hidden-$$name.png; done
+
+benchmarks: $(READY) ## measure the speed, and take tables and figure into docs
+	python benchmarks/run.py docs/speed.md
 
 lint: $(READY) ## check style, types and the workflow
 	ruff check

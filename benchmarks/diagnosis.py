@@ -3,7 +3,6 @@
 python benchmarks/diagnosis.py [campaigns of each kind]
 """
 
-import subprocess
 import sys
 import tempfile
 import time
@@ -15,6 +14,7 @@ from accelstudy.campaign import write_campaign
 from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.models import get_model
+from processes import ACCELSTUDY, took
 
 HIDDEN = {
     "nothing": (),
@@ -41,14 +41,6 @@ def settings(effects: tuple[str, ...], seed: int) -> CampaignSettings:
     )
 
 
-def seconds_of_command(folder: Path, out: Path) -> float:
-    """Wall time of one command."""
-    start = time.perf_counter()
-    command = [sys.executable, "-m", "accelstudy", "diagnose", str(folder), "--out", str(out)]
-    subprocess.run(command, check=True, capture_output=True)
-    return time.perf_counter() - start
-
-
 def main(count: int) -> None:
     """Print the medians and the ranges."""
     model = get_model("bias-scale-nonorthogonality")
@@ -63,7 +55,7 @@ def main(count: int) -> None:
         with tempfile.TemporaryDirectory() as folder:
             write_campaign(campaigns[0], Path(folder, "campaign"))
             commands = [
-                seconds_of_command(Path(folder, "campaign"), Path(folder, f"out-{k}"))
+                took(*ACCELSTUDY, "diagnose", f"{folder}/campaign", "--out", f"{folder}/{k}").wall
                 for k in range(COMMANDS)
             ]
         # The first of a batch generates the functions of the models.

@@ -8,22 +8,19 @@ their largest resident memory. `apply` writes four times what it reads, so the f
 temporary files (TMPDIR says which) needs six times the largest size.
 """
 
-import os
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from time import perf_counter
 
 import numpy as np
 
 from accelstudy.schemes import get_scheme
+from processes import ACCELSTUDY, took
 
 RATE = 1000
 HOLD, MOTION = 30, 4
 """Seconds."""
 SIGMA = 0.02
-COMMAND = (sys.executable, "-c", "from accelstudy.cli import main; main()")
 
 
 def lines(seed=1):
@@ -47,18 +44,6 @@ def write_log(path, session, size):
             file.write(session)
 
 
-def measure(*arguments):
-    """Seconds and largest resident memory, MB, of a command."""
-    start = perf_counter()
-    process = subprocess.Popen([*COMMAND, *map(str, arguments)], stdout=subprocess.DEVNULL)
-    _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)  # as nobody else can wait for it now
-    if process.returncode:
-        raise SystemExit(f"{arguments[0]} failed")
-    # ru_maxrss is in kB, but in bytes on macOS.
-    return perf_counter() - start, usage.ru_maxrss * (1 if sys.platform == "darwin" else 1024) / 1e6
-
-
 def main(sizes):
     """Print a row for each command and size."""
     session = lines()
@@ -74,11 +59,11 @@ def main(sizes):
                 "apply": (calibration, log, "--out", folder / "leveled.csv"),
             }
             for command, arguments in commands.items():
-                seconds, peak = measure(command, *arguments)
-                speed = log.stat().st_size / 1e6 / seconds
-                print(f"{command:8}{size:10.0f}{seconds:10.0f}{speed:8.1f}{peak:11.0f}", flush=True)
+                wall, _, peak = took(*ACCELSTUDY, command, *arguments)
+                speed = log.stat().st_size / 1e6 / wall
+                print(f"{command:8}{size:10.0f}{wall:10.0f}{speed:8.1f}{peak:11.0f}", flush=True)
                 if command == "import":
-                    measure("calibrate", out, "--out", calibration.parent)
+                    took(*ACCELSTUDY, "calibrate", out, "--out", calibration.parent)
 
 
 if __name__ == "__main__":

@@ -9,13 +9,12 @@ of starting Python. The folder of temporary files (TMPDIR says which) needs 150 
 """
 
 import json
-import os
 import sys
 import tempfile
 from pathlib import Path
-from subprocess import Popen
 
 from accelstudy.study.config import read_study
+from processes import took
 
 CONFIG = Path(__file__).parents[1] / "config" / "config.yaml"
 MODEL = "bias-scale-nonorthogonality"
@@ -99,18 +98,6 @@ STEPS = [
 ]
 
 
-def measure(*arguments):
-    """CPU seconds and largest resident memory, MB, of this script with arguments."""
-    process = Popen([sys.executable, __file__, *arguments])
-    _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)  # as nobody else can wait for it now
-    if process.returncode:
-        raise SystemExit(f"{arguments[1]} failed")
-    # ru_maxrss is in kB, but in bytes on macOS.
-    peak = usage.ru_maxrss * (1 if sys.platform == "darwin" else 1024) / 1e6
-    return usage.ru_utime + usage.ru_stime, peak
-
-
 def main(sizes):
     """Print a row for each way to keep, number of replicates and rule."""
     print(f"{'keep':12}{'replicates':>12}  {'rule':20}{'CPU / s':>9}{'peak / MB':>11}")
@@ -119,8 +106,8 @@ def main(sizes):
             with tempfile.TemporaryDirectory() as name:
                 content = json.dumps(study_of(size, keep))
                 for step in STEPS:
-                    seconds, peak = measure("--step", step, content, name)
-                    row = f"{keep:12}{size:12.0e}  {step:20}{seconds:9.1f}{peak:11.0f}"
+                    _, cpu, peak = took(sys.executable, __file__, "--step", step, content, name)
+                    row = f"{keep:12}{size:12.0e}  {step:20}{cpu:9.1f}{peak:11.0f}"
                     print(row, flush=True)
 
 

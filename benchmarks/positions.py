@@ -3,11 +3,8 @@
 python benchmarks/positions.py [numbers of positions]
 """
 
-import os
-import subprocess
 import sys
 import tempfile
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +13,7 @@ import numpy as np
 from accelstudy.campaign import write_campaign
 from accelstudy.campaign.format import Campaign
 from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign
+from processes import ACCELSTUDY, took
 
 FAMILY = 5000
 """Positions of one simulated session; of more, several sessions one after the other are made."""
@@ -45,18 +43,6 @@ def campaign(n: int, approach: str) -> Campaign:
     )
 
 
-def cost(*arguments: str) -> tuple[float, float, float]:
-    """Wall time and CPU time, s, and peak memory, MB, of a command."""
-    start = time.perf_counter()
-    command = [sys.executable, "-m", "accelstudy", *arguments]
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
-    _, status, usage = os.wait4(process.pid, 0)
-    if status:
-        raise SystemExit(f"{' '.join(arguments)} failed")
-    cpu = usage.ru_utime + usage.ru_stime
-    return time.perf_counter() - start, cpu, usage.ru_maxrss / 1024
-
-
 def main(numbers: list[int]) -> None:
     """Print one row per command and number of positions."""
     titles = ("command", "approach", "positions", "wall / s", "CPU / s", "peak / MB", "ms / more")
@@ -70,9 +56,8 @@ def main(numbers: list[int]) -> None:
                 for n in numbers:
                     source = Path(folder, f"{approach}-{n}")
                     out = Path(folder, f"{command}-{source.name}")
-                    wall, cpu, peak = cost(
-                        command, str(source), "--approach", approach, "--out", str(out)
-                    )
+                    arguments = ("--approach", approach, "--out", out)
+                    wall, cpu, peak = took(*ACCELSTUDY, command, source, *arguments)
                     least = least or (n, cpu)
                     further = 1e3 * (cpu - least[1]) / (n - least[0]) if n > least[0] else np.nan
                     print(f"{command:>12}{approach:>12}{n:>12}{wall:12.1f}{cpu:12.1f}{peak:12.0f}"

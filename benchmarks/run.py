@@ -1,0 +1,74 @@
+"""All benchmarks of speed, and the tables and the figure that show them.
+
+    python benchmarks/run.py [PAGE]
+
+PAGE is a Markdown file, such as docs/speed.md: its tables are replaced, and beside it
+figures/speed.png is. Without it the tables are printed, and no more. It takes some minutes. All
+works take turns, and processor time is taken, so that what else the machine does hits all alike.
+"""
+
+import os
+
+for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[variable] = "1"  # read when NumPy is imported
+
+import platform  # noqa: E402
+import sys  # noqa: E402
+from importlib.metadata import version  # noqa: E402
+from pathlib import Path  # noqa: E402
+
+import around  # noqa: E402
+import cores  # noqa: E402
+import figure  # noqa: E402
+import growth  # noqa: E402
+import roofline  # noqa: E402
+import speeds  # noqa: E402
+from page import put  # noqa: E402
+from processes import cores_here  # noqa: E402
+from ways import WAYS  # noqa: E402
+
+PARTS = (speeds, roofline, growth, cores, around)
+NAMES = ("machine", *(part.__name__ for part in PARTS))
+"""Tables of the page."""
+
+
+def machine():
+    """Say where and with what it ran."""
+    cpuinfo = Path("/proc/cpuinfo")
+    names = cpuinfo.read_text().splitlines() if cpuinfo.exists() else []
+    name = next((line.split(": ")[1] for line in names if line.startswith("model name")), "")
+    packages = [f"{each} {version(each)}" for each in ("numpy", "scipy", "llvmlite")]
+    packages += [f"jax {version('jax')}"] if not WAYS.get("jax").missing() else []
+    load = ", ".join(f"{each:.1f}" for each in os.getloadavg())
+    return (
+        f"{name or platform.machine()}, {cores_here()} cores, Python {platform.python_version()}, "
+        f"{', '.join(packages)}; load at the start (1, 5, 15 minutes) {load}."
+    )
+
+
+def main(arguments):
+    """Run all parts; print each when it is done."""
+    for way in map(WAYS.get, WAYS.names()):
+        if way.missing():
+            print(f"{way.title}: not measured; it needs {way.missing()}", flush=True)
+    texts, results = {"machine": machine()}, {}
+    path = Path(arguments[0]) if arguments else None
+    page = path.read_text() if path else ""
+    for name in NAMES if path else ():
+        put(page, name, "")  # before the minutes that measuring takes
+    for part in PARTS:
+        results[part] = part.run()
+        texts[part.__name__] = part.tables(results[part])
+        print(f"\n{part.__doc__}\n\n{texts[part.__name__]}", flush=True)
+    if path:
+        for name, text in texts.items():
+            page = put(page, name, text)
+        path.write_text(page)
+        figure.draw(
+            path.parent / "figures" / "speed.png",
+            results[speeds][0], results[growth], results[cores],
+        )  # fmt: skip
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
