@@ -153,21 +153,21 @@ def test_nine_d_optimal_positions_are_the_extremal_points_of_degree_2():
     assert min(values) > known
 
 
-@pytest.mark.parametrize("approach", ["gravity", "robot"])
-def test_the_i_optimum_has_its_own_equivalence_theorem(approach):
+@pytest.mark.parametrize(("approach", "name"), [("gravity", "I"), ("robot", "I"), ("robot", "D")])
+def test_a_continuous_optimum_has_its_own_equivalence_theorem(approach, name):
+    """No direction has a larger derivative than those that have a share, which are all equal."""
     task = Task(NINE, get_approach(approach), tilt_range=30 * GON)
-    criterion = get_criterion("I", task)
+    criterion = get_criterion(name, task)
     best = continuous_optimum(task, criterion, Sphere(), Constraints(), 24)
     assert 0 <= best.value - best.bound < 2e-4
     normal = 24 * np.einsum("k,kuw->uw", best.shares, task.informations(best.directions))
-    anywhere = task.informations(random_directions(3000))
-    slope = 24 * np.einsum("kuw,uw->k", anywhere, -criterion.gradient(normal))
-    assert slope.max() <= 1 + 3e-4  # of the criterion's logarithm; 1 on the support
-    held = best.shares > 1e-3
-    slope = 24 * np.einsum(
-        "kuw,uw->k", task.informations(best.directions[held]), -criterion.gradient(normal)
-    )
-    np.testing.assert_allclose(slope, 1.0, atol=2e-3)
+    assert float(criterion.value(normal)) == pytest.approx(best.value, abs=1e-9)
+    slope = -24 * criterion.gradient(normal)
+    whole = 9 if name == "D" else 1  # of a logarithm of a homogeneous function, times its degree
+    anywhere = np.einsum("kuw,uw->k", task.informations(random_directions(3000)), slope)
+    assert anywhere.max() <= whole + 3e-4
+    held = task.informations(best.directions[best.shares > 1e-3])
+    np.testing.assert_allclose(np.einsum("kuw,uw->k", held, slope), whole, atol=2e-3)
 
 
 def test_optimal_positions_level_better_than_those_of_the_literature():

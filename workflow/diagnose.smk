@@ -8,6 +8,7 @@ from snakemake.utils import min_version
 from accelstudy.diagnosis.round_trip import parse_round_trip
 from accelstudy.errors import InputError
 from accelstudy.outputs import CAMPAIGN, DIAGNOSIS
+from accelstudy.schemes import is_scheme_file
 from accelstudy.study.config import read_layer
 from accelstudy.study.earlier import earlier_run
 from accelstudy.study.job import killed_notice, quote_python
@@ -50,6 +51,8 @@ rule round_trip:
 
 
 rule simulate_campaign:
+    input:
+        [TRIP.campaign.scheme] if is_scheme_file(TRIP.campaign.scheme) else [],
     output:
         campaign=directory(f"{RESULTS}/campaign"),
         truth=f"{RESULTS}/truth.yaml",

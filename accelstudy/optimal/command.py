@@ -56,7 +56,7 @@ _TURN = 200 * GON
     cls=Sectioned,
     sections=SECTIONS,
     epilog=example(
-        "accelstudy design --positions 12 --tilt-range 30gon --roll -100gon 100gon "
+        "accelstudy design --positions 12 --tilt-range 30gon --least-angle 20gon "
         "--out my-scheme.yaml",
         "accelstudy simulate-campaign --scheme my-scheme.yaml --out my-campaign",
     ),

@@ -65,7 +65,7 @@ def continuous_optimum(
     points = fine if len(fine) <= COARSE else allowed(space, constraints, COARSE)
     flat, shares = _flat(task, points), np.full(len(points), 1 / len(points))
     u = len(task.names)
-    value, bound = np.inf, -np.inf
+    best = Continuous(points, shares, np.inf, -np.inf)
     for _ in range(ROUNDS):
         shares = _share(task.prior, criterion, flat, shares, n)
         keep = shares > 1e-7 / len(shares)
@@ -73,18 +73,18 @@ def continuous_optimum(
         normal = task.prior + n * (shares @ flat).reshape(u, u)
         value = float(criterion.value(normal))
         slope = criterion.gradient(normal).ravel()
-        here, everywhere = flat @ slope, fine_flat @ slope
-        best, least = _lowest(
-            task, criterion.gradient(normal), space, constraints, fine, everywhere
-        )
+        here = flat @ slope
+        gradient, everywhere = slope.reshape(u, u), fine_flat @ slope
+        lowest, least = _lowest(task, gradient, space, constraints, fine, everywhere)
         least = min(least, float(here.min()))
-        bound = max(bound, value + n * (least - float(shares @ here)))
+        bound = max(best.bound, value + n * (least - float(shares @ here)))
+        best = Continuous(points, shares, value, bound)
         if value - bound < ENOUGH:
             break
-        points = np.concatenate([points, best])
-        flat = np.concatenate([flat, _flat(task, best)])
-        shares = np.concatenate([0.9 * shares, np.full(len(best), 0.1 / len(best))])
-    return Continuous(points, shares, value, bound)
+        points = np.concatenate([points, lowest])
+        flat = np.concatenate([flat, _flat(task, lowest)])
+        shares = np.concatenate([0.9 * shares, np.full(len(lowest), 0.1 / len(lowest))])
+    return best
 
 
 def allowed(space: Space, constraints: Constraints, count: int) -> Array:

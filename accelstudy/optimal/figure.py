@@ -32,7 +32,7 @@ def efficiency_figure(table: pd.DataFrame) -> Figure:
             above = figure.add_subplot(grid[0, column])
             _efficiencies(above, part, schemes, approach, column == 0)
             below = figure.add_subplot(grid[1, column])
-            _over_positions(below, part, approach, column == 0)
+            _over_positions(below, part, approach, column == 0, column == len(approaches) - 1)
         return figure
 
 
@@ -57,7 +57,9 @@ def _efficiencies(
         ax.legend(title="criterion", loc="center left")
 
 
-def _over_positions(ax: Axes, table: pd.DataFrame, approach: str, labelled: bool) -> None:
+def _over_positions(
+    ax: Axes, table: pd.DataFrame, approach: str, labelled: bool, last: bool
+) -> None:
     rows = table[(table["criterion"] == "I") & (table["reason"] == "")].copy()
     rows["rms"] = np.sqrt((rows["rms_roll"] ** 2 + rows["rms_pitch"] ** 2) / 2)
     n = np.geomspace(rows["n"].min(), rows["n"].max(), 60)
@@ -78,4 +80,5 @@ def _over_positions(ax: Axes, table: pd.DataFrame, approach: str, labelled: bool
     ax.set_title(f"{approach}: expected rms")
     if labelled:
         ax.set_ylabel(f"rms of roll and pitch, {display_unit('rad')}")
-    ax.legend(loc="lower left")
+    if last:
+        ax.legend(loc="best")
