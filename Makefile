@@ -35,7 +35,7 @@ help: ## list the targets
 env: $(READY) ## make the environment, from locked versions, in .venv
 
 test: lint ## check and test the package, with coverage
-	pytest --cov --numprocesses $(CORES) --dist loadfile
+	pytest --cov --numprocesses $(CORES) --dist loadfile --no-loadscope-reorder
 
 test-cluster: $(READY) ## run the small configuration by a SLURM on this machine, and compare
 	python tests/cluster.py
@@ -83,16 +83,12 @@ hidden-docs: $(READY) ## study hidden effects, and take score and figures into d
 benchmarks: $(READY) ## measure the speed, and take tables and figure into docs
 	python benchmarks/run.py docs/speed.md
 
-lint: $(READY) ## check style, types and the workflow
+# Snakemake's own check of the workflows is a test, as starting it takes longer.
+lint: $(READY) ## check style and types
 	ruff check
 	ruff format --check
 	mypy
 	snakefmt --check Snakefile workflow
-	snakemake --lint
-	snakemake --lint --snakefile workflow/campaigns.smk --configfile config/campaigns.yaml
-	snakemake --lint --snakefile workflow/diagnose.smk --configfile config/diagnose-example.yaml
-	snakemake --lint --snakefile workflow/hidden.smk --configfile config/hidden-effects.yaml
-	snakemake --lint --snakefile workflow/plan.smk --configfile config/plan-example.yaml
 
 lock: $(READY) ## lock the newest versions that pyproject.toml allows
 	uv lock --upgrade --default-index https://pypi.org/simple

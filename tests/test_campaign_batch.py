@@ -440,11 +440,6 @@ def test_without_configuration(tmp_path):
     one_line(result.stdout, "no campaigns; name them with --configfile")
 
 
-def test_lint(tmp_path):
-    text = succeed(tmp_path, {"batch": "b", "campaigns": [{"campaign": "a"}]}, "--lint")
-    assert "Congratulations" in text
-
-
 # --- without Snakemake ---------------------------------------------------------------------------
 
 

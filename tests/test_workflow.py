@@ -339,8 +339,19 @@ def test_truncated_estimates(finished):
 # --- around it -----------------------------------------------------------------------------------
 
 
-def test_lint(tmp_path):
-    assert "Congratulations" in succeed(tmp_path, "--lint")
+@pytest.mark.parametrize(
+    ("snakefile", "config"),
+    [
+        ("Snakefile", "config"),
+        ("workflow/campaigns.smk", "campaigns"),
+        ("workflow/diagnose.smk", "diagnose-example"),
+        ("workflow/hidden.smk", "hidden-effects"),
+        ("workflow/plan.smk", "plan-example"),
+    ],
+)
+def test_lint(snakefile, config, tmp_path):
+    given = ["--snakefile", ROOT / snakefile, "--configfile", ROOT / f"config/{config}.yaml"]
+    assert "Congratulations" in snakemake(tmp_path, "--lint", *given).stdout
 
 
 def test_report(finished):
