@@ -15,7 +15,7 @@ from accelstudy.campaign.fit import (
     initial_values,
 )
 from accelstudy.campaign.format import Campaign
-from accelstudy.design import is_blind, rank_of
+from accelstudy.design import is_blind
 from accelstudy.errors import InputError
 from accelstudy.leveling_error import TiltError
 from accelstudy.sensor import SensorModel
@@ -31,6 +31,8 @@ from accelstudy.sequential.stopping import LEAST_REDUNDANCY, get_rule
 
 Array = NDArray[np.float64]
 
+TOLD = 0.5
+"""Sigma over usual size of a parameter, up to which positions without a solution tell something."""
 CONDITIONS = {"time", "temperature", "vibration"}
 """Columns of the holds that change by themselves from position to position."""
 
@@ -156,12 +158,13 @@ class Advisor:
         return self.promise.tilt_error(self.model, own, campaign.gravity, hold)
 
     def _undetermined(self, root: Array, solved: bool) -> tuple[str, ...]:
+        """Parameters of which positions without a solution tell little beyond their usual size."""
         if solved:
             return ()
-        free = rank_of(root)[2][: self.model.n_parameters]
-        return tuple(
-            n for n, is_free in zip(self.model.parameter_names, free, strict=True) if is_free
-        )
+        names, sizes = self.model.parameter_names, typical_sizes(self.model, len(root))
+        known = np.linalg.inv(root.T @ root + np.diag(sizes**-2))
+        sigma = np.sqrt(np.diag(known))[: len(names)]
+        return tuple(n for n, s, z in zip(names, sigma, sizes, strict=False) if s > TOLD * z)
 
     def _vague(self, screening: Screening) -> tuple[str, ...]:
         """Parameters that are known less well than they are of any cheap sensor."""
