@@ -13,11 +13,12 @@ from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from accelstudy.figures.factors import FACTORS, NOISES, factor_note, varies
-from accelstudy.study.config import StudyConfig
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
+
+    from accelstudy.study.config import StudyConfig
 
 Tables: TypeAlias = "Mapping[str, pd.DataFrame]"
 

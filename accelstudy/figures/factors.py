@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from accelstudy.study.cells import study_cells
-from accelstudy.study.config import StudyConfig
 from accelstudy.units import MGON, display_unit, to_display, unit_label
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from accelstudy.study.config import StudyConfig
 
 
 @dataclass(frozen=True)
@@ -96,6 +96,8 @@ class Block:
 def cell_table(study: StudyConfig) -> pd.DataFrame:
     """One row per cell of a study; the robot's noise is NaN where no robot is used."""
     import pandas as pd  # slow, and studies that vary nothing do without
+
+    from accelstudy.study.cells import study_cells
 
     rows = [
         {

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING
 from accelstudy.errors import InputError
 from accelstudy.figures.entries import FigureEntry, Tables, all_figures
 from accelstudy.registry import Registry
-from accelstudy.study.config import StudyConfig
 from accelstudy.units import ANGLE_UNITS, angle_note, angles_in
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from accelstudy.study.config import StudyConfig
 
 ANGLE_UNIT_VARIABLE = "ACCELSTUDY_ANGLE_UNIT"
 

@@ -17,7 +17,6 @@ from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.effects import effects_without
 from accelstudy.errors import InputError
-from accelstudy.hidden.baselines import METHODS, answers
 from accelstudy.hidden.cells import Cell
 from accelstudy.hidden.config import HiddenConfig
 from accelstudy.hidden.physics import Truth, generate
@@ -75,6 +74,8 @@ def run_baselines(
 
     Where none of them can work, as the model cannot be fitted, they find nothing, with the error.
     """
+    from accelstudy.hidden.baselines import METHODS, answers  # slow, and diagnosing does without
+
     model, rows = get_model(config.model), []
 
     def answer(campaign: Campaign) -> list[Row]:
