@@ -275,6 +275,9 @@ def assumption_lines(question: Question) -> list[str]:
         lines.append(f"Of a usual size, as nothing is known of it: {joined(assumed)}.")
     if any(size.source == ASSUMED for size in question.sizes.values()):
         lines.append("Taken to be linear, as only its noise is known.")
+    if question.sheet.position_sigma is not None:
+        sigma = quantity_text(question.sheet.position_sigma, "m/s^2")
+        lines.append(f"The mean of a position has a noise of {sigma}, however long it is held.")
     for equipment in question.equipment:
         setup = f", {number_of(equipment.setup / 60)} minutes to set up" if equipment.setup else ""
         lines.append(
