@@ -58,7 +58,7 @@ _TURN = 200 * GON
     epilog=example(
         "accelstudy design --positions 12 --tilt-range 30gon --least-angle 20gon "
         "--out my-scheme.yaml",
-        "accelstudy simulate-campaign --scheme my-scheme.yaml --out my-campaign",
+        "accelstudy simulate-campaign --scheme my-scheme.yaml --out designed-campaign",
     ),
 )
 @click.option("--out", type=PATH, required=True, help="YAML file for the positions.")
