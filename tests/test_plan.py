@@ -1,6 +1,7 @@
 """The plan of a calibration: linear theory, ranking, simulation, words and files."""
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -273,9 +274,15 @@ def test_the_answer_stands_in_the_first_line(found):
     ("options", "parts"),
     [
         ({"equipment": (BY_HAND,)}, ("No calibration tried here reaches 0.1 mgon (rms) by hand",)),
-        ({"most_seconds": 600.0}, ("within 10 minutes",)),
-        ({"most_seconds": 60.0}, ("No calibration fits", "within 1 minutes")),
-        ({"most_positions": 5}, ("No calibration fits",)),
+        ({"most_seconds": 600.0}, ("within 10 min",)),
+        (
+            {"most_seconds": 60.0},
+            ("No calibration fits within 1 min: the shortest takes 9 positions by hand",),
+        ),
+        (
+            {"most_positions": 5, "equipment": (BY_HAND,)},
+            ("No calibration fits with at most 5 positions by hand: the shortest takes 9",),
+        ),
         ({"sigma_angle": 1 * GON, "equipment": (ROBOT,)}, ("the best leaves", "with a robot")),
         ({"confidence": 0.95}, ("(95 % of them)",)),
     ],
@@ -289,6 +296,21 @@ def test_what_cannot_be_reached_is_one_line_with_what_can(options, parts):
     for part in parts:
         assert part in line
     assert "\n" not in line
+
+
+def test_by_hand_alone_it_is_said_that_a_robot_would_do():
+    question = Question(3 * MGON, 30 * GON, of_sigma(0.002), equipment=(BY_HAND,))
+    (line,) = answer_lines(answer(question, replicates=200))
+    assert re.search(r"It takes a robot: \d+ positions with a robot, 10 s each", line)
+
+
+def test_the_way_by_hand_stays_in_the_table_however_long_it_takes():
+    slow = replace(BY_HAND, moving=600.0)
+    result = answer(asked(equipment=(slow, ROBOT)), replicates=500)
+    assert result.first.candidate.equipment == slow
+    assert len(result.ranked) <= 8
+    assert result.ranked[-1].candidate.equipment == slow
+    assert answer_lines(result)[0].startswith("You need no robot.")
 
 
 # --- the command ---------------------------------------------------------------------------------

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from accelstudy.plan.candidates import Candidate, candidates, with_optimal
-from accelstudy.plan.question import Question
+from accelstudy.plan.question import ROBOT, Question
 from accelstudy.plan.simulated import Simulated, simulate, study_of
 from accelstudy.progress import track
 
@@ -40,6 +40,8 @@ class Answer:
         time they take; empty if none does
     stricter : Candidate, the cheapest with the equipment of the first that reaches the target by
         the other measure (95 % of the calibrations, or the rms); None if there is none
+    instead : Candidate, the cheapest with a robot where none by hand reaches the target and a robot
+        was not asked for; None if that would not do either
     seed, replicates : int, of the simulation
     """
 
@@ -47,6 +49,7 @@ class Answer:
     compared: list[Candidate]
     ranked: list[Ranked]
     stricter: Candidate | None
+    instead: Candidate | None
     seed: int
     replicates: int
 
@@ -78,21 +81,41 @@ def answer(question: Question, seed: int = 1, replicates: int = 10_000) -> Answe
     kinds: dict[tuple[str, str], list[Candidate]] = {}
     for c in by_time(c for c in compared if c.reaches(question.target, question.confidence)):
         kinds.setdefault(c.kind[:2], []).append(c)
-    top = _in_front(list(kinds))[:SIMULATED]
-    ranked = [Ranked(good[0]) for kind, good in kinds.items() if kind not in top]
-    for kind in track(top, "simulated calibrations"):
-        if checked := _checked(question, kinds[kind], seed, replicates):
-            ranked.append(checked)
-    ranked.sort(key=lambda r: _effort(r.candidate))
-    found = Answer(question, compared, ranked[:SHOWN], None, seed, replicates)
+    ranked: list[Ranked] = []
+    for kind in track(_in_front(list(kinds)), "simulated calibrations"):
+        checked = [r.candidate.equipment.name for r in ranked if r.simulated]
+        if len(checked) >= SIMULATED and kind[0] in checked:
+            ranked.append(Ranked(kinds[kind][0]))
+        elif found_good := _checked(question, kinds[kind], seed, replicates):
+            ranked.append(found_good)
     if not any(r.simulated for r in ranked):
-        return Answer(question, compared, [], None, seed, replicates)
+        instead = _with_a_robot(question)
+        return Answer(question, compared, [], None, instead, seed, replicates)
+    table = _shown(ranked)
+    found = Answer(question, compared, table, None, None, seed, replicates)
     equipment = found.first.candidate.equipment
     other = OTHER_CONFIDENCE if question.confidence is None else None
     compared += with_optimal(question, equipment, compared, other)
     mine = by_time(c for c in compared if c.equipment == equipment)
     stricter = next((c for c in mine if c.reaches(question.target, other)), None)
-    return Answer(question, compared, found.ranked, stricter, seed, replicates)
+    return replace(found, stricter=stricter)
+
+
+def _shown(ranked: list[Ranked]) -> list[Ranked]:
+    """Rows of the table by time: those that were simulated, and the quickest of the others."""
+    ranked = sorted(ranked, key=lambda r: _effort(r.candidate))
+    others = [r for r in ranked if r.simulated is None]
+    left_out = others[max(0, SHOWN - len(ranked) + len(others)) :]
+    return [r for r in ranked if r not in left_out]
+
+
+def _with_a_robot(question: Question) -> Candidate | None:
+    """Cheapest candidate with a robot, by linear theory, where there is none by hand alone."""
+    if any(equipment.name != "gravity" for equipment in question.equipment):
+        return None
+    compared = candidates(replace(question, equipment=(ROBOT,)))
+    good = (c for c in compared if c.reaches(question.target, question.confidence))
+    return next(iter(by_time(good)), None)
 
 
 def by_time(found: Iterable[Candidate]) -> list[Candidate]:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -143,6 +144,18 @@ def with_optimal(
             found += tried
             low, high = (low, middle) if good(tried) else (middle + 1, high)
     return found
+
+
+def shortest(question: Question) -> Candidate | None:
+    """Quickest calibration that there is, whatever the limits; None if there is none."""
+    free = replace(question, most_seconds=math.inf, most_positions=SIZES[-1])
+    first: dict[str, Candidate] = {}
+    for scheme in schemes_for(free.most_positions, free.schemes):
+        for candidate in sorted(_with_scheme(free, scheme), key=lambda c: c.seconds):
+            first.setdefault(candidate.equipment.name, candidate)
+        if len(first) == len(question.equipment):
+            break
+    return min(first.values(), key=lambda c: c.seconds, default=None)
 
 
 def _with_scheme(question: Question, scheme: Scheme) -> list[Candidate]:

@@ -21,7 +21,7 @@ from accelstudy.plan.advice import (
     spoilers,
 )
 from accelstudy.plan.answer import OTHER_CONFIDENCE, Answer, Ranked
-from accelstudy.plan.candidates import Candidate
+from accelstudy.plan.candidates import Candidate, shortest
 from accelstudy.plan.question import Equipment, Question
 from accelstudy.sensor import SensorModel
 from accelstudy.study.report import number
@@ -100,19 +100,23 @@ def unreachable(answer: Answer) -> str:
     question, best = answer.question, answer.best
     within = []
     if question.most_seconds < math.inf:
-        within.append(f"within {number_of(question.most_seconds / 60)} minutes")
+        within.append(f"within {number_of(question.most_seconds / 60)} min")
     if question.most_positions < 200:
         within.append(f"with at most {question.most_positions} positions")
     within.append({1: _equipment(question.equipment[0])}.get(len(question.equipment), ""))
     limit = " ".join(filter(None, within))
     if best is None:
-        return f"No calibration fits: none has positions enough for its parameters {limit}.".strip()
+        least = shortest(question)
+        needed = "" if least is None else f": the shortest takes {effort(least)}"
+        return f"No calibration fits {limit}{needed}."
     measure = "rms" if question.confidence is None else f"{100 * question.confidence:g} % of them"
     target = quantity_text(question.target, "rad")
     return (
         f"No calibration tried here reaches {target} ({measure}) {limit}".rstrip()
         + f"; the best leaves {_angle(best.accuracy(question.confidence))}: {effort(best)}, "
-        f"limited by the {limits(question, best)}."
+        f"limited by the {limits(question, best)}"
+        + ("" if answer.instead is None else f". It takes a robot: {effort(answer.instead)}")
+        + "."
     )
 
 
