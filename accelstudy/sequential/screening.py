@@ -28,10 +28,10 @@ MANY = 0.2
 class Screening:
     """One session, its positions sorted into those that agree and those in conflict.
 
-    One that is in conflict is set aside, and is to be repeated. If another one is in conflict, the
-    fault may be with those before, which nothing checked when they came in. So all positions are
-    tested by all others then, and those are set aside that the others do not bear. If these are too
-    many, the noise or the model is wrong and not the positions: then all are used.
+    One that is in conflict is set aside, and is to be repeated. The fault may be with those before,
+    which nothing checked when they came in. So with each further position all are tested by all
+    others, and those are set aside that the others do not bear. If these are too many, the noise or
+    the model is wrong and not the positions: then all are used.
 
     Parameters
     ----------
@@ -87,19 +87,25 @@ class Screening:
     def _take(self, i: int, observed: Observations) -> None:
         p = self._p_value(i, observed)
         before = self.aside[-1] if self.aside else None
-        again = before is not None and not _apart(observed, i, before)
         conflict = p < CONFLICT
+        again = conflict and before is not None and not _apart(observed, i, before)
         if conflict:
             self.aside.append(i)
-            if before is not None and not again and self._sort_anew(observed, i):
-                conflict, p = i in self.aside, self._p_value(i, observed)
-        if not conflict:
-            self.used.append(i)
-            self.recursion.add(observed.take(np.array(self.used)))
+        else:
+            self._use(i, observed)
+        doubtful = before is not None or self.refuted
+        if doubtful and not again and self._sort_anew(observed, i):
+            conflict, p = i in self.aside, self._p_value(i, observed)
+            if not conflict:
+                self._use(i, observed)
         agreement = Agreement.CONFLICT if conflict else Agreement.AGREES
         if np.isnan(p):
             agreement = Agreement.UNTESTED
-        self.last = LastPosition(i, agreement, p, again and conflict)
+        self.last = LastPosition(i, agreement, p, again)
+
+    def _use(self, i: int, observed: Observations) -> None:
+        self.used.append(i)
+        self.recursion.add(observed.take(np.array(self.used)))
 
     def _p_value(self, i: int, observed: Observations) -> float:
         """P-value of position i by those that are used; NaN where they say nothing of it."""
