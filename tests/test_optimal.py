@@ -124,6 +124,17 @@ def test_the_error_by_a_neglected_effect_is_that_of_calibrations_without_it():
     assert float(np.exp(value)) == pytest.approx(expected.mean(), rel=2e-3)
 
 
+def test_no_positions_are_below_the_bound_of_a_neglected_effect():
+    task = Task(NINE, GRAVITY, neglected={"quadratic_scale": 2.5e-3})
+    criterion = get_criterion("robust", task)
+    found = optimal_design(task, criterion, 24, starts=1)
+    assert 0.9 < found.efficiency < 1
+    others = [random_directions(24, seed) for seed in range(50)]
+    assert min(criterion.value(task.normal(each)) for each in others) > found.value
+    plain = optimal_design(task, get_criterion("I", task), 24, starts=1, bounded=False)
+    assert np.all(task.rms_tilt(found.directions) < 0.5 * task.rms_tilt(plain.directions))
+
+
 # Known optima
 
 

@@ -1,6 +1,6 @@
 """The best there can be: shares of all positions instead of whole ones, and a bound from them.
 
-The criterion of a convex kind as a function of shares w is convex, so from its derivatives at any w
+A convex criterion is a convex function of shares w, too, so from its derivatives at any w
 follows a bound that no shares, and no whole positions, are below (the general equivalence theorem
 of Kiefer & Wolfowitz 1960 and Whittle 1973 is the case in which the bound is reached):
 

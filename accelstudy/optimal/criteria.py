@@ -3,7 +3,8 @@
 A criterion is the logarithm of a variance, or of a determinant of variances, as a function of the
 scaled normal matrix; so its differences are relative, and it is to be made small. It has a
 derivative by that matrix, with which positions are ranked and moved. All but that of a neglected
-effect are convex, so that no choice of positions can be better than a bound (`continuous`).
+effect are convex, so that no choice of positions can be better than a bound (`continuous`); that
+one has its bound from another.
 """
 
 from __future__ import annotations
@@ -32,13 +33,11 @@ class Criterion(ABC):
     ----------
     name : str
     text : str, what it minimises, for people
-    convex : bool
     estimated : (u,) array of bool, which parameters the model has
     """
 
     name: ClassVar[str]
     text: ClassVar[str]
-    convex: ClassVar[bool] = True
     estimated: NDArray[np.bool_]
 
     @abstractmethod
@@ -57,6 +56,15 @@ class Criterion(ABC):
     def unknowns(self) -> int:
         """Number of parameters that the positions must determine."""
         return int(np.count_nonzero(self.estimated))
+
+    @property
+    def convex(self) -> Criterion:
+        """A convex criterion that is nowhere above this one."""
+        return self
+
+    def bound(self, convex: float) -> float:
+        """What this criterion is not below, given what `convex` is not below."""
+        return convex
 
     def blind(self, normal: Array) -> str:
         """What else a normal matrix leaves undetermined; empty if nothing."""
@@ -151,7 +159,6 @@ class NeglectedEffect(Criterion):
 
     name = "robust"
     text = "mean square of roll and pitch, the neglected effects included"
-    convex = False
 
     def value(self, normal: Array) -> Array:
         """Logarithm of the mean square."""
@@ -165,6 +172,19 @@ class NeglectedEffect(Criterion):
         own = np.einsum("...ik,ij,...jk->...k", shift, w, shift, optimize=True)
         cross = np.einsum("...ik,ik->...k", shift, w12)
         return np.asarray(np.log(square + np.sum((own - 2 * cross) * self.variance, axis=-1)))
+
+    @property
+    def convex(self) -> Criterion:
+        """The variance alone."""
+        return Leveling(self.estimated, self.weight)
+
+    def bound(self, convex: float) -> float:
+        """Add what no shift of the estimates can make up for: W₂₂ − W₂₁ W₁₁⁻¹ W₁₂."""
+        kept, left = np.flatnonzero(self.estimated), np.flatnonzero(~self.estimated)
+        w, w12 = self.weight[np.ix_(kept, kept)], self.weight[np.ix_(kept, left)]
+        imitated = np.sum(w12 * (np.linalg.pinv(w, rcond=1e-9, hermitian=True) @ w12), axis=0)
+        remains = np.maximum(np.diag(self.weight)[left] - imitated, 0.0)
+        return float(np.log(np.exp(convex) + np.sum(remains * self.variance)))
 
     def gradient(self, normal: Array) -> Array:
         """By the blocks N₁₁ and N₁₂; what is neglected tells nothing by N₂₂."""

@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 CANDIDATES = 600
 STARTS = 8
+PARTS = 10
+"""Parts of a space that are searched in full."""
 TIED = 1e-6
 """Relative difference below which two designs are equally good, and the first one is taken."""
 
@@ -32,7 +34,7 @@ class Design:
     ----------
     directions : (n, 3) array of unit vectors, gravity in the body frame
     value : float, of the criterion
-    bound : float, below which no positions are; NaN where the criterion has none
+    bound : float, below which no positions are; NaN if it is not wanted
     efficiency : float, against the bound; NaN likewise
     """
 
@@ -78,20 +80,19 @@ def optimal_design(
         raise InputError(f"no attitude is left of {space.text} with {_shown(constraints)}")
     _check_determined(task, criterion, everything, n)
     parts = space.parts(np.random.default_rng(np.random.SeedSequence([seed, 0])))
-    # Many parts share out the starts; the best few of them then have all of theirs.
-    found = [
-        _best(task, criterion, part, constraints, n, seed, 1 if len(parts) > 1 else starts)
-        for part in parts
-    ]
-    if len(parts) > 1:
-        order = np.argsort([value for _, value in found], kind="stable")[:3]
-        found = [_best(task, criterion, parts[i], constraints, n, seed, starts) for i in order]
-    directions, value = _first_best(found)
+    if len(parts) > PARTS:  # those that are best as they come out of one exchange
+        tried = [_best(task, criterion, p, constraints, n, seed, 1, moved=False) for p in parts]
+        order = np.argsort([value for _, value in tried], kind="stable")
+        parts = [parts[i] for i in order[:PARTS]]
+    directions, value = _first_best(
+        [_best(task, criterion, part, constraints, n, seed, starts) for part in parts]
+    )
     if reason := undetermined(task, criterion, directions):
         raise InputError(f"no {n} positions of {space.text} were found that suffice: {reason}")
     bound = efficiency = np.nan
-    if bounded and criterion.convex:
-        bound = continuous_optimum(task, criterion, space, constraints, n).bound
+    if bounded:
+        best = continuous_optimum(task, criterion.convex, space, constraints, n)
+        bound = criterion.bound(best.bound)
         efficiency = min(1.0, criterion.efficiency(value, bound))
     return Design(directions, value, bound, efficiency)
 
@@ -104,6 +105,7 @@ def _best(
     n: int,
     seed: int,
     starts: int,
+    moved: bool = True,
 ) -> tuple[Array, float]:
     directions = allowed(space, constraints, CANDIDATES)
     if not len(directions):
@@ -114,7 +116,9 @@ def _best(
     for start in range(1, starts + 1):
         rng = np.random.default_rng(np.random.SeedSequence([seed, start]))
         chosen = exchange(candidates, candidates.random(n, rng), criterion)
-        refined = refine(task, criterion, space, constraints, directions[chosen])
+        refined = directions[chosen]
+        if moved:
+            refined = refine(task, criterion, space, constraints, refined)
         found.append((refined, float(criterion.value(task.normal(refined)))))
     return _first_best(found)
 
