@@ -14,6 +14,7 @@ from accelstudy.options import (
     SCHEME,
     Name,
     Quantity,
+    Sectioned,
     angle_unit_option,
     example,
     force_option,
@@ -54,8 +55,29 @@ class Confidence(click.ParamType):  # type: ignore[type-arg]
         return share
 
 
+_SECTIONS = {
+    "What is asked": (
+        "tilt_accuracy",
+        "tilt_range",
+        "sensor",
+        "sigma",
+        "equipment",
+        "confidence",
+    ),
+    "What is tried": ("holds", "schemes", "max_time", "max_positions", "replicates", "seed"),
+    "What the equipment takes": (
+        "moving_time",
+        "robot_moving_time",
+        "robot_setup_time",
+        "robot_accuracy",
+    ),
+}
+
+
 @click.command(
     "plan",
+    cls=Sectioned,
+    sections=_SECTIONS,
     epilog=example("accelstudy plan --tilt-accuracy 10mgon --tilt-range 30gon --sigma 2mm/s2"),
 )
 @click.option(
@@ -112,7 +134,11 @@ class Confidence(click.ParamType):  # type: ignore[type-arg]
 )
 @click.option("--max-time", type=SECONDS, help="Time in the field at most, as 20min.")
 @click.option(
-    "--max-positions", type=click.IntRange(4, 400), default=200, show_default=True, help="At most."
+    "--max-positions",
+    type=click.IntRange(4, 400),
+    default=200,
+    show_default=True,
+    help="Positions at most.",
 )
 @click.option(
     "--moving-time",
