@@ -191,12 +191,12 @@ def test_optimal_positions_level_better_than_those_of_the_literature():
 
 def test_the_exchange_finds_the_best_of_all_choices():
     task = Task(get_model("bias-scale"), get_approach("robot"))
-    points = random_directions(9, 5)
+    points = random_directions(8, 5)
     for name in "DAI":
         criterion = get_criterion(name, task)
-        choices = combinations_with_replacement(range(9), 4)
+        choices = combinations_with_replacement(range(8), 3)
         best = min(float(criterion.value(task.normal(points[list(c)]))) for c in choices)
-        found = optimal_design(task, criterion, 4, Listed(points, "nine"), bounded=False)
+        found = optimal_design(task, criterion, 3, Listed(points, "eight"), bounded=False)
         assert found.value == pytest.approx(best, abs=1e-9)
 
 
@@ -207,9 +207,6 @@ def test_the_same_arguments_give_the_same_positions():
         for _ in range(2)
     )
     np.testing.assert_array_equal(one.directions, two.directions)
-    np.testing.assert_array_equal(
-        get_scheme("i-optimal-10").directions, get_scheme("i-optimal-10").directions
-    )
     with pytest.raises(InputError, match="8 positions do not determine 9 parameters; at least 9"):
         get_scheme("d-optimal-8")
 

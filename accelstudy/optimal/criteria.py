@@ -16,6 +16,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.errors import UnknownNameError
 from accelstudy.optimal.task import Task
 
 Array = NDArray[np.float64]
@@ -267,14 +268,16 @@ class Rivals(Criterion):
 def get_criterion(name: str, task: Task) -> Criterion:
     """Return a criterion by its name, D, A, I or robust, for a task."""
     estimated = task.estimated
-    if name == "D":
-        return Determinant(estimated)
-    if name == "A":
-        return MeanVariance(estimated, np.diag(estimated * 1.0))
     weight = task.tilt_weights.mean(axis=0)
-    if name == "I":
-        return Leveling(estimated, weight)
-    return NeglectedEffect(estimated, weight, task.neglected_variance)
+    known: dict[str, Criterion] = {
+        "D": Determinant(estimated),
+        "A": MeanVariance(estimated, np.diag(estimated * 1.0)),
+        "I": Leveling(estimated, weight),
+        "robust": NeglectedEffect(estimated, weight, task.neglected_variance),
+    }
+    if name not in known:
+        raise UnknownNameError("criterion", name, known)
+    return known[name]
 
 
 def rivals(task: Task, first: str, second: str) -> Rivals:
