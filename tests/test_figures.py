@@ -376,7 +376,9 @@ def test_a_figure_that_cannot_be_drawn_is_named(tables, paper, tmp_path):
     paths = {name: tmp_path / f"{name}.parquet" for name in ("summary", "quantiles")}
     with pytest.raises(KeyError) as error:
         draw_figures(paper, ["closed-forms", "figure-7"], paths, tmp_path)
-    assert "the figure 'figure-7'" in error.value.__notes__[0]
+    (note,) = error.value.__notes__
+    assert note.startswith("The figure 'figure-7' could not be drawn")
+    assert "closed-forms and figure-7" in note
     assert {path.stem for path in tmp_path.glob("*.svg")} == {"closed-forms"}
 
 

@@ -19,6 +19,7 @@ from accelstudy.study.cells import study_cells
 from accelstudy.study.config import StudyConfig
 from accelstudy.study.tables import read_table, write_table
 from accelstudy.units import to_si
+from accelstudy.wording import joined
 
 APPROACHES = ("gravity", "robot")
 """Those whose calibrations the sensitivity is analysed with."""
@@ -196,5 +197,8 @@ def draw_figures(
         try:
             render(name, read, study, path.with_suffix(".svg"), path.with_suffix(".png"))
         except Exception as error:
-            error.add_note(f"This was the figure {name!r}, which a job draws with others.")
+            error.add_note(
+                f"The figure {name!r} could not be drawn, so all of its job are missing: "
+                f"{joined(names)}."
+            )
             raise
