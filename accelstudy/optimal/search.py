@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 CANDIDATES = 600
 STARTS = 8
+REFINED = 3
+"""Of the starts, how many are refined: those that are best after the exchange, which is cheap."""
 PARTS = 10
 """Parts of a space that are searched in full."""
 TIED = 1e-6
