@@ -21,6 +21,7 @@ from accelstudy.optimal.constraints import (
 from accelstudy.optimal.continuous import continuous_optimum
 from accelstudy.optimal.criteria import get_criterion, rivals
 from accelstudy.optimal.information import information, position_rows
+from accelstudy.optimal.repeats import with_repeats
 from accelstudy.optimal.search import optimal_design
 from accelstudy.optimal.separation import Explained, Separation
 from accelstudy.optimal.spaces import Listed, Mountings, Sphere, attitudes, by_eye, cube, listed_in
@@ -330,3 +331,25 @@ def test_the_separation_grows_by_what_the_wrong_explanation_misses():
         rows = np.concatenate([old[wrong], new[wrong].reshape(6, 4)])
         expected += (left(rows, shown) - left(old[wrong], seen)) / 2
     assert grown == pytest.approx(expected, rel=1e-9)
+
+
+def test_positions_that_hardly_differ_are_one_that_is_repeated():
+    task = Task(NINE, get_approach("robot"))
+    criterion = get_criterion("I", task)
+    best = optimal_design(task, criterion, 12, starts=3, bounded=False).directions
+    cosines = (best @ best.T)[np.triu_indices(12, 1)]
+    same = cosines > 1 - 1e-12
+    assert same.any()
+    assert cosines[~same].max() < np.cos(1 * GON)
+
+    apart = random_directions(12)
+    assert with_repeats(task, criterion, Constraints(), apart) is apart
+    beside = np.cross(apart[0], apart[1])
+    near = apart[0] + 0.5 * GON * beside / np.linalg.norm(beside)
+    thirteen = np.vstack([apart, near / np.linalg.norm(near)])
+    joined = with_repeats(task, criterion, Constraints(), thirteen)
+    np.testing.assert_array_equal(joined[0], joined[12])
+    np.testing.assert_array_equal(joined[1:12], thirteen[1:12])
+    assert any(np.array_equal(joined[0], thirteen[i]) for i in (0, 12))
+    kept = Constraints(pair=LeastAngle(0.1 * GON))
+    assert with_repeats(task, criterion, kept, thirteen) is thirteen

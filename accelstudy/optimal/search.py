@@ -13,6 +13,7 @@ from accelstudy.optimal.continuous import allowed, continuous_optimum
 from accelstudy.optimal.criteria import Criterion
 from accelstudy.optimal.exchange import Candidates, exchange
 from accelstudy.optimal.refinement import refine
+from accelstudy.optimal.repeats import with_repeats
 from accelstudy.optimal.spaces import Space, Sphere
 from accelstudy.optimal.task import Task
 
@@ -86,9 +87,11 @@ def optimal_design(
         tried = [_best(task, criterion, p, constraints, n, seed, 1, moved=False) for p in parts]
         order = np.argsort([value for _, value in tried], kind="stable")
         parts = [parts[i] for i in order[:PARTS]]
-    directions, value = _first_best(
+    directions, _ = _first_best(
         [_best(task, criterion, part, constraints, n, seed, starts) for part in parts]
     )
+    directions = with_repeats(task, criterion, constraints, directions)
+    value = float(criterion.value(task.normal(directions)))
     if reason := undetermined(task, criterion, directions):
         raise InputError(f"no {n} positions of {space.text} were found that suffice: {reason}")
     bound = efficiency = np.nan
@@ -117,11 +120,14 @@ def _best(
     found = []
     for start in range(1, starts + 1):
         rng = np.random.default_rng(np.random.SeedSequence([seed, start]))
-        chosen = exchange(candidates, candidates.random(n, rng), criterion)
-        refined = directions[chosen]
-        if moved:
-            refined = refine(task, criterion, space, constraints, refined)
-        found.append((refined, float(criterion.value(task.normal(refined)))))
+        chosen = directions[exchange(candidates, candidates.random(n, rng), criterion)]
+        found.append((chosen, float(criterion.value(task.normal(chosen)))))
+    if moved:
+        order = np.argsort([value for _, value in found], kind="stable")
+        refined = [
+            refine(task, criterion, space, constraints, found[i][0]) for i in order[:REFINED]
+        ]
+        found = [(u, float(criterion.value(task.normal(u)))) for u in refined]
     return _first_best(found)
 
 
