@@ -345,11 +345,11 @@ def test_positions_that_hardly_differ_are_one_that_is_repeated():
     apart = random_directions(12)
     assert with_repeats(task, criterion, Constraints(), apart) is apart
     beside = np.cross(apart[0], apart[1])
-    near = apart[0] + 0.5 * GON * beside / np.linalg.norm(beside)
+    near = apart[0] + 0.01 * GON * beside / np.linalg.norm(beside)
     thirteen = np.vstack([apart, near / np.linalg.norm(near)])
     joined = with_repeats(task, criterion, Constraints(), thirteen)
     np.testing.assert_array_equal(joined[0], joined[12])
     np.testing.assert_array_equal(joined[1:12], thirteen[1:12])
     assert any(np.array_equal(joined[0], thirteen[i]) for i in (0, 12))
-    kept = Constraints(pair=LeastAngle(0.1 * GON))
+    kept = Constraints(pair=LeastAngle(0.001 * GON))
     assert with_repeats(task, criterion, kept, thirteen) is thirteen
