@@ -25,7 +25,7 @@ from accelstudy.plan.candidates import NINE, candidates
 from accelstudy.plan.question import BY_HAND, ROBOT, Question
 from accelstudy.plan.simulated import simulate, study_of
 from accelstudy.plan.theory import theory_of
-from accelstudy.plan.wording import answer_lines, reason_lines, table_lines, unreachable
+from accelstudy.plan.wording import answer_lines, effort, reason_lines, table_lines, unreachable
 from accelstudy.schemes import get_scheme
 from accelstudy.simulation import Noise
 from accelstudy.study.cells import study_cells
@@ -268,6 +268,11 @@ def test_the_answer_stands_in_the_first_line(found):
     with angles_in("deg"):
         assert " mdeg" in answer_lines(found)[1]
         assert "roll/mdeg" in table_lines(found)[0]
+
+
+def test_set_up_is_told_in_its_own_unit():
+    candidate = replace(_candidate(asked(), equipment="robot"), hold=600.0)
+    assert effort(candidate).endswith("600 s each, about 4.57 hours, with 30 minutes to set it up")
 
 
 @pytest.mark.parametrize(

@@ -125,8 +125,8 @@ def effort(candidate: Candidate, imperative: bool = False) -> str:
     n = candidate.scheme.n_positions
     how = _equipment(candidate.equipment)
     text = f"{n} positions {how}, {number_of(candidate.hold)} s each"
-    setup = candidate.equipment.setup / 60
-    extra = f", {setup:.0f} of them to set it up" if setup else ""
+    setup = candidate.equipment.setup
+    extra = f", with {minutes(setup)} to set it up" if setup else ""
     link = ": about" if imperative else ", about"
     verb = "Measure " if imperative else ""
     return f"{verb}{text}{link} {minutes(candidate.seconds)}{extra}"
