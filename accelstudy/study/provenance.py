@@ -68,7 +68,7 @@ _UNUSED = {
     ),
     "hidden": (*_NOT_HIDDEN, "figures/", "hidden/baselines.py", *_SCORED),
     "baselines": (*_NOT_HIDDEN, "figures/", *_DECIDED, *_SCORED),
-    "planning": ("cli.py", "catalogue.py", "study/earlier.py", "hidden/", "campaign/"),
+    "planning": ("cli.py", "catalogue.py", "study/earlier.py", "hidden/"),
     "score": (*_NOT_HIDDEN, "hidden/baselines.py", *_DECIDED),
 }
 
