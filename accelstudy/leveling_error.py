@@ -14,6 +14,9 @@ from accelstudy.units import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
 
+ATTITUDES = 200
+"""Over which a tilt error is averaged, where nobody says how many."""
+
 
 def cap_forces(max_tilt: float, attitudes: int, g: float = STANDARD_GRAVITY) -> Array:
     """Specific forces (k, 3) of attitudes spread evenly over all tilts up to `max_tilt` (rad)."""

@@ -15,15 +15,13 @@ from accelstudy.approaches import get_approach
 from accelstudy.campaign.fit import CampaignFit, campaign_noise
 from accelstudy.gross_errors.recognition import Recognised, recognise
 from accelstudy.leveling import jacobian
-from accelstudy.leveling_error import cap_forces, holds_in_use
+from accelstudy.leveling_error import ATTITUDES, cap_forces, holds_in_use
 from accelstudy.units import GON, MGON
 
 Array = NDArray[np.float64]
 
 MAX_TILT_GON = 50.0
 """Range of tilts for which the accuracy of leveling is stated."""
-ATTITUDES = 200
-"""Attitudes over which it is taken."""
 
 SUSPECT = 0.05
 """Family-wise level of the tests of single positions."""

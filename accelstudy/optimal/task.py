@@ -13,7 +13,7 @@ from accelstudy.approaches import Approach
 from accelstudy.design import diagnose
 from accelstudy.errors import InputError
 from accelstudy.hold_plan import HoldPlan, check_needs_no_plan
-from accelstudy.leveling_error import TiltError, cap_forces, tilt_error
+from accelstudy.leveling_error import ATTITUDES, TiltError, cap_forces, tilt_error
 from accelstudy.models import compose, composition_name
 from accelstudy.optimal.information import information, position_rows
 from accelstudy.schemes import Scheme, get_scheme
@@ -24,8 +24,6 @@ from accelstudy.units import GON, STANDARD_GRAVITY
 Array = NDArray[np.float64]
 
 SPHERE = "fibonacci-300"
-ATTITUDES = 200
-"""Attitudes, spread evenly over the tilt range, in which the tilt accuracy is evaluated."""
 LOOKING_BACK = ("step_x", "step_y", "step_z", "order")
 
 

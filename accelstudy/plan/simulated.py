@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment.block import joined
 from accelstudy.effects import get_effect
+from accelstudy.leveling_error import ATTITUDES
 from accelstudy.plan.candidates import Candidate
 from accelstudy.plan.question import Question
-from accelstudy.plan.theory import ATTITUDES
 from accelstudy.study.cells import Cell, study_cells
 from accelstudy.study.config import parse_study
 from accelstudy.study.followed import cell_tilt_error

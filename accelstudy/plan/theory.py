@@ -23,7 +23,7 @@ from scipy.special import gammaincinv
 from accelstudy.approaches import get_approach
 from accelstudy.design import SINGULAR
 from accelstudy.effects import Hold, get_effect
-from accelstudy.leveling_error import cap_forces, tilt_error
+from accelstudy.leveling_error import ATTITUDES, cap_forces, tilt_error
 from accelstudy.models import get_model
 from accelstudy.optimal.information import position_rows
 from accelstudy.sensor import SensorModel
@@ -31,8 +31,6 @@ from accelstudy.simulation import Noise
 
 Array = NDArray[np.float64]
 
-ATTITUDES = 200
-"""Over which the tilt error is averaged, as in a study."""
 OF_SENSOR = (
     "bias",
     "scale",

@@ -8,14 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.effects import Hold
-from accelstudy.leveling_error import TiltError, cap_forces, holds_in_use, tilt_error
+from accelstudy.leveling_error import ATTITUDES, TiltError, cap_forces, holds_in_use, tilt_error
 from accelstudy.sensor import SensorModel
 from accelstudy.units import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
-
-ATTITUDES = 200
-"""Attitudes, spread evenly over the tilt range, in which the tilt accuracy is taken."""
 
 
 @dataclass(frozen=True)

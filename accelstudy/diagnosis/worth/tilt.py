@@ -8,13 +8,12 @@ from numpy.typing import NDArray
 from accelstudy.adjustment.quality import Solution
 from accelstudy.effects import Hold
 from accelstudy.leveling import jacobian, roll_pitch
-from accelstudy.leveling_error import cap_forces, holds_in_use
+from accelstudy.leveling_error import ATTITUDES, cap_forces, holds_in_use
 from accelstudy.units import GON
 
 Array = NDArray[np.float64]
 
 MAX_TILT = 50 * GON
-ATTITUDES = 200
 
 
 def in_use(hold: Hold, g: float) -> tuple[Array, Hold]:
