@@ -70,9 +70,8 @@ class Errors:
 
 def errors_in_use(sensor: CalibratedSensor, use: Use) -> tuple[Errors, ...]:
     """List what is wrong beside the calibration; what the data sheet does not know is zero."""
-    sheet, kelvin = sensor.sheet, use.temperature_change
-    bias = 0.0 if "bias" in sensor.corrected else sheet.bias_change(0.0, kelvin)
-    scale = 0.0 if "scale" in sensor.corrected else (sheet.scale_per_kelvin or 0.0) * kelvin
+    sheet = sensor.sheet
+    bias, scale = sensor.warmed(use.temperature_change)
     biases, scales = ("b_x", "b_y", "b_z"), ("s_x", "s_y", "s_z")
     return (
         Errors("noise", FORCES, sheet.sigma_mean(use.averaging)),

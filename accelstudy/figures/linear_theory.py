@@ -8,7 +8,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from scipy import special
 
 from accelstudy.figures.entries import Tables
 from accelstudy.figures.style import (
@@ -23,9 +22,9 @@ from accelstudy.figures.style import (
     new_figure,
     say_empty,
 )
+from accelstudy.shares import Z95
 from accelstudy.study.config import StudyConfig
 
-Z95 = float(special.ndtri(0.975))
 BAND = "#DDDDDD"
 GAP = 0.25
 """Between two groups of parameters, which are 1 wide each."""

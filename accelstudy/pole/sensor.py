@@ -70,6 +70,15 @@ class CalibratedSensor:
         units = {parameter.unit for parameter in self.model.parameters}
         return tuple(name for name, unit in COEFFICIENTS.items() if unit in units)
 
+    def warmed(self, kelvin: float) -> tuple[float, float]:
+        """Sds by which bias, m/s², and scale change with the temperature, uncorrected.
+
+        What the data sheet does not know is zero.
+        """
+        bias = 0.0 if "bias" in self.corrected else self.sheet.bias_change(0.0, kelvin)
+        per_kelvin = 0.0 if "scale" in self.corrected else self.sheet.scale_per_kelvin or 0.0
+        return bias, per_kelvin * kelvin
+
     def conditions(self, forces: Array, temperature_change: float) -> Hold | None:
         """What effects depend on beside the force, in attitudes with forces (k, 3), m/s².
 

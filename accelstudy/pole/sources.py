@@ -139,10 +139,7 @@ def drift(situation: Situation) -> Wrong:
 )
 def temperature(situation: Situation) -> Wrong:
     """Change of the bias and of the scales, of what the calibration does not correct."""
-    sensor, kelvin = situation.sensor, situation.setup.temperature_change
-    bias = 0.0 if "bias" in sensor.corrected else sensor.sheet.bias_change(0.0, kelvin)
-    per_kelvin = 0.0 if "scale" in sensor.corrected else sensor.sheet.scale_per_kelvin or 0.0
-    scale = per_kelvin * kelvin
+    bias, scale = situation.sensor.warmed(situation.setup.temperature_change)
     return scatter(situation, (FORCE,), *np.hypot(bias, scale * situation.sensor_forces.T))
 
 

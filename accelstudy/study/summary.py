@@ -16,7 +16,7 @@ from accelstudy import closed_forms
 from accelstudy.design import Design, diagnose
 from accelstudy.effects import get_effect
 from accelstudy.leveling_error import TiltError
-from accelstudy.shares import wilson
+from accelstudy.shares import Z95, wilson
 from accelstudy.study.cells import Cell
 from accelstudy.study.distributions import Distribution, cell_distributions
 from accelstudy.study.followed import ANGLES, ERROR, POSTERIORI, PRIORI, TILT, cell_tilt_error
@@ -28,7 +28,6 @@ from accelstudy.units import GON, MGON, recorded_unit, to_recorded
 
 Array = NDArray[np.float64]
 
-Z95 = float(special.ndtri(0.975))
 
 LOWER = (1e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.025, 0.05, 0.25)
 PROBABILITIES = np.array([*LOWER, 0.5, *(1 - p for p in reversed(LOWER))])
