@@ -38,10 +38,10 @@ test: lint ## check and test the package, with coverage
 	pytest --cov --numprocesses $(CORES) --dist loadfile --no-loadscope-reorder
 
 test-cluster: $(READY) ## run the small configuration by a SLURM on this machine, and compare
-	python tests/cluster.py
+	python tests/helpers/cluster.py
 
 test-faults: $(READY) ## kill jobs and runs, fill a disk, and compare what comes out in the end
-	pytest tests/faults.py
+	pytest tests/study/faults.py
 
 smoke: $(READY) ## run the whole workflow on a small configuration
 	snakemake --cores $(CORES) --configfile config/smoke.yaml

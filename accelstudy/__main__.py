@@ -8,7 +8,7 @@ def run() -> None:
     # Imports and figures make a million objects that stay. To look for garbage among them again
     # and again takes a tenth of the time of a command.
     gc.set_threshold(100_000, 50, 50)
-    from accelstudy.cli import main
+    from accelstudy.commands.main import main
 
     main(prog_name="accelstudy")
 

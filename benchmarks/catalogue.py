@@ -12,13 +12,13 @@ from zlib import crc32
 
 import numpy as np
 
+from accelstudy.basics.errors import InputError
 from accelstudy.campaign import Campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.effects import effect_names, effects_without
-from accelstudy.errors import InputError
 from accelstudy.hidden.physics.case import Case
 from accelstudy.hidden.physics.generate import generate
-from accelstudy.models import get_model
+from accelstudy.sensors.models import get_model
 
 DESIGNS = ("spread-24", "yaw-50", "two-warm-36")
 NONCENTRALITY = 25.0

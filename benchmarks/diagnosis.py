@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from accelstudy.campaign import write_campaign
-from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign
+from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.models import get_model
+from accelstudy.sensors.models import get_model
 from processes import ACCELSTUDY, took
 
 HIDDEN = {

@@ -4,7 +4,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.ticker import FuncFormatter, NullLocator
 
-from accelstudy.figures.style import FULL, STYLE, approach_colour, approach_marker
+from accelstudy.drawing.style import FULL, STYLE, approach_colour, approach_marker
 from problem import APPROACHES, BLOCK
 from timing import short
 from ways import WAYS

@@ -4,8 +4,8 @@ import numpy as np
 
 from accelstudy.approaches import get_approach
 from accelstudy.kernel import calibrate as kernel
-from accelstudy.models import get_model
 from accelstudy.schemes import get_scheme
+from accelstudy.sensors.models import get_model
 from problem import APPROACHES, BLOCK, MODEL, SCHEME, drawn, ideal_session
 from timing import in_turns, short, table
 

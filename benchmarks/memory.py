@@ -38,14 +38,14 @@ def study_of(replicates, keep):
 
 def run(step, content, folder):
     """One rule, on files in a folder."""
-    from accelstudy.figures import figure_names, figure_tables, render
-    from accelstudy.study import analysis
-    from accelstudy.study.batches import Share
-    from accelstudy.study.cells import study_cells
+    from accelstudy.files.tables import collect, read_table
+    from accelstudy.study.cells.batches import Share
+    from accelstudy.study.cells.cell import study_cells
     from accelstudy.study.config import parse_study
-    from accelstudy.study.simulate import simulate_batch
-    from accelstudy.study.summary import summarise_batch
-    from accelstudy.study.tables import collect, read_table
+    from accelstudy.study.figures import figure_names, figure_tables, render
+    from accelstudy.study.monte_carlo.simulate import simulate_batch
+    from accelstudy.study.results import analysis
+    from accelstudy.study.results.summary import summarise_batch
 
     study = parse_study(content)
     cells = study_cells(study)

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from accelstudy.campaign import write_campaign
-from accelstudy.campaign.format import Campaign
-from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign
+from accelstudy.campaign.files.format import Campaign
+from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
 from processes import ACCELSTUDY, took
 
 FAMILY = 5000

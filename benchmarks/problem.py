@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from accelstudy.models import get_model
+from accelstudy.basics.units import MGON
 from accelstudy.schemes import get_scheme
-from accelstudy.simulation import Noise, session
-from accelstudy.units import MGON
+from accelstudy.sensors.models import get_model
+from accelstudy.simulation.sessions import Noise, session
 
 APPROACHES = ("gravity", "robot")
 BLOCK = 500

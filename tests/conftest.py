@@ -5,7 +5,7 @@ import os
 import pytest
 from hypothesis import settings
 
-from accelstudy.figures import saving
+from accelstudy.drawing import saving
 
 settings.register_profile("repeatable", deadline=None, derandomize=True, max_examples=50)
 settings.load_profile("repeatable")

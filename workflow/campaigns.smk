@@ -5,14 +5,15 @@ from pathlib import Path
 from snakemake.exceptions import WorkflowError
 from snakemake.utils import min_version
 
-from accelstudy.campaign.batch_config import parse_batch
-from accelstudy.campaign.public import next_attempt
-from accelstudy.errors import InputError
-from accelstudy.outputs import BATCH_JOB
-from accelstudy.study.config import read_layer
-from accelstudy.study.earlier import earlier_run
-from accelstudy.study.job import killed_notice, quote_python
-from accelstudy.study.provenance import check_writable, code_hash
+from accelstudy.campaign.batch.config import parse_batch
+from accelstudy.campaign.importing.public import next_attempt
+from accelstudy.basics.errors import InputError
+from accelstudy.files.outputs import BATCH_JOB
+from accelstudy.files.layers import read_layer
+from accelstudy.jobs.earlier import earlier_run
+from accelstudy.jobs.job import killed_notice, quote_python
+from accelstudy.files.provenance import check_writable
+from accelstudy.jobs.code import code_hash
 
 min_version("9.10")
 quote_python()
@@ -114,7 +115,7 @@ rule calibrate:
     params:
         task=lambda wildcards: TASKS[wildcards.campaign].model_dump(mode="json"),
         braced=braced_files,
-        code=code_hash("campaign"),
+        code=code_hash(workflow.source_path("scripts/calibrate.py")),
     message:
         "Calibrate {wildcards.campaign}"
     script:
@@ -136,7 +137,7 @@ rule overview:
     resources:
         mem_mb=2000,
     params:
-        code=code_hash("overview"),
+        code=code_hash(workflow.source_path("scripts/overview.py")),
     message:
         "Summarise the campaigns"
     script:

@@ -6,13 +6,14 @@ from snakemake.exceptions import WorkflowError
 from snakemake.utils import min_version
 
 from accelstudy.diagnosis.round_trip import parse_round_trip
-from accelstudy.errors import InputError
-from accelstudy.outputs import CAMPAIGN, DIAGNOSIS
+from accelstudy.basics.errors import InputError
+from accelstudy.files.outputs import CAMPAIGN, DIAGNOSIS
 from accelstudy.schemes import is_scheme_file
-from accelstudy.study.config import read_layer
-from accelstudy.study.earlier import earlier_run
-from accelstudy.study.job import killed_notice, quote_python
-from accelstudy.study.provenance import check_writable, code_hash
+from accelstudy.files.layers import read_layer
+from accelstudy.jobs.earlier import earlier_run
+from accelstudy.jobs.job import killed_notice, quote_python
+from accelstudy.files.provenance import check_writable
+from accelstudy.jobs.code import code_hash
 
 min_version("9.10")
 quote_python()
@@ -65,7 +66,7 @@ rule simulate_campaign:
         mem_mb=2000,
     params:
         settings=asdict(TRIP.campaign),
-        code=code_hash("diagnosis"),
+        code=code_hash(workflow.source_path("scripts/simulate_campaign.py")),
     message:
         "Simulate the campaign"
     script:
@@ -91,7 +92,7 @@ rule diagnose:
             "seed": TRIP.seed,
             "replicates": TRIP.replicates,
         },
-        code=code_hash("diagnosis"),
+        code=code_hash(workflow.source_path("scripts/diagnose.py")),
     message:
         "Diagnose the campaign"
     script:

@@ -3,14 +3,15 @@
 from snakemake.exceptions import WorkflowError
 from snakemake.utils import min_version
 
-from accelstudy.errors import InputError
+from accelstudy.basics.errors import InputError
 from accelstudy.hidden.cells import number_of_chunks
 from accelstudy.hidden.config import parse_hidden
 from accelstudy.hidden.tables import TABLES
-from accelstudy.study.config import read_layer
-from accelstudy.study.earlier import earlier_run
-from accelstudy.study.job import killed_notice, quote_python
-from accelstudy.study.provenance import check_writable, code_hash
+from accelstudy.files.layers import read_layer
+from accelstudy.jobs.earlier import earlier_run
+from accelstudy.jobs.job import killed_notice, quote_python
+from accelstudy.files.provenance import check_writable
+from accelstudy.jobs.code import code_hash
 
 min_version("9.10")
 quote_python()
@@ -88,7 +89,7 @@ rule plan:
         mem_mb=4000,
     params:
         config=CONTENT,
-        code=code_hash("plan"),
+        code=code_hash(workflow.source_path("scripts/hidden_plan.py")),
     message:
         "Plan the campaigns"
     script:
@@ -112,7 +113,7 @@ rule diagnose:
     params:
         config=CONTENT,
         provenance=ORIGIN,
-        code=code_hash("hidden"),
+        code=code_hash(workflow.source_path("scripts/hidden_diagnose.py")),
     message:
         "Simulate and diagnose chunk {wildcards.chunk}"
     script:
@@ -134,7 +135,7 @@ rule baselines:
     params:
         config=CONTENT,
         provenance=ORIGIN,
-        code=code_hash("baselines"),
+        code=code_hash(workflow.source_path("scripts/hidden_baselines.py")),
     message:
         "Try simpler methods on chunk {wildcards.chunk}"
     script:
@@ -161,7 +162,7 @@ rule score:
     params:
         config=CONTENT,
         provenance=ORIGIN,
-        code=code_hash("score"),
+        code=code_hash(workflow.source_path("scripts/hidden_score.py")),
     message:
         "Score all chunks"
     script:

@@ -2,7 +2,7 @@
 # snakemake --cores 2 --snakefile workflow/plan.smk --configfile config/plan-example.yaml
 from snakemake.utils import min_version
 
-from accelstudy.study.job import quote_python
+from accelstudy.jobs.job import quote_python
 
 min_version("9.10")
 quote_python()

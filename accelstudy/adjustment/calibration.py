@@ -31,11 +31,11 @@ from accelstudy.adjustment.gauss_helmert import (
     whitened_design,
 )
 from accelstudy.approaches import Approach
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.tracing import TracedFunction, derivative, inverse, symbolic, symbols
+from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import Hold
-from accelstudy.errors import InputError
-from accelstudy.sensor import SensorModel, SensorTrace
-from accelstudy.tracing import TracedFunction, derivative, inverse, symbolic, symbols
-from accelstudy.units import STANDARD_GRAVITY
+from accelstudy.sensors.sensor import SensorModel, SensorTrace
 
 Array = NDArray[np.float64]
 

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.adjustment import cholesky
-from accelstudy.errors import InputError
+from accelstudy.basics.errors import InputError
 
 Array = NDArray[np.float64]
 

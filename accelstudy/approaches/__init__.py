@@ -4,7 +4,7 @@ To add one, write a module next to this file with a class under `register`.
 """
 
 from accelstudy.approaches.base import Approach, approach_names, get_approach, register
-from accelstudy.registry import import_modules
+from accelstudy.basics.registry import import_modules
 
 __all__ = ["Approach", "approach_names", "get_approach", "register"]
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, TypeVar
 
+from accelstudy.basics.registry import Registry
 from accelstudy.effects.base import Number, Vector
-from accelstudy.registry import Registry
 
 
 class Approach:

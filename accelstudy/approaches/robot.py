@@ -1,7 +1,7 @@
 """Robot-aided calibration: a robot also observes roll and pitch of every attitude."""
 
 from accelstudy.approaches.base import Approach, register
-from accelstudy.leveling import specific_force
+from accelstudy.leveling.angles import specific_force
 
 
 @register

@@ -4,7 +4,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from accelstudy.campaign.format import Campaign, read_campaign, write_campaign
+    from accelstudy.campaign.files.format import Campaign, read_campaign, write_campaign
 
 __all__ = ["Campaign", "read_campaign", "write_campaign"]
 
@@ -12,5 +12,5 @@ __all__ = ["Campaign", "read_campaign", "write_campaign"]
 def __getattr__(name: str) -> Any:
     # The commands stand in this package; to list them must not import what they work with.
     if name in __all__:
-        return getattr(import_module("accelstudy.campaign.format"), name)
+        return getattr(import_module("accelstudy.campaign.files.format"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -9,14 +9,14 @@ import numpy as np
 import yaml
 from scipy.optimize import nnls
 
-from accelstudy.campaign.allan import RELIABLE, AllanDeviation
-from accelstudy.campaign.format import read_campaign
-from accelstudy.campaign.import_settings import ImportSettings
-from accelstudy.campaign.importing import import_log
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import recorded_unit, to_recorded
+from accelstudy.campaign.files.format import read_campaign
+from accelstudy.campaign.holds.allan import RELIABLE, AllanDeviation
+from accelstudy.campaign.importing.conversion import import_log
+from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.data_sheets.flicker import FLICKER
 from accelstudy.data_sheets.sheet import QUANTITIES, DataSheet
-from accelstudy.errors import InputError
-from accelstudy.units import recorded_unit, to_recorded
 
 SEEN = 0.02
 """Part of the Allan variance, where it is largest, below which a kind of noise is not seen."""

@@ -10,9 +10,9 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from accelstudy.basics.errors import InputError, UnknownNameError, shown
+from accelstudy.basics.units import parse_quantity
 from accelstudy.data_sheets.sheet import QUANTITIES, DataSheet
-from accelstudy.errors import InputError, UnknownNameError, shown
-from accelstudy.units import parse_quantity
 
 TEXTS = ("name", "title", "source")
 DENSITY = "noise_density"
@@ -54,7 +54,7 @@ def read_data_sheet(path: str | Path) -> DataSheet:
     InputError
         One line that names the file, the key, what is wrong and what would be right.
     """
-    from accelstudy.study.config.layers import read_layer  # its package needs all models
+    from accelstudy.files.layers import read_layer  # its package needs all models
 
     return parse_data_sheet(read_layer(path), str(path))
 

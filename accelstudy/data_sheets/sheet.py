@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.data_sheets.flicker import FLICKER, flicker_change
-from accelstudy.errors import InputError
-from accelstudy.units import STANDARD_GRAVITY
 
 QUANTITIES: dict[str, tuple[str, str]] = {
     "velocity_random_walk": ("m/s^2/sqrt(Hz)", "white noise: the mean of τ s has the sd N/√τ"),

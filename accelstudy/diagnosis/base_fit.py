@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import Solution, solve
 from accelstudy.approaches import Approach
-from accelstudy.campaign.fit import fit_campaign, least_sigma
-from accelstudy.campaign.format import Campaign
+from accelstudy.basics.errors import InputError
+from accelstudy.campaign.calibration.fit import fit_campaign, least_sigma
+from accelstudy.campaign.files.format import Campaign
 from accelstudy.diagnosis.evidence.size import Level
-from accelstudy.errors import InputError
-from accelstudy.sensor import SensorModel
+from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 

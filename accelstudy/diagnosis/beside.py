@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from accelstudy.adjustment.quality import suspects
-from accelstudy.campaign.assessment import SUSPECT
+from accelstudy.basics.progress import stage
+from accelstudy.campaign.calibration.assessment import SUSPECT
 from accelstudy.diagnosis.decision.posterior import of_effects
 from accelstudy.diagnosis.decision.search import Search
 from accelstudy.diagnosis.decision.verdict import Finding
@@ -19,7 +20,6 @@ from accelstudy.diagnosis.worth.changes import Change, parameter_changes
 from accelstudy.diagnosis.worth.limits import UpperLimit, upper_limits
 from accelstudy.diagnosis.worth.next_positions import NextPosition, next_positions
 from accelstudy.diagnosis.worth.tilt import leveling_rms
-from accelstudy.progress import stage
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from accelstudy.adjustment.quality import Solution
 from accelstudy.adjustment.quality.whole_model import REFUTED
 from accelstudy.approaches import Approach, get_approach
-from accelstudy.campaign.format import Campaign
+from accelstudy.basics.progress import stage
+from accelstudy.campaign.files.format import Campaign
+from accelstudy.campaign.gross_errors.recognition import Recognised, recognise
 from accelstudy.diagnosis.base_fit import BaseFit
 from accelstudy.diagnosis.beside import Beside
 from accelstudy.diagnosis.decision.noise import NoiseJudge
@@ -25,9 +27,7 @@ from accelstudy.diagnosis.evidence.noise import NoiseTest
 from accelstudy.diagnosis.result import Diagnosis, Gap, Named, level_of_effects
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
 from accelstudy.diagnosis.worth.held_out import held_out
-from accelstudy.gross_errors.recognition import Recognised, recognise
-from accelstudy.progress import stage
-from accelstudy.sensor import SensorModel
+from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 

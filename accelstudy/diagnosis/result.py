@@ -10,7 +10,8 @@ import numpy as np
 from accelstudy.adjustment.quality import GlobalTest, Solution, global_test
 from accelstudy.adjustment.quality.whole_model import REFUTED
 from accelstudy.approaches import Approach
-from accelstudy.campaign.format import Campaign
+from accelstudy.campaign.files.format import Campaign
+from accelstudy.campaign.gross_errors.recognition import Recognised
 from accelstudy.diagnosis.beside import Beside
 from accelstudy.diagnosis.decision.explanations import Explanation
 from accelstudy.diagnosis.evidence.detection import Detection
@@ -20,8 +21,7 @@ from accelstudy.diagnosis.worth.changes import Change
 from accelstudy.diagnosis.worth.gap import HeldOutGap
 from accelstudy.diagnosis.worth.limits import UpperLimit
 from accelstudy.diagnosis.worth.next_positions import NextPosition
-from accelstudy.gross_errors.recognition import Recognised
-from accelstudy.sensor import SensorModel
+from accelstudy.sensors.sensor import SensorModel
 
 LEVEL_EFFECTS = 0.04
 """Level of the test for anything that is missing, where the noise level is not tested, too."""

@@ -13,14 +13,14 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from accelstudy.approaches import get_approach
-from accelstudy.campaign.format import write_campaign
-from accelstudy.campaign.simulating import CampaignSettings, simulate_campaign, write_truth
-from accelstudy.errors import InputError, UnknownNameError
-from accelstudy.models import get_model
-from accelstudy.names import check_path_name
-from accelstudy.study.config.errors import first_error
-from accelstudy.study.config.schema import Block
-from accelstudy.study.config.types import ModelName, Seed, Sessions
+from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.names import check_path_name
+from accelstudy.campaign.files.format import write_campaign
+from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign, write_truth
+from accelstudy.design.config_names import ModelName
+from accelstudy.files.types import Seed, Sessions
+from accelstudy.files.validation import Block, first_error
+from accelstudy.sensors.models import get_model
 
 
 def _known_settings(value: Any) -> Any:

@@ -5,6 +5,7 @@ Simulation, adjustment, sensitivity analysis and diagnosis evaluate or different
 definition. To add one, write a module next to this file with a class under `register`.
 """
 
+from accelstudy.basics.registry import Hyper, import_modules
 from accelstudy.effects.base import (
     Effect,
     Hold,
@@ -15,7 +16,6 @@ from accelstudy.effects.base import (
     register,
 )
 from accelstudy.effects.lag import Course
-from accelstudy.registry import Hyper, import_modules
 
 __all__ = [
     "Course",

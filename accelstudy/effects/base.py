@@ -22,9 +22,9 @@ from typing import Any, ClassVar, Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.registry import Shaped, ShapedRegistry
 from accelstudy.effects.lag import Course
-from accelstudy.errors import InputError, UnknownNameError
-from accelstudy.registry import Shaped, ShapedRegistry
 
 AXES = ("x", "y", "z")
 

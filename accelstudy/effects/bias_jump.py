@@ -1,8 +1,8 @@
 """Bias jump: the bias steps after a knock."""
 
+from accelstudy.basics.registry import Hyper
 from accelstudy.effects.base import Effect, after, per_axis, register
 from accelstudy.effects.step_times import step_times, times_between
-from accelstudy.registry import Hyper
 
 LEAST = 2
 """Holds on either side of a jump."""

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from accelstudy.basics.tracing import symbolic, symbols
+from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects.base import AXES, Effect, Hold, Matrix
 from accelstudy.effects.hold_symbols import HoldSymbols
-from accelstudy.tracing import symbolic, symbols
-from accelstudy.units import STANDARD_GRAVITY
 
 USUAL = (1e-4, 1e-3)
 """Parts of g by which an effect of usual size changes a reading."""

@@ -1,7 +1,7 @@
 """Encoder eccentricity: an angular error that repeats with each turn."""
 
+from accelstudy.basics.registry import Hyper
 from accelstudy.effects.base import Effect, Parameter, register
-from accelstudy.registry import Hyper
 
 
 @register

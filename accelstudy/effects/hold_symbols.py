@@ -6,8 +6,8 @@ from typing import Any
 
 import sympy as sp
 
+from accelstudy.basics.tracing import symbols
 from accelstudy.effects.base import Hold
-from accelstudy.tracing import symbols
 
 
 class HoldSymbols:

@@ -1,8 +1,8 @@
 """Mounting slip: the mounting of the sensor gives way once."""
 
+from accelstudy.basics.registry import Hyper
 from accelstudy.effects.base import Effect, after, per_axis, register
 from accelstudy.effects.step_times import step_times, times_between
-from accelstudy.registry import Hyper
 
 LEAST = 3
 """Holds on either side of a slip: two hardly show a rotation."""

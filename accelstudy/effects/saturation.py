@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from accelstudy.basics.registry import Hyper
+from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects.base import Effect, per_axis, register
-from accelstudy.registry import Hyper
-from accelstudy.units import STANDARD_GRAVITY
 
 FIRST = 0.25
 """Part of a stated range up to which a sensor does not saturate: who states one knows it so far."""

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from accelstudy.basics.registry import Hyper
 from accelstudy.effects.base import REFERENCE_TEMPERATURE, Effect, per_axis, register
-from accelstudy.registry import Hyper
 
 LAGS = (0.04, 0.1, 0.25)
 """Time constants of a lag that are tried, in parts of the session."""

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from accelstudy.basics.registry import Hyper
 from accelstudy.effects.base import Effect, per_axis, register
-from accelstudy.registry import Hyper
 
 
 @register

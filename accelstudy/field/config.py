@@ -8,15 +8,15 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from accelstudy.drawing.saving import save
+from accelstudy.drawing.style import DPI
 from accelstudy.field.figure import field_figure
 from accelstudy.field.shares import Use, field_shares
-from accelstudy.figures.saving import save
-from accelstudy.figures.style import DPI
+from accelstudy.files.tables import write_table
+from accelstudy.files.types import Angle, Number, OneOrMore, PathName
+from accelstudy.files.validation import Block
 from accelstudy.pole.case import SensorCase
 from accelstudy.pole.setup import quantities
-from accelstudy.study.config.schema import Block
-from accelstudy.study.config.types import Angle, Number, OneOrMore, PathName
-from accelstudy.study.tables import write_table
 
 USUAL = quantities()
 

@@ -12,11 +12,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from accelstudy.basics.units import MGON, display_unit, to_display
 from accelstudy.data_sheets import DataSheet
+from accelstudy.drawing.style import FULL, INK, STYLE, legend_columns, log_ticks, new_figure
 from accelstudy.field.shares import RESTART, Use, parts_of_variance
-from accelstudy.figures.style import FULL, INK, STYLE, legend_columns, log_ticks, new_figure
 from accelstudy.pole.sources import sources
-from accelstudy.units import MGON, display_unit, to_display
 
 Array = NDArray[np.float64]
 

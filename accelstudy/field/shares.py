@@ -16,12 +16,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from accelstudy.leveling import specific_force
-from accelstudy.leveling_shares import leveling_slope
+from accelstudy.basics.units import GON, MGON
+from accelstudy.leveling.angles import specific_force
+from accelstudy.leveling.sensitivity import FORCES, OUTPUTS
+from accelstudy.leveling.shapley import linear_shapley
+from accelstudy.leveling.shares import leveling_slope
 from accelstudy.pole.sensor import CalibratedSensor
-from accelstudy.sensitivity import FORCES, OUTPUTS
-from accelstudy.shapley import linear_shapley
-from accelstudy.units import GON, MGON
 
 Array = NDArray[np.float64]
 

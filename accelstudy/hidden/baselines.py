@@ -16,11 +16,11 @@ from scipy import stats
 
 from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
+from accelstudy.basics.errors import InputError
 from accelstudy.campaign import Campaign
-from accelstudy.campaign.fit import fit_campaign
+from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis, setting_of
-from accelstudy.errors import InputError
-from accelstudy.sensor import SensorModel
+from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 

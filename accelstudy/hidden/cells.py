@@ -14,8 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from accelstudy.basics.errors import InputError
 from accelstudy.effects import effect_names, get_effect
-from accelstudy.errors import InputError
+from accelstudy.files.outputs import whole_file
 from accelstudy.hidden.config import HiddenConfig
 from accelstudy.hidden.physics import (
     NOISES,
@@ -26,7 +27,6 @@ from accelstudy.hidden.physics import (
     visible_outside,
 )
 from accelstudy.hidden.physics.atlas import atlas
-from accelstudy.outputs import whole_file
 
 CHUNK = 800
 """Campaigns in one job: some minutes, beside which starting Python does not matter."""

@@ -9,14 +9,14 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
-from accelstudy.bounds import Range
+from accelstudy.basics.bounds import Range
+from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.design.config_names import ModelName
 from accelstudy.effects import effect_names
-from accelstudy.errors import InputError, UnknownNameError
+from accelstudy.files.types import OneOrMore, PathName, Positive, Replicates, Seed
+from accelstudy.files.validation import Block, first_error
 from accelstudy.hidden.physics import APPROACHES, DESIGNS, EFFECTS, GROSS, NOISES, OUTSIDE
-from accelstudy.models import get_model
-from accelstudy.study.config.errors import first_error
-from accelstudy.study.config.schema import Block
-from accelstudy.study.config.types import ModelName, OneOrMore, PathName, Positive, Replicates, Seed
+from accelstudy.sensors.models import get_model
 
 Names = OneOrMore[str]
 Sizes = OneOrMore[Positive]

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from accelstudy.diagnosis.decision.explanations import CREDIBLE
-from accelstudy.figures.style import (
+from accelstudy.drawing.style import (
     COLUMN,
     FULL,
     INK,

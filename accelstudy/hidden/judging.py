@@ -44,7 +44,7 @@ def judge(campaigns: pd.DataFrame) -> pd.DataFrame:
     Parameters
     ----------
     campaigns : DataFrame
-        Truths and outcomes side by side, as `accelstudy.hidden.run` writes them.
+        Truths and outcomes side by side, as `accelstudy.hidden.diagnosing` writes them.
 
     Returns
     -------

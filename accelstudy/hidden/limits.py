@@ -13,8 +13,8 @@ from accelstudy.hidden.cells import limit_cells
 from accelstudy.hidden.config import HiddenConfig
 from accelstudy.hidden.physics import generate
 from accelstudy.hidden.rates import with_intervals
-from accelstudy.models import get_model
-from accelstudy.sensor import SensorModel
+from accelstudy.sensors.models import get_model
+from accelstudy.sensors.sensor import SensorModel
 
 ALPHA = 0.001
 """Level of the tests of which the minimal detectable and identifiable sizes are."""

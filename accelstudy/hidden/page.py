@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from accelstudy.basics.wording import number
 from accelstudy.hidden.rates import ALL, share_of
-from accelstudy.study.report import number
 
 Tables = Mapping[str, pd.DataFrame]
 
@@ -21,7 +21,7 @@ def score_page(tables: Tables, seconds: pd.DataFrame, origin: Mapping[str, Any])
     ----------
     tables : those of `accelstudy.hidden.tables.TABLES`
     seconds : DataFrame, processor time of each diagnosis
-    origin : see `accelstudy.study.tables.origin`
+    origin : see `accelstudy.files.tables.origin`
     """
     campaigns = tables["campaigns"]
     each = seconds["seconds"]

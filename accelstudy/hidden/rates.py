@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from accelstudy.shares import clopper_pearson
+from accelstudy.basics.shares import clopper_pearson
 
 ALL = "all"
 """Stands in a column by which a share is not divided."""

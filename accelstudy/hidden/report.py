@@ -6,15 +6,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from accelstudy.figures.saving import save_all
+from accelstudy.drawing.saving import save_all
+from accelstudy.files.outputs import whole_file
+from accelstudy.files.tables import origin, read_table, write_table
 from accelstudy.hidden.config import HiddenConfig
 from accelstudy.hidden.figures import figures
 from accelstudy.hidden.limits import study_limits
 from accelstudy.hidden.page import score_page
 from accelstudy.hidden.score import score_tables
 from accelstudy.hidden.tables import TABLES
-from accelstudy.outputs import whole_file
-from accelstudy.study.tables import origin, read_table, write_table
 
 PARTS = ("truths", "outcomes", "baselines", "seconds")
 """Tables that the chunks write."""
@@ -33,7 +33,7 @@ def write_score(
     config : HiddenConfig
     inputs : paths of all chunks of each of `PARTS`
     outputs : paths of each of `accelstudy.hidden.tables.TABLES`, of page and figures (a folder)
-    provenance : see `accelstudy.study.tables.origin`
+    provenance : see `accelstudy.files.tables.origin`
     """
     parts = {name: read_table([*inputs[name]]) for name in PARTS}
     tables = score_tables(

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from accelstudy.basics.errors import InputError
 from accelstudy.effects import get_effect
-from accelstudy.errors import InputError
 from accelstudy.hidden.judging import all_true, judge, same_effects
 from accelstudy.hidden.limits import limit_table
 from accelstudy.hidden.rates import shares, with_intervals

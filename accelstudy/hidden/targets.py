@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from accelstudy.shares import clopper_pearson
-from accelstudy.study.report import number
+from accelstudy.basics.shares import clopper_pearson
+from accelstudy.basics.wording import number
 
 LARGE = 150.0
 """λ from which on physics outside the catalogue has to be seen as that."""

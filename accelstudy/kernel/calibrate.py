@@ -8,17 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.block import Block
-from accelstudy.adjustment.calibration import (
-    CalibrationEquations,
-    CalibrationProblem,
-    Observations,
-)
+from accelstudy.adjustment.calibration import CalibrationEquations, CalibrationProblem, Observations
 from accelstudy.adjustment.gauss_helmert import redundancy_of
 from accelstudy.approaches import Approach
 from accelstudy.kernel.adjustment import INTEGERS, NAME, POINTERS, KernelCode
 from accelstudy.kernel.compiled import Compiled
 from accelstudy.kernel.lanes import LANES
-from accelstudy.sensor import SensorModel
+from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 

@@ -199,4 +199,4 @@ _FUNCTIONS: dict[Any, Callable[..., Term]] = {
     sp.Max: _extreme("maximum"),
     sp.Min: _extreme("minimum"),
 }
-"""What `accelstudy.tracing.symbolic` has, and what its derivatives bring."""
+"""What `accelstudy.basics.tracing.symbolic` has, and what its derivatives bring."""

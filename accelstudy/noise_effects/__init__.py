@@ -3,13 +3,13 @@
 To add one, write a module next to this file with a class under `register`.
 """
 
+from accelstudy.basics.registry import import_modules
 from accelstudy.noise_effects.base import (
     NoiseEffect,
     get_noise_effect,
     noise_effect_names,
     register,
 )
-from accelstudy.registry import import_modules
 
 __all__ = ["NoiseEffect", "get_noise_effect", "noise_effect_names", "register"]
 

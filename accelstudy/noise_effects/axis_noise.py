@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from accelstudy.basics.registry import Hyper
 from accelstudy.effects import Hold
 from accelstudy.noise_effects.base import Array, NoiseEffect, register
-from accelstudy.registry import Hyper
 
 
 @register

@@ -13,8 +13,8 @@ from typing import ClassVar, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.basics.registry import Shaped, ShapedRegistry
 from accelstudy.effects import Hold
-from accelstudy.registry import Shaped, ShapedRegistry
 
 Array = NDArray[np.float64]
 

@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from accelstudy.basics.registry import Hyper
 from accelstudy.effects import Hold
 from accelstudy.noise_effects.base import Array, NoiseEffect, register
-from accelstudy.registry import Hyper
 
 
 def memory(lag: ArrayLike, tau: float) -> Array:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from accelstudy.basics.registry import Hyper
+from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.noise_effects.base import Array, NoiseEffect, register
-from accelstudy.registry import Hyper
-from accelstudy.units import STANDARD_GRAVITY
 
 
 @register

@@ -9,11 +9,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, Template
 
-from accelstudy.figures.saving import failure
-from accelstudy.outputs import whole_file
-from accelstudy.pages.glossary import explained
-from accelstudy.study.report import interval, number
-from accelstudy.units import (
+from accelstudy.basics.units import (
     GON,
     MGON,
     angle_note,
@@ -22,7 +18,10 @@ from accelstudy.units import (
     to_attitude,
     to_display,
 )
-from accelstudy.wording import joined, p_value, probability, words
+from accelstudy.basics.wording import interval, joined, number, p_value, probability, words
+from accelstudy.drawing.saving import failure
+from accelstudy.files.outputs import whole_file
+from accelstudy.pages.glossary import explained
 
 BADGES = {
     "accepted": ("✓ ACCEPTED", "good"),

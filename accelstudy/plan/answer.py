@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+from accelstudy.basics.progress import track
 from accelstudy.plan.candidates import Candidate, candidates, with_optimal
 from accelstudy.plan.question import ROBOT, Question
 from accelstudy.plan.simulated import Simulated, simulate, study_of
-from accelstudy.progress import track
 
 SHOWN = 8
 """Candidates in the table."""

@@ -11,13 +11,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.models import MODELS, get_model
+from accelstudy.basics.progress import stage, track
 from accelstudy.plan.question import Equipment, Question
 from accelstudy.plan.theory import Expected, Theory, theory_of
-from accelstudy.progress import stage, track
 from accelstudy.schemes import Scheme, get_scheme, scheme_names
-from accelstudy.sensor import SensorModel
-from accelstudy.simulation import Noise
+from accelstudy.sensors.models import MODELS, get_model
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.simulation.sessions import Noise
 
 Array = NDArray[np.float64]
 

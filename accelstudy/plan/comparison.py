@@ -8,18 +8,13 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from accelstudy.figures.style import (
-    FULL,
-    approach_colour,
-    log_ticks,
-    new_figure,
-)
+from accelstudy.basics.units import GON, MGON, display_unit, to_display
+from accelstudy.drawing.style import FULL, approach_colour, log_ticks, new_figure
 from accelstudy.plan.answer import by_time
 from accelstudy.plan.candidates import candidates
 from accelstudy.plan.question import Question
 from accelstudy.plan.sensors import get_sensor
 from accelstudy.plan.wording import model_words
-from accelstudy.units import GON, MGON, display_unit, to_display
 
 TILT_RANGE = 30 * GON
 HOLDS = (1.0, 10.0, 60.0)

@@ -7,13 +7,13 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import GON, MGON, parse_quantity
 from accelstudy.data_sheets import data_sheet_names, of_sigma
-from accelstudy.errors import InputError
+from accelstudy.files.types import OneOrMore, PathName, Replicates
+from accelstudy.files.validation import Block
 from accelstudy.plan.question import BY_HAND, ROBOT, Question
 from accelstudy.plan.sensors import get_sensor
-from accelstudy.study.config.schema import Block
-from accelstudy.study.config.types import OneOrMore, PathName, Replicates
-from accelstudy.units import GON, MGON, parse_quantity
 
 
 class PlanCase(Block):

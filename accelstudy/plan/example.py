@@ -9,10 +9,9 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, Field, ValidationError
 
-from accelstudy.errors import InputError
-from accelstudy.study.config.errors import first_error
-from accelstudy.study.config.schema import Block
-from accelstudy.study.config.types import PathName, Seed
+from accelstudy.basics.errors import InputError
+from accelstudy.files.types import PathName, Seed
+from accelstudy.files.validation import Block, first_error
 
 Section = TypeVar("Section", bound=BaseModel)
 

@@ -7,7 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from accelstudy.figures.style import (
+from accelstudy.basics.units import display_unit, quantity_text, to_display
+from accelstudy.drawing.style import (
     FULL,
     INK,
     approach_colour,
@@ -18,7 +19,6 @@ from accelstudy.figures.style import (
 from accelstudy.plan.answer import Answer, by_time
 from accelstudy.plan.candidates import Candidate
 from accelstudy.plan.simulated import Simulated
-from accelstudy.units import display_unit, quantity_text, to_display
 
 LABELS = {"gravity": "by hand, gravity alone", "robot": "with a robot"}
 

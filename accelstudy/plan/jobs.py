@@ -8,15 +8,15 @@ from typing import Any
 
 import matplotlib as mpl
 
-from accelstudy.errors import InputError
-from accelstudy.figures.saving import save
-from accelstudy.figures.style import DPI, STYLE
+from accelstudy.basics.errors import InputError
+from accelstudy.drawing.saving import save
+from accelstudy.drawing.style import DPI, STYLE
+from accelstudy.files.tables import write_table
 from accelstudy.plan.answer import answer
 from accelstudy.plan.comparison import front_figure, front_table
 from accelstudy.plan.config import PlanCase
 from accelstudy.plan.output import plan_files
 from accelstudy.plan.wording import unreachable
-from accelstudy.study.tables import write_table
 
 
 def make_plan(

@@ -11,7 +11,8 @@ import numpy as np
 import pandas as pd
 import yaml
 
-from accelstudy.outputs import PLAN, result_folder
+from accelstudy.basics.units import MGON
+from accelstudy.files.outputs import PLAN, result_folder
 from accelstudy.plan.advice import limits
 from accelstudy.plan.answer import Answer
 from accelstudy.plan.candidates import Candidate
@@ -22,7 +23,6 @@ from accelstudy.plan.wording import (
     reason_lines,
     table_lines,
 )
-from accelstudy.units import MGON
 
 STUDY_HEAD = """\
 # The simulated candidates of a plan as a study, made by `accelstudy plan`. It makes their numbers
@@ -62,14 +62,14 @@ def plan_files(
     ----------
     answer : Answer, that reaches its target
     folder : Path
-    provenance : see `accelstudy.study.tables.origin`
+    provenance : see `accelstudy.files.tables.origin`
     shown : Path, what the folder is called in what is written
     study : str, name of the study that makes the numbers again
     """
-    from accelstudy.figures.saving import save
-    from accelstudy.figures.style import DPI, STYLE
+    from accelstudy.drawing.saving import save
+    from accelstudy.drawing.style import DPI, STYLE
+    from accelstudy.files.tables import write_table
     from accelstudy.plan.figure import plan_figure
-    from accelstudy.study.tables import write_table
 
     write_table(folder / "plan.parquet", plan_table(answer), provenance)
     head = STUDY_HEAD.format(path=shown / "study.yaml")

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from accelstudy.basics.units import MGON
 from accelstudy.data_sheets import ASSUMED, DataSheet
 from accelstudy.effects import get_effect
 from accelstudy.schemes import Scheme, get_scheme, is_scheme_file
-from accelstudy.units import MGON
 
 HOLDS = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0)
 """Durations of a hold that are tried, s."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from accelstudy.basics.errors import InputError
 from accelstudy.data_sheets import DataSheet, get_data_sheet, read_data_sheet
-from accelstudy.errors import InputError
 
 LOGS = (".csv", ".txt", ".gz", ".mat", ".parquet", ".log", ".dat")
 

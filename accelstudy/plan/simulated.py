@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.block import joined
+from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY, recorded_unit, to_recorded
 from accelstudy.effects import get_effect
-from accelstudy.leveling_error import ATTITUDES
+from accelstudy.leveling.error import ATTITUDES
 from accelstudy.plan.candidates import Candidate
 from accelstudy.plan.question import Question
-from accelstudy.study.cells import Cell, study_cells
+from accelstudy.study.cells.cell import Cell, study_cells
 from accelstudy.study.config import parse_study
-from accelstudy.study.followed import cell_tilt_error
-from accelstudy.study.simulate import blocks
-from accelstudy.units import GON, MGON, STANDARD_GRAVITY, recorded_unit, to_recorded
+from accelstudy.study.monte_carlo.followed import cell_tilt_error
+from accelstudy.study.monte_carlo.simulate import blocks
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ the sizes p of what is neglected, the estimates are off by
     δx = (AᵀA)⁻¹Aᵀ (n + N p),        and what is neglected by −p,
 
 so that the mean square of the tilt error is tr(Q C), C the covariance of both together and Q the
-quadratic form of `accelstudy.leveling_error`.
+quadratic form of `accelstudy.leveling.error`.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from numpy.typing import NDArray
 from scipy.special import gammaincinv
 
 from accelstudy.approaches import get_approach
-from accelstudy.design import SINGULAR
+from accelstudy.design.estimability import SINGULAR
+from accelstudy.design.optimal.information import position_rows
 from accelstudy.effects import Hold, get_effect
-from accelstudy.leveling_error import ATTITUDES, cap_forces, tilt_error
-from accelstudy.models import get_model
-from accelstudy.optimal.information import position_rows
-from accelstudy.sensor import SensorModel
-from accelstudy.simulation import Noise
+from accelstudy.leveling.error import ATTITUDES, cap_forces, tilt_error
+from accelstudy.sensors.models import get_model
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.simulation.sessions import Noise
 
 Array = NDArray[np.float64]
 

@@ -8,25 +8,15 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from accelstudy.basics.units import angle_note, display_unit, quantity_text, to_display
+from accelstudy.basics.wording import joined, number, words
 from accelstudy.data_sheets import ASSUMED
 from accelstudy.effects import get_effect
-from accelstudy.plan.advice import (
-    PLAIN,
-    InUse,
-    Need,
-    Spoiler,
-    in_use,
-    limits,
-    needs,
-    spoilers,
-)
+from accelstudy.plan.advice import PLAIN, InUse, Need, Spoiler, in_use, limits, needs, spoilers
 from accelstudy.plan.answer import OTHER_CONFIDENCE, Answer, Ranked
 from accelstudy.plan.candidates import Candidate, shortest
 from accelstudy.plan.question import Equipment, Question
-from accelstudy.sensor import SensorModel
-from accelstudy.study.report import number
-from accelstudy.units import angle_note, display_unit, quantity_text, to_display
-from accelstudy.wording import joined, words
+from accelstudy.sensors.sensor import SensorModel
 
 VERDICTS = {
     "needed": "must be in the model",

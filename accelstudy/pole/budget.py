@@ -9,12 +9,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from accelstudy.basics.units import GON
 from accelstudy.pole.radius import radius
 from accelstudy.pole.sensor import CalibratedSensor
 from accelstudy.pole.setup import Setup
 from accelstudy.pole.situation import Situation
 from accelstudy.pole.sources import Source, sources
-from accelstudy.units import GON
 
 Array = NDArray[np.float64]
 

@@ -8,14 +8,14 @@ from typing import Any, Self
 from pydantic import Field, model_validator
 
 from accelstudy.approaches import get_approach
+from accelstudy.basics.errors import InputError
 from accelstudy.data_sheets import data_sheet_names, get_data_sheet
-from accelstudy.errors import InputError
-from accelstudy.frames import FRD, Frame
+from accelstudy.design.config_names import ModelName
+from accelstudy.files.validation import Block
 from accelstudy.pole.sensor import CalibratedSensor, from_calibration, from_linear_theory
 from accelstudy.pole.setup import HOLD, ROBOT_SIGMA, check_one_kind
 from accelstudy.schemes import get_scheme
-from accelstudy.study.config.schema import Block
-from accelstudy.study.config.types import ModelName
+from accelstudy.sensors.frames import FRD, Frame
 
 
 class SensorCase(Block):

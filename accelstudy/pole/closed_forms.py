@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from accelstudy.units import STANDARD_GRAVITY
+from accelstudy.basics.units import STANDARD_GRAVITY
 
 
 def of_force(

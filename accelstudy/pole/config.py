@@ -9,13 +9,13 @@ from typing import Any
 from pydantic import Field
 
 from accelstudy.data_sheets import get_data_sheet
-from accelstudy.frames import FRD, Frame, parse_frame
+from accelstudy.files.types import PathName, Replicates
+from accelstudy.files.validation import Block
 from accelstudy.pole.case import SensorCase
 from accelstudy.pole.output import PoleResult, write_pole
 from accelstudy.pole.sensor import CalibratedSensor, from_tilt_sigma
 from accelstudy.pole.setup import TILT_RANGE, TILT_SIGMA, setup_of
-from accelstudy.study.config.schema import Block
-from accelstudy.study.config.types import PathName, Replicates
+from accelstudy.sensors.frames import FRD, Frame, parse_frame
 
 
 class PoleCase(SensorCase):

@@ -7,10 +7,10 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from accelstudy.figures.style import FULL, INK, STYLE, legend_columns, log_ticks, new_figure
+from accelstudy.basics.units import GON, attitude_unit, to_attitude
+from accelstudy.drawing.style import FULL, INK, STYLE, legend_columns, log_ticks, new_figure
 from accelstudy.pole.budget import TOTAL, Budget
 from accelstudy.pole.sources import sources
-from accelstudy.units import GON, attitude_unit, to_attitude
 
 WIDEST = 1e4
 """Largest ratio of the largest error to the smallest that is shown."""

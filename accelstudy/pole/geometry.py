@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects.base import Number, Vector
-from accelstudy.units import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
 
@@ -68,7 +68,7 @@ def _about_down(v: Vector, angle: Number, xp: Any) -> Vector:
 
 @cache
 def _jacobian_function() -> Any:
-    from accelstudy.tracing import jacobian_of
+    from accelstudy.basics.tracing import jacobian_of
 
     return jacobian_of(foot, len(INPUTS))
 

@@ -11,17 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from accelstudy.figures.saving import save
-from accelstudy.figures.style import DPI
-from accelstudy.outputs import whole_file
+from accelstudy.basics.units import GON
+from accelstudy.drawing.saving import save
+from accelstudy.drawing.style import DPI
+from accelstudy.files.outputs import whole_file
+from accelstudy.files.tables import write_table
 from accelstudy.pole.budget import Budget, budget
 from accelstudy.pole.figure import budget_figure
 from accelstudy.pole.sensor import CalibratedSensor
 from accelstudy.pole.setup import Setup
 from accelstudy.pole.simulation import simulate
 from accelstudy.pole.statement import agreement, remarks, sentences, shown_tilts
-from accelstudy.study.tables import write_table
-from accelstudy.units import GON
 
 STEPS = 50
 """Steps of the tilt in the figure and in the table."""

@@ -9,22 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.approaches import get_approach
-from accelstudy.campaign.applying import read_calibration
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import STANDARD_GRAVITY, quantity_text
+from accelstudy.basics.wording import joined
+from accelstudy.campaign.use.applying import read_calibration
 from accelstudy.data_sheets import DataSheet
-from accelstudy.design import diagnose
+from accelstudy.design.estimability import diagnose
 from accelstudy.effects import Hold
 from accelstudy.effects.base import REFERENCE_TEMPERATURE
 from accelstudy.effects.lag import Course
-from accelstudy.errors import InputError
-from accelstudy.frames import FRD, Frame
-from accelstudy.hold_plan import check_needs_no_plan
-from accelstudy.leveling import roll_pitch
-from accelstudy.models import compose, get_model
+from accelstudy.leveling.angles import roll_pitch
 from accelstudy.schemes import get_scheme
-from accelstudy.sensor import SensorModel
-from accelstudy.simulation import Noise
-from accelstudy.units import STANDARD_GRAVITY, quantity_text
-from accelstudy.wording import joined
+from accelstudy.sensors.frames import FRD, Frame
+from accelstudy.sensors.models import compose, get_model
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.simulation.hold_plan import check_needs_no_plan
+from accelstudy.simulation.sessions import Noise
 
 Array = NDArray[np.float64]
 

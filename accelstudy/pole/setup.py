@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from dataclasses import Field, dataclass, field, fields
 from typing import Any
 
-from accelstudy.errors import InputError, UnknownNameError
-from accelstudy.units import parse_quantity
+from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.units import parse_quantity
 
 POLE, USE, ERRORS = "The pole", "Its use", "How well it is known (standard deviations)"
 """Sections of the quantities."""

@@ -6,12 +6,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from accelstudy.basics.units import GON, MGON
 from accelstudy.pole.budget import Budget, budget, situation_at
 from accelstudy.pole.sensor import CalibratedSensor
 from accelstudy.pole.setup import Setup
 from accelstudy.pole.situation import Situation
 from accelstudy.pole.sources import sources
-from accelstudy.units import GON, MGON
 
 Array = NDArray[np.float64]
 

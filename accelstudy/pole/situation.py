@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.effects import Hold
-from accelstudy.leveling import jacobian as leveling_jacobian
-from accelstudy.leveling import roll_pitch
+from accelstudy.leveling.angles import jacobian as leveling_jacobian
+from accelstudy.leveling.angles import roll_pitch
 from accelstudy.pole.geometry import INPUTS, foot, jacobian, leaning
 from accelstudy.pole.sensor import CalibratedSensor
 from accelstudy.pole.setup import Setup

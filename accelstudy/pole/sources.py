@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.basics.registry import Registry
 from accelstudy.pole.bending import flexibility
 from accelstudy.pole.situation import FORCE, PARAMETERS, Situation
-from accelstudy.registry import Registry
 
 Array = NDArray[np.float64]
 

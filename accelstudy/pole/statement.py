@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from accelstudy.basics.units import GON, attitude_unit, quantity_text, to_attitude
+from accelstudy.basics.wording import joined, words
 from accelstudy.pole.budget import Budget
 from accelstudy.pole.sensor import COEFFICIENTS
 from accelstudy.pole.sources import sources
-from accelstudy.units import GON, attitude_unit, quantity_text, to_attitude
-from accelstudy.wording import joined, words
 
 BEYOND_CHANCE = 4.0
 """Standard errors of the Monte Carlo beyond which linear theory is said to be wrong."""

@@ -3,7 +3,7 @@
 To add one, write a module next to this file with a function under `register`.
 """
 
-from accelstudy.registry import import_modules
+from accelstudy.basics.registry import import_modules
 from accelstudy.schemes.files import is_scheme_file
 from accelstudy.schemes.registry import (
     Scheme,

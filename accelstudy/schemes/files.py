@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from accelstudy.errors import InputError, UnknownNameError
-from accelstudy.names import check_path_name
+from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.names import check_path_name
 from accelstudy.schemes.registry import Scheme
 
 KEYS = ("scheme", "title", "source", "directions", "positions", "design")
@@ -38,7 +38,7 @@ def scheme_of_file(path: str | Path) -> Scheme:
     InputError
         One line that names the file, the key, what is wrong and what would be right.
     """
-    from accelstudy.study.config.layers import read_layer  # its package needs all schemes
+    from accelstudy.files.layers import read_layer  # its package needs all schemes
 
     content = read_layer(path)
     try:

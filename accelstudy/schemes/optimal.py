@@ -49,10 +49,10 @@ def i_optimal(n: int) -> Array:
 def _optimal(n: int, criterion: str) -> Array:
     # Only these schemes need models and their adjustment, which need schemes themselves.
     from accelstudy.approaches import get_approach
-    from accelstudy.models import get_model
-    from accelstudy.optimal.criteria import get_criterion
-    from accelstudy.optimal.search import optimal_design
-    from accelstudy.optimal.task import Task
+    from accelstudy.design.optimal.criteria import get_criterion
+    from accelstudy.design.optimal.search import optimal_design
+    from accelstudy.design.optimal.task import Task
+    from accelstudy.sensors.models import get_model
 
     task = Task(get_model(MODEL), get_approach("gravity"))
     return optimal_design(task, get_criterion(criterion, task), n, bounded=False).directions

@@ -13,7 +13,7 @@ from typing import Literal, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from accelstudy.errors import InputError
+from accelstudy.basics.errors import InputError
 
 Array = NDArray[np.float64]
 Status = Literal["exact", "standard", "stand-in", "generated"]

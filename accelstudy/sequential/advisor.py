@@ -8,17 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.approaches import Approach
-from accelstudy.campaign.fit import (
+from accelstudy.basics.errors import InputError
+from accelstudy.campaign.calibration.fit import (
     campaign_noise,
     campaign_observations,
     check_campaign,
     initial_values,
 )
-from accelstudy.campaign.format import Campaign
-from accelstudy.design import is_blind
-from accelstudy.errors import InputError
-from accelstudy.leveling_error import TiltError
-from accelstudy.sensor import SensorModel
+from accelstudy.campaign.files.format import Campaign
+from accelstudy.design.estimability import is_blind
+from accelstudy.leveling.error import TiltError
+from accelstudy.sensors.sensor import SensorModel
 from accelstudy.sequential.advice import Advice, Agreement, NextPosition, NoiseTaken
 from accelstudy.sequential.chooser import Chooser
 from accelstudy.sequential.choosing import typical_sizes

@@ -7,10 +7,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.errors import InputError, UnknownNameError
-from accelstudy.optimal.constraints import Constraint, Constraints, OffPole, PitchRange, RollRange
-from accelstudy.optimal.spaces import by_eye, cube, listed_in
-from accelstudy.units import GON
+from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.units import GON
+from accelstudy.design.optimal.constraints import (
+    Constraint,
+    Constraints,
+    OffPole,
+    PitchRange,
+    RollRange,
+)
+from accelstudy.design.optimal.spaces import by_eye, cube, listed_in
 
 Array = NDArray[np.float64]
 

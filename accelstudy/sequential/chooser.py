@@ -7,13 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.leveling_error import TiltError
+from accelstudy.leveling.error import TiltError
 from accelstudy.sequential.attitudes import apart_from
-from accelstudy.sequential.choosing import (
-    best,
-    gain_of_leveling,
-    gain_of_parameters,
-)
+from accelstudy.sequential.choosing import best, gain_of_leveling, gain_of_parameters
 from accelstudy.sequential.promise import Promise, rms_of
 from accelstudy.sequential.stopping import get_rule
 

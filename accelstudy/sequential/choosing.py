@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.sensor import SensorModel
+from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 

@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment import Observations, whitened_jacobian
 from accelstudy.approaches import Approach
-from accelstudy.campaign.format import Campaign
+from accelstudy.campaign.files.format import Campaign
 from accelstudy.effects import Hold
 from accelstudy.effects.base import REFERENCE_TEMPERATURE
-from accelstudy.leveling import roll_pitch
-from accelstudy.sensor import SensorModel
-from accelstudy.simulation import Noise
+from accelstudy.leveling.angles import roll_pitch
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.simulation.sessions import Noise
 
 Array = NDArray[np.float64]
 

@@ -7,13 +7,13 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from accelstudy.approaches import get_approach
-from accelstudy.errors import InputError
-from accelstudy.hold_plan import check_needs_no_plan
-from accelstudy.models import get_model
+from accelstudy.basics.errors import InputError
+from accelstudy.files.types import OneOrMore, Positive
+from accelstudy.files.validation import Block
 from accelstudy.schemes import get_scheme
+from accelstudy.sensors.models import get_model
 from accelstudy.sequential.stopping import get_rule
-from accelstudy.study.config.schema import Block
-from accelstudy.study.config.types import OneOrMore, Positive
+from accelstudy.simulation.hold_plan import check_needs_no_plan
 
 
 class SequentialConfig(Block):

@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator
 
-from accelstudy.figures.style import FULL, INK, MM, STYLE, approach_colour, approach_marker
+from accelstudy.basics.units import attitude_unit, display_unit, to_attitude, to_display
+from accelstudy.drawing.style import FULL, INK, MM, STYLE, approach_colour, approach_marker
 from accelstudy.schemes import get_scheme
-from accelstudy.units import attitude_unit, display_unit, to_attitude, to_display
 
 NAMES = {
     "known": "noise known",

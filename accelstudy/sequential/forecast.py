@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.design import rank_of
+from accelstudy.design.estimability import rank_of
 from accelstudy.sequential.chooser import Chooser
 
 Array = NDArray[np.float64]

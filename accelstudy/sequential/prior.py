@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from accelstudy.errors import InputError
-from accelstudy.sensor import SensorModel
+from accelstudy.basics.errors import InputError
+from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import Hold
-from accelstudy.leveling_error import ATTITUDES, TiltError, cap_forces, holds_in_use, tilt_error
-from accelstudy.sensor import SensorModel
-from accelstudy.units import STANDARD_GRAVITY
+from accelstudy.leveling.error import ATTITUDES, TiltError, cap_forces, holds_in_use, tilt_error
+from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 

@@ -20,8 +20,8 @@ from accelstudy.adjustment import Observations
 from accelstudy.adjustment.calibration import CalibrationProblem
 from accelstudy.adjustment.gauss_helmert import MAX_ITERATIONS, ROUNDING, Whitened, whitened
 from accelstudy.approaches import Approach
-from accelstudy.design import rank_of
-from accelstudy.sensor import SensorModel
+from accelstudy.design.estimability import rank_of
+from accelstudy.sensors.sensor import SensorModel
 from accelstudy.sequential.linearised import (
     no_conditions,
     of_sessions,

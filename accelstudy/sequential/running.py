@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from accelstudy.campaign.format import (
+from accelstudy.basics.errors import InputError
+from accelstudy.campaign.files.format import (
     Campaign,
     campaign_of,
     parse_table,
@@ -15,9 +16,8 @@ from accelstudy.campaign.format import (
     read_header,
     table_of,
 )
-from accelstudy.campaign.header import HEADER, Header
-from accelstudy.campaign.position_files import columns_of, ignored_in
-from accelstudy.errors import InputError
+from accelstudy.campaign.files.header import HEADER, Header
+from accelstudy.campaign.files.position_files import columns_of, ignored_in
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,8 @@ def read_running(folder: str | Path, settled: str = "") -> Running:
     Raises
     ------
     InputError
-        As `accelstudy.campaign.format.read_campaign`, but not for positions that are not there yet.
+        As `accelstudy.campaign.files.format.read_campaign`, but not for positions that are not
+        there yet.
     """
     folder = Path(folder)
     if not folder.is_dir():

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from accelstudy.adjustment import Observations
 from accelstudy.adjustment.quality import global_test, suspects
 from accelstudy.approaches import Approach
-from accelstudy.errors import InputError
-from accelstudy.sensor import SensorModel
+from accelstudy.basics.errors import InputError
+from accelstudy.sensors.sensor import SensorModel
 from accelstudy.sequential.advice import Agreement, LastPosition
 from accelstudy.sequential.attitudes import apart_from
 from accelstudy.sequential.prior import NOTHING_KNOWN, Prior

@@ -13,22 +13,22 @@ from scipy import special
 
 from accelstudy.adjustment import Observations
 from accelstudy.approaches import Approach, get_approach
-from accelstudy.design import diagnose
-from accelstudy.errors import InputError
-from accelstudy.leveling import roll_pitch
-from accelstudy.leveling_error import TiltError, tilt_error
-from accelstudy.models import get_model
-from accelstudy.optimal.information import position_rows
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
+from accelstudy.design.estimability import diagnose
+from accelstudy.design.optimal.information import position_rows
+from accelstudy.leveling.angles import roll_pitch
+from accelstudy.leveling.error import TiltError, tilt_error
 from accelstudy.schemes import get_scheme
-from accelstudy.sensor import SensorModel
+from accelstudy.sensors.models import get_model
+from accelstudy.sensors.sensor import SensorModel
 from accelstudy.sequential.attitudes import DEFAULTS, candidates
 from accelstudy.sequential.chooser import Chooser
 from accelstudy.sequential.choosing import typical_sizes
 from accelstudy.sequential.config import SequentialConfig
 from accelstudy.sequential.promise import Promise, rms_of
 from accelstudy.sequential.recursion import Recursion
-from accelstudy.simulation import Noise
-from accelstudy.units import GON, MGON, STANDARD_GRAVITY
+from accelstudy.simulation.sessions import Noise
 
 Array = NDArray[np.float64]
 

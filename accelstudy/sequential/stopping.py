@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
-from accelstudy.errors import UnknownNameError
+from accelstudy.basics.errors import UnknownNameError
 
 Array = NDArray[np.float64]
 

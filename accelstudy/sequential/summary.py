@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from accelstudy.basics.shares import clopper_pearson
 from accelstudy.schemes import get_scheme
 from accelstudy.sequential.simulated import SetUp
-from accelstudy.shares import clopper_pearson
 
 ROUNDING = 1e-9
 CENTRAL = (0.05, 0.5, 0.95)

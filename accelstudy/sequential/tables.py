@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from accelstudy.progress import track
+from accelstudy.basics.progress import track
 from accelstudy.sequential.config import SequentialConfig
 from accelstudy.sequential.simulated import SetUp, simulate
 from accelstudy.sequential.summary import identity, summarise

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from accelstudy.campaign.format import Campaign
-from accelstudy.campaign.header import COLUMNS
-from accelstudy.errors import InputError
+from accelstudy.basics.errors import InputError
+from accelstudy.campaign.files.format import Campaign
+from accelstudy.campaign.files.header import COLUMNS
 from accelstudy.sequential.running import read_running
 
 SETTLED = 3

@@ -8,19 +8,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.campaign.format import Campaign
-from accelstudy.campaign.wording import counted
+from accelstudy.basics.suggested import calibrate
+from accelstudy.basics.units import attitude_unit, quantity_text, to_attitude
+from accelstudy.basics.wording import counted, joined, p_value, words
+from accelstudy.campaign.files.format import Campaign
 from accelstudy.effects import Effect
-from accelstudy.frames import FRD, Frame
-from accelstudy.leveling import roll_pitch
-from accelstudy.models import compose
-from accelstudy.sensor import SensorModel
+from accelstudy.leveling.angles import roll_pitch
+from accelstudy.sensors.frames import FRD, Frame
+from accelstudy.sensors.models import compose
+from accelstudy.sensors.sensor import SensorModel
 from accelstudy.sequential.advice import Advice, Agreement
 from accelstudy.sequential.promise import Promise
 from accelstudy.sequential.stopping import LEAST_REDUNDANCY
-from accelstudy.suggested import calibrate
-from accelstudy.units import attitude_unit, quantity_text, to_attitude
-from accelstudy.wording import joined, p_value, words
 
 Array = NDArray[np.float64]
 

@@ -3,7 +3,7 @@
 To add one, write a module next to this file with a class under `register`.
 """
 
-from accelstudy.registry import import_modules
+from accelstudy.basics.registry import import_modules
 from ways.base import WAYS
 
 __all__ = ["WAYS"]

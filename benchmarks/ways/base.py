@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
-from accelstudy.registry import Registry
+from accelstudy.basics.registry import Registry
 
 
 class Way(ABC):

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from accelstudy.units import STANDARD_GRAVITY
+from accelstudy.basics.units import STANDARD_GRAVITY
 from problem import NOISE
 from processes import scratch
 from ways.base import Way, register

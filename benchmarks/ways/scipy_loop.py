@@ -7,8 +7,8 @@ Levenberg-Marquardt does the rest.
 import numpy as np
 from scipy.optimize import least_squares
 
-from accelstudy.leveling import specific_force
-from accelstudy.units import STANDARD_GRAVITY
+from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.leveling.angles import specific_force
 from problem import NOISE
 from ways.base import Way, register
 

@@ -2,21 +2,23 @@ from functools import cache
 
 from snakemake.exceptions import WorkflowError
 
-from accelstudy.errors import InputError
-from accelstudy.figures import (
+from accelstudy.basics.errors import InputError
+from accelstudy.study.figures import (
     angle_unit,
     caption_notes,
     figure_names,
     figure_tables,
     get_figure,
 )
-from accelstudy.study.batches import batches
-from accelstudy.study.cells import study_cells
-from accelstudy.study.config import parse_study, read_layer
-from accelstudy.study.effort import study_effort
-from accelstudy.study.job import setup_digest
-from accelstudy.study.provenance import check_writable, code_hash
-from accelstudy.study.tables import TABLES
+from accelstudy.study.cells.batches import batches
+from accelstudy.study.cells.cell import study_cells
+from accelstudy.study.config import parse_study
+from accelstudy.files.layers import read_layer
+from accelstudy.study.cells.effort import study_effort
+from accelstudy.jobs.job import setup_digest
+from accelstudy.files.provenance import check_writable
+from accelstudy.jobs.code import code_hash
+from accelstudy.study.results.estimates import TABLES
 
 try:
     for path in workflow.configfiles:

@@ -1,4 +1,4 @@
-from accelstudy.optimal.config import DesignsConfig
+from accelstudy.design.proposal.config import DesignsConfig
 
 DESIGNS = section("designs", DesignsConfig)
 DESIGNS_FILES = {kind: f"{RESULTS}/designs/efficiency.{kind}" for kind in ("parquet", "svg", "png")}
@@ -22,7 +22,7 @@ rule designs:
         section=EXAMPLE.designs,
         read=DESIGNS.model_dump(),
         provenance=PROVENANCE,
-        code=code_hash("planning"),
+        code=code_hash(workflow.source_path("../scripts/designs.py")),
     message:
         "Compare schemes with the best there can be"
     script:

@@ -20,7 +20,7 @@ rule field:
     params:
         case=lambda wildcards: FIELD[wildcards.case].model_dump(exclude_unset=True),
         provenance=PROVENANCE,
-        code=code_hash("planning"),
+        code=code_hash(workflow.source_path("../scripts/field.py")),
     message:
         "Share out the variance of roll and pitch in use: {wildcards.case}"
     script:

@@ -16,7 +16,7 @@ rule figures:
         figures=CELL_FIGURES,
         study=STUDY.model_dump(mode="json"),
         notes=caption_notes(CELL_FIGURES, STUDY),
-        code=code_hash("figures"),
+        code=code_hash(workflow.source_path("../scripts/figures.py")),
     message:
         "Draw the figures of the cells"
     script:
@@ -36,6 +36,6 @@ use rule figures as sensitivity_figures with:
         figures=SENSITIVITY_FIGURES,
         study=STUDY.model_dump(mode="json"),
         notes=caption_notes(SENSITIVITY_FIGURES, STUDY),
-        code=code_hash("figures"),
+        code=code_hash(workflow.source_path("../scripts/figures.py")),
     message:
         "Draw the figures of sensitivity"

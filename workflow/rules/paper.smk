@@ -15,7 +15,7 @@ rule sensitivity:
     params:
         settings=STUDY.sensitivity.model_dump() if STUDY.sensitivity else None,
         sensor=STUDY.model_dump(include={"seed", "gravity_mps2", "noise", "sensor"}),
-        code=code_hash("sensitivity"),
+        code=code_hash(workflow.source_path("../scripts/sensitivity.py")),
     message:
         "Analyse what roll and pitch depend on"
     script:
@@ -45,7 +45,7 @@ rule claims:
     resources:
         mem_mb=1000,
     params:
-        code=code_hash("claims"),
+        code=code_hash(workflow.source_path("../scripts/claims.py")),
     message:
         "Judge the paper's claims"
     script:

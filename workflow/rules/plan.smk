@@ -23,7 +23,7 @@ rule plan:
         replicates=PLAN.replicates,
         folder=lambda wildcards: f"{RESULTS}/plan/cases/{wildcards.plan}",
         provenance=PROVENANCE,
-        code=code_hash("planning"),
+        code=code_hash(workflow.source_path("../scripts/plan.py")),
     message:
         "Plan {wildcards.plan}"
     script:
@@ -45,7 +45,7 @@ rule plan_sensors:
     params:
         sensors=PLAN.chosen_sensors,
         provenance=PROVENANCE,
-        code=code_hash("planning"),
+        code=code_hash(workflow.source_path("../scripts/plan_sensors.py")),
     message:
         "Compare the sensors"
     script:

@@ -26,7 +26,7 @@ rule pole:
     params:
         case=lambda wildcards: POLES[wildcards.pole].model_dump(exclude_unset=True),
         provenance=PROVENANCE,
-        code=code_hash("planning"),
+        code=code_hash(workflow.source_path("../scripts/pole.py")),
     message:
         "Work out the pole {wildcards.pole}"
     script:

@@ -1,9 +1,10 @@
 from snakemake.exceptions import WorkflowError
 
-from accelstudy.errors import InputError
+from accelstudy.basics.errors import InputError
 from accelstudy.plan.example import parse_example, parse_section
-from accelstudy.study.config import read_layer
-from accelstudy.study.provenance import check_writable, code_hash
+from accelstudy.files.layers import read_layer
+from accelstudy.files.provenance import check_writable
+from accelstudy.jobs.code import code_hash
 
 SOURCE = ", ".join(map(str, workflow.configfiles)) or "config"
 

@@ -21,7 +21,7 @@ rule sequential_sessions:
     params:
         config=SEQUENTIAL.model_dump(mode="json"),
         provenance=PROVENANCE,
-        code=code_hash("planning"),
+        code=code_hash(workflow.source_path("../scripts/sequential_sessions.py")),
     message:
         "Simulate sessions that choose their positions: {wildcards.approach}"
     script:
@@ -47,7 +47,7 @@ rule sequential:
     params:
         config=SEQUENTIAL.model_dump(mode="json"),
         provenance=PROVENANCE,
-        code=code_hash("planning"),
+        code=code_hash(workflow.source_path("../scripts/sequential_summary.py")),
     message:
         "Sum up how many positions a promised accuracy takes, and whether it is kept"
     script:

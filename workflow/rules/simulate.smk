@@ -10,7 +10,7 @@ rule simulate:
         mem_mb=MEMORY,
     params:
         spec=lambda wildcards: part_spec(wildcards.part),
-        code=code_hash("simulate"),
+        code=code_hash(workflow.source_path("../scripts/simulate.py")),
     message:
         "Simulate and calibrate batch {wildcards.part}"
     script:

@@ -16,7 +16,7 @@ rule summarise:
         },
         setups=lambda wildcards: [setup_of(part) for part in PARTS_OF[wildcards.batch]],
         leveling=STUDY.leveling.model_dump(),
-        code=code_hash("summarise"),
+        code=code_hash(workflow.source_path("../scripts/summarise.py")),
     message:
         "Summarise batch {wildcards.batch}"
     script:
@@ -36,7 +36,7 @@ rule collect:
     resources:
         mem_mb=1000,
     params:
-        code=code_hash("summarise"),
+        code=code_hash(workflow.source_path("../scripts/collect.py")),
     message:
         "Collect the tables of all batches"
     script:

@@ -1,10 +1,10 @@
 import logging
 import os
 
-from accelstudy.campaign.batch import run_task
-from accelstudy.campaign.batch_config import Task
-from accelstudy.study.job import logged
-from accelstudy.units import ANGLE_UNIT_VARIABLE, angles_in
+from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, angles_in
+from accelstudy.campaign.batch.config import Task
+from accelstudy.campaign.batch.run import run_task
+from accelstudy.jobs.job import logged
 
 with logged(snakemake), angles_in(os.environ.get(ANGLE_UNIT_VARIABLE)):
     error = run_task(

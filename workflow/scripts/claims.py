@@ -1,6 +1,6 @@
-from accelstudy.study.analysis import judge_claims
+from accelstudy.jobs.job import job, lists
 from accelstudy.study.config import parse_study
-from accelstudy.study.job import job, lists
+from accelstudy.study.results.judging import judge_claims
 
 with job(snakemake) as provenance:
     study = parse_study(snakemake.config)

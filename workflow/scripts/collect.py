@@ -1,5 +1,5 @@
-from accelstudy.study.job import job, lists
-from accelstudy.study.tables import collect
+from accelstudy.files.tables import collect
+from accelstudy.jobs.job import job, lists
 
 with job(snakemake) as provenance:
     for table, parts in lists(snakemake.input).items():

@@ -1,11 +1,11 @@
-from accelstudy.figures.saving import save
-from accelstudy.figures.style import DPI
-from accelstudy.optimal.config import DesignsConfig
-from accelstudy.optimal.efficiency import efficiency_table
-from accelstudy.optimal.figure import efficiency_figure
+from accelstudy.design.proposal.config import DesignsConfig
+from accelstudy.design.proposal.efficiency import efficiency_table
+from accelstudy.design.proposal.figure import efficiency_figure
+from accelstudy.drawing.saving import save
+from accelstudy.drawing.style import DPI
+from accelstudy.files.tables import write_table
+from accelstudy.jobs.job import logged
 from accelstudy.schemes import get_scheme
-from accelstudy.study.job import logged
-from accelstudy.study.tables import write_table
 
 with logged(snakemake):
     config = DesignsConfig.model_validate(snakemake.params.section)

@@ -1,10 +1,10 @@
 import logging
 import os
 
+from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, angles_in
 from accelstudy.diagnosis.report.output import diagnose_folder
 from accelstudy.diagnosis.report.wording import verdict_lines
-from accelstudy.study.job import logged
-from accelstudy.units import ANGLE_UNIT_VARIABLE, angles_in
+from accelstudy.jobs.job import logged
 
 with logged(snakemake), angles_in(os.environ.get(ANGLE_UNIT_VARIABLE)):
     diagnosis = diagnose_folder(

@@ -1,7 +1,7 @@
 from pathlib import Path
 
 from accelstudy.field.config import FieldCase
-from accelstudy.study.job import logged
+from accelstudy.jobs.job import logged
 
 with logged(snakemake):
     case = FieldCase.model_validate(snakemake.params.case)

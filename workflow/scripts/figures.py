@@ -1,8 +1,8 @@
 from pathlib import Path
 
-from accelstudy.study.analysis import draw_figures
+from accelstudy.jobs.job import job
 from accelstudy.study.config import parse_study
-from accelstudy.study.job import job
+from accelstudy.study.results.figure_files import draw_figures
 
 with job(snakemake):
     draw_figures(

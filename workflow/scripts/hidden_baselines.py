@@ -1,7 +1,7 @@
 from accelstudy.hidden.cells import planned
+from accelstudy.hidden.comparing import run_baselines
 from accelstudy.hidden.config import parse_hidden
-from accelstudy.hidden.run import run_baselines
-from accelstudy.study.job import logged
+from accelstudy.jobs.job import logged
 
 with logged(snakemake):
     run_baselines(

@@ -1,7 +1,7 @@
 from accelstudy.hidden.cells import planned
 from accelstudy.hidden.config import parse_hidden
-from accelstudy.hidden.run import run_chunk
-from accelstudy.study.job import logged
+from accelstudy.hidden.diagnosing import run_chunk
+from accelstudy.jobs.job import logged
 
 with logged(snakemake):
     run_chunk(

@@ -1,6 +1,6 @@
 from accelstudy.hidden.config import parse_hidden
 from accelstudy.hidden.report import write_score
-from accelstudy.study.job import logged
+from accelstudy.jobs.job import logged
 
 with logged(snakemake):
     page = write_score(

@@ -1,9 +1,9 @@
 import os
 
-from accelstudy.campaign.batch_config import parse_batch
-from accelstudy.campaign.overview import counts, summarise_batch
-from accelstudy.study.job import logged
-from accelstudy.units import ANGLE_UNIT_VARIABLE, angles_in
+from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, angles_in
+from accelstudy.campaign.batch.config import parse_batch
+from accelstudy.campaign.batch.overview import counts, summarise_batch
+from accelstudy.jobs.job import logged
 
 with logged(snakemake), angles_in(os.environ.get(ANGLE_UNIT_VARIABLE)):
     batch = parse_batch(snakemake.config)

@@ -1,7 +1,7 @@
 from pathlib import Path
 
+from accelstudy.jobs.job import logged
 from accelstudy.pole.config import PoleCase
-from accelstudy.study.job import logged
 
 with logged(snakemake):
     case = PoleCase.model_validate(snakemake.params.case)

@@ -1,5 +1,5 @@
-from accelstudy.campaign.public import record_public
-from accelstudy.study.job import logged
+from accelstudy.campaign.importing.public import record_public
+from accelstudy.jobs.job import logged
 
 with logged(snakemake):
     record_public(

@@ -1,6 +1,6 @@
-from accelstudy.study.analysis import analyse_sensitivity, analyse_shapley
+from accelstudy.jobs.job import job
 from accelstudy.study.config import parse_study
-from accelstudy.study.job import job
+from accelstudy.study.results.sensitivity import analyse_sensitivity, analyse_shapley
 
 with job(snakemake) as provenance:
     study = parse_study(snakemake.config)

@@ -1,6 +1,6 @@
-from accelstudy.campaign.simulating import CampaignSettings
+from accelstudy.campaign.simulated.campaign import CampaignSettings
 from accelstudy.diagnosis.round_trip import write_simulated
-from accelstudy.study.job import logged
+from accelstudy.jobs.job import logged
 
 with logged(snakemake):
     write_simulated(

@@ -1,9 +1,6 @@
 """Quality of a calibration: tests, redundancy, reliability, held-out errors, components."""
 
-from accelstudy.adjustment.quality.components import (
-    VarianceComponents,
-    variance_components,
-)
+from accelstudy.adjustment.quality.components import VarianceComponents, variance_components
 from accelstudy.adjustment.quality.positions import (
     PositionTests,
     Suspect,

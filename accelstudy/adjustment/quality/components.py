@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from accelstudy.adjustment.calibration import Observations
 from accelstudy.adjustment.quality.solution import Solution, solve
 from accelstudy.approaches import Approach
-from accelstudy.sensor import SensorModel
+from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from scipy import special
 from accelstudy.adjustment.calibration import Observations
 from accelstudy.adjustment.quality.solution import Solution, solve
 from accelstudy.approaches import Approach
-from accelstudy.sensor import SensorModel
+from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 

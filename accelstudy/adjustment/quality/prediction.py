@@ -8,15 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.calibration import CalibrationProblem, Observations
-from accelstudy.adjustment.gauss_helmert import (
-    ConditionEquations,
-    Linearisation,
-    adjust,
-)
+from accelstudy.adjustment.gauss_helmert import ConditionEquations, Linearisation, adjust
 from accelstudy.adjustment.quality.solution import Solution, solve
 from accelstudy.approaches import Approach
-from accelstudy.leveling import roll_pitch
-from accelstudy.sensor import SensorModel
+from accelstudy.leveling.angles import roll_pitch
+from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from scipy import special
 
 from accelstudy.adjustment.quality.solution import Solution
+from accelstudy.basics.units import GON
 from accelstudy.effects import Hold
 from accelstudy.effects.base import REFERENCE_TEMPERATURE
-from accelstudy.leveling import jacobian, roll_pitch
-from accelstudy.leveling_error import cap_forces
-from accelstudy.units import GON
+from accelstudy.leveling.angles import jacobian, roll_pitch
+from accelstudy.leveling.error import cap_forces
 
 Array = NDArray[np.float64]
 

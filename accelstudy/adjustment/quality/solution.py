@@ -24,12 +24,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.calibration import CalibrationProblem, Observations, calibrate
-from accelstudy.adjustment.gauss_helmert import (
-    Adjustment,
-)
+from accelstudy.adjustment.gauss_helmert import Adjustment
 from accelstudy.approaches import Approach
-from accelstudy.errors import InputError
-from accelstudy.sensor import SensorModel
+from accelstudy.basics.errors import InputError
+from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 

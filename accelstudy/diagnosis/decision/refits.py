@@ -9,12 +9,12 @@ from itertools import product
 import numpy as np
 
 from accelstudy.adjustment.quality import Solution, solve
+from accelstudy.basics.errors import InputError
 from accelstudy.diagnosis.space.hypotheses import Hypothesis, Setting, Shapes
 from accelstudy.diagnosis.space.refinement import shaped as reshaped
 from accelstudy.diagnosis.space.refinement import strongest
-from accelstudy.errors import InputError
-from accelstudy.models import composition_name
-from accelstudy.sensor import SensorModel
+from accelstudy.sensors.models import composition_name
+from accelstudy.sensors.sensor import SensorModel
 
 SAME = 0.5
 """Difference of Ω within which two fits are equally good."""

@@ -23,12 +23,7 @@ from accelstudy.diagnosis.evidence.field import UNKNOWN, Field, shape_weights
 from accelstudy.diagnosis.evidence.pairs import all_pairs
 from accelstudy.diagnosis.evidence.size import Evidence, Level, log_mean
 from accelstudy.diagnosis.evidence.unknown import unknown_beside
-from accelstudy.diagnosis.space.hypotheses import (
-    Hypothesis,
-    Setting,
-    Shapes,
-    setting_of,
-)
+from accelstudy.diagnosis.space.hypotheses import Hypothesis, Setting, Shapes, setting_of
 from accelstudy.diagnosis.space.location import groups
 from accelstudy.diagnosis.space.refinement import refined, strongest
 from accelstudy.diagnosis.space.residuals import Residuals

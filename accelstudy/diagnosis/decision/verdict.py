@@ -10,6 +10,7 @@ from scipy import special
 
 from accelstudy.adjustment.quality import Solution
 from accelstudy.adjustment.quality.whole_model import REFUTED
+from accelstudy.basics.wording import joined, words
 from accelstudy.diagnosis.decision import priors
 from accelstudy.diagnosis.decision.explanations import Explanation
 from accelstudy.diagnosis.decision.posterior import Posterior, Weighed, of_effects
@@ -21,7 +22,6 @@ from accelstudy.diagnosis.space.location import LACK_OF_FIT
 from accelstudy.diagnosis.space.repeats import clusters
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.spaces import LackOfFit, Spaces
-from accelstudy.wording import joined, words
 
 LARGE = 300.0
 """Noncentrality beyond which an effect is judged by its refit, as it is not of first order."""

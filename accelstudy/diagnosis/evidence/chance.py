@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.basics.progress import track
 from accelstudy.diagnosis.space.residuals import Residuals
-from accelstudy.progress import track
 
 if TYPE_CHECKING:
     from accelstudy.diagnosis.evidence.field import Field

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from accelstudy.adjustment import calibrate
-from accelstudy.campaign.assessment import assess
-from accelstudy.campaign.document import calibration_document, quality_document
-from accelstudy.campaign.fit import CampaignFit, campaign_design
+from accelstudy.campaign.calibration.assessment import assess
+from accelstudy.campaign.calibration.document import calibration_document, quality_document
+from accelstudy.campaign.calibration.fit import CampaignFit, campaign_design
 from accelstudy.diagnosis.report.missing import explanation_words, missing
 from accelstudy.diagnosis.report.positions import kept_positions
 from accelstudy.diagnosis.result import Diagnosis

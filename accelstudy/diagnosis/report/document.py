@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from accelstudy.campaign.document import number
+from accelstudy.basics.units import GON, MGON
+from accelstudy.campaign.calibration.document import number
 from accelstudy.diagnosis.report.missing import refuted
 from accelstudy.diagnosis.report.statement import cosine_in, statement
 from accelstudy.diagnosis.result import Diagnosis, Named
-from accelstudy.units import GON, MGON
 
 
 def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:

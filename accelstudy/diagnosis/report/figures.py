@@ -14,16 +14,15 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
+from accelstudy.basics.units import display_unit, to_display
+from accelstudy.basics.wording import number, words
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.report.positions import condition_sigma
 from accelstudy.diagnosis.report.set_figure import explanations_figure
 from accelstudy.diagnosis.report.wording import GROUPS
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.diagnosis.worth.loop import CASES, Loop
-from accelstudy.figures.style import FULL, INK, log_ticks, new_figure
-from accelstudy.study.report import number
-from accelstudy.units import display_unit, to_display
-from accelstudy.wording import words
+from accelstudy.drawing.style import FULL, INK, log_ticks, new_figure
 
 Array = NDArray[np.float64]
 

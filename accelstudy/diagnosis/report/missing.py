@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 
-from accelstudy.catalogue import family_of
+from accelstudy.basics.wording import joined, probability, words
 from accelstudy.diagnosis.decision.explanations import CREDIBLE, Explanation
 from accelstudy.diagnosis.decision.priors import MANY, SURE
+from accelstudy.diagnosis.report.families import family_of
 from accelstudy.diagnosis.report.statement import Name, Part, Statement, statement
 from accelstudy.diagnosis.worth.next_positions import NextPosition
 from accelstudy.effects import effect_names
-from accelstudy.wording import joined, probability, words
 
 FAMILIES = {
     "alignment of the axes": "a misalignment of the axes",

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from accelstudy.campaign.format import Campaign
+from accelstudy.basics.names import LONGEST
+from accelstudy.basics.units import MGON
+from accelstudy.campaign.files.format import Campaign
 from accelstudy.diagnosis.result import Diagnosis
-from accelstudy.models import MODELS, composition_name
-from accelstudy.names import LONGEST
-from accelstudy.sensor import SensorModel
-from accelstudy.units import MGON
+from accelstudy.sensors.models import MODELS, composition_name
+from accelstudy.sensors.sensor import SensorModel
 
 REPLICATES = 1000
 

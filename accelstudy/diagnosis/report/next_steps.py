@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from accelstudy import suggested
-from accelstudy.campaign.gauges import not_affine
+from accelstudy.basics import suggested
+from accelstudy.basics.wording import joined, words
+from accelstudy.campaign.calibration.gauges import not_affine
 from accelstudy.diagnosis.result import Diagnosis
-from accelstudy.wording import joined, words
 
 
 def next_steps(

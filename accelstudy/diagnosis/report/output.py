@@ -9,8 +9,10 @@ import numpy as np
 import yaml
 
 from accelstudy.approaches import get_approach
-from accelstudy.campaign.document import json_text
-from accelstudy.campaign.format import read_campaign
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.progress import stage
+from accelstudy.campaign.calibration.document import json_text
+from accelstudy.campaign.files.format import read_campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.calibration import diagnosed_calibration
 from accelstudy.diagnosis.report.document import diagnosis_document
@@ -18,10 +20,8 @@ from accelstudy.diagnosis.report.model_file import study_overlay
 from accelstudy.diagnosis.report.positions import positions_table
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.diagnosis.worth.loop import REPLICATES, Loop, close_loop
-from accelstudy.errors import InputError
-from accelstudy.models import get_model
-from accelstudy.outputs import DIAGNOSIS, result_folder, whole_file
-from accelstudy.progress import stage
+from accelstudy.files.outputs import DIAGNOSIS, result_folder, whole_file
+from accelstudy.sensors.models import get_model
 
 
 def diagnose_folder(
@@ -41,7 +41,7 @@ def diagnose_folder(
     model, approach : str, names; robot-aided by default if the campaign has a robot
     seed : int
     replicates : int, sessions simulated with the old and with the new model
-    force : bool, as in `accelstudy.outputs.result_folder`
+    force : bool, as in `accelstudy.files.outputs.result_folder`
 
     Raises
     ------

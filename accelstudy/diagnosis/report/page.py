@@ -17,8 +17,8 @@ from accelstudy.diagnosis.report.missing import family_words, separates
 from accelstudy.diagnosis.report.next_steps import next_steps
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.diagnosis.worth.loop import Loop
+from accelstudy.drawing.saving import save_all
 from accelstudy.effects import effect_names, get_effect
-from accelstudy.figures.saving import save_all
 from accelstudy.pages import write_page
 
 

@@ -7,8 +7,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import Solution, position_tests
+from accelstudy.basics.units import GON
 from accelstudy.diagnosis.result import Diagnosis
-from accelstudy.units import GON
 
 Array = NDArray[np.float64]
 

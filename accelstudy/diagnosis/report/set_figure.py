@@ -6,10 +6,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from accelstudy.catalogue import family_of
+from accelstudy.basics.wording import words
 from accelstudy.diagnosis.decision.explanations import CREDIBLE, Explanation
-from accelstudy.figures.style import COLUMN, INK, MISSING, new_figure
-from accelstudy.wording import words
+from accelstudy.diagnosis.report.families import family_of
+from accelstudy.drawing.style import COLUMN, INK, MISSING, new_figure
 
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00")
 """Of the families, the most probable first."""

@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, product
 
-from accelstudy.catalogue import family_of
 from accelstudy.diagnosis.decision.explanations import CREDIBLE, Explanation
+from accelstudy.diagnosis.report.families import family_of
 from accelstudy.diagnosis.space.hypotheses import Setting, cosines
 
 Names = tuple[str, ...]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from accelstudy.basics.units import display_unit, to_display, unit_label
+from accelstudy.basics.wording import joined, number, p_value, words
 from accelstudy.diagnosis.report.missing import (
     explanation_words,
     missing,
@@ -13,9 +15,6 @@ from accelstudy.diagnosis.report.missing import (
 )
 from accelstudy.diagnosis.result import Diagnosis, Named
 from accelstudy.effects import effect_names, get_effect
-from accelstudy.study.report import number
-from accelstudy.units import display_unit, to_display, unit_label
-from accelstudy.wording import joined, p_value, words
 
 GROUPS = {
     "direction": "with the direction of gravity",

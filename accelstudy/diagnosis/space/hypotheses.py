@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import Solution, root_of
+from accelstudy.basics.errors import InputError
 from accelstudy.diagnosis.space.residuals import Residuals, ideal_residuals, position_products
 from accelstudy.diagnosis.space.signatures import Moments, Signature, signatures
 from accelstudy.diagnosis.space.slopes import Slopes
 from accelstudy.diagnosis.space.spaces import VISIBLE, Bases, spans
 from accelstudy.effects import Effect, Hold, effect_names, get_effect
-from accelstudy.errors import InputError
-from accelstudy.leveling import roll_pitch
+from accelstudy.leveling.angles import roll_pitch
 
 Array = NDArray[np.float64]
 

@@ -7,21 +7,14 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.basics.errors import InputError
 from accelstudy.diagnosis.evidence.chance import Chance
 from accelstudy.diagnosis.space.hypotheses import Frame, Setting
 from accelstudy.diagnosis.space.repeats import clusters
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.signatures import Moment, Signature, rate_of
-from accelstudy.diagnosis.space.spaces import (
-    ABSORBED,
-    Bases,
-    LackOfFit,
-    Repeats,
-    Spaces,
-    span,
-)
+from accelstudy.diagnosis.space.spaces import ABSORBED, Bases, LackOfFit, Repeats, Spaces, span
 from accelstudy.effects import Hold, effect_names, get_effect
-from accelstudy.errors import InputError
 
 Array = NDArray[np.float64]
 

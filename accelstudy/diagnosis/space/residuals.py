@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from accelstudy.adjustment.calibration import CalibrationProblem
 from accelstudy.adjustment.quality import Solution, column_basis, diagonal_blocks, whitening_of
 from accelstudy.diagnosis.space.signatures import Signature
-from accelstudy.leveling import roll_pitch, specific_force
+from accelstudy.leveling.angles import roll_pitch, specific_force
 
 Array = NDArray[np.float64]
 

@@ -10,18 +10,13 @@ from numpy.typing import NDArray
 from scipy.special import softmax
 
 from accelstudy.adjustment.quality import Solution, solve
+from accelstudy.basics.errors import InputError
 from accelstudy.diagnosis.decision.priors import SURE
 from accelstudy.diagnosis.decision.search import Search
 from accelstudy.diagnosis.decision.verdict import Choice, Finding
-from accelstudy.diagnosis.worth.gap import (
-    HELD_OUT,
-    HeldOutGap,
-    held_out_gap,
-    split_positions,
-)
+from accelstudy.diagnosis.worth.gap import HELD_OUT, HeldOutGap, held_out_gap, split_positions
 from accelstudy.diagnosis.worth.given_a_name import needed_z
 from accelstudy.diagnosis.worth.linear import LinearSplit
-from accelstudy.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -16,15 +16,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.adjustment import Adjustment, Observations, calibrate
 from accelstudy.adjustment.quality import Solution
+from accelstudy.basics.progress import track
+from accelstudy.basics.units import MGON
 from accelstudy.diagnosis.report.positions import kept_positions
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.diagnosis.worth.tilt import in_use
 from accelstudy.effects import Hold
-from accelstudy.leveling_error import leveling_error
-from accelstudy.progress import track
-from accelstudy.sensor import SensorModel
-from accelstudy.simulation import Noise, session
-from accelstudy.units import MGON
+from accelstudy.leveling.error import leveling_error
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.simulation.sessions import Noise, session
 
 Array = NDArray[np.float64]
 

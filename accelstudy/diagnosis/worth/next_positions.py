@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.design.proposal.separation import Explained, Separation
 from accelstudy.diagnosis.space.hypotheses import Frame, Hypothesis
 from accelstudy.diagnosis.space.signatures import signature
 from accelstudy.effects import Hold
-from accelstudy.leveling import roll_pitch
-from accelstudy.models import compose
-from accelstudy.optimal.separation import Explained, Separation
+from accelstudy.leveling.angles import roll_pitch
 from accelstudy.schemes import get_scheme
+from accelstudy.sensors.models import compose
 
 Array = NDArray[np.float64]
 
@@ -60,7 +60,7 @@ def next_positions(frame: Frame, first: Explanation, second: Explanation) -> lis
     Both are fitted to all positions, each together with the parameters of the model. Of a grid of
     attitudes, at the lowest, middle and highest temperature so far and right after the session or
     later, those are chosen one after the other that add most to the separation, in which the
-    explanation that is wrong may be fitted to them, too (`accelstudy.optimal.separation`).
+    explanation that is wrong may be fitted to them, too (`accelstudy.design.proposal.separation`).
     Temperature and time vary only where one of the effects depends on them. Where the attitude
     hardly matters, those from the start of the session are to be repeated, so that readings can be
     compared without any model.

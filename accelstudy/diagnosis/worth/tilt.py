@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import Solution
+from accelstudy.basics.units import GON
 from accelstudy.effects import Hold
-from accelstudy.leveling import jacobian, roll_pitch
-from accelstudy.leveling_error import ATTITUDES, cap_forces, holds_in_use
-from accelstudy.units import GON
+from accelstudy.leveling.angles import jacobian, roll_pitch
+from accelstudy.leveling.error import ATTITUDES, cap_forces, holds_in_use
 
 Array = NDArray[np.float64]
 

@@ -7,17 +7,17 @@ import pandas as pd
 
 from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import Approach, get_approach
-from accelstudy.campaign.fit import fit_campaign
-from accelstudy.campaign.format import Campaign
+from accelstudy.basics.units import display_unit, to_display
+from accelstudy.basics.wording import number
+from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.files.format import Campaign
 from accelstudy.diagnosis.space.hypotheses import Setting, setting_of
 from accelstudy.diagnosis.worth.limits import visibilities
 from accelstudy.effects import Effect, get_effect
-from accelstudy.hold_plan import check_needs_no_plan
 from accelstudy.schemes import Scheme
-from accelstudy.sensor import SensorModel
-from accelstudy.simulation import Noise, session
-from accelstudy.study.report import number
-from accelstudy.units import display_unit, to_display
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.simulation.hold_plan import check_needs_no_plan
+from accelstudy.simulation.sessions import Noise, session
 
 
 def campaign_setting(

@@ -10,9 +10,9 @@ from itertools import permutations, product
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.basics.units import MGON
 from accelstudy.hidden.physics.rotations import rotated
 from accelstudy.hidden.physics.session import Course, Session
-from accelstudy.units import MGON
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.errors import InputError
+from accelstudy.basics.errors import InputError
 from accelstudy.hidden.physics.atlas import Shape
 from accelstudy.hidden.physics.conditions import Conditions
 from accelstudy.hidden.physics.effects import EFFECTS, Effect

@@ -9,10 +9,10 @@ from itertools import permutations, product
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.campaign.session import Campaign
+from accelstudy.basics.units import GON, STANDARD_GRAVITY
+from accelstudy.campaign.files.session import Campaign
 from accelstudy.hidden.physics.conditions import Conditions
 from accelstudy.hidden.physics.session import GRAVITY, Session
-from accelstudy.units import GON, STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
 Settings = dict[str, float]

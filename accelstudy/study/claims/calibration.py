@@ -6,10 +6,10 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from accelstudy.basics.units import recorded_unit, to_recorded
 from accelstudy.effects import get_effect
 from accelstudy.study.claims.base import Array, Claim, Evidence, SchemeClaim, verdict
-from accelstudy.study.followed import EFFECT, POSTERIORI
-from accelstudy.units import recorded_unit, to_recorded
+from accelstudy.study.monte_carlo.followed import EFFECT, POSTERIORI
 
 EFFECTS = {"bias": "bias", "scale": "scale", "nonorthogonality": "misalignment"}
 """Effect -> the paper's word for it."""

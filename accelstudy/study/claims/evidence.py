@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import optimize
 
-from accelstudy.study.cells import Cell
+from accelstudy.study.cells.cell import Cell
 from accelstudy.study.claims.base import Evidence, schemes_with_both
-from accelstudy.study.distributions import EXACT, Distribution, Sample, kept_values
-from accelstudy.study.followed import EFFECT
-from accelstudy.study.kept import kept_sketches
-from accelstudy.study.sketch import Sketch
-from accelstudy.study.statistics import Statistics, read_statistics
+from accelstudy.study.monte_carlo.distributions import EXACT, Distribution, Sample, kept_values
+from accelstudy.study.monte_carlo.followed import EFFECT
+from accelstudy.study.monte_carlo.kept import kept_sketches
+from accelstudy.study.monte_carlo.sketch import Sketch
+from accelstudy.study.monte_carlo.statistics import Statistics, read_statistics
 
 Array = NDArray[np.float64]
 

@@ -7,9 +7,9 @@ from collections.abc import Iterable
 import numpy as np
 from scipy import stats
 
-from accelstudy.leveling import roll_pitch, specific_force
+from accelstudy.basics.units import GON, MGON
+from accelstudy.leveling.angles import roll_pitch, specific_force
 from accelstudy.study.claims.base import Array, Claim, Evidence, verdict
-from accelstudy.units import GON, MGON
 
 DRAWS = 200_000
 

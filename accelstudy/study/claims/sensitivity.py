@@ -7,8 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 
-from accelstudy.leveling_shares import overtaken
-from accelstudy.sensitivity import leveling_sensitivity
+from accelstudy.leveling.sensitivity import leveling_sensitivity
+from accelstudy.leveling.shares import overtaken
 from accelstudy.study.claims.base import Claim, Evidence, verdict
 
 TILT = 50.0

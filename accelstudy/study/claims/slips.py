@@ -6,10 +6,10 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from accelstudy.leveling import specific_force
+from accelstudy.basics.units import GON
+from accelstudy.leveling.angles import specific_force
 from accelstudy.study.claims.base import SLIP, Claim, Evidence
 from accelstudy.study.claims.leveling import sd_with_interval, simulated_tilts
-from accelstudy.units import GON
 
 
 def slips(evidence: Evidence) -> Iterable[Claim]:

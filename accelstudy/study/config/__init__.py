@@ -1,6 +1,6 @@
 """The configuration of a study: its schema, how it is read, and what is said of errors in it."""
 
-from accelstudy.study.config.layers import overlay, read_layer
+from accelstudy.files.layers import overlay, read_layer
 from accelstudy.study.config.reading import config_schema, parse_study, read_study
 from accelstudy.study.config.schema import Grid, StudyConfig
 

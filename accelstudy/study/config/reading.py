@@ -8,9 +8,9 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from accelstudy.errors import InputError
-from accelstudy.study.config.errors import first_error
-from accelstudy.study.config.layers import overlay, read_layer
+from accelstudy.basics.errors import InputError
+from accelstudy.files.layers import overlay, read_layer
+from accelstudy.files.validation import first_error
 from accelstudy.study.config.schema import StudyConfig
 
 

@@ -10,22 +10,18 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
-from accelstudy import bounds
 from accelstudy.approaches import approach_names, get_approach
-from accelstudy.design import diagnose
+from accelstudy.basics import bounds
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.names import LONGEST
+from accelstudy.basics.units import STANDARD_GRAVITY, to_si
+from accelstudy.design.config_names import ModelName, SchemeName
+from accelstudy.design.estimability import diagnose
 from accelstudy.effects import Effect, get_effect
-from accelstudy.errors import InputError
-from accelstudy.hold_plan import HoldPlan
-from accelstudy.models import MODELS, PRESETS, get_model
-from accelstudy.names import LONGEST
-from accelstudy.noise_effects import get_noise_effect
-from accelstudy.schemes import get_scheme, scheme_names
-from accelstudy.schemes.files import held, remember
-from accelstudy.sensor import SensorModel
-from accelstudy.simulation import Noise, sigma_of_mean
-from accelstudy.study.config.types import (
+from accelstudy.files.provenance import config_hash
+from accelstudy.files.types import (
     Angle,
     Attitudes,
     BaseSamples,
@@ -34,13 +30,11 @@ from accelstudy.study.config.types import (
     Gravity,
     GravityError,
     Interval,
-    ModelName,
     OneOrMore,
     Pitch,
     Rate,
     Replicates,
     Resamples,
-    SchemeName,
     Seed,
     SigmaAngle,
     SigmaForce,
@@ -49,8 +43,14 @@ from accelstudy.study.config.types import (
     Tilt,
     Vibration,
 )
-from accelstudy.study.provenance import config_hash
-from accelstudy.units import STANDARD_GRAVITY, to_si
+from accelstudy.files.validation import Block
+from accelstudy.noise_effects import get_noise_effect
+from accelstudy.schemes import get_scheme, scheme_names
+from accelstudy.schemes.files import held, remember
+from accelstudy.sensors.models import MODELS, PRESETS, get_model
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.simulation.hold_plan import HoldPlan
+from accelstudy.simulation.sessions import Noise, sigma_of_mean
 
 CLAIMED_EFFECTS = ("bias", "scale", "nonorthogonality")
 """Effects that the model of the paper's claims and figures has."""
@@ -59,12 +59,6 @@ CLAIMED_EFFECTS = ("bias", "scale", "nonorthogonality")
 Temperatures = tuple[Temperature, Temperature]
 Vibrations = tuple[Vibration, Vibration]
 """Two numbers, from and to."""
-
-
-class Block(BaseModel):
-    """A part of the configuration; keys that it does not know are errors."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=False)
 
 
 class SensorNoise(Block):

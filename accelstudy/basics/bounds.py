@@ -1,0 +1,73 @@
+"""What a quantity can be at all: more than is ever measured, but never beyond computing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from accelstudy.basics.errors import InputError
+
+
+@dataclass(frozen=True)
+class Range:
+    """The values that a quantity may have.
+
+    Attributes
+    ----------
+    least, most : float, both allowed
+    unit : str, for messages; empty for a count
+    zero : bool, whether 0 is allowed too, where it means "none"
+    """
+
+    least: float
+    most: float
+    unit: str = ""
+    zero: bool = False
+
+    def check(self, value: float) -> float:
+        """Return the value; raise `InputError` with the range if it is outside."""
+        if self.least <= value <= self.most or (self.zero and value == 0):
+            return value
+        ends = f"from {_plain(self.least)} to {_plain(self.most)} {self.unit}".rstrip()
+        raise InputError(f"must be {'0, or ' if self.zero else ''}{ends}, not {_plain(value)}")
+
+    def check_key(self, key: str, value: float) -> None:
+        """Check the value of a key, which the error names."""
+        try:
+            self.check(value)
+        except InputError as error:
+            raise InputError(f"{key}: {error}") from None
+
+
+def _plain(value: float) -> str:
+    if isinstance(value, int):
+        # Python writes no integer of more than 4300 digits.
+        return str(value) if abs(value) <= 10**20 else "a huge number"
+    return f"{value:.7g}"
+
+
+GRAVITY = Range(1e-3, 1e3, "m/s²")
+GRAVITY_ERROR = Range(-1e2, 1e2, "m/s²")
+# Forces are always observed, and an observation without noise has no finite weight; the best
+# gravimeters resolve 1e-9 m/s².
+SIGMA_FORCE = Range(1e-9, 1e3, "m/s²")
+SIGMA_READING = Range(1e-9, 1e3, "m/s²", zero=True)
+SIGMA_GRAVITY = Range(1e-9, 1e3, "m/s²", zero=True)
+SIGMA_ANGLE = Range(1e-6, 4e5, "mgon", zero=True)
+ANGLE = Range(-400.0, 400.0, "gon")
+TEMPERATURE = Range(-273.15, 1e4, "°C")
+VIBRATION = Range(0.0, 1e4, "m/s²")
+TIME = Range(-1e12, 1e12, "s")
+INTERVAL = Range(1e-6, 1e6, "s")
+DURATION = Range(1e-6, 1e7, "s")
+RATE = Range(1e-6, 1e9, "per second")
+
+CELLS = Range(1, 100_000)
+REPLICATES = Range(1, 10**11)
+SESSIONS = Range(100, 100_000)
+ATTITUDES = Range(1, 100_000)
+BASE_SAMPLES = Range(2, 2**20)
+RESAMPLES = Range(1, 100_000)
+POSITIONS = Range(1, 100_000)
+SAMPLES = Range(2, 10**9)
+SIZE = Range(1e-6, 1e6)
+SEED = Range(0, 2**64 - 1)

@@ -1,0 +1,29 @@
+"""Names that become names of files and folders."""
+
+from __future__ import annotations
+
+import re
+
+from accelstudy.basics.errors import InputError, shown
+
+LONGEST = 100
+"""Bytes; with what is added to it, the name of a file must stay below 255."""
+
+
+def check_path_name(name: str) -> str:
+    """Return a name that can be that of a folder on any disk and in any pattern of the workflow.
+
+    Raises
+    ------
+    InputError
+        If it has other characters than letters, digits, _, - and ., begins with - or ., or is
+        longer than `LONGEST`.
+    """
+    if not re.fullmatch(r"\w[\w.-]*", name):
+        raise InputError(
+            f"{shown(name)} cannot be the name of a folder; use letters, digits, _, - and ., and "
+            "begin with a letter, a digit or _"
+        )
+    if len(name.encode()) > LONGEST:
+        raise InputError(f"{shown(name)} is too long for a folder; use at most {LONGEST} letters")
+    return name

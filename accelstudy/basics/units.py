@@ -1,0 +1,227 @@
+"""Units at the border: everything below works in SI, people read and write gon, ppm and mm/s².
+
+This is the only place where conversion factors stand.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import TYPE_CHECKING
+
+from accelstudy.basics.errors import InputError, UnknownNameError, shown
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
+
+GON = math.pi / 200.0
+"""One gon in rad."""
+MGON = 1e-3 * GON
+"""One milligon in rad."""
+STANDARD_GRAVITY = 9.80665
+"""m/s²"""
+
+UNITS: dict[str, dict[str, float]] = {
+    "rad": {
+        "mgon": MGON,
+        "gon": GON,
+        "rad": 1.0,
+        "mrad": 1e-3,
+        "mdeg": 1e-3 * math.pi / 180.0,
+        "deg": math.pi / 180.0,
+        "arcsec": math.pi / 648000.0,
+    },
+    "1": {"ppm": 1e-6, "%": 1e-2, "1": 1.0},
+    "m": {"mm": 1e-3, "cm": 1e-2, "m": 1.0},
+    "s": {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0},
+    "kg": {"kg": 1.0, "g": 1e-3},
+    "m/s^2": {
+        "mm/s^2": 1e-3,
+        "m/s^2": 1.0,
+        "mg": 1e-3 * STANDARD_GRAVITY,
+        "ug": 1e-6 * STANDARD_GRAVITY,
+        "g": STANDARD_GRAVITY,
+    },
+    "m/s^2/K": {
+        "mm/s^2/K": 1e-3,
+        "m/s^2/K": 1.0,
+        "mg/K": 1e-3 * STANDARD_GRAVITY,
+        "ug/K": 1e-6 * STANDARD_GRAVITY,
+    },
+    "m/s^2/K^2": {
+        "mm/s^2/K^2": 1e-3,
+        "m/s^2/K^2": 1.0,
+        "mg/K^2": 1e-3 * STANDARD_GRAVITY,
+    },
+    "1/K": {"ppm/K": 1e-6, "%/K": 1e-2, "1/K": 1.0},
+    "m/s^2/s": {
+        "mm/s^2/h": 1e-3 / 3600,
+        "m/s^2/s": 1.0,
+        "mg/h": 1e-3 * STANDARD_GRAVITY / 3600,
+    },
+    "s^2/m": {
+        "ug/g^2": 1e-6 / STANDARD_GRAVITY,
+        "s^2/m": 1.0,
+        "mg/g^2": 1e-3 / STANDARD_GRAVITY,
+    },
+    "m/s^2/sqrt(Hz)": {
+        "ug/sqrt(Hz)": 1e-6 * STANDARD_GRAVITY,
+        "mg/sqrt(Hz)": 1e-3 * STANDARD_GRAVITY,
+        "mm/s^2/sqrt(Hz)": 1e-3,
+        "m/s^2/sqrt(Hz)": 1.0,
+        "m/s/sqrt(h)": 1.0 / 60,
+        "mm/s/sqrt(h)": 1e-3 / 60,
+    },
+    "m/s^2/sqrt(s)": {
+        "ug/sqrt(s)": 1e-6 * STANDARD_GRAVITY,
+        "mm/s^2/sqrt(s)": 1e-3,
+        "m/s^2/sqrt(s)": 1.0,
+        "mm/s^2/sqrt(h)": 1e-3 / 60,
+    },
+    "K": {"K": 1.0, "degC": 1.0},
+}
+"""SI unit -> {unit that people use: its size in the SI unit}; the first is the one we record."""
+
+ANGLE_UNITS = {"gon": "mgon", "deg": "mdeg"}
+"""Units in which angles can be shown: that of an attitude -> that of a small angle."""
+ANGLE_UNIT_VARIABLE = "ACCELSTUDY_ANGLE_UNIT"
+"""Environment variable with the user's choice of them, which commands and workflows heed."""
+_angle_unit: ContextVar[str] = ContextVar("angle_unit", default="gon")
+
+
+@contextmanager
+def angles_in(unit: str | None) -> Iterator[None]:
+    """Show angles in gon or deg within a ``with`` block; None leaves what holds outside it.
+
+    Only what people look at changes: files keep their units.
+
+    Raises
+    ------
+    UnknownNameError
+        If `unit` is neither gon nor deg.
+    """
+    if unit is not None and unit not in ANGLE_UNITS:
+        raise UnknownNameError("angle unit", unit, ANGLE_UNITS)
+    token = _angle_unit.set(unit or _angle_unit.get())
+    try:
+        yield
+    finally:
+        _angle_unit.reset(token)
+
+
+def attitude_unit() -> str:
+    """Unit in which attitudes are shown, gon or deg; small ones have that of `display_unit`."""
+    return _angle_unit.get()
+
+
+def to_attitude(angle: ArrayLike) -> NDArray[np.float64]:
+    """Convert an angle from rad into the unit in which attitudes are shown."""
+    return _converted(angle, "rad", attitude_unit())
+
+
+def angle_note() -> str:
+    """Explain the unit of angles, where it is first used."""
+    if attitude_unit() == "gon":
+        return "100 gon = 90°, 1 mgon = 0.0009°"
+    return "90° = 100 gon, 1 mdeg = 0.001°"
+
+
+def recorded_unit(unit: str) -> str:
+    """Unit in which files hold a quantity of the SI `unit`; that itself if none is better."""
+    return next(iter(UNITS.get(unit, {unit: 1.0})))
+
+
+def to_recorded(value: ArrayLike, unit: str) -> NDArray[np.float64]:
+    """Convert `value` from the SI `unit` into the unit of files."""
+    return _converted(value, unit, recorded_unit(unit))
+
+
+def display_unit(unit: str) -> str:
+    """Unit in which people see a quantity of the SI `unit`: that of files, angles as chosen."""
+    return ANGLE_UNITS[attitude_unit()] if unit == "rad" else recorded_unit(unit)
+
+
+def unit_label(unit: str) -> str:
+    """Return a unit as it is printed."""
+    return unit.replace("^2", "²").replace("ug", "µg")
+
+
+def to_display(value: ArrayLike, unit: str) -> NDArray[np.float64]:
+    """Convert `value` from the SI `unit` into the unit shown to people."""
+    return _converted(value, unit, display_unit(unit))
+
+
+def _converted(value: ArrayLike, unit: str, wanted: str) -> NDArray[np.float64]:
+    return _numbers(value) / UNITS.get(unit, {}).get(wanted, 1.0)
+
+
+def to_si(value: ArrayLike, given: str, unit: str) -> NDArray[np.float64]:
+    """Convert `value` from the unit `given` into the SI `unit`.
+
+    Raises
+    ------
+    UnknownNameError
+        If `given` is no unit of that quantity.
+    """
+    known = UNITS.get(unit, {unit: 1.0})
+    if given not in known:
+        raise UnknownNameError(f"unit of a quantity in {unit}", given, known)
+    return _numbers(value) * known[given]
+
+
+def quantity_text(value: float, unit: str) -> str:
+    """Write a quantity of the SI `unit` for people, with its unit: ``10 mgon``, ``30 gon``."""
+    if unit == "rad" and abs(to_attitude(value)) >= 1:
+        return f"{float(to_attitude(value)):.4g} {attitude_unit()}"
+    return f"{float(to_display(value, unit)):.4g} {display_unit(unit)}".removesuffix(" 1")
+
+
+_SPELLINGS = {"µ": "u", "μ": "u", "²": "^2", "°C": "degC", "°": "deg", "√Hz": "sqrt(Hz)"}
+_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S*)\s*")
+
+
+def parse_quantity(text: str, unit: str, least: float = -math.inf, most: float = math.inf) -> float:
+    """Read a number with its unit, as a person writes it: 10mgon, 0.01°, 2 mm/s2, 22.5µg/√Hz.
+
+    Parameters
+    ----------
+    text : str
+    unit : str, SI unit of the quantity
+    least, most : float, in that unit, both allowed
+
+    Returns
+    -------
+    float, in the SI `unit`
+
+    Raises
+    ------
+    InputError
+        If it is no such quantity, or out of bounds. Only 0 needs no unit.
+    """
+    match = _QUANTITY.fullmatch(text)
+    known = UNITS.get(unit, {unit: 1.0})
+    if match is None or not (match[2] or float(match[1]) == 0):
+        example = f"2{next(iter(known))}"
+        raise InputError(f"expected a number with its unit, as {example}, not {shown(text)}")
+    given = match[2] or next(iter(known))
+    for spelling, plain in _SPELLINGS.items():
+        given = given.replace(spelling, plain)
+    given = re.sub(r"(?<=[a-zA-Z])2", "^2", given)
+    if given not in known:
+        raise InputError(f"{shown(text)}: the unit must be one of {', '.join(known)}")
+    value = float(match[1]) * known[given]
+    if not least <= value <= most:
+        ends = [f"at least {least / known[given]:.6g}"] if least > -math.inf else []
+        ends += [f"at most {most / known[given]:.6g}"] if most < math.inf else []
+        raise InputError(f"{shown(text)}: must be {' and '.join(ends)} {given}")
+    return value
+
+
+def _numbers(value: ArrayLike) -> NDArray[np.float64]:
+    import numpy as np  # half of the time of a command that shows no number, as --help
+
+    return np.asarray(value, dtype=float)

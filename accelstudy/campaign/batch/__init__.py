@@ -1,0 +1,1 @@
+"""Many campaigns calibrated by one configuration, and their overview."""

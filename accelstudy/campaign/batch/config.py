@@ -1,0 +1,223 @@
+"""The configuration of a batch of campaigns: what may stand in `config/campaigns.yaml`."""
+
+from __future__ import annotations
+
+import glob
+import hashlib
+import json
+import os
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Literal, Self
+
+from pydantic import Field, ValidationError, model_validator
+
+from accelstudy.approaches import get_approach
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.names import check_path_name
+from accelstudy.campaign.files.header import HEADER, TABLES
+from accelstudy.campaign.importing.public import import_settings
+from accelstudy.campaign.importing.settings import GravitySettings, ImportSettings
+from accelstudy.design.config_names import ModelName
+from accelstudy.files.layers import overlay, read_layer
+from accelstudy.files.types import PathName
+from accelstudy.files.validation import Block, first_error
+from accelstudy.sensors.models import get_model
+
+KINDS = ("campaign", "log", "public")
+
+Kind = Literal["campaign", "log", "public"]
+
+
+class Entry(Block):
+    """What is calibrated, and with what where it is not that of the batch."""
+
+    campaign: str | None = Field(None, description="folder of a campaign, or a pattern of folders")
+    log: str | None = Field(None, description="raw log or table of means, or a pattern of files")
+    public: str | None = Field(None, description="name of public data, see `accelstudy public`")
+    name: PathName | None = Field(None, description="of the results; that of the source if absent")
+    model: ModelName | None = Field(None, description="model, if not that of the batch")
+    approach: str | None = Field(None, description="approach, if not that of the batch")
+    gravity: GravitySettings | None = Field(None, description="instead of the campaign's own")
+    settings: ImportSettings | None = Field(
+        None, alias="import", description="how a log is read; of public data, what to do otherwise"
+    )
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        if sum(getattr(self, kind) is not None for kind in KINDS) != 1:
+            raise ValueError(f"give exactly one of {', '.join(KINDS)}")
+        if self.campaign is not None and self.settings is not None:
+            raise ValueError("import: goes with log or public; a campaign is imported already")
+        try:
+            _check_names(self.model, self.approach)
+            if self.public is not None:
+                import_settings(self.public)
+        except InputError as error:
+            raise ValueError(str(error)) from None
+        return self
+
+    @property
+    def kind(self) -> Kind:
+        """Which of `KINDS` it is."""
+        if self.campaign is not None:
+            return "campaign"
+        return "log" if self.log is not None else "public"
+
+
+class Task(Block):
+    """One campaign to calibrate.
+
+    Attributes
+    ----------
+    name : str, of the results
+    kind : "campaign", "log" or "public"
+    source : str, path of the folder or file, or name of the public data
+    model, approach : str
+    gravity : GravitySettings, instead of that of a campaign folder; None leaves it
+    settings : ImportSettings, of a log or public data
+    """
+
+    name: str
+    kind: Kind
+    source: str
+    model: str
+    approach: str
+    gravity: GravitySettings | None = None
+    settings: ImportSettings | None = None
+
+    def files(self) -> list[str]:
+        """Files that are there and on which the result depends; none for public data."""
+        source = Path(self.source)
+        if self.kind == "campaign":
+            return [str(path) for name in (HEADER, *TABLES) if (path := source / name).is_file()]
+        return [str(source)] if self.kind == "log" and source.is_file() else []
+
+
+class BatchConfig(Block):
+    """Campaigns that are calibrated and summarised together."""
+
+    batch: PathName = Field(description="name; results go to results/<batch>/")
+    model: ModelName = Field("bias-scale-nonorthogonality", description="model of all campaigns")
+    approach: str = Field("gravity", description="approach of all campaigns")
+    public_folder: str = Field(
+        "resources/public",
+        description="where public files are, in any subfolder, or are downloaded to",
+    )
+    campaigns: list[Entry] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _names_exist(self) -> Self:
+        try:
+            _check_names(self.model, self.approach)
+            twice = [name for name, n in Counter(t.name for t in self.tasks()).items() if n > 1]
+        except InputError as error:
+            raise ValueError(str(error)) from None
+        if twice:
+            sources = " and ".join(task.source for task in self.tasks() if task.name == twice[0])
+            raise ValueError(
+                f"campaigns: {sources} are both named {twice[0]!r}; give one another `name`"
+            )
+        return self
+
+    def tasks(self) -> list[Task]:
+        """Campaigns in the order of the configuration; patterns are those of now.
+
+        What an entry names itself is left out of patterns, so that it can differ from the rest.
+
+        Raises
+        ------
+        InputError
+            If nothing matches a pattern.
+        """
+        return list(self._tasks())
+
+    def _tasks(self) -> Iterator[Task]:
+        named = {_path(entry) for entry in self.campaigns if not _is_pattern(entry)}
+        for index, entry in enumerate(self.campaigns):
+            sources = [_path(entry)]
+            if _is_pattern(entry):
+                wanted = os.path.isdir if entry.kind == "campaign" else os.path.isfile
+                matching = sorted(filter(wanted, glob.glob(sources[0])))
+                if not matching:
+                    what = "folder" if entry.kind == "campaign" else "file"
+                    raise InputError(f"campaigns.{index}: no {what} matches {sources[0]}")
+                sources = [path for path in matching if path not in named]
+            for source in sources:
+                yield Task(
+                    name=entry.name or _name_of(entry.kind, source),
+                    kind=entry.kind,
+                    source=source,
+                    model=entry.model or self.model,
+                    approach=entry.approach or self.approach,
+                    gravity=entry.gravity if entry.kind == "campaign" else None,
+                    settings=_settings(entry, source),
+                )
+
+    @property
+    def fingerprint(self) -> str:
+        """Hash of the whole configuration, defaults included."""
+        text = json.dumps(self.model_dump(mode="json"), sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def parse_batch(content: Mapping[str, Any], source: str = "config") -> BatchConfig:
+    """Check a configuration; raise `InputError` with one line that names the source and the key."""
+    try:
+        return BatchConfig.model_validate(content)
+    except ValidationError as error:
+        raise InputError(f"{source}: {first_error(error, BatchConfig)}") from None
+
+
+def read_batch(path: str | Path) -> BatchConfig:
+    """Read a configuration from a YAML file.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or does not fit the schema.
+    """
+    return parse_batch(read_layer(path), str(path))
+
+
+def _check_names(model: str | None, approach: str | None) -> None:
+    if model is not None:
+        get_model(model)
+    if approach is not None:
+        get_approach(approach)
+
+
+def _path(entry: Entry) -> str:
+    """Path, or name of public data, spelled in one way."""
+    return entry.public or os.path.normpath(entry.campaign or entry.log or "")
+
+
+def _is_pattern(entry: Entry) -> bool:
+    path = _path(entry)
+    return entry.public is None and glob.has_magic(path) and not os.path.exists(path)
+
+
+def _name_of(kind: Kind, source: str) -> str:
+    path = Path(os.path.abspath(source))
+    name = source if kind == "public" else path.stem if kind == "log" else path.name
+    name = re.sub(r"[^\w.-]+", "-", name).lstrip(".-") or "campaign"
+    try:
+        return check_path_name(name)
+    except InputError as error:
+        raise InputError(f"campaigns: {source}: {error}; give it a `name`") from None
+
+
+def _settings(entry: Entry, source: str) -> ImportSettings | None:
+    """How a file is imported: as the registry says, if it is public, the entry over it."""
+    if entry.kind == "campaign":
+        return None
+    content = import_settings(source).model_dump(exclude_unset=True) if entry.public else {}
+    if entry.name is not None:
+        content["name"] = entry.name
+    if entry.settings is not None:
+        content = overlay(content, entry.settings.model_dump(exclude_unset=True))
+    if entry.gravity is not None:
+        content["gravity"] = entry.gravity.model_dump()
+    return ImportSettings.model_validate(content)

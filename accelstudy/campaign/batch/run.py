@@ -1,0 +1,106 @@
+"""Calibrate one campaign of a batch, so that a bad one is reported and stops no other."""
+
+from __future__ import annotations
+
+import json
+import logging
+import shutil
+from pathlib import Path
+from typing import Any
+
+from accelstudy.approaches import get_approach
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.wording import one_line
+from accelstudy.campaign.batch.config import Task
+from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.calibration.output import write_calibration
+from accelstudy.campaign.files.format import Campaign, read_campaign
+from accelstudy.campaign.importing.conversion import import_to
+from accelstudy.campaign.importing.public import read_record
+from accelstudy.files.outputs import BATCH_JOB, result_folder
+from accelstudy.sensors.models import get_model
+
+STATUS = BATCH_JOB.marker
+
+
+def run_task(
+    task: Task,
+    folder: str | Path,
+    record: str | Path | None = None,
+    log: str | Path | None = None,
+) -> str | None:
+    """Import and calibrate a campaign, and write how it went to status.json.
+
+    Parameters
+    ----------
+    task : Task
+    folder : path
+        For what `write_calibration` writes; an imported campaign goes to its subfolder campaign.
+    record : path
+        Of public data, written by `accelstudy.campaign.importing.public.record_public`.
+    log : path
+        Where the traceback of an error stands that nobody has foreseen.
+
+    Returns
+    -------
+    str
+        What is wrong, in one line; None if it was calibrated.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written.
+    """
+    with result_folder(folder, BATCH_JOB) as new:
+        error = _calibrate(task, new, record, log)
+        status = {
+            **task.model_dump(mode="json", include={"name", "kind", "source", "model", "approach"}),
+            "status": "ok" if error is None else "failed",
+            "error": error,
+        }
+        text = json.dumps(status, indent=2, ensure_ascii=False) + "\n"
+        (new / STATUS).write_text(text, encoding="utf-8")
+    return error
+
+
+def _calibrate(
+    task: Task, folder: Path, record: str | Path | None, log: str | Path | None
+) -> str | None:
+    try:
+        campaign = _measured(task, folder / "campaign", record)
+        fit = fit_campaign(campaign, get_model(task.model), get_approach(task.approach))
+        write_calibration(fit, folder)
+    except InputError as error:
+        _remove_results(folder)
+        return " ".join(str(error).split()).removeprefix(f"{task.name}: ")
+    except OSError:  # a full disk, say, which is no matter of this campaign
+        raise
+    except Exception as error:
+        # One campaign must not cost the others their overview.
+        logging.exception("%s: not foreseen", task.name)
+        _remove_results(folder)
+        see = "" if log is None else f"; the log has the details: {log}"
+        return f"internal error, please report it ({type(error).__name__}: {one_line(error)}){see}"
+    return None
+
+
+def _remove_results(folder: Path) -> None:
+    """Leave of a calibration that failed only the campaign that was imported."""
+    for name in BATCH_JOB.files:
+        (folder / name).unlink(missing_ok=True)
+    shutil.rmtree(folder / "figures", ignore_errors=True)
+
+
+def _measured(task: Task, folder: Path, record: str | Path | None) -> Campaign:
+    if task.settings is None:
+        gravity = task.gravity
+        return read_campaign(task.source, {"gravity": gravity.model_dump()} if gravity else None)
+    path = task.source if record is None else _recorded(record)
+    return import_to(folder, path, task.settings)[0]
+
+
+def _recorded(path: str | Path) -> str:
+    record: dict[str, Any] = read_record(path)
+    if record["error"] is not None:
+        raise InputError(record["error"])
+    return record["file"]

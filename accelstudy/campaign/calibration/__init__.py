@@ -1,0 +1,1 @@
+"""The calibration of a campaign: adjustment, assessment, verdict, documents and pages."""

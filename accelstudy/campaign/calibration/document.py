@@ -1,0 +1,171 @@
+"""The machine-readable result of a calibration: the content of `calibration.json`."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+
+from accelstudy.basics.units import MGON, recorded_unit, to_recorded
+from accelstudy.campaign.calibration.assessment import MAX_TILT_GON, Assessment
+from accelstudy.campaign.calibration.fit import CampaignFit
+from accelstudy.campaign.calibration.gauges import GAUGES, affine_form, in_gauge
+from accelstudy.campaign.calibration.ranges import ranges_of
+from accelstudy.campaign.calibration.verdict import state, verdict_lines, warnings
+from accelstudy.campaign.files.session import Campaign
+
+
+def calibration_document(fit: CampaignFit) -> dict[str, Any]:
+    """Describe a fit: parameters with sigmas, correlation, accuracy, matrix and gauges.
+
+    All numbers are in SI but those whose key names another unit.
+    """
+    campaign, adjustment = fit.campaign, fit.adjustment
+    covariance, sigma = fit.covariance, fit.sigma
+    correlation = covariance / np.outer(sigma, sigma)
+    return {
+        "schema_version": 1,
+        "campaign": campaign.name,
+        "sensor": campaign.sensor,
+        "model": fit.model.name,
+        "effects": [effect.spec for effect in fit.model.effects],
+        "approach": fit.approach.name,
+        "unit": campaign.unit,
+        "nominal": _nominal(fit),
+        "gravity_mps2": fit.gravity,
+        "n_positions": campaign.n_positions,
+        "sigma_source": "a priori" if fit.trusts_sigma else "a posteriori",
+        "sigma_position_mps2": number(fit.sigma_position),
+        "sigma_position_priori_mps2": number(campaign.sigma_force),
+        "sigma_position_posteriori_mps2": number(fit.sigma_position_posteriori),
+        "sigma_reading_mps2": _sigma_reading(campaign),
+        "parameters": [
+            {
+                "name": parameter.name,
+                "value": float(fit.parameters[i]),
+                "sigma": number(sigma[i]),
+                "sigma_priori": number(adjustment.sigma_priori[0, i] if fit.sigma_known else None),
+                "sigma_posteriori": number(adjustment.sigma_posteriori[0, i]),
+                "unit": parameter.unit,
+                "shown": {
+                    "value": float(to_recorded(fit.parameters[i], parameter.unit)),
+                    "sigma": number(to_recorded(sigma[i], parameter.unit)),
+                    "unit": recorded_unit(parameter.unit),
+                },
+            }
+            for i, parameter in enumerate(fit.model.parameters)
+        ],
+        "covariance": _numbers(covariance),
+        "correlation": _numbers(correlation),
+        "condition": number(fit.design.condition),
+        "redundancy": adjustment.redundancy,
+        "variance_of_unit_weight": number(adjustment.variance_posteriori[0]),
+        "iterations": int(adjustment.iterations[0]),
+        "rms_norm_residual_mps2": number(fit.rms_norm_residual),
+        "affine": _affine(fit),
+        "mended": None,
+        "excluded": campaign.exclusions,
+        "range_mps2": campaign.full_range,
+        "ranges": ranges_of(fit),
+        "log": None if campaign.log is None else campaign.log.model_dump(exclude_none=True),
+        "warnings": list(campaign.warnings),
+    }
+
+
+def quality_document(assessment: Assessment) -> dict[str, Any]:
+    """Quality in plain data, for `calibration.json`."""
+    held, test = assessment.held_out, assessment.fit.global_test
+    components = assessment.components
+    gross, parameters = assessment.gross_error, assessment.tilt_parameters / MGON
+    angles = None if held is None else held.rms_angles
+    positions = assessment.fit.campaign.positions
+    return {
+        "state": state(assessment),
+        "plausible": not warnings(assessment),
+        "warnings": warnings(assessment),
+        "gross_error": None if gross is None else {"name": gross.name, "reason": gross.reason},
+        "verdict": " ".join(verdict_lines(assessment)),
+        "global_test": None
+        if test is None
+        else {
+            "statistic": test.statistic,
+            "dof": test.dof,
+            "p_value": test.p_value,
+            "accepted": test.accepted,
+            "remark": test.remark,
+        },
+        "suspects": [
+            {"position": int(positions[s.position]), "p_value": number(s.p_value)}
+            for s in assessment.suspects
+        ],
+        "held_out": None
+        if held is None or held.n_predicted == 0
+        else {
+            "n_predicted": held.n_predicted,
+            "rms_mps2": number(held.rms),
+            "rms_roll_mgon": None if angles is None else number(angles[0] / MGON),
+            "rms_pitch_mgon": None if angles is None else number(angles[1] / MGON),
+        },
+        "variance_components": None
+        if components is None
+        else {
+            "accelerometer": number(components.factors[0]),
+            "robot": number(components.factors[1]),
+            "sigma": [number(sigma) for sigma in components.sigma],
+            "converged": components.converged,
+        },
+        "tilt_rms_mgon": {
+            "roll": number(assessment.tilt[0] / MGON),
+            "pitch": number(assessment.tilt[1] / MGON),
+            "parameters_roll": number(parameters[0]),
+            "parameters_pitch": number(parameters[1]),
+            "max_tilt_gon": MAX_TILT_GON,
+        },
+    }
+
+
+def _sigma_reading(campaign: Campaign) -> float | None:
+    """Noise of a single reading, m/s², from the samples within the holds."""
+    return None if campaign.sd is None else number(np.sqrt(np.mean(campaign.sd**2)))
+
+
+def _nominal(fit: CampaignFit) -> dict[str, list[float]] | None:
+    campaign = fit.campaign
+    if campaign.nominal_scale is None or campaign.nominal_offset is None:
+        return None
+    return {"scale": campaign.nominal_scale.tolist(), "offset": campaign.nominal_offset.tolist()}
+
+
+def _affine(fit: CampaignFit) -> dict[str, Any] | None:
+    form = affine_form(fit.model, fit.parameters)
+    if form is None:
+        return None
+    matrix, bias = form
+    return {
+        "matrix": matrix.tolist(),
+        "bias_mps2": bias.tolist(),
+        "gauges": {gauge: in_gauge(matrix, gauge).tolist() for gauge in GAUGES},
+    }
+
+
+def _numbers(matrix: np.ndarray) -> list[list[float | None]]:
+    return [[number(value) for value in row] for row in matrix]
+
+
+def number(value: Any) -> float | None:
+    """Number for JSON, which knows no NaN."""
+    return None if value is None or not np.isfinite(value) else float(value)
+
+
+def json_text(content: Any) -> str:
+    """JSON for a file; what is no finite number is null, or the file could not be read again."""
+    return json.dumps(_known(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _known(content: Any) -> Any:
+    if isinstance(content, dict):
+        return {key: _known(value) for key, value in content.items()}
+    if isinstance(content, (list, tuple)):
+        return [_known(value) for value in content]
+    return number(content) if isinstance(content, float) else content

@@ -1,0 +1,289 @@
+"""The calibration of a measured campaign, by the same adjustment as the simulated ones."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.adjustment import Adjustment, Observations, calibrate
+from accelstudy.adjustment.quality import GlobalTest, global_test
+from accelstudy.approaches import Approach, get_approach
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import MGON
+from accelstudy.basics.wording import words
+from accelstudy.campaign.calibration.gauges import not_affine
+from accelstudy.campaign.files.format import Campaign
+from accelstudy.campaign.files.header import COLUMNS
+from accelstudy.campaign.gross_errors.recognition import recognise
+from accelstudy.campaign.holds.sphere import fit_sphere
+from accelstudy.design.estimability import Design, diagnose
+from accelstudy.schemes import Scheme
+from accelstudy.sensors.models import compose
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.simulation.sessions import Noise
+
+Array = NDArray[np.float64]
+
+LEAST_RATIO = 1e-6
+"""Noise of the forces beside that of the robot's angles below which double precision ends."""
+
+HARDLY = 10.0
+"""Condition beyond which it is the positions that keep an adjustment from converging: where noise
+alone tells repeats of too few attitudes apart."""
+
+UNIT_SIGMA = 1e-3
+"""m/s², stands for an unknown sigma; only sigmas a posteriori mean anything then."""
+
+
+@dataclass(frozen=True)
+class CampaignFit:
+    """A calibrated campaign.
+
+    Attributes
+    ----------
+    campaign, model, approach : what was fitted, with what
+    observed : Observations, R = 1
+    adjustment : Adjustment, R = 1
+    design : Design, of the campaign's own positions
+    unit_variance : float, variance of unit weight to quote, where somebody has judged the noise by
+        more than this fit; by default its global test does
+    """
+
+    campaign: Campaign
+    model: SensorModel
+    approach: Approach
+    observed: Observations
+    adjustment: Adjustment
+    design: Design
+    unit_variance: float | None = None
+
+    @property
+    def sigma_known(self) -> bool:
+        """Whether the campaign gives the noise of its position means."""
+        return self.campaign.sigma_force is not None
+
+    @property
+    def parameters(self) -> Array:
+        """Estimates of the model's parameters, (u,), SI."""
+        return self.adjustment.parameters[0, : self.model.n_parameters]
+
+    @property
+    def global_test(self) -> GlobalTest | None:
+        """Test of the whole model; None where sigma is unknown or there is no redundancy."""
+        if not self.sigma_known:
+            return None
+        return global_test(float(self.adjustment.omega[0]), self.adjustment.redundancy)
+
+    @property
+    def trusts_sigma(self) -> bool:
+        """Whether the a-priori noise is quoted: it is given, and the residuals do not refute it."""
+        if self.unit_variance is not None:
+            return self.sigma_known and self.unit_variance == 1
+        test = self.global_test
+        return self.sigma_known and (test is None or test.accepted)
+
+    @property
+    def variance_factor(self) -> float:
+        """Variance of unit weight to quote: 1 if a-priori noise is trusted, else a posteriori."""
+        if self.unit_variance is not None:
+            return self.unit_variance
+        return 1.0 if self.trusts_sigma else float(self.adjustment.variance_posteriori[0])
+
+    @property
+    def sigma_position(self) -> float:
+        """Noise of a position mean, m/s², a priori or a posteriori likewise."""
+        return self._sigma_taken * float(np.sqrt(self.variance_factor))
+
+    @property
+    def sigma_position_posteriori(self) -> float:
+        """Noise of a position mean from the residuals, m/s²; NaN without redundancy."""
+        factor = float(self.adjustment.variance_posteriori[0])
+        return self._sigma_taken * float(np.sqrt(factor))
+
+    @property
+    def _sigma_taken(self) -> float:
+        """Noise of a position mean of unit weight, m/s²."""
+        return float(np.mean(np.asarray(self.observed.sigma_force)))
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance matrix of the model's parameters to quote, (u, u), SI: likewise."""
+        u = self.model.n_parameters
+        return self.variance_factor * self.adjustment.cofactors[0, :u, :u]
+
+    @property
+    def sigma(self) -> Array:
+        """Standard deviations of the parameters to quote, (u,), SI: likewise."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def gravity(self) -> float:
+        """Gravity, m/s²: the adjusted value if it was observed."""
+        if self.campaign.sigma_gravity > 0:
+            return float(self.adjustment.parameters[0, -1])
+        return self.campaign.gravity
+
+    @property
+    def corrected(self) -> Array:
+        """Calibrated specific forces of the holds, (n, 3), m/s²."""
+        campaign = self.campaign
+        return self.model.correct(campaign.forces, self.parameters, self.gravity, campaign.hold)
+
+    @property
+    def norm_residuals(self) -> Array:
+        """|f_b| − g of the holds, (n,), m/s²."""
+        return np.linalg.norm(self.corrected, axis=1) - self.gravity
+
+    @property
+    def rms_norm_residual(self) -> float:
+        """Rms of |f_b| − g over the holds, m/s²."""
+        return float(np.sqrt(np.mean(self.norm_residuals**2)))
+
+
+def campaign_noise(campaign: Campaign) -> Noise:
+    """Stochastic model of a campaign; an unknown sigma is `UNIT_SIGMA`."""
+    return Noise(
+        sigma_force=UNIT_SIGMA if campaign.sigma_force is None else campaign.sigma_force,
+        sigma_angle=campaign.sigma_angle or 0.0,
+        sigma_gravity=campaign.sigma_gravity,
+    )
+
+
+def least_sigma(campaign: Campaign, approach: Approach) -> float:
+    """Smallest noise of a force, m/s², whose weight is regular beside that of the angles."""
+    return LEAST_RATIO * campaign.gravity * (campaign.sigma_angle or 0.0) * approach.uses_angles
+
+
+def campaign_observations(campaign: Campaign) -> Observations:
+    """Return a campaign as the adjustment takes it, R = 1."""
+    noise, known = campaign_noise(campaign), campaign.sigma_force is not None
+    return Observations(
+        forces=campaign.forces[None],
+        sigma_force=noise.sigma_force,
+        angles=None if campaign.angles is None else campaign.angles[None],
+        sigma_angle=noise.sigma_angle,
+        gravity=campaign.gravity,
+        sigma_gravity=campaign.sigma_gravity,
+        hold=campaign.hold,
+        # Beside means of unknown noise nobody knows what slopes weigh.
+        slope=campaign.slope if known else None,
+        sd_slope=campaign.sd_slope if known else None,
+    )
+
+
+def check_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> None:
+    """Raise `InputError` if a campaign lacks what the approach or the model needs."""
+    if approach.uses_angles and campaign.angles is None:
+        raise InputError(
+            f"{campaign.name}: approach {approach.name!r} needs the columns roll_robot_gon and "
+            "pitch_robot_gon"
+        )
+    check_columns(campaign, model)
+    noise, least = campaign_noise(campaign), least_sigma(campaign, approach)
+    if noise.sigma_force < least:
+        raise InputError(
+            f"{campaign.name}: sensor_noise.sigma_mps2: {noise.sigma_force:g} is too small beside "
+            f"robot.angle_sigma_mgon: {noise.sigma_angle / MGON:g}; expected {least:.2g} or more"
+        )
+
+
+def check_columns(campaign: Campaign, model: SensorModel) -> None:
+    """Raise `InputError` if a campaign lacks a column that an effect of the model needs."""
+    hold = campaign.hold
+    for effect in model.effects:
+        for column in compose(effect.spec, (effect.spec,)).hold_columns:
+            if getattr(hold, column) is None:
+                attribute = "angles" if column in ("roll", "pitch") else column
+                names = " and ".join(COLUMNS[attribute])
+                raise InputError(
+                    f"{campaign.name}: the effect {effect.name!r} of the model needs the {column} "
+                    f"of each position; the campaign has no {names}"
+                )
+
+
+def fit_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> CampaignFit:
+    """Calibrate a campaign.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    model : SensorModel
+    approach : Approach
+
+    Raises
+    ------
+    InputError
+        If the campaign lacks what the approach or the model needs, if its positions do not
+        determine the model (says which parameters), or if the adjustment does not converge.
+    """
+    check_campaign(campaign, model, approach)
+    start_of = partial(initial_values, forces=campaign.forces, gravity=campaign.gravity)
+    design = campaign_design(campaign, model, approach)
+    if not design.estimable:
+        raise InputError(
+            f"{campaign.name}: {campaign.n_positions} positions do not determine the model "
+            f"{model.name!r}: {design.reason}"
+        )
+    observed = replace(campaign_observations(campaign), initial=start_of(model))
+    adjustment = calibrate(model, approach, observed)
+    if not adjustment.converged[0] and (unfit := not_affine(model)):
+        # Of a model with large effects the affine part alone is a better start.
+        rest = [effect.spec for effect in model.effects if effect.name not in unfit]
+        part = compose("affine part", tuple(rest))
+        first = calibrate(part, approach, replace(observed, initial=start_of(part)))
+        values = dict(zip(part.parameter_names, first.parameters[0].tolist(), strict=False))
+        observed = replace(observed, initial=model.vector(values))
+        adjustment = calibrate(model, approach, observed)
+    if not adjustment.converged[0]:
+        raise InputError(
+            f"{campaign.name}: the adjustment of the model {model.name!r} does not converge; "
+            f"{_cause(campaign, design)}"
+        )
+    return CampaignFit(campaign, model, approach, observed, adjustment, design)
+
+
+def campaign_design(campaign: Campaign, model: SensorModel, approach: Approach) -> Design:
+    """Say what the positions of a campaign determine."""
+    start = initial_values(model, campaign.forces, campaign.gravity)
+    rough = model.correct(campaign.forces, start, campaign.gravity, campaign.hold)
+    return diagnose(
+        Scheme(campaign.name, campaign.name, -rough, "exact", f"campaign {campaign.name}"),
+        model,
+        approach,
+        campaign_noise(campaign),
+        gravity=campaign.gravity,
+        hold=campaign.hold,
+    )
+
+
+def _cause(campaign: Campaign, design: Design) -> str:
+    """Say what may keep an adjustment from converging."""
+    found = recognise(campaign, get_approach("gravity" if campaign.angles is None else "robot"))
+    more = "`accelstudy diagnose` looks for more"
+    if found is not None:
+        return f"this looks like a gross error ({words(found.name)}): {found.reason}; {more}"
+    if design.condition > HARDLY:
+        return (
+            f"the {campaign.n_positions} positions hardly determine it (condition "
+            f"{design.condition:.0f}, up to {HARDLY:.0f} is usual); more attitudes are needed"
+        )
+    return f"a gross error in the data or a wrong unit is the usual cause; {more}"
+
+
+def initial_values(model: SensorModel, forces: Array, gravity: float) -> Array:
+    """Biases and a common scale from the sphere that fits best, (u,), SI; the rest is zero.
+
+    Positions that do not
+    determine a sphere, and models without these parameters, start from an ideal sensor.
+    """
+    sphere = fit_sphere(forces)
+    if sphere is None:
+        return np.zeros(model.n_parameters)
+    center, radius = sphere
+    scale = radius / gravity - 1
+    names = ("x", "y", "z")
+    values = {f"b_{i}": b for i, b in zip(names, center, strict=True)}
+    return model.vector({**values, **{f"s_{i}": scale for i in names}})

@@ -1,0 +1,1 @@
+"""The format of a campaign: header, positions, and the checks when they are read."""

@@ -1,0 +1,281 @@
+"""A campaign: one calibration session of one sensor, as a folder with two files."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import pyarrow as pa
+import yaml
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import MGON
+from accelstudy.basics.wording import one_line
+from accelstudy.campaign.files.checks import (
+    check_angles,
+    check_column,
+    check_norm,
+    check_outliers,
+    check_robot,
+    check_size,
+)
+from accelstudy.campaign.files.header import COLUMNS, COUNTING, HEADER, KNOWN, TABLES, Header
+from accelstudy.campaign.files.position_files import Columns, read_positions
+from accelstudy.campaign.files.session import Campaign
+from accelstudy.files.layers import overlay, read_layer
+from accelstudy.files.outputs import whole_file
+from accelstudy.files.parquet import write_parquet
+from accelstudy.files.validation import first_error
+
+__all__ = ["Campaign", "read_campaign", "write_campaign"]
+
+Array = NDArray[np.float64]
+
+
+def read_campaign(
+    folder: str | Path, given: Mapping[str, Any] | None = None, *, plausible: bool = True
+) -> Campaign:
+    """Read a campaign folder: `campaign.yaml` and `positions.csv` or `positions.parquet`.
+
+    With ``unit: g`` forces are multiples of standard gravity, 9.80665 m/s², whatever `gravity`
+    says: the unit is the same everywhere, `gravity` is what holds at the place. For data scaled so
+    that local gravity is 1, give 9.80665 as the value of gravity; the norm to be met is 1 then.
+
+    With ``unit: counts`` forces are (raw − offset) · scale, and sds are sd · abs(scale).
+
+    Numbers in `position` grow, but some may be absent: holds that were removed. Where a robot gives
+    no yaw it is 0. Columns that the format does not know are left out and named in `warnings`.
+
+    Parameters
+    ----------
+    folder : path
+    given : mapping, optional
+        Overlays the header key by key.
+    plausible : bool
+        Whether to refuse forces that are not as large as gravity, and angles that fit them better
+        in another unit. Who looks for such errors reads without.
+
+    Raises
+    ------
+    InputError
+        If a file is missing or not whole, or what it says cannot be right; one line says where.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise InputError(
+            f"{folder}: no such folder; a campaign is a folder with {HEADER} and "
+            f"{' or '.join(TABLES)}"
+        )
+    header = read_header(folder, given)
+    path = table_of(folder)
+    if path is None:
+        raise InputError(f"{folder}: no table of positions; expected either {' or '.join(TABLES)}")
+    columns, warnings = read_positions(path)
+    campaign = parse_table(columns, header, path, plausible)
+    return replace(campaign, warnings=tuple(warnings), source=folder)
+
+
+def read_header(folder: Path, given: Mapping[str, Any] | None = None) -> Header:
+    """Header of a campaign folder, with `given` laid over it key by key; errors as above."""
+    return _parse_header(overlay(read_layer(folder / HEADER), given or {}), folder / HEADER)
+
+
+def table_of(folder: Path) -> Path | None:
+    """Table of positions in a campaign folder; None if there is none yet, an error for two."""
+    found = [folder / name for name in TABLES if (folder / name).exists()]
+    if len(found) > 1:
+        raise InputError(
+            f"{folder}: two tables of positions; expected either {' or '.join(TABLES)}"
+        )
+    return found[0] if found else None
+
+
+def write_campaign(
+    campaign: Campaign,
+    folder: str | Path,
+    table: Literal["csv", "parquet"] = "csv",
+    plausible: bool = True,
+) -> None:
+    """Write a campaign folder, in the unit that the campaign had.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        Its `warnings` and `source` are not written.
+    folder : path
+        Made if it is not there. A table of positions in it is replaced, whichever of the two kinds
+        it has; other files are left as they are.
+    table : "csv" or "parquet"
+    plausible : bool
+        As in `read_campaign`.
+
+    Raises
+    ------
+    InputError
+        If the campaign could not be read again (nothing is written then), or the folder cannot be
+        written.
+    """
+    folder = Path(folder)
+    path = folder / f"positions.{table}"
+    header = _parse_header(_content_of(campaign), folder / HEADER)
+    columns = _columns_of(campaign.whole, header)
+    parse_table(columns, header, path, plausible)
+    try:
+        with whole_file(path) as temporary:
+            if table == "csv":
+                with temporary.open("w", newline="", encoding="utf-8") as file:
+                    writer = csv.writer(file, lineterminator="\n")
+                    writer.writerow(columns)
+                    writer.writerows(zip(*columns.values(), strict=True))
+            else:
+                write_parquet(temporary, pa.table(columns))
+        for name in set(TABLES) - {path.name}:
+            (folder / name).unlink(missing_ok=True)
+        with whole_file(folder / HEADER) as temporary:
+            content = header.model_dump(mode="json", exclude_none=True)
+            text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
+            temporary.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written: {error.strerror or error}") from None
+
+
+def _parse_header(content: dict[str, Any], path: Path) -> Header:
+    try:
+        return Header.model_validate(content)
+    except ValidationError as error:
+        raise InputError(f"{path}: {first_error(error, Header)}") from None
+
+
+def parse_table(columns: Columns, header: Header, path: Path, plausible: bool = True) -> Campaign:
+    """Check the columns of the table `path`, and turn them and the header into a campaign."""
+    given: dict[str, Array] = {}
+    labels: list[str] = []
+    for attribute, names in COLUMNS.items():
+        if attribute not in ("positions", "forces") and not {*names} & {*columns}:
+            continue
+        parts = [_numbers(columns, name, labels, path) for name in names]
+        if attribute == "positions":
+            labels = [f"position {value:.15g}" for value in parts[0]]
+        for name, part in zip(names, parts, strict=True):
+            check_column(attribute, name, part, labels, path)
+        given[attribute] = np.column_stack(parts) if len(parts) > 1 else parts[0]
+    check_robot(given, header, path)
+    values: dict[str, Any] = {}
+    with np.errstate(all="ignore"):  # what overflows is nowhere near gravity, and found so
+        for attribute, array in given.items():
+            scale, offset = header.to_si(attribute)
+            values[attribute] = (array - offset) * scale
+        check = check_norm if plausible else check_size
+        check(given["forces"], values["forces"], header, path)
+        if plausible:
+            check_outliers(values["forces"], labels, header.gravity.value_mps2, path)
+        if header.robot is not None:
+            if plausible:
+                check_angles(given["angles"], values["forces"], header.gravity.value_mps2, path)
+            values.setdefault("yaw", np.zeros(len(labels)))
+    for attribute in COUNTING:
+        if attribute in values:
+            values[attribute] = values[attribute].astype(np.int64)
+    campaign = campaign_of(header, values)
+    reasons = {entry.position: entry.reason for entry in header.excluded or ()}
+    try:
+        return campaign.without(reasons)
+    except InputError as error:
+        raise InputError(f"{path.with_name(HEADER)}: {error}") from None
+
+
+def campaign_of(header: Header, values: Mapping[str, Any]) -> Campaign:
+    """Campaign of a header and of columns in SI, by attribute."""
+    nominal, noise, robot = header.nominal, header.sensor_noise, header.robot
+    return Campaign(
+        name=header.name,
+        sensor=header.sensor,
+        unit=header.unit,
+        gravity=header.gravity.value_mps2,
+        sigma_gravity=header.gravity.sigma_mps2,
+        sigma_force=None if noise is None else noise.sigma_mps2,
+        sigma_angle=None if robot is None else robot.angle_sigma_mgon * MGON,
+        nominal_scale=None if nominal is None else np.array(nominal.scale),
+        nominal_offset=None if nominal is None else np.array(nominal.offset),
+        full_range=header.range_mps2,
+        log=header.log,
+        **values,
+    )
+
+
+def _numbers(columns: Columns, name: str, labels: Sequence[str], path: Path) -> Array:
+    """Column of finite numbers; `labels` say what its rows are called."""
+    if name not in columns:
+        lower = {other.lower(): other for other in columns if other not in KNOWN}
+        near = get_close_matches(name.lower(), lower, n=1)
+        hint = f"; is {lower[near[0]]!r} meant?" if near else ""
+        beside = next((names for names in COLUMNS.values() if name in names), ())
+        group = f" (it goes with {', '.join(n for n in beside if n != name)})" if beside[1:] else ""
+        raise InputError(f"{path}: {name}: the column is missing{group}{hint}")
+    values = columns[name]
+    if not len(values):
+        raise InputError(f"{path}: no positions; expected one row per hold")
+    numbers = np.empty(len(values))
+    for i, value in enumerate(values):
+        where = f"{path}: {name}: {labels[i] if labels else f'row {i + 1}'}"
+        if value is None or value == "":
+            raise InputError(f"{where}: empty; expected a number")
+        try:
+            if isinstance(value, bool) or "_" in str(value):
+                raise ValueError
+            numbers[i] = float(value)
+        except (TypeError, ValueError, OverflowError):
+            shown = one_line(repr(value), 60)
+            raise InputError(f"{where}: {shown} is no number, such as -9.81") from None
+        if not np.isfinite(numbers[i]):
+            raise InputError(f"{where}: {value} is not finite; leave out a hold that has no mean")
+    return numbers
+
+
+def _content_of(campaign: Campaign) -> dict[str, Any]:
+    """What `campaign.yaml` says of a campaign."""
+    content = {
+        "schema_version": 1,
+        "name": campaign.name,
+        "sensor": campaign.sensor,
+        "unit": campaign.unit,
+        "gravity": {"value_mps2": campaign.gravity, "sigma_mps2": campaign.sigma_gravity},
+    }
+    if campaign.nominal_scale is not None or campaign.nominal_offset is not None:
+        nominal = {"scale": campaign.nominal_scale, "offset": campaign.nominal_offset}
+        content["nominal"] = {k: np.asarray(v).tolist() for k, v in nominal.items()}
+    if campaign.sigma_force is not None:
+        content["sensor_noise"] = {"sigma_mps2": campaign.sigma_force}
+    if campaign.full_range is not None:
+        content["range_mps2"] = campaign.full_range
+    if campaign.reasons:
+        content["excluded"] = campaign.exclusions
+    if campaign.log is not None:
+        content["log"] = campaign.log.model_dump(exclude_none=True)
+    if campaign.sigma_angle is not None:
+        content["robot"] = {"angle_sigma_mgon": campaign.sigma_angle / MGON}
+    return content
+
+
+def _columns_of(campaign: Campaign, header: Header) -> dict[str, list[Any]]:
+    """Columns of a campaign in the units of the files."""
+    columns: dict[str, list[Any]] = {}
+    for attribute, names in COLUMNS.items():
+        values = getattr(campaign, attribute)
+        if values is None:
+            continue
+        shape = (campaign.n_positions, len(names)) if len(names) > 1 else (campaign.n_positions,)
+        if np.shape(values) != shape:
+            raise InputError(f"{campaign.name}: {attribute}: shape {np.shape(values)}, not {shape}")
+        if attribute not in COUNTING:
+            scale, offset = header.to_si(attribute)
+            values = np.asarray(values, dtype=float) / scale + offset
+        columns.update(zip(names, np.reshape(values, (-1, len(names))).T.tolist(), strict=True))
+    return columns

@@ -1,0 +1,114 @@
+"""Axis error: channels are swapped, or have the wrong sign."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import permutations, product
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.registry import Hyper
+from accelstudy.campaign.gross_errors.base import (
+    EVERYWHERE,
+    Array,
+    GrossError,
+    Mending,
+    register,
+    with_readings,
+)
+
+if TYPE_CHECKING:
+    from accelstudy.campaign.files.session import Campaign
+    from accelstudy.campaign.gross_errors.real_sensor import RealSensor
+
+SIGNED_PERMUTATIONS = tuple(
+    tuple(sign * axis for sign, axis in zip(signs, axes, strict=True))
+    for axes in permutations((1, 2, 3))
+    for signs in product((1, -1), repeat=3)
+)
+"""What the channels x, y, z show: axis 1, 2 or 3 with a sign; the first is the right one."""
+NEAR = 2.0
+"""How many times as far from the ideal sensor as the best axes others may be, to be tried."""
+
+
+@register
+class AxisError(GrossError):
+    """One of the 48 signed permutations of the axes.
+
+    The settings say what each channel shows: 1, 2 and 3 are the axes x, y and z, and a minus is a
+    wrong sign; ``axis_error(x=2, y=1, z=3)`` exchanges x and y. One of the 47 that are wrong is
+    drawn if none is given.
+    """
+
+    name = "axis_error"
+    hypers = tuple(Hyper(axis, "1", math.nan) for axis in "xyz")
+    equation = "f → P f, P one of 48 signed permutations"
+    rank = EVERYWHERE
+
+    def drawn(self, campaign: Campaign, rng: np.random.Generator) -> Self:
+        """Draw one of the 47."""
+        if not self.is_open(*"xyz"):
+            return self
+        wrong = SIGNED_PERMUTATIONS[1:]
+        return type(self)(**dict(zip("xyz", wrong[rng.integers(len(wrong))], strict=True)))
+
+    def act(self, campaign: Campaign) -> Campaign:
+        """Permute the channels, and turn their signs."""
+        shown = tuple(self.shape[axis] for axis in "xyz")
+        if shown not in SIGNED_PERMUTATIONS:
+            raise InputError(
+                f"gross error {self.name!r}: x, y, z must be 1, 2, 3 in some order, each with a "
+                f"sign, such as x=2, y=-1, z=3, not {self.spec}"
+            )
+        return _turned(campaign, _matrix(shown))
+
+    def mendings(self, campaign: Campaign, sensor: RealSensor) -> Iterator[Mending]:
+        """Undo each of the 47 that could be meant; gravity alone sees none of them."""
+        if sensor.expected is None:
+            return
+        # What the ideal sensor reads tells the axes well enough, and all 48 at once.
+        misses = {}
+        for axes in SIGNED_PERMUTATIONS:
+            distance = np.linalg.norm(campaign.forces @ _matrix(axes) - sensor.expected, axis=1)
+            misses[axes] = float(np.mean(np.minimum(distance, campaign.gravity)))
+        least = min(misses.values())
+        near = [axes for axes in SIGNED_PERMUTATIONS[1:] if misses[axes] < NEAR * least]
+        for axes in sorted(near, key=_changes):
+            matrix = _matrix(axes).T
+            yield Mending(_reason(matrix), _turned(campaign, matrix), matrix)
+
+
+def _matrix(shown: Sequence[float]) -> Array:
+    """P of what the channels show: f → P f."""
+    matrix = np.zeros((3, 3))
+    matrix[range(3), np.abs(shown).astype(int) - 1] = np.sign(shown)
+    return matrix
+
+
+def _turned(campaign: Campaign, matrix: Array) -> Campaign:
+    """Return the campaign with f → P f; columns are taken, so that no digit changes."""
+    axes = np.argmax(np.abs(matrix), axis=1)
+    return with_readings(campaign, lambda values: matrix[range(3), axes] * values[:, axes])
+
+
+def _changes(shown: Sequence[float]) -> tuple[int, int]:
+    """Number of channels that are wrong, those from another axis first."""
+    return (
+        sum(abs(axis) != i for i, axis in enumerate(shown, 1)),
+        sum(axis < 0 for axis in shown),
+    )
+
+
+def _reason(matrix: Array) -> str:
+    """Say how the axes are read, from the matrix that turns them right."""
+    axes, signs = np.argmax(np.abs(matrix), axis=1), matrix.sum(axis=1)
+    words = ", ".join(
+        f"{axis} is read as {'−' if sign < 0 else ''}{'xyz'[other]}"
+        for axis, other, sign in zip("xyz", axes, signs, strict=True)
+        if (axis, sign) != ("xyz"[other], 1.0)
+    )
+    wrong = "have the wrong sign" if (axes == range(3)).all() else "are swapped"
+    return f"axes {wrong}: {words}"

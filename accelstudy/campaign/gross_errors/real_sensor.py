@@ -1,0 +1,139 @@
+"""How well a real sensor can fit a campaign: what gross errors are judged by.
+
+A real sensor is within some hundredths of an ideal one, before any calibration. So the fit starts
+at the ideal sensor and stays about it, however many positions there are, and positions that are
+far off have no weight in it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.leveling.angles import specific_force
+
+if TYPE_CHECKING:
+    from accelstudy.campaign.files.session import Campaign
+
+Array = NDArray[np.float64]
+
+USUAL = 0.3
+"""Standard deviation of each parameter of an uncalibrated sensor, as a share of gravity."""
+CLEARLY = 4.0
+"""How many times better an explanation must fit; as many times the usual distance are too far."""
+LOST = 0.15
+"""Share of gravity beyond which no sensor of any use is off."""
+LEAST = 1e-6
+"""Distance, as a share of gravity, below which all are alike."""
+SPARE = 3
+"""Positions beside the numbers that are fitted, with which a wrong one is noticed."""
+STEPS = 40
+"""Iterations at most."""
+
+
+@dataclass(frozen=True)
+class RealSensor:
+    """A sensor that was fitted to most positions of a campaign.
+
+    Attributes
+    ----------
+    expected : (n, 3) array, m/s², what it reads in each position; None where only the norm is known
+    distance : (n,) array, m/s², of each reading from what it should be
+    gravity : float, m/s²
+    tells : bool, whether there are enough positions to tell which of them are wrong
+    """
+
+    expected: Array | None
+    distance: Array
+    gravity: float
+    tells: bool
+
+    @property
+    def usual(self) -> float:
+        """Distance of the usual position, m/s²."""
+        return float(np.median(self.distance))
+
+    @property
+    def misfit(self) -> float:
+        """Mean distance, m/s²; beyond `LOST` a position is wrong, and how far does not matter."""
+        return float(np.mean(np.minimum(self.distance, LOST * self.gravity)))
+
+    @property
+    def wrong(self) -> NDArray[np.bool_]:
+        """Which positions, (n,), do not fit."""
+        return self.distance > CLEARLY * self.usual
+
+    @classmethod
+    def of(cls, campaign: Campaign, attitude: bool, mounted: bool = False) -> RealSensor:
+        """Fit a sensor, robustly.
+
+        Parameters
+        ----------
+        campaign : Campaign
+        attitude : bool, whether to compare with the robot's attitudes, or with gravity alone
+        mounted : bool, whether the sensor may be mounted in any way, and be wrong by anything
+        """
+        g, conditions = campaign.gravity, _conditions(campaign)
+        if not attitude:
+            # The norm of (I + D) f/g + c is 1: linear in the nine numbers of (I + D)ᵀ(I + D), c.
+            x, y, z = unit = campaign.forces.T / g
+            columns = [*unit**2, x * y, y * z, z * x, *unit]
+            columns += [c * axis for c in conditions for axis in unit]
+            design = np.stack(columns, axis=1)
+            lacking = (1 - np.sum(unit**2, axis=0, keepdims=True).T) / 2
+            squares = 1 - 2 * (lacking - _robust(design, lacking, USUAL))[:, 0]
+            return cls(None, g * np.abs(np.sqrt(np.maximum(squares, 0)) - 1), g, _tells(design))
+        ideal = attitude_forces(campaign)
+        columns = [*ideal.T / g, np.ones(len(ideal)), *conditions]
+        design, lacking = np.stack(columns, axis=1), (campaign.forces - ideal) / g
+        expected = ideal + g * _robust(design, lacking, np.inf if mounted else USUAL)
+        distance = np.linalg.norm(campaign.forces - expected, axis=1)
+        return cls(expected, distance, g, _tells(design))
+
+
+def attitude_forces(campaign: Campaign) -> Array:
+    """Return what an ideal sensor reads at the robot's angles, (n, 3), m/s²."""
+    assert campaign.angles is not None
+    roll, pitch = campaign.angles.T
+    return np.column_stack(specific_force(roll, pitch, campaign.gravity))
+
+
+def _tells(design: Array) -> bool:
+    n, u = design.shape
+    return n >= u + SPARE
+
+
+def _conditions(campaign: Campaign) -> list[Array]:
+    """Temperature and time from −1 to 1: of what drifts with them no position is to be blamed."""
+    found = []
+    for values in (campaign.temperature, campaign.time):
+        if values is not None and np.ptp(values) > 0:
+            found.append(2 * (values - values.min()) / np.ptp(values) - 1)
+    return found
+
+
+def _robust(design: Array, lacking: Array, share: float) -> Array:
+    """Fit X p ≈ y with weights that far positions lose; returns X p, (n, k).
+
+    The parameters count like one more observation for each position: with `share` as their standard
+    deviation, where an observation has the usual distance. So they remain small as long as the
+    usual distance is not.
+    """
+    n, u = design.shape
+    start: Array = np.zeros((u, lacking.shape[1]))
+    if share == np.inf:
+        start = np.asarray(np.linalg.lstsq(design, lacking, rcond=None)[0])
+    parameters, before = start, np.inf
+    for _ in range(STEPS):
+        distance = np.linalg.norm(lacking - design @ parameters, axis=1)
+        usual = max(float(np.median(distance)), LEAST)
+        if abs(before - usual) < 1e-3 * usual:
+            break
+        before = usual
+        weights = 1 / (1 + (distance / (CLEARLY * usual)) ** 2) ** 2
+        normal = design.T * weights @ design / n + np.eye(u) * max((usual / share) ** 2, 1e-12)
+        parameters = np.linalg.solve(normal, design.T * weights @ lacking / n)
+    return np.asarray(design @ parameters)

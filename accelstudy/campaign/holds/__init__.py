@@ -1,0 +1,1 @@
+"""Holds: where a log is at rest, found by its variance, with their means and noise."""

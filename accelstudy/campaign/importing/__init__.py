@@ -1,0 +1,1 @@
+"""Import: a raw log, or a table of means, becomes a campaign."""

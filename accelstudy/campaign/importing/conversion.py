@@ -1,0 +1,304 @@
+"""From a raw log, or a table of means, to a campaign."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import display_unit, to_display
+from accelstudy.campaign.files.format import write_campaign
+from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.holds.allan import MeanAccuracy, accuracy_of_mean
+from accelstudy.campaign.holds.detection import Holds, find_joint_holds
+from accelstudy.campaign.importing.imported import imported_campaign, layout_of
+from accelstudy.campaign.importing.means import import_means
+from accelstudy.campaign.importing.report import ImportReport, shown
+from accelstudy.campaign.importing.settings import (
+    GravitySettings,
+    ImportSettings,
+    parse_settings,
+    read_settings,
+)
+from accelstudy.campaign.logs.recording import AXES, Log, Recording, conversion, open_log
+from accelstudy.campaign.logs.series import LogSeries
+
+__all__ = [
+    "GravitySettings",
+    "ImportReport",
+    "ImportSettings",
+    "import_each",
+    "import_file",
+    "import_log",
+    "import_means",
+    "import_sensors",
+    "import_to",
+    "log_of",
+    "parse_settings",
+    "read_settings",
+]
+
+Array = NDArray[np.float64]
+
+TURNING = 1.5
+"""Noise across over noise along gravity from which on the sensor is said to turn in its holds."""
+
+
+def log_of(path: str | Path, settings: ImportSettings) -> Log:
+    """Open a log as the settings say."""
+    return open_log(
+        path,
+        columns=settings.columns,
+        time=settings.time,
+        rate=settings.rate_hz,
+        unit=settings.unit,
+        scale=settings.scale,
+        offset=settings.offset,
+        time_unit=settings.time_unit,
+        variable=settings.variable,
+        frame=settings.axes,
+    )
+
+
+def import_log(
+    path: str | Path, settings: ImportSettings | None = None
+) -> tuple[Campaign, ImportReport]:
+    """Find the static holds of a log of one sensor; see `import_sensors`."""
+    ((campaign, report),) = import_sensors([path], settings or ImportSettings()).values()
+    return campaign, report
+
+
+def import_sensors(
+    paths: Sequence[str | Path], settings: ImportSettings
+) -> dict[str, tuple[Campaign, ImportReport]]:
+    """Find the static holds of the sensors in a log, or in logs of one position each.
+
+    Parameters
+    ----------
+    paths : files with raw logs, see `open_log`; of several each has one position, the longest hold
+        in it
+    settings : ImportSettings
+
+    Returns
+    -------
+    dict
+        For each sensor, by its name ("" if the settings name none), the campaign and what was
+        found. The campaign has one position for each hold. Its `sigma_force` takes into account
+        that the samples are not independent: it is the Allan deviation over a typical hold, of the
+        specific force along gravity, as across it a sensor that settles looks like one that drifts.
+
+    Raises
+    ------
+    InputError
+        If a log cannot be read or has no static hold.
+    """
+    chosen = _settings_of_sensors(settings)
+    logs = {name: _recording(paths, each) for name, each in chosen.items()}
+    found = find_joint_holds(
+        list(logs.values()),
+        window=settings.window_s,
+        threshold=settings.threshold_mps2,
+        trim=settings.trim_s,
+        shortest=settings.shortest_s,
+        full_range=_full_range(settings),
+        selection=settings.selection,
+        one_each=len(paths) > 1,
+    )
+    return {
+        name: _campaign(paths, each, logs[name], holds)
+        for (name, each), holds in zip(chosen.items(), found, strict=True)
+    }
+
+
+def import_file(
+    path: str | Path, settings: ImportSettings | None = None
+) -> tuple[Campaign, ImportReport]:
+    """Import a log of one sensor or, if the settings say so, a table of means."""
+    settings = settings or ImportSettings()
+    if settings.means:
+        return import_means(path, settings)
+    return import_log(path, settings)
+
+
+def import_to(
+    folder: str | Path, path: str | Path, settings: ImportSettings, figure: bool = True
+) -> tuple[Campaign, ImportReport]:
+    """Import a file of one sensor and write the campaign to a folder; see `import_each`."""
+    if settings.sensors:
+        raise InputError("sensors: several sensors make several campaigns; only one fits here")
+    return import_each({"": Path(folder)}, [path], settings, figure)[""]
+
+
+def import_each(
+    folders: Mapping[str, Path],
+    paths: Sequence[str | Path],
+    settings: ImportSettings,
+    figure: bool = True,
+) -> dict[str, tuple[Campaign, ImportReport]]:
+    """Import logs, or a table of means, and write the campaigns to folders.
+
+    With `figure`, segmentation.svg and .png there show the log with its holds, if it is a log.
+
+    Parameters
+    ----------
+    folders : mapping of the names of the sensors to folders; "" where the settings name none
+    paths, settings : as of `import_sensors`
+    figure : bool
+
+    Raises
+    ------
+    InputError
+        If something cannot be read, makes no campaign, or cannot be written.
+    """
+    if settings.means:
+        if len(paths) > 1 or settings.sensors:
+            raise InputError("a table of means is one file of one sensor")
+        campaigns = {"": import_means(paths[0], settings)}
+    else:
+        campaigns = import_sensors(paths, settings)
+    for name, (campaign, report) in campaigns.items():
+        write_campaign(campaign, folders[name])
+        if figure and report.holds is not None:
+            from accelstudy.campaign.importing.segmentation_figure import render_segmentation
+
+            files = (folders[name] / f"segmentation.{kind}" for kind in ("svg", "png"))
+            own = _settings_of_sensors(settings)[name]
+            if campaign.log is not None:  # it knows the offset that the positions showed
+                own = own.model_copy(update={"offset": campaign.log.offset})
+            render_segmentation(_recording(paths, own), report.holds, *files)
+    return campaigns
+
+
+def _settings_of_sensors(settings: ImportSettings) -> dict[str, ImportSettings]:
+    """Settings of each sensor, as if it were alone."""
+    if settings.robot is not None:
+        raise InputError("robot: its angles go with a table of means (--means)")
+    if not settings.sensors:
+        return {"": settings}
+    if set(AXES) & set(settings.columns):
+        raise InputError("columns: fx, fy and fz stand in sensors (--sensor) already")
+    return {
+        name: settings.model_copy(
+            update={
+                "columns": {**dict(zip(AXES, places, strict=True)), **settings.columns},
+                "name": None if settings.name is None else f"{settings.name}-{name}",
+                "sensor": settings.sensor or name,
+            }
+        )
+        for name, places in settings.sensors.items()
+    }
+
+
+def _recording(paths: Sequence[str | Path], settings: ImportSettings) -> Recording:
+    parts = [log_of(path, settings) for path in paths]
+    if len(parts) == 1:
+        return parts[0]
+    return LogSeries([replace(part, lively=False) for part in parts])
+
+
+def _campaign(
+    paths: Sequence[str | Path], settings: ImportSettings, log: Recording, holds: Holds
+) -> tuple[Campaign, ImportReport]:
+    accuracy, warnings = _accuracy(holds, settings.gravity.value_mps2)
+    notes = [] if settings.frame == "frd" else [_frame_note(settings)]
+    forces = holds.mean
+    if settings.unit == "counts" and settings.offset is None:
+        settings, forces, note = _with_offset(settings, holds)
+        notes += note
+    first, time = log, (holds.t0 + holds.t1) / 2
+    if isinstance(log, LogSeries):
+        first = log.parts[0]
+        notes.append(
+            f"files: {len(log.parts)}, with the longest hold of each as one position; what is "
+            "before and after it does not count"
+            + ("" if log.timed else "; the times of the files do not tell that of a position")
+        )
+        missing = [i for i in range(1, len(paths) + 1) if i not in holds.number]
+        warnings += [f"{paths[i - 1]}: no static hold; position {i} is missing" for i in missing]
+    assert isinstance(first, Log)
+    columns = {}
+    for name, values in holds.conditions.items():
+        if np.isfinite(values).all():
+            columns[name] = values
+        else:
+            hold = holds.number[np.argmin(np.isfinite(values))]
+            warnings.append(f"hold {hold} has no {name}; the column is left out")
+    campaign = imported_campaign(
+        paths,
+        settings,
+        forces,
+        positions=holds.number,
+        sigma_force=accuracy.allan,
+        n_samples=holds.n_samples,
+        sd=holds.sd,
+        slope=holds.slope,
+        sd_slope=holds.sd_slope,
+        time=None if isinstance(log, LogSeries) and not log.timed else time,
+        log=layout_of(settings, first.source, first.places),
+        warnings=tuple(warnings),
+        **columns,
+    ).without(holds.left_out)
+    report = ImportReport(
+        len(holds), accuracy, float(accuracy.white), holds, tuple(notes), tuple(warnings)
+    )
+    return campaign, report
+
+
+def _accuracy(holds: Holds, gravity: float) -> tuple[MeanAccuracy, list[str]]:
+    """How well the mean over a typical hold is known, and what is odd about the holds."""
+    typical = int(np.median(holds.n_samples[holds.used]))
+
+    def accuracy_in(channels: slice) -> MeanAccuracy:
+        sd = float(np.sqrt(np.mean(holds.noise[channels] ** 2)))
+        return accuracy_of_mean(holds.allan.channels(channels), typical * holds.step, sd, typical)
+
+    accuracy = accuracy_in(slice(0, 1) if holds.directed else slice(0, 3))
+    warnings = list(holds.warnings)
+    if not holds.directed:
+        warnings.append(
+            "the norms of the means differ too much for specific forces (is an offset missing?); "
+            "sigma is that of all axes together"
+        )
+    elif (across := accuracy_in(slice(1, 3)).allan) > TURNING * accuracy.allan:
+        turned = f"{to_display(across / gravity, 'rad'):.0f} {display_unit('rad')}"
+        warnings.append(
+            f"across gravity the means vary by {shown(across)}, more than along it: the sensor "
+            f"turns by some {turned} within holds"
+        )
+    if accuracy.slope is not None:
+        warnings.append(
+            f"the Allan deviation is known up to {accuracy.tau:.2g} s, and carried on from there "
+            f"to the {accuracy.duration:.2g} s of a hold with slope {accuracy.slope:.2f}"
+        )
+    return accuracy, warnings
+
+
+def _with_offset(settings: ImportSettings, holds: Holds) -> tuple[ImportSettings, Array, list[str]]:
+    """Offset of counts from the positions, unless zero is right but for a sensor's bias."""
+    frame = settings.axes
+    radius = float(np.median(np.linalg.norm(holds.mean - holds.center, axis=1)))
+    if not (holds.directed and np.linalg.norm(holds.center) > radius / 2):
+        return settings, holds.mean, []
+    factor, _ = conversion("counts", settings.scale, None)
+    offset = np.round(frame.from_frd(holds.center) / factor)
+    note = (
+        f"offset: {', '.join(f'{x:.0f}' for x in offset)} counts, from the positions, as none was "
+        "given"
+    )
+    forces = holds.mean - frame.to_frd(offset * factor)
+    return settings.model_copy(update={"offset": offset.tolist()}), forces, [note]
+
+
+def _full_range(settings: ImportSettings) -> float:
+    """Range of the sensor, infinite if unknown; counts without an offset reach no range."""
+    if settings.range_mps2 is None or (settings.unit == "counts" and settings.offset is None):
+        return np.inf
+    return settings.range_mps2
+
+
+def _frame_note(settings: ImportSettings) -> str:
+    return f"axes: {settings.frame} in the log, turned to frd (forward, right, down) here"

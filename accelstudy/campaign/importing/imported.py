@@ -1,0 +1,102 @@
+"""What is common to campaigns made of logs and of tables of means."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import UNITS
+from accelstudy.campaign.files.checks import likely_fault
+from accelstudy.campaign.files.layout import LogLayout, Place
+from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.importing.settings import ImportSettings
+from accelstudy.campaign.logs.recording import conversion
+from accelstudy.campaign.logs.sources import Source
+
+Array = NDArray[np.float64]
+
+
+def imported_campaign(
+    paths: Sequence[str | Path], settings: ImportSettings, forces: Array, **columns: Any
+) -> Campaign:
+    """Campaign of forces (n, 3) in m/s², in forward, right, down, as the settings describe it.
+
+    Raises
+    ------
+    InputError
+        If the forces are nowhere near gravity; says which options would make them so.
+    """
+    scale, offset = None, None
+    if settings.unit == "counts":
+        factor, shift = conversion("counts", settings.scale, settings.offset)
+        frame = settings.axes
+        scale, offset = frame.rearranged(factor) * frame.signs, frame.rearranged(shift)
+        raw = frame.from_frd(forces) / factor + shift
+    else:
+        raw = forces / UNITS["m/s^2"][settings.unit]
+    _check_size(paths[0], settings, raw, forces)
+    return Campaign(
+        **{
+            "name": settings.name or default_name(paths),
+            "positions": np.arange(1, len(forces) + 1),
+            "forces": forces,
+            "gravity": settings.gravity.value_mps2,
+            "sigma_gravity": settings.gravity.sigma_mps2,
+            "unit": settings.unit,
+            "sensor": settings.sensor,
+            "nominal_scale": scale,
+            "nominal_offset": offset,
+            "full_range": settings.range_mps2,
+            **columns,
+        }
+    )
+
+
+def _check_size(path: str | Path, settings: ImportSettings, raw: Array, forces: Array) -> None:
+    """Check that forces are roughly as large as gravity; names the options that would make them."""
+    gravity, unit = settings.gravity.value_mps2, settings.unit
+    norm, given = (float(np.median(np.linalg.norm(array, axis=1))) for array in (forces, raw))
+    fault = likely_fault(given, norm, unit, gravity)
+    if fault is None:
+        return
+    at_rest = f"{path}: at rest the forces are about {given:.3g} {unit}"
+    if fault == "gravity":
+        raise InputError(
+            f"{at_rest}, which does not fit a gravity of {gravity:g} m/s²; give --gravity"
+        )
+    if fault == "counts":
+        raise InputError(f"{at_rest}: these look like counts; give --unit counts and --scale")
+    if fault != "unknown":
+        raise InputError(f"{at_rest}: these look like {fault}; give --unit {fault}")
+    advice = "--scale and --offset" if unit == "counts" else "--unit or --columns"
+    converted = f", by --scale and --offset {norm:.3g} m/s²," if unit == "counts" else ","
+    raise InputError(f"{at_rest}{converted} which is nowhere near gravity; give other {advice}")
+
+
+def layout_of(settings: LogLayout, source: Source, places: Mapping[str, int]) -> LogLayout:
+    """How a log was read, with all its columns: by their names if it has names."""
+    names = source.names
+    named = names != [str(i) for i in range(len(names))]
+
+    def column(key: str) -> Place:
+        place = places[key]
+        name = names[place]
+        return name if named and name and names.count(name) == 1 else place
+
+    layout = settings.model_dump(include=set(LogLayout.model_fields))
+    time = column("time") if "time" in places else None
+    columns = {key: column(key) for key in places if key != "time"}
+    return LogLayout.model_validate({**layout, "columns": columns, "time": time})
+
+
+def default_name(paths: Sequence[str | Path]) -> str:
+    """Name of a campaign: that of its file without its endings, or of the folder of several."""
+    path = Path(paths[0])
+    if len(paths) > 1:
+        return path.absolute().parent.name or path.stem
+    return Path(path.stem).stem if path.suffix == ".gz" else path.stem

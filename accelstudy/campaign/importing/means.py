@@ -1,0 +1,170 @@
+"""From a table of means to a campaign."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.units import MGON, UNITS
+from accelstudy.campaign.files.checks import clearly_worse, misfit_of_angles
+from accelstudy.campaign.files.layout import LogLayout
+from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.gross_errors import unit_error
+from accelstudy.campaign.importing.imported import imported_campaign
+from accelstudy.campaign.importing.report import ImportReport
+from accelstudy.campaign.importing.settings import ImportSettings
+from accelstudy.campaign.logs.columns import AXES, locate, read_columns
+from accelstudy.campaign.logs.recording import TIME_UNITS, conversion
+from accelstudy.campaign.logs.sources import Source, open_source
+
+Array = NDArray[np.float64]
+
+SDS = ("sd_fx", "sd_fy", "sd_fz")
+ANGLES = ("roll", "pitch")
+MEANS = (*AXES, "n_samples", *SDS, "temperature", "vibration", *ANGLES, "yaw")
+"""Columns that a table of means may have, besides its time."""
+_YEARS = 1e8  # s; nobody calibrates for years, so times beyond count from 1970
+
+
+def import_means(
+    path: str | Path, settings: ImportSettings | None = None
+) -> tuple[Campaign, ImportReport]:
+    """Take a table of means, one row for each position.
+
+    Parameters
+    ----------
+    path : file, of any kind that `open_log` reads; a MATLAB array may have a column for each
+        position instead
+    settings : ImportSettings, optional
+        Of `columns` those of `MEANS`; nothing is detected, so that windows do not matter. With
+        `robot` the columns roll, pitch and perhaps yaw are the robot's angles, in the convention of
+        the frame.
+
+    Returns
+    -------
+    Campaign
+        With a `sigma_force` if the table has the number of samples and their standard deviations:
+        that of white noise, as a table of means does not tell more.
+    ImportReport
+
+    Raises
+    ------
+    InputError
+        If the table cannot be read.
+    """
+    settings = settings or ImportSettings()
+    factor, shift = conversion(settings.unit, settings.scale, settings.offset)
+    source = open_source(path, settings.variable)
+    values, warnings = _columns(source, settings)
+    frame = settings.axes
+
+    n_samples = None
+    if "n_samples" in values:
+        n_samples = np.round(values["n_samples"]).astype(int)
+        if np.any(n_samples < 1):
+            raise InputError(f"{path}: column n_samples: must be positive")
+    sd = None
+    if all(key in values for key in SDS):
+        sd = frame.rearranged(np.column_stack([values[key] for key in SDS]) * np.abs(factor))
+        if np.any(sd < 0):
+            raise InputError(f"{path}: columns sd_fx, sd_fy, sd_fz: must not be negative")
+    sigma: float | None = None
+    if sd is not None and n_samples is not None and np.any(sd > 0):
+        sigma = float(np.sqrt(np.mean(sd**2 / n_samples[:, None])))
+        warnings.append("sigma of a mean is that of white noise; coloured noise makes it larger")
+    forces = frame.to_frd((np.column_stack([values[axis] for axis in AXES]) - shift) * factor)
+    campaign = imported_campaign(
+        [path],
+        settings,
+        forces,
+        sigma_force=sigma,
+        n_samples=n_samples,
+        sd=sd,
+        time=values.get("time"),
+        temperature=values.get("temperature"),
+        vibration=values.get("vibration"),
+        log=_layout(settings),
+        warnings=tuple(warnings),
+    )
+    if settings.robot is not None:
+        unit, signs = UNITS["rad"][settings.robot.unit], frame.signs
+        angles = np.column_stack([values[key] for key in ANGLES]) * signs[:2]
+        _check_angles(path, angles, settings.robot.unit, campaign)
+        yaw = values.get("yaw")
+        campaign = replace(
+            campaign,
+            angles=angles * unit,
+            yaw=None if yaw is None else yaw * unit * signs[2],
+            sigma_angle=settings.robot.angle_sigma_mgon * MGON,
+        )
+    return campaign, ImportReport(len(forces), None, sigma, None, (), tuple(warnings))
+
+
+def _layout(settings: ImportSettings) -> LogLayout:
+    """What a table of means tells of logs: their unit and axes, but not their columns."""
+    return LogLayout.model_validate(
+        settings.model_dump(include={"unit", "scale", "offset", "frame"}, exclude_none=True)
+    )
+
+
+def _columns(source: Source, settings: ImportSettings) -> tuple[dict[str, Array], list[str]]:
+    """Columns by their keys, and what was not taken."""
+    given = settings.columns
+    for key in given:
+        if key not in MEANS:
+            raise UnknownNameError("column", key, MEANS)
+
+    def found(keys: tuple[str, ...], needed: bool = False) -> dict[str, int]:
+        return locate(source, {k: given[k] for k in keys if k in given}, keys, needed)
+
+    places = found(AXES, needed=True)
+    places |= found(("n_samples", *SDS, "temperature", "vibration"))
+    warnings = []
+    angles = found((*ANGLES, "yaw"))
+    if settings.robot is not None:
+        missing = [key for key in ANGLES if key not in angles]
+        if missing:
+            raise InputError(
+                f"{source.path}: which column is the robot's {missing[0]}? Say it with "
+                f"--columns {missing[0]}=..."
+            )
+        places |= angles
+    elif {*angles} & {*given}:
+        raise InputError(
+            f"{source.path}: columns {', '.join(angles)}: give the standard deviation of the "
+            "robot's angles (--robot-sigma)"
+        )
+    elif angles:
+        warnings.append(
+            f"columns {', '.join(angles)} are left out; --robot-sigma takes them for the robot's"
+        )
+    if settings.time is not None:
+        places |= locate(source, {"time": settings.time}, ("time",))
+    rows = read_columns(source, places, places.get("time"))
+    values = dict(zip(places, rows.T, strict=True))
+    if "time" in places:
+        factor = TIME_UNITS[settings.time_unit]
+        first = float(next(source.read([places["time"]], 1))[0, 0]) * factor
+        values["time"] = values["time"] * factor + (first if abs(first) < _YEARS else 0.0)
+    return values, warnings
+
+
+def _check_angles(path: str | Path, angles: Array, unit: str, campaign: Campaign) -> None:
+    """Check that the robot's angles (n, 2) fit the forces in this unit and frame, if in any."""
+
+    def misfit(unit: str, sign: int = 1) -> float:
+        given = angles * unit_error.ANGLES[unit]
+        return misfit_of_angles(given, sign * campaign.forces, campaign.gravity)
+
+    units = unit_error.ANGLES
+    others = {f"--robot-unit {name}": misfit(name) for name in units if name != unit}
+    others["another --frame"] = misfit(unit, -1)
+    best = min(others, key=lambda option: others[option])
+    if clearly_worse(misfit(unit), others[best]):
+        raise InputError(
+            f"{path}: the robot's angles do not fit the forces in {unit}; {best} would be right"
+        )

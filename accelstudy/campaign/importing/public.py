@@ -1,0 +1,239 @@
+"""Public measurements: a registry of where they are, and a way to get them whole."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from contextlib import suppress
+from functools import cache
+from http.client import HTTPException
+from pathlib import Path
+from typing import Annotated, Any
+from urllib.error import HTTPError
+from urllib.parse import unquote, urlsplit
+from urllib.request import Request, urlopen
+
+from pydantic import Field, ValidationError
+
+from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.progress import stage
+from accelstudy.campaign.importing.settings import ImportSettings
+from accelstudy.files.layers import read_layer
+from accelstudy.files.outputs import is_temporary, whole_file
+from accelstudy.files.validation import Block, first_error
+
+REGISTRY = Path(__file__).with_name("public_data.yaml")
+TIMEOUT = 30.0
+"""s, that a server may be silent."""
+BLOCK = 1 << 16
+"""Bytes that are taken from it at a time."""
+
+
+class PublicData(Block):
+    """One public file.
+
+    Attributes
+    ----------
+    description : str
+    url : str, of the file as it was at one commit
+    sha256 : str, of its bytes
+    licence : str, SPDX identifier
+    settings : ImportSettings, the key `import`; None where the file holds no forces
+    """
+
+    description: str
+    url: str
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+    licence: str
+    settings: ImportSettings | None = Field(None, alias="import")
+
+    @property
+    def file_name(self) -> str:
+        """Name of the file at its source."""
+        return Path(unquote(urlsplit(self.url).path)).name
+
+
+class _Registry(Block):
+    sets: dict[str, PublicData]
+
+
+@cache
+def public_data() -> Mapping[str, PublicData]:
+    """Public files by name."""
+    try:
+        return _Registry(sets=read_layer(REGISTRY)).sets
+    except ValidationError as error:
+        raise InputError(f"{REGISTRY}: {first_error(error, _Registry)}") from None
+
+
+def import_settings(name: str) -> ImportSettings:
+    """How a public file is imported; the campaign is named as in the registry.
+
+    Raises
+    ------
+    UnknownNameError
+        If the registry has no such name.
+    InputError
+        If the file holds no forces.
+    """
+    settings = _known(name).settings
+    if settings is None:
+        raise InputError(f"the public data {name!r} hold no forces")
+    return settings.model_copy(update={"name": name})
+
+
+def public_file(name: str, folder: str | Path) -> Path:
+    """Path of a public file, which is downloaded unless it is there already.
+
+    Parameters
+    ----------
+    name : str
+        Name in the registry, see `public_data`.
+    folder : path
+        Searched with all its subfolders for a file of that name and checksum. A download goes to
+        `<folder>/<name>/`.
+
+    Raises
+    ------
+    UnknownNameError
+        If the registry has no such name.
+    InputError
+        If the file cannot be downloaded, or is not the one that the registry knows.
+    """
+    folder = Path(folder).expanduser()  # no shell has seen what stands in a configuration
+    return fetch(_known(name), folder, folder / name)
+
+
+def _known(name: str) -> PublicData:
+    known = public_data()
+    if name not in known:
+        raise UnknownNameError("public data", name, known)
+    return known[name]
+
+
+def record_public(name: str, folder: str | Path, path: str | Path, attempt: int) -> None:
+    """Write to a JSON file where a public file is, or why it could not be had.
+
+    `attempt` is kept with it; see `next_attempt`.
+    """
+    record: dict[str, Any] = {"name": name, "file": None, "error": None, "attempt": attempt}
+    try:
+        record["file"] = str(public_file(name, folder))
+    except InputError as error:
+        record["error"] = str(error)
+    with whole_file(path) as temporary:
+        temporary.write_text(json.dumps(record, indent=2, ensure_ascii=False), encoding="utf-8")
+
+
+def read_record(path: str | Path) -> dict[str, Any]:
+    """Read what `record_public` wrote."""
+    return json.loads(Path(path).read_text(encoding="utf-8"))
+
+
+def next_attempt(path: str | Path) -> int:
+    """Number of the attempt to get a file that its record calls for, from 1.
+
+    It is that of the record as long as its file is there. As a parameter of a rule it makes
+    Snakemake try again what failed, and nothing else.
+    """
+    if not Path(path).exists():
+        return 1
+    record = read_record(path)
+    there = record["file"] is not None and Path(record["file"]).is_file()
+    return record["attempt"] + (0 if there else 1)
+
+
+def fetch(data: PublicData, searched: Path, target: Path) -> Path:
+    """Find a file below the folder `searched`, or download it to the folder `target`.
+
+    A download that breaks off goes on as long as each try brings something. What is left of it in
+    the end, a `.part` file, is continued by the next call. Two calls at once do not meet: each
+    writes to a file of its own.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be downloaded, or is not the one that is meant.
+    """
+    try:
+        for path in sorted(searched.rglob(data.file_name)):
+            if path.is_file() and not is_temporary(path) and _sha256(path) == data.sha256:
+                return path
+        target.mkdir(parents=True, exist_ok=True)
+        path = target / data.file_name
+        with whole_file(path) as temporary:
+            _download_after_earlier(data.url, temporary, path.with_name(f"{path.name}.part"))
+            found = _sha256(temporary)
+            if found != data.sha256:
+                raise InputError(
+                    f"{data.url}: the sha256 is {found}, not {data.sha256}: damaged on the way or "
+                    "changed at its source; try again"
+                )
+        return path
+    except (OSError, HTTPException) as error:
+        reason = getattr(error, "reason", None) or error
+        reason = getattr(reason, "strerror", None) or reason
+        raise InputError(
+            f"{data.url}: cannot be downloaded: {' '.join(str(reason).split())}; try again, or put "
+            f"the file {data.file_name} below {searched}"
+        ) from None
+
+
+def _download_after_earlier(url: str, path: Path, left: Path) -> None:
+    """Go on with what an earlier call has left, which nobody else can take then; leave it again."""
+    if left.is_symlink():  # no download of ours: it would be written to another place
+        left.unlink()
+    with suppress(FileNotFoundError):
+        left.replace(path)
+    try:
+        _download_with_retries(url, path)
+    except BaseException:
+        if path.exists():
+            path.replace(left)
+        raise
+
+
+def _download_with_retries(url: str, path: Path) -> None:
+    while True:
+        have = _size(path)
+        try:
+            return _download(url, path, have)
+        except (OSError, HTTPException):
+            if _size(path) <= have:
+                raise
+
+
+def _download(url: str, path: Path, have: int) -> None:
+    """Download to `path`, after the `have` bytes that it holds already."""
+    request = Request(url, headers={"Range": f"bytes={have}-"} if have else {})
+    try:
+        with urlopen(request, timeout=TIMEOUT) as response:
+            # A server that does not know ranges sends the whole file, with another status.
+            resumed = response.headers.get("Content-Range", "").startswith(f"bytes {have}-")
+            with path.open("ab" if resumed else "wb") as file:
+                start = file.tell()
+                # Only a server that says how much there is can be held to it.
+                expected = response.headers.get("Content-Length", "").strip()
+                known = expected.isascii() and expected.isdigit()
+                total = int(expected[:18]) if known else None
+                with stage(f"download of {path.name}", total) as advance:
+                    while block := response.read(BLOCK):
+                        advance(file.write(block))
+                came = file.tell() - start
+            # The end of a broken connection looks like the end of the file.
+            if total is not None and came < total:
+                raise OSError(f"the connection broke after {came} of {expected} bytes")
+    except HTTPError as error:
+        # Nothing comes after what is there: it is whole, or wrong, which its checksum will tell.
+        if not (have and error.code == 416):
+            raise
+
+
+def _size(path: Path) -> int:
+    return path.stat().st_size if path.exists() else 0
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

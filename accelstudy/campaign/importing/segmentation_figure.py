@@ -1,0 +1,133 @@
+"""Figure of a log with its static holds, by which a person judges the segmentation."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from matplotlib.ticker import NullLocator
+from numpy.typing import NDArray
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.progress import stage
+from accelstudy.basics.wording import counted
+from accelstudy.campaign.holds.detection import Holds
+from accelstudy.campaign.holds.windows import windows
+from accelstudy.campaign.logs.recording import Recording
+from accelstudy.drawing.saving import failure, save
+from accelstudy.drawing.style import DPI, FULL, INK, STYLE, new_figure
+
+Array = NDArray[np.float64]
+
+COLUMNS = 1200
+"""Points of time drawn, about as many as a page can show."""
+# Okabe & Ito's colours.
+_COLOURS = ("#0072B2", "#D55E00", "#009E73")
+_THRESHOLD = "#CC79A7"
+_SHADE = "#DCE6F0"
+_LEFT_OUT: dict[str, Any] = {"facecolor": "#F2E4E4", "hatch": "////", "edgecolor": "#B08080"}
+_DIGITS = 130
+"""Digits that stand beside each other; of more only every second, third, … number is shown."""
+
+
+def draw_segmentation(log: Recording, holds: Holds) -> Figure:
+    """Draw specific forces and the standard deviation of the windows over time.
+
+    Holds are shaded and numbered, those that are left out hatched. The log is read once more, and
+    reduced to the smallest and the largest value in each of `COLUMNS` spans of time.
+    """
+    edges, low, high = _envelope(log, holds)
+    middle = (edges[:-1] + edges[1:]) / 2
+    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
+        figure = new_figure(FULL, 90)
+        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+        for i, (name, colour) in enumerate(zip("xyz", _COLOURS, strict=True)):
+            _band(above, middle, low[:, i], high[:, i], colour, f"$f_{name}$")
+        _band(below, middle, low[:, 3], high[:, 3], INK, None)
+        label = f"threshold {holds.threshold.sd:.2g} m/s²"
+        below.axhline(holds.threshold.sd, color=_THRESHOLD, linestyle="--", label=label)
+        for ax in (above, below):
+            for start, end, used in zip(holds.t0, holds.t1, holds.used, strict=True):
+                look = {"color": _SHADE} if used else _LEFT_OUT
+                ax.axvspan(start, end, linewidth=0, zorder=0.5, **look)
+        _number(above, holds)
+        above.set_ylabel("specific force / (m/s²)")
+        below.set(yscale="log", xlabel="time / s", ylabel="window sd / (m/s²)")
+        below.set_xlim(0, holds.span[1])
+        below.yaxis.set_minor_locator(NullLocator())
+        handles, labels = above.get_legend_handles_labels()
+        lines, texts = below.get_legend_handles_labels()
+        shades = [(Patch(color=_SHADE), counted(int(holds.used.sum()), "static hold"))]
+        if holds.left_out:
+            shades.append((Patch(linewidth=0, **_LEFT_OUT), f"{len(holds.left_out)} left out"))
+        figure.legend(
+            [*handles, *(patch for patch, _ in shades), *lines],
+            [*labels, *(text for _, text in shades), *texts],
+            loc="outside upper center",
+            ncols=6,
+        )
+        figure.align_ylabels()
+    return figure
+
+
+def render_segmentation(
+    log: Recording, holds: Holds, svg_path: str | Path, png_path: str | Path
+) -> None:
+    """Draw the segmentation and write it as SVG and PNG, each whole or not at all.
+
+    A figure that fails takes nothing with it: there is none, and a warning on stderr says why.
+    """
+    try:
+        save(draw_segmentation(log, holds), svg_path, png_path, "Static holds", DPI)
+    except (OSError, InputError):  # a full disk or a log that is gone is no matter of the figure
+        raise
+    except Exception as error:
+        for path in (svg_path, png_path):  # of an import before
+            Path(path).unlink(missing_ok=True)
+        failure("The figure 'segmentation' could not be drawn", error)
+
+
+def _number(ax: Axes, holds: Holds) -> None:
+    """Write the numbers of the holds above them."""
+    every = 1 + len(holds) * len(str(holds.number[-1])) // _DIGITS
+    for i, (number, used) in enumerate(zip(holds.number, holds.used, strict=True)):
+        if i % every == 0 or not used:
+            ax.annotate(
+                f"{number}",
+                ((holds.t0[i] + holds.t1[i]) / 2, 1),
+                xycoords=("data", "axes fraction"),
+                xytext=(0, 1),
+                textcoords="offset points",
+                ha="center",
+                va="bottom",
+                fontsize=5,
+                color=INK if used else _LEFT_OUT["edgecolor"],
+            )
+
+
+def _envelope(log: Recording, holds: Holds) -> tuple[Array, Array, Array]:
+    """Edges of the spans (k + 1,), and least and largest fx, fy, fz and sd in each (k, 4)."""
+    count = max(1, min(COLUMNS, holds.total // 4))
+    edges = np.linspace(*holds.span, count + 1)
+    low, high = np.full((count, 4), np.inf), np.full((count, 4), -np.inf)
+    with stage("figure", holds.total) as advance:
+        for batch in windows(log, holds.window):
+            values = np.column_stack([batch.forces, np.sqrt(batch.variance)])
+            span = np.clip(np.searchsorted(edges, batch.time, side="right") - 1, 0, count - 1)
+            np.minimum.at(low, span, values)
+            np.maximum.at(high, span, values)
+            advance(len(batch.time))
+    empty = ~np.isfinite(low)
+    low[empty] = high[empty] = np.nan  # a gap
+    return edges, low, high
+
+
+def _band(ax: Axes, x: Array, low: Array, high: Array, colour: str, label: str | None) -> None:
+    # A band without height would be invisible, so its middle is drawn too.
+    ax.fill_between(x, low, high, color=colour, alpha=0.5, linewidth=0)
+    ax.plot(x, (low + high) / 2, color=colour, linewidth=0.8, label=label)

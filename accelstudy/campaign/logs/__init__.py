@@ -1,0 +1,1 @@
+"""Raw logs: text, MATLAB and Parquet files read as rows of numbers, chunk by chunk."""

@@ -1,0 +1,313 @@
+"""Raw accelerometer logs, read piece by piece, so that their size does not matter.
+
+A log is text (comma, semicolon, tab or blanks between numbers, with or without header and comment
+lines), a MATLAB file or a Parquet file. It gives times in s from its first sample on, and specific
+forces in m/s²; whatever is wrong with it is said in one line with the place where it stands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.units import UNITS
+from accelstudy.campaign.logs.columns import AXES, LARGEST, Column, check_numbers, locate
+from accelstudy.campaign.logs.sources import CHUNK, Source, open_source
+from accelstudy.sensors.frames import FRD, Frame
+
+__all__ = ["AXES", "TIME_UNITS", "Log", "Recording", "conversion", "locate", "open_log"]
+
+Array = NDArray[np.float64]
+
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+CONDITIONS = ("temperature", "vibration")
+"""Columns of a log besides time and forces."""
+GAP = 5.0
+"""A step of time this many times the usual one is a gap."""
+_USUAL_RATE = 100.0
+"""1/s; of several units of time the one is likely that comes nearest to it."""
+
+
+class Rows(NamedTuple):
+    """Neighbouring samples of a log.
+
+    Attributes
+    ----------
+    time : (k,) array, s
+    forces : (k, 3) array, m/s², in forward, right, down
+    conditions : (k, c) array, °C or m/s², NaN where nothing is known
+    anew : bool, whether another recording begins here, so that no hold goes on
+    """
+
+    time: Array
+    forces: Array
+    conditions: Array
+    anew: bool = False
+
+
+class Recording(Protocol):
+    """What the detector of holds takes: a log, or several."""
+
+    @property
+    def path(self) -> Path:
+        """What messages name."""
+        ...
+
+    @property
+    def step(self) -> float:
+        """Usual time between two samples, s."""
+        ...
+
+    @property
+    def conditions(self) -> tuple[str, ...]:
+        """Which of `CONDITIONS` there are."""
+        ...
+
+    def chunks(self) -> Iterator[Rows]:
+        """Samples from the beginning to the end."""
+        ...
+
+    def likely_unit(self) -> str:
+        """What to say where the rate is odd."""
+        ...
+
+
+def open_log(
+    path: str | Path,
+    *,
+    columns: Mapping[str, Column] | None = None,
+    time: Column | None = None,
+    rate: float | None = None,
+    unit: str = "m/s^2",
+    scale: ArrayLike | None = None,
+    offset: ArrayLike | None = None,
+    time_unit: str = "s",
+    variable: str | None = None,
+    frame: Frame = FRD,
+    chunk_size: int = CHUNK,
+) -> Log:
+    """Find out how a log is laid out.
+
+    Parameters
+    ----------
+    path : file; .parquet, .mat (binary or ASCII), anything else is text, perhaps packed by gzip
+    columns : mapping of "fx", "fy", "fz", "temperature" and "vibration" to columns; by their names
+        in the header if omitted, or the only three columns there are. The last two may be absent.
+    time : column of time; by its name in the header if omitted
+    rate : float, samples per second, instead of a column of time
+    unit : "m/s^2", "g" or "counts"
+    scale, offset : number or (3,), with counts only: f = (raw − offset) · scale, in m/s²
+    time_unit : "s", "ms", "us" or "ns"
+    variable : str, which array of a MATLAB file
+    frame : Frame, the axes of the log
+    chunk_size : int, rows held in memory at a time
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or lacks a column.
+    """
+    factor, shift = conversion(unit, scale, offset)
+    if time_unit not in TIME_UNITS:
+        raise UnknownNameError("unit of time", time_unit, TIME_UNITS)
+    if rate is not None and time is not None:
+        raise InputError(f"{path}: give the rate or the column of time, not both")
+    if rate is not None and not (np.isfinite(rate) and rate > 0):
+        raise InputError(f"{path}: the rate must be positive, not {rate:g}")
+    source = open_source(path, variable)
+    given = dict(columns or {})
+    for key in given:
+        if key not in (*AXES, *CONDITIONS):
+            raise UnknownNameError("column", key, (*AXES, *CONDITIONS))
+    places = locate(source, {k: v for k, v in given.items() if k in AXES}, AXES)
+    if rate is None:
+        wanted = {} if time is None else {"time": time}
+        try:
+            places = {**places, **locate(source, wanted, ("time",))}
+        except InputError as error:
+            if time is not None:
+                raise
+            raise InputError(
+                f"{error}; give the column of time (--time), or the rate (--rate)"
+            ) from None
+    for key in CONDITIONS:
+        wanted = {key: given[key]} if key in given else {}
+        found = locate(source, wanted, (key,), needed=False)
+        if key in given or not {*found.values()} & {*places.values()}:
+            places |= found
+    if len(set(places.values())) < len(places):
+        raise InputError(f"{path}: two of {', '.join(places)} name the same column")
+    return Log(
+        path=Path(path),
+        source=source,
+        places=places,
+        rate=rate,
+        time_factor=TIME_UNITS[time_unit],
+        scale=factor,
+        offset=shift,
+        frame=frame,
+        chunk_size=chunk_size,
+    )
+
+
+@dataclass(frozen=True)
+class Log:
+    """A raw log whose layout is known.
+
+    Attributes
+    ----------
+    path : Path
+    source : Source, what gives the numbers as they stand in the file
+    places : mapping of "fx", "fy", "fz" and perhaps "time" and `CONDITIONS` to columns
+    rate : float, 1/s; None with a column of time
+    time_factor : float, s per unit of that column
+    scale, offset : (3,), f = (raw − offset) · scale, in the axes of the log
+    frame : Frame, the axes of the log
+    chunk_size : int, rows held in memory at a time
+    lively : bool, whether each channel must change; in one position that of a coarse sensor may not
+    """
+
+    path: Path
+    source: Source
+    places: Mapping[str, int]
+    rate: float | None
+    time_factor: float
+    scale: Array
+    offset: Array
+    frame: Frame
+    chunk_size: int
+    lively: bool = True
+
+    @property
+    def conditions(self) -> tuple[str, ...]:
+        """Which of `CONDITIONS` the log has."""
+        return tuple(key for key in CONDITIONS if key in self.places)
+
+    @cached_property
+    def step(self) -> float:
+        """Usual time between two samples, s: the mean one of the first chunk, without gaps.
+
+        Steps may jitter or come in multiples of a clock's tick. So the middle one may be far from
+        the mean, and only the mean belongs to the number of samples.
+        """
+        if self.rate is not None:
+            return 1.0 / self.rate
+        rows = next(self.chunks(), None)
+        if rows is None or len(rows.time) < 2:
+            raise InputError(f"{self.path}: too few samples")
+        return usual_step(np.diff(rows.time))
+
+    @cached_property
+    def start(self) -> float:
+        """Time of the first sample as the file has it, s; NaN without a column of time."""
+        if self.rate is not None:
+            return np.nan
+        first = next(self.source.read([self.places["time"]], 1), np.full((1, 1), np.nan))
+        return float(first[0, 0]) * self.time_factor
+
+    def likely_unit(self) -> str:
+        """Unit of time with which the log has a usual rate, as a hint; empty if it has one."""
+        if self.rate is not None:
+            return ""
+        step = self.step / self.time_factor
+        rates = {unit: 1 / (step * factor) for unit, factor in TIME_UNITS.items()}
+        unit = min(rates, key=lambda unit: abs(np.log(rates[unit] / _USUAL_RATE)))
+        if TIME_UNITS[unit] == self.time_factor:
+            return ""
+        return (
+            f"; if its times are in {unit}, there are {rates[unit]:.4g} samples per second: give "
+            f"--time-unit {unit}"
+        )
+
+    def chunks(self) -> Iterator[Rows]:
+        """Samples from the beginning to the end; times count from the first one.
+
+        Raises
+        ------
+        InputError
+            At a value that is no finite number, where time does not increase, and at the end if
+            there is nothing in the log or a channel is constant.
+        """
+        keys = list(self.places)
+        axes = [keys.index(axis) for axis in AXES]
+        others = [keys.index(key) for key in self.conditions]
+        row, last = 0, -np.inf
+        lowest, highest = np.full(3, np.inf), np.full(3, -np.inf)
+        clock = self.places.get("time")
+        for raw in self.source.read(list(self.places.values()), self.chunk_size, clock):
+            if clock is not None:
+                raw[:, keys.index("time")] *= self.time_factor
+            check_numbers(self.source, self.places, raw, row, self.conditions)
+            forces = self.frame.to_frd((raw[:, axes] - self.offset) * self.scale)
+            if clock is not None:
+                time = raw[:, keys.index("time")]
+                self._check_order(time, last, row)
+                last = time[-1]
+            else:
+                assert self.rate is not None
+                time = np.arange(row, row + len(raw)) / self.rate
+            lowest = np.minimum(lowest, raw[:, axes].min(axis=0))
+            highest = np.maximum(highest, raw[:, axes].max(axis=0))
+            row += len(raw)
+            yield Rows(time, forces, raw[:, others])
+        if row < 2:
+            raise InputError(f"{self.path}: too few samples ({row})")
+        for axis, constant in zip(AXES, lowest == highest, strict=True):
+            if constant and self.lively:
+                name = self.source.names[self.places[axis]]
+                raise InputError(f"{self.path}: column {name} ({axis}) is constant")
+
+    def _check_order(self, time: Array, last: float, row: int) -> None:
+        backward = np.diff(time, prepend=last) <= 0
+        if backward.any():
+            i = int(np.argmax(backward))
+            where, found = self.source.look_up(row + i, self.places["time"])
+            raise InputError(
+                f"{self.path}: {where}, column {self.source.names[self.places['time']]} (time): "
+                f"time does not increase ({found}); give the rate if it does not count"
+            )
+
+
+def usual_step(steps: Array) -> float:
+    """Mean of steps of time without those that are gaps, `GAP` times the mean or more."""
+    kept = steps
+    while True:
+        mean = float(np.mean(kept))
+        without = steps[steps <= GAP * mean]
+        if len(without) == len(kept):
+            return mean
+        kept = without
+
+
+def conversion(unit: str, scale: ArrayLike | None, offset: ArrayLike | None) -> tuple[Array, Array]:
+    """Scale and offset, (3,) each, that turn numbers in `unit` into m/s²."""
+    if unit == "counts":
+        if scale is None:
+            raise InputError("unit counts needs a nominal scale, in m/s² per count")
+        factor = _triple(scale, "scale")
+        if not np.all((np.abs(factor) > 0) & (np.abs(factor) <= LARGEST)):
+            raise InputError("scale: must not be 0, and must be finite")
+        shift = _triple(0.0 if offset is None else offset, "offset")
+        if not np.all(np.abs(shift) <= LARGEST):
+            raise InputError("offset: must be finite")
+        return factor, shift
+    if scale is not None or offset is not None:
+        raise InputError(f"a nominal scale or offset goes with unit counts, not {unit}")
+    known = {name: UNITS["m/s^2"][name] for name in ("m/s^2", "g")}
+    if unit not in known:
+        raise UnknownNameError("unit of a log", unit, (*known, "counts"))
+    return np.full(3, known[unit]), np.zeros(3)
+
+
+def _triple(value: ArrayLike, name: str) -> Array:
+    given = np.atleast_1d(np.asarray(value, dtype=float))
+    if given.shape not in ((1,), (3,)):
+        raise InputError(f"{name}: one number or three, not {given.size}")
+    return np.array(np.broadcast_to(given, 3))

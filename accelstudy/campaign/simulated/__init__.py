@@ -1,0 +1,1 @@
+"""Simulated campaigns, with hidden effects and gross errors whose truth is recorded."""

@@ -1,0 +1,334 @@
+"""Simulated campaigns: measured data as it might be, with effects of one's choice and the truth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from accelstudy.approaches import get_approach
+from accelstudy.basics import bounds
+from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.registry import Shaped
+from accelstudy.basics.units import MGON, STANDARD_GRAVITY
+from accelstudy.campaign.files.format import Campaign
+from accelstudy.campaign.gross_errors import GrossError, get_gross_error
+from accelstudy.effects import Effect, get_effect
+from accelstudy.files.outputs import whole_file
+from accelstudy.noise_effects import NoiseEffect, get_noise_effect
+from accelstudy.schemes import get_scheme
+from accelstudy.sensors.models import compose, get_model
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.simulation.hold_plan import PROVIDES, HoldPlan
+from accelstudy.simulation.sessions import Noise, Session, session
+
+Array = NDArray[np.float64]
+
+STREAMS = ("sensor", "effects", "order", "noise", "sd", "gross", "slope")
+"""What is drawn, each from a stream of its own, so that none changes another (nor the holds)."""
+
+ORDERS = ("scheme", "random")
+
+_RANGES = {
+    "seed": bounds.SEED,
+    "repeats": bounds.POSITIONS,
+    "repeat_first": replace(bounds.POSITIONS, least=0),
+    "n_samples": bounds.SAMPLES,
+    "duration": bounds.INTERVAL,
+    "sigma": bounds.SIGMA_FORCE,
+    "gravity": bounds.GRAVITY,
+    "size": bounds.SIZE,
+}
+
+
+@dataclass(frozen=True)
+class CampaignSettings:
+    """What is simulated; SI but for temperatures.
+
+    Parameters
+    ----------
+    name : str
+    seed : int
+    scheme : str
+    repeats : int, how often the whole scheme is measured
+    repeat_first : int, how many of the first holds are measured again at the end
+    order : "scheme" or "random", of the holds
+    approach : str, whether there is a robot
+    model : str, effects that every sensor has; their parameters are drawn, of `Effect.typical` size
+    effects : tuple of str, effects beyond the model, "warm_up(tau=400)" or with their parameters in
+        SI, "thermal_bias: 0.004, -0.002, 0.001"; one of an effect of the model replaces it
+    size : float, factor of the parameters of `effects` that are not given; they are as large as
+        the larger typical size, with random signs
+    noise_effects, gross_errors : tuple of str
+    sigma : float, m/s², of a position mean
+    sigma_known : bool, whether the campaign tells it
+    sigma_angle : float, rad, of the robot's roll and pitch
+    gravity : float, m/s²
+    interval, temperature, temperature_order, vibration, yaw : as in `HoldPlan`
+    n_samples : int, samples per hold, optional; adds their sds
+    duration : float, s, of a hold, optional; adds the slopes of its samples, and their sds
+    """
+
+    name: str = "simulated"
+    seed: int = 1
+    scheme: str = "mclaren-24"
+    repeats: int = 1
+    repeat_first: int = 0
+    order: str = "scheme"
+    approach: str = "robot"
+    model: str = "bias-scale-nonorthogonality"
+    effects: tuple[str, ...] = ()
+    size: float = 1.0
+    noise_effects: tuple[str, ...] = ()
+    gross_errors: tuple[str, ...] = ()
+    sigma: float = 0.002
+    sigma_known: bool = True
+    sigma_angle: float = 3.2 * MGON
+    gravity: float = STANDARD_GRAVITY
+    interval: float | None = 60.0
+    temperature: tuple[float, float] | None = None
+    temperature_order: str = "linear"
+    vibration: tuple[float, float] | None = None
+    yaw: str = "none"
+    n_samples: int | None = None
+    duration: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.order not in ORDERS:
+            raise UnknownNameError("order", self.order, ORDERS)
+        for key, allowed in _RANGES.items():
+            if (value := getattr(self, key)) is not None:
+                allowed.check_key(key, value)
+        bounds.SIGMA_ANGLE.check_key("sigma_angle", self.sigma_angle / MGON)
+        if self.duration is not None and self.n_samples is None:
+            raise InputError("duration: slopes need n_samples, too")
+        if self.duration is not None and self.duration > (self.interval or 0.0):
+            raise InputError(
+                f"duration: {self.duration:g} s are more than the interval between holds"
+            )
+        n = self.repeats * get_scheme(self.scheme).n_positions + self.repeat_first
+        bounds.POSITIONS.check_key("repeats: number of positions", n)
+
+    @property
+    def holds(self) -> HoldPlan:
+        """Conditions of the holds."""
+        return HoldPlan(
+            self.interval,
+            self.temperature,
+            self.temperature_order,
+            self.vibration,
+            self.yaw,
+            self.seed,
+        )
+
+
+def simulate_campaign(settings: CampaignSettings) -> tuple[Campaign, dict[str, Any]]:
+    """Simulate a campaign.
+
+    Parameters
+    ----------
+    settings : CampaignSettings
+
+    Returns
+    -------
+    campaign : Campaign
+    truth : dict
+        Plain data: the settings, and all that was drawn: the parameters of the sensor and of the
+        effects, the settings of the gross errors.
+
+    Raises
+    ------
+    InputError
+        If a name or a setting is unknown, or an effect needs a column that is not simulated.
+    """
+    seeds = np.random.SeedSequence(settings.seed).spawn(len(STREAMS))
+    rng = {name: np.random.default_rng(s) for name, s in zip(STREAMS, seeds, strict=True)}
+    hidden = _hidden_effects(settings, rng["effects"])
+    replaced = {effect.name for effect, _ in hidden}
+    usual = [
+        (effect, _usual_parameters(effect, rng["sensor"]))
+        for effect in get_model(settings.model).effects
+    ]
+    sensor = [(effect, values) for effect, values in usual if effect.name not in replaced]
+    present = [*sensor, *hidden]
+    model = compose("simulated", tuple(effect.spec for effect, _ in present))
+    noise_effects = [get_noise_effect(spec) for spec in settings.noise_effects]
+
+    directions = _directions(settings, rng["order"])
+    hold = settings.holds.hold(len(directions))
+    for effect, _ in present:
+        if column := settings.holds.missing(effect):
+            raise InputError(
+                f"{PROVIDES[column]}: missing; the effect {effect.name!r} needs the {column} of "
+                "each hold"
+            )
+    parameters = np.concatenate([v for _, v in present])
+    ideal = session(model, parameters, directions, settings.gravity, hold)
+    noise = Noise(settings.sigma, settings.sigma_angle, effects=settings.noise_effects)
+    drawn = ideal.draw(noise, 1, rng["noise"])
+    robot = get_approach(settings.approach).uses_angles
+    campaign = Campaign(
+        name=settings.name,
+        positions=np.arange(1, len(directions) + 1),
+        forces=drawn.forces[0],
+        gravity=settings.gravity,
+        sigma_force=settings.sigma if settings.sigma_known else None,
+        angles=drawn.angles[0] if robot and drawn.angles is not None else None,
+        sigma_angle=settings.sigma_angle if robot else None,
+        time=hold.time,
+        temperature=hold.temperature,
+        vibration=hold.vibration,
+        yaw=hold.yaw if robot and settings.yaw != "none" else None,
+        **_samples(settings, noise_effects, len(directions), rng["sd"]),
+        **_slopes(settings, model, parameters, ideal, noise_effects, rng["slope"]),
+    )
+    gross = []
+    for spec in settings.gross_errors:
+        gross.append(get_gross_error(spec).drawn(campaign, rng["gross"]))
+        campaign = gross[-1].act(campaign)
+    return campaign, _truth(settings, sensor, hidden, noise_effects, gross)
+
+
+def write_truth(truth: dict[str, Any], path: str | Path) -> None:
+    """Write the truth as YAML."""
+    text = yaml.safe_dump(truth, sort_keys=False, allow_unicode=True)
+    try:
+        with whole_file(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+
+def _hidden_effects(
+    settings: CampaignSettings, rng: np.random.Generator
+) -> list[tuple[Effect, Array]]:
+    """Effects beyond the model with their parameters."""
+    found = []
+    for text in settings.effects:
+        spec, colon, numbers = text.partition(":")
+        effect = get_effect(spec.strip())
+        n = len(effect.parameters)
+        values = settings.size * effect.typical[1] * rng.choice([-1.0, 1.0], n)
+        if colon:
+            try:
+                values = np.array([float(part) for part in numbers.split(",")])
+            except ValueError:
+                values = np.array([np.nan])
+            if len(values) != n or not np.isfinite(values).all():
+                names = ", ".join(f"{p.name} in {p.unit}" for p in effect.parameters)
+                raise InputError(f"effect {text!r}: expected {n} numbers after the colon ({names})")
+        found.append((effect, values))
+    return found
+
+
+def _usual_parameters(effect: Effect, rng: np.random.Generator) -> Array:
+    """Parameters of either sign and, on a scale of logarithms, anywhere between typical sizes."""
+    n = len(effect.parameters)
+    low, high = np.log(effect.typical)
+    return np.asarray(np.exp(rng.uniform(low, high, n)) * rng.choice([-1.0, 1.0], n))
+
+
+def _directions(settings: CampaignSettings, rng: np.random.Generator) -> Array:
+    directions = np.tile(get_scheme(settings.scheme).directions, (settings.repeats, 1))
+    if settings.order == "random":
+        directions = rng.permutation(directions)
+    if settings.repeat_first > len(directions):
+        raise InputError(
+            f"repeat_first: must be at most {len(directions)}, the holds of {settings.scheme}, "
+            f"not {settings.repeat_first}"
+        )
+    return np.concatenate([directions, directions[: settings.repeat_first]])
+
+
+def _samples(
+    settings: CampaignSettings,
+    noise_effects: Sequence[NoiseEffect],
+    n_positions: int,
+    rng: np.random.Generator,
+) -> dict[str, Any]:
+    """Numbers of samples, and their sds: σ√n with the scatter of the sd of a normal sample."""
+    n = settings.n_samples
+    if n is None:
+        return {}
+    sigma = settings.sigma * np.sqrt(n) * np.prod([e.within_hold for e in noise_effects], axis=0)
+    scatter = np.sqrt(rng.chisquare(n - 1, (n_positions, 3)) / (n - 1))
+    return {"n_samples": np.full(n_positions, n), "sd": sigma * scatter}
+
+
+def _slopes(
+    settings: CampaignSettings,
+    model: SensorModel,
+    parameters: Array,
+    ideal: Session,
+    noise_effects: Sequence[NoiseEffect],
+    rng: np.random.Generator,
+) -> dict[str, Any]:
+    """Slopes of the samples, and their sds: √12 σ over the time of a hold, as of white noise."""
+    if settings.duration is None:
+        return {}
+    # A line through samples has the slope between these two moments, up to the third order.
+    dt = np.sqrt(0.6) * settings.duration / 2
+    later, earlier = (
+        model.sense(ideal.f_b, parameters, settings.gravity, settings.holds.moved(ideal.hold, d))
+        for d in (dt, -dt)
+    )
+    within = np.prod([np.ones(3), *(e.within_hold for e in noise_effects)], axis=0)
+    sigma = np.sqrt(12.0) * settings.sigma * within / settings.duration
+    error = sigma * rng.standard_normal(ideal.forces.shape)
+    return {
+        "slope": (later - earlier) / (2 * dt) + error,
+        "sd_slope": np.broadcast_to(sigma, ideal.forces.shape),
+    }
+
+
+def _truth(
+    settings: CampaignSettings,
+    sensor: Sequence[tuple[Effect, Array]],
+    hidden: Sequence[tuple[Effect, Array]],
+    noise_effects: Sequence[NoiseEffect],
+    gross: Sequence[GrossError],
+) -> dict[str, Any]:
+    def described(effect: Effect, values: Array) -> dict[str, Any]:
+        return {
+            **_named(effect),
+            "parameters": [
+                {"name": p.name, "value": float(value), "unit": p.unit}
+                for p, value in zip(effect.parameters, values, strict=True)
+            ],
+        }
+
+    return {
+        "schema_version": 1,
+        "campaign": settings.name,
+        "seed": settings.seed,
+        "sensor": [described(*pair) for pair in sensor],
+        "effects": [described(*pair) for pair in hidden],
+        "noise": {
+            "sigma_mps2": settings.sigma,
+            "effects": [_named(effect) for effect in noise_effects],
+        },
+        "gross_errors": [_named(error) for error in gross],
+        "settings": {
+            key: list(value) if isinstance(value, tuple) else value
+            for key, value in asdict(settings).items()
+        },
+    }
+
+
+def _named(item: Shaped) -> dict[str, Any]:
+    """Name and settings, each setting with its unit."""
+    units = {hyper.name: hyper.unit for hyper in item.hypers}
+    return {
+        "name": item.name,
+        "settings": {
+            name: {"value": float(value), "unit": units[name]}
+            for name, value in item.shape.items()
+            if not math.isnan(value)
+        },
+    }

@@ -1,0 +1,251 @@
+"""Apply a calibration to readings, and level with it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BaseModel, Field, ValidationError, model_validator
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.wording import one_line
+from accelstudy.campaign.files.header import Nominal, PerAxis
+from accelstudy.campaign.files.layout import LogLayout
+from accelstudy.effects import Hold
+from accelstudy.files.types import Finite, NotNegative, Number, Positive
+from accelstudy.files.validation import first_error
+from accelstudy.leveling.angles import jacobian, roll_pitch
+from accelstudy.sensors.models import compose
+from accelstudy.sensors.sensor import SensorModel
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A calibration as the sensor takes it along, without what belongs to the rig.
+
+    Attributes
+    ----------
+    model : SensorModel
+    parameters : (u,) array, SI
+    covariance : (u, u) array, SI
+    gravity : float, m/s²
+    content : mapping, what is used of the file
+    log : LogLayout, how the log was read that the campaign was made of; None if there was none
+    ranges : mapping, what the calibration saw, see `accelstudy.campaign.calibration.ranges`
+    """
+
+    model: SensorModel
+    parameters: Array
+    covariance: Array
+    gravity: float
+    content: Mapping[str, Any]
+    log: LogLayout | None = None
+    ranges: Mapping[str, list[float]] = field(default_factory=dict)
+
+    @cached_property
+    def needs(self) -> tuple[tuple[str, str], ...]:
+        """Effects that need more than a force, each with one of the columns of `Hold`."""
+        if not self.model.hold_columns:
+            return ()
+        return tuple(
+            (effect.name, column)
+            for effect in self.model.effects
+            for column in compose(effect.spec, (effect.spec,)).hold_columns
+        )
+
+    @property
+    def drifts(self) -> tuple[str, ...]:
+        """Effects that drift with the session, and are kept as they were at its end."""
+        return tuple(effect.name for effect in self.model.effects if effect.drifts)
+
+    def correct(self, forces: ArrayLike, hold: Hold | None = None) -> Array:
+        """Calibrated specific force of readings.
+
+        Parameters
+        ----------
+        forces : (n, 3) array, m/s², readings
+        hold : Hold, what else is known of them, as far as the effects need it
+
+        Returns
+        -------
+        (n, 3) array, m/s²; NaN where no force makes such a reading
+        """
+        forces, _ = self._as_continued(np.asarray(forces, dtype=float), hold)
+        return self.model.correct(forces, self.parameters, self.gravity, hold)
+
+    def level(
+        self, forces: ArrayLike, sigma_force: float, hold: Hold | None = None
+    ) -> tuple[Array, Array]:
+        """Roll and pitch with standard deviations.
+
+        Parameters
+        ----------
+        forces : (n, 3) array, m/s², readings
+        sigma_force : float, m/s², noise of a reading, per axis
+        hold : Hold, as in `correct`
+
+        Returns
+        -------
+        angles, sigma : (n, 2) arrays, rad; sigma holds the noise of the reading and the
+        uncertainty of the calibration
+        """
+        forces, share = self._as_continued(np.asarray(forces, dtype=float), hold)
+        corrected = self.model.correct(forces, self.parameters, self.gravity, hold)
+        slope = jacobian(corrected)
+        # A reading's noise reaches the corrected force by ∂f_b/∂f_s, which is close to I.
+        by_parameters = slope @ self.model.correction_jacobian(
+            forces, self.parameters, self.gravity, hold
+        )
+        by_parameters *= share
+        variance = np.sum((by_parameters @ self.covariance) * by_parameters, axis=-1)
+        variance += np.square(sigma_force) * np.sum(slope**2, axis=-1)
+        return np.stack(roll_pitch(tuple(corrected.T)), axis=-1), np.sqrt(variance)
+
+    def _as_continued(self, forces: Array, hold: Hold | None) -> tuple[Array, Array]:
+        """Readings as they would be if drifts had continued, for the model that has it so.
+
+        A drift is known in its session only. Beyond, the sensor keeps what it had at the end.
+
+        Returns
+        -------
+        forces : (n, 3) array, m/s²
+        share : (n, 1, u) array, of the derivative by a parameter with a drift that continues
+        """
+        share = np.ones((len(forces), 1, self.model.n_parameters))
+        if hold is None or "time_s" not in self.ranges or not self.drifts:
+            return forces, share
+        time = hold.column("time")
+        kept = np.clip(time, 0.0, self.ranges["time_s"][1])
+        first = 0
+        for effect in self.model.effects:
+            own = slice(first, first := first + len(effect.parameters))
+            if effect.drifts:
+                f, p = tuple(forces.T), tuple(self.parameters[own])
+                then, end = (
+                    np.stack(effect.output(f, p, self.gravity, Hold(time=t), np), axis=-1)
+                    for t in (time, kept)
+                )
+                forces = forces + (then - end)
+                share[:, 0, own] = np.divide(kept, time, out=np.ones_like(time), where=time != 0)[
+                    :, None
+                ]
+        return forces, share
+
+
+class _Shown(BaseModel):
+    value: Finite
+    sigma: NotNegative | None
+    unit: str
+
+
+class _Parameter(BaseModel):
+    name: str
+    value: Finite
+    sigma: NotNegative | None
+    sigma_priori: NotNegative | None
+    sigma_posteriori: NotNegative | None
+    unit: str
+    shown: _Shown
+
+
+Triple = Annotated[list[Finite], PerAxis]
+
+
+class _Affine(BaseModel):
+    matrix: Annotated[list[Triple], PerAxis]
+    bias_mps2: Triple
+
+
+class _Mended(BaseModel):
+    error: str
+    reason: str
+    matrix: Annotated[list[Triple], PerAxis] | None
+
+
+class _Quality(BaseModel):
+    state: str = ""
+    plausible: bool = True
+    warnings: list[str] = []
+
+
+class _Document(BaseModel):
+    """What is read of `calibration.json`; the rest is for persons and other programs."""
+
+    schema_version: Annotated[Literal[1], Number]
+    campaign: str
+    model: str
+    effects: Annotated[list[str], Field(min_length=1)]
+    unit: Literal["m/s^2", "g", "counts"]
+    nominal: Nominal | None
+    gravity_mps2: Positive
+    sigma_position_mps2: NotNegative | None
+    sigma_reading_mps2: NotNegative | None = None
+    parameters: list[_Parameter]
+    covariance: list[list[Finite | None]]
+    affine: _Affine | None
+    log: LogLayout | None = None
+    range_mps2: Positive | None = None
+    mended: _Mended | None = None
+    quality: _Quality = _Quality()
+    ranges: dict[str, Annotated[list[Finite], Field(min_length=2, max_length=2)]] = {}
+
+    @model_validator(mode="after")
+    def _whole(self) -> Self:
+        names = list(compose(self.model, tuple(self.effects)).parameter_names)
+        if [entry.name for entry in self.parameters] != names:
+            raise ValueError(f"parameters: expected {', '.join(names)}, in this order")
+        if {len(row) for row in self.covariance} | {len(self.covariance)} != {len(names)}:
+            raise ValueError(f"covariance: expected {len(names)} rows of {len(names)} numbers")
+        if self.unit == "counts" and self.nominal is None:
+            raise ValueError("nominal: missing; unit: counts needs it")
+        return self
+
+
+def read_calibration(path: str | Path) -> Calibration:
+    """Read `calibration.json`.
+
+    Raises
+    ------
+    InputError
+        If there is no such file or it is none.
+    """
+    if Path(path).is_dir():
+        raise InputError(f"{path}: a folder; give the calibration.json in it")
+    try:
+        document = _Document.model_validate(json.loads(Path(path).read_text(encoding="utf-8")))
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from None
+    except ValidationError as error:
+        reason = first_error(error, _Document)
+    except RecursionError:
+        reason = "nested too deeply"
+    except (ValueError, OverflowError) as error:
+        reason = one_line(error)
+    else:
+        return _calibration(document)
+    raise InputError(f"{path}: not a calibration.json of accelstudy: {reason}")
+
+
+def _calibration(document: _Document) -> Calibration:
+    whole = compose(document.model, tuple(document.effects))
+    # What the rig had is estimated beside the sensor, and stays with the rig.
+    own = [effect.spec for effect in whole.effects if effect.part == "sensor"]
+    stays = np.flatnonzero(whole.stays)
+    covariance = np.array(document.covariance, dtype=float)  # None becomes NaN
+    return Calibration(
+        model=compose(document.model, tuple(own)),
+        parameters=np.array([entry.value for entry in document.parameters])[stays],
+        covariance=covariance[np.ix_(stays, stays)],
+        gravity=document.gravity_mps2,
+        content=document.model_dump(),
+        log=document.log,
+        ranges=document.ranges,
+    )

@@ -1,0 +1,202 @@
+"""A calibration in the forms in which a device or another program takes it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import ArrayLike, NDArray
+
+from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.basics.wording import joined
+from accelstudy.campaign.calibration.gauges import not_affine
+from accelstudy.campaign.logs.recording import conversion
+from accelstudy.effects import Effect
+from accelstudy.effects.defaults import formulas
+from accelstudy.sensors.frames import FRD, Frame, parse_frame
+from accelstudy.sensors.models import compose
+from accelstudy.sensors.sensor import SensorModel
+
+Array = NDArray[np.float64]
+
+FORMS = ("json", "yaml", "c", "matrix")
+
+STEPS = (
+    "f_s = mending · to_frd · ((raw − offset) · scale), m/s²",
+    "f_a from f_s = f_a + Σ output, where output is that at f_a = (f_x, f_y, f_z): repeat "
+    "f_a ← f_s − Σ output, from f_a = f_s on, until it settles",
+    "f_b = (I + Σ axes) · f_a",
+    "result = to_frdᵀ · f_b, m/s², in the axes of the readings",
+)
+"""How a reading is calibrated; sums are over the effects of the sensor."""
+SYMBOLS = {
+    "f_x": "m/s², f_a along x; likewise f_y, f_z",
+    "g": "m/s², gravity_mps2",
+    "temperature": "°C",
+    "temperature_lagged": "°C, T with tau dT/dt = temperature − T, tau in s of the spec; at first "
+    "T = temperature",
+    "time": "s since the start of the session",
+    "vibration": "m/s², rms while the sensor stands still",
+    "step_x": "m/s², f_a along x less that of the position before; likewise step_y, step_z",
+    "roll": "rad, attitude of the rig; likewise pitch, yaw",
+}
+
+WAYS = {"f": "forward", "b": "back", "r": "right", "l": "left", "d": "down", "u": "up"}
+"""Where an axis points, by the letter of a frame."""
+
+
+def device_matrix(calibration: Mapping[str, Any]) -> Array:
+    """M (3, 4) with f = M · (raw, 1), from raw readings to m/s², both in the axes of the log.
+
+    Parameters
+    ----------
+    calibration : mapping, content of calibration.json
+
+    Raises
+    ------
+    InputError
+        If the model has effects that no matrix can hold.
+    """
+    if unfit := not_affine(_model(calibration)):
+        raise InputError(
+            f"no matrix can hold {joined(list(unfit))} of the model {calibration['model']!r}; "
+            "the forms json and yaml carry all effects"
+        )
+    affine = calibration["affine"]
+    if affine is None:
+        raise InputError(f"the model {calibration['model']!r} with these parameters has no inverse")
+    k, bias = np.array(affine["matrix"]), np.array(affine["bias_mps2"])
+    scale, offset, frame = _readings(calibration)
+    linear = frame.matrix.T @ k @ mending(calibration) @ frame.matrix * scale
+    return np.column_stack([linear, -linear @ offset - frame.matrix.T @ k @ bias])
+
+
+def raw_conversion(calibration: Mapping[str, Any]) -> tuple[Array, Array]:
+    """Scale and offset (3,) with f = (raw − offset) · scale in m/s², for the campaign's unit."""
+    if calibration["unit"] == "counts":
+        nominal = calibration["nominal"]
+        return np.array(nominal["scale"], dtype=float), np.array(nominal["offset"], dtype=float)
+    factor = STANDARD_GRAVITY if calibration["unit"] == "g" else 1.0
+    return np.full(3, factor), np.zeros(3)
+
+
+def mending(calibration: Mapping[str, Any]) -> Array:
+    """C (3, 3) by which forces as they are read become those that were fitted, in frd.
+
+    It is not I where the calibration is of data with a gross error that a diagnosis mended.
+    """
+    mended = calibration.get("mended") or {}
+    return np.eye(3) if mended.get("matrix") is None else np.array(mended["matrix"], dtype=float)
+
+
+def export(calibration: Mapping[str, Any], form: str) -> str:
+    """Text of a calibration in one of `FORMS`.
+
+    "json" and "yaml" hold all: parameters with sigmas, formulas of the effects and, where there is
+    one, the matrix; "c" is a header with the matrix, "matrix" the plain 3 × 4 numbers.
+    """
+    if form == "matrix":
+        return "\n".join(_row(row, " ") for row in device_matrix(calibration)) + "\n"
+    if form == "c":
+        return _c_header(calibration)
+    if form == "json":
+        return json.dumps(_whole(calibration), indent=2, ensure_ascii=False) + "\n"
+    if form == "yaml":
+        return yaml.safe_dump(_whole(calibration), sort_keys=False, allow_unicode=True)
+    raise UnknownNameError("form", form, FORMS)
+
+
+def _model(calibration: Mapping[str, Any]) -> SensorModel:
+    return compose(calibration["model"], tuple(calibration["effects"]))
+
+
+def _readings(calibration: Mapping[str, Any]) -> tuple[Array, Array, Frame]:
+    """Scale and offset (3,) of raw readings, and their axes: those of the log, if there was one."""
+    log = calibration.get("log")
+    if log is None:
+        return *raw_conversion(calibration), FRD
+    scale, offset = conversion(log["unit"], log.get("scale"), log.get("offset"))
+    return scale, offset, parse_frame(log["frame"])
+
+
+def _whole(calibration: Mapping[str, Any]) -> dict[str, Any]:
+    """All that a stranger needs to implement a calibration."""
+    model = _model(calibration)
+    scale, offset, frame = _readings(calibration)
+    values = iter(calibration["parameters"])
+    effects = [
+        _effect(effect, [next(values) for _ in effect.parameters]) for effect in model.effects
+    ]
+    used = " ".join(json.dumps(effect) for effect in effects)
+    matrix = None
+    if not not_affine(model) and calibration["affine"] is not None:
+        matrix = device_matrix(calibration).tolist()
+    return {
+        "campaign": calibration["campaign"],
+        "model": calibration["model"],
+        "unit": _unit(calibration),
+        "gravity_mps2": calibration["gravity_mps2"],
+        "readings": {
+            "frame": frame.name,
+            "scale": scale.tolist(),
+            "offset": offset.tolist(),
+            "to_frd": frame.matrix.tolist(),
+            "mending": mending(calibration).tolist(),
+        },
+        "steps": list(STEPS),
+        "symbols": {name: text for name, text in SYMBOLS.items() if name in used or name == "g"},
+        "effects": effects,
+        "ranges": calibration.get("ranges") or {},
+        "parameters": calibration["parameters"],
+        "matrix_3x4": matrix,
+    }
+
+
+def _effect(effect: Effect, parameters: list[Any]) -> dict[str, Any]:
+    """What an effect adds, with its parameters in SI."""
+    notes = []
+    if effect.part == "rig":
+        notes.append("belongs to the rig: not for readings of the sensor away from it")
+    if effect.drifts:
+        notes.append("known in its session only: keep time within ranges.time_s")
+    return {
+        "spec": effect.spec,
+        "part": effect.part,
+        **({"note": "; ".join(notes)} if notes else {}),
+        **formulas(effect),
+        "parameters": [
+            {key: p[key] for key in ("name", "value", "sigma", "unit")} for p in parameters
+        ],
+    }
+
+
+def _unit(calibration: Mapping[str, Any]) -> str:
+    log = calibration.get("log")
+    return str(calibration["unit"] if log is None else log["unit"])
+
+
+def _row(values: ArrayLike, separator: str) -> str:
+    return separator.join(f"{value: .12e}" for value in np.asarray(values))
+
+
+def _c_header(calibration: Mapping[str, Any]) -> str:
+    rows = ",\n".join(f"    {{{_row(row, ', ')}}}" for row in device_matrix(calibration))
+    frame = _readings(calibration)[2]
+    ways = ", ".join(f"{i} {WAYS[letter]}" for i, letter in zip("xyz", frame.name, strict=True))
+    lines = [
+        f"Accelerometer calibration of {calibration['campaign']}.",
+        f"Specific force in m/s^2 = M * (x, y, z, 1), with x, y, z in {_unit(calibration)}.",
+        f"Both are in the axes {frame.name}: {ways}.",
+    ]
+    if (calibration.get("mended") or {}).get("matrix") is not None:
+        lines.append(f"M mends the readings, too: {calibration['mended']['reason']}.")
+    comment = "\n * ".join(line.replace("*/", "* /") for line in lines)
+    return (
+        f"/* {comment} */\n"
+        "#ifndef ACCELEROMETER_CALIBRATION_H\n#define ACCELEROMETER_CALIBRATION_H\n\n"
+        f"static const double accelerometer_calibration[3][4] = {{\n{rows}\n}};\n\n#endif\n"
+    )

@@ -1,0 +1,226 @@
+"""How a log is read that a calibration is applied to, and what its effects need of each row."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from accelstudy.basics.errors import InputError
+from accelstudy.campaign.files.layout import LogLayout
+from accelstudy.campaign.logs.recording import AXES, TIME_UNITS, conversion, locate
+from accelstudy.campaign.logs.sources import CHUNK, Source, open_source
+from accelstudy.campaign.logs.tables import column_names, numbers, read_chunks
+from accelstudy.campaign.use.applying import Calibration
+from accelstudy.campaign.use.export import mending, raw_conversion
+from accelstudy.effects import Course, Hold
+from accelstudy.files.validation import first_error
+from accelstudy.sensors.frames import Frame
+
+Array = NDArray[np.float64]
+
+OPTIONS = {
+    "time": "--time or --rate",
+    "temperature": "--columns temperature=NAME",
+    "vibration": "--columns vibration=NAME",
+}
+"""Conditions that a log can tell, and the options that say where it does."""
+
+
+@dataclass(frozen=True)
+class Readings:
+    """A log as a calibration takes it.
+
+    Attributes
+    ----------
+    source : Source
+    places : mapping of fx, fy, fz, time, temperature and vibration to columns, as far as known
+    rate : float, 1/s, if it tells the time
+    time_factor : float, s per unit of the column of time
+    start : float, s, from the start of the calibration session to the first row
+    unit : str, of the forces
+    scale, offset : (3,), f = (raw − offset) · scale, in the axes of the log
+    frame : Frame, the axes of the log
+    mending : (3, 3), turns forces in frd as they are read into mended ones
+    """
+
+    source: Source
+    places: Mapping[str, int]
+    rate: float | None
+    time_factor: float
+    start: float
+    unit: str
+    scale: Array
+    offset: Array
+    frame: Frame
+    mending: Array
+
+    def chunks(
+        self, chunk_size: int = CHUNK, typed: bool = False
+    ) -> Iterator[tuple[pa.Table, Array, Hold]]:
+        """Rows as they stand, their forces (k, 3) in m/s² in frd, and their conditions.
+
+        See `read_chunks` for `typed`.
+        """
+        names, places = column_names(self.source), list(self.places.items())
+        row, first = 0, np.nan
+        course = Course(np.empty(0), np.empty(0))
+        for table in read_chunks(self.source, chunk_size, typed):
+            values = {key: self._numbers(table[names[place]], place) for key, place in places}
+            forces = np.column_stack([values[axis] for axis in AXES])
+            time = values.get("time")
+            if self.rate is not None:
+                time = self.start + np.arange(row, row + len(table)) / self.rate
+            elif time is not None:
+                if np.isnan(first):
+                    first = next(iter(time[np.isfinite(time)]), np.nan)
+                time = self.start + (time - first) * self.time_factor
+            temperature = values.get("temperature")
+            if time is not None and temperature is not None:
+                course = course.then(time, temperature)
+            # A log does not tell the position before: effects that need it add nothing.
+            still = np.zeros(len(table))
+            hold = Hold(
+                time=time,
+                temperature=temperature,
+                vibration=values.get("vibration"),
+                step_x=still,
+                step_y=still,
+                step_z=still,
+                course=course if len(course.time) else None,
+            )
+            read = self.frame.to_frd((forces - self.offset) * self.scale)
+            yield table, read @ self.mending.T, hold
+            row += len(table)
+
+    def _numbers(self, column: pa.ChunkedArray, place: int) -> Array:
+        kind = column.type
+        if not (
+            pa.types.is_string(kind) or pa.types.is_integer(kind) or pa.types.is_floating(kind)
+        ):
+            name = self.source.names[place]
+            raise InputError(f"{self.source.path}: column {name} is {kind}, not numbers")
+        return numbers(column)
+
+
+def readings_of(
+    log: str | Path,
+    calibration: Calibration,
+    given: Mapping[str, Any] | None = None,
+    start: float = 0.0,
+) -> Readings:
+    """Open a log, read as the one that the campaign was made of unless it is told otherwise.
+
+    Parameters
+    ----------
+    log : file, of any kind that `open_source` reads
+    calibration : Calibration
+    given : mapping, optional
+        Keys of `LogLayout`. Columns overlay those of the campaign's log; all three of the forces
+        replace them, as then the log is another. A column of time replaces a rate, and the reverse.
+    start : float, s, from the start of the calibration session to the first row
+
+    Returns
+    -------
+    Readings
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, lacks a column, or does not tell what an effect needs.
+    """
+    given = dict(given or {})
+    if {"time", "rate_hz"} <= set(given):
+        raise InputError(f"{log}: give the rate or the column of time, not both")
+    layout = _layout(calibration, given)
+    source = open_source(log, layout.variable)
+    try:
+        places = _places(source, layout, calibration, {*given, *given.get("columns", {})})
+    except InputError as error:
+        if calibration.log is None or "columns" in given:
+            raise
+        raise InputError(
+            f"{error}; looked for as in the log of the campaign, --columns and --time say otherwise"
+        ) from None
+    for effect, condition in calibration.needs:
+        known = condition in places or (condition == "time" and layout.rate_hz is not None)
+        if condition in OPTIONS and not known:
+            raise InputError(
+                f"{log}: the effect {effect} needs the {condition} of each row; "
+                f"give it by {OPTIONS[condition]}"
+            )
+    unit = layout.unit
+    if calibration.log is None and "unit" not in given:
+        unit = calibration.content["unit"]
+    scale, offset = _conversion(calibration, layout, unit)
+    factor = TIME_UNITS[layout.time_unit]
+    # What is told of the log is right, whatever was wrong in the campaign.
+    told = {"unit_error": "unit", "axis_error": "frame"}
+    mended = calibration.content.get("mended")
+    mends = mended is None or told.get(mended["error"]) not in given
+    return Readings(
+        source,
+        places,
+        layout.rate_hz,
+        factor,
+        start,
+        unit,
+        scale,
+        offset,
+        layout.axes,
+        mending(calibration.content) if mends else np.eye(3),
+    )
+
+
+def _layout(calibration: Calibration, given: Mapping[str, Any]) -> LogLayout:
+    """Layout of the campaign's log, overlaid with what is given."""
+    known = {} if calibration.log is None else calibration.log.model_dump(exclude_none=True)
+    if given.keys() & {"time", "rate_hz"}:
+        known = {key: value for key, value in known.items() if key not in ("time", "rate_hz")}
+    columns = given.get("columns", {})
+    if not set(AXES) <= set(columns):
+        columns = {**known.get("columns", {}), **columns}
+    try:
+        return LogLayout.model_validate({**known, **given, "columns": columns})
+    except ValidationError as error:
+        raise InputError(f"options: {first_error(error, LogLayout)}") from None
+
+
+def _places(
+    source: Source, layout: LogLayout, calibration: Calibration, given: set[str]
+) -> dict[str, int]:
+    """Columns of the log; one that no effect needs may be missing, unless it was asked for."""
+    columns = dict(layout.columns)
+    if layout.time is not None:
+        columns["time"] = layout.time
+    needed = {condition for _, condition in calibration.needs}
+    if layout.rate_hz is not None:
+        columns.pop("time", None)
+        needed.discard("time")
+    places = locate(source, {k: v for k, v in columns.items() if k not in OPTIONS}, AXES)
+    for key in OPTIONS:
+        if key in needed or (key in columns and key != "time"):
+            wanted = {key: columns[key]} if key in columns else {}
+            try:
+                places |= locate(source, wanted, (key,), needed=False)
+            except InputError:
+                if key in given:
+                    raise
+    return places
+
+
+def _conversion(calibration: Calibration, layout: LogLayout, unit: str) -> tuple[Array, Array]:
+    """Scale and offset (3,) of readings in a unit, in the axes of the log."""
+    if calibration.log is None and unit == calibration.content["unit"]:
+        return raw_conversion(calibration.content)
+    if unit != "counts":
+        return conversion(unit, None, None)
+    if layout.scale is None:
+        raise InputError("--unit counts: the calibration has no nominal scale of counts")
+    return conversion("counts", layout.scale, layout.offset)

@@ -1,0 +1,1 @@
+"""The command line: a file each for a command and its options."""

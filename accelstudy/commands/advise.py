@@ -1,0 +1,173 @@
+"""The command that advises in a running session."""
+
+from __future__ import annotations
+
+import math
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from accelstudy.basics.progress import say, warn
+from accelstudy.commands.options import (
+    PATH,
+    Quantity,
+    Sectioned,
+    angle_unit_option,
+    approach_option,
+    example,
+    model_option,
+    quiet_option,
+)
+
+if TYPE_CHECKING:
+    from accelstudy.campaign.files.format import Campaign
+    from accelstudy.sequential.prior import Prior
+
+POLL = 1.0
+"""Seconds between two looks at a growing table."""
+SECTIONS = {
+    "What is wanted": ("tilt_accuracy", "tilt_range"),
+    "The calibration": ("approach", "model", "prior"),
+    "Positions to choose from": ("attitudes", "pole_distance", "max_roll", "max_pitch"),
+    "The session": ("watch",),
+}
+
+
+@click.command(
+    "advise",
+    cls=Sectioned,
+    sections=SECTIONS,
+    epilog=example("accelstudy advise my-campaign --tilt-accuracy 10mgon --tilt-range 30gon"),
+)
+@click.argument("campaign", type=PATH)
+@click.option(
+    "--tilt-accuracy",
+    type=Quantity("rad", 1e-9, math.pi / 2),
+    required=True,
+    help="Rms of roll and of pitch to reach, as 10mgon or 0.01deg.",
+)
+@click.option(
+    "--tilt-range",
+    type=Quantity("rad", 1e-3, math.pi / 2),
+    default="30gon",
+    show_default=True,
+    help="Tilts up to which it is to hold.",
+)
+@approach_option(None)
+@model_option
+@click.option("--prior", type=PATH, help="A calibration.json of before, with the same model.")
+@click.option(
+    "--attitudes",
+    help="Attitudes to choose from: cube (faces, edges, corners), grid (roll and pitch in steps of "
+    "25 gon) or a CSV file.  [default: cube, with a robot grid]",
+)
+@click.option(
+    "--pole-distance",
+    type=Quantity("rad", 0.0, 2.0),
+    help="Least angle between the x axis and the vertical.  [default: none]",
+)
+@click.option(
+    "--max-roll", type=Quantity("rad", 0.0, 4.0), help="Largest roll, either way.  [default: any]"
+)
+@click.option(
+    "--max-pitch", type=Quantity("rad", 0.0, 4.0), help="Largest pitch, either way.  [default: any]"
+)
+@click.option("--watch", is_flag=True, help="Wait for further positions, until Ctrl-C.")
+@angle_unit_option
+@quiet_option
+def advise_command(
+    campaign: Path,
+    tilt_accuracy: float,
+    tilt_range: float,
+    approach: str | None,
+    model: str,
+    prior: Path | None,
+    attitudes: str | None,
+    pole_distance: float | None,
+    max_roll: float | None,
+    max_pitch: float | None,
+    watch: bool,
+) -> None:
+    """In a running session: where to go next, when to stop.
+
+    CAMPAIGN is the folder of the session. Its campaign.yaml is there; its positions.csv may have
+    few positions, none, or not be there yet. Each position is tested by those before it, and used
+    if it agrees with them. What is not determined yet is said, and the tilt accuracy so far.
+    """
+    from accelstudy.approaches import get_approach
+    from accelstudy.sensors.models import get_model
+    from accelstudy.sequential.advisor import Advisor
+    from accelstudy.sequential.attitudes import DEFAULTS, candidates
+    from accelstudy.sequential.promise import Promise
+    from accelstudy.sequential.running import read_as_it_is
+    from accelstudy.sequential.watching import Watch
+    from accelstudy.sequential.wording import finished, heading, lines
+
+    session, promise = Watch(campaign), Promise(tilt_accuracy, tilt_range)
+    if watch:
+        now = next(session.look()).campaign
+    else:
+        running = read_as_it_is(campaign)
+        now = running.campaign
+        if running.unfinished:
+            warn(f"{campaign}: the last line of the table is not whole; it is not counted")
+    name = approach or ("gravity" if now.angles is None else "robot")
+    sensor = get_model(model)
+    directions = candidates(
+        attitudes or DEFAULTS.get(name, "grid"), pole_distance, max_roll, max_pitch
+    )
+    advisor = Advisor(sensor, get_approach(name), promise, directions, *_prior(prior, model))
+
+    def tell(now: Campaign) -> None:
+        """Print the advice."""
+        advisor.check(now)
+        advice = advisor.advise(now)
+        click.echo(heading(advice, now, sensor, name))
+        for line in lines(advice, now, sensor, promise):
+            click.echo(f"  {line}")
+        if advice.enough:
+            click.echo(f"  {finished(campaign, model, name)}")
+
+    for warning in now.warnings:
+        warn(warning)
+    tell(now)
+    if not watch:
+        return
+    say("\nwaiting for the next position; Ctrl-C ends")
+    try:
+        while True:
+            time.sleep(POLL)
+            for news in session.look():
+                click.echo("")
+                if news.remark:
+                    warn(news.remark)
+                if news.again:
+                    advisor.restart()
+                if news.again or not news.remark:
+                    tell(news.campaign)
+    except KeyboardInterrupt:
+        say("\nended")
+
+
+def _prior(path: Path | None, model: str) -> tuple[Prior, ...]:
+    """What an earlier calibration says; nothing without one."""
+    if path is None:
+        return ()
+    import numpy as np
+
+    from accelstudy.basics.errors import InputError
+    from accelstudy.campaign.use.applying import read_calibration
+    from accelstudy.sensors.models import get_model
+    from accelstudy.sequential.prior import Prior
+
+    earlier, wanted = read_calibration(path), get_model(model)
+    if earlier.model.parameter_names != wanted.parameter_names:
+        raise InputError(
+            f"{path}: calibrates {', '.join(earlier.model.parameter_names)}, but the model "
+            f"{wanted.name!r} has {', '.join(wanted.parameter_names)}"
+        )
+    if not np.isfinite(earlier.covariance).all():
+        raise InputError(f"{path}: does not say how well its parameters are known")
+    return (Prior.of_covariance(earlier.parameters, earlier.covariance),)

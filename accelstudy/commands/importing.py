@@ -1,0 +1,147 @@
+"""The commands that make a campaign of a raw log, or of public data."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.progress import say, warn
+from accelstudy.commands.options import (
+    PATH,
+    Sectioned,
+    angle_unit_option,
+    example,
+    force_option,
+    quiet_option,
+)
+
+if TYPE_CHECKING:
+    from accelstudy.campaign.importing.conversion import ImportReport
+
+
+_SECTIONS = {
+    "The log": ("columns", "sensor", "time", "time_unit", "rate"),
+    "Its numbers": ("unit", "scale", "offset", "full_range", "frame"),
+    "The holds": ("threshold", "exclude", "join", "figure"),
+    "A table of means instead": ("means", "robot_sigma", "robot_unit"),
+    "The campaign": ("out", "name", "gravity", "settings_path"),
+}
+
+
+@click.command(
+    "import",
+    cls=Sectioned,
+    sections=_SECTIONS,
+    epilog=example(
+        "accelstudy import log.csv --out my-campaign --rate 100 --columns fx=0,fy=1,fz=2"
+    ),
+)
+@click.argument("log", type=PATH, nargs=-1, required=True)
+@click.option("--columns", help="By name, or place from 0: fx=1,fy=2,fz=3,temperature=temp.")
+@click.option("--sensor", multiple=True, help="One of several: NAME=ax,ay,az; repeat it.")
+@click.option("--time", help="Column of time, by name or place.")
+@click.option("--time-unit", help="One of s, ms, us and ns, also since 1970.  [default: s]")
+@click.option("--rate", type=float, help="Samples per second, without a column of time.")
+@click.option("--unit", help="One of m/s^2, g and counts.  [default: m/s^2]")
+@click.option("--scale", help="With counts: m/s² per count, one number or three.")
+@click.option("--offset", help="With counts: reading at 0 m/s².  [default: from the holds]")
+@click.option("--range", "full_range", help="The sensor measures ± this: 78.5, 8g, 32767counts.")
+@click.option("--frame", help="Where x, y, z point: frd, flu (ROS), rfu …  [default: frd]")
+@click.option("--threshold", type=float, help="Sd of a window at rest, m/s², instead of chosen.")
+@click.option("--exclude", multiple=True, help="Leave out 13:moved or 120s-135s:moved; repeat it.")
+@click.option("--join", multiple=True, help="Holds that are one, as 4,5 or 120s-135s; repeat it.")
+@click.option("--figure/--no-figure", default=True, help="Draw the log with its holds.")
+@click.option("--means", is_flag=True, help="LOG is a table of means already.")
+@click.option("--robot-sigma", type=float, help="Sd of its robot angles roll and pitch, mgon.")
+@click.option("--robot-unit", help="Unit of these angles: gon, deg or rad.  [default: gon]")
+@click.option("--out", type=PATH, required=True, help="Folder of the campaign.")
+@click.option("--name", help="Name of the campaign.  [default: that of the file]")
+@click.option("--gravity", type=float, help="Local gravity, m/s².  [default: 9.80665]")
+@click.option("--settings", "settings_path", type=PATH, help="YAML file; options overlay it.")
+@force_option
+@angle_unit_option
+@quiet_option
+def import_command(
+    log: tuple[Path, ...],
+    out: Path,
+    settings_path: Path | None,
+    means: bool,
+    figure: bool,
+    force: bool,
+    **options: Any,
+) -> None:
+    """Make a campaign of a raw LOG: find its static holds.
+
+    LOG is text (CSV or columns, perhaps .gz), MATLAB or Parquet. Several files, a folder or a
+    pattern are one position each. Without --threshold the noise of the log itself says what is at
+    rest; segmentation.png in the folder shows the outcome, with the numbers of the holds.
+    """
+    from accelstudy.campaign.importing.conversion import import_each
+    from accelstudy.commands.import_options import files_of, settings_of
+    from accelstudy.files.outputs import CAMPAIGN, result_folder
+
+    settings = settings_of(settings_path, means=means or None, **options)
+    files = files_of(log)
+    folders = {name: out / name for name in settings.sensors} or {"": out}
+    inputs = [*files, *([] if settings_path is None else [settings_path])]
+    with ExitStack() as stack:
+        campaigns = {
+            name: stack.enter_context(result_folder(folder, CAMPAIGN, inputs, force))
+            for name, folder in folders.items()
+        }
+        imported = import_each(campaigns, files, settings, figure)
+    for name, (_, report) in imported.items():
+        if name:
+            say(f"sensor {name}")
+        _show(report, folders[name], figure)
+
+
+@click.command(
+    "public", epilog=example("accelstudy public", "accelstudy public xsens-mti --out xsens")
+)
+@click.argument("name", required=False)
+@click.option("--out", type=PATH, help="Folder of the campaign.")
+@click.option(
+    "--folder",
+    type=PATH,
+    default="resources/public",
+    show_default=True,
+    help="Where the file is, in any subfolder, or is downloaded to.",
+)
+@force_option
+@angle_unit_option
+@quiet_option
+def public_command(name: str | None, out: Path | None, folder: Path, force: bool) -> None:
+    """Make a campaign of public data, or list what there is.
+
+    NAME is that of the data; without it they are listed. A download is checked by its sha256, and
+    goes on where an earlier one broke off.
+    """
+    from accelstudy.campaign.importing.conversion import import_to
+    from accelstudy.campaign.importing.public import import_settings, public_data, public_file
+    from accelstudy.files.outputs import CAMPAIGN, result_folder
+
+    if name is None:
+        for known, entry in public_data().items():
+            click.echo(f"{known}: {entry.description}\n    {entry.licence}, {entry.url}")
+        return
+    settings = import_settings(name)
+    if out is None:
+        raise InputError("--out: give the folder of the campaign")
+    with result_folder(out, CAMPAIGN, [folder], force) as campaign:
+        _, report = import_to(campaign, public_file(name, folder), settings)
+    _show(report, out)
+
+
+def _show(report: ImportReport, out: Path, figure: bool = True) -> None:
+    for line in report.lines():
+        say(line)
+    for warning in report.warnings:
+        warn(warning)
+    if figure and report.holds is not None:
+        say(f"figure: {out / 'segmentation.png'}")
+    say(f"campaign: {out}")

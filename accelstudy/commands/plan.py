@@ -1,0 +1,259 @@
+"""The command that plans a calibration."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import click
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.progress import say
+from accelstudy.basics.units import GON, MGON
+from accelstudy.commands.options import (
+    PATH,
+    SCHEME,
+    Name,
+    Quantity,
+    Sectioned,
+    angle_unit_option,
+    example,
+    force_option,
+    quiet_option,
+    seed_option,
+)
+
+TARGET = Quantity("rad", least=1e-4 * MGON, most=100 * GON)
+RANGE = Quantity("rad", least=0.1 * GON, most=90 * GON)
+SECONDS = Quantity("s", least=0.01, most=86400.0)
+NOT_REACHED = 1
+"""Exit status where no calibration reaches the target."""
+
+
+class Confidence(click.ParamType):  # type: ignore[type-arg]
+    """A share of the calibrations, ``95%`` or ``0.95``, or ``rms``."""
+
+    name = "confidence"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float | None:
+        """Share, or None for the rms."""
+        if value is None or value == "rms":
+            return None
+        text = str(value).strip()
+        try:
+            share = float(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
+        except ValueError:
+            share = math.nan
+        if not 0.5 <= share <= 0.999:
+            raise InputError(
+                f"--confidence: must be rms, or a share from 50% to 99.9% of the calibrations, "
+                f"not {text!r}"
+            )
+        return share
+
+
+_SECTIONS = {
+    "What is asked": (
+        "tilt_accuracy",
+        "tilt_range",
+        "sensor",
+        "sigma",
+        "equipment",
+        "confidence",
+    ),
+    "What is tried": ("holds", "schemes", "max_time", "max_positions", "replicates", "seed"),
+    "What the equipment takes": (
+        "moving_time",
+        "robot_moving_time",
+        "robot_setup_time",
+        "robot_accuracy",
+    ),
+}
+
+
+@click.command(
+    "plan",
+    cls=Sectioned,
+    sections=_SECTIONS,
+    epilog=example("accelstudy plan --tilt-accuracy 10mgon --tilt-range 30gon --sigma 2mm/s2"),
+)
+@click.option(
+    "--tilt-accuracy",
+    type=TARGET,
+    required=True,
+    help="Wanted of roll and of pitch, as 10mgon or 0.01deg.",
+)
+@click.option(
+    "--tilt-range",
+    type=RANGE,
+    default="30gon",
+    show_default=True,
+    help="Largest tilt at which the sensor is used.",
+)
+@click.option(
+    "--sensor",
+    type=Name("sensor", "accelstudy.data_sheets", "data_sheet_names"),
+    help="A data sheet that comes along, a YAML file like it, or the folder of a campaign.",
+)
+@click.option(
+    "--sigma",
+    type=Quantity("m/s^2", least=1e-9, most=10.0),
+    help="Noise of the mean of a position, as 2mm/s2, if no more is known of the sensor.",
+)
+@click.option(
+    "--equipment",
+    type=click.Choice(["gravity", "robot", "both"]),
+    default="both",
+    show_default=True,
+    help="Positions by hand, with gravity alone, or with a robot that tells roll and pitch.",
+)
+@click.option(
+    "--confidence",
+    type=Confidence(),
+    default="rms",
+    show_default=True,
+    help="What must reach the accuracy: the rms, or so many of the calibrations, as 95%.",
+)
+@click.option(
+    "--hold",
+    "holds",
+    type=SECONDS,
+    multiple=True,
+    help="Duration of a position, as 10s; may be repeated.  [default: 1 s to 120 s; 10 s for "
+    "--sigma]",
+)
+@click.option(
+    "--scheme",
+    "schemes",
+    type=SCHEME,
+    multiple=True,
+    help="One more to compare: a name, or a file of `accelstudy design`; may be repeated.",
+)
+@click.option("--max-time", type=SECONDS, help="Time in the field at most, as 20min.")
+@click.option(
+    "--max-positions",
+    type=click.IntRange(4, 400),
+    default=200,
+    show_default=True,
+    help="Positions at most.",
+)
+@click.option(
+    "--moving-time",
+    type=Quantity("s", most=3600.0),
+    default="20s",
+    show_default=True,
+    help="From position to position by hand.",
+)
+@click.option(
+    "--robot-moving-time",
+    type=Quantity("s", most=3600.0),
+    default="10s",
+    show_default=True,
+    help="From position to position with the robot.",
+)
+@click.option(
+    "--robot-setup-time",
+    type=Quantity("s", most=86400.0),
+    default="30min",
+    show_default=True,
+    help="To mount the sensor on the robot.",
+)
+@click.option(
+    "--robot-accuracy",
+    type=Quantity("rad", least=1e-6 * MGON, most=10 * GON),
+    default="3.2mgon",
+    show_default=True,
+    help="Standard deviation of the robot's roll and pitch.",
+)
+@click.option(
+    "--replicates",
+    type=click.IntRange(200, 1_000_000),
+    default=10_000,
+    show_default=True,
+    help="Simulated calibrations of each candidate at the top.",
+)
+@seed_option
+@click.option("--out", type=PATH, help="Folder for the table, the figure and a study.")
+@force_option
+@angle_unit_option
+@quiet_option
+def plan_command(
+    tilt_accuracy: float,
+    tilt_range: float,
+    sensor: str | None,
+    sigma: float | None,
+    equipment: str,
+    confidence: float | None,
+    holds: tuple[float, ...],
+    schemes: tuple[str, ...],
+    max_time: float | None,
+    max_positions: int,
+    moving_time: float,
+    robot_moving_time: float,
+    robot_setup_time: float,
+    robot_accuracy: float,
+    replicates: int,
+    seed: int,
+    out: Path | None,
+    force: bool,
+) -> None:
+    """Find the cheapest calibration for a tilt accuracy.
+
+    Compares models, position schemes, numbers of positions and durations by linear theory, and
+    simulates those at the top. The sensor is --sensor or, if only its noise is known, --sigma. If
+    nothing reaches the accuracy, one line says what would be reachable, and the exit status is 1.
+    """
+    if (sensor is None) == (sigma is None):
+        raise InputError(
+            "plan: give the sensor by --sensor, or its noise by --sigma"
+            + (", not both" if sensor else "")
+        )
+    from accelstudy.data_sheets import of_sigma
+    from accelstudy.plan.answer import answer
+    from accelstudy.plan.question import Equipment, Question
+    from accelstudy.plan.sensors import get_sensor
+    from accelstudy.plan.wording import (
+        answer_lines,
+        assumption_lines,
+        how_to,
+        reason_lines,
+        table_lines,
+        unreachable,
+    )
+
+    by_hand = Equipment("gravity", moving_time, 0.0)
+    robot = Equipment("robot", robot_moving_time, robot_setup_time)
+    question = Question(
+        tilt_accuracy,
+        tilt_range,
+        of_sigma(sigma) if sigma is not None else get_sensor(str(sensor)),
+        {"gravity": (by_hand,), "robot": (robot,), "both": (by_hand, robot)}[equipment],
+        confidence,
+        tuple(sorted(set(holds))),
+        robot_accuracy,
+        math.inf if max_time is None else max_time,
+        max_positions,
+        schemes,
+    )
+    found = answer(question, seed, replicates)
+    if not found.ranked:
+        click.echo(unreachable(found))
+        raise click.exceptions.Exit(NOT_REACHED)
+    for line in (*answer_lines(found), "", *how_to(found)):
+        click.echo(line)
+    for line in ("", *table_lines(found), "", *reason_lines(found)):
+        say(line)
+    for line in ("", *assumption_lines(question)):
+        say(line)
+    if out is not None:
+        from accelstudy.plan.output import write_plan
+
+        inputs = [Path(sensor)] if sensor is not None and Path(sensor).exists() else []
+        write_plan(found, out, {"config_hash": None, "seed": seed}, inputs, force)
+        say(f"\nplan, table and figure: {out}")
+        say(f"the same numbers again: snakemake --cores 2 --configfile {out / 'study.yaml'}")
+    else:
+        say("\n--out FOLDER keeps the table, the figure, and a study that makes the numbers again.")

@@ -1,0 +1,79 @@
+"""Closed forms of linear theory, against which the Monte Carlo is held.
+
+They are valid for the models of bias, scale and non-orthogonality in schemes with octahedral
+moments: over the n directions ⟨x⟩ = ⟨xy⟩ = 0 and all third moments vanish, ⟨x⁴⟩ is the same for
+each axis and m = ⟨x²y²⟩ the same for each pair, and no moment such as ⟨x³y⟩ remains.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations_with_replacement
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.basics.units import STANDARD_GRAVITY
+
+Array = NDArray[np.float64]
+
+COVERED_EFFECTS = ({"bias", "scale"}, {"bias", "scale", "nonorthogonality"})
+"""Compositions of effects to which the closed forms apply."""
+
+
+def has_octahedral_moments(directions: Array, tolerance: float = 1e-6) -> bool:
+    """Whether `directions` (n, 3) have the moments of a cube's symmetry through degree 4."""
+    fourth = np.mean(directions[:, 0] ** 4)
+    m = np.mean(directions[:, 0] ** 2 * directions[:, 1] ** 2)
+    for degree in range(1, 5):
+        for axes in combinations_with_replacement(range(3), degree):
+            counts = sorted(axes.count(i) for i in set(axes))
+            expected = {(2,): 1 / 3, (4,): fourth, (2, 2): m}.get(tuple(counts), 0.0)
+            if abs(np.mean(np.prod(directions[:, axes], axis=1)) - expected) > tolerance:
+                return False
+    return True
+
+
+def gravity_sigma(
+    directions: Array, sigma_force: float, g: float = STANDARD_GRAVITY
+) -> dict[str, float]:
+    """Standard deviations of the gravity-based calibration.
+
+    σ_b = σ √(3/n), σ_α = (σ/g) / √(n m), σ_s = (σ/g) √((1 − 3m) / (n (1/3 − 3m))).
+
+    Parameters
+    ----------
+    directions : (n, 3) array with octahedral moments
+    sigma_force : float, m/s²
+    g : float, m/s²
+
+    Returns
+    -------
+    dict of effect ("bias", "scale", "nonorthogonality") to sigma in SI; infinite for an effect
+    that the scheme does not determine (non-orthogonality with m = 0)
+    """
+    n, m = len(directions), float(np.mean(directions[:, 0] ** 2 * directions[:, 1] ** 2))
+    relative = sigma_force / g
+    return {
+        "bias": sigma_force * np.sqrt(3 / n),
+        "scale": relative * np.sqrt((1 - 3 * m) / (n * (1 / 3 - 3 * m))),
+        "nonorthogonality": relative / np.sqrt(n * m) if m > 0 else np.inf,
+    }
+
+
+def gravity_scale_correlation(directions: Array) -> float:
+    """Correlation of two scales in the gravity-based calibration, −3m / (1 − 3m)."""
+    m = float(np.mean(directions[:, 0] ** 2 * directions[:, 1] ** 2))
+    return -3 * m / (1 - 3 * m)
+
+
+def perfect_robot_ratio(directions: Array) -> dict[str, float]:
+    """Standard deviations with a robot without error, relative to the gravity-based ones.
+
+    Bias 1/√3, misalignment √(3m), scale √(3 (1/3 − 3m) / (1 − 3m)).
+    """
+    m = float(np.mean(directions[:, 0] ** 2 * directions[:, 1] ** 2))
+    return {
+        "bias": 1 / np.sqrt(3),
+        "scale": np.sqrt(3 * (1 / 3 - 3 * m) / (1 - 3 * m)),
+        "nonorthogonality": np.sqrt(3 * m),
+    }

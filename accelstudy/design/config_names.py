@@ -1,0 +1,27 @@
+"""The types of the names of models and schemes in a configuration."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated
+
+from pydantic import AfterValidator
+
+
+def _model_name(text: str) -> str:
+    from accelstudy.sensors.models import get_model  # slow to import, and most keys need no model
+
+    # A plain name may be that of a model of the study's own, which is known later.
+    return text if re.fullmatch(r"[\w-]+", text) else get_model(text).name
+
+
+def _scheme_name(text: str) -> str:
+    from accelstudy.schemes import get_scheme, is_scheme_file  # as above
+
+    return get_scheme(text).name if is_scheme_file(text) else text
+
+
+ModelName = Annotated[str, AfterValidator(_model_name)]
+"""A model by its name; a composition and a file have the name that their effects give them."""
+SchemeName = Annotated[str, AfterValidator(_scheme_name)]
+"""A scheme by its name; that of a file has a name that tells of its content."""

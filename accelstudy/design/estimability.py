@@ -1,0 +1,165 @@
+"""What a scheme can determine: rank, condition and linear theory, before any simulation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.adjustment import whitened_jacobian
+from accelstudy.approaches import Approach
+from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.effects import Hold
+from accelstudy.schemes import Scheme, get_scheme
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.simulation.hold_plan import HoldPlan
+from accelstudy.simulation.sessions import Noise, session
+
+Array = NDArray[np.float64]
+
+SINGULAR = 1e-7
+"""Singular values of the scaled design below this fraction of the largest count as zero."""
+ROUNDING = 1e-14
+"""Columns of the design shorter than this fraction of the longest count as zero."""
+
+EVERYTHING_VARIES = HoldPlan(60.0, (0.0, 40.0), "random", (0.0, 1.0), "random")
+
+
+@dataclass(frozen=True)
+class Design:
+    """Diagnosis of one scheme with one model and one approach.
+
+    Attributes
+    ----------
+    parameter_names : tuple of str
+    rank : int, of the design at the ideal sensor
+    condition : float, of the design with columns scaled to unit length; inf if singular
+    redundancy : int, r = conditions − unknowns
+    fourth_moment : float, m = ⟨x²y²⟩ of the directions, mean over the three pairs of axes
+    pole_distance : float, rad, smallest angle of a direction to the x axis, where roll is undefined
+    not_estimable : tuple of str, parameters that the scheme cannot determine
+    reason : str, why; empty if all is estimable
+    cofactors : (u, u) array, Q_xx of linear theory at the given parameters; NaN if not estimable
+    """
+
+    parameter_names: tuple[str, ...]
+    rank: int
+    condition: float
+    redundancy: int
+    fourth_moment: float
+    pole_distance: float
+    not_estimable: tuple[str, ...]
+    reason: str
+    cofactors: Array
+
+    @property
+    def estimable(self) -> bool:
+        """Whether every parameter is determined."""
+        return not self.not_estimable
+
+    @property
+    def sigma(self) -> Array:
+        """Standard deviations of linear theory, (u,), SI."""
+        return np.sqrt(np.diag(self.cofactors))
+
+
+def diagnose(
+    scheme: Scheme,
+    model: SensorModel,
+    approach: Approach,
+    noise: Noise | None = None,
+    parameters: Array | None = None,
+    gravity: float = STANDARD_GRAVITY,
+    hold: Hold | None = None,
+) -> Design:
+    """Diagnose what a scheme determines.
+
+    Rank and condition are those at the ideal sensor (all parameters zero): what is singular there
+    is near-singular for every real sensor. The cofactors are taken at `parameters`.
+
+    Parameters
+    ----------
+    scheme : Scheme
+    model : SensorModel
+    approach : Approach
+    noise : Noise, optional
+    parameters : (u,) array, SI, optional; the ideal sensor by default
+    gravity : float, m/s²
+    hold : Hold, optional
+        What a session knows of its positions beyond their directions (temperature, time, …).
+    """
+    noise = noise or Noise()
+    ideal = np.zeros(model.n_parameters)
+    names = (*model.parameter_names, "g") if noise.sigma_gravity > 0 else model.parameter_names
+    a = _design(scheme, model, approach, noise, ideal, gravity, hold)
+    rank, condition, free = rank_of(a)
+    not_estimable = tuple(name for name, is_free in zip(names, free, strict=True) if is_free)
+    reason = ""
+    cofactors = np.full((len(names), len(names)), np.nan)
+    if not np.isfinite(a).all():
+        reason = "the sigmas differ too much: the conditions have no weights to compute with"
+    elif not_estimable:
+        blind = is_blind(model, approach, noise, gravity)
+        reason = (
+            f"rank {rank} of {len(names)}: {', '.join(not_estimable)} cannot be told apart by "
+            + (f"the {approach.name} approach in any scheme" if blind else "these positions")
+        )
+    else:
+        if parameters is not None:
+            at = np.asarray(parameters, dtype=float)
+            a = _design(scheme, model, approach, noise, at, gravity, hold)
+        scale = np.linalg.norm(a, axis=0)
+        cofactors = np.linalg.inv((a / scale).T @ (a / scale)) / np.outer(scale, scale)
+    return Design(
+        parameter_names=names,
+        rank=rank,
+        condition=condition,
+        redundancy=len(a) - len(names),
+        fourth_moment=scheme.fourth_moment,
+        pole_distance=scheme.pole_distance,
+        not_estimable=not_estimable,
+        reason=reason,
+        cofactors=cofactors,
+    )
+
+
+def _design(
+    scheme: Scheme,
+    model: SensorModel,
+    approach: Approach,
+    noise: Noise,
+    parameters: Array,
+    gravity: float,
+    hold: Hold | None,
+) -> Array:
+    """Design matrix (conditions, u) with unit weights."""
+    ideal = session(model, parameters, scheme.directions, gravity, hold)
+    return whitened_jacobian(model, approach, ideal.observations(noise), parameters)
+
+
+def is_blind(model: SensorModel, approach: Approach, noise: Noise, gravity: float) -> bool:
+    """Whether not even many positions all around, in all conditions, determine the model."""
+    ideal = np.zeros(model.n_parameters)
+    scheme = get_scheme("fibonacci-60")
+    hold = EVERYTHING_VARIES.hold(scheme.n_positions)
+    a = _design(scheme, model, approach, noise, ideal, gravity, hold)
+    return rank_of(a)[0] < a.shape[1]
+
+
+def rank_of(a: Array) -> tuple[int, float, NDArray[np.bool_]]:
+    """Rank, condition and which columns lie in the null space of a design."""
+    if not np.isfinite(a).all():
+        return 0, np.inf, np.ones(a.shape[1], dtype=bool)
+    length = np.linalg.norm(a, axis=0)
+    longest = length.max() or 1.0
+    # A column of rounding errors is no direction, and would be one at unit length.
+    scaled = a / np.where(length > ROUNDING * longest, length, longest)
+    # The whole null space is wanted, also of a design with fewer rows than columns; R of a QR
+    # decomposition has it too, without a matrix of all conditions by all conditions.
+    triangle = np.linalg.qr(scaled, mode="r") if len(scaled) > len(length) else scaled
+    _, values, vt = np.linalg.svd(triangle, full_matrices=True)
+    rank = int(np.count_nonzero(values > SINGULAR * values[0]))
+    complete = rank == a.shape[1]
+    condition = float(values[0] / values[-1]) if complete else np.inf
+    return rank, condition, np.linalg.norm(vt[rank:], axis=0) > 1e-3

@@ -1,0 +1,150 @@
+"""The best there can be: shares of all positions instead of whole ones, and a bound from them.
+
+A convex criterion is a convex function of shares w, too, so from its derivatives at any w
+follows a bound that no shares, and no whole positions, are below (the general equivalence theorem
+of Kiefer & Wolfowitz 1960 and Whittle 1973 is the case in which the bound is reached):
+
+    φ(w*) ≥ φ(w) + n (min gⱼ − Σ wᵢ gᵢ),  gⱼ = tr(∂φ/∂N · Iⱼ).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.design.optimal.constraints import Constraints
+from accelstudy.design.optimal.criteria import Criterion
+from accelstudy.design.optimal.spaces import Space
+from accelstudy.design.optimal.task import Task
+
+Array = NDArray[np.float64]
+
+COARSE, FINE = 600, 6000
+"""Attitudes that have shares, and attitudes on which the bound is taken."""
+ROUNDS = 8
+ENOUGH = 1e-4
+"""Gap between the criterion and its bound, relative, at which to stop."""
+
+
+@dataclass(frozen=True)
+class Continuous:
+    """The optimum of shares.
+
+    Attributes
+    ----------
+    directions : (k, 3) array, attitudes with a share
+    shares : (k,) array, of sum 1
+    value : float, criterion of n positions so shared out
+    bound : float, below which no n positions are
+    """
+
+    directions: Array
+    shares: Array
+    value: float
+    bound: float
+
+
+def continuous_optimum(
+    task: Task, criterion: Criterion, space: Space, constraints: Constraints, n: int
+) -> Continuous:
+    """Share out n positions best, in the attitudes that are allowed one by one.
+
+    Parameters
+    ----------
+    task : Task
+    criterion : Criterion, convex
+    space : Space
+    constraints : Constraints; least angles and a number of mountings are left out, so that the
+        bound holds with them, too
+    n : int
+    """
+    fine = allowed(space, constraints, FINE)
+    fine_flat = _flat(task, fine)
+    points = fine if len(fine) <= COARSE else allowed(space, constraints, COARSE)
+    flat, shares = _flat(task, points), np.full(len(points), 1 / len(points))
+    u = len(task.names)
+    best = Continuous(points, shares, np.inf, -np.inf)
+    for _ in range(ROUNDS):
+        shares = _share(task.prior, criterion, flat, shares, n)
+        keep = shares > 1e-7 / len(shares)
+        points, flat, shares = points[keep], flat[keep], shares[keep] / shares[keep].sum()
+        normal = task.prior + n * (shares @ flat).reshape(u, u)
+        value = float(criterion.value(normal))
+        slope = criterion.gradient(normal).ravel()
+        here = flat @ slope
+        gradient, everywhere = slope.reshape(u, u), fine_flat @ slope
+        lowest, least = _lowest(task, gradient, space, constraints, fine, everywhere)
+        least = min(least, float(here.min()))
+        bound = max(best.bound, value + n * (least - float(shares @ here)))
+        best = Continuous(points, shares, value, bound)
+        if value - bound < ENOUGH:
+            break
+        points = np.concatenate([points, lowest])
+        flat = np.concatenate([flat, _flat(task, lowest)])
+        shares = np.concatenate([0.9 * shares, np.full(len(lowest), 0.1 / len(lowest))])
+    return best
+
+
+def allowed(space: Space, constraints: Constraints, count: int) -> Array:
+    """About `count` attitudes that are allowed, evenly spread; all of a finite set."""
+    found = constraints.keep(space.directions(count))
+    if 0 < len(found) < count / 2 and space.tangents(found[:1]).shape[2]:
+        found = constraints.keep(space.directions(min(9999, count * count // len(found))))
+    return found
+
+
+def _flat(task: Task, directions: Array) -> Array:
+    return task.informations(directions).reshape(len(directions), -1)
+
+
+def _share(prior: Array, criterion: Criterion, flat: Array, start: Array, n: int) -> Array:
+    """Best shares of given attitudes; squares of free numbers, so that none is negative."""
+    from scipy.optimize import minimize  # slow to import
+
+    u = len(prior)
+
+    def value_and_gradient(root: Array) -> tuple[float, Array]:
+        total = float(root @ root)
+        shares = root**2 / total
+        normal = prior + n * (shares @ flat).reshape(u, u)
+        by_shares = n * flat @ criterion.gradient(normal).ravel()
+        slope = 2 * root / total * (by_shares - shares @ by_shares)
+        return float(criterion.value(normal)), slope
+
+    found = minimize(
+        value_and_gradient,
+        np.sqrt(start),
+        jac=True,
+        method="L-BFGS-B",
+        options={"maxiter": 500, "ftol": 1e-13, "gtol": 1e-9},
+    )
+    return np.asarray(found.x**2 / (found.x @ found.x))
+
+
+def _lowest(
+    task: Task,
+    gradient: Array,
+    space: Space,
+    constraints: Constraints,
+    fine: Array,
+    slopes: Array,
+) -> tuple[Array, float]:
+    """Attitudes of the smallest derivatives, between those of the grid too, and the smallest."""
+    points = fine[np.argsort(slopes, kind="stable")[:60]]
+    step = np.sqrt(4 * np.pi / FINE)
+    for _ in range(12):
+        tangents = space.tangents(points)
+        if not tangents.shape[2]:
+            break
+        moves = step * np.concatenate([np.zeros_like(tangents[..., :1]), tangents, -tangents], 2)
+        around = np.moveaxis(points[..., None] + moves, 2, 1)
+        around = around / np.linalg.norm(around, axis=-1, keepdims=True)
+        values = np.einsum("kuw,uw->k", task.informations(around.reshape(-1, 3)), gradient)
+        inside = np.all(constraints.margins(around.reshape(-1, 3)) >= -1e-9, axis=1)
+        values = np.where(inside, values, np.inf).reshape(around.shape[:2])
+        points = around[np.arange(len(points)), np.argmin(values, axis=1)]
+        step /= 2
+    values = np.einsum("kuw,uw->k", task.informations(points), gradient)
+    return points, float(values.min())

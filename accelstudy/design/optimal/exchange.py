@@ -1,0 +1,117 @@
+"""Exchange of positions for better ones, from a list of candidates (Fedorov 1972).
+
+Each position in turn is taken out, and the candidate put in with which the criterion is best. They
+are ranked by the derivative of the criterion first, and only the best of them are tried out, as in
+the KL exchange of Atkinson & Donev (1989).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.basics.errors import InputError
+from accelstudy.design.optimal.constraints import Constraints
+from accelstudy.design.optimal.criteria import Criterion
+
+Array = NDArray[np.float64]
+
+TRIED = 24
+"""Candidates that are tried out for each position, of those that rank first."""
+GAIN = 1e-9
+"""Relative improvement below which a position stays."""
+SWEEPS = 100
+DRAWS = 200
+"""Random sets that are drawn to find one that keeps its distances."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Attitudes to choose from.
+
+    Attributes
+    ----------
+    directions : (k, 3) array
+    informations : (k, u, u) array, scaled
+    prior : (u, u) array, information that there is before
+    constraints : Constraints, of which those of single attitudes are kept by all candidates
+    """
+
+    directions: Array
+    informations: Array
+    prior: Array
+    constraints: Constraints
+
+    def allowed(self, chosen: list[int]) -> NDArray[np.bool_]:
+        """Which candidates, (k,), may join those that are chosen."""
+        if self.constraints.pair is None or not chosen:
+            return np.ones(len(self.directions), dtype=bool)
+        apart = self.constraints.pair.apart(self.directions, self.directions[chosen])
+        return np.asarray(apart.all(axis=1))
+
+    def normal(self, chosen: list[int]) -> Array:
+        """Normal matrix of a choice."""
+        return np.asarray(self.prior + self.informations[chosen].sum(axis=0))
+
+    def random(self, n: int, rng: np.random.Generator) -> list[int]:
+        """Draw n candidates that may stand together.
+
+        Raises
+        ------
+        InputError
+            If so many do not fit.
+        """
+        most = 0
+        for _ in range(DRAWS):
+            chosen: list[int] = []
+            free = np.ones(len(self.directions), dtype=bool)
+            while len(chosen) < n and free.any():
+                new = int(rng.choice(np.flatnonzero(free)))
+                chosen.append(new)
+                if self.constraints.pair is not None:
+                    pair = self.directions[[new]]
+                    free &= self.constraints.pair.apart(self.directions, pair)[:, 0]
+            if len(chosen) == n:
+                return chosen
+            most = max(most, len(chosen))
+        assert self.constraints.pair is not None
+        raise InputError(
+            f"{n} positions {self.constraints.pair.text} were not found among the allowed "
+            f"attitudes; {most} were"
+        )
+
+
+def exchange(candidates: Candidates, chosen: list[int], criterion: Criterion) -> list[int]:
+    """Exchange positions until none can be exchanged for a better one.
+
+    Parameters
+    ----------
+    candidates : Candidates
+    chosen : indices of the positions to begin with
+    criterion : Criterion
+    """
+    chosen = list(chosen)
+    flat = candidates.informations.reshape(len(candidates.directions), -1)
+    normal = candidates.normal(chosen)
+    value = float(criterion.value(normal))
+    for _ in range(SWEEPS):
+        before = value
+        for i, old in enumerate(chosen):
+            rest = normal - candidates.informations[old]
+            rank = flat @ criterion.gradient(normal).ravel()
+            rank[~candidates.allowed(chosen[:i] + chosen[i + 1 :])] = np.inf
+            tried = np.argsort(rank, kind="stable")[:TRIED]
+            tried = tried[np.isfinite(rank[tried])]
+            if not len(tried):
+                continue
+            values = criterion.value(rest + candidates.informations[tried])
+            best = int(np.nanargmin(values))
+            if values[best] < value - GAIN:
+                chosen[i], value = int(tried[best]), float(values[best])
+                normal = rest + candidates.informations[chosen[i]]
+        normal = candidates.normal(chosen)  # without the rounding of many exchanges
+        if not value < before - GAIN:
+            break
+    return chosen

@@ -1,0 +1,158 @@
+"""The search for the best positions: exchange and refinement from several starts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.basics.errors import InputError
+from accelstudy.design.optimal.constraints import Constraints
+from accelstudy.design.optimal.continuous import allowed, continuous_optimum
+from accelstudy.design.optimal.criteria import Criterion
+from accelstudy.design.optimal.exchange import Candidates, exchange
+from accelstudy.design.optimal.refinement import refine
+from accelstudy.design.optimal.repeats import with_repeats
+from accelstudy.design.optimal.spaces import Space, Sphere
+from accelstudy.design.optimal.task import Task
+
+Array = NDArray[np.float64]
+
+CANDIDATES = 600
+STARTS = 8
+REFINED = 3
+"""Of the starts, how many are refined: those that are best after the exchange, which is cheap."""
+PARTS = 10
+"""Parts of a space that are searched in full."""
+TIED = 1e-6
+"""Relative difference below which two designs are equally good, and the first one is taken."""
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """Positions that were found.
+
+    Attributes
+    ----------
+    directions : (n, 3) array of unit vectors, gravity in the body frame
+    value : float, of the criterion
+    bound : float, below which no positions are; NaN if it is not wanted
+    efficiency : float, against the bound; NaN likewise
+    """
+
+    directions: Array
+    value: float
+    bound: float
+    efficiency: float
+
+
+def optimal_design(
+    task: Task,
+    criterion: Criterion,
+    n: int,
+    space: Space | None = None,
+    constraints: Constraints | None = None,
+    seed: int = 1,
+    starts: int = STARTS,
+    bounded: bool = True,
+) -> Design:
+    """Find the n positions that are best by a criterion.
+
+    The same arguments give the same positions.
+
+    Parameters
+    ----------
+    task : Task
+    criterion : Criterion
+    n : int
+    space : Space, optional; all attitudes by default
+    constraints : Constraints, optional
+    seed : int
+    starts : int, random sets to begin with, of each part of the space
+    bounded : bool, whether the bound, and with it the efficiency, is wanted
+
+    Raises
+    ------
+    InputError
+        If no attitude is allowed, the allowed ones do not determine the model, or are too few.
+    """
+    space, constraints = space or Sphere(), constraints or Constraints()
+    everything = allowed(space, constraints, CANDIDATES)
+    if not len(everything):
+        raise InputError(f"no attitude is left of {space.text} with {_shown(constraints)}")
+    _check_determined(task, criterion, everything, n)
+    parts = space.parts(np.random.default_rng(np.random.SeedSequence([seed, 0])))
+    if len(parts) > PARTS:  # those that are best as they come out of one exchange
+        tried = [_best(task, criterion, p, constraints, n, seed, 1, moved=False) for p in parts]
+        order = np.argsort([value for _, value in tried], kind="stable")
+        parts = [parts[i] for i in order[:PARTS]]
+    directions, _ = _first_best(
+        [_best(task, criterion, part, constraints, n, seed, starts) for part in parts]
+    )
+    directions = with_repeats(task, criterion, constraints, directions)
+    value = float(criterion.value(task.normal(directions)))
+    if reason := undetermined(task, criterion, directions):
+        raise InputError(f"no {n} positions of {space.text} were found that suffice: {reason}")
+    bound = efficiency = np.nan
+    if bounded:
+        best = continuous_optimum(task, criterion.convex, space, constraints, n)
+        bound = criterion.bound(best.bound)
+        efficiency = min(1.0, criterion.efficiency(value, bound))
+    return Design(directions, value, bound, efficiency)
+
+
+def _best(
+    task: Task,
+    criterion: Criterion,
+    space: Space,
+    constraints: Constraints,
+    n: int,
+    seed: int,
+    starts: int,
+    moved: bool = True,
+) -> tuple[Array, float]:
+    directions = allowed(space, constraints, CANDIDATES)
+    if not len(directions):
+        return np.zeros((n, 3)), np.inf
+    informations = task.informations(directions)
+    candidates = Candidates(directions, informations, task.prior, constraints)
+    found = []
+    for start in range(1, starts + 1):
+        rng = np.random.default_rng(np.random.SeedSequence([seed, start]))
+        chosen = directions[exchange(candidates, candidates.random(n, rng), criterion)]
+        found.append((chosen, float(criterion.value(task.normal(chosen)))))
+    if moved:
+        order = np.argsort([value for _, value in found], kind="stable")
+        refined = [
+            refine(task, criterion, space, constraints, found[i][0]) for i in order[:REFINED]
+        ]
+        found = [(u, float(criterion.value(task.normal(u)))) for u in refined]
+    return _first_best(found)
+
+
+def _first_best(found: list[tuple[Array, float]]) -> tuple[Array, float]:
+    """Where designs tie, rounding must not choose between them."""
+    smallest = min(value for _, value in found)
+    return next(pair for pair in found if pair[1] <= smallest + TIED)
+
+
+def _check_determined(task: Task, criterion: Criterion, directions: Array, n: int) -> None:
+    if reason := undetermined(task, criterion, directions):
+        raise InputError(f"the allowed attitudes do not suffice: {reason}")
+    known = int(np.linalg.matrix_rank(task.prior))
+    least = -(-(criterion.unknowns - known) // task.approach.n_conditions)
+    if n < least:
+        raise InputError(
+            f"{n} positions do not determine {criterion.unknowns} parameters; "
+            f"at least {least} are needed"
+        )
+
+
+def undetermined(task: Task, criterion: Criterion, directions: Array) -> str:
+    """Why positions do not determine what is wanted; empty if they do."""
+    return task.missing(directions) or criterion.blind(task.normal(directions))
+
+
+def _shown(constraints: Constraints) -> str:
+    return ", ".join(constraints.texts) or "no constraints"

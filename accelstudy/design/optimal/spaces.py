@@ -1,0 +1,193 @@
+"""The attitudes that there are to choose from: where they lie, and in which ways they can move."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from itertools import combinations, product
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import ANGLE_UNITS, to_si
+from accelstudy.leveling.angles import roll_pitch, specific_force
+from accelstudy.schemes import get_scheme
+from accelstudy.schemes.polyhedra import corners, edges, faces
+
+Array = NDArray[np.float64]
+
+MOST_MOUNTINGS = 150
+"""Choices of mountings that are tried; of more, a random part."""
+
+
+class Space(ABC):
+    """A set of attitudes, as directions of gravity in the body frame.
+
+    Attributes
+    ----------
+    text : str, for people
+    """
+
+    text: str
+
+    @abstractmethod
+    def directions(self, count: int) -> Array:
+        """Attitudes of the set, (k, 3): all of a finite one, else about `count`, evenly spread."""
+
+    def tangents(self, directions: Array) -> Array:
+        """Unit vectors along which positions (n, 3) can move, (n, 3, d); d = 0 of a finite set."""
+        return np.zeros((len(directions), 3, 0))
+
+    def parts(self, rng: np.random.Generator) -> list[Space]:
+        """Parts of the set of which one is to be chosen; itself if it is one."""
+        return [self]
+
+
+class Sphere(Space):
+    """All attitudes."""
+
+    text = "all attitudes"
+
+    def directions(self, count: int) -> Array:
+        """Points of the Fibonacci lattice."""
+        return get_scheme(f"fibonacci-{count}").directions
+
+    def tangents(self, directions: Array) -> Array:
+        """Return two directions across gravity."""
+        away = np.eye(3)[np.argmin(np.abs(directions), axis=1)]
+        first = np.cross(directions, away)
+        first /= np.linalg.norm(first, axis=1, keepdims=True)
+        return np.stack([first, np.cross(directions, first)], axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class Listed(Space):
+    """A finite set of attitudes.
+
+    Attributes
+    ----------
+    points : (k, 3) array of unit vectors
+    """
+
+    points: Array
+    text: str
+
+    def directions(self, count: int) -> Array:
+        """All of them."""
+        return self.points
+
+
+def cube() -> Listed:
+    """Attitudes of a cube on a table: on its faces, edges and corners."""
+    points = np.vstack([faces(), edges(), corners()])
+    return Listed(_unit(points), "a cube: 6 faces, 12 edges, 8 corners")
+
+
+def by_eye(step: float) -> Listed:
+    """Attitudes that a person can judge by eye: roll and pitch in whole steps, rad."""
+    turns = max(1, round(np.pi / 2 / step))
+    rolls = np.arange(4 * turns) * np.pi / 2 / turns
+    pitches = np.arange(-turns + 1, turns) * np.pi / 2 / turns
+    points = [-np.array(specific_force(r, p, 1.0, np)) for p in pitches for r in rolls]
+    return Listed(
+        _unit(np.array([*points, [1.0, 0, 0], [-1.0, 0, 0]])),
+        f"a block held by hand: roll and pitch in steps of {np.degrees(np.pi / 2 / turns):g}°",
+    )
+
+
+@dataclass(frozen=True)
+class Mountings(Space):
+    """Turns about one horizontal axis per mounting of the sensor: circles about its axes.
+
+    Attributes
+    ----------
+    count : int, mountings
+    axes : tuple of axes in the sensor, to choose from; by default x, y, z and what halves them
+    """
+
+    count: int
+    axes: tuple[tuple[float, float, float], ...] = tuple(
+        (float(x), float(y), float(z))
+        for x, y, z in product((1, 0, -1), repeat=3)
+        if (x, y, z) > (0, 0, 0) and abs(x) + abs(y) + abs(z) <= 2
+    )
+
+    @property
+    def text(self) -> str:  # type: ignore[override]
+        """How many of them."""
+        one = self.count == 1
+        return f"{self.count} {'mounting' if one else 'mountings, each'} turned about one axis"
+
+    def directions(self, count: int) -> Array:
+        """Even steps about each axis."""
+        steps = max(8, count // len(self.axes))
+        angle = 2 * np.pi * np.arange(steps) / steps
+        circles = []
+        for axis in _unit(np.array(self.axes)):
+            one = Sphere().tangents(axis[None])[0]
+            circles.append(np.cos(angle)[:, None] * one[:, 0] + np.sin(angle)[:, None] * one[:, 1])
+        return np.vstack(circles)
+
+    def mounting(self, directions: Array) -> NDArray[np.int_]:
+        """Index of the axis, (n,), that is horizontal in each position."""
+        return np.asarray(np.argmin(np.abs(directions @ _unit(np.array(self.axes)).T), axis=1))
+
+    def tangents(self, directions: Array) -> Array:
+        """Turn about the axis of the mounting."""
+        axes = _unit(np.array(self.axes))[self.mounting(directions)]
+        return _unit(np.cross(axes, directions))[..., None]
+
+    def parts(self, rng: np.random.Generator) -> list[Space]:
+        """Choices of as many axes as there are mountings."""
+        chosen = list(combinations(self.axes, self.count))
+        if len(chosen) > MOST_MOUNTINGS:
+            keep = rng.choice(len(chosen), MOST_MOUNTINGS, replace=False)
+            chosen = [chosen[i] for i in sorted(keep)]
+        return [Mountings(self.count, axes) for axes in chosen]
+
+
+def listed_in(path: Path) -> Listed:
+    """Read the attitudes of a CSV file.
+
+    It has the columns x, y, z (directions of gravity in the body frame) or roll_U, pitch_U, where U
+    is one of gon, deg and rad.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or has neither.
+    """
+    try:
+        table = pd.read_csv(path, comment="#")
+    except (OSError, UnicodeDecodeError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "is no CSV table"
+        raise InputError(f"{path}: {reason}") from None
+    units = (*ANGLE_UNITS, "rad")
+    pairs = [("x", "y", "z"), *((f"roll_{u}", f"pitch_{u}") for u in units)]
+    found = next((names for names in pairs if set(names) <= set(table.columns)), None)
+    if found is None:
+        wanted = "; ".join(", ".join(names) for names in pairs)
+        raise InputError(f"{path}: has the columns {', '.join(table.columns)}; expected {wanted}")
+    values = table[list(found)].apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
+    bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
+    if len(bad):
+        raise InputError(f"{path}: row {bad[0] + 1}: {', '.join(found)} must be numbers")
+    if len(found) == 2:
+        roll, pitch = to_si(values, found[0].rpartition("_")[2], "rad").T
+        values = -np.stack(specific_force(roll, pitch, 1.0, np), axis=-1)
+    if not len(values) or not np.all(np.linalg.norm(values, axis=1) > 0):
+        raise InputError(f"{path}: no attitudes in it, or a direction of length zero")
+    points = np.unique(_unit(values).round(12), axis=0)
+    return Listed(_unit(points), f"{len(points)} attitudes of {path.name}")
+
+
+def attitudes(directions: Array) -> Array:
+    """Roll and pitch, rad, (n, 2), of directions of gravity."""
+    return np.stack(roll_pitch(tuple(-np.asarray(directions).T)), axis=-1)
+
+
+def _unit(points: Array) -> Array:
+    return np.asarray(points / np.linalg.norm(points, axis=-1, keepdims=True))

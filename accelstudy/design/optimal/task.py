@@ -1,0 +1,198 @@
+"""What is to be calibrated, and what is known of it before the first position."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from accelstudy.approaches import Approach
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import GON, STANDARD_GRAVITY
+from accelstudy.design.estimability import diagnose
+from accelstudy.design.optimal.information import information, position_rows
+from accelstudy.leveling.error import ATTITUDES, TiltError, cap_forces, tilt_error
+from accelstudy.schemes import Scheme, get_scheme
+from accelstudy.sensors.models import compose, composition_name
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.simulation.hold_plan import HoldPlan, check_needs_no_plan
+from accelstudy.simulation.sessions import Noise
+
+Array = NDArray[np.float64]
+
+SPHERE = "fibonacci-300"
+LOOKING_BACK = ("step_x", "step_y", "step_z", "order")
+
+
+@dataclass(frozen=True)
+class Task:
+    """A calibration whose positions are to be chosen.
+
+    All matrices are of scaled parameters: the unit of each is the standard deviation that one
+    position gives it, on average over all attitudes, were all others known. So no number depends on
+    a choice of units, and all criteria weigh alike what one position tells alike.
+
+    Attributes
+    ----------
+    model : SensorModel, that is estimated
+    approach : Approach
+    noise : Noise
+    gravity : float, m/s²
+    tilt_range : float, rad, up to which the calibrated sensor is used
+    prior_sigmas : mapping of parameter to the sd of what is known of it, SI (a factory calibration)
+    measured : (k, 3) array of unit vectors, directions of positions that are measured already
+    neglected : mapping of effect to the sd of its parameters, SI; effects that the sensor has and
+        the model lacks, for criteria that reckon with them
+
+    Raises
+    ------
+    InputError
+        If positions alone do not tell what the model needs, or a prior sigma is of no parameter.
+    """
+
+    model: SensorModel
+    approach: Approach
+    noise: Noise = field(default_factory=Noise)
+    gravity: float = STANDARD_GRAVITY
+    tilt_range: float = 50 * GON
+    prior_sigmas: Mapping[str, float] = field(default_factory=dict)
+    measured: Array | None = None
+    neglected: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        check_needs_no_plan(self.extended)
+        if back := [c for c in self.extended.hold_columns if c in LOOKING_BACK]:
+            raise InputError(
+                f"the model {self.extended.name!r} depends on the order of the positions "
+                f"({back[0]}), which a set of attitudes has not; leave that effect out"
+            )
+        for name in self.prior_sigmas:
+            if name not in self.model.parameter_names:
+                raise InputError(
+                    f"prior: the model {self.model.name!r} has no parameter {name!r}; it has "
+                    + ", ".join(self.model.parameter_names)
+                )
+
+    @cached_property
+    def extended(self) -> SensorModel:
+        """The model with what it neglects."""
+        if not self.neglected:
+            return self.model
+        specs = tuple(effect.spec for effect in self.model.effects)
+        return extended_model(self.model, [e for e in self.neglected if e not in specs])
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all parameters, gravity last if it is observed."""
+        observed = ("g",) if self.noise.sigma_gravity > 0 else ()
+        return (*self.extended.parameter_names, *observed)
+
+    @cached_property
+    def estimated(self) -> NDArray[np.bool_]:
+        """Which of all parameters are estimated, (u,)."""
+        own = self.model.parameter_names
+        return np.array([name in own or name == "g" for name in self.names])
+
+    @cached_property
+    def scale(self) -> Array:
+        """Root of the information of one position on each parameter, mean over the sphere, (u,)."""
+        rows = self._rows(get_scheme(SPHERE).directions)
+        size = np.sqrt(np.mean(np.sum(rows**2, axis=1), axis=0))
+        return np.where(size > 1e-12 * size.max(), size, 1.0)
+
+    def _rows(self, directions: Array) -> Array:
+        hold = HoldPlan().hold(len(directions))
+        return position_rows(
+            self.extended, self.approach, self.noise, directions, None, self.gravity, hold
+        )
+
+    def informations(self, directions: ArrayLike) -> Array:
+        """Scaled information of each of k positions, (k, u, u)."""
+        directions = np.asarray(directions, dtype=float)
+        return information(self._rows(directions) / self.scale)
+
+    @cached_property
+    def prior(self) -> Array:
+        """Scaled information that there is before the first position, (u, u)."""
+        weights = np.zeros(len(self.names))
+        for name, sigma in self.prior_sigmas.items():
+            weights[self.names.index(name)] = sigma**-2
+        if self.noise.sigma_gravity > 0:
+            weights[-1] = self.noise.sigma_gravity**-2
+        known = np.diag(weights / self.scale**2)
+        if self.measured is not None:
+            known = known + self.informations(self.measured).sum(axis=0)
+        return known
+
+    def normal(self, directions: ArrayLike) -> Array:
+        """Scaled normal matrix of positions and of what was known before, (u, u)."""
+        return self.prior + self.informations(directions).sum(axis=0)
+
+    @cached_property
+    def tilt(self) -> TiltError:
+        """Tilt error of a calibration as a function of errors of all parameters."""
+        model, f_b = self.extended, cap_forces(self.tilt_range, ATTITUDES, self.gravity)
+        ideal = np.zeros(model.n_parameters)
+        hold = HoldPlan().use(f_b, 1)
+        return tilt_error(model, ideal, model, ideal, f_b, self.gravity, hold)
+
+    @cached_property
+    def tilt_weights(self) -> Array:
+        """Quadratic forms of scaled errors: mean squares of roll and of pitch, (2, u, u), rad²."""
+        u, m = len(self.names), self.extended.n_parameters
+        weights = np.zeros((2, u, u))
+        weights[:, :m, :m] = self.tilt.quadratic / np.outer(self.scale[:m], self.scale[:m])
+        return weights
+
+    @cached_property
+    def neglected_variance(self) -> Array:
+        """Scaled mean squares of the parameters that are neglected, (u − estimated,)."""
+        sizes = [
+            self.neglected[e.spec]
+            for e in self.extended.effects
+            if e.spec in self.neglected
+            for _ in e.parameters
+        ]
+        return (np.array(sizes) * self.scale[~self.estimated]) ** 2
+
+    def covariance(self, directions: ArrayLike) -> Array:
+        """Scaled covariance matrix of the estimated parameters, of linear theory."""
+        keep = np.ix_(self.estimated, self.estimated)
+        return np.asarray(np.linalg.inv(self.normal(directions)[keep]))
+
+    def rms_tilt(self, directions: ArrayLike) -> Array:
+        """Expected rms of roll and of pitch, rad, (2,), without the noise of the leveled reading.
+
+        What is neglected is in it, as a scatter of the size that it has.
+        """
+        kept, left = self.estimated, ~self.estimated
+        normal = self.normal(directions)
+        covariance = np.linalg.inv(normal[np.ix_(kept, kept)])
+        whole = np.zeros((len(normal), len(normal)))
+        whole[np.ix_(kept, kept)] = covariance
+        if left.any():
+            shift = np.zeros((len(normal), left.sum()))
+            shift[kept] = covariance @ normal[np.ix_(kept, left)]
+            shift[left] = -np.eye(left.sum())
+            whole += (shift * self.neglected_variance) @ shift.T
+        return np.sqrt(np.einsum("auw,uw->a", self.tilt_weights, whole))
+
+    def missing(self, directions: Array) -> str:
+        """Why positions do not determine the model; empty if they do."""
+        keep = np.ix_(self.estimated, self.estimated)
+        if np.linalg.cond(self.normal(directions)[keep]) < 1e13:
+            return ""
+        scheme = Scheme("allowed", "allowed", directions, "generated", "")
+        hold = HoldPlan().hold(len(directions))
+        found = diagnose(scheme, self.model, self.approach, self.noise, None, self.gravity, hold)
+        return found.reason or "they hardly determine the model"
+
+
+def extended_model(model: SensorModel, effects: list[str]) -> SensorModel:
+    """Return a model with further effects, each traced once."""
+    extended = SensorModel.of("extended", (*(e.spec for e in model.effects), *effects))
+    name = composition_name(extended.effects)
+    return compose(name, tuple(effect.spec for effect in extended.effects))

@@ -1,0 +1,214 @@
+"""What a person asks of a design, in words and numbers, and what that means."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from accelstudy.approaches import get_approach
+from accelstudy.basics.bounds import Range
+from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.units import GON, STANDARD_GRAVITY, parse_quantity
+from accelstudy.design.optimal.constraints import (
+    Constraint,
+    Constraints,
+    LeastAngle,
+    OffPole,
+    PitchRange,
+    RollRange,
+)
+from accelstudy.design.optimal.criteria import Criterion, get_criterion, rivals
+from accelstudy.design.optimal.search import STARTS, Design, optimal_design
+from accelstudy.design.optimal.spaces import Mountings, Space, Sphere, by_eye, cube, listed_in
+from accelstudy.design.optimal.task import Task
+from accelstudy.effects import get_effect
+from accelstudy.schemes import get_scheme
+from accelstudy.sensors.models import get_model
+from accelstudy.simulation.sessions import Noise
+
+CRITERIA = ("I", "D", "A")
+ATTITUDES = ("all", "cube", "hand")
+HAND_STEP = np.pi / 6
+"""rad, in which steps a person judges roll and pitch by eye."""
+MOUNTINGS = Range(1, 9)
+MOST_POSITIONS = Range(1, 300)
+
+
+@dataclass(frozen=True)
+class Request:
+    """A design that is asked for; SI.
+
+    Attributes
+    ----------
+    positions : int, how many new ones
+    model, approach : str
+    criterion : str, of `CRITERIA`
+    tilt_range : float, rad
+    noise : Noise
+    gravity : float, m/s²
+    attitudes : str, of `ATTITUDES`, or the path of a CSV file with those that are allowed
+    mountings : int, optional, how often the sensor may be mounted; each is turned about one axis
+    roll, pitch : (least, most), rad, optional
+    pole_distance, least_angle : float, rad, optional
+    prior : tuple of str, what is known before, as "bias=20mg" or "s_x=500ppm"
+    after : str, scheme that is measured already, optional
+    neglect : tuple of str, effects that the model leaves out, as "quadratic_scale=50ug/g^2"
+    discriminate : (effect, effect), optional
+    seed, starts : int
+    """
+
+    positions: int
+    model: str = "bias-scale-nonorthogonality"
+    approach: str = "robot"
+    criterion: str = "I"
+    tilt_range: float = 50 * GON
+    noise: Noise = field(default_factory=Noise)
+    gravity: float = STANDARD_GRAVITY
+    attitudes: str = "all"
+    mountings: int | None = None
+    roll: tuple[float, float] | None = None
+    pitch: tuple[float, float] | None = None
+    pole_distance: float | None = None
+    least_angle: float | None = None
+    prior: tuple[str, ...] = ()
+    after: str | None = None
+    neglect: tuple[str, ...] = ()
+    discriminate: tuple[str, str] | None = None
+    seed: int = 1
+    starts: int = STARTS
+
+    def __post_init__(self) -> None:
+        MOST_POSITIONS.check_key("positions", self.positions)
+        if self.criterion not in CRITERIA:
+            raise UnknownNameError("criterion", self.criterion, CRITERIA)
+        if (self.neglect or self.discriminate) and self.criterion != "I":
+            raise InputError(
+                f"criterion {self.criterion}: effects that are neglected, or told apart, have a "
+                "criterion of their own; leave it out"
+            )
+        if self.neglect and self.discriminate:
+            raise InputError("neglect and discriminate exclude each other; give one of them")
+
+    @cached_property
+    def task(self) -> Task:
+        """What is to be calibrated."""
+        model = get_model(self.model)
+        prior: dict[str, float] = {}
+        for text in self.prior:
+            effects = {effect.name: effect.parameters for effect in model.effects}
+            parameters = {p.name: (p,) for p in model.parameters}
+            name, size = _named(text, "prior")
+            if name not in effects and name not in parameters:
+                known = (*effects, *parameters)
+                raise UnknownNameError(f"effect or parameter of {self.model!r}", name, known)
+            for parameter in effects.get(name) or parameters[name]:
+                prior[parameter.name] = _positive(text, size, parameter.unit, "prior")
+        neglected: dict[str, float] = dict.fromkeys(self._rivals, 0.0)
+        for text in self.neglect:
+            name, size = _named(text, "neglect", needs_size=False)
+            effect = get_effect(name)
+            unit = effect.parameters[0].unit
+            neglected[effect.spec] = (
+                _positive(text, size, unit, "neglect") if size else effect.typical[1]
+            )
+        own = {effect.spec for effect in model.effects}
+        for spec in neglected:
+            if spec in own:
+                raise InputError(f"the effect {spec!r} is in the model; it is not neglected")
+        return Task(
+            model,
+            get_approach(self.approach),
+            self.noise,
+            self.gravity,
+            self.tilt_range,
+            prior,
+            None if self.after is None else get_scheme(self.after).directions,
+            neglected,
+        )
+
+    @cached_property
+    def _rivals(self) -> tuple[str, ...]:
+        found = tuple(get_effect(name).spec for name in self.discriminate or ())
+        if len(set(found)) < len(found):
+            raise InputError(f"discriminate: {found[0]!r} twice; give two effects")
+        return found
+
+    @cached_property
+    def chosen(self) -> Criterion:
+        """The criterion."""
+        if self.discriminate:
+            return rivals(self.task, *self._rivals)
+        return get_criterion("robust" if self.neglect else self.criterion, self.task)
+
+    @cached_property
+    def space(self) -> Space:
+        """The attitudes to choose from."""
+        if self.mountings is not None:
+            if self.attitudes != "all":
+                raise InputError("mountings: need all attitudes; leave out `attitudes`")
+            MOUNTINGS.check_key("mountings", self.mountings)
+            return Mountings(self.mountings)
+        if self.attitudes == "all":
+            return Sphere()
+        if self.attitudes == "cube":
+            return cube()
+        if self.attitudes == "hand":
+            return by_eye(HAND_STEP)
+        if self.attitudes.endswith(".csv") or "/" in self.attitudes:
+            return listed_in(Path(self.attitudes))
+        raise UnknownNameError("attitudes", self.attitudes, (*ATTITUDES, "a path ending in .csv"))
+
+    @cached_property
+    def constraints(self) -> Constraints:
+        """What the positions must keep to."""
+        single: list[Constraint] = []
+        for name, ends, kind in (("roll", self.roll, RollRange), ("pitch", self.pitch, PitchRange)):
+            if ends is not None:
+                if not ends[0] < ends[1]:
+                    raise InputError(f"{name}: the first angle must be less than the second")
+                single.append(kind(*ends))
+        if self.pole_distance is not None:
+            single.append(OffPole(self.pole_distance))
+        pair = None if self.least_angle is None else LeastAngle(self.least_angle)
+        return Constraints(tuple(single), pair)
+
+    def find(self) -> Design:
+        """Find the positions.
+
+        Raises
+        ------
+        InputError
+            If what is asked for cannot be.
+        """
+        return optimal_design(
+            self.task,
+            self.chosen,
+            self.positions,
+            self.space,
+            self.constraints,
+            self.seed,
+            self.starts,
+        )
+
+
+def _named(text: str, key: str, needs_size: bool = True) -> tuple[str, str]:
+    """Split "name=size"; an effect may have settings of its own, with equal signs."""
+    name, equal, size = text.rpartition("=")
+    if equal and ")" not in size:
+        return name.strip(), size.strip()
+    if needs_size:
+        raise InputError(f"{key}: expected NAME=SIZE, as bias=20mg, not {text!r}")
+    return text.strip(), ""
+
+
+def _positive(text: str, size: str, unit: str, key: str) -> float:
+    try:
+        value = parse_quantity(size, unit)
+    except InputError as error:
+        raise InputError(f"{key}: {text}: {error}") from None
+    if not value > 0:
+        raise InputError(f"{key}: {text}: must be more than 0")
+    return value

@@ -1,0 +1,1 @@
+"""What all figures share: colours, symbols and sizes, and how they are saved."""

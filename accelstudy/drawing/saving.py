@@ -1,0 +1,104 @@
+"""Figures as files and as parts of pages."""
+
+from __future__ import annotations
+
+import html
+import io
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from accelstudy.basics.progress import warn
+from accelstudy.drawing.style import STYLE
+from accelstudy.files.outputs import whole_file
+
+PAGE_DPI = 150
+"""Of the figures of a page, which shows them as SVG."""
+MANY = 1000
+"""Points or lines of one artist from which on it is drawn as an image inside of the SVG."""
+
+
+def save(figure: Figure, svg_path: str | Path, png_path: str | Path, title: str, dpi: int) -> str:
+    """Write a figure as SVG and PNG, each whole or not at all.
+
+    The same figure gives the same bytes. The canvases are called themselves, since
+    `Figure.savefig` would draw each twice.
+
+    Parameters
+    ----------
+    figure : Figure
+    svg_path, png_path : str or Path
+    title : str, for the metadata
+    dpi : int, of the PNG
+
+    Returns
+    -------
+    str, the figure as an SVG element that can stand in a page
+    """
+    buffer = io.StringIO()
+    metadata = {"Date": None, "Creator": None, "Title": title}
+    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
+        FigureCanvasSVG(figure).print_svg(buffer, metadata=metadata)  # type: ignore[no-untyped-call]
+        figure.set_layout_engine("none")  # laid out once, alike in both
+        figure.set_dpi(dpi)
+        with whole_file(png_path) as path:
+            FigureCanvasAgg(figure).print_png(  # type: ignore[no-untyped-call]
+                path, metadata={"Software": None, "Title": title}
+            )
+    text = buffer.getvalue()
+    with whole_file(svg_path) as path:
+        path.write_text(text, encoding="utf-8")
+    return text[text.index("<svg") :]
+
+
+def save_all(figures: Mapping[str, Callable[[], Figure]], folder: Path) -> dict[str, str]:
+    """Draw the figures of a page and write them under their names; returns elements for the page.
+
+    A figure that fails takes nothing else with it: a line on the page and a warning on stderr say
+    so, with the error.
+
+    Parameters
+    ----------
+    figures : mapping of name to a function that draws the figure
+    folder : Path
+    """
+    elements = {}
+    for name, draw in figures.items():
+        try:
+            with mpl.rc_context(STYLE):  # type: ignore[arg-type]
+                figure = draw()
+            _simplify(figure)
+            svg, png = folder / f"{name}.svg", folder / f"{name}.png"
+            elements[name] = save(figure, svg, png, name, PAGE_DPI)
+        except OSError:  # a full disk, say, which is no matter of the figure
+            raise
+        except Exception as error:
+            said = failure(f"The figure {name!r} could not be drawn", error)
+            elements[name] = f'<p class="failed">{html.escape(said)}</p>'
+    return elements
+
+
+def failure(what: str, error: Exception) -> str:
+    """Say what failed and by which error, and warn of it on stderr."""
+    reason = " ".join(str(error).split())[:200]
+    said = f"{what} ({type(error).__name__}: {reason})."
+    warn(said)
+    return said
+
+
+def _simplify(figure: Figure) -> None:
+    """Draw artists of very many points as images, or a page would have many megabytes."""
+    drawn = [artist for axes in figure.axes for artist in (*axes.lines, *axes.collections)]
+    lines = [a for a in drawn if isinstance(a, Line2D) and np.size(a.get_xdata()) > MANY]
+    collections = [a for a in drawn if isinstance(a, LineCollection) and len(a.get_paths()) > MANY]
+    for artist in (*lines, *collections):
+        artist.set_rasterized(True)
+    if lines or collections:
+        figure.set_dpi(PAGE_DPI)

@@ -1,0 +1,240 @@
+"""How all figures look: sizes, fonts, and one colour for each thing wherever it occurs."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from functools import cache
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.textpath import TextPath
+from matplotlib.ticker import Locator, LogLocator, MaxNLocator, NullLocator
+from numpy.typing import ArrayLike, NDArray
+
+from accelstudy.basics.units import display_unit, recorded_unit, to_display, to_si, unit_label
+from accelstudy.effects import Parameter, effect_names, get_effect
+from accelstudy.sensors.models import TITLES, compose
+
+MM = 1 / 25.4
+"""One millimetre in inches."""
+COLUMN = 85 * MM
+"""Width of a journal's column, inches."""
+FULL = 175 * MM
+"""Width of a journal's page, inches."""
+DPI = 300
+
+Style = dict[str, Any]
+"""Keyword arguments of an artist."""
+
+STYLE: Style = {
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.labelsize": 8,
+    "axes.linewidth": 0.6,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlesize": 8,
+    "figure.constrained_layout.h_pad": 0.03,
+    "figure.constrained_layout.w_pad": 0.03,
+    "figure.titlesize": 9,
+    "font.family": "DejaVu Sans",
+    "font.size": 8,
+    "grid.color": "#DDDDDD",
+    "grid.linewidth": 0.5,
+    "hatch.color": "#999999",
+    "hatch.linewidth": 0.5,
+    "legend.fontsize": 7.5,
+    "legend.frameon": False,
+    "lines.linewidth": 1.2,
+    "lines.markersize": 4,
+    "mathtext.default": "it",
+    "mathtext.fontset": "dejavusans",
+    "savefig.facecolor": "white",
+    "svg.fonttype": "path",
+    "svg.hashsalt": "accelstudy",
+    "xtick.labelsize": 7.5,
+    "xtick.major.width": 0.6,
+    "ytick.labelsize": 7.5,
+    "ytick.major.width": 0.6,
+}
+
+INK = "#222222"
+MISSING = "#E6E6E6"
+"""Background of what does not exist; drawn hatched."""
+HATCH = "////"
+
+# Okabe & Ito's colours for the groups of parameters, and two others for the approaches.
+APPROACH_COLOURS = {"gravity": "#4A4A4A", "robot": "#C2247A"}
+APPROACH_MARKERS = {"gravity": "o", "robot": "s"}
+ANGLE_COLOURS = {"roll": "#0072B2", "pitch": "#D55E00"}
+GROUPS = {
+    "force": ("force", "#0072B2"),
+    "bias": ("bias", "#009E73"),
+    "scale": ("scale", "#E69F00"),
+    "nonorthogonality": ("non-orthogonality", "#D55E00"),
+    "cross_axis_misalignment": ("cross-axis", "#56B4E9"),
+    "quadratic_scale": ("quadratic", "#8A8A2B"),
+    "cubic_scale": ("cubic", "#7F5539"),
+    "gravity": ("gravity", "#4A4A4A"),
+}
+"""Group of parameters (an effect, or what else varies): its label and its colour."""
+
+# One cannot tell two dozen colours apart, so effects beyond the registered models share the colour
+# of their cause. These keep apart from all others with normal and with red-green blind eyes.
+CAUSES = {
+    "rig": "#332288",
+    "environment": "#5C0A1E",
+    "history": "#66C2C2",
+    "nonlinearity": "#99CC66",
+}
+
+
+def approach_colour(approach: str) -> str:
+    """Colour of an approach."""
+    return APPROACH_COLOURS.get(approach, "#0072B2")
+
+
+def approach_marker(approach: str) -> str:
+    """Marker of an approach."""
+    return APPROACH_MARKERS.get(approach, "D")
+
+
+def group_label(group: str) -> str:
+    """Return the label of a group of parameters."""
+    return GROUPS.get(group, (group.replace("_", " "), ""))[0]
+
+
+def group_colour(group: str) -> str:
+    """Colour of a group of parameters: its own, or that of the effect's cause."""
+    if group in GROUPS:
+        return GROUPS[group][1]
+    return CAUSES[cause(group)] if group in effect_names() else "#999999"
+
+
+@cache
+def cause(effect: str) -> str:
+    """Cause of an effect: what has it, or on what it depends beside the force."""
+    if get_effect(effect).part == "rig":
+        return "rig"
+    columns = set(compose(effect, (effect,)).hold_columns)
+    if columns & {"temperature", "time", "vibration"}:
+        return "environment"
+    return "history" if columns else "nonlinearity"
+
+
+@cache
+def _parameters() -> dict[str, tuple[str, Parameter]]:
+    known = {
+        parameter.name: (effect, parameter)
+        for effect in effect_names()
+        for parameter in get_effect(effect).parameters
+    }
+    for axis in "xyz":
+        known[f"f_{axis}"] = ("force", Parameter(f"f_{axis}", "m/s^2", f"$f_{axis}$"))
+    known["g"] = ("gravity", Parameter("g", "m/s^2", "$g$"))
+    return known
+
+
+def group_of(parameter: str) -> str:
+    """Group of a parameter: the effect it belongs to, "force" or "gravity"."""
+    return _parameters()[parameter][0]
+
+
+def symbol(parameter: str) -> str:
+    """Return the symbol of a parameter (mathtext)."""
+    return _parameters()[parameter][1].symbol
+
+
+def shown(values: ArrayLike, unit: str) -> tuple[NDArray[np.float64], str]:
+    """Convert values in the unit of a table into what people see; the values and their unit."""
+    if unit != recorded_unit("rad"):
+        return np.asarray(values, dtype=float), unit_label(unit)
+    return to_display(to_si(values, unit, "rad"), "rad"), display_unit("rad")
+
+
+def in_order(groups: Iterable[str]) -> list[str]:
+    """Groups in the order of `GROUPS`, those that are not in it last."""
+    found = set(groups)
+    return [name for name in GROUPS if name in found] + sorted(found - set(GROUPS))
+
+
+def model_title(model: str) -> str:
+    """Short title of a model; one that extends a known one is named by what it adds."""
+    if model in TITLES:
+        return TITLES[model]
+    known = max(
+        (name for name in TITLES if model.startswith((f"{name}-", f"{name}+"))),
+        key=len,
+        default=None,
+    )
+    if known is None:
+        return " + ".join(map(_part_title, model.split("+"))) if "+" in model else model
+    parameters, added = TITLES[known].split(":")[0], model.removeprefix(known)[1:]
+    parts = added.split("+") if "(" in added or "+" in added else added.split("-")
+    return " + ".join([parameters, *map(_part_title, parts)])
+
+
+def _part_title(part: str) -> str:
+    """Name an effect as words, with the number of its setting."""
+    return re.sub(r"\((?:\w+=)?", " (", part.replace("_", " "))
+
+
+def new_figure(width: float, height_mm: float) -> Figure:
+    """Make an empty figure, `width` in inches."""
+    return Figure(figsize=(width, height_mm * MM), layout="constrained")
+
+
+def log_ticks(axis: Axis, low: float, high: float) -> None:
+    """Ticks of a logarithmic axis from `low` to `high`: a few, all of them labelled."""
+    if high / low > 100:
+        locator: Locator = LogLocator()
+    elif high / low > 4:
+        locator = LogLocator(subs=(1, 2, 5))
+    else:
+        locator = MaxNLocator(4, steps=[1, 2, 2.5, 5, 10])
+    axis.set_major_locator(locator)
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_locator(NullLocator())
+
+
+def spread(places: NDArray[np.float64], apart: float) -> list[int]:
+    """Indices of those places, from the first on, that lie at least `apart` from the last."""
+    chosen: list[int] = []
+    for i, place in enumerate(places):
+        if not chosen or place - places[chosen[-1]] >= apart:
+            chosen.append(i)
+    return chosen
+
+
+def legend_columns(labels: Iterable[str], width_mm: float = 170.0) -> int:
+    """Columns of a legend that fit a figure's width, for the longest of its labels."""
+    size = STYLE["legend.fontsize"]
+    longest = max(TextPath((0, 0), label, size=size).get_extents().width for label in labels)
+    # Handle and spaces take about as much as seven letters m.
+    return max(1, int(width_mm / (longest * 25.4 / 72 + 7 * size * 25.4 / 72)))
+
+
+def say_empty(ax: Axes, text: str = "no estimable cell") -> None:
+    """Write into axes why nothing is drawn there."""
+    ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", color="#777777",
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 2})  # fmt: skip
+
+
+def approach_handles(approaches: Iterable[str], **options: Any) -> list[Line2D]:
+    """Entries of a legend, one for each approach."""
+    style: Style = {"linestyle": "", **options}
+    return [
+        Line2D(
+            [],
+            [],
+            label=name,
+            **{"marker": approach_marker(name), **style},
+            color=approach_colour(name),
+        )
+        for name in approaches
+    ]

@@ -1,0 +1,345 @@
+"""What commands and jobs write: whole or not at all, and over nothing that is a user's.
+
+Everything is written to a temporary folder on the same disk first, and moved when it is complete.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from errno import ENOTDIR
+from pathlib import Path
+from stat import S_ISDIR
+from tempfile import mkdtemp
+from time import sleep
+from types import ModuleType
+
+from accelstudy.basics.errors import InputError
+
+fcntl: ModuleType | None
+try:
+    import fcntl
+except ImportError:  # without locks, what a killed run leaves stays until somebody removes it
+    fcntl = None
+
+_PREFIX, _SUFFIX = ".accelstudy-", ".part"
+WAIT = 0.05
+"""Seconds in which a run that took a new folder for one of a killed run has removed it."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What a command writes to a folder.
+
+    Attributes
+    ----------
+    name : str, for messages
+    marker : str, the file by which such a folder is known; it is moved there last
+    files : tuple of str, other files that it may have
+    folders : tuple of str, subfolders whose files are the command's own
+    replaced : bool, whether the same command may replace an earlier result unasked
+    """
+
+    name: str
+    marker: str
+    files: tuple[str, ...] = ()
+    folders: tuple[str, ...] = ()
+    replaced: bool = True
+
+    def of_earlier_run(self, folder: Path) -> set[Path]:
+        """Files in a folder of this kind that are not a user's, relative to it."""
+        found = {Path(name) for name in (self.marker, *self.files) if (folder / name).is_file()}
+        for name in self.folders:
+            found |= {p.relative_to(folder) for p in (folder / name).rglob("*") if p.is_file()}
+        return found
+
+
+CAMPAIGN = Kind(
+    "campaign",
+    "campaign.yaml",
+    ("positions.csv", "positions.parquet", "segmentation.svg", "segmentation.png"),
+    replaced=False,
+)
+CALIBRATION = Kind(
+    "calibration", "calibration.json", ("positions.parquet", "report.html"), ("figures",)
+)
+DIAGNOSIS = Kind(
+    "diagnosis",
+    "diagnosis.json",
+    ("calibration.json", "loop.parquet", "model.yaml", "positions.parquet", "report.html"),
+    ("figures",),
+)
+BATCH_JOB = Kind(
+    "job of a batch",
+    "status.json",
+    ("calibration.json", "positions.parquet", "report.html"),
+    ("figures", "campaign"),
+)
+POLE = Kind(
+    "budget of a pole",
+    "pole.json",
+    ("budget.parquet", "monte-carlo.parquet", "budget.svg", "budget.png"),
+)
+PLAN = Kind("plan", "plan.parquet", ("plan.md", "study.yaml", "plan.svg", "plan.png"))
+_KINDS = (BATCH_JOB, DIAGNOSIS, CALIBRATION, CAMPAIGN, POLE, PLAN)
+
+
+@contextmanager
+def result_folder(
+    out: str | Path, kind: Kind, inputs: Iterable[str | Path] = (), force: bool = False
+) -> Iterator[Path]:
+    """Give a new folder to write to, whose files go to `out` together if all went well.
+
+    Enter it before anything is computed: a folder that cannot be written is found at once.
+
+    Parameters
+    ----------
+    out : path of the folder of results, made if it is not there
+    kind : Kind of the results
+    inputs : files and folders that are read, which `out` must be apart from
+    force : bool
+        Whether to write into a folder with other files. Files that have the name of one that is
+        written are replaced, the others stay.
+
+    Raises
+    ------
+    InputError
+        If `out` is, holds or lies in an input, holds what must not be overwritten, or cannot be
+        written. `out` is then as it was.
+    """
+    out = Path(out)
+    with _reported(out) as stages:
+        _check_apart(out, inputs)
+        mine = _check_folder(out, kind, force)
+        with _staging(out) as stage:
+            new = stage / "new"
+            stages.append(new)
+            new.mkdir()
+            yield new
+            _publish(stage, out.resolve(), kind, mine)
+
+
+@contextmanager
+def new_file(
+    path: str | Path, inputs: Iterable[str | Path] = (), force: bool = False
+) -> Iterator[Path]:
+    """Give a temporary file, which is moved to `path` if all went well; see `result_folder`.
+
+    Raises
+    ------
+    InputError
+        If `path` is an input, lies in a folder that is one, is there already and `force` is not
+        given, or cannot be written.
+    """
+    path = Path(path)
+    with _reported(path) as stages:
+        _check_apart(path, inputs)
+        if path.is_dir() or (path.exists() and not path.is_file()):
+            raise InputError(f"{path}: is no file; give the name of a file to write")
+        if os.path.lexists(path) and not force:
+            raise InputError(f"{path}: is there already; --force replaces it")
+        with whole_file(path) as temporary:
+            stages.append(temporary)
+            yield temporary
+
+
+@contextmanager
+def whole_file(path: str | Path) -> Iterator[Path]:
+    """Give a temporary file of the same name, and move it to `path` only if all went well."""
+    path = Path(path)
+    with _staging(path.parent) as stage:
+        yield stage / path.name
+        with _parents(path):
+            (stage / path.name).replace(path)
+
+
+def cannot_write(error: OSError, out: Path) -> str:
+    """Say that `out` cannot be written and why, with the place that is meant if it is another."""
+    where = Path(str(error.filename)) if error.filename is not None else out
+    inside = where.is_relative_to(out) or is_temporary(where)
+    place = "" if inside else f"{where}: "
+    reason = str(error.strerror or error).rpartition("] ")[2]  # Arrow puts more before it
+    return f"{out}: cannot be written: {place}{reason}"
+
+
+def is_temporary(path: Path) -> bool:
+    """Whether a file belongs to a run that has not finished it."""
+    return any(part.startswith(_PREFIX) for part in path.parts)
+
+
+@contextmanager
+def _staging(near: Path) -> Iterator[Path]:
+    """A private folder in `near` or, if that is not there, in the nearest folder above it.
+
+    Nobody can foretell its name and plant a link there. It is locked while it is in use, so that
+    the next run can tell what a killed one left, and remove it.
+    """
+    folder = next(path for path in (near, *near.absolute().parents) if path.exists())
+    if not folder.is_dir():
+        raise NotADirectoryError(ENOTDIR, f"{folder} is not a folder")
+    for left in folder.glob(f"{_PREFIX}*{_SUFFIX}"):
+        if (lock := _locked(left)) is not None:
+            shutil.rmtree(left, ignore_errors=True)
+            os.close(lock)
+    while True:
+        stage = Path(mkdtemp(prefix=_PREFIX, suffix=_SUFFIX, dir=folder))
+        lock = _locked(stage)
+        if lock is None and fcntl is not None:  # another run was quicker, and is removing it
+            sleep(WAIT)
+        if stage.exists():
+            break
+    try:
+        yield stage
+    finally:
+        shutil.rmtree(stage, ignore_errors=True)
+        if lock is not None:
+            os.close(lock)
+
+
+def _locked(folder: Path) -> int | None:
+    """Descriptor of a folder of ours, locked by it; None if it is in use, or cannot be locked."""
+    if fcntl is None:
+        return None
+    try:
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    except OSError:
+        return None
+    try:
+        if os.fstat(descriptor).st_uid == os.geteuid():
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return descriptor
+    except OSError:
+        pass
+    os.close(descriptor)
+    return None
+
+
+@contextmanager
+def _reported(out: Path) -> Iterator[list[Path]]:
+    """Turn errors into one line that names `out`, also for the temporary paths in the list."""
+    stages: list[Path] = []
+    try:
+        yield stages
+    except BrokenPipeError:  # of the terminal
+        raise
+    except OSError as error:
+        raise InputError(cannot_write(error, out)) from None
+    except InputError as error:
+        text = str(error)
+        for stage in stages:
+            text = text.replace(str(stage), str(out))
+        if text == str(error):
+            raise
+        raise InputError(text) from None
+
+
+def _check_apart(out: Path, inputs: Iterable[str | Path]) -> None:
+    above_out = _identities(out)
+    for given in inputs:
+        source = Path(given)
+        if not source.exists():
+            continue  # who reads it says so
+        above = _identities(source)
+        if above[0] == above_out[0]:
+            raise InputError(f"{out}: is the input; give another name for the results")
+        if above[0] in above_out and S_ISDIR(source.stat().st_mode):
+            raise InputError(f"{out}: lies in the input {source}; give another place")
+        if out.is_dir() and above_out[0] in above:
+            raise InputError(f"{out}: holds the input {source}; give another folder")
+
+
+def _identities(path: Path) -> list[tuple[int, int] | None]:
+    """What a path and the folders above it are on the disk; None for what is not there."""
+    resolved = path.resolve()
+    found: list[tuple[int, int] | None] = []
+    for each in (resolved, *resolved.parents):
+        try:
+            status = each.stat()
+        except (FileNotFoundError, NotADirectoryError):
+            # Not there, and so the same as nothing; only the first place of the list counts.
+            found.append(None)
+        else:
+            found.append((status.st_dev, status.st_ino))
+    return found
+
+
+def _check_folder(out: Path, kind: Kind, force: bool) -> bool:
+    """Check that a folder may be written to; whether it is an earlier result of this kind."""
+    if not out.is_dir():
+        if out.exists():
+            raise InputError(f"{out}: is not a folder")
+        return False
+    there = sorted(
+        path.name
+        for path in out.iterdir()
+        if not (path.name.startswith(_PREFIX) and path.name.endswith(_SUFFIX))
+    )
+    if not there:
+        return False
+    _check_free(out, map(Path, (kind.marker, *kind.files)), map(Path, kind.folders))
+    found = next((known for known in _KINDS if (out / known.marker).is_file()), None)
+    if found not in (None, kind):
+        raise InputError(f"{out}: is the folder of a {found.name}; give another folder")
+    if not force and (found is None or not kind.replaced):
+        shown = ", ".join(there[:3]) + (", …" if len(there) > 3 else "")
+        raise InputError(
+            f"{out}: is not empty ({shown}); give another folder, or --force to replace the files "
+            f"of a {kind.name} in it"
+        )
+    return found is kind
+
+
+def _publish(stage: Path, out: Path, kind: Kind, mine: bool) -> None:
+    """Move what is new to `out`, and what it replaces away; on an error, all of it back."""
+    new, old = stage / "new", stage / "old"
+    if not out.is_dir():
+        with _parents(out):
+            new.rename(out)
+        return
+    files = {path.relative_to(new) for path in new.rglob("*") if not path.is_dir()}
+    folders = {parent for file in files for parent in file.parents} - {Path()}
+    _check_free(out, files, folders)
+    made = [folder for folder in folders if not (out / folder).exists()]
+    stale = kind.of_earlier_run(out) if mine else set()
+    moves = [(out / file, old / file) for file in stale | files if (out / file).is_file()]
+    # The marker leaves first and comes last: with it, the results are complete.
+    moves.sort(key=lambda move: move[0] != out / kind.marker)
+    moves += [(new / f, out / f) for f in sorted(files, key=lambda f: f == Path(kind.marker))]
+    done: list[tuple[Path, Path]] = []
+    try:
+        for source, target in moves:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            source.rename(target)
+            done.append((source, target))
+    except BaseException:
+        for source, target in reversed(done):
+            target.rename(source)
+        for folder in sorted(made, reverse=True):
+            with suppress(OSError):
+                (out / folder).rmdir()
+        raise
+
+
+def _check_free(out: Path, files: Iterable[Path], folders: Iterable[Path]) -> None:
+    """Check that nothing of another sort, and no link, is where files and folders belong."""
+    for paths, fits in ((files, Path.is_file), (folders, Path.is_dir)):
+        for path in (out / path for path in paths):
+            if path.is_symlink() or (path.exists() and not fits(path)):
+                raise InputError(f"{path}: is in the way; move it elsewhere")
+
+
+@contextmanager
+def _parents(path: Path) -> Iterator[None]:
+    """Make the folders above a path; on an error, those that were made are removed."""
+    made = [folder for folder in path.absolute().parents if not folder.exists()]
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield
+    except BaseException:
+        for folder in made:
+            with suppress(OSError):
+                folder.rmdir()
+        raise

@@ -1,0 +1,72 @@
+"""Parquet files whose pages carry checksums, so that a damaged one is refused and not read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from accelstudy.basics.errors import InputError
+
+
+def parquet_file(path: str | Path, schema: pa.Schema, **options: Any) -> pq.ParquetWriter:
+    """Open a new file, which is written table by table; `options` are those of Arrow's writer."""
+    return pq.ParquetWriter(path, schema, write_page_checksum=True, **options)
+
+
+def write_parquet(path: str | Path, table: pa.Table, **options: Any) -> None:
+    """Write a whole table; `options` are those of Arrow's writer."""
+    pq.write_table(table, path, write_page_checksum=True, **options)
+
+
+def read_parquet(path: str | Path, remedy: str = "", **options: Any) -> pa.Table:
+    """Read a whole table; `remedy` and errors as in `whole_parquet`, `options` those of Arrow."""
+    with _whole(path, remedy):
+        return pq.read_table(path, partitioning=None, page_checksum_verification=True, **options)
+
+
+def read_row_groups(path: str | Path, remedy: str = "") -> Iterator[pa.Table]:
+    """Read a table row group by row group; `remedy` and errors as in `whole_parquet`."""
+    with whole_parquet(path, remedy) as file:
+        for number in range(file.num_row_groups):
+            with _whole(path, remedy):
+                group = file.read_row_group(number)
+            yield group
+
+
+@contextmanager
+def whole_parquet(path: str | Path, remedy: str = "") -> Iterator[pq.ParquetFile]:
+    """Open a file whose pages are verified when they are read.
+
+    Parameters
+    ----------
+    path : path
+    remedy : str
+        What a person must do if the file is damaged; ends the message.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, is no whole Parquet file, or a page is not what was written.
+    """
+    with _whole(path, remedy), pq.ParquetFile(path, page_checksum_verification=True) as file:
+        yield file
+
+
+@contextmanager
+def _whole(path: str | Path, remedy: str) -> Iterator[None]:
+    """Turn what Arrow raises on a file that is not whole into one line."""
+    try:
+        yield
+    except InputError:
+        raise
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
+    except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError) as error:
+        reason = (str(error).splitlines() or [type(error).__name__])[0][:100]
+        end = f"; {remedy}" if remedy else ""
+        raise InputError(f"{path}: not a whole Parquet file ({reason}){end}") from None

@@ -1,0 +1,163 @@
+"""Parquet files with their origin in the metadata, written whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pyarrow as pa
+
+from accelstudy import __version__
+from accelstudy.basics.errors import InputError
+from accelstudy.files.outputs import whole_file
+from accelstudy.files.parquet import parquet_file, read_parquet, whole_parquet, write_parquet
+
+if (
+    TYPE_CHECKING
+):  # else where it is needed: it is slow to import, and jobs that simulate do without
+    import pandas as pd
+
+METADATA_KEY = b"accelstudy"
+
+REMEDY = "delete it and run again"
+"""What to do with a damaged file; Snakemake then makes it anew."""
+
+LIBRARIES = ("numpy", "scipy", "llvmlite")
+"""Libraries on whose versions the last bits of the numbers depend."""
+
+
+@cache
+def git_commit() -> str:
+    """Commit of the checkout that the package runs from; `+` marks uncommitted changes."""
+    folder = Path(__file__).parent
+
+    def git(*arguments: str) -> str:
+        command = ["git", "-C", str(folder), *arguments]
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+
+    try:
+        changed = git("status", "--porcelain", "--untracked-files=no", ".")
+        return git("rev-parse", "HEAD") + ("+" if changed else "")
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+
+
+def origin(provenance: Mapping[str, Any]) -> dict[str, Any]:
+    """What is written into each file: where its numbers come from.
+
+    `provenance` holds `config_hash` and `seed`, and `setup` where the file is of a batch (see
+    `accelstudy.jobs.job`). Commit and versions of what numbers depend on are added.
+    """
+    return {
+        **provenance,
+        "version": __version__,
+        "commit": git_commit(),
+        **{name: _version(name) for name in LIBRARIES},
+    }
+
+
+def _version(name: str) -> str | None:
+    """Version of an installed library; None if it is not installed."""
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None
+
+
+@contextmanager
+def parquet_writer(
+    path: str | Path,
+    schema: pa.Schema,
+    provenance: Mapping[str, Any],
+    measured: Sequence[str] = (),
+) -> Iterator[Callable[[pa.Table], None]]:
+    """Write tables of one schema into one file, a row group each.
+
+    `measured` names columns of floats that hardly repeat; they are packed byte by byte, which is
+    smaller and faster than looking for repetition.
+    """
+    metadata = {METADATA_KEY: json.dumps(origin(provenance)).encode()}
+    with (
+        whole_file(path) as temporary,
+        parquet_file(
+            temporary,
+            schema.with_metadata(metadata),
+            compression="zstd",
+            use_dictionary=[name for name in schema.names if name not in measured],
+            use_byte_stream_split=list(measured),
+        ) as writer,
+    ):
+        yield writer.write_table
+
+
+def write_table(path: str | Path, table: pd.DataFrame, provenance: Mapping[str, Any]) -> None:
+    """Write a table with its origin."""
+    content = pa.Table.from_pandas(table, preserve_index=False)
+    metadata = {**(content.schema.metadata or {}), METADATA_KEY: json.dumps(origin(provenance))}
+    with whole_file(path) as temporary:
+        write_parquet(temporary, content.replace_schema_metadata(metadata), compression="zstd")
+
+
+def read_table(path: str | Path | Sequence[str | Path], **options: Any) -> pd.DataFrame:
+    """Read a table from a file, a folder of files, or several files.
+
+    Raises
+    ------
+    InputError
+        If a file is missing, or is not whole as it was written, or a folder holds files that were
+        made with different seeds.
+    """
+    import pandas as pd
+
+    if not isinstance(path, str | Path):
+        return pd.concat([read_table(each, **options) for each in path], ignore_index=True)
+    path = Path(path)
+    if path.is_dir():
+        paths = sorted(path.glob("*.parquet"))
+        if not paths:
+            raise InputError(f"{path}: holds no tables")
+        _check_seeds(paths)
+        return read_table(paths, **options)
+    return read_parquet(path, REMEDY, **options).to_pandas()
+
+
+def _check_seeds(paths: Sequence[Path]) -> None:
+    """Check that files are of one study; a run that was stopped leaves some of an earlier one."""
+    seeds: dict[Any, Path] = {}
+    for path in paths:
+        seeds.setdefault(read_origin(path)["seed"], path)
+    if len(seeds) > 1:
+        (one, first), (other, second) = list(seeds.items())[:2]
+        raise InputError(
+            f"{second.parent}: holds files of different studies, {first.name} of seed {one} and "
+            f"{second.name} of seed {other}; run the study again: it removes or names those that "
+            "are not its own"
+        )
+
+
+def collect(parts: Sequence[str | Path], output: str | Path, provenance: Mapping[str, Any]) -> None:
+    """Join the parts of a table into one."""
+    import pandas as pd
+
+    write_table(output, pd.concat(map(read_table, parts), ignore_index=True), provenance)
+
+
+def read_origin(path: str | Path) -> dict[str, Any]:
+    """Origin of a file: config hash, seed, and the software that made it; see `origin`.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, is not whole, or was not written by this package.
+    """
+    with whole_parquet(path, REMEDY) as file:
+        metadata = file.schema_arrow.metadata or {}
+    if METADATA_KEY not in metadata:
+        raise InputError(f"{path}: does not say where it comes from; it is no table of a study")
+    return json.loads(metadata[METADATA_KEY])

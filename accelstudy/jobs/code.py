@@ -1,0 +1,88 @@
+"""The code that a job depends on, as its imports have it."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import accelstudy
+
+_FOR_TYPES = re.compile(r"^if \(?\s*TYPE_CHECKING\s*\)?:\n(?:[ \t]+.*\n|\n)+", re.MULTILINE)
+_FROM = re.compile(r"^[ \t]*from (accelstudy[\w.]*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
+_NAMED = re.compile(r"^[ \t]*import (accelstudy[\w.]*)|\"(accelstudy\.[\w.]+)\"", re.MULTILINE)
+_BESIDE = re.compile(r"\"(\w+):\w+\"")
+_ALL_BESIDE = "import_modules(__name__, __path__)"
+_DATA = (".j2", ".yaml")
+
+
+def code_hash(script: str | Path) -> str:
+    """Hash of the package's files on which a script of the workflow depends.
+
+    Snakemake sees that a script has changed, but not that a package has; as a parameter of a rule
+    this shows it. What an import needs at the beginning of a module, or within a function, is found
+    by reading; imports for type checkers do not count. A registry depends on all modules of its
+    folder, a function named as ``module:function`` on that module, and a module on the templates
+    and data beside it.
+
+    Parameters
+    ----------
+    script : path of a Python file
+    """
+    root = Path(accelstudy.__file__).parent
+    found: dict[Path, str] = {}
+    waiting = [*_imported(root, Path(script))]
+    while waiting:
+        path = waiting.pop()
+        if path not in found:
+            found[path] = _read(path, path.stat().st_mtime_ns)[0]
+            waiting += _imported(root, path)
+    for folder in {path.parent for path in found}:
+        data = (path for path in folder.iterdir() if path.suffix in _DATA)
+        found |= {path: _read(path, path.stat().st_mtime_ns)[0] for path in data}
+    digest = hashlib.sha256()
+    for name, content in sorted((p.relative_to(root).as_posix(), c) for p, c in found.items()):
+        digest.update(f"{name} {content}".encode())
+    return digest.hexdigest()[:16]
+
+
+def _imported(root: Path, path: Path) -> Iterator[Path]:
+    """Files of the package that a file imports."""
+    _, modules, beside = _read(path, path.stat().st_mtime_ns)
+    for module in modules:
+        yield from _files(root, module)
+    for name in beside:
+        if name == "*":
+            yield from path.parent.glob("*.py")
+        elif (file := path.with_name(f"{name}.py")).is_file():
+            yield file
+
+
+@cache
+def _read(path: Path, modified: int) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
+    """Hash of a file, modules that it names, and modules beside it that it names, `*` for all.
+
+    The time at which it was modified is there so that a file is read again when it has changed.
+    """
+    content = path.read_text(encoding="utf-8")
+    digest = hashlib.sha256(content.encode()).hexdigest()
+    if path.suffix in _DATA:
+        return digest, (), ()
+    text = _FOR_TYPES.sub("", content)
+    modules = [imported or quoted for imported, quoted in _NAMED.findall(text)]
+    for module, names in _FROM.findall(text):
+        modules += [module, *(f"{module}.{name}" for name in re.findall(r"\w+", names))]
+    beside = ["*"] if _ALL_BESIDE in text else _BESIDE.findall(text)
+    return digest, tuple(dict.fromkeys(modules)), tuple(dict.fromkeys(beside))
+
+
+@cache
+def _files(root: Path, module: str) -> tuple[Path, ...]:
+    """Files that an import of a module runs: its own, and those of the packages above it."""
+    path, files = root, []
+    for part in module.split(".")[1:]:
+        path /= part
+        files += [file for file in (path.with_suffix(".py"), path / "__init__.py") if file.exists()]
+    return tuple(files)

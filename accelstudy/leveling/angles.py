@@ -1,0 +1,72 @@
+"""Leveling: roll and pitch from the specific force, and back (Thalmann & Neuner 2018, section 3).
+
+North-east-down convention: at level f_b = (0, 0, −g).
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from accelstudy.effects.base import Number, Vector
+
+
+def roll_pitch(f: Vector, xp: Any = np) -> tuple[Number, Number]:
+    """Roll and pitch in rad of the components of a specific force (eq. 6).
+
+    Roll lies in (−π, π] and has no meaning where f_y = f_z = 0; pitch lies in [−π/2, π/2].
+    """
+    x, y, z = f
+    return xp.arctan2(-y, -z), xp.arctan2(x, xp.sqrt(y * y + z * z))
+
+
+def specific_force(roll: Number, pitch: Number, g: Number, xp: Any = np) -> Vector:
+    """Components of the specific force at rest in an attitude; the inverse of `roll_pitch`."""
+    return (
+        g * xp.sin(pitch),
+        -g * xp.cos(pitch) * xp.sin(roll),
+        -g * xp.cos(pitch) * xp.cos(roll),
+    )
+
+
+@cache
+def _jacobian_function() -> Any:
+    from accelstudy.basics.tracing import jacobian_of
+
+    return jacobian_of(roll_pitch, 3)
+
+
+def jacobian(f: ArrayLike) -> NDArray[np.float64]:
+    """Partial derivatives of roll and pitch with respect to the specific force (eq. 7).
+
+    Parameters
+    ----------
+    f : (..., 3) array, m/s²
+
+    Returns
+    -------
+    (..., 2, 3) array, rad/(m/s²); derived from `roll_pitch`, of which it is the only definition.
+    """
+    f = np.asarray(f, dtype=float)
+    return np.asarray(_jacobian_function()(f))
+
+
+def sigma_roll_pitch(f: ArrayLike, cov: ArrayLike) -> NDArray[np.float64]:
+    """Propagate the covariance matrix of a specific force to roll and pitch (section 3.1).
+
+    Parameters
+    ----------
+    f : (..., 3) array, m/s²
+    cov : (..., 3, 3) array, (m/s²)²
+
+    Returns
+    -------
+    (..., 2) array, standard deviations of roll and pitch in rad. Near level and for equal noise σ
+    on all axes they are σ/(g cos θ) and σ/g.
+    """
+    jac = jacobian(f)
+    variance = np.einsum("...ij,...jk,...ik->...i", jac, np.asarray(cov, dtype=float), jac)
+    return np.sqrt(variance)

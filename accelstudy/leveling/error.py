@@ -1,0 +1,153 @@
+"""The tilt error that a calibration leaves: what a user of the calibrated sensor sees."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.effects import Hold
+from accelstudy.leveling.angles import jacobian, roll_pitch
+from accelstudy.sensors.sensor import SensorModel
+
+Array = NDArray[np.float64]
+
+ATTITUDES = 200
+"""Over which a tilt error is averaged, where nobody says how many."""
+
+
+def cap_forces(max_tilt: float, attitudes: int, g: float = STANDARD_GRAVITY) -> Array:
+    """Specific forces (k, 3) of attitudes spread evenly over all tilts up to `max_tilt` (rad)."""
+    i = np.arange(attitudes) + 0.5
+    z = 1 - i / attitudes * (1 - np.cos(max_tilt))
+    azimuth = np.pi * (1 + np.sqrt(5)) * i
+    radius = np.sqrt(1 - z * z)
+    return -g * np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), z], axis=-1)
+
+
+def holds_in_use(hold: Hold, n: int, f_b: Array) -> Hold:
+    """Return conditions like those of a calibration, in attitudes in which the sensor is used.
+
+    Parameters
+    ----------
+    hold : Hold, of the n positions of the calibration
+    n : int
+    f_b : (k, 3) array, m/s², of the attitudes
+    """
+    roll, pitch = roll_pitch(tuple(f_b.T))
+    used = hold.take(np.arange(len(f_b)) % n)
+    yaw = np.zeros(len(f_b)) if used.yaw is None else used.yaw
+    return replace(used, roll=roll, pitch=pitch, yaw=yaw)
+
+
+@dataclass(frozen=True)
+class TiltError:
+    """Errors of roll and pitch as a function of the estimates, about a reference calibration.
+
+    The mean over attitudes of the squared error of an estimate x is, with δ = x − reference,
+    constant + 2 linear δ + δᵀ quadratic δ: the reference is propagated exactly, and what is left
+    linearly.
+
+    Attributes
+    ----------
+    reference : (u,) array, SI
+    constant : (2,) array, rad², of roll and of pitch
+    linear : (2, u) array
+    quadratic : (2, u, u) array
+    """
+
+    reference: Array
+    constant: Array
+    linear: Array
+    quadratic: Array
+
+    def rms(self, estimates: Array) -> Array:
+        """Rms over attitudes of the errors of roll and of pitch, (R, 2), of estimates (R, u)."""
+        delta = estimates - self.reference
+        scattered = [
+            np.einsum("ru,uw,rw->r", delta, q, delta, optimize=True) for q in self.quadratic
+        ]
+        square = self.constant + 2 * delta @ self.linear.T + np.stack(scattered, -1)
+        return np.sqrt(np.maximum(square, 0.0))
+
+    def rms_of_all(self, covariance: Array) -> Array:
+        """Rms over attitudes and over calibrations whose mean is the reference, (2,)."""
+        return np.sqrt(self.constant + np.einsum("auw,uw->a", self.quadratic, covariance))
+
+
+def tilt_error(
+    simulated: SensorModel,
+    truth: Array,
+    estimated: SensorModel,
+    reference: Array,
+    f_b: Array,
+    g: float = STANDARD_GRAVITY,
+    hold: Hold | None = None,
+) -> TiltError:
+    """Propagate calibration errors to roll and pitch, without noise of the leveled reading.
+
+    Effects that the estimated model lacks count in full. Effects of the rig, estimated or not, do
+    not count: the sensor has left it.
+
+    Parameters
+    ----------
+    simulated, estimated : SensorModel, what the sensor is and what is estimated of it
+    truth : (u',) array, SI, of the simulated model
+    reference : (u,) array, SI, of the estimated model, near the estimates: their mean, say
+    f_b : (k, 3) array, m/s², attitudes
+    g : float, m/s²
+    hold : Hold, optional
+        What else is known of the attitudes, where effects depend on it.
+    """
+    reference = np.where(estimated.stays, reference, 0.0)
+    output = simulated.sense(f_b, np.where(simulated.stays, truth, 0.0), g, hold)
+    corrected = estimated.correct(output, reference, g, hold)
+    offset = np.stack(roll_pitch(tuple(corrected.T)), -1) - np.stack(roll_pitch(tuple(f_b.T)), -1)
+    offset = (offset + np.pi) % (2 * np.pi) - np.pi
+    slope = jacobian(corrected) @ estimated.correction_jacobian(output, reference, g, hold)
+    slope = np.where(estimated.stays, slope, 0.0)
+    return TiltError(
+        reference,
+        constant=np.mean(offset**2, axis=0),
+        linear=np.einsum("ka,kau->au", offset, slope) / len(f_b),
+        quadratic=np.einsum("kau,kaw->auw", slope, slope) / len(f_b),
+    )
+
+
+@dataclass(frozen=True)
+class LevelingError:
+    """Errors of roll and pitch after calibration, rms over attitudes, in rad.
+
+    Attributes
+    ----------
+    per_replicate : (R, 2) array, rms of roll and of pitch of each calibration
+    """
+
+    per_replicate: Array
+
+    @property
+    def rms(self) -> Array:
+        """Rms of roll and of pitch over attitudes and calibrations, (2,)."""
+        return np.sqrt(np.mean(self.per_replicate**2, axis=0))
+
+
+def leveling_error(
+    simulated: SensorModel,
+    truth: Array,
+    estimated: SensorModel,
+    estimates: Array,
+    f_b: Array,
+    g: float = STANDARD_GRAVITY,
+    hold: Hold | None = None,
+) -> LevelingError:
+    """Propagate the errors of R calibrations about their mean; the rest is as in `tilt_error`.
+
+    Parameters
+    ----------
+    estimates : (R, u) array, SI, of the estimated model
+    """
+    mean = estimates.mean(axis=0)
+    error = tilt_error(simulated, truth, estimated, mean, f_b, g, hold)
+    return LevelingError(error.rms(estimates))

@@ -1,0 +1,214 @@
+"""Variance-based sensitivity of leveling: which inputs make roll and pitch uncertain.
+
+Total effects by Sobol's method (SALib) over a grid of attitudes, for the forces alone (the
+parameter-free model f_s = f_b + v, figure 4) and for the forces and all parameters of a calibrated
+sensor model (figures 5 and 6 of Thalmann & Neuner 2018).
+
+The total effect of an input is the share of the output's variance that would remain if all others
+were known. The inputs are sampled independently, as classic indices assume; the parameters of a
+calibration are correlated, which `accelstudy.leveling.shares` takes into account.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from itertools import product
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from scipy import special
+
+from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
+from accelstudy.leveling.angles import roll_pitch, specific_force
+from accelstudy.sensors.sensor import SensorModel
+
+Array = NDArray[np.float64]
+
+FORCES = ("f_x", "f_y", "f_z")
+OUTPUTS = ("roll", "pitch")
+
+Z95 = float(special.ndtri(0.975))
+
+NEGLIGIBLE_VARIANCE = 1e-24
+"""Variance in rad² below which an output does not vary: rounding, not an effect."""
+
+
+def total_effects(
+    function: Callable[[Array], Array],
+    mean: ArrayLike,
+    sigma: ArrayLike,
+    base_samples: int,
+    resamples: int,
+    seed: int,
+) -> tuple[Array, Array, Array]:
+    """Total effects of independent normal inputs on the outputs of a function.
+
+    Parameters
+    ----------
+    function : takes (N, d), d inputs, and returns (N, k)
+    mean, sigma : (d,) arrays; inputs with sigma 0 have total effect 0
+    base_samples : int, a power of two
+    resamples : int, bootstrap resamples of the confidence interval
+    seed : int
+
+    Returns
+    -------
+    total : (k, d) array; NaN where an output has no variance
+    ci95 : (k, d) array, half width of its 95 % confidence interval
+    sd : (k,) array, standard deviation of the outputs
+    """
+    mean, sigma = np.asarray(mean, dtype=float), np.asarray(sigma, dtype=float)
+    varied = np.flatnonzero(sigma > 0)
+    normal = _standard_normal(len(varied), base_samples, seed + 1)
+    inputs = np.tile(mean, (len(normal), 1))
+    inputs[:, varied] += sigma[varied] * normal
+    outputs = function(inputs)
+
+    total = np.full((outputs.shape[1], len(mean)), np.nan)
+    ci95 = np.full_like(total, np.nan)
+    resampled = np.random.default_rng(seed + 1).integers(
+        base_samples, size=(base_samples, resamples)
+    )
+    for k, values in enumerate(outputs.T):
+        if values.var() <= NEGLIGIBLE_VARIANCE:
+            continue
+        total[k] = ci95[k] = 0.0
+        total[k, varied], ci95[k, varied] = _total_effects(
+            (values - values.mean()) / values.std(), resampled
+        )
+    return total, ci95, outputs.std(axis=0)
+
+
+@lru_cache(maxsize=1)  # the same at every attitude
+def _standard_normal(d: int, base_samples: int, seed: int) -> Array:
+    """Saltelli's samples of d standard normal inputs, (base_samples (d + 2), d)."""
+    # Slow to import, and figures need only the names of this module.
+    from SALib.sample import sobol
+
+    problem = {
+        "num_vars": d,
+        "names": [str(i) for i in range(d)],
+        "bounds": [[0.0, 1.0]] * d,
+        "dists": ["norm"] * d,
+    }
+    samples = sobol.sample(problem, base_samples, calc_second_order=False, seed=seed)
+    samples.flags.writeable = False
+    return samples
+
+
+def _total_effects(values: Array, resampled: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Total effects by Jansen's estimator, with the half widths of their 95 % intervals.
+
+    What SALib's `sobol.analyze` gives, in a thirtieth of its time: it makes first-order effects
+    too, and resamples the outputs anew for each input.
+
+    Parameters
+    ----------
+    values : (N (d + 2),) array, the output at each of `_standard_normal`, of mean 0 and sd 1
+    resampled : (N, b) array, which base samples each bootstrap resample has
+    """
+    values = (values - values.mean()) / values.std()  # once more, as SALib does: the last bits
+    base, *mixed, other = values.reshape(len(resampled), -1).T
+    variance = np.var(np.concatenate([base, other]))
+    variances = np.var(np.concatenate([base[resampled], other[resampled]]), axis=0)
+    squares = [(base - each) ** 2 for each in mixed]
+    total = [0.5 * each.mean() / variance for each in squares]
+    sd = [(0.5 * each[resampled].mean(axis=0) / variances).std(ddof=1) for each in squares]
+    return np.array(total), Z95 * np.array(sd)
+
+
+def leveled(
+    attitude: Array, model: SensorModel | None, g: float = STANDARD_GRAVITY
+) -> Callable[[Array], Array]:
+    """Return the function of which leveling is the evaluation near an attitude.
+
+    Parameters
+    ----------
+    attitude : (2,) array, rad
+    model : SensorModel, or None if the output is the force itself
+    g : float, m/s²
+
+    Returns
+    -------
+    callable
+        Takes (N, 3 + u), the sensor's output and the parameters of the model; returns roll and
+        pitch less those of the attitude, (N, 2), rad, within half a turn.
+    """
+
+    def offset(inputs: Array) -> Array:
+        force = inputs[:, :3]
+        if model is not None:
+            force = model.correct(force[:, None, :], inputs[:, 3:], g)[:, 0]
+        angles = np.stack(roll_pitch(tuple(force.T)), axis=-1) - attitude
+        return (angles + np.pi) % (2 * np.pi) - np.pi
+
+    return offset
+
+
+def leveling_sensitivity(
+    roll_gon: Sequence[float],
+    pitch_gon: Sequence[float],
+    sigma_force: float,
+    base_samples: int,
+    resamples: int,
+    seed: int,
+    model: SensorModel | None = None,
+    parameters: Array | None = None,
+    sigma_parameters: Array | None = None,
+    g: float = STANDARD_GRAVITY,
+) -> pd.DataFrame:
+    """Total effects on roll and pitch over a grid of attitudes.
+
+    Parameters
+    ----------
+    roll_gon, pitch_gon : the grid
+    sigma_force : float, m/s², of each component of the sensor's output
+    base_samples, resamples, seed : as in `total_effects`
+    model, parameters, sigma_parameters : sensor model with its (u,) parameters and their sds, SI;
+        without them the output is the force itself
+    g : float, m/s²
+
+    Returns
+    -------
+    DataFrame
+        output, roll_gon, pitch_gon, input, total_effect, ci95, sd_output_mgon, defined; where the
+        output has no variance the total effect is NaN and `defined` False.
+    """
+    names, u = list(FORCES), 0
+    if model is not None:
+        names += model.parameter_names
+        u = model.n_parameters
+    x = np.zeros(u) if parameters is None else parameters
+    sigma = np.concatenate(
+        [np.full(3, sigma_force), np.zeros(u) if sigma_parameters is None else sigma_parameters]
+    )
+    rows: list[pd.DataFrame] = []
+    for roll, pitch in product(roll_gon, pitch_gon):
+        attitude = np.array([roll * GON, pitch * GON])
+        f_s = np.array(specific_force(attitude[0], attitude[1], g))
+        if model is not None:
+            f_s = model.sense(f_s[None], x, g)[0]
+        total, ci95, sd = total_effects(
+            leveled(attitude, model, g),
+            np.concatenate([f_s, x]),
+            sigma,
+            base_samples,
+            resamples,
+            seed,
+        )
+        for k, output in enumerate(OUTPUTS):
+            columns: dict[str, Any] = {
+                "output": output,
+                "roll_gon": float(roll),
+                "pitch_gon": float(pitch),
+                "input": names,
+                "total_effect": total[k],
+                "ci95": ci95[k],
+                "sd_output_mgon": sd[k] / MGON,
+                "defined": bool(np.isfinite(total[k]).all()),
+            }
+            rows.append(pd.DataFrame(columns))
+    return pd.concat(rows, ignore_index=True)

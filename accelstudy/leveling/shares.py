@@ -1,0 +1,168 @@
+"""What roll and pitch owe to each input, with the correlations of the calibration's parameters.
+
+Shapley effects over a grid of attitudes, beside the total effects that
+`accelstudy.leveling.sensitivity` has for inputs taken as independent (figures 5 and 6 of
+Thalmann & Neuner 2018).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
+from accelstudy.effects import Hold
+from accelstudy.leveling.angles import jacobian, specific_force
+from accelstudy.leveling.sensitivity import (
+    FORCES,
+    NEGLIGIBLE_VARIANCE,
+    OUTPUTS,
+    leveled,
+    total_effects,
+)
+from accelstudy.leveling.shapley import linear_shapley, sampled_shapley
+from accelstudy.sensors.sensor import SensorModel
+
+Array = NDArray[np.float64]
+
+LINEAR_UP_TO = 0.01
+"""Sd of roll and pitch in rad up to which linear theory is right to 3e-4 of their variance."""
+ORDERS = 8192
+"""Random orders of the Monte Carlo where it is not."""
+NOTABLE = 0.01
+"""Share below which it does not matter which of two inputs is the larger."""
+TIED = 0.02
+"""Relative difference of two shares up to which they count as equal.
+
+Sds of 100 000 calibrations leave 0.6 % of it.
+"""
+
+
+def leveling_slope(
+    model: SensorModel, parameters: Array, f_s: Array, g: float, hold: Hold | None = None
+) -> Array:
+    """Derivatives of roll and pitch by the sensor's output and the parameters, (..., 2, 3 + u).
+
+    Parameters
+    ----------
+    model, parameters : sensor model and its (u,) parameters, SI
+    f_s : (..., 3) array, m/s², output of the sensor
+    g : float, m/s²
+    hold : Hold, optional
+        What else is known of the attitudes, where effects depend on it.
+    """
+    by_inputs = [
+        model.output_jacobian(f_s, parameters, g, hold),
+        model.correction_jacobian(f_s, parameters, g, hold),
+    ]
+    return jacobian(model.correct(f_s, parameters, g, hold)) @ np.concatenate(by_inputs, axis=-1)
+
+
+def leveling_shares(
+    roll_gon: Sequence[float],
+    pitch_gon: Sequence[float],
+    sigma_force: float,
+    model: SensorModel,
+    parameters: Array,
+    covariance: Array,
+    base_samples: int,
+    seed: int,
+    g: float = STANDARD_GRAVITY,
+) -> pd.DataFrame:
+    """Shapley effects on roll and pitch over a grid of attitudes.
+
+    They are exact as long as leveling is linear within the errors; at attitudes so near to the roll
+    pole that it is not they are sampled.
+
+    Parameters
+    ----------
+    roll_gon, pitch_gon : the grid
+    sigma_force : float, m/s², of each component of the sensor's output
+    model, parameters : sensor model with its (u,) parameters, SI
+    covariance : (u, u) array, SI, of the parameters
+    base_samples, seed : as in `accelstudy.leveling.sensitivity.total_effects`, for what is sampled
+    g : float, m/s²
+
+    Returns
+    -------
+    DataFrame
+        output, roll_gon, pitch_gon, input, shapley_effect, ci95 (0 where exact), total_effect (of
+        the inputs taken as independent), sd_output_mgon, method (linear or Monte Carlo), defined;
+        where the output has no variance the effects are NaN and `defined` False.
+    """
+    names = [*FORCES, *model.parameter_names]
+    whole = np.zeros((len(names), len(names)))
+    whole[:3, :3] = sigma_force**2 * np.eye(3)
+    whole[3:, 3:] = covariance
+    sigma = np.sqrt(np.diagonal(whole))
+    attitudes = np.array(list(product(roll_gon, pitch_gon))) * GON
+    f_b = np.stack(specific_force(attitudes[:, 0], attitudes[:, 1], g), axis=-1)
+    f_s = model.sense(f_b, parameters, g)
+    slopes = leveling_slope(model, parameters, f_s, g)
+    shares, variance = linear_shapley(slopes.reshape(-1, len(names)), whole)
+    shares, variance = shares.reshape(slopes.shape), variance.reshape(slopes.shape[:2])
+    ci95 = np.zeros_like(shares)
+    total = (slopes * sigma) ** 2
+    total /= np.maximum(total.sum(axis=-1, keepdims=True), np.finfo(float).tiny)
+    sampled = (variance > LINEAR_UP_TO**2).any(axis=1)
+    for i in np.flatnonzero(sampled):
+        function, mean = leveled(attitudes[i], model, g), np.concatenate([f_s[i], parameters])
+        rng = np.random.default_rng(seed)
+        shares[i], ci95[i], variance[i] = sampled_shapley(
+            function, mean, whole, slopes[i], ORDERS, rng
+        )
+        total[i], _, _ = total_effects(function, mean, sigma, base_samples, 2, seed)
+
+    defined = variance > NEGLIGIBLE_VARIANCE
+    for values in (shares, ci95, total):
+        values[~defined] = np.nan
+    labels = pd.MultiIndex.from_product(
+        [list(product(map(float, roll_gon), map(float, pitch_gon))), OUTPUTS, names],
+        names=["attitude", "output", "input"],
+    ).to_frame(index=False)
+    return pd.DataFrame(
+        {
+            "output": labels["output"],
+            "roll_gon": labels["attitude"].str[0],
+            "pitch_gon": labels["attitude"].str[1],
+            "input": labels["input"],
+            "shapley_effect": shares.ravel(),
+            "ci95": ci95.ravel(),
+            "total_effect": total.ravel(),
+            "sd_output_mgon": np.repeat(np.sqrt(variance).ravel() / MGON, len(names)),
+            "method": np.repeat(np.where(sampled, "Monte Carlo", "linear"), 2 * len(names)),
+            "defined": np.repeat(defined.ravel(), len(names)),
+        }
+    )
+
+
+def overtaken(table: pd.DataFrame) -> pd.DataFrame:
+    """Find the pairs of inputs whose order the correlations change.
+
+    An input overtakes another if its Shapley effect is the larger of the two and its total effect
+    the smaller, by more than `TIED` either way, and one of the two shares is `NOTABLE`.
+
+    Parameters
+    ----------
+    table : DataFrame, as `leveling_shares` returns it; further columns tell analyses apart
+
+    Returns
+    -------
+    DataFrame
+        One row per pair: what it has of analysis, output, roll_gon and pitch_gon, `input` and
+        `over`, the input that it overtakes.
+    """
+    labels = [c for c in ("analysis", "output", "roll_gon", "pitch_gon") if c in table]
+    shares = ["input", "shapley_effect", "total_effect"]
+    rows = table.loc[table["defined"].astype(bool), labels + shares]
+    rows = rows[rows[shares[1:]].max(axis=1) >= NOTABLE]
+    pairs = rows.merge(rows, on=labels, suffixes=("", "_over"))
+    factor = 1 + TIED
+    now = pairs["shapley_effect"] > factor * pairs["shapley_effect_over"]
+    before = factor * pairs["total_effect"] < pairs["total_effect_over"]
+    found = pairs.loc[now & before, [*labels, "input", "input_over"]]
+    return found.rename(columns={"input_over": "over"}).reset_index(drop=True)

@@ -1,0 +1,1 @@
+"""Sensors: models composed of effects, frames, and what no real sensor can have."""

@@ -1,0 +1,101 @@
+"""The axes of a sensor by three letters, and the angles that people measure in them.
+
+The letters say where x, y and z point: f or b forward or back, r or l right or left, d or u down
+or up. ``frd`` (forward, right, down) is the convention of everything inside; ``flu`` is that of
+ROS (REP 103), ``rfu`` that of phones.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from accelstudy.basics.errors import InputError
+
+Array = NDArray[np.float64]
+
+_LETTERS = ("fb", "rl", "du")
+"""Letters of the axes of frd, in its order; the first of each pair points along the axis."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Axes of a sensor.
+
+    Attributes
+    ----------
+    name : str, three letters
+    """
+
+    name: str
+
+    @property
+    def order(self) -> NDArray[np.int_]:
+        """For each axis of frd the axis of the frame that lies along it, (3,)."""
+        return np.array(
+            [next(i for i, c in enumerate(self.name) if c in pair) for pair in _LETTERS]
+        )
+
+    @property
+    def signs(self) -> Array:
+        """For each axis of frd 1 if that axis of the frame points the same way, else −1, (3,).
+
+        These are the signs of roll, pitch and yaw too. In the frame's own convention roll turns
+        about its axis forward or back, pitch about the one to the right or left, yaw about the one
+        down or up; the sequence of the turns is the same.
+        """
+        return np.array(
+            [
+                1.0 if self.name[i] == pair[0] else -1.0
+                for i, pair in zip(self.order, _LETTERS, strict=True)
+            ]
+        )
+
+    @property
+    def matrix(self) -> Array:
+        """R with f_frd = R f, (3, 3)."""
+        return self.signs[:, None] * np.eye(3)[self.order]
+
+    def to_frd(self, vectors: ArrayLike) -> Array:
+        """Components in frd of vectors (..., 3) in this frame."""
+        return self.rearranged(np.asarray(vectors, dtype=float)) * self.signs
+
+    def from_frd(self, vectors: ArrayLike) -> Array:
+        """Components in this frame of vectors (..., 3) in frd."""
+        values = np.asarray(vectors, dtype=float) * self.signs
+        return values[..., np.argsort(self.order)]
+
+    def rearranged(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Put what belongs to the axes, as their sds, (..., 3), in the order of frd."""
+        return values[..., self.order]
+
+
+def parse_frame(name: str) -> Frame:
+    """Frame of three letters.
+
+    Raises
+    ------
+    InputError
+        If the letters do not name each direction once, or make a left-handed frame.
+    """
+    letters = name.strip().lower()
+    named = [sum(c in pair for c in letters) for pair in _LETTERS]
+    if len(letters) != 3 or named != [1, 1, 1]:
+        raise InputError(
+            f"frame {name!r}: expected three letters that say where x, y and z point: f or b "
+            "(forward, back), r or l (right, left), d or u (down, up), as frd or flu"
+        )
+    frame = Frame(letters)
+    if np.linalg.det(frame.matrix) < 0:
+        other = {"f": "b", "b": "f", "r": "l", "l": "r", "d": "u", "u": "d"}[letters[2]]
+        raise InputError(
+            f"frame {name!r}: is left-handed; with x and y like this z must point the other way: "
+            f"{letters[:2]}{other}"
+        )
+    return frame
+
+
+FRD = parse_frame("frd")

@@ -1,0 +1,192 @@
+"""Sensor models by what people write for one, and Table 1 as presets of a model and a scheme.
+
+A model is written as the name of a registered one; as a composition, whose parts, joined by +, are
+registered models and effects (``bias-scale-nonorthogonality+warm_up(tau=300)``); or as the path of
+a YAML file with a model, such as the `model.yaml` of a diagnosis.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.effects import Effect, effect_names, get_effect
+from accelstudy.sensors.sensor import SensorModel
+
+MODEL_FILE = "model.yaml"
+"""What a diagnosis calls its file with a model."""
+
+_NINE = ("bias", "scale", "nonorthogonality")
+
+MODELS: dict[str, tuple[str, ...]] = {
+    "bias-scale": ("bias", "scale"),
+    "bias-scale-nonorthogonality": _NINE,
+    "bias-scale-nonorthogonality-crossaxis": (*_NINE, "cross_axis_misalignment"),
+    "bias-scale-nonorthogonality-quadratic": (*_NINE, "quadratic_scale"),
+    "bias-scale-nonorthogonality-cubic": (*_NINE, "cubic_scale"),
+    "bias-scale-nonorthogonality-quadratic-cubic": (*_NINE, "quadratic_scale", "cubic_scale"),
+}
+"""Name -> effects (Thalmann & Neuner 2018, section 2; nonlinear scale after Cai 2013)."""
+
+TITLES = {
+    "bias-scale": "6: bias, scale",
+    "bias-scale-nonorthogonality": "9: + non-orthogonality",
+    "bias-scale-nonorthogonality-crossaxis": "12: 9 + cross-axis",
+    "bias-scale-nonorthogonality-quadratic": "12: 9 + quadratic",
+    "bias-scale-nonorthogonality-cubic": "12: 9 + cubic",
+    "bias-scale-nonorthogonality-quadratic-cubic": "15: 9 + quadratic + cubic",
+}
+"""Short titles for figures."""
+
+
+def get_model(text: str, extra: Mapping[str, Sequence[str]] | None = None) -> SensorModel:
+    """Return the model that a person wrote.
+
+    Parameters
+    ----------
+    text : str
+        A name; parts joined by +, each a registered model or an effect with its settings; or the
+        path of a YAML file, of which the name of one of its models may follow after a colon. A
+        path has a separator or ends in .yaml or .yml.
+    extra : mapping of name to names of effects, optional
+        Models defined by the caller, beside the registered ones.
+
+    Returns
+    -------
+    SensorModel
+        A composition and the model of a file have the name that `composition_name` gives them.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such model, or an effect of it does not exist.
+    InputError
+        If an effect occurs twice, a setting cannot be read, or a file has not one model.
+    """
+    text = text.strip()
+    known = {**MODELS, **(extra or {})}
+    if text in known:
+        return compose(text, tuple(known[text]))
+    if text and os.path.isfile(inside := os.path.join(text, MODEL_FILE)):
+        raise InputError(f"{text}: a folder, not a model; take {inside}")
+    if path := re.fullmatch(rf"(.*(?:\.ya?ml|[/{re.escape(os.sep)}].*?))(?::([\w-]+))?", text):
+        return _model_of_file(path[1], path[2])
+    parts = [part.strip() for part in re.split(r"\+(?![^()]*\))", text)]
+    if len(parts) == 1 and not _is_effect(text):
+        raise UnknownNameError("model", text, known)
+    specs: list[str] = []
+    for part in parts:
+        if not part:
+            raise InputError(f"model {text!r}: a part is empty; write models and effects between +")
+        if part not in MODELS and not _is_effect(part):
+            raise UnknownNameError("model or effect", part, (*MODELS, *effect_names()))
+        specs += MODELS.get(part, (part,))
+    return _composed(specs, text)
+
+
+def composition_name(effects: Sequence[Effect]) -> str:
+    """Name of a composition: the longest registered model that it begins with, and the rest.
+
+    The same effects with the same settings in the same order always have one name, which
+    `get_model` takes.
+    """
+    specs = tuple(effect.spec for effect in effects)
+    begins = [name for name, own in MODELS.items() if specs[: len(own)] == own]
+    base = max(begins, key=lambda name: len(MODELS[name]), default=None)
+    if base is None:
+        return "+".join(specs)
+    return "+".join((base, *specs[len(MODELS[base]) :]))
+
+
+@cache
+def compose(name: str, effects: tuple[str, ...]) -> SensorModel:
+    """Compose a model of effects; the same model, traced once, for the same arguments."""
+    return SensorModel.of(name, effects)
+
+
+def _is_effect(text: str) -> bool:
+    return re.split(r"[(\[\s]", text)[0] in effect_names()
+
+
+def _composed(specs: Sequence[str], source: str) -> SensorModel:
+    """Compose a model and name it."""
+    effects = [get_effect(spec) for spec in specs]
+    names = [effect.name for effect in effects]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise InputError(f"model {source!r}: the effect {twice[0]!r} is in it twice")
+    return compose(composition_name(effects), tuple(effect.spec for effect in effects))
+
+
+def _model_of_file(path: str, name: str | None) -> SensorModel:
+    """Model of a YAML file: the one under `models`, or the one of these that is asked for.
+
+    A file without `models` that simulates a sensor of certain effects has the model of that sensor:
+    so a diagnosis that added nothing writes its base model.
+    """
+    # The package of the configuration needs the models of this module.
+    from accelstudy.files.layers import read_layer
+
+    content = read_layer(path)
+    models: Any = content.get("models") or {}
+    if not isinstance(models, Mapping):
+        raise InputError(f"{path}: models: must be a mapping of names to lists of effects")
+    if name is None and not models and isinstance(content.get("simulated_effects"), list):
+        key, effects = "simulated_effects", content["simulated_effects"]
+    elif name is None and len(models) == 1:
+        ((only, effects),) = models.items()
+        key = f"models.{only}"
+    elif name in models:
+        key, effects = f"models.{name}", models[name]
+    elif not models:
+        raise InputError(f"{path}: no model in it; expected `models:` with a name and its effects")
+    elif name is not None:
+        raise InputError(f"{path}: no model {name!r} in it; it has {', '.join(map(str, models))}")
+    else:
+        raise InputError(
+            f"{path}: several models ({', '.join(map(str, models))}); write which one after a "
+            f"colon, as {path}:{next(iter(models))}"
+        )
+    effects = [effects] if isinstance(effects, str) else effects
+    if not isinstance(effects, list) or not effects or not all(isinstance(e, str) for e in effects):
+        raise InputError(f"{path}: {key}: must be a list of effects")
+    try:
+        return _composed(effects, str(name or key.removeprefix("models.")))
+    except InputError as error:
+        raise InputError(f"{path}: {key}: {error}") from None
+
+
+@dataclass(frozen=True)
+class Preset:
+    """One row of the paper's Table 1 (or one of the schemes a row names)."""
+
+    name: str
+    source: str
+    model: str
+    scheme: str
+
+
+_SIX_MODEL, _NINE_MODEL = "bias-scale", "bias-scale-nonorthogonality"
+_CROSS_AXIS = "bias-scale-nonorthogonality-crossaxis"
+
+PRESETS: tuple[Preset, ...] = (
+    Preset("loetters-1998", "[21] Lötters 1998", _SIX_MODEL, "faces-6"),
+    Preset("shin-2002", "[22] Shin & El-Sheimy 2002", _NINE_MODEL, "faces-edges-18"),
+    Preset("skog-2006", "[14] Skog & Händel 2006", _NINE_MODEL, "faces-edges-18"),
+    Preset("syed-2007", "[15] Syed 2007", _NINE_MODEL, "faces-edges-18"),
+    Preset("syed-2007-26", "[15] Syed 2007, 26", _NINE_MODEL, "faces-edges-corners-26"),
+    Preset("qureshi-2017", "[23] Qureshi 2017", _NINE_MODEL, "faces-edges-18"),
+    Preset("fong-2008-18", "[20] Fong 2008, 18", _CROSS_AXIS, "faces-edges-18"),
+    Preset("fong-2008-24", "[20] Fong 2008, 24", _CROSS_AXIS, "rings-24"),
+    Preset("zhang-2010", "[17] Zhang 2010", _NINE_MODEL, "d-optimal-9"),
+    Preset("cai-2013", "[24] Cai 2013", f"{_NINE_MODEL}-quadratic", "mclaren-24"),
+    Preset("tedaldi-2014-36", "[25, 26] Tedaldi 2014, 36", _NINE_MODEL, "fibonacci-36"),
+    Preset("tedaldi-2014-38", "[25, 26] Tedaldi 2014, 38", _NINE_MODEL, "xsens-38"),
+    Preset("tedaldi-2014-50", "[25, 26] Tedaldi 2014, 50", _NINE_MODEL, "fibonacci-50"),
+    Preset("lv-2017", "[19] Lv 2017", _CROSS_AXIS, "icosidodecahedron-30"),
+)
+"""Table 1 of Thalmann & Neuner (2018); the misalignment of [19] spans the cross-axis angles."""

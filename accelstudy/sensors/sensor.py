@@ -1,0 +1,398 @@
+"""Sensor models: compositions of effects, evaluated forwards and backwards.
+
+    f_a = T⁻¹ f_b,   T = I + Σ axes(p),      f_s = f_a + Σ output(f_a, p)
+
+With the effects bias, scale and non-orthogonality this is f_s = S T⁻¹ f_b + b (Thalmann & Neuner
+2018, eq. 5). The way back solves the second equation for f_a by Newton's method, so that an effect
+needs no inverse of its own, and has f_b = T f_a in closed form.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache, cached_property
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import ArrayLike, NDArray
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.tracing import TracedFunction, derivative, inverse, symbolic, symbols
+from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.effects import Effect, Hold, Parameter, get_effect
+from accelstudy.effects.hold_symbols import HoldSymbols
+
+
+@dataclass(frozen=True)
+class SensorModel:
+    """A named composition of effects.
+
+    Parameters
+    ----------
+    name : str
+    effects : tuple of Effect
+        No two of them share a parameter name.
+    """
+
+    name: str
+    effects: tuple[Effect, ...]
+
+    def __post_init__(self) -> None:
+        names = [parameter.name for parameter in self.parameters]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise InputError(
+                f"model {self.name!r}: parameters {', '.join(twice)} occur in two effects"
+            )
+
+    @classmethod
+    def of(cls, name: str, effects: Iterable[str]) -> SensorModel:
+        """Compose a model of registered effects by their names."""
+        return cls(name, tuple(get_effect(effect) for effect in effects))
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """All parameters, effect after effect."""
+        return tuple(p for effect in self.effects for p in effect.parameters)
+
+    @property
+    def n_parameters(self) -> int:
+        """Number of parameters u."""
+        return len(self.parameters)
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of all parameters."""
+        return tuple(p.name for p in self.parameters)
+
+    @property
+    def stays(self) -> NDArray[np.bool_]:
+        """Which parameters, (u,), the sensor takes along when it leaves the rig."""
+        return np.array([e.part == "sensor" for e in self.effects for _ in e.parameters], bool)
+
+    def vector(self, values: Mapping[str, float]) -> NDArray[np.float64]:
+        """Parameter vector (u,) in SI from a mapping; what it does not name is zero."""
+        return np.array([values.get(name, 0.0) for name in self.parameter_names], dtype=float)
+
+    @cached_property
+    def settings(self) -> NDArray[np.float64]:
+        """Numbers that shape the effects, (s,), effect after effect."""
+        return np.array([v for effect in self.effects for v in effect.shape.values()], dtype=float)
+
+    @property
+    def trace(self) -> SensorTrace:
+        """The model in symbols, and the functions generated from it."""
+        return trace_of(tuple(type(effect) for effect in self.effects))
+
+    @cached_property
+    def hold_columns(self) -> tuple[str, ...]:
+        """Columns of `Hold` on which the output of the sensor or the robot's reading depends."""
+        trace = self.trace
+        readings = trace.reading_errors(trace.force[:2])
+        used = sp.Matrix([*trace.h, *trace.t_matrix, *readings]).free_symbols
+        names = {name for name, symbol in trace.hold.items() if symbol in used}
+        for tau, symbol in zip(trace.lags(self.settings), trace.lagged.values(), strict=True):
+            if symbol in used:
+                names |= {"temperature", "time"} if tau > 0 else {"temperature"}
+        return tuple(name for name in trace.hold if name in names)
+
+    def sense(
+        self,
+        f_b: ArrayLike,
+        parameters: ArrayLike,
+        g: ArrayLike = STANDARD_GRAVITY,
+        hold: Hold | None = None,
+    ) -> NDArray[np.float64]:
+        """Output of the sensor for a specific force in the body frame (forward, no noise).
+
+        Parameters
+        ----------
+        f_b : (..., n, 3) array, m/s²
+        parameters : (..., u) array, SI
+        g : float or (...) array, local gravity, m/s²
+        hold : Hold, optional
+            What else is known of the n positions; only effects that depend on it need it.
+
+        Returns
+        -------
+        f_s : (..., n, 3) array, m/s²
+        """
+        return self._apply(self.trace.sense, f_b, parameters, g, hold)
+
+    def correct(
+        self,
+        f_s: ArrayLike,
+        parameters: ArrayLike,
+        g: ArrayLike = STANDARD_GRAVITY,
+        hold: Hold | None = None,
+    ) -> NDArray[np.float64]:
+        """Specific force in the body frame for a sensor output: the inverse of `sense`.
+
+        Parameters and result as in `sense`, with f_s and f_b exchanged. Where the Newton iteration
+        does not converge (effects as large as the signal) the result is NaN.
+        """
+        f_a = self.sensitive_force(f_s, parameters, g, hold)
+        return self._apply(self.trace.body, f_a, parameters, g, hold)
+
+    def correction_jacobian(
+        self,
+        f_s: ArrayLike,
+        parameters: ArrayLike,
+        g: ArrayLike = STANDARD_GRAVITY,
+        hold: Hold | None = None,
+    ) -> NDArray[np.float64]:
+        """Derivative of `correct` with respect to the parameters, (..., n, 3, u)."""
+        return self._corrected_by(self.trace.body_jacobian, f_s, parameters, g, hold)
+
+    def output_jacobian(
+        self,
+        f_s: ArrayLike,
+        parameters: ArrayLike,
+        g: ArrayLike = STANDARD_GRAVITY,
+        hold: Hold | None = None,
+    ) -> NDArray[np.float64]:
+        """Derivative of `correct` with respect to the sensor's output, (..., n, 3, 3)."""
+        return self._corrected_by(self.trace.output_jacobian, f_s, parameters, g, hold)
+
+    def _corrected_by(
+        self,
+        derivatives: TracedFunction,
+        f_s: ArrayLike,
+        parameters: ArrayLike,
+        g: ArrayLike,
+        hold: Hold | None,
+    ) -> NDArray[np.float64]:
+        f_a = np.moveaxis(self.sensitive_force(f_s, parameters, g, hold), -1, 0)
+        x = np.moveaxis(np.asarray(parameters, dtype=float), -1, 0)
+        jacobian = self.trace.evaluate(
+            derivatives, f_a, f_a, x, self.settings, np.asarray(g, dtype=float), hold
+        )
+        return np.moveaxis(jacobian, (0, 1), (-2, -1))
+
+    def sensitive_force(
+        self,
+        f_s: ArrayLike,
+        parameters: ArrayLike,
+        g: ArrayLike = STANDARD_GRAVITY,
+        hold: Hold | None = None,
+    ) -> NDArray[np.float64]:
+        """Specific force in the sensitive axes, f_a, for a sensor output; else as `correct`."""
+        f_s = np.asarray(f_s, dtype=float)
+        batch = np.broadcast_shapes(f_s.shape[:-2], np.shape(parameters)[:-1])
+        f_a = np.broadcast_to(f_s, batch + f_s.shape[-2:])
+        step = np.zeros_like(f_a)
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            for _ in range(25):
+                step = self._apply(self.trace.newton_step, f_a, parameters, g, hold, f_s)
+                f_a = f_a + step
+                if not np.any(np.abs(step) > 1e-14 * STANDARD_GRAVITY):
+                    break
+        return np.where(np.abs(step) <= 1e-12 * STANDARD_GRAVITY, f_a, np.nan)
+
+    def axes_matrix(self, parameters: ArrayLike) -> NDArray[np.float64]:
+        """Return T, (3, 3), which turns forces in the sensitive axes into the body frame."""
+        return self._apply(self.trace.body, np.eye(3), parameters, STANDARD_GRAVITY, None).T
+
+    def reading_errors(
+        self, angles: ArrayLike, parameters: ArrayLike, hold: Hold | None = None
+    ) -> NDArray[np.float64]:
+        """Return what the effects add to a robot's reading of roll and pitch.
+
+        Effects are functions of what the robot reads, as in the adjustment, so the reading r of an
+        attitude a is the solution of r = a + e(r).
+
+        Parameters
+        ----------
+        angles : (n, 2) array, rad, roll and pitch of the attitude
+        parameters : (u,) array, SI
+        hold : Hold, optional
+
+        Returns
+        -------
+        (n, 2) array, rad
+        """
+        angles = np.asarray(angles, dtype=float)
+        errors = np.zeros_like(angles)
+        for _ in range(10):  # each gains as many digits as the relative errors are small
+            before, errors = errors, self.errors_of_reading(angles + errors, parameters, hold)
+            if np.array_equal(before, errors):
+                break
+        return errors
+
+    def errors_of_reading(
+        self, reading: NDArray[np.float64], parameters: ArrayLike, hold: Hold | None = None
+    ) -> NDArray[np.float64]:
+        """Return the errors (..., n, 2) of a reading (..., n, 2); see `reading_errors`."""
+        padded = np.concatenate([reading, np.zeros_like(reading[..., :1])], axis=-1)
+        return self._apply(self.trace.reading, padded, parameters, STANDARD_GRAVITY, hold)
+
+    def _apply(
+        self,
+        function: TracedFunction,
+        force: ArrayLike,
+        parameters: ArrayLike,
+        g: ArrayLike,
+        hold: Hold | None,
+        output: ArrayLike | None = None,
+    ) -> NDArray[np.float64]:
+        """Call a function of the trace, of vectors, components last: (..., n, 3) in and out."""
+        force = np.moveaxis(np.asarray(force, dtype=float), -1, 0)
+        output = force if output is None else np.moveaxis(np.asarray(output, dtype=float), -1, 0)
+        parameters = np.moveaxis(np.asarray(parameters, dtype=float), -1, 0)
+        g = np.asarray(g, dtype=float)
+        result = self.trace.evaluate(function, force, output, parameters, self.settings, g, hold)
+        return np.moveaxis(result[:, 0], 0, -1)
+
+
+class SensorTrace:
+    """A composition of kinds of effects evaluated with symbols, those of their settings included.
+
+    Attributes
+    ----------
+    force, output, p, settings, g : the symbols of a force, of the output, of the parameters, of the
+        numbers that shape the effects and of gravity
+    t_matrix : Matrix (3, 3), T
+    h : list of 3 expressions, f_s as a function of f_a
+    """
+
+    def __init__(self, kinds: tuple[type[Effect], ...]) -> None:
+        self.force = symbols("f_x", "f_y", "f_z")
+        self.output = symbols("l_x", "l_y", "l_z")
+        (self.g,) = symbols("g")
+        self._hold = HoldSymbols("hold_")
+        effects = [_in_symbols(kind) for kind in kinds]
+        parameters = [symbols(*(q.name for q in effect.parameters)) for effect in effects]
+        self._effects = list(zip(effects, parameters, strict=True))
+        self.p = tuple(symbol for own in parameters for symbol in own)
+        self.settings = tuple(symbol for effect in effects for symbol in effect.shape.values())
+
+        self.t_matrix = sp.eye(3)
+        self.h = list(self.force)
+        for effect, p in self._effects:
+            self.t_matrix += sp.Matrix(effect.axes(p, symbolic))
+            added = effect.output(self.force, p, self.g, self._hold, symbolic)
+            self.h = [a + b for a, b in zip(self.h, added, strict=True)]
+
+    @property
+    def hold(self) -> dict[str, sp.Symbol]:
+        """Symbols of the columns of `Hold`."""
+        return self._hold.columns
+
+    @property
+    def lagged(self) -> dict[sp.Symbol, sp.Symbol]:
+        """Symbols of temperatures behind a lag, by that of the lag."""
+        return self._hold.lagged_by
+
+    def lags(self, settings: NDArray[np.float64]) -> list[float]:
+        """Lags of the temperatures of `lagged`, of settings (s,)."""
+        values = dict(zip(self.settings, settings, strict=True))
+        return [float(values[tau]) for tau in self.lagged]
+
+    def reading_errors(self, angles: tuple[Any, Any]) -> tuple[Any, Any]:
+        """Sum of what the effects add to the robot's reading of roll and pitch."""
+        total: tuple[Any, Any] = (sp.S.Zero, sp.S.Zero)
+        for effect, p in self._effects:
+            added = effect.reading(angles, p, self._hold, symbolic)
+            total = (total[0] + added[0], total[1] + added[1])
+        return total
+
+    @property
+    def arguments(self) -> tuple[sp.Symbol, ...]:
+        """Symbols in the order in which generated functions take them."""
+        known = (*self.hold.values(), *self.lagged.values())
+        return (*self.force, *self.output, *self.p, *self.settings, self.g, *known)
+
+    def evaluate(
+        self,
+        function: TracedFunction,
+        force: NDArray[np.float64],
+        output: NDArray[np.float64],
+        parameters: NDArray[np.float64],
+        settings: NDArray[np.float64],
+        g: NDArray[np.float64],
+        hold: Hold | None,
+        *more: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """Call a generated function, components first.
+
+        force, output : (3, ..., n); parameters : (u, ...); settings : (s,); g : (...); more :
+        (..., n), arguments of the function beyond `arguments`. Returns (rows, columns, ..., n).
+        """
+        hold = hold or Hold()
+        columns = [
+            hold.column(name) if symbol in function.used else 0.0
+            for name, symbol in self.hold.items()
+        ]
+        columns += [
+            hold.lagged(tau) if symbol in function.used else 0.0
+            for tau, symbol in zip(self.lags(settings), self.lagged.values(), strict=True)
+        ]
+        shape = np.broadcast_shapes(force.shape[1:], (*parameters.shape[1:], 1), (*g.shape, 1))
+        x = (*parameters[..., None], *settings)
+        return function(shape, *force, *output, *x, g[..., None], *columns, *more)
+
+    @cached_property
+    def sense(self) -> TracedFunction:
+        """f_s of f_b."""
+        f_a = inverse(self.t_matrix) * sp.Matrix(self.force)
+        at = dict(zip(self.force, f_a, strict=True))
+        h = [sp.sympify(e).subs(at, simultaneous=True) for e in self.h]
+        return TracedFunction(self.arguments, sp.Matrix(h))
+
+    @cached_property
+    def reading(self) -> TracedFunction:
+        """Errors of the robot's reading, with roll and pitch in place of the first two forces."""
+        return TracedFunction(self.arguments, sp.Matrix(self.reading_errors(self.force[:2])))
+
+    @cached_property
+    def h_inverse(self) -> sp.Matrix:
+        """(∂f_s/∂f_a)⁻¹, (3, 3)."""
+        return inverse(derivative(self.h, self.force))
+
+    @cached_property
+    def body_by_output(self) -> sp.Matrix:
+        """∂f_b/∂f_s = T H⁻¹, (3, 3), as a function of f_a."""
+        return self.t_matrix * self.h_inverse
+
+    def body_by(self, parameters: tuple[sp.Symbol, ...]) -> sp.Matrix:
+        """∂f_b/∂x at a given output, (3, u), as a function of f_a."""
+        f_b = self.t_matrix * sp.Matrix(self.force)
+        return derivative(f_b, parameters) - self.body_by_output * derivative(self.h, parameters)
+
+    @cached_property
+    def body_jacobian(self) -> TracedFunction:
+        """∂f_b/∂x for the parameters of the model, generated."""
+        return TracedFunction(self.arguments, self.body_by(self.p))
+
+    @cached_property
+    def output_jacobian(self) -> TracedFunction:
+        """∂f_b/∂f_s, generated."""
+        return TracedFunction(self.arguments, self.body_by_output)
+
+    @cached_property
+    def newton_step(self) -> TracedFunction:
+        """What to add to f_a so that the model's output comes closer to l."""
+        misfit = sp.Matrix(self.output) - sp.Matrix(self.h)
+        return TracedFunction(self.arguments, self.h_inverse * misfit)
+
+    @cached_property
+    def body(self) -> TracedFunction:
+        """f_b of f_a."""
+        return TracedFunction(self.arguments, self.t_matrix * sp.Matrix(self.force))
+
+
+@cache
+def trace_of(kinds: tuple[type[Effect], ...]) -> SensorTrace:
+    """Return the trace of effects of some kinds; it takes a fraction of a second, so once."""
+    return SensorTrace(kinds)
+
+
+def _in_symbols(kind: type[Effect]) -> Effect:
+    """Effect of a kind whose settings are symbols."""
+    effect = kind()
+    names = tuple(effect.shape)
+    values = symbols(*(f"{effect.name}_{name}" for name in names))
+    effect.shape = dict(zip(names, values, strict=True))
+    return effect

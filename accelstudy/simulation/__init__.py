@@ -1,0 +1,1 @@
+"""Simulated sessions: noise, observations, and when and how warm each hold is."""

@@ -1,0 +1,137 @@
+"""Simulated calibration sessions: the observations of R replicates of one set-up."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.adjustment import Observations
+from accelstudy.basics.units import MGON, STANDARD_GRAVITY
+from accelstudy.effects import Hold
+from accelstudy.leveling.angles import roll_pitch
+from accelstudy.noise_effects import get_noise_effect
+from accelstudy.sensors.sensor import SensorModel
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Noise:
+    """The stochastic model of a session.
+
+    Parameters
+    ----------
+    sigma_force : float, m/s², of the mean of one position, per axis
+    sigma_angle : float, rad, of the robot's roll and of its pitch
+    sigma_gravity : float, m/s², of the value of gravity; 0 holds it fixed in the adjustment
+    gravity_error : float, m/s², by which the value of gravity is wrong, besides its noise
+    effects : tuple of str, noise effects of the forces in the order in which they work
+    """
+
+    sigma_force: float = 0.002
+    sigma_angle: float = 3.2 * MGON
+    sigma_gravity: float = 0.0
+    gravity_error: float = 0.0
+    effects: tuple[str, ...] = ()
+
+
+def sigma_of_mean(sigma_sample: float, rate: float, duration: float) -> float:
+    """Return the sd of the mean of a position from white noise per sample.
+
+    Parameters
+    ----------
+    sigma_sample : float, m/s²
+    rate : float, Hz
+    duration : float, s
+    """
+    return sigma_sample / math.sqrt(max(1, round(rate * duration)))
+
+
+@dataclass(frozen=True)
+class Session:
+    """A session before noise: what an ideal measurement of the sensor in the scheme would give.
+
+    Parameters
+    ----------
+    f_b : (n, 3) array, m/s², specific force in the body frame
+    forces : (n, 3) array, m/s², sensor output without noise
+    angles : (n, 2) array, rad, reading of the robot without noise
+    gravity : float, m/s²
+    hold : Hold
+    """
+
+    f_b: Array
+    forces: Array
+    angles: Array
+    gravity: float
+    hold: Hold
+
+    def observations(self, noise: Noise) -> Observations:
+        """Return the session as it would be observed without any noise, R = 1."""
+        return Observations(
+            forces=self.forces[None],
+            sigma_force=noise.sigma_force,
+            angles=self.angles[None],
+            sigma_angle=noise.sigma_angle,
+            gravity=np.array([self.gravity + noise.gravity_error]),
+            sigma_gravity=noise.sigma_gravity,
+            hold=self.hold,
+        )
+
+    def draw(
+        self, noise: Noise, replicates: int, rng: np.random.Generator, angles: bool = True
+    ) -> Observations:
+        """Draw the observations of `replicates` sessions.
+
+        The draws are made in a fixed order (forces, angles, gravity, then what noise effects draw)
+        whatever is used of them; without `angles`, the readings of the robot are not drawn where
+        nothing follows them. The adjustment knows nothing of the noise effects.
+        """
+        n = len(self.forces)
+        error = noise.sigma_force * rng.standard_normal((replicates, n, 3))
+        read = None
+        gravity = np.full(replicates, self.gravity + noise.gravity_error)
+        if angles or noise.sigma_gravity > 0 or noise.effects:
+            read = self.angles + noise.sigma_angle * rng.standard_normal((replicates, n, 2))
+            gravity += noise.sigma_gravity * rng.standard_normal(replicates)
+        effects = [get_noise_effect(spec) for spec in noise.effects]
+        for effect in effects:
+            error = effect.disturb(error, noise.sigma_force, self.hold, rng)
+        forces = self.forces + error
+        for effect in effects:
+            forces = effect.read(forces)
+        return replace(self.observations(noise), forces=forces, angles=read, gravity=gravity)
+
+
+def session(
+    model: SensorModel,
+    parameters: Array,
+    directions: Array,
+    gravity: float = STANDARD_GRAVITY,
+    hold: Hold | None = None,
+) -> Session:
+    """Simulate a session without noise.
+
+    Parameters
+    ----------
+    model : SensorModel, with all effects that the simulated sensor has
+    parameters : (u,) array, SI
+    directions : (n, 3) array of unit vectors, gravity in the body frame (f_b = −g · direction)
+    gravity : float, m/s²
+    hold : Hold, optional
+        Columns that the simulation cannot derive from the directions (temperature, time, …).
+    """
+    f_b = -gravity * np.asarray(directions, dtype=float)
+    roll, pitch = roll_pitch(tuple(f_b.T))
+    known = replace(hold or Hold(), roll=roll, pitch=pitch).with_steps(f_b)
+    angles = np.stack([roll, pitch], axis=-1)
+    return Session(
+        f_b=f_b,
+        forces=model.sense(f_b, parameters, gravity, known),
+        angles=angles + model.reading_errors(angles, parameters, known),
+        gravity=gravity,
+        hold=known,
+    )

@@ -1,0 +1,236 @@
+"""Cells: the combinations of model, scheme, approach and noise that a study simulates."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, replace
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from accelstudy.approaches import Approach, approach_names, get_approach
+from accelstudy.basics.units import MGON
+from accelstudy.effects import Hold, get_effect
+from accelstudy.noise_effects import get_noise_effect
+from accelstudy.schemes import Scheme, get_scheme, scheme_names
+from accelstudy.schemes.files import held
+from accelstudy.sensors.models import compose, get_model
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.simulation.hold_plan import HoldPlan
+from accelstudy.simulation.sessions import Noise
+from accelstudy.study.cells.compiling import with_compiled
+
+if TYPE_CHECKING:
+    from accelstudy.study.config import Grid, StudyConfig
+
+BLOCK = 500
+"""Replicates that are drawn and adjusted together, from one seed; small enough for the cache."""
+CHUNK = 20
+"""Blocks that are held, summed up and written together: memory follows it, not the count."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One set-up, complete in itself.
+
+    Parameters
+    ----------
+    name : str, unique within the study
+    model : str, name of the model that is estimated
+    effects : tuple of str, its effects
+    simulated_effects : tuple of str, the effects of the simulated sensor
+    scheme, approach : str
+    replicates : int
+    noise : Noise
+    gravity : float, true local gravity, m/s²
+    truth : dict of parameter name to true value, SI
+    holds : HoldPlan, conditions of the holds
+    directions : tuple of (x, y, z), of a scheme that was read from a file; None of any other
+    compiled : bool, whether compiled code calibrates it; see `accelstudy.study.cells.compiling`
+    """
+
+    name: str
+    model: str
+    effects: tuple[str, ...]
+    simulated_effects: tuple[str, ...]
+    scheme: str
+    approach: str
+    replicates: int
+    noise: Noise
+    gravity: float
+    truth: dict[str, float]
+    holds: HoldPlan
+    compiled: bool = False
+    directions: tuple[tuple[float, ...], ...] | None = None
+
+    @property
+    def estimated_model(self) -> SensorModel:
+        """The model of the adjustment."""
+        return compose(self.model, self.effects)
+
+    @property
+    def simulated_model(self) -> SensorModel:
+        """The model of the simulated sensor."""
+        if self.simulated_effects == self.effects:
+            return self.estimated_model
+        return compose("simulated", self.simulated_effects)
+
+    @property
+    def positions(self) -> Scheme:
+        """The scheme."""
+        if self.directions is None:
+            return get_scheme(self.scheme)
+        return Scheme(self.scheme, self.scheme, np.array(self.directions), "generated", "")
+
+    @property
+    def conditions(self) -> Approach:
+        """The approach."""
+        return get_approach(self.approach)
+
+    @property
+    def hold(self) -> Hold:
+        """What is known of the holds, without what follows from their attitudes."""
+        return self.holds.hold(self.positions.n_positions)
+
+    @property
+    def parameter_units(self) -> dict[str, str]:
+        """SI unit of each parameter that is estimated; gravity is the last one if observed."""
+        units = {p.name: p.unit for p in self.estimated_model.parameters}
+        return {**units, "g": "m/s^2"} if self.noise.sigma_gravity > 0 else units
+
+    @property
+    def n_blocks(self) -> int:
+        """Number of blocks; the last one may have fewer replicates."""
+        return -(-self.replicates // BLOCK)
+
+    @property
+    def n_chunks(self) -> int:
+        """Number of chunks; the last one may have fewer blocks."""
+        return -(-self.n_blocks // CHUNK)
+
+    def seed(self, seed: int, block: int) -> np.random.SeedSequence:
+        """Seed of one block of replicates.
+
+        It depends on the study's seed, on what the cell is and on the block, so that no other cell
+        and no other block changes it.
+        """
+        identity = [
+            list(self.effects),
+            list(self.simulated_effects),
+            self.scheme,
+            self.approach,
+            # What a set-up does without is not part of it, so that new things leave old seeds be.
+            {key: value for key, value in asdict(self.noise).items() if value != ()},
+        ]
+        holds = replace(self.holds, seed=HoldPlan().seed)
+        if holds != HoldPlan():
+            identity.append(asdict(holds))
+        digest = hashlib.sha256(json.dumps(identity).encode()).digest()
+        words = np.frombuffer(digest, dtype="<u4").tolist()
+        return np.random.SeedSequence([seed, *words], spawn_key=(block,))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data, from which `from_dict` makes the cell again."""
+        data = json.loads(json.dumps(asdict(self)))
+        # What few set-ups have is no part of the others, so that their results stay up to date.
+        return {key: value for key, value in data.items() if value is not None}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Cell:
+        """Make a cell of plain data."""
+        return cls(
+            **{
+                **data,
+                "effects": tuple(data["effects"]),
+                "simulated_effects": tuple(data["simulated_effects"]),
+                "noise": Noise(**_tuples(data["noise"])),
+                "holds": HoldPlan(**_tuples(data["holds"])),
+                "directions": _rows(data.get("directions")),
+            }
+        )
+
+
+def _tuples(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Plain data with tuples for lists."""
+    return {k: tuple(v) if isinstance(v, list) else v for k, v in data.items()}
+
+
+def _rows(data: Any) -> tuple[tuple[float, ...], ...] | None:
+    return None if data is None else tuple(map(tuple, data))
+
+
+def study_cells(study: StudyConfig) -> list[Cell]:
+    """All cells of a study, in the order of its configuration, without repetition.
+
+    A cell that occurs more than once (as a Table 1 row and in a grid, say) runs once, with the
+    largest number of replicates.
+    """
+    cells: dict[str, Cell] = {}
+    for grid in study.all_grids:
+        for cell in _grid_cells(study, grid):
+            known = cells.get(cell.name)
+            if known is None or cell.replicates > known.replicates:
+                cells[cell.name] = cell
+    return with_compiled(list(cells.values()))
+
+
+def _grid_cells(study: StudyConfig, grid: Grid) -> Iterable[Cell]:
+    noise = study.noise
+    schemes = scheme_names() if grid.schemes == ["all"] else grid.schemes
+    approaches = approach_names() if grid.approaches == ["all"] else grid.approaches
+    for model, scheme, approach, sensor, robot, gravity, error in product(
+        study.model_names(grid.models),
+        schemes,
+        approaches,
+        grid.sensor_sigma_mps2 or [noise.sensor.sigma_mps2],
+        grid.robot_sigma_mgon or [noise.robot.sigma_mgon],
+        grid.gravity_sigma_mps2 or [noise.gravity.sigma_mps2],
+        grid.gravity_error_mps2 or [noise.gravity.error_mps2],
+    ):
+        uses_angles = get_approach(approach).uses_angles
+        if not uses_angles:  # the same cell whatever the robot's accuracy
+            robot = noise.robot.sigma_mgon
+        settings = {
+            "sensor_sigma_mps2": (sensor, noise.sensor.sigma_mps2),
+            "robot_sigma_mgon": (robot, noise.robot.sigma_mgon),
+            "gravity_sigma_mps2": (gravity, noise.gravity.sigma_mps2),
+            "gravity_error_mps2": (error, noise.gravity.error_mps2),
+        }
+        changed = [
+            f"{key}={_shown(value)}" for key, (value, usual) in settings.items() if value != usual
+        ]
+        effects = tuple(e.spec for e in get_model(model, study.models).effects)
+        simulated = (
+            effects
+            if study.simulated_effects == ["model"]
+            else tuple(get_effect(e).spec for e in study.simulated_effects)
+        )
+        yield Cell(
+            name="/".join([model, scheme, approach, *changed]),
+            model=model,
+            effects=effects,
+            simulated_effects=simulated,
+            scheme=scheme,
+            approach=approach,
+            replicates=grid.replicates,
+            noise=Noise(
+                study.position_sigma(sensor),
+                robot * MGON if uses_angles else 0.0,
+                gravity,
+                error,
+                tuple(get_noise_effect(spec).spec for spec in noise.effects),
+            ),
+            gravity=study.gravity_mps2,
+            truth=study.truth(dict.fromkeys([*effects, *simulated])),
+            holds=study.hold_plan,
+            directions=_rows((held(scheme) or {}).get("directions")),
+        )
+
+
+def _shown(value: float) -> str:
+    """Show a number briefly, but never two numbers alike."""
+    short = f"{value:g}"
+    return short if float(short) == value else repr(value)

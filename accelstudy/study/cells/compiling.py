@@ -1,0 +1,84 @@
+"""Which cells of a study are calibrated by compiled code, and which by NumPy.
+
+Both give the same numbers to rounding, 1e-10 of a standard deviation or less, but not the same
+bits. So that a study has the same bits however it is run, the choice is made once, when its cells
+are planned, and is a part of each cell: it depends on the configuration and on whether the compiler
+is installed, and never on batches, on cores or on what is compiled already. It goes into the
+parameters of the jobs, so Snakemake runs a cell again when it changes. A job that is to compile and
+has no compiler ends with an error.
+
+A cell is compiled where the calibrations of all cells that share its code take NumPy longer than
+the compiler takes, were it to start from nothing.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import replace
+from importlib.util import find_spec
+from typing import TYPE_CHECKING
+
+from accelstudy.adjustment.block import Block
+from accelstudy.adjustment.calibration import Observations, calibrate
+from accelstudy.approaches import Approach
+from accelstudy.basics.errors import InputError
+from accelstudy.sensors.sensor import SensorModel
+
+if TYPE_CHECKING:
+    from accelstudy.study.cells.cell import Cell
+
+POSITIONS_PER_PARAMETER = 50_000
+"""Positions, of all calibrations together, per parameter that pay for compilation.
+
+Measured on one core of a virtual x86-64 server of 2026: to compile takes 0.5 s for 9 parameters and
+1.3 s for 15, and a position takes NumPy 0.8 µs and 2.3 µs by gravity, 1.9 µs and 3 µs with a robot.
+"""
+
+
+def installed() -> bool:
+    """Whether the compiler is there: the extra `kernel` of the package."""
+    return find_spec("llvmlite") is not None
+
+
+def with_compiled(cells: Sequence[Cell]) -> list[Cell]:
+    """Say of the cells of a study which are compiled."""
+    if not installed():
+        return list(cells)
+    positions: Counter[Hashable] = Counter()
+    for cell in cells:
+        positions[_code(cell)] += cell.replicates * cell.positions.n_positions
+    return [
+        replace(cell, compiled=positions[_code(cell)] >= POSITIONS_PER_PARAMETER * _unknowns(cell))
+        for cell in cells
+    ]
+
+
+def calibrator(cell: Cell) -> Callable[[SensorModel, Approach, Observations], Block]:
+    """Return what calibrates the replicates of a cell.
+
+    Raises
+    ------
+    InputError
+        If the cell is compiled, and there is no compiler.
+    """
+    if not cell.compiled:
+        return lambda *problem: Block.of(calibrate(*problem))
+    if not installed():
+        raise InputError(
+            f"{cell.name}: is to be compiled, as where the study was planned, but llvmlite is not "
+            "installed here: install accelstudy[kernel], or plan the study without it"
+        )
+    from accelstudy.kernel import calibrate as kernel  # loads the compiler
+
+    return kernel.calibrate
+
+
+def _unknowns(cell: Cell) -> int:
+    return cell.estimated_model.n_parameters + (cell.noise.sigma_gravity > 0)
+
+
+def _code(cell: Cell) -> Hashable:
+    """What the code depends on: settings of effects, for one, are arguments."""
+    kinds = tuple(type(effect) for effect in cell.estimated_model.effects)
+    return kinds, cell.approach, cell.noise.sigma_gravity > 0

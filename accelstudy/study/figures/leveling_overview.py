@@ -1,0 +1,128 @@
+"""Which model, scheme and approach leaves which tilt error."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
+from numpy.typing import NDArray
+
+from accelstudy.basics.units import display_unit, to_display
+from accelstudy.drawing.style import (
+    FULL,
+    HATCH,
+    INK,
+    MISSING,
+    Style,
+    log_ticks,
+    model_title,
+    new_figure,
+    say_empty,
+    shown,
+)
+from accelstudy.schemes import get_scheme
+from accelstudy.study.config import StudyConfig
+from accelstudy.study.figures.entries import Tables
+
+Array = NDArray[np.float64]
+
+ANGLES = ("roll", "pitch")
+ROW_MM = 6.0
+NOT_ESTIMABLE: Style = {
+    "facecolor": MISSING,
+    "edgecolor": "#999999",
+    "hatch": HATCH,
+    "linewidth": 0,
+}
+
+
+def tilt_errors(tables: Tables, study: StudyConfig) -> Figure:
+    """Matrices of scheme × model, one for each angle and approach, with the rms and its q95."""
+    table = _with_tilt(tables["cells"], tables["leveling"])
+    schemes = sorted(set(table["scheme"]), key=lambda name: (get_scheme(name).n_positions, name))
+    models = list(dict.fromkeys(table["model"]))
+    approaches = list(dict.fromkeys(table["approach"]))
+    known = table[[f"{angle}_rms" for angle in ANGLES]].to_numpy(float)
+    known = known[np.isfinite(known)]
+    norm = LogNorm(*np.quantile(known, (0, 0.97))) if len(known) else LogNorm(1, 10)
+    unit = display_unit("rad")
+    one_reading = float(to_display(study.sigma_force / study.gravity_mps2, "rad"))
+
+    fig = new_figure(FULL, 62 + 2 * ROW_MM * max(len(schemes), 4))
+    axes = fig.subplots(2, len(approaches), sharex=True, sharey=True, squeeze=False)
+    image = None
+    for row, angle in zip(axes, ANGLES, strict=True):
+        for ax, approach in zip(row, approaches, strict=True):
+            its = table[table["approach"] == approach]
+            rms, q95 = (
+                its.pivot_table(f"{angle}_{what}", "scheme", "model", dropna=False)
+                .reindex(index=schemes, columns=models)
+                .to_numpy(float)
+                for what in ("rms", "q95")
+            )
+            image = _draw_matrix(ax, rms, q95, norm)
+            for scheme, model in zip(its["scheme"], its["model"], strict=True):
+                i, j = schemes.index(scheme), models.index(model)
+                if not np.isfinite(rms[i, j]):
+                    ax.add_patch(Rectangle((j - 0.5, i - 0.5), 1, 1, **NOT_ESTIMABLE))
+            ax.set_title(f"{angle}, {approach}")
+    axes[0, 0].set_yticks(range(len(schemes)), [get_scheme(name).title for name in schemes])
+    axes[0, 0].set_xticks(range(len(models)), [model_title(name) for name in models])
+    for ax in axes[-1]:
+        ax.tick_params(axis="x", rotation=90)
+    if image is not None and len(known):
+        label = f"tilt error (rms) / {unit}"
+        bar = fig.colorbar(image, ax=axes, label=label, pad=0.02, aspect=50, extend="max")
+        log_ticks(bar.ax.yaxis, float(norm.vmin or 1), float(norm.vmax or 10))
+    text: Style = {"linestyle": "", "marker": ""}
+    noise = f"{study.sigma_force * 1e3:.3g} mm/s²"
+    labels = [
+        f"upper number: rms / {unit}; lower number: what 95 % of the calibrations stay below",
+        f"not in it: the noise of a single reading, at {noise} and level {one_reading:.1f} {unit}",
+    ]
+    fig.legend(
+        handles=[
+            *[Line2D([], [], **text, label=label) for label in labels],
+            Patch(**NOT_ESTIMABLE, label="not estimable"),
+        ],
+        loc="outside lower center",
+    )
+    return fig
+
+
+def _with_tilt(cells: pd.DataFrame, leveling: pd.DataFrame) -> pd.DataFrame:
+    """Cells with the rms of each angle and its 95 % quantile as shown, NaN where there is none."""
+    found = leveling.set_index("cell") if len(leveling) else pd.DataFrame()
+    columns = {}
+    for angle in ANGLES:
+        for what, name in (("rms", "rms"), ("q95", "rms_q95")):
+            values = cells["cell"].map(found.get(f"{angle}_{name}_mgon", {})).astype(float)
+            columns[f"{angle}_{what}"] = shown(values, "mgon")[0]
+    return cells.assign(**columns)
+
+
+def _draw_matrix(ax: Axes, rms: Array, q95: Array, norm: LogNorm) -> AxesImage:
+    image = ax.imshow(rms, norm=norm, cmap="viridis_r", aspect="auto", interpolation="none")
+    ax.grid(False)
+    ax.tick_params(length=0)
+    ax.spines[:].set_visible(False)
+    middle = np.sqrt(float(norm.vmin or 1) * float(norm.vmax or 1))
+    for i, j in np.argwhere(np.isfinite(rms)):
+        colour = "white" if rms[i, j] > middle else INK
+        for value, offset, size in ((rms[i, j], -0.2, 7), (q95[i, j], 0.24, 5.8)):
+            ax.text(
+                j, i + offset, _short(value), ha="center", va="center", fontsize=size, color=colour
+            )
+    if not np.isfinite(rms).any():
+        say_empty(ax)
+    return image
+
+
+def _short(value: float) -> str:
+    """One decimal below 100."""
+    return f"{value:.1f}" if value < 100 else f"{value:.0f}"

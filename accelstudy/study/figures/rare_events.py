@@ -1,0 +1,94 @@
+"""What happens once in thousands of calibrations and more: tails of tilt errors, and failures."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from accelstudy.basics.shares import clopper_pearson
+from accelstudy.basics.units import unit_label
+from accelstudy.drawing.style import (
+    FULL,
+    INK,
+    Style,
+    approach_colour,
+    approach_handles,
+    model_title,
+    new_figure,
+    say_empty,
+    shown,
+)
+from accelstudy.study.config import StudyConfig
+from accelstudy.study.figures.entries import Tables
+
+LINES: Style = {"roll": "-", "pitch": "--"}
+MOST = 3
+"""Set-ups whose tails are drawn; a panel each."""
+NONE: Style = {"linestyle": "", "marker": "v", "markersize": 4, "fillstyle": "none"}
+
+
+def rare_events(tables: Tables, study: StudyConfig) -> Figure:
+    """Tilt error over the share of calibrations that leave more, and shares that do not converge.
+
+    The tails are those of the set-ups with the least noise of the sensor.
+    """
+    cells, tilt = tables["cells"], tables["quantiles"]
+    tilt = tilt[(tilt["quantity"] == "tilt") & (tilt["probability"] >= 0.5)]
+    tilt = tilt[tilt["sensor_sigma_mps2"] == tilt["sensor_sigma_mps2"].min()]
+    setups = list(dict.fromkeys(zip(tilt["model"], tilt["scheme"], strict=True)))
+    fig = new_figure(FULL, 72)
+    *tails, failures = fig.subplots(1, max(len(setups[:MOST]), 1) + 1)
+    if not setups:
+        say_empty(tails[0])
+    for ax, (model, scheme) in zip(tails, setups, strict=False):
+        own = tilt[(tilt["model"] == model) & (tilt["scheme"] == scheme)]
+        _draw_tails(ax, own)
+        ax.set_title(f"{model_title(model)}, {scheme}")
+    _draw_failures(failures, cells[cells["n_replicates"] > 0])
+    left_out = len(setups[MOST:])
+    if left_out:
+        fig.text(0, 0, f"{left_out} more set-ups are not drawn; their numbers are in the tables.")
+    fig.legend(
+        handles=[
+            *approach_handles(dict.fromkeys(cells["approach"]), linestyle="-", marker=""),
+            *(Line2D([], [], color=INK, linestyle=its, label=name) for name, its in LINES.items()),
+            Line2D([], [], color=INK, label="none failed: 97.5 % limit", **NONE),
+        ],
+        loc="outside lower center",
+        ncols=5,
+    )
+    return fig
+
+
+def _draw_tails(ax: Axes, rows: pd.DataFrame) -> None:
+    for (cell, name), its in rows.groupby(["cell", "name"], sort=False):
+        values, unit = shown(its["value"], its["unit"].iloc[0])
+        colour = approach_colour(its["approach"].iloc[0])
+        beyond = 1 - its["probability"].to_numpy(float)
+        ax.plot(beyond, values, LINES[str(name)], color=colour, gid=f"{cell} {name}")
+        ax.set_ylabel(f"tilt error / {unit}")
+    ax.set_xscale("log")
+    ax.invert_xaxis()
+    ax.set_ylim(bottom=0)
+    ax.set_xlabel("share of calibrations that leave more")
+
+
+def _draw_failures(ax: Axes, cells: pd.DataFrame) -> None:
+    for approach, its in cells.groupby("approach", sort=False):
+        its = its.sort_values("sensor_sigma_mps2")
+        n = its["n_replicates"].to_numpy(float)
+        failed = n - its["n_converged"].to_numpy(float)
+        low, high = clopper_pearson(failed, n)
+        share, sigma = failed / n, its["sensor_sigma_mps2"].to_numpy(float)
+        colour, some = approach_colour(str(approach)), failed > 0
+        bars = np.stack([share - low, high - share])[:, some]
+        ax.errorbar(sigma[some], share[some], bars, color=colour, marker="o", elinewidth=0.8)
+        ax.plot(sigma[~some], high[~some], color=colour, **NONE)
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    ax.set_title("not converged")
+    ax.set_xlabel(f"sensor noise / {unit_label('m/s^2')}")
+    ax.set_ylabel("share of calibrations")

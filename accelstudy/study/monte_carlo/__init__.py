@@ -1,0 +1,1 @@
+"""Simulated calibrations of a cell, and the statistics that follow from them."""

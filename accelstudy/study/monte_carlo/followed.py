@@ -1,0 +1,139 @@
+"""What a study follows of every calibration of a cell, and which of it it keeps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from accelstudy.adjustment.block import Block
+from accelstudy.basics.units import GON
+from accelstudy.effects import get_effect
+from accelstudy.leveling.error import TiltError, cap_forces, tilt_error
+from accelstudy.study.cells.cell import Cell
+from accelstudy.study.monte_carlo.moments import Moments, moments_of
+from accelstudy.study.monte_carlo.sketch import Key, Sketch
+
+Array = NDArray[np.float64]
+
+ERROR, PRIORI, POSTERIORI, EFFECT = "error", "sd_priori", "sd_posteriori", "sd_of_effect"
+TILT = "tilt"
+"""Quantities: of each parameter, of each effect (the mean of its parameters' sds a posteriori), and
+the rms over attitudes of the errors of roll and of pitch."""
+ANGLES = ("roll", "pitch")
+
+
+@dataclass(frozen=True)
+class Followed:
+    """The quantities of a cell, in SI.
+
+    Attributes
+    ----------
+    units : dict of parameter to SI unit, in the order of the estimates
+    truth : (u,) array
+    effects : dict of effect to the numbers of its parameters
+    """
+
+    units: dict[str, str]
+    truth: Array
+    effects: dict[str, list[int]]
+
+    @classmethod
+    def of(cls, cell: Cell) -> Followed:
+        """Take what a cell estimates."""
+        units = cell.parameter_units
+        truth = {**cell.truth, "g": cell.gravity}
+        names = list(units)
+        effects = {
+            spec: [names.index(p.name) for p in get_effect(spec).parameters]
+            for spec in cell.effects
+            if len({p.unit for p in get_effect(spec).parameters}) == 1
+        }
+        return cls(units, np.array([truth.get(name, 0.0) for name in units]), effects)
+
+    @cached_property
+    def keys(self) -> list[Key]:
+        """Quantity and name of each column of `values`."""
+        each = [(quantity, name) for quantity in (ERROR, PRIORI, POSTERIORI) for name in self.units]
+        return [*each, *((EFFECT, spec) for spec in self.effects)]
+
+    def columns(self, quantity: str) -> slice:
+        """Columns of `values` that hold a quantity: of each parameter, or of each effect."""
+        held = [i for i, (each, _) in enumerate(self.keys) if each == quantity]
+        return slice(held[0], held[-1] + 1) if held else slice(0)
+
+    def values(self, block: Block) -> Array:
+        """Quantities of the converged calibrations, (R, q); NaN what needs redundancy."""
+        converged = block.converged
+        priori = block.sigma_priori[converged]
+        freedom = block.redundancy if block.redundancy > 0 else np.nan
+        posteriori = np.sqrt(block.omega[converged] / freedom)[:, None] * priori
+        effects = [posteriori[:, columns].mean(axis=1) for columns in self.effects.values()]
+        errors = block.estimates[converged] - self.truth
+        return np.column_stack([errors, priori, posteriori, *effects])
+
+    def moments(self, block: Block, values: Array) -> Moments:
+        """Moments of a chunk, given its `values`."""
+        t = special.stdtrit(max(block.redundancy, 1), 0.975)
+        half = t * values[:, self.columns(POSTERIORI)]  # NaN without redundancy: nothing is inside
+        inside = np.count_nonzero(np.abs(values[:, self.columns(ERROR)]) <= half, axis=0)
+        return moments_of(
+            values, len(block.converged), block.redundancy, inside, block.correlation_sum
+        )
+
+    def sketched(self, redundancy: int) -> list[Key]:
+        """Quantities of which there are quantiles."""
+        defined = (ERROR, POSTERIORI, EFFECT) if redundancy > 0 else (ERROR,)
+        return [key for key in self.keys if key[0] in defined]
+
+
+class CellSketches:
+    """Sketches of the quantities of a cell.
+
+    Parameters
+    ----------
+    followed : Followed
+    tilt : TiltError, about a calibration that is like the others; None without any
+    """
+
+    def __init__(self, followed: Followed, tilt: TiltError | None) -> None:
+        self.followed = followed
+        self.tilt = tilt
+        self.found: dict[Key, Sketch] = {}
+
+    def add(self, block: Block, values: Array) -> None:
+        """Count the calibrations of a block, given their `Followed.values`."""
+        keys = self.followed.keys
+        for key in self.followed.sketched(block.redundancy):
+            self.found.setdefault(key, Sketch()).add(values[:, keys.index(key)])
+        if self.tilt is not None:
+            estimates = block.estimates[block.converged][:, : len(self.tilt.reference)]
+            for angle, rms in zip(ANGLES, self.tilt.rms(estimates).T, strict=True):
+                self.found.setdefault((TILT, angle), Sketch()).add(rms)
+
+
+def cell_tilt_error(cell: Cell, reference: Array, leveling: Mapping[str, Any]) -> TiltError:
+    """Tilt error that the calibrations of a cell leave, about one of them.
+
+    Parameters
+    ----------
+    cell : Cell
+    reference : (u,) array, SI, estimates; gravity may follow them
+    leveling : mapping with max_tilt_gon and attitudes
+    """
+    simulated, estimated = cell.simulated_model, cell.estimated_model
+    forces = cap_forces(leveling["max_tilt_gon"] * GON, leveling["attitudes"], cell.gravity)
+    return tilt_error(
+        simulated,
+        simulated.vector(cell.truth),
+        estimated,
+        reference[: estimated.n_parameters],
+        forces,
+        cell.gravity,
+        cell.holds.use(forces, cell.positions.n_positions),
+    )

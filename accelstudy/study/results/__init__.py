@@ -1,0 +1,1 @@
+"""Results of a study: summary tables, sensitivity, and the page of claims."""

@@ -1,0 +1,662 @@
+"""The calibration of an accelerometer: its equations, its estimates and their statistics.
+
+Derivatives against finite differences, the robot adjustment against the paper's own equations,
+exact data, invariances, and a seeded Monte Carlo against closed forms and published numbers. Limits
+of statistical assertions are 4.5 standard errors.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+from scipy.stats import kstest, norm, t
+
+from accelstudy.adjustment import CalibrationEquations, FunctionConditions, adjust, calibrate
+from accelstudy.approaches import get_approach
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import MGON, STANDARD_GRAVITY
+from accelstudy.design.closed_forms import (
+    gravity_scale_correlation,
+    gravity_sigma,
+    perfect_robot_ratio,
+)
+from accelstudy.effects import Effect, Hold, Parameter
+from accelstudy.effects.base import per_axis
+from accelstudy.leveling.angles import specific_force
+from accelstudy.schemes import get_scheme
+from accelstudy.sensors.models import MODELS, get_model
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.simulation.sessions import Noise, session
+
+G = STANDARD_GRAVITY
+NINE = get_model("bias-scale-nonorthogonality")
+GRAVITY, ROBOT = get_approach("gravity"), get_approach("robot")
+BOTH = pytest.mark.parametrize("approach", [GRAVITY, ROBOT], ids=lambda a: a.name)
+# Thalmann & Neuner (2018), section 4; other effects get what is typical of them.
+TRUTH = {
+    **{"b_x": 0.05, "b_y": 0.01, "b_z": 0.03, "s_x": 200e-6, "s_y": 200e-6, "s_z": 200e-6},
+    **{"alpha_yz": 12 * MGON, "alpha_zy": 12 * MGON, "alpha_zx": 44 * MGON},
+    **{"alpha_xz": 20 * MGON, "alpha_xy": -15 * MGON, "alpha_yx": 30 * MGON},
+    **{"k2_x": 300e-6, "k2_y": -200e-6, "k2_z": 100e-6},
+    **{"k3_x": -400e-6, "k3_y": 500e-6, "k3_z": 300e-6},
+}
+STANDARD_ERRORS = 4.5
+
+
+def true_session(scheme="mclaren-24", model=NINE, hold=None, gravity=G, **more):
+    truth = model.vector({**TRUTH, **more})
+    return session(model, truth, get_scheme(scheme).directions, gravity, hold), truth
+
+
+def simulate(approach, replicates, seed, scheme="mclaren-24", noise=None):
+    noise = noise or Noise()
+    ideal, truth = true_session(scheme)
+    observed = ideal.draw(noise, replicates, np.random.default_rng(seed))
+    return calibrate(NINE, approach, observed), truth
+
+
+def omega_of(result, observed, approach):
+    """Ω = vᵀ Q⁻¹ v from the residuals."""
+    sigma = [np.broadcast_to(observed.sigma_force, 3)]
+    if approach.uses_angles:
+        sigma.append(np.broadcast_to(observed.sigma_angle, 2))
+    return np.sum((result.residuals / np.concatenate(sigma)) ** 2, axis=(1, 2))
+
+
+# --- derivatives ---------------------------------------------------------------------------------
+
+
+@BOTH
+@pytest.mark.parametrize("estimates_gravity", [False, True])
+@pytest.mark.parametrize("name", MODELS)
+def test_derivatives_against_finite_differences(name, approach, estimates_gravity):
+    model = get_model(name)
+    ideal, truth = true_session(model=model)
+    rng = np.random.default_rng(3)
+    forces = ideal.forces + 0.01 * rng.standard_normal(ideal.forces.shape)
+    l = np.concatenate([forces, ideal.angles], axis=1)[:, : 5 if approach.uses_angles else 3]
+    x = np.append(truth, G) if estimates_gravity else truth
+
+    def psi(x, l):
+        """The conditions from their definition: in the output where the force is told."""
+        parameters, g = (x[:-1], x[-1]) if estimates_gravity else (x, G)
+        if approach is ROBOT:
+            told = np.stack(specific_force(*l[:, 3:].T, g), axis=-1)
+            return (l[:, :3] - model.sense(told, parameters, g)).T
+        f_b = model.correct(l[:, :3], parameters, g)
+        return np.stack(approach.conditions(tuple(f_b.T), (), g, np))
+
+    def central(function, at, i):
+        step = np.zeros_like(at)
+        step[..., i] = 1e-5
+        return (function(at + step) - function(at - step)) / 2e-5
+
+    a = np.stack([central(lambda x: psi(x, l), x, i) for i in range(len(x))], axis=1)
+    b = np.stack([central(lambda l: psi(x, l), l, i) for i in range(l.shape[1])], axis=1)
+
+    equations = CalibrationEquations(model.trace, approach, estimates_gravity)
+    f_a = model.correct(l[:, :3], truth) @ np.linalg.inv(model.axes_matrix(truth)).T
+    at = equations.at(model.settings, G, ideal.hold).linearise(
+        x[:, None], l.T[:, None], f_a.T[:, None]
+    )
+    np.testing.assert_allclose(at.psi[:, 0], psi(x, l), rtol=0, atol=1e-13 * G)
+    np.testing.assert_allclose(at.jac_parameters[:, :, 0], a, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(at.jac_observations[:, :, 0], b, rtol=0, atol=1e-6)
+
+
+def test_parameters_of_the_equations_end_with_gravity():
+    names = [str(p) for p in CalibrationEquations(NINE.trace, ROBOT, True).parameters]
+    assert names == [*NINE.parameter_names, "g"]
+
+
+# --- the robot's conditions in components are those of the paper ---------------------------------
+
+
+def wrapped(angle):
+    return (angle + np.pi) % (2 * np.pi) - np.pi
+
+
+def paper_equations(g):
+    """Eq. (10) with the sign of eq. (6) and wrapped roll residuals, for the 9-parameter model."""
+    positions = {(0, 1): (6, -1), (0, 2): (7, 1), (1, 2): (8, -1)}  # of the angles in T, eq. (4)
+
+    def matrices(x):
+        t_matrix = np.broadcast_to(np.eye(3), (len(x), 3, 3)).copy()
+        for (row, column), (k, sign) in positions.items():
+            t_matrix[:, row, column] = sign * x[:, k]
+        return t_matrix, 1 / (1 + x[:, None, 3:6])
+
+    def forces(x, l):
+        t_matrix, gain = matrices(x)
+        f_a = (l[..., :3] - x[:, None, :3]) * gain
+        return np.einsum("rij,rnj->rni", t_matrix, f_a), f_a
+
+    def of_force(f):
+        """Derivatives of roll, pitch (eq. 7) and norm by the force, (R, n, 3, 3)."""
+        x, y, z = np.moveaxis(f, -1, 0)
+        yz2, xyz2 = y**2 + z**2, x**2 + y**2 + z**2
+        yz, xyz = np.sqrt(yz2), np.sqrt(xyz2)
+        rows = [
+            [0 * x, z / yz2, -y / yz2],
+            [yz / xyz2, -x * y / (xyz2 * yz), -x * z / (xyz2 * yz)],
+            [x / xyz, y / xyz, z / xyz],
+        ]
+        return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+    def psi(x, l):
+        f = forces(x, l)[0]
+        roll = np.arctan2(-f[..., 1], -f[..., 2])
+        pitch = np.arctan(f[..., 0] / np.hypot(f[..., 1], f[..., 2]))
+        norm_of_f = np.linalg.norm(f, axis=-1)
+        return np.stack([wrapped(roll - l[..., 3]), pitch - l[..., 4], norm_of_f - g], axis=-1)
+
+    def jac_parameters(x, l):
+        f, f_a = forces(x, l)
+        t_matrix, gain = matrices(x)
+        by_bias = np.repeat((-t_matrix * gain)[:, None], f.shape[1], axis=1)
+        by_scale = by_bias * f_a[:, :, None]
+        by_angle = np.zeros_like(by_bias)
+        for (row, column), (k, sign) in positions.items():
+            by_angle[..., row, k - 6] = sign * f_a[..., column]
+        return of_force(f) @ np.concatenate([by_bias, by_scale, by_angle], axis=-1)
+
+    def jac_observations(x, l):
+        f = forces(x, l)[0]
+        t_matrix, gain = matrices(x)
+        by_force = of_force(f) @ (t_matrix * gain)[:, None]
+        by_reading = np.zeros((*f.shape[:2], 3, 2))
+        by_reading[..., 0, 0] = by_reading[..., 1, 1] = -1
+        return np.concatenate([by_force, by_reading], axis=-1)
+
+    return FunctionConditions(psi, jac_parameters, jac_observations)
+
+
+def test_robot_adjustment_is_that_of_the_papers_equations():
+    noise = Noise()
+    ideal, _ = true_session()
+    # Turn the first position upside down: the noise scatters its roll about ±200 gon.
+    scheme = get_scheme("mclaren-24").rotated([ideal.angles[0, 0] - np.pi, 0, 0])
+    ideal = session(NINE, NINE.vector(TRUTH), scheme.directions)
+    observed = ideal.draw(noise, 20, np.random.default_rng(10))
+    observed = replace(observed, angles=wrapped(observed.angles))
+    of_forces = np.arctan2(-observed.forces[..., 1], -observed.forces[..., 2])
+    assert np.abs(of_forces - observed.angles[..., 0]).max() > 6  # wrapping matters
+    components = calibrate(NINE, ROBOT, observed)
+    l = np.concatenate([observed.forces, observed.angles], axis=-1)
+    q = np.tile(np.r_[np.full(3, noise.sigma_force), np.full(2, noise.sigma_angle)] ** 2, (24, 1))
+    paper = adjust(paper_equations(G), l, q, np.zeros(9))
+
+    assert components.converged.all()
+    assert paper.converged.all()
+    assert components.redundancy == paper.redundancy == 63
+    sigma = components.sigma_priori
+    assert np.abs((components.parameters - paper.parameters) / sigma).max() < 1e-5
+    assert np.abs((components.residuals - paper.residuals) / np.sqrt(q)).max() < 1e-5
+    np.testing.assert_allclose(components.omega, paper.omega, rtol=1e-8)
+    np.testing.assert_allclose(components.sigma_priori, paper.sigma_priori, rtol=1e-6)
+    correlation = [r.cofactors / (sigma[:, None] * sigma[..., None]) for r in (components, paper)]
+    np.testing.assert_allclose(*correlation, atol=1e-6)
+
+
+# --- exact data ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "approach"),
+    [
+        (name, approach)
+        for name in MODELS
+        for approach in (GRAVITY, ROBOT)
+        if approach is ROBOT or not name.endswith("crossaxis")  # to which gravity is blind
+    ],
+)
+def test_exact_data_return_the_truth(name, approach):
+    model = get_model(name)
+    ideal, truth = true_session(model=model)
+    result = calibrate(model, approach, ideal.observations(Noise()))
+    assert result.converged.all()
+    np.testing.assert_allclose(result.parameters[0], truth, rtol=0, atol=1e-10)
+    assert result.omega[0] < 1e-12
+
+
+def test_gravity_cannot_calibrate_cross_axis_misalignment():
+    model = get_model("bias-scale-nonorthogonality-crossaxis")
+    ideal, _ = true_session(model=model)
+    observed = ideal.draw(Noise(), 3, np.random.default_rng(0))
+    result = calibrate(model, GRAVITY, observed)
+    assert not result.converged.any()
+    assert np.isnan(result.parameters).all()
+
+
+def test_robot_angles_are_needed():
+    ideal, _ = true_session()
+    observed = replace(ideal.observations(Noise()), angles=None)
+    assert calibrate(NINE, GRAVITY, observed).converged.all()
+    with pytest.raises(InputError, match="robot's roll and pitch"):
+        calibrate(NINE, ROBOT, observed)
+
+
+def test_an_unknown_approach_is_named_with_a_suggestion():
+    with pytest.raises(InputError, match="unknown approach 'robots'; did you mean 'robot'"):
+        get_approach("robots")
+
+
+def test_too_few_positions_are_refused():
+    ideal, _ = true_session("faces-6")
+    with pytest.raises(InputError, match="6 condition equations cannot determine 9"):
+        calibrate(NINE, GRAVITY, ideal.observations(Noise()))
+
+
+def test_the_paper_miscounts_the_degree_of_freedom():
+    """Section 4.2 says that it does not change; 48 conditions and no unknown are added."""
+    redundancy = {a.name: simulate(a, 1, 0)[0].redundancy for a in (GRAVITY, ROBOT)}
+    assert redundancy == {"gravity": 24 - 9, "robot": 72 - 9}
+
+
+# --- Monte Carlo ---------------------------------------------------------------------------------
+
+REPLICATES = 2000
+
+
+@pytest.fixture(scope="module")
+def monte_carlo():
+    """Results of 2000 sessions with the paper's numbers by (approach, scheme)."""
+    return {
+        (approach.name, scheme): simulate(approach, REPLICATES, 2018, scheme)
+        for approach in (GRAVITY, ROBOT)
+        for scheme in ("mclaren-24", "faces-edges-18")
+    }
+
+
+CASES = pytest.mark.parametrize(
+    "case",
+    [(a, s) for a in ("gravity", "robot") for s in ("mclaren-24", "faces-edges-18")],
+    ids="-".join,
+)
+
+
+@CASES
+def test_estimates_are_unbiased(monte_carlo, case):
+    """At the poles too: two of the faces have the x axis vertical, where roll has no meaning."""
+    result, truth = monte_carlo[case]
+    assert result.converged.all()
+    errors = (result.parameters - truth) / result.sigma_priori
+    # The mean of 9 parameters each; the paper's numbers leave a non-linear bias far below this.
+    assert np.abs(errors.mean(axis=0)).max() < STANDARD_ERRORS / math.sqrt(REPLICATES)
+
+
+@CASES
+def test_spread_of_the_estimates_is_the_sigma_of_the_adjustment(monte_carlo, case):
+    result, truth = monte_carlo[case]
+    errors = (result.parameters - truth) / result.sigma_priori
+    np.testing.assert_allclose(
+        errors.std(axis=0), 1, rtol=0, atol=STANDARD_ERRORS / math.sqrt(2 * REPLICATES)
+    )
+
+
+@pytest.mark.parametrize("scheme", ["mclaren-24", "faces-edges-18"])
+def test_spread_of_gravity_estimates_is_the_closed_form(monte_carlo, scheme):
+    result, _ = monte_carlo["gravity", scheme]
+    directions = get_scheme(scheme).directions
+    expected = gravity_sigma(directions, 0.002)
+    sigma = [expected[effect] for effect in ("bias", "scale", "nonorthogonality")]
+    np.testing.assert_allclose(
+        result.parameters.std(axis=0),
+        np.repeat(sigma, 3),
+        rtol=STANDARD_ERRORS / math.sqrt(2 * REPLICATES),
+    )
+    correlation = gravity_scale_correlation(directions)
+    observed = np.corrcoef(result.parameters[:, 3:6].T)[np.triu_indices(3, 1)]
+    limit = STANDARD_ERRORS * (1 - correlation**2) / math.sqrt(REPLICATES)
+    np.testing.assert_allclose(observed, correlation, rtol=0, atol=limit)
+
+
+def test_closed_forms_of_an_isotropic_scheme_are_the_published_numbers():
+    directions = get_scheme("mclaren-24").directions
+    sigma = gravity_sigma(directions, 0.002, 9.81)
+    assert sigma["bias"] == pytest.approx(0.707e-3, abs=0.0005e-3)
+    assert sigma["nonorthogonality"] / MGON == pytest.approx(10.26, abs=0.005)
+    assert sigma["scale"] == pytest.approx(101.9e-6, abs=0.05e-6)
+    assert gravity_scale_correlation(directions) == pytest.approx(-0.25, abs=1e-9)
+
+
+def test_a_perfect_robot_improves_the_spread_by_the_closed_form():
+    noise = Noise(sigma_angle=0.0)
+    robot, _ = simulate(ROBOT, 1000, 5, noise=noise)
+    gravity, _ = simulate(GRAVITY, 1000, 6, noise=noise)
+    ratio = perfect_robot_ratio(get_scheme("mclaren-24").directions)
+    expected = np.repeat([ratio[e] for e in ("bias", "scale", "nonorthogonality")], 3)
+    np.testing.assert_allclose(
+        robot.parameters.std(axis=0) / gravity.parameters.std(axis=0),
+        expected,
+        rtol=STANDARD_ERRORS * math.sqrt(2 / (2 * 1000)),
+    )
+    np.testing.assert_allclose(
+        (robot.sigma_priori / gravity.sigma_priori).mean(axis=0), expected, rtol=2e-3
+    )
+
+
+@CASES
+def test_omega_is_chi_square_distributed(monte_carlo, case):
+    result, _ = monte_carlo[case]
+    r = result.redundancy
+    standard_error = math.sqrt(2 * r / REPLICATES)
+    assert abs(result.omega.mean() - r) < STANDARD_ERRORS * standard_error
+    assert kstest(result.omega, "chi2", args=(r,)).pvalue > 1e-4
+
+
+@BOTH
+def test_omega_is_that_of_the_residuals(approach):
+    ideal, _ = true_session()
+    observed = ideal.draw(Noise(), 10, np.random.default_rng(4))
+    result = calibrate(NINE, approach, observed)
+    np.testing.assert_allclose(result.omega, omega_of(result, observed, approach), rtol=1e-9)
+
+
+@CASES
+@pytest.mark.parametrize("which", ["priori", "posteriori"])
+def test_intervals_cover_the_truth_in_95_percent(monte_carlo, case, which):
+    result, truth = monte_carlo[case]
+    quantile = norm.ppf(0.975) if which == "priori" else t.ppf(0.975, result.redundancy)
+    sigma = getattr(result, f"sigma_{which}")
+    coverage = np.mean(np.abs(result.parameters - truth) < quantile * sigma, axis=0)
+    limit = STANDARD_ERRORS * math.sqrt(0.95 * 0.05 / REPLICATES)
+    np.testing.assert_allclose(coverage, 0.95, rtol=0, atol=limit)
+
+
+# --- gravity as an observation -------------------------------------------------------------------
+
+
+def test_a_milligal_is_a_common_scale_of_1_02_ppm():
+    ideal, _ = true_session(gravity=G)
+    sigma_gravity = 1e-5
+
+    def variance_of_mean_scale(noise):
+        result = calibrate(NINE, GRAVITY, ideal.observations(noise))
+        return result.cofactors[0, 3:6, 3:6].mean()
+
+    added = variance_of_mean_scale(Noise(sigma_gravity=sigma_gravity)) - variance_of_mean_scale(
+        Noise()
+    )
+    assert math.sqrt(added) == pytest.approx(1.02e-6, abs=0.005e-6)
+    assert math.sqrt(added) == pytest.approx(sigma_gravity / G, rel=1e-3)
+
+
+@BOTH
+def test_observed_gravity_spreads_the_mean_scale_as_theory_says(approach):
+    noise = Noise(sigma_gravity=0.002)
+    result, truth = simulate(approach, 1000, 8, noise=noise)
+    fixed, _ = simulate(approach, 1, 8)
+    assert result.redundancy == fixed.redundancy  # one unknown and one observation more
+    mean = result.parameters[:, 3:6].mean(axis=1) - truth[3:6].mean()
+    expected = math.sqrt(
+        fixed.cofactors[0, 3:6, 3:6].mean() + (noise.sigma_gravity / G * (1 + 200e-6)) ** 2
+    )
+    limit = STANDARD_ERRORS / math.sqrt(2 * 1000)
+    assert mean.std() == pytest.approx(expected, rel=limit)
+    assert abs(mean.mean()) < STANDARD_ERRORS * expected / math.sqrt(1000)
+    # Whatever value of gravity is observed, the conditions cannot improve it.
+    assert result.sigma_priori[0, 9] == pytest.approx(noise.sigma_gravity, rel=1e-9)
+
+
+@BOTH
+def test_a_wrong_gravity_is_a_common_scale_and_nothing_else(approach):
+    ideal, truth = true_session()
+    observed = ideal.observations(Noise(gravity_error=1e-3))
+    result = calibrate(NINE, approach, observed)
+    expected = truth.copy()
+    expected[3:6] = (1 + truth[3:6]) * G / (G + 1e-3) - 1
+    np.testing.assert_allclose(result.parameters[0], expected, rtol=0, atol=1e-10)
+    assert result.omega[0] < 1e-12
+
+
+def test_gravity_that_is_held_fixed_is_one_number():
+    observed = replace(noisy(0), gravity=np.array([9.80, 9.81]))
+    with pytest.raises(InputError, match="gravity differs between the sessions"):
+        calibrate(NINE, GRAVITY, observed)
+
+
+# --- effects that see more than the force --------------------------------------------------------
+
+
+class ThermalBias(Effect):
+    """A bias that follows the temperature."""
+
+    name = "thermal_bias_of_the_test"
+    parameters = per_axis("b_T", "m/s^2/K", "b_{T%}")
+
+    def output(self, f, p, g, hold, xp):
+        return tuple(b_t * hold.temperature for b_t in p)
+
+
+class Hysteresis(Effect):
+    """An offset with the sign of the last change of the force."""
+
+    name = "hysteresis_of_the_test"
+    parameters = per_axis("h", "m/s^2", "h_%")
+
+    def output(self, f, p, g, hold, xp):
+        step = (hold.step_x, hold.step_y, hold.step_z)
+        return tuple(h * xp.sign(d) for h, d in zip(p, step, strict=True))
+
+
+class EncoderOffset(Effect):
+    """A zero offset of the robot's two angles."""
+
+    name = "encoder_offset_of_the_test"
+    parameters = (Parameter("c_roll", "rad", "$c_1$"), Parameter("c_pitch", "rad", "$c_2$"))
+
+    def reading(self, angles, p, hold, xp):
+        return p
+
+
+class EncoderScale(Effect):
+    """A scale error of the robot's two angles."""
+
+    name = "encoder_scale_of_the_test"
+    parameters = (Parameter("k_roll", "1", "$k_1$"), Parameter("k_pitch", "1", "$k_2$"))
+
+    def reading(self, angles, p, hold, xp):
+        return tuple(k * a for k, a in zip(p, angles, strict=True))
+
+
+TEMPERATURE = Hold(temperature=15 * np.sin(np.arange(24.0)))
+EXTENDED = {
+    "temperature": (ThermalBias(), {"b_T_x": 2e-3, "b_T_y": -1e-3, "b_T_z": 3e-3}, TEMPERATURE),
+    "previous position": (Hysteresis(), {"h_x": 3e-3, "h_y": -2e-3, "h_z": 4e-3}, None),
+    "offset of the robot": (EncoderOffset(), {"c_roll": 15 * MGON, "c_pitch": -9 * MGON}, None),
+    "scale of the robot": (EncoderScale(), {"k_roll": 1e-4, "k_pitch": -2e-4}, None),
+}
+
+
+def extended_session(case):
+    effect, sizes, hold = EXTENDED[case]
+    model = SensorModel(f"nine + {effect.name}", (*NINE.effects, effect))
+    return model, *true_session(model=model, hold=hold, **sizes)
+
+
+@pytest.mark.parametrize("case", EXTENDED)
+def test_exact_data_with_an_extended_model_return_the_truth(case):
+    model, ideal, truth = extended_session(case)
+    result = calibrate(model, ROBOT, ideal.observations(Noise()))
+    assert result.converged.all()
+    np.testing.assert_allclose(result.parameters[0], truth, rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("case", EXTENDED)
+def test_an_extended_model_recovers_the_truth_within_its_sigma(case):
+    model, ideal, truth = extended_session(case)
+    observed = ideal.draw(Noise(), 400, np.random.default_rng(12))
+    result = calibrate(model, ROBOT, observed)
+    assert result.converged.all()
+    errors = (result.parameters - truth) / result.sigma_priori
+    assert np.abs(errors.mean(axis=0)).max() < STANDARD_ERRORS / math.sqrt(400)
+    assert np.abs(errors.std(axis=0) - 1).max() < STANDARD_ERRORS / math.sqrt(2 * 400)
+    r = result.redundancy
+    assert abs(result.omega.mean() - r) < STANDARD_ERRORS * math.sqrt(2 * r / 400)
+
+
+@pytest.mark.parametrize("case", EXTENDED)
+def test_what_is_missing_in_the_model_shows_in_omega(case):
+    _, ideal, _ = extended_session(case)
+    observed = ideal.draw(Noise(), 100, np.random.default_rng(12))
+    result = calibrate(NINE, ROBOT, observed)
+    assert result.omega.mean() > result.redundancy + 10 * math.sqrt(2 * result.redundancy / 100)
+
+
+def test_hysteresis_has_no_sign_in_the_first_position():
+    """Before it there is none: f_prev = f, and sign(0) = 0."""
+    _, ideal, _ = extended_session("previous position")
+    without, _ = true_session()
+    np.testing.assert_allclose(ideal.forces[0], without.forces[0], rtol=0, atol=1e-12)
+
+
+@BOTH
+@pytest.mark.parametrize(
+    ("case", "column"), [("temperature", "temperature"), ("previous position", "step_x")]
+)
+def test_a_missing_column_is_named(case, column, approach):
+    model, ideal, _ = extended_session(case)
+    observed = replace(ideal.observations(Noise()), hold=None)
+    with pytest.raises(InputError, match=f"column '{column}'"):
+        calibrate(model, approach, observed)
+
+
+def test_a_missing_column_is_named_before_the_simulation():
+    effect, sizes, _ = EXTENDED["temperature"]
+    model = SensorModel("nine + temperature", (*NINE.effects, effect))
+    with pytest.raises(InputError, match="column 'temperature'"):
+        true_session(model=model, **sizes)
+
+
+# --- invariances ---------------------------------------------------------------------------------
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def noisy(seed):
+    ideal, _ = true_session()
+    return ideal.draw(Noise(), 2, np.random.default_rng(seed))
+
+
+def assert_same_estimates(result, expected):
+    assert result.converged.all()
+    np.testing.assert_array_less(
+        np.abs(result.parameters - expected.parameters), 1e-6 * expected.sigma_priori
+    )
+    np.testing.assert_allclose(result.omega, expected.omega, rtol=1e-9)
+
+
+@BOTH
+@given(seed=SEEDS, order=st.permutations(range(24)))
+def test_the_order_of_the_positions_does_not_matter(approach, seed, order):
+    observed = noisy(seed)
+    permuted = replace(observed, forces=observed.forces[:, order], angles=observed.angles[:, order])
+    expected = calibrate(NINE, approach, observed)
+    result = calibrate(NINE, approach, permuted)
+    assert_same_estimates(result, expected)
+    difference = np.abs(result.residuals - expected.residuals[:, order])
+    assert difference[..., :3].max() < 1e-5 * 0.002
+    assert difference[..., 3:].max(initial=0) < 1e-5 * 3.2 * MGON
+
+
+@given(seed=SEEDS, rotation=SEEDS)
+def test_gravity_residuals_do_not_know_the_orientation_of_the_sensor(seed, rotation):
+    """A turned triad has another bias and another triangle T S⁻¹, but the same ellipsoid."""
+    observed = noisy(seed)
+    matrix = Rotation.random(random_state=np.random.default_rng(rotation)).as_matrix()
+    turned = replace(observed, forces=observed.forces @ matrix.T)
+    result, expected = calibrate(NINE, GRAVITY, turned), calibrate(NINE, GRAVITY, observed)
+    np.testing.assert_allclose(result.omega, expected.omega, rtol=1e-9)
+    np.testing.assert_allclose(
+        result.residuals, expected.residuals @ matrix.T, rtol=0, atol=1e-5 * 0.002
+    )
+    # The centre of the ellipsoid turns with it.
+    np.testing.assert_allclose(
+        result.parameters[:, :3], expected.parameters[:, :3] @ matrix.T, rtol=0, atol=1e-8
+    )
+
+
+@given(seed=SEEDS)
+def test_any_choice_of_nine_parameters_gives_the_same_gravity_residuals(seed):
+    """The lower triangle of T is another gauge of the same ellipsoid."""
+    lower = SensorModel.of("lower", ("bias", "scale", "cross_axis_misalignment"))
+    observed = noisy(seed)
+    result, expected = calibrate(lower, GRAVITY, observed), calibrate(NINE, GRAVITY, observed)
+    np.testing.assert_allclose(result.omega, expected.omega, rtol=1e-9)
+    np.testing.assert_allclose(result.residuals, expected.residuals, rtol=0, atol=1e-5 * 0.002)
+    np.testing.assert_allclose(
+        result.parameters[:, :3], expected.parameters[:, :3], rtol=0, atol=1e-8
+    )
+
+
+@BOTH
+@given(seed=SEEDS, factor=st.floats(1e-4, 1e4))
+def test_the_unit_of_force_does_not_matter(approach, seed, factor):
+    observed = noisy(seed)
+    scaled = replace(
+        observed,
+        forces=factor * observed.forces,
+        sigma_force=factor * observed.sigma_force,
+        gravity=factor * observed.gravity,
+    )
+    result, expected = calibrate(NINE, approach, scaled), calibrate(NINE, approach, observed)
+    in_si = result.parameters / np.array([factor] * 3 + [1] * 6)
+    np.testing.assert_array_less(np.abs(in_si - expected.parameters), 1e-6 * expected.sigma_priori)
+    np.testing.assert_allclose(result.omega, expected.omega, rtol=1e-9)
+
+
+@given(seed=SEEDS, factor=st.floats(0.1, 10))
+def test_a_common_factor_of_the_noise_changes_only_the_variances(seed, factor):
+    observed = noisy(seed)
+    scaled = replace(
+        observed,
+        sigma_force=factor * observed.sigma_force,
+        sigma_angle=factor * observed.sigma_angle,
+    )
+    result, expected = calibrate(NINE, ROBOT, scaled), calibrate(NINE, ROBOT, observed)
+    np.testing.assert_allclose(result.parameters, expected.parameters, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(result.omega, expected.omega / factor**2, rtol=1e-6)
+    np.testing.assert_allclose(result.sigma_posteriori, expected.sigma_posteriori, rtol=1e-6)
+
+
+def test_a_replicate_does_not_depend_on_its_batch():
+    ideal, _ = true_session()
+    observed = ideal.draw(Noise(), 60, np.random.default_rng(9))
+    together = calibrate(NINE, ROBOT, observed)
+    again = calibrate(NINE, ROBOT, observed)
+    assert np.array_equal(together.parameters, again.parameters)
+    for i in (0, 31, 59):
+        one = replace(
+            observed,
+            forces=observed.forces[i : i + 1],
+            angles=observed.angles[i : i + 1],
+            gravity=observed.gravity[i : i + 1],
+        )
+        alone = calibrate(NINE, ROBOT, one)
+        np.testing.assert_allclose(alone.parameters[0], together.parameters[i], rtol=1e-9)
+        np.testing.assert_allclose(alone.omega[0], together.omega[i], rtol=1e-10)
+
+
+def test_a_broken_replicate_is_flagged_and_harms_no_other():
+    ideal, _ = true_session()
+    observed = ideal.draw(Noise(), 3, np.random.default_rng(9))
+    forces = observed.forces.copy()
+    forces[1, 4] = np.nan
+    result = calibrate(NINE, GRAVITY, replace(observed, forces=forces))
+    expected = calibrate(NINE, GRAVITY, observed)
+    assert result.converged.tolist() == [True, False, True]
+    assert np.isnan(result.parameters[1]).all()
+    np.testing.assert_allclose(result.parameters[::2], expected.parameters[::2], rtol=1e-9)
+
+
+def test_forces_of_the_robot_are_those_of_its_attitude():
+    """Noise-free readings and forces agree through the leveling equations."""
+    ideal, _ = true_session("faces-edges-18")
+    np.testing.assert_allclose(
+        np.stack(specific_force(*ideal.angles.T, G), axis=-1), ideal.f_b, atol=1e-14 * G
+    )

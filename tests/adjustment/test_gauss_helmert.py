@@ -1,0 +1,472 @@
+"""The general adjustment, held against published solutions of reference problems.
+
+The line of Pearson with York's weights (both coordinates observed), the implicit ellipse of
+ODRPACK, and the regressions Misra1a and Rat43 of the NIST Statistical Reference Datasets; then what
+the adjustment promises of batches, cofactor matrices, observed parameters and failures.
+"""
+
+import numpy as np
+import pytest
+
+from accelstudy.adjustment import FunctionConditions, adjust, gauss_helmert
+from accelstudy.basics.errors import InputError
+
+
+@pytest.fixture
+def all_digits(monkeypatch):
+    """Iterate until published digits can be compared, beyond what the default stops at."""
+    monkeypatch.setattr(gauss_helmert, "STEP_TOLERANCE", 1e-11)
+
+
+# --- Pearson's line with York's weights ----------------------------------------------------------
+
+PEARSON = np.array(
+    [
+        [0.0, 0.9, 1.8, 2.6, 3.3, 4.4, 5.2, 6.1, 6.5, 7.4],
+        [5.9, 5.4, 4.4, 4.6, 3.5, 3.7, 2.8, 2.8, 2.4, 1.5],
+    ]
+).T
+YORK_WEIGHTS = np.array(
+    [
+        [1000, 1000, 500, 800, 200, 80, 60, 20, 1.8, 1],
+        [1, 1.8, 4, 8, 20, 20, 70, 70, 100, 500],
+    ]
+).T
+YORK_COFACTORS = 1 / YORK_WEIGHTS
+YORK = [5.479910224, -0.480533407]
+YORK_OMEGA = 11.866353194
+
+# a + b x - y = 0, a block for each point
+LINE = FunctionConditions(
+    psi=lambda x, l: x[:, None, :1] + x[:, None, 1:] * l[..., :1] - l[..., 1:],
+    jac_parameters=lambda x, l: np.stack([np.ones_like(l[..., 0]), l[..., 0]], -1)[:, :, None],
+    jac_observations=lambda x, l: np.stack(
+        [np.broadcast_to(x[:, 1:], l.shape[:2]), -np.ones(l.shape[:2])], -1
+    )[:, :, None],
+)
+
+
+def york(observations=PEARSON[None], cofactors=YORK_COFACTORS, initial=(5.0, -0.5), **more):
+    return adjust(LINE, observations, cofactors, initial, **more)
+
+
+def as_one_block(equations, n_blocks):
+    """The same conditions with all observations in a single block, (R, 1, n o)."""
+
+    def split(l):
+        return l.reshape(len(l), n_blocks, -1)
+
+    def jac_observations(x, l):
+        b = equations.jac_observations(x, split(l))
+        eye = np.eye(n_blocks)
+        c, o = b.shape[2:]
+        return np.einsum("rnco,nm->rncmo", b, eye).reshape(len(l), 1, n_blocks * c, n_blocks * o)
+
+    def jac_parameters(x, l):
+        a = equations.jac_parameters(x, split(l))
+        return a.reshape(len(l), 1, -1, a.shape[-1])
+
+    return FunctionConditions(
+        psi=lambda x, l: equations.psi(x, split(l)).reshape(len(l), 1, -1),
+        jac_parameters=jac_parameters,
+        jac_observations=jac_observations,
+    )
+
+
+@pytest.mark.usefixtures("all_digits")
+def test_york_line_is_the_published_one():
+    result = york()
+    assert result.converged.all()
+    assert result.redundancy == 8
+    np.testing.assert_allclose(result.parameters[0], YORK, rtol=0, atol=1e-9)
+    assert result.omega[0] == pytest.approx(YORK_OMEGA, abs=2e-9)
+    np.testing.assert_allclose(result.sigma_priori[0], [0.29497074, 0.05798501], rtol=2e-8)
+    np.testing.assert_allclose(result.sigma_posteriori[0], [0.35924652, 0.07062027], rtol=2e-8)
+    assert result.covariance_priori[0, 0, 1] == pytest.approx(-0.01647254, abs=1e-8)
+    assert result.variance_posteriori[0] == pytest.approx(YORK_OMEGA / 8, rel=1e-9)
+
+
+@pytest.mark.usefixtures("all_digits")
+def test_unweighted_line_is_the_published_one():
+    result = york(cofactors=np.ones((10, 2)))
+    np.testing.assert_allclose(result.parameters[0], [5.784043775, -0.545561198], atol=1e-9)
+    assert result.omega[0] == pytest.approx(0.618572759, abs=1e-9)
+
+
+@pytest.mark.parametrize("initial", [(5.0, -0.5), (0.0, 0.0), (10.0, -3.0)])
+def test_the_default_stops_at_a_millionth_of_sigma_from_any_start(initial):
+    result = york(initial=initial)
+    assert np.abs((result.parameters[0] - YORK) / result.sigma_priori[0]).max() < 1e-6
+
+
+def test_adjusted_observations_fulfil_the_conditions():
+    result = york()
+    adjusted = PEARSON + result.residuals
+    assert np.abs(LINE.psi(result.parameters, adjusted)).max() < 1e-9
+
+
+def test_residuals_converge_even_where_the_parameters_are_found_at_once():
+    """x = l₁ needs no iteration; the foot of the perpendicular of (l₂, l₃) on a circle does."""
+    circle = FunctionConditions(
+        psi=lambda x, l: np.stack([x[:, :1] - l[..., 0], l[..., 1] ** 2 + l[..., 2] ** 2 - 1], -1),
+        jac_parameters=lambda x, l: np.broadcast_to([[1.0], [0.0]], (len(l), 1, 2, 1)),
+        jac_observations=lambda x, l: np.stack(
+            [np.broadcast_to([-1.0, 0, 0], l.shape), 2 * l * [0, 1, 1]], axis=-2
+        ),
+    )
+    l = np.array([[[5.0, 3.0, 4.0]]])
+    result = adjust(circle, l, np.ones((1, 3)), [0.0])
+    np.testing.assert_allclose(l + result.residuals, [[[5.0, 0.6, 0.8]]], rtol=1e-9)
+    assert result.omega[0] == pytest.approx(4**2, rel=1e-9)
+
+
+def test_omega_is_that_of_the_residuals():
+    result = york()
+    assert result.omega[0] == pytest.approx(np.sum(YORK_WEIGHTS * result.residuals[0] ** 2))
+
+
+def test_plugging_in_the_raw_observations_is_not_the_same():
+    """The shortcut linearises at l, not at l + v; its fixed point is not the least-squares line."""
+    x = np.array([5.0, -0.5])
+    for _ in range(50):
+        a = np.column_stack([np.ones(10), PEARSON[:, 0]])
+        b = np.array([x[1], -1.0])
+        weight = 1 / (YORK_COFACTORS @ b**2)
+        psi = x[0] + x[1] * PEARSON[:, 0] - PEARSON[:, 1]
+        dx = -np.linalg.solve(a.T @ (weight[:, None] * a), a.T @ (weight * psi))
+        x = x + dx
+    assert np.abs(dx).max() < 1e-12
+    assert np.abs(x - YORK).max() > 1e-3
+    residual = x[0] + x[1] * PEARSON[:, 0] - PEARSON[:, 1]
+    assert np.sum(residual**2 / (YORK_COFACTORS @ np.array([x[1] ** 2, 1]))) > YORK_OMEGA
+
+
+# --- cofactor matrices and dense blocks ----------------------------------------------------------
+
+
+def test_cofactor_matrices_of_the_points():
+    matrices = np.einsum("no,op->nop", YORK_COFACTORS, np.eye(2))
+    result, expected = york(cofactors=matrices), york()
+    np.testing.assert_allclose(result.parameters, expected.parameters, rtol=1e-12)
+    np.testing.assert_allclose(result.cofactors, expected.cofactors, rtol=1e-10)
+    np.testing.assert_allclose(result.residuals, expected.residuals, atol=1e-12)
+
+
+def test_all_points_in_one_dense_block():
+    equations = as_one_block(LINE, 10)
+    matrix = np.diag(YORK_COFACTORS.ravel())[None]
+    result = adjust(equations, PEARSON.reshape(1, 1, 20), matrix, [5.0, -0.5])
+    np.testing.assert_allclose(result.parameters, york().parameters, rtol=1e-10)
+    np.testing.assert_allclose(result.cofactors, york().cofactors, rtol=1e-10)
+    assert result.omega[0] == pytest.approx(YORK_OMEGA, abs=2e-9)
+    assert result.redundancy == 8
+
+
+def test_correlated_observations_equal_transformed_uncorrelated_ones():
+    """With l = C z and uncorrelated z, the conditions in z have the cofactors C Cᵀ in l."""
+    rng = np.random.default_rng(1)
+    c = np.diag(np.sqrt(YORK_COFACTORS.ravel())) @ (np.eye(20) + rng.uniform(-0.2, 0.2, (20, 20)))
+    in_l = as_one_block(LINE, 10)
+    in_z = FunctionConditions(
+        psi=lambda x, z: in_l.psi(x, z @ c.T),
+        jac_parameters=lambda x, z: in_l.jac_parameters(x, z @ c.T),
+        jac_observations=lambda x, z: in_l.jac_observations(x, z @ c.T) @ c,
+    )
+    l = PEARSON.reshape(1, 1, 20)
+    correlated = adjust(in_l, l, (c @ c.T)[None], [5.0, -0.5])
+    transformed = adjust(in_z, l @ np.linalg.inv(c).T, np.ones((1, 20)), [5.0, -0.5])
+    assert correlated.converged.all()
+    assert np.abs(correlated.parameters[0] - YORK).max() > 1e-2  # the correlations matter
+    np.testing.assert_allclose(correlated.parameters, transformed.parameters, rtol=1e-9)
+    np.testing.assert_allclose(correlated.cofactors, transformed.cofactors, rtol=1e-8)
+    np.testing.assert_allclose(correlated.omega, transformed.omega, rtol=1e-9)
+    v = correlated.residuals[0, 0]
+    assert v @ np.linalg.solve(c @ c.T, v) == pytest.approx(correlated.omega[0], rel=1e-9)
+
+
+# --- observed parameters -------------------------------------------------------------------------
+
+
+def test_an_observed_parameter_equals_an_added_condition():
+    slope, variance = -0.6, 0.03**2
+    direct = york(
+        parameter_observations=[[0.0, slope]], parameter_weights=np.array([0.0, 1 / variance])
+    )
+
+    points = as_one_block(LINE, 10)
+
+    def jac_observations(x, l):
+        b = np.zeros((len(l), 1, 11, 21))
+        b[..., :10, :20] = points.jac_observations(x, l[..., :20])
+        b[..., 10, 20] = -1
+        return b
+
+    def jac_parameters(x, l):
+        extra = np.broadcast_to([0.0, 1.0], (len(l), 1, 1, 2))
+        return np.concatenate([points.jac_parameters(x, l[..., :20]), extra], axis=2)
+
+    added = FunctionConditions(
+        psi=lambda x, l: np.concatenate(
+            [points.psi(x, l[..., :20]), x[:, None, 1:] - l[..., 20:]], axis=2
+        ),
+        jac_parameters=jac_parameters,
+        jac_observations=jac_observations,
+    )
+    l = np.append(PEARSON.ravel(), slope).reshape(1, 1, 21)
+    q = np.diag(np.append(YORK_COFACTORS.ravel(), variance))[None]
+    condition = adjust(added, l, q, [5.0, -0.5])
+
+    assert direct.redundancy == condition.redundancy == 9
+    np.testing.assert_allclose(direct.parameters, condition.parameters, rtol=1e-9)
+    np.testing.assert_allclose(direct.cofactors, condition.cofactors, rtol=1e-9)
+    np.testing.assert_allclose(direct.omega, condition.omega, rtol=1e-9)
+    of_points = np.sum(YORK_WEIGHTS * direct.residuals[0] ** 2)
+    of_slope = (direct.parameters[0, 1] - slope) ** 2 / variance
+    assert direct.omega[0] == pytest.approx(of_points + of_slope, rel=1e-9)
+
+
+# --- batches and failures ------------------------------------------------------------------------
+
+
+def noisy_lines(replicates, seed=0):
+    rng = np.random.default_rng(seed)
+    noise = np.sqrt(YORK_COFACTORS) * rng.standard_normal((replicates, 10, 2))
+    return PEARSON + 0.3 * noise
+
+
+def test_a_repeated_run_is_identical():
+    one, other = york(noisy_lines(50)), york(noisy_lines(50))
+    assert np.array_equal(one.parameters, other.parameters)
+    assert np.array_equal(one.cofactors, other.cofactors)
+    assert np.array_equal(one.omega, other.omega)
+
+
+def test_replicates_do_not_depend_on_their_batch():
+    lines = noisy_lines(50)
+    together = york(lines)
+    assert together.converged.all()
+    assert len(np.unique(together.iterations)) > 1  # some go on when others have ended
+    for i in range(0, 50, 7):
+        alone = york(lines[i : i + 1])
+        np.testing.assert_allclose(alone.parameters[0], together.parameters[i], rtol=1e-12)
+        np.testing.assert_allclose(alone.cofactors[0], together.cofactors[i], rtol=1e-10)
+        np.testing.assert_allclose(alone.omega[0], together.omega[i], rtol=1e-10)
+        assert alone.iterations[0] == together.iterations[i]
+
+
+def test_each_replicate_may_have_its_own_initial_values():
+    lines = noisy_lines(5)
+    result = york(lines, initial=np.linspace([4, -1], [7, 0], 5))
+    expected = york(lines)
+    np.testing.assert_array_less(
+        np.abs(result.parameters - expected.parameters), 1e-6 * expected.sigma_priori
+    )
+
+
+def assert_no_result(result, i):
+    assert not result.converged[i]
+    for name in ("parameters", "residuals", "cofactors", "omega", "sigma_posteriori"):
+        assert np.isnan(getattr(result, name)[i]).all()
+
+
+def test_a_singular_replicate_is_flagged_and_harms_no_other():
+    lines = noisy_lines(4)
+    bad = lines.copy()
+    bad[2, :, 0] = 3.0  # a vertical line has no intercept and slope
+    result, expected = york(bad), york(lines)
+    assert result.singular.tolist() == [False, False, True, False]
+    assert_no_result(result, 2)
+    others = [0, 1, 3]
+    assert result.converged[others].all()
+    np.testing.assert_allclose(result.parameters[others], expected.parameters[others], rtol=1e-12)
+
+
+def test_an_absurd_replicate_does_not_loosen_the_convergence_of_others():
+    lines = noisy_lines(3)
+    absurd = lines.copy()
+    absurd[1] = 1e12 * lines[1]
+    result, expected = york(absurd), york(lines)
+    np.testing.assert_allclose(result.parameters[::2], expected.parameters[::2], rtol=1e-12)
+    assert result.iterations[[0, 2]].tolist() == expected.iterations[[0, 2]].tolist()
+
+
+def test_a_replicate_that_does_not_converge_is_flagged():
+    result = york(noisy_lines(3), max_iterations=1)
+    assert result.iterations.tolist() == [1, 1, 1]
+    assert not result.singular.any()
+    for i in range(3):
+        assert_no_result(result, i)
+
+
+def test_fewer_conditions_than_unknowns_are_refused():
+    with pytest.raises(InputError, match="1 condition equations cannot determine 2 parameters"):
+        york(PEARSON[None, :1], YORK_COFACTORS[:1])
+
+
+def test_without_redundancy_there_is_no_variance_a_posteriori():
+    result = york(PEARSON[None, :2], YORK_COFACTORS[:2])
+    assert result.redundancy == 0
+    np.testing.assert_allclose(result.parameters[0], [5.9, -0.5 / 0.9], rtol=1e-9)
+    assert np.isnan(result.sigma_posteriori).all()
+    assert np.isfinite(result.sigma_priori).all()
+
+
+# --- implicit ellipse of ODRPACK -----------------------------------------------------------------
+
+# Boggs et al. (1992), User's Reference Guide for ODRPACK, p. 49.
+# fmt: off
+ELLIPSE_POINTS = np.array([
+    [0.5, 1.2, 1.6, 1.86, 2.12, 2.36, 2.44, 2.36, 2.06, 1.74,
+     1.34, 0.9, -0.28, -0.78, -1.36, -1.9, -2.5, -2.88, -3.18, -3.44],
+    [-0.12, -0.6, -1.0, -1.4, -2.54, -3.36, -4.0, -4.75, -5.25, -5.64,
+     -5.97, -6.32, -6.44, -6.44, -6.41, -6.25, -5.88, -5.5, -5.24, -4.86],
+]).T
+# fmt: on
+ELLIPSE_START = [-1.0, -3.0, 0.09, 0.02, 0.08]
+
+
+def ellipse_terms(x, l):
+    b0, b1, b2, b3, b4 = (column[:, None] for column in x.T)
+    return l[..., 0] - b0, l[..., 1] - b1, b2, b3, b4
+
+
+def ellipse_psi(x, l):
+    dx, dy, b2, b3, b4 = ellipse_terms(x, l)
+    return (b2 * dx**2 + 2 * b3 * dx * dy + b4 * dy**2 - 1)[..., None]
+
+
+def ellipse_by_point(x, l):
+    dx, dy, b2, b3, b4 = ellipse_terms(x, l)
+    return np.stack([2 * (b2 * dx + b3 * dy), 2 * (b3 * dx + b4 * dy)], -1)[:, :, None]
+
+
+def ellipse_by_parameters(x, l):
+    dx, dy, *_ = ellipse_terms(x, l)
+    squares = np.stack([dx**2, 2 * dx * dy, dy**2], -1)[:, :, None]
+    return np.concatenate([-ellipse_by_point(x, l), squares], axis=-1)
+
+
+ELLIPSE = FunctionConditions(ellipse_psi, ellipse_by_parameters, ellipse_by_point)
+
+
+def test_implicit_ellipse_of_odrpack():
+    result = adjust(ELLIPSE, ELLIPSE_POINTS[None], np.ones((20, 2)), ELLIPSE_START)
+    assert result.redundancy == 15
+    np.testing.assert_allclose(
+        result.parameters[0],
+        [-0.9993809167, -2.9310484652, 0.0875730503, 0.0162299709, 0.0797537983],
+        rtol=0,
+        atol=2e-6,
+    )
+    np.testing.assert_allclose(
+        result.sigma_posteriori[0],
+        [0.1113840353, 0.1097673311, 0.0041060738, 0.0027500348, 0.0034962502],
+        rtol=0,
+        atol=2e-5,
+    )
+
+
+# --- regressions of NIST -------------------------------------------------------------------------
+
+
+def regression(model, derivatives):
+    """y − model(b, t) = 0, where only y is observed and t is fixed: B = I."""
+    return FunctionConditions(
+        psi=lambda b, y: y - model(b)[..., None],
+        jac_parameters=lambda b, y: -derivatives(b)[:, :, None],
+        jac_observations=lambda b, y: np.ones((*y.shape[:2], 1, 1)),
+    )
+
+
+# fmt: off
+MISRA1A = np.array([
+    [10.07, 14.73, 17.94, 23.93, 29.61, 35.18, 40.02,
+     44.82, 50.76, 55.05, 61.01, 66.40, 75.47, 81.78],
+    [77.6, 114.9, 141.1, 190.8, 239.9, 289.0, 332.8,
+     378.4, 434.8, 477.3, 536.8, 593.1, 689.1, 760.0],
+])
+RAT43 = np.array([
+    16.08, 33.83, 65.80, 97.20, 191.55, 326.20, 386.87, 520.53,
+    590.03, 651.92, 724.93, 699.56, 689.96, 637.56, 717.41,
+])
+# fmt: on
+
+
+def misra1a():
+    """y = b1 (1 − exp(−b2 t))."""
+    t = MISRA1A[1]
+
+    def model(b):
+        return b[:, :1] * (1 - np.exp(-b[:, 1:] * t))
+
+    def derivatives(b):
+        e = np.exp(-b[:, 1:] * t)
+        return np.stack([1 - e, b[:, :1] * t * e], -1)
+
+    return regression(model, derivatives)
+
+
+def rat43():
+    """y = b1 / (1 + exp(b2 − b3 t))^(1/b4)."""
+    t = np.arange(1.0, 16.0)
+
+    def terms(b):
+        b1, b2, b3, b4 = (column[:, None] for column in b.T)
+        e = np.exp(b2 - b3 * t)
+        return b1, b4, e, (1 + e) ** (-1 / b4)
+
+    def model(b):
+        b1, _, _, power = terms(b)
+        return b1 * power
+
+    def derivatives(b):
+        b1, b4, e, power = terms(b)
+        by_b2 = -b1 * power * e / (b4 * (1 + e))
+        return np.stack([power, by_b2, -t * by_b2, b1 * power * np.log(1 + e) / b4**2], -1)
+
+    return regression(model, derivatives)
+
+
+CERTIFIED = {
+    "Misra1a": (
+        misra1a(),
+        MISRA1A[0],
+        [2.3894212918e02, 5.5015643181e-04],
+        [2.7070075241e00, 7.2668688436e-06],
+        1.2455138894e-01,
+    ),
+    "Rat43": (
+        rat43(),
+        RAT43,
+        [6.9964151270e02, 5.2771253025e00, 7.5962938329e-01, 1.2792483859e00],
+        [1.6302297817e01, 2.0828735829e00, 1.9566123451e-01, 6.8761936385e-01],
+        8.7864049080e03,
+    ),
+}
+
+
+@pytest.mark.parametrize(
+    ("problem", "start"),
+    [
+        ("Misra1a", [500.0, 0.0001]),  # NIST's first start, far away
+        ("Misra1a", [250.0, 0.0005]),
+        ("Rat43", [700.0, 5.0, 0.75, 1.3]),  # NIST's second start
+    ],
+)
+@pytest.mark.usefixtures("all_digits")
+def test_certified_regression(problem, start):
+    equations, y, parameters, sigma, rss = CERTIFIED[problem]
+    # NIST leaves the variance to be estimated; here it is the unit in which steps are judged.
+    variance = np.full((len(y), 1), rss / (len(y) - len(start)))
+    result = adjust(equations, y[None, :, None], variance, start)
+    assert result.converged.all()
+    np.testing.assert_allclose(result.parameters[0], parameters, rtol=1e-10)
+    np.testing.assert_allclose(result.sigma_posteriori[0], sigma, rtol=1e-9)
+    assert np.sum(result.residuals**2) == pytest.approx(rss, rel=1e-10)
+
+
+def test_rat43_from_afar_is_flagged():
+    """From NIST's first start pure Gauss–Newton steps diverge; that must not pass for a result."""
+    equations, y, *_ = CERTIFIED["Rat43"]
+    result = adjust(equations, y[None, :, None], np.ones((15, 1)), [100.0, 10.0, 1.0, 1.0])
+    assert_no_result(result, 0)

@@ -1,0 +1,210 @@
+"""The compiled adjustment against the NumPy path: the same numbers, whoever shares the lanes."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from study_helpers import grid, make_cells, simulated
+
+from accelstudy import adjustment
+from accelstudy.adjustment.block import Block
+from accelstudy.adjustment.calibration import equations_of
+from accelstudy.approaches import get_approach
+from accelstudy.basics.errors import InputError
+from accelstudy.effects import Hold, effect_names
+from accelstudy.schemes import get_scheme
+from accelstudy.sensors.models import get_model
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.simulation.sessions import Noise, session
+from accelstudy.study.cells import compiling
+from accelstudy.study.cells.compiling import POSITIONS_PER_PARAMETER
+from accelstudy.study.monte_carlo.simulate import BLOCK, blocks
+
+pytest.importorskip("llvmlite")
+
+from accelstudy.kernel import calibrate, compiled
+from accelstudy.kernel.formulas import Formulas
+from accelstudy.kernel.lanes import LANES, Code
+
+GRAVITY, ROBOT = get_approach("gravity"), get_approach("robot")
+NINE = get_model("bias-scale-nonorthogonality")
+ODD = get_model("bias+scale+saturation(knee=8)+warm_up(tau=500)")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def caches(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("caches")))
+        yield
+
+
+def drawn(model, noise, replicates, seed, scheme="mclaren-24"):
+    """Sessions of a sensor with parameters at random."""
+    rng = np.random.default_rng(seed)
+    parameters = 1e-3 * rng.standard_normal(model.n_parameters)
+    positions = get_scheme(scheme)
+    n = positions.n_positions
+    hold = Hold(temperature=rng.uniform(0, 40, n), time=60.0 * np.arange(n))
+    ideal = session(model, parameters, positions.directions, hold=hold)
+    return ideal.draw(noise, replicates, rng)
+
+
+def both(model, approach, observed):
+    return (
+        calibrate.calibrate(model, approach, observed),
+        Block.of(adjustment.calibrate(model, approach, observed)),
+    )
+
+
+def assert_same(found, expected):
+    """To 1e-10, relative to the numbers and to their standard deviations."""
+    assert np.array_equal(found.converged, expected.converged)
+    assert np.array_equal(found.iterations, expected.iterations)
+    assert found.redundancy == expected.redundancy
+    done = expected.converged
+    sigma = expected.sigma_priori[done]
+    size = sigma + np.abs(expected.estimates[done])
+    assert np.max(np.abs(found.estimates - expected.estimates)[done] / size, initial=0) < 1e-10
+    assert found.sigma_priori[done] == pytest.approx(sigma, rel=1e-10, abs=0)
+    assert found.omega[done] == pytest.approx(expected.omega[done], rel=1e-10, abs=1e-10)
+    assert found.correlation_sum == pytest.approx(expected.correlation_sum, abs=1e-10 * len(done))
+    for name in ("estimates", "sigma_priori", "omega"):
+        assert np.isnan(getattr(found, name)[~done]).all()
+
+
+@pytest.mark.parametrize(
+    ("model", "approach", "sigma_gravity"),
+    [(NINE, GRAVITY, 0), (NINE, ROBOT, 0), (ODD, GRAVITY, 1e-4), (ODD, ROBOT, 1e-4)],
+    ids=["gravity", "robot", "odd-gravity", "odd-robot"],
+)
+def test_random_cells(model, approach, sigma_gravity):
+    rng = np.random.default_rng(5)
+    converged = 0
+    for seed in range(8):
+        noise = Noise(
+            # Below, rounding of the observations alone is more than 1e-10 of it.
+            sigma_force=10 ** rng.uniform(-4, -1.5),
+            sigma_angle=10 ** rng.uniform(-7, -3) if seed % 4 else 0.0,
+            sigma_gravity=sigma_gravity,
+            gravity_error=1e-3 * rng.standard_normal(),
+            effects=[(), ("heavy_tails", "quantisation"), ("coloured_noise",)][seed % 3],
+        )
+        scheme = ["mclaren-24", "fibonacci-17", "faces-edges-corners-26"][seed % 3]
+        observed = drawn(model, noise, 1 + 7 * seed, seed, scheme)
+        found, expected = both(model, approach, observed)
+        assert_same(found, expected)
+        converged += found.converged.sum()
+    assert converged > 150
+
+
+def test_what_does_not_converge_and_what_is_singular():
+    observed = drawn(NINE, Noise(sigma_force=2.0), 100, 1)
+    found, expected = both(NINE, GRAVITY, observed)
+    assert 0 < found.converged.sum() < 100
+    assert_same(found, expected)
+    observed = drawn(NINE, Noise(), 5, 1, "faces-6")
+    with pytest.raises(InputError, match="6 condition equations cannot determine 9 parameters"):
+        calibrate.calibrate(NINE, GRAVITY, observed)
+    found, expected = both(NINE, ROBOT, drawn(NINE, Noise(), 5, 1).take(np.zeros(24, int)))
+    assert not found.converged.any()
+    assert_same(found, expected)
+
+
+def test_who_shares_the_lanes_changes_no_bit():
+    """Among sessions that end early, late and not at all, and in the lanes beyond the last."""
+    observed = drawn(NINE, Noise(sigma_force=2.0), 3 * LANES + 1, 1)
+    whole = calibrate.calibrate(NINE, GRAVITY, observed)
+    assert len(set(whole.iterations[whole.converged])) > 1
+    assert not whole.converged.all()
+    for chosen in (slice(0, 3), slice(5, 2 * LANES), slice(None, None, -1)):
+        part = calibrate.calibrate(NINE, GRAVITY, observed.sessions(chosen))
+        for name in (field.name for field in fields(Block)):
+            if name not in ("redundancy", "correlation_sum"):
+                expected = getattr(whole, name)[chosen]
+                assert getattr(part, name).tobytes() == expected.tobytes()
+
+
+@pytest.mark.parametrize("approach", [GRAVITY, ROBOT], ids=["gravity", "robot"])
+def test_the_formulas_of_every_effect(approach):
+    names = effect_names()
+    for first in range(0, len(names), 7):
+        model = SensorModel.of("some", names[first : first + 7])
+        equations = equations_of(model.trace, approach, False)
+        traced = equations.linear
+        n = len(traced.arguments)
+        rng = np.random.default_rng(first)
+        values = rng.uniform(-4, 4, (n, LANES))
+        values[[a in model.trace.settings for a in traced.arguments]] = 0.7
+
+        formulas = Formulas(list(traced.expressions), frozenset())
+        code = Code("f", (), ("x", "y"))
+        table = {
+            symbol: code.load("x", str(k * LANES)) for k, symbol in enumerate(traced.arguments)
+        }
+        for k, value in enumerate(formulas.write(code, table)):
+            code.store(value, "y", str(k * LANES))
+        result = np.empty((len(traced.expressions), LANES))
+        compiled.Compiled(str(code), "f", 0, 2).call(values.ctypes.data, result.ctypes.data)
+        expected = traced((LANES,), *values).reshape(result.shape)
+        assert result == pytest.approx(expected, rel=1e-11, abs=1e-11)
+
+
+def test_what_is_compiled_is_kept_whole_or_not_at_all(tmp_path, monkeypatch):
+    made = []
+    make = compiled._compiled
+    monkeypatch.setattr(compiled, "_compiled", lambda *a: made.append(1) or make(*a))
+
+    def doubled(folder):
+        monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
+        code = Code("f", (), ("x",))
+        x = code.load("x", "0")
+        code.store(x + x, "x", "0")
+        values = np.arange(float(LANES))
+        compiled.Compiled(str(code), "f", 0, 1).call(values.ctypes.data)
+        assert np.array_equal(values, 2 * np.arange(LANES))
+        return len(made)
+
+    assert [doubled(tmp_path), doubled(tmp_path)] == [1, 1]
+    (file,) = compiled.folder().iterdir()
+    content = file.read_bytes()
+    for damaged in (content[:-8], content[:-1] + bytes([content[-1] ^ 1]), b""):
+        file.write_bytes(damaged)
+        before = len(made)
+        assert doubled(tmp_path) == before + 1
+        assert file.read_bytes() == content
+    assert [path.name for path in compiled.folder().iterdir()] == [file.name]
+    closed = tmp_path / "closed"
+    closed.write_text("no folder", encoding="utf-8")
+    before = len(made)
+    assert doubled(closed) == before + 1
+
+
+@pytest.mark.parametrize("approach", ["gravity", "robot"])
+def test_a_compiled_cell_of_a_study(approach):
+    (cell,) = make_cells(grid(approaches=approach, replicates=BLOCK + 30)).values()
+    cell = replace(cell, compiled=True)
+    found = simulated(cell)
+    assert_same(found, simulated(replace(cell, compiled=False)))
+    (second,) = blocks(cell, 1, 1, 1)
+    assert second.estimates.tobytes() == found.estimates[BLOCK:].tobytes()
+
+
+def test_which_cells_are_compiled(monkeypatch):
+    """Those of a code that takes NumPy longer than the compiler, over all cells that share it."""
+    pays = -(-9 * POSITIONS_PER_PARAMETER // 24)
+
+    def compiled_cells(*replicates):
+        grids = [
+            grid(schemes=["mclaren-24"], approaches="gravity", replicates=replicates[0]),
+            grid(schemes=["mclaren-24"], approaches="robot", replicates=replicates[1]),
+            grid(schemes=["rings-24"], approaches="gravity", replicates=replicates[2]),
+        ]
+        return [cell.compiled for cell in make_cells(*grids).values()]
+
+    assert compiled_cells(pays - 1, pays, 1) == [True, True, True]
+    assert compiled_cells(pays - 2, pays - 1, 1) == [False, False, False]
+    monkeypatch.setattr(compiling, "find_spec", lambda name: None)
+    assert compiled_cells(pays, pays, pays) == [False, False, False]
+    (cell,) = make_cells(grid(approaches="gravity")).values()
+    with pytest.raises(InputError, match=r"install accelstudy\[kernel\]"):
+        next(blocks(replace(cell, compiled=True), 1, 0, 1))

@@ -1,0 +1,344 @@
+"""Public data through the commands, against what is known of them.
+
+Each log goes through `accelstudy import` and `accelstudy calibrate` as a user would call them. The
+expected numbers are those of other authors and of a fit made without this package, as the README
+of the data gives them; where our detector cuts the holds otherwise, the tolerance says so.
+"""
+
+import json
+import math
+import re
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+import pytest
+from click.testing import CliRunner
+from places import SHARED
+from scipy.stats import f as f_distribution
+
+from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.commands.main import main
+
+DATA = SHARED / "data"
+pytestmark = pytest.mark.skipif(
+    not DATA.is_dir(), reason=f"needs the public data in {DATA}; set ACCELSTUDY_SHARED"
+)
+
+NINE = "bias-scale-nonorthogonality"
+MG = 1e-3 * STANDARD_GRAVITY
+SCALE, OFFSET = 0.0024, np.array([33123, 33275, 32364])
+COUNTS = ("--unit", "counts", "--scale", SCALE, "--offset", ",".join(map(str, OFFSET)))
+MPU_9150 = ("--columns", "fx=0,fy=1,fz=2", "--rate", 100, "--gravity", 9.81)
+IMPORTS = {
+    "xsens": (
+        "imu_tk_xsens/xsens_acc.mat",
+        *("--columns", "fx=1,fy=2,fz=3", "--time", 0, *COUNTS, "--gravity", 9.81744),
+    ),
+    "xsens, white": (
+        "imu_tk_xsens/derived_static_means.csv",
+        *("--means", *COUNTS, "--gravity", 9.81744),
+    ),
+    **{f"mpu9150 {i}": (f"mpu9150/imu{i}.log", *MPU_9150) for i in range(3)},
+    "ctu 24": (
+        "ctu_innalabs/CalibrationOfLowCostTriaxialInertialSensors.mat",
+        *("--means", "--unit", "g"),
+    ),
+    "ctu 49": (
+        "ctu_innalabs/CalibrationOfLowCostTriaxialInertialSensors50.mat",
+        *("--means", "--unit", "g"),
+    ),
+    "mpu6050": (
+        "mpu6050/example_data_calibration.csv",
+        *("--rate", 100, "--unit", "counts", "--scale", STANDARD_GRAVITY / 16384),
+    ),
+    "phone": (
+        "ctu_innalabs/MobileAccData30orientationRawSample01.mat",
+        *("--rate", 100, "--settings", "short.yaml"),
+    ),
+    "ferraris": (
+        "ferraris/example_ferraris_session.csv",
+        *("--columns", "fx=acc_x,fy=acc_y,fz=acc_z", "--rate", 204.8, "--gravity", 9.81),
+    ),
+}
+SHORT = "shortest_s: 0.2\n"  # the phone was held for 1.5 to 4 s, of which windows take 1.4 s
+
+
+class Outcome(NamedTuple):
+    """What both commands said, and the content of calibration.json."""
+
+    imported: str
+    calibrated: str
+    content: dict
+
+    @property
+    def verdict(self):
+        return self.content["quality"]["verdict"]
+
+    @property
+    def test(self):
+        return self.content["quality"]["global_test"]
+
+    @property
+    def rms(self):
+        return self.content["rms_norm_residual_mps2"]
+
+    @property
+    def sigma0(self):
+        """Sigma of a position a posteriori, m/s²."""
+        prior = self.content["sigma_position_mps2"]
+        factor = math.sqrt(self.content["variance_of_unit_weight"])
+        return prior * factor if self.content["sigma_source"] == "a priori" else prior
+
+    def affine(self, gauge):
+        """K in a gauge, and the bias in m/s²."""
+        affine = self.content["affine"]
+        return np.array(affine["gauges"][gauge]), np.array(affine["bias_mps2"])
+
+
+def run(*arguments):
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    """What the import said, and the folder that it wrote; each log is imported once."""
+    folder = tmp_path_factory.mktemp("known")
+    (folder / "short.yaml").write_text(SHORT, encoding="utf-8")
+
+    @cache
+    def imported(name):
+        file, *options = IMPORTS[name]
+        options = [folder / "short.yaml" if o == "short.yaml" else o for o in options]
+        out = folder / name
+        result = run("import", DATA / file, "--out", out, "--no-figure", *options)
+        assert result.exit_code == 0, result.output
+        return result.output, out
+
+    return imported
+
+
+@pytest.fixture(scope="module")
+def known(campaign):
+    """Import and calibrate, each once for a log and a model."""
+
+    @cache
+    def calibrated(name, model=NINE):
+        said, folder = campaign(name)
+        out = folder.with_name(f"{name}, {model}")
+        result = run("calibrate", folder, "--model", model, "--out", out)
+        assert result.exit_code == 0, result.output
+        content = json.loads((out / "calibration.json").read_text(encoding="utf-8"))
+        return Outcome(said, result.output, content)
+
+    return calibrated
+
+
+def no_effect_is_missing(known, name, least, candidates=("quadratic-cubic",)):
+    """F-tests of nonlinear effects beside the nine parameters, each p at least `least`."""
+    omega, r = unexplained(known(name))
+    for effects in candidates:
+        less, rest = unexplained(known(name, f"{NINE}-{effects}"))
+        ratio = (omega - less) / (r - rest) / (less / rest)
+        assert f_distribution.sf(ratio, r - rest, rest) > least, effects
+
+
+def unexplained(outcome):
+    r = outcome.content["redundancy"]
+    return outcome.content["variance_of_unit_weight"] * r, r
+
+
+# --- Xsens MTi: the noise is coloured ------------------------------------------------------------
+
+
+def test_xsens_refutes_white_noise_and_agrees_with_the_allan_deviation(known):
+    white, coloured = known("xsens, white"), known("xsens")
+    assert white.content["n_positions"] == 38
+    assert not white.test["accepted"]
+    assert white.test["p_value"] < 1e-6
+    assert "understated" in white.verdict
+    assert white.content["sigma_source"] == "a posteriori"
+    assert coloured.test["accepted"]
+    assert coloured.content["sigma_source"] == "a priori"
+    # The Allan deviation is flat at 0.5 to 1.5 mm/s² from 1 to 5 s.
+    assert 0.5e-3 < coloured.content["sigma_position_mps2"] < 1.5e-3
+    expected = re.search(r"([0-9.]+) mm/s² if the noise were white", coloured.imported)
+    assert float(expected[1]) == pytest.approx(0.29, abs=0.01)
+
+
+def test_xsens_residuals(known):
+    """The means of the README are cut at another threshold; 0.02 to 0.06 m/s² move it by 0.02."""
+    assert known("xsens, white").rms == pytest.approx(1.02e-3, abs=0.005e-3)
+    assert known("xsens, white").sigma0 == pytest.approx(1.16e-3, abs=0.01e-3)
+    assert 38 <= known("xsens").content["n_positions"] <= 42
+    assert known("xsens").rms == pytest.approx(1.02e-3, abs=0.025e-3)
+    assert known("xsens").sigma0 == pytest.approx(1.16e-3, abs=0.03e-3)
+
+
+def test_xsens_parameters_are_those_of_imu_tk(known):
+    """Within the spread over the detector's threshold: 0.03 counts per m/s² and 0.0005 rad."""
+    k, bias = known("xsens").affine("upper")
+    inverse_scale = 1 / (np.diag(k) * SCALE)
+    np.testing.assert_allclose(inverse_scale, [414.4143, 412.0467, 414.6139], rtol=0, atol=0.03)
+    # Of the offsets no spread is given; 0.1 counts are 0.24 mm/s², a third of their sigma.
+    offset = bias / SCALE + OFFSET
+    np.testing.assert_allclose(offset, [33123.885, 33275.159, 32364.571], rtol=0, atol=0.1)
+    t = k / np.diag(k)
+    angles = [-t[0, 1], t[0, 2], -t[1, 2]]
+    np.testing.assert_allclose(angles, [0.003413, -0.009415, 0.021277], rtol=0, atol=5e-4)
+
+
+def test_xsens_lacks_no_effect(known):
+    no_effect_is_missing(known, "xsens", 0.3, ("quadratic", "cubic", "quadratic-cubic"))
+
+
+# --- MPU-9150: the null case ---------------------------------------------------------------------
+
+AUTHORS = {  # sx, sy, sz in %; myz, mxy, mxz in deg; bx, by, bz in m/s²
+    0: ((0.363, 0.315, 0.647), (0.123, 0.02, 0.317), (0.103, 0.097, 0.344)),
+    1: ((0.471, 0.482, 0.932), (-0.284, -0.01, 0.145), (0.09, 0.07, 0.338)),
+    2: ((0.382, 0.355, 0.780), (0.26, -0.012, 0.282), (0.096, 0.008, -0.045)),
+}
+
+
+@pytest.mark.parametrize("i", range(3))
+def test_mpu9150_lacks_nothing(known, i):
+    outcome = known(f"mpu9150 {i}")
+    assert outcome.content["n_positions"] == 23
+    assert outcome.test["accepted"]
+    assert outcome.content["quality"]["suspects"] == []
+    assert "The residuals agree with the stated noise" in outcome.verdict
+    # White noise lets expect 2.0 to 3.3 mm/s².
+    assert 2.0e-3 < outcome.content["sigma_position_mps2"] < 3.3e-3
+    # As holds are noisy and short, thresholds of 0.12 to 0.35 m/s² move the rms by up to a fifth,
+    # which is what an rms with r = 14 is worth: 1/√28.
+    assert outcome.rms == pytest.approx(2.1e-3, rel=1 / math.sqrt(28))
+    assert outcome.sigma0 == pytest.approx(2.7e-3, rel=1 / math.sqrt(28))
+    no_effect_is_missing(known, f"mpu9150 {i}", 0.3)
+
+
+@pytest.mark.parametrize("i", AUTHORS)
+def test_mpu9150_agrees_with_its_authors(known, i):
+    """Within 0.027 % in scale, 0.018° and 1.8 mm/s², and the rounding of their numbers."""
+    scale, angles, offset = AUTHORS[i]
+    k, bias = known(f"mpu9150 {i}").affine("upper")
+    m = np.linalg.inv(k)
+    np.testing.assert_allclose(100 * (np.diag(m) - 1), scale, rtol=0, atol=0.027 + 0.0005)
+    found = np.degrees([m[1, 2], m[0, 1], m[0, 2]])
+    np.testing.assert_allclose(found, angles, rtol=0, atol=0.018 + 0.001)
+    np.testing.assert_allclose(bias, offset, rtol=0, atol=1.8e-3 + 0.0005)
+
+
+# --- Innalabs AHRS M3: means in units of g -------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("n", "rms", "sigma0"), [(24, 0.4256, 0.538), (49, 0.8356, 0.925)], ids=["24", "49"]
+)
+def test_ctu_residuals(known, n, rms, sigma0):
+    """The README gives all norms the same weight, and the adjustment each its own.
+
+    They differ by up to 7 %, as the axes are 3° from orthogonal. So the README's rms is the least
+    there is and ours a little more, and σ̂0 differs by less than 0.5 %.
+    """
+    outcome = known(f"ctu {n}")
+    assert outcome.imported.startswith(f"{n} positions; sigma of a mean: unknown")
+    assert rms - 0.00005 < outcome.rms / MG < rms + 0.0002
+    assert outcome.sigma0 / MG == pytest.approx(sigma0, rel=0.005)
+    assert outcome.test is None
+    assert "is not stated, so nothing says whether the model is complete" in outcome.verdict
+    no_effect_is_missing(known, f"ctu {n}", 0.05)
+
+
+def test_ctu_parameters(known):
+    """Lower-triangular T S (f − b); the weights move them by 0.03 sigma at most."""
+    k, bias = known("ctu 24").affine("lower")
+    scale = np.diag(k)
+    t = k / scale
+    np.testing.assert_allclose(
+        [t[1, 0], t[2, 0], t[2, 1]], [-0.0155999, 0.0530982, 0.0033578], rtol=0, atol=2e-5
+    )
+    np.testing.assert_allclose(scale, [1.006356, 0.9969344, 0.9936887], rtol=0, atol=5e-6)
+    offset = [0.0008532, -0.0051819, 0.0135543]
+    np.testing.assert_allclose(bias / STANDARD_GRAVITY, offset, rtol=0, atol=4e-6)
+
+
+# --- Data that tell less -------------------------------------------------------------------------
+
+
+def test_mpu6050_has_no_power(known):
+    """With r = 1 the rms is one number, |N(0, 1)| σ / √10; the README's is 0.29 mm/s²."""
+    outcome = known("mpu6050")
+    assert outcome.content["n_positions"] == 10
+    assert outcome.content["redundancy"] == 1
+    assert "With r = 1 the test of the model has next to no power" in outcome.verdict
+    sigma = outcome.content["sigma_position_mps2"]
+    assert sigma == pytest.approx(2e-3, rel=0.3)
+    assert outcome.rms < 1.96 * sigma / math.sqrt(10)
+
+
+def test_a_phone_in_the_hand_is_not_static(known):
+    """Where a hold begins and ends matters, as the hand moves: the rms is 26 within some 5 %."""
+    outcome = known("phone")
+    assert outcome.content["n_positions"] == 30
+    assert outcome.rms == pytest.approx(26e-3, rel=0.05)
+    assert outcome.sigma0 == pytest.approx(31e-3, rel=0.06)
+    expected = re.search(r"([0-9.]+) mm/s² if the noise were white", outcome.imported)
+    assert 4 < float(expected[1]) < 8
+    assert "the sensor turns" in outcome.imported
+    assert not outcome.test["accepted"]
+    assert "understated, or an effect is missing" in outcome.verdict
+    assert outcome.content["sigma_source"] == "a posteriori"
+
+
+@pytest.fixture(scope="module")
+def six_positions(tmp_path_factory):
+    """The six positions of Ferraris, cut at the samples that its authors noted."""
+    folder = tmp_path_factory.mktemp("ferraris")
+    session = pd.read_csv(DATA / "ferraris/example_ferraris_session.csv")
+    notes = json.loads((DATA / "ferraris/example_ferraris_session_list.json").read_text())
+    sections = [s for name, s in notes.items() if not name.endswith("rot")]
+    forces = session[["acc_x", "acc_y", "acc_z"]]
+    means = pd.DataFrame([forces[s["start"] : s["end"]].mean() for s in sections])
+    means.to_csv(folder / "means.csv", index=False)
+    imported = run(
+        *("import", folder / "means.csv", "--means", "--gravity", 9.81, "--out", folder / "six")
+    )
+    assert imported.exit_code == 0, imported.output
+    return folder / "six"
+
+
+def test_ferraris_says_what_six_positions_do_not_determine(six_positions, tmp_path):
+    result = run("calibrate", six_positions, "--out", tmp_path / "out")
+    assert result.exit_code == 2
+    assert "6 positions do not determine the model" in result.stderr
+    assert "alpha_yz, alpha_zy, alpha_zx" in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_ferraris_determines_six_parameters(six_positions, tmp_path):
+    """They are near the half sums and half differences of opposite positions.
+
+    Exactly so if the sensor stood upright; at an angle of ε they differ by g ε²/2.
+    """
+    result = run("calibrate", six_positions, "--model", "bias-scale", "--out", tmp_path)
+    assert result.exit_code == 0, result.output
+    assert "no redundancy" in result.output
+    content = json.loads((tmp_path / "calibration.json").read_text(encoding="utf-8"))
+    found = {entry["name"]: entry["value"] for entry in content["parameters"]}
+    means = pd.read_csv(six_positions / "positions.csv")[["fx", "fy", "fz"]].to_numpy()
+    half = 9.81 * math.radians(5) ** 2 / 2
+    for i, axis in enumerate("xyz"):
+        up, down = means[2 * i, i], means[2 * i + 1, i]
+        assert found[f"b_{axis}"] == pytest.approx((up + down) / 2, abs=half)
+        assert 1 + found[f"s_{axis}"] == pytest.approx((up - down) / 2 / 9.81, abs=half / 9.81)
+
+
+def test_ferraris_rests_between_its_turns_too(known):
+    outcome = known("ferraris", "bias-scale")
+    assert "holds: 9" in outcome.imported
+    assert outcome.content["redundancy"] == 3
+    # Six parameters leave out that the axes of a sensor are not orthogonal.
+    assert not outcome.test["accepted"]

@@ -1,0 +1,295 @@
+"""What a calibration or a diagnosis costs grows like its positions, not like their square."""
+
+import tracemalloc
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+from quality_helpers import BOTH, GRAVITY, NINE, ROBOT, SIGMA, draw
+
+from accelstudy.adjustment import calibrate, calibration
+from accelstudy.adjustment.quality import (
+    held_out,
+    position_tests,
+    prediction,
+    redundancy_numbers,
+    reliability,
+    solve,
+    suspects,
+    variance_components,
+)
+from accelstudy.approaches import get_approach
+from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.calibration.output import write_calibration
+from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
+from accelstudy.diagnosis.decision import search
+from accelstudy.diagnosis.evidence import chance
+from accelstudy.diagnosis.evidence.colour import LENGTHS, quadratic_forms, restricted
+from accelstudy.diagnosis.evidence.noise import axis_factors
+from accelstudy.diagnosis.pipeline import diagnose
+from accelstudy.diagnosis.space.hypotheses import setting_of
+from accelstudy.diagnosis.space.location import groups
+from accelstudy.diagnosis.space.repeats import clusters
+from accelstudy.effects import Hold, get_effect
+from accelstudy.simulation.sessions import Noise
+
+FEW, MANY = 400, 1600
+
+
+def dense_projector(solution):
+    """R = I − Ã (Ãᵀ Ã)⁻¹ Ãᵀ as it is defined."""
+    a = solution.design
+    return np.eye(len(a)) - a @ np.linalg.solve(a.T @ a, a.T)
+
+
+def peak(function):
+    """Largest memory in use while a function runs, MB."""
+    tracemalloc.start()
+    function()
+    size = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return size / 1e6
+
+
+@BOTH
+@pytest.mark.parametrize("sigma_gravity", [0.0, 1e-3])
+def test_blocks_are_those_of_the_whole_projector(approach, sigma_gravity):
+    solution = solve(NINE, approach, draw(3, noise=Noise(sigma_gravity=sigma_gravity)))
+    n, c = solution.misclosures.shape
+    whole = dense_projector(solution)
+    for i in range(n):
+        at = slice(i * c, (i + 1) * c)
+        np.testing.assert_allclose(solution.blocks[i], whole[at, at], rtol=0, atol=1e-12)
+    gravity = redundancy_numbers(solution).gravity
+    if sigma_gravity:
+        assert gravity == pytest.approx(whole[-1, -1], abs=1e-12)
+    assert np.trace(whole) == pytest.approx(solution.redundancy, abs=1e-9)
+
+
+@pytest.mark.parametrize("sigma_gravity", [0.0, 1e-3])
+def test_variance_components_solve_their_equations_with_whole_matrices(sigma_gravity):
+    """S θ = q − S₀ with W, M_i and M₀ as they are defined, at the factors that were found."""
+    noise = Noise(sigma_gravity=sigma_gravity)
+    observed = draw(3, "fibonacci-40", noise=noise)
+    found = variance_components(NINE, ROBOT, observed)
+    assert found.converged
+    force, angle = np.sqrt(found.factors)
+    solution = solve(
+        NINE,
+        ROBOT,
+        replace(
+            observed,
+            sigma_force=force * noise.sigma_force,
+            sigma_angle=angle * noise.sigma_angle,
+        ),
+    )
+    n, c, u = solution.jac_parameters.shape
+    size = n * c + len(solution.prior[1])
+    m = np.zeros((3, size, size))
+    for i, columns in enumerate((slice(0, 3), slice(3, 5))):
+        b = solution.jac_observations[:, :, columns]
+        q = solution.variances[:, columns] / found.factors[i]
+        for k, block in enumerate(np.einsum("nco,no,ndo->ncd", b, q, b)):
+            m[i, k * c : (k + 1) * c, k * c : (k + 1) * c] = block
+    m[2, n * c :, n * c :] = np.eye(size - n * c)
+    a = np.concatenate([solution.jac_parameters.reshape(n * c, u), solution.prior[0]])
+    w = np.concatenate([solution.misclosures.ravel(), solution.prior[1]])
+    inverse = np.linalg.inv(found.factors[0] * m[0] + found.factors[1] * m[1] + m[2])
+    scale = np.linalg.norm(a, axis=0)
+    a = a / scale
+    projected = inverse - inverse @ a @ np.linalg.solve(a.T @ inverse @ a, a.T @ inverse)
+    s = np.array([[np.trace(projected @ i @ projected @ j) for j in m] for i in m[:2]])
+    shares = np.array([w @ projected @ i @ projected @ w for i in m[:2]])
+    # The derivatives belong to weights that differ from these by the limit of convergence.
+    np.testing.assert_allclose(s[:, :2] @ found.factors + s[:, 2], shares, rtol=2e-3)
+    np.testing.assert_allclose(
+        found.sigma, np.sqrt(np.diag(2 * np.linalg.inv(s[:, :2]))), rtol=1e-3
+    )
+    traces = [np.trace(projected @ i) for i in m[:2]]
+    np.testing.assert_allclose(found.redundancy, found.factors * traces, rtol=1e-3)
+
+
+@BOTH
+def test_predictions_by_derivatives_are_those_of_refits(approach, monkeypatch):
+    """From so many positions on, one changes next to nothing by second order."""
+    observed = draw(3, f"fibonacci-{prediction.REFITTED}", noise=Noise(sigma_gravity=1e-3))
+    refitted = held_out(NINE, approach, observed)
+    monkeypatch.setattr(prediction, "REFITTED", 10)
+    derived = held_out(NINE, approach, observed)
+    np.testing.assert_allclose(derived.misclosures, refitted.misclosures, rtol=0, atol=2e-4 * SIGMA)
+    np.testing.assert_allclose(derived.cofactors, refitted.cofactors, rtol=0, atol=5e-4 * SIGMA**2)
+    if approach is ROBOT:
+        np.testing.assert_allclose(derived.angles, refitted.angles, rtol=0, atol=1e-7)
+
+
+@BOTH
+def test_sessions_that_are_adjusted_in_parts_are_the_same(approach, monkeypatch):
+    observed = draw(3, replicates=7, noise=Noise(sigma_gravity=1e-3))
+    whole = calibrate(NINE, approach, observed)
+    monkeypatch.setattr(calibration, "AT_ONCE", 2 * 24 + 5)
+    parts = calibrate(NINE, approach, observed)
+    np.testing.assert_allclose(parts.parameters, whole.parameters, rtol=0, atol=1e-14)
+    np.testing.assert_array_equal(parts.iterations, whole.iterations)
+    assert parts.redundancy == whole.redundancy
+
+
+@pytest.mark.parametrize("approach", [GRAVITY, ROBOT], ids=lambda a: a.name)
+def test_memory_of_the_quality_is_linear_in_the_positions(approach):
+    def assess(n):
+        observed = draw(3, f"fibonacci-{n}")
+        solution = solve(NINE, approach, observed)
+        redundancy_numbers(solution)
+        position_tests(solution)
+        reliability(solution)
+        suspects(NINE, approach, observed)
+        held_out(NINE, approach, observed)
+        variance_components(NINE, approach, observed)
+
+    assert peak(lambda: assess(MANY)) < 1.3 * MANY / FEW * peak(lambda: assess(FEW))
+
+
+def test_a_page_of_many_positions_lists_those_that_fit_worst(tmp_path):
+    campaign, _ = simulate_campaign(
+        CampaignSettings(
+            seed=3, scheme="fibonacci-1200", gross_errors=("outlier_position(position=77)",)
+        )
+    )
+    fit = fit_campaign(campaign, NINE, ROBOT)
+    write_calibration(fit, tmp_path)
+    page = (tmp_path / "report.html").read_text()
+    assert "200 positions of 1200 that fit worst" in page
+    assert '<tr class="suspect"><td>77</td>' in page
+    # The points are one image within the figure.
+    assert "<image" in (tmp_path / "figures" / "residuals.svg").read_text()
+    assert len(page) < 500_000
+
+
+# --- the diagnosis -------------------------------------------------------------------------------
+
+
+def complement(columns):
+    """Orthonormal basis of all that is orthogonal to columns."""
+    return np.linalg.qr(columns, mode="complete")[0][:, columns.shape[1] :]
+
+
+@pytest.fixture(scope="module", params=["gravity", "robot"])
+def setting(request):
+    """A campaign with a repeated scheme, all columns and observed gravity."""
+    campaign, _ = simulate_campaign(
+        CampaignSettings(
+            seed=4,
+            scheme="fibonacci-15",
+            repeats=2,
+            approach=request.param,
+            temperature=(10.0, 40.0),
+            temperature_order="random",
+        )
+    )
+    fit = fit_campaign(replace(campaign, sigma_gravity=1e-3), NINE, get_approach(request.param))
+    return setting_of(solve(NINE, fit.approach, fit.observed, fit.adjustment))
+
+
+def test_residuals_are_those_of_a_basis_of_the_residual_space(setting):
+    residuals = setting.frame.residuals
+    n = complement(residuals.design)
+    np.testing.assert_allclose(residuals.z, n @ n.T @ residuals.errors, atol=1e-9)
+    assert residuals.redundancy == n.shape[1]
+    rows = np.random.default_rng(1).standard_normal((len(n), 4))
+    np.testing.assert_allclose(residuals.project(rows), n @ n.T @ rows, atol=1e-12)
+    errors = residuals.project(rows)
+    for shapes in setting.candidates.values():
+        for h, part in zip(shapes, shapes.parts(errors.T).T, strict=True):
+            np.testing.assert_allclose(h.basis.T @ h.basis, np.eye(h.dim), atol=1e-9)
+            np.testing.assert_allclose(residuals.absorbed.T @ h.basis, 0, atol=1e-9)
+            np.testing.assert_allclose(part, np.sum((h.basis.T @ errors) ** 2, axis=0), rtol=1e-7)
+
+
+def test_repeats_and_lack_of_fit_share_the_residual_space(setting):
+    """Against a basis of all differences between conditions of one attitude."""
+    residuals = setting.frame.residuals
+    n, c = residuals.whitening.shape[:2]
+    labels = clusters(setting.frame.forces)
+    assert len(np.unique(labels)) == n / 2
+    differences = []
+    for i in range(n):
+        for axis in range(c if labels[i] != i else 0):
+            change = np.zeros((n, c, 1))
+            change[i, axis], change[labels[i], axis] = 1, -1
+            differences.append(residuals.rows(change))
+    basis = np.linalg.qr(residuals.project(np.concatenate(differences, axis=1)))[0]
+    found = groups(setting)
+    errors = residuals.project(np.random.default_rng(1).standard_normal((len(residuals.z), 5))).T
+    repeated = np.sum((errors @ basis) ** 2, axis=1)
+    assert found["repeat"].dims[0] == basis.shape[1]
+    np.testing.assert_allclose(found["repeat"].parts(errors)[:, 0], repeated, rtol=1e-9)
+    assert found["lack_of_fit"].dims[0] == residuals.redundancy - basis.shape[1]
+    rest = np.sum(errors**2, axis=1) - repeated
+    np.testing.assert_allclose(found["lack_of_fit"].parts(errors)[:, 0], rest, rtol=1e-9)
+
+
+def test_coloured_noise_has_the_likelihood_of_whole_covariance_matrices(setting):
+    residuals = setting.frame.residuals
+    n, c = residuals.whitening.shape[:2]
+    basis, i = complement(residuals.design), np.arange(n)
+    z, r = basis.T @ residuals.z, residuals.redundancy
+    g = np.einsum("ncr,nca->anr", basis[: n * c].reshape(n, c, -1), residuals.force_noise)
+    v = np.random.default_rng(2).standard_normal((4, n, 3))
+    forms, (determinants, squares) = quadratic_forms(v), restricted(residuals, (0.25, 16.0))
+    for k, length in enumerate(LENGTHS):
+        lag = np.abs(i[:, None] - i)
+        kernel = np.exp(-lag / length) if length < np.inf else (np.minimum(i[:, None], i) + 1) / n
+        np.testing.assert_allclose(forms[:, k], np.einsum("bia,ij,bja->b", v, kernel, v))
+        for j, strength in enumerate((0.25, 16.0)):
+            covariance = np.eye(r) + strength * np.einsum("anr,nm,ams->rs", g, kernel, g)
+            square = z @ np.linalg.solve(covariance, z)
+            assert squares[k, j] == pytest.approx(square, rel=1e-9)
+            assert determinants[k, j] == pytest.approx(np.linalg.slogdet(covariance)[1], rel=1e-9)
+
+
+def test_factors_of_the_axes_are_those_of_whole_matrices(setting):
+    residuals = setting.frame.residuals
+    n, c = residuals.whitening.shape[:2]
+    basis = complement(residuals.design)
+    g = np.einsum("ncr,nca->arn", basis[: n * c].reshape(n, c, -1), residuals.force_noise)
+    left = np.array([[np.sum((a.T @ b) ** 2) for b in g] for a in g])
+    angles = np.sum(g**2, axis=(1, 2)) - left.sum(axis=1)
+    z = basis.T @ residuals.z
+    right = np.array([np.sum((z @ a) ** 2) for a in g]) - angles
+    expected = np.maximum(np.linalg.solve(left, right), 0)
+    np.testing.assert_allclose(axis_factors(residuals), expected, rtol=1e-6, atol=1e-9)
+
+
+def test_a_jump_among_many_holds_is_found_where_it_is():
+    """Not all times are searched at first; those next to the best one are looked at then."""
+    hold = Hold(time=60.0 * np.arange(1000))
+    effect = get_effect("bias_jump")
+    coarse = effect.candidates(hold, np.zeros((1000, 3)), 9.8)
+    assert len(coarse) <= 50
+    times = np.array([c.shape["t"] for c in coarse])
+    assert (times[0], times[-1]) == (90, 60 * 997.5)
+    assert np.all(np.diff(times) > 0)
+    between = [b.shape["t"] for b in coarse[20].between(coarse[21], hold)]
+    assert 1 <= len(between) <= 7
+    assert times[20] < min(between) <= max(between) < times[21]
+    campaign, _ = simulate_campaign(
+        CampaignSettings(seed=4, scheme="fibonacci-400", effects=("bias_jump(t=3570)",), size=0.3)
+    )
+    found = diagnose(campaign, NINE)
+    assert [named.spec for named in found.found] == ["bias_jump(t=3570)"]
+
+
+def test_memory_of_a_diagnosis_is_linear_in_the_positions(monkeypatch):
+    # What is drawn at once has a size of its own, whatever the positions.
+    monkeypatch.setattr(chance, "AT_ONCE", 10_000)
+    monkeypatch.setattr(chance, "KEPT", 0)
+    monkeypatch.setattr(search, "Chance", partial(chance.Chance, simulations=20))
+
+    def run(n):
+        campaign, _ = simulate_campaign(
+            CampaignSettings(seed=4, scheme=f"fibonacci-{n}", approach="robot")
+        )
+        return diagnose(campaign, NINE)
+
+    few, many = FEW // 2, MANY // 2
+    assert peak(lambda: run(many)) < 1.3 * many / few * peak(lambda: run(few))

@@ -1,0 +1,96 @@
+"""What a command tells while it works: after a while, on a terminal only, and never if quiet."""
+
+import io
+import time
+from contextlib import redirect_stderr
+
+import pytest
+
+from accelstudy.basics import progress
+from accelstudy.basics.progress import feedback, say, stage, track
+from accelstudy.commands.main import main
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+@pytest.fixture(autouse=True)
+def at_once(monkeypatch):
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setattr(progress, "DELAY", 0.0)
+
+
+def work():
+    """Two stages, one within the other; what passes through them is what was put in."""
+    with stage("null simulation"):
+        done = [item for item in track([1, 2, 3], "sets") if time.sleep(0.1) is None]
+    with stage("download", 10) as advance:
+        advance(4)
+    return done
+
+
+def seen(screen, quiet=False):
+    """What `screen` shows after the work."""
+    with redirect_stderr(screen), feedback(quiet):
+        assert work() == [1, 2, 3]
+    return screen.getvalue()
+
+
+def test_bars_on_a_terminal():
+    text = seen(Terminal())
+    assert "null simulation" in text
+    assert "sets" in text
+
+
+def test_what_is_fast_gets_no_bar(monkeypatch):
+    monkeypatch.setattr(progress, "DELAY", 60.0)
+    assert seen(Terminal()) == ""
+
+
+def test_nothing_if_quiet_in_a_pipe_or_used_from_python(monkeypatch):
+    assert seen(Terminal(), quiet=True) == ""
+    assert seen(io.StringIO()) == ""
+    with redirect_stderr(Terminal()) as screen:
+        work()
+    assert screen.getvalue() == ""
+    monkeypatch.setenv("TERM", "dumb")
+    assert seen(Terminal()) == ""
+
+
+def test_a_command_says_what_it_did_unless_it_is_quiet(capsys):
+    with feedback():
+        say("done")
+    with feedback(quiet=True):
+        say("more")
+    assert capsys.readouterr().out == "done\n"
+
+
+def test_a_command_that_takes_long(tmp_path, capsys):
+    main(["simulate-campaign", "--out", str(tmp_path / "c")], standalone_mode=False)
+    command = ["check-sigmas", str(tmp_path / "c"), "--replicates", "50"]
+    capsys.readouterr()
+    for quiet in ([], ["--quiet"]):
+        with redirect_stderr(Terminal()) as screen:
+            main([*command, *quiet], standalone_mode=False)
+        assert ("simulated campaigns" in screen.getvalue()) == (not quiet)
+        printed = capsys.readouterr().out
+        assert "alpha_zx" in printed
+        assert ("as the adjustment claims it" in printed) == (not quiet)
+
+
+def test_a_bar_goes_when_the_work_fails():
+    def fails():
+        with feedback(), stage("null simulation"):
+            time.sleep(0.2)
+            raise ValueError("bad")
+
+    screen = Terminal()
+    with redirect_stderr(screen), pytest.raises(ValueError, match="bad"):
+        fails()
+    bar, after = screen.getvalue().rsplit("\x1b[2K", 1)  # which clears the line
+    assert "null simulation" in bar
+    assert after.strip() == "\x1b[?25h"  # which shows the cursor again
+    assert "sets" in seen(Terminal())

@@ -1,0 +1,162 @@
+"""Units at the border, and what is said of a unit that is unknown."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.units import (
+    GON,
+    MGON,
+    STANDARD_GRAVITY,
+    UNITS,
+    angle_note,
+    angles_in,
+    attitude_unit,
+    display_unit,
+    parse_quantity,
+    quantity_text,
+    recorded_unit,
+    to_attitude,
+    to_display,
+    to_recorded,
+    to_si,
+)
+
+
+def test_a_full_turn_is_400_gon():
+    np.testing.assert_allclose(400 * GON, 2 * math.pi, rtol=1e-15)
+    np.testing.assert_allclose(1000 * MGON, GON, rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("value", "given", "unit", "expected"),
+    [
+        (200, "gon", "rad", math.pi),
+        (1000, "mgon", "rad", math.pi / 200),
+        (90, "deg", "rad", math.pi / 2),
+        (3600, "arcsec", "rad", math.pi / 180),
+        (2, "mrad", "rad", 2e-3),
+        (200, "ppm", "1", 2e-4),
+        (3, "%", "1", 0.03),
+        (1, "g", "m/s^2", 9.80665),
+        (1, "mg", "m/s^2", 9.80665e-3),
+        (50, "mm/s^2", "m/s^2", 0.05),
+        (1, "mg/K", "m/s^2/K", 9.80665e-3),
+        (3.6, "mm/s^2/h", "m/s^2/s", 1e-6),
+        (9.80665, "ug/g^2", "s^2/m", 1e-6),
+        (50, "ppm/K", "1/K", 5e-5),
+        (100, "ug", "m/s^2", 9.80665e-4),
+        (7, "K", "K", 7),  # a unit that is shown as it is
+    ],
+)
+def test_conversions(value, given, unit, expected):
+    assert to_si(value, given, unit) == pytest.approx(expected, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("unit", "shown"),
+    [("rad", "mgon"), ("1", "ppm"), ("m/s^2", "mm/s^2"), ("m/s^2/K", "mm/s^2/K"), ("s", "s")],
+)
+def test_units_that_people_read(unit, shown):
+    assert display_unit(unit) == shown
+
+
+@given(unit=st.sampled_from([*UNITS, "s"]), value=st.floats(-1e6, 1e6))
+def test_what_is_shown_can_be_read_back(unit, value):
+    back = to_si(to_display(value, unit), display_unit(unit), unit)
+    assert back == pytest.approx(value, rel=1e-14)
+    assert to_si(to_recorded(value, unit), recorded_unit(unit), unit) == pytest.approx(
+        value, rel=1e-14
+    )
+
+
+def test_angles_in_degrees_are_for_people_only():
+    with angles_in("deg"):
+        assert (attitude_unit(), display_unit("rad")) == ("deg", "mdeg")
+        assert to_attitude(math.pi / 4) == pytest.approx(45, rel=1e-15)
+        assert to_display(math.pi / 180, "rad") == pytest.approx(1000, rel=1e-15)
+        assert recorded_unit("rad") == "mgon"
+        assert to_recorded(math.pi / 200, "rad") == pytest.approx(1000, rel=1e-15)
+        assert display_unit("1") == "ppm"
+        assert "1 mdeg" in angle_note()
+        with angles_in(None):
+            assert attitude_unit() == "deg"
+        with angles_in("gon"):
+            assert to_attitude(math.pi / 2) == pytest.approx(100, rel=1e-15)
+    assert (attitude_unit(), display_unit("rad")) == ("gon", "mgon")
+    assert "100 gon = 90°" in angle_note()
+
+
+def test_the_unit_of_angles_is_as_before_when_a_command_fails():
+    with pytest.raises(ZeroDivisionError), angles_in("deg"):
+        _ = 1 / 0
+    assert attitude_unit() == "gon"
+
+
+def test_an_unknown_angle_unit_is_named():
+    with pytest.raises(UnknownNameError, match="unknown angle unit 'grad'"), angles_in("grad"):
+        pass
+
+
+def test_arrays_are_converted():
+    np.testing.assert_allclose(to_display([0.0, 1e-6, 2e-4], "1"), [0, 1, 200], rtol=1e-14)
+
+
+def test_an_unknown_unit_is_named_with_what_is_known():
+    with pytest.raises(UnknownNameError) as error:
+        to_si(1.0, "mgn", "rad")
+    assert "unit of a quantity in rad 'mgn'; did you mean 'mgon'?" in str(error.value)
+    assert "arcsec" in str(error.value)
+
+
+def test_a_unit_of_another_quantity_is_refused():
+    with pytest.raises(UnknownNameError, match="unknown unit of a quantity in rad 'ppm'"):
+        to_si(1.0, "ppm", "rad")
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "expected"),
+    [
+        ("10mgon", "rad", 10 * MGON),
+        ("0.01deg", "rad", math.radians(0.01)),
+        ("0.01°", "rad", math.radians(0.01)),
+        ("2mm/s2", "m/s^2", 2e-3),
+        ("2 mm/s²", "m/s^2", 2e-3),
+        ("50µg", "m/s^2", 50e-6 * STANDARD_GRAVITY),
+        (".5 %", "1", 0.005),
+        (" 2 m ", "m", 2.0),
+        ("1.5e1mm", "m", 0.015),
+        ("-3h", "s", -10800.0),
+        ("0", "m", 0.0),
+    ],
+)
+def test_a_number_with_its_unit_is_read(text, unit, expected):
+    assert parse_quantity(text, unit) == pytest.approx(expected, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("2", "expected a number with its unit, as 2mm, not '2'"),
+        ("two m", "expected a number with its unit"),
+        ("nan m", "expected a number with its unit"),
+        ("2gon", "the unit must be one of mm, cm, m"),
+        ("4000mm", "must be at least 100 and at most 3000 mm"),
+    ],
+)
+def test_what_is_no_such_quantity_is_refused(text, why):
+    with pytest.raises(InputError, match=re.escape(why)):
+        parse_quantity(text, "m", 0.1, 3.0)
+
+
+def test_a_quantity_is_written_with_its_unit():
+    assert quantity_text(10 * MGON, "rad") == "10 mgon"
+    assert quantity_text(30 * GON, "rad") == "30 gon"
+    with angles_in("deg"):
+        assert quantity_text(math.radians(0.01), "rad") == "10 mdeg"
+    assert quantity_text(0.002, "m/s^2") == "2 mm/s^2"

@@ -1,0 +1,584 @@
+"""A calibration applied to readings, and leveling with its sigmas."""
+
+import gzip
+import json
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from campaign_helpers import GRAVITY, NINE, ROBOT, simulated_campaign
+from scipy.io import savemat
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import GON, MGON
+from accelstudy.campaign import Campaign
+from accelstudy.campaign.calibration.document import calibration_document
+from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.files.layout import LogLayout
+from accelstudy.campaign.use.applying import read_calibration
+from accelstudy.campaign.use.leveling import level_log
+from accelstudy.effects import Hold
+from accelstudy.leveling.angles import specific_force
+from accelstudy.schemes import get_scheme
+from accelstudy.sensors.frames import parse_frame
+from accelstudy.sensors.models import get_model
+from accelstudy.simulation.sessions import Noise, session
+
+TRUTH = {"b_x": 0.05, "b_y": 0.01, "s_z": 2e-4, "alpha_zx": 7e-4}
+
+
+def calibration_file(folder, approach=ROBOT, seed=1):
+    fit = fit_campaign(simulated_campaign(TRUTH, seed=seed), NINE, approach)
+    path = folder / "calibration.json"
+    path.write_text(json.dumps(calibration_document(fit), allow_nan=False), encoding="utf-8")
+    return path
+
+
+def test_the_file_gives_back_the_fit(tmp_path):
+    fit = fit_campaign(simulated_campaign(TRUTH), NINE, GRAVITY)
+    read = read_calibration(calibration_file(tmp_path, GRAVITY))
+    np.testing.assert_array_equal(read.parameters, fit.parameters)
+    np.testing.assert_allclose(np.sqrt(np.diag(read.covariance)), fit.sigma, rtol=1e-12)
+    np.testing.assert_allclose(read.correct(fit.campaign.forces), fit.corrected, atol=1e-12)
+
+
+def test_sigmas_of_leveling_hold_over_calibrations_and_readings(tmp_path):
+    """Errors of roll and pitch over 300 calibrations, each with a reading, against the sigma."""
+    attitude = np.array([30 * GON, -20 * GON])
+    f_b = np.array(specific_force(*attitude, 9.80665))
+    f_s = NINE.sense(f_b[None], NINE.vector(TRUTH))[0]
+    rng = np.random.default_rng(5)
+    errors, sigmas = [], []
+    for seed in range(300):
+        calibration = read_calibration(calibration_file(tmp_path, seed=seed))
+        reading = f_s + 0.001 * rng.standard_normal(3)
+        angles, sigma = calibration.level(reading[None], 0.001)
+        errors.append(angles[0] - attitude)
+        sigmas.append(sigma[0])
+    normalised = np.array(errors) / np.array(sigmas)
+    assert np.abs(normalised.mean(axis=0)).max() < 4 / np.sqrt(300)
+    assert np.abs(normalised.std(axis=0) - 1).max() < 4 / np.sqrt(2 * 300)
+
+
+@pytest.mark.parametrize("content", ["", "[]", "{}", '{"parameters": 3}', "\x00"])
+def test_what_is_no_calibration_is_one_line(tmp_path, content):
+    path = tmp_path / "calibration.json"
+    path.write_text(content, encoding="utf-8")
+    with pytest.raises(InputError) as error:
+        read_calibration(path)
+    assert str(path) in str(error.value)
+    assert "\n" not in str(error.value)
+    with pytest.raises(InputError, match="No such file"):
+        read_calibration(tmp_path / "none.json")
+    with pytest.raises(InputError, match="a folder; give the calibration"):
+        read_calibration(tmp_path)
+
+
+# --- Effects that need more than the force -------------------------------------------------------
+
+SESSION = 600.0
+SIGMA = 1e-4
+
+
+def fitted(folder, effects, values, approach=GRAVITY, scheme="fibonacci-30", **changes):
+    """File of a calibration that has effects, in a session with time, temperature and vibration."""
+    model = get_model(f"bias-scale-nonorthogonality+{effects}")
+    directions = get_scheme(scheme).directions
+    n = len(directions)
+    rng = np.random.default_rng(3)
+    conditions = {
+        "time": np.linspace(10, SESSION, n),
+        "temperature": rng.uniform(15, 35, n),
+        "vibration": rng.uniform(0, 2, n),
+        "yaw": rng.uniform(-3, 3, n),
+    }
+    simulated = session(model, model.vector(values), directions, hold=Hold(**conditions))
+    drawn = simulated.draw(Noise(sigma_force=SIGMA, sigma_angle=0.1 * MGON), 1, rng)
+    angles = {"angles": drawn.angles[0], "sigma_angle": 0.1 * MGON} if approach is ROBOT else {}
+    campaign = Campaign(
+        name="extended",
+        positions=np.arange(1, n + 1),
+        forces=drawn.forces[0],
+        gravity=simulated.gravity,
+        sigma_force=SIGMA,
+        **{**conditions, **angles, **changes},
+    )
+    fit = fit_campaign(campaign, model, approach)
+    path = folder / "calibration.json"
+    path.write_text(json.dumps(calibration_document(fit), allow_nan=False), encoding="utf-8")
+    return path
+
+
+ATTITUDES = np.random.default_rng(4).uniform(-60, 60, (40, 2)) * GON
+
+
+def written_log(path, effects, values, **columns):
+    """Log of a sensor that has effects, in known attitudes and conditions."""
+    model = get_model(f"bias-scale-nonorthogonality+{effects}")
+    f_b = np.column_stack(specific_force(*ATTITUDES.T, 9.80665))
+    hold = Hold(**{k: np.broadcast_to(v, len(f_b)) for k, v in columns.items()})
+    forces = model.sense(f_b, model.vector(values), 9.80665, hold.with_steps(f_b))
+    table = pd.DataFrame({**dict(zip(("fx", "fy", "fz"), forces.T, strict=True)), **columns})
+    table.to_csv(path, index=False)
+    return path
+
+
+def errors_of(path, attitudes=ATTITUDES):
+    """Errors of roll and pitch, and what the file says of their sigma, mgon."""
+    table = pd.read_csv(path)
+    found = table[["roll_gon", "pitch_gon"]].to_numpy() * 1e3
+    return found - attitudes / MGON, table[["sigma_roll_mgon", "sigma_pitch_mgon"]].to_numpy()
+
+
+@pytest.mark.parametrize(
+    ("effects", "values", "columns"),
+    [
+        ("thermal_bias", {"b_T_x": 2e-3, "b_T_y": -3e-3}, {"temperature": np.linspace(16, 34, 40)}),
+        ("thermal_scale", {"s_T_x": 2e-4, "s_T_z": 1e-4}, {"temperature": np.linspace(16, 34, 40)}),
+        ("warm_up(tau=200)", {"w_x": 0.05, "w_y": 0.03}, {"time": np.linspace(0, 3000, 40)}),
+        ("bias_jump(t=300)", {"c_x": 0.03, "c_z": 0.02}, {"time": np.linspace(0, 580, 40)}),
+        ("bias_drift", {"d_x": 5e-5, "d_y": -4e-5}, {"time": np.linspace(0, 600, 40)}),
+        ("vibration_rectification", {"K_vre_x": 5e-3}, {"vibration": np.linspace(0, 2, 40)}),
+    ],
+)
+def test_what_depends_on_conditions_is_corrected_by_those_of_the_row(
+    tmp_path, effects, values, columns
+):
+    (condition,) = columns
+    path, log = fitted(tmp_path, effects, values), tmp_path / "log.csv"
+    written_log(log, effects, values, **columns)
+    calibration = read_calibration(path)
+    leveled = level_log(calibration, log, tmp_path / "out.csv", sigma=0.0)
+    errors, sigmas = errors_of(tmp_path / "out.csv")
+    assert np.abs(errors / sigmas).max() < 4.5
+    assert np.sqrt(np.mean(errors**2)) < 3
+    assert sigmas.max() < 20
+    assert sum("start of the calibration session" in w for w in leveled.warnings) == (
+        condition == "time"
+    )
+    # Its parameters are uncertain, too.
+    column = calibration.model.parameter_names.index(next(iter(values)))
+    covariance = calibration.covariance.copy()
+    covariance[column, column] *= 100
+    worse = replace(calibration, covariance=covariance)
+    level_log(worse, log, tmp_path / "worse.csv", sigma=0.0)
+    assert errors_of(tmp_path / "worse.csv")[1].max() > 1.05 * sigmas.max()
+
+    without = pd.read_csv(log).drop(columns=condition)
+    without.to_csv(tmp_path / "without.csv", index=False)
+    stored = LogLayout(columns={c: c for c in ("temperature", "vibration")}, time=None)
+    for known in (None, stored):
+        with pytest.raises(InputError, match=rf"{effects.split('(')[0]} needs the {condition}.*--"):
+            level_log(
+                replace(calibration, log=known), tmp_path / "without.csv", tmp_path / "never.csv"
+            )
+    assert not (tmp_path / "never.csv").exists()
+
+
+@pytest.mark.parametrize("chunk_size", [7, 100])
+def test_a_lag_goes_on_from_chunk_to_chunk(tmp_path, chunk_size):
+    effects, values = "thermal_bias(tau=400)", {"b_T_x": 2e-3, "b_T_y": -3e-3}
+    calibration, log = read_calibration(fitted(tmp_path, effects, values)), tmp_path / "log.csv"
+    time = np.linspace(0, 2000, 40)
+    written_log(log, effects, values, time=time, temperature=25 + 10 * np.sin(time / 500))
+    leveled = level_log(calibration, log, tmp_path / "out.csv", sigma=0, chunk_size=chunk_size)
+    errors, _ = errors_of(tmp_path / "out.csv")
+    # A chunk does not know the next reading of the thermometer.
+    assert np.sqrt(np.mean(errors**2)) < (10 if chunk_size < 40 else 3)
+    assert any("as warm as the first row says" in warning for warning in leveled.warnings)
+    assert not any("start of the calibration session" in warning for warning in leveled.warnings)
+    table = pd.read_csv(log).drop(columns="time")
+    table.to_csv(tmp_path / "without.csv", index=False)
+    with pytest.raises(InputError, match="thermal_bias needs the time"):
+        level_log(calibration, tmp_path / "without.csv", tmp_path / "never.csv")
+
+
+def test_a_drift_stays_where_the_session_left_it(tmp_path):
+    values = {"d_x": 5e-5, "d_y": -4e-5, "d_z": 3e-5}
+    calibration = read_calibration(fitted(tmp_path, "bias_drift", values))
+    # The sensor stops drifting at the end of the session, in the first tenth of the log.
+    log = written_log(
+        tmp_path / "log.csv", "bias_drift", values, time=np.minimum(150.0 * np.arange(40), SESSION)
+    )
+    pd.read_csv(log).drop(columns="time").to_csv(log, index=False)
+    leveled = level_log(
+        calibration, log, tmp_path / "out.csv", {"rate_hz": 1 / 150}, sigma=0.0, start=0
+    )
+    errors, sigmas = errors_of(tmp_path / "out.csv")
+    assert np.abs(errors / sigmas).max() < 4.5
+    (warning,) = leveled.warnings
+    assert "bias_drift: kept as it was at the end" in warning
+    assert "600 s, in 35 of 40 rows" in warning
+    # A day later nothing else is known, and no more is claimed to be unknown.
+    level_log(calibration, log, tmp_path / "day.csv", {"rate_hz": 1 / 150}, 0.0, start=86400)
+    np.testing.assert_allclose(errors_of(tmp_path / "day.csv")[1][5:], sigmas[5:], rtol=1e-9)
+    reading = np.array([[0.1, 0.2, -9.8]])
+    for time in (0.0, 300.0, SESSION):  # within the session it is the model's own
+        hold = Hold(time=np.array([time]))
+        expected = calibration.model.correct(
+            reading, calibration.parameters, calibration.gravity, hold
+        )
+        np.testing.assert_allclose(calibration.correct(reading, hold), expected, atol=1e-12)
+
+
+def test_what_depends_on_the_position_before_is_left_and_said(tmp_path):
+    values = {"h_x": 5e-3, "h_y": -2e-3}
+    calibration = read_calibration(fitted(tmp_path, "hysteresis", values))
+    written_log(tmp_path / "log.csv", "hysteresis", values)
+    leveled = level_log(calibration, tmp_path / "log.csv", tmp_path / "out.csv")
+    (warning,) = leveled.warnings
+    assert "hysteresis is not corrected (h_x = 4.9" in warning
+    table = pd.read_csv(tmp_path / "out.csv")
+    nine = replace(
+        calibration, model=NINE, parameters=calibration.parameters[: NINE.n_parameters]
+    ).correct(table[["fx", "fy", "fz"]])
+    found = table[[f"f{axis}_calibrated_mps2" for axis in "xyz"]]
+    np.testing.assert_allclose(found, nine, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("effects", "values"),
+    [
+        ("base_tilt", {"tilt_a": 5e-3, "tilt_b": -3e-3}),
+        ("encoder_scale", {"e_roll": 1e-3, "e_pitch": -1e-3}),
+        ("mounting_rotation", {"eps_x": 0.01, "eps_y": -0.02, "eps_z": 0.015}),
+    ],
+)
+def test_the_sensor_takes_along_what_is_its_own(tmp_path, effects, values):
+    """What the rig had is left with it; the rotation against the flange is taken along."""
+    own = values if effects == "mounting_rotation" else {}
+    known = dict(zip(get_model(effects).parameter_names, values.values(), strict=True))
+    calibration = read_calibration(fitted(tmp_path, effects, known, ROBOT))
+    kept = {name for name in known if name in calibration.model.parameter_names}
+    assert kept == set(own)
+    written_log(tmp_path / "log.csv", "mounting_rotation", own)
+    leveled = level_log(calibration, tmp_path / "log.csv", tmp_path / "out.csv", sigma=0.0)
+    errors, sigmas = errors_of(tmp_path / "out.csv")
+    assert np.abs(errors / sigmas).max() < 4.5
+    assert np.sqrt(np.mean(errors**2)) < 3
+    assert leveled.warnings == ()
+
+
+def test_a_log_in_other_axes_is_leveled_in_them(tmp_path):
+    values = {"b_T_x": 2e-3, "b_T_y": -3e-3}
+    calibration = read_calibration(fitted(tmp_path, "thermal_bias", values))
+    written_log(tmp_path / "log.csv", "thermal_bias", values, temperature=np.linspace(16, 34, 40))
+    level_log(calibration, tmp_path / "log.csv", tmp_path / "frd.csv")
+    frd, frame = pd.read_csv(tmp_path / "frd.csv"), parse_frame("rfu")
+    table = pd.read_csv(tmp_path / "log.csv")
+    names = ["fx", "fy", "fz"]
+    # As counts, whose scale and offset belong to the axes of the log.
+    scale, offset = np.array([0.01, 0.02, 0.005]), np.array([5.0, 6.0, 7.0])
+    table[names] = frame.from_frd(table[names]) / scale + offset
+    table.to_csv(tmp_path / "rfu.csv", index=False)
+    layout = LogLayout(unit="counts", scale=[*scale], offset=[*offset], frame="rfu")
+    turned = replace(calibration, log=layout)
+    level_log(turned, tmp_path / "rfu.csv", tmp_path / "out.csv")
+    found = pd.read_csv(tmp_path / "out.csv")
+    calibrated = [f"{name}_calibrated_mps2" for name in names]
+    np.testing.assert_allclose(found[calibrated], frame.from_frd(frd[calibrated]), atol=1e-8)
+    for i, angle in enumerate(("roll", "pitch")):
+        expected = frame.signs[i] * frd[f"{angle}_gon"]
+        np.testing.assert_allclose(found[f"{angle}_gon"], expected, atol=1e-6)
+        np.testing.assert_allclose(
+            found[f"sigma_{angle}_mgon"], frd[f"sigma_{angle}_mgon"], atol=1e-6
+        )
+
+
+# --- Logs ----------------------------------------------------------------------------------------
+
+N = 20
+
+
+def mixed_log():
+    """Columns whose chunks look like other types than the whole."""
+    forces = np.random.default_rng(1).normal(0, 5, (N, 3)).round(4)
+    return pd.DataFrame(
+        {
+            "fx": [9, *forces[1:, 0]],
+            "note": ["1", "2", *[""] * (N - 4), "3", 'late, "quoted" é'],
+            "fy": forces[:, 1],
+            "count": np.arange(N),
+            "gap": [1, 2, *[None] * (N - 3), 4],
+            "fz": forces[:, 2],
+            "still": np.arange(N) % 2 == 0,
+            "big": [1, *[2**63 + 5] * (N - 1)],
+            "never": [None] * N,
+            "sparse": [True, *[None] * (N - 1)],
+        }
+    )
+
+
+def read_back(path):
+    return pd.read_csv(path) if ".csv" in path.name else pd.read_parquet(path)
+
+
+@pytest.mark.parametrize("chunk_size", [1, 7, N])
+def test_a_log_in_pieces_is_the_whole_log(tmp_path, chunk_size):
+    """What the log had is written as it was, cell by cell."""
+    calibration, log = read_calibration(calibration_file(tmp_path)), tmp_path / "log.csv"
+    mixed_log().to_csv(log, index=False)
+    leveled = level_log(calibration, log, tmp_path / "level.csv", chunk_size=chunk_size)
+    assert (leveled.rows, leveled.empty) == (N, 0)
+    text = {"dtype": str, "keep_default_na": False}
+    found = pd.read_csv(tmp_path / "level.csv", **text)
+    pd.testing.assert_frame_equal(found[[*mixed_log()]], pd.read_csv(log, **text))
+    forces = mixed_log()[["fx", "fy", "fz"]].to_numpy(float)
+    angles, sigmas = calibration.level(forces, calibration.content["sigma_position_mps2"])
+    expected = np.column_stack(
+        [calibration.correct(forces), np.stack([angles / GON, sigmas / MGON], -1).reshape(N, 4)]
+    )
+    added = found.drop(columns=[*mixed_log()]).astype(float)
+    np.testing.assert_allclose(added, expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("given", ["log.csv", "log.parquet"])
+@pytest.mark.parametrize("wanted", ["level.csv", "level.parquet"])
+def test_pieces_do_not_matter(tmp_path, given, wanted):
+    calibration, log = read_calibration(calibration_file(tmp_path)), tmp_path / given
+    table = mixed_log()
+    table["when"] = pd.to_datetime(np.arange(N) // 5 * 500, unit="ms")
+    table["roll_gon"] = 0.0  # is replaced
+    if given == "log.csv":
+        table.to_csv(log, index=False)
+    else:
+        table.index = table["count"] + 5
+        kept = {"gap": "Int64", "sparse": "boolean"}
+        table.drop(columns="never").astype(kept).rename_axis(None).to_parquet(log)
+    outcomes = []
+    for chunk_size in (3, 8, N):
+        out = tmp_path / str(chunk_size) / wanted
+        level_log(calibration, log, out, chunk_size=chunk_size)
+        parquet = out.suffix == ".parquet"
+        outcomes.append(pq.read_table(out) if parquet else out.read_text(encoding="utf-8"))
+        assert len(read_back(out)) == N
+        assert [path.name for path in out.parent.iterdir()] == [wanted]
+        assert "__index_level_0__" not in read_back(out)
+        assert list(read_back(out)).count("roll_gon") == 1
+        assert read_back(out)["roll_gon"].abs().min() > 0
+    assert outcomes[0] == outcomes[-1]
+    assert outcomes[1] == outcomes[-1]
+
+
+def test_parquet_keeps_its_types(tmp_path):
+    calibration = read_calibration(calibration_file(tmp_path))
+    log = pa.table(
+        {
+            "fx": pa.array([1, 2], pa.int16()),
+            "fy": pa.array([1.5, 2.5], pa.float32()),
+            "fz": pa.array([9.0, 9.5]),
+            "n": pa.array([1, None], pa.uint8()),
+            "when": pa.array([0, 1], pa.timestamp("ns")),
+        }
+    )
+    pq.write_table(log, tmp_path / "log.parquet")
+    level_log(calibration, tmp_path / "log.parquet", tmp_path / "out.parquet", chunk_size=1)
+    assert pq.read_table(tmp_path / "out.parquet").select(log.column_names).equals(log)
+    level_log(calibration, tmp_path / "log.parquet", tmp_path / "out.csv", chunk_size=1)
+    given = {"columns": {"fx": "when", "fy": "fy", "fz": "fz"}}
+    with pytest.raises(InputError, match="column when is timestamp"):
+        level_log(calibration, tmp_path / "log.parquet", tmp_path / "no.csv", given)
+    text = (tmp_path / "out.csv").read_text(encoding="utf-8").splitlines()
+    assert text[1].startswith("1,1.5,9,1,1970-01-01 00:00:00.000000000,")
+    assert text[2].startswith("2,2.5,9.5,,1970-01-01 00:00:00.000000001,")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("log.csv", "fx,fy,fz,fz\n1,2,9,9\n", "which column is fz"),
+        ("log.csv", "fx,fy,fz\n", "no line of numbers"),
+        (
+            "log.csv",
+            "fx,fy,fz\n0.1,0.2,-1\n0.5,0.5,-0.8\n",
+            "about 1.02 m.s.2: these look like g; give --unit g",
+        ),
+        (
+            "log.csv",
+            "fx,fy,fz\n100,200,9000\n0,9100,100\n1,2,9\n",
+            "give the --unit or the --columns",
+        ),
+        ("log.csv", "fx,fy,fz\n" + 2 * "0,0,-1000\n" + "1,2,-9\n", "nowhere near gravity"),
+        ("log.csv", "a,b,c,d\n1,2,9,9\n", "which column is fx"),
+        ("log.parquet", "fx,fy,fz\n1,2,9\n", "not a whole Parquet file"),
+    ],
+)
+def test_a_bad_log_leaves_nothing_behind(tmp_path, name, content, words):
+    calibration, log = read_calibration(calibration_file(tmp_path)), tmp_path / name
+    log.write_text(content, encoding="utf-8")
+    with pytest.raises(InputError, match=words) as error:
+        level_log(calibration, log, tmp_path / "out.csv", chunk_size=1)
+    assert "\n" not in str(error.value)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["calibration.json", name]
+
+
+@pytest.mark.parametrize("chunk_size", [2, 100])
+def test_a_lost_sample_does_not_lose_the_log(tmp_path, chunk_size):
+    calibration, log = read_calibration(calibration_file(tmp_path)), tmp_path / "log.csv"
+    rows = [
+        "1,2,9,a",
+        "# a comment",
+        "1,2,,b",
+        "1,2,nan,c",
+        "1,2",
+        "1,2,9,d,1,2,9",
+        "1,-,9,e",
+        "1,2,9,f",
+    ]
+    log.write_text("fx,fy,fz,note\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    leveled = level_log(calibration, log, tmp_path / "out.csv", chunk_size=chunk_size)
+    found = pd.read_csv(tmp_path / "out.csv", dtype=str, keep_default_na=False)
+    assert (leveled.rows, leveled.empty) == (7, 5)
+    assert found["roll_gon"].map(bool).tolist() == [True, *5 * [False], True]
+    # A row with too few or too many cells has none: nobody knows which are right.
+    assert found["note"].tolist() == ["a", "b", "c", "", "", "e", "f"]
+    (warning,) = leveled.warnings
+    assert warning.startswith("5 of 7 rows have no calibrated force")
+    assert "line 4, column fz (fz): nothing" in warning
+    log.write_text("fx,fy,fz,note\n1,2,9,a\n1,2\n", encoding="utf-8")
+    (warning,) = level_log(calibration, log, tmp_path / "out.csv").warnings
+    assert warning.endswith("line 3 has not the 4 columns of the others")
+
+
+@pytest.mark.parametrize("wanted", ["out.csv.gz", "out.pq"])
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("blank.log", "{x} {y} {z} 5\n"),
+        ("semicolon.csv", "{x};{y};{z};5\n"),
+        ("comma.csv", "{x};{y};{z};5,0\n"),
+        ("tab.txt", "{x}\t{y}\t{z}\t5\n"),
+        ("packed.csv.gz", "{x},{y},{z},5\n"),
+    ],
+)
+def test_any_layout_that_import_reads_is_leveled(tmp_path, name, text, wanted):
+    calibration, log = read_calibration(calibration_file(tmp_path)), tmp_path / name
+    forces = mixed_log()[["fx", "fy", "fz"]].to_numpy(float)
+    lines = [text.format(x=x, y=y, z=z) for x, y, z in forces]
+    content = "".join(line.replace(".", ",") if name == "comma.csv" else line for line in lines)
+    data = content.encode()
+    log.write_bytes(gzip.compress(data) if name.endswith("gz") else data)
+    given = {"columns": {"fx": 0, "fy": "1", "fz": 2}}
+    with pytest.raises(InputError, match="which column is fx"):
+        level_log(calibration, log, tmp_path / wanted)
+    level_log(calibration, log, tmp_path / wanted, given, chunk_size=7)
+    known = replace(calibration, log=LogLayout(**given, rate_hz=100))
+    level_log(known, log, tmp_path / "again" / wanted)
+    for out in (tmp_path / wanted, tmp_path / "again" / wanted):
+        found = read_back(out)
+        assert [*found][:4] == [f"column_{i}" for i in range(4)]
+        np.testing.assert_array_equal(found[["column_0", "column_1", "column_2"]], forces)
+        assert (found["column_3"] == 5).all()
+        np.testing.assert_allclose(
+            found[[f"f{axis}_calibrated_mps2" for axis in "xyz"]],
+            calibration.correct(forces),
+            atol=1e-9,
+        )
+
+
+def test_a_matlab_array_is_leveled(tmp_path):
+    calibration, log = read_calibration(calibration_file(tmp_path)), tmp_path / "log.mat"
+    forces = mixed_log()[["fx", "fy", "fz"]].to_numpy(float)
+    savemat(log, {"other": np.eye(3), "acc": forces.T / 9.80665})
+    known = replace(calibration, log=LogLayout(variable="acc", unit="g", rate_hz=100))
+    level_log(known, log, tmp_path / "out.csv")
+    found = read_back(tmp_path / "out.csv")
+    np.testing.assert_allclose(
+        found[[f"f{axis}_calibrated_mps2" for axis in "xyz"]],
+        calibration.correct(forces),
+        atol=1e-8,
+    )
+
+
+def test_a_single_reading_is_as_noisy_as_within_the_holds(tmp_path):
+    n = get_scheme("fibonacci-30").n_positions
+    sd = np.full((n, 3), 0.05)
+    noisy = read_calibration(fitted(tmp_path, "thermal_bias", {}, sd=sd))
+    plain = read_calibration(fitted(tmp_path, "thermal_bias", {}))
+    log = written_log(tmp_path / "log.csv", "thermal_bias", {}, temperature=np.full(40, 20.0))
+    for calibration, sigma in ((noisy, 0.05), (plain, SIGMA)):
+        level_log(calibration, log, tmp_path / "default.csv")
+        level_log(calibration, log, tmp_path / "given.csv", sigma=sigma)
+        found, expected = (errors_of(tmp_path / f"{name}.csv")[1] for name in ("default", "given"))
+        np.testing.assert_allclose(found, expected, rtol=0.05)
+
+
+def test_a_calibration_that_no_sensor_has_is_not_applied_without_a_word(tmp_path):
+    path, log = calibration_file(tmp_path), tmp_path / "log.csv"
+    mixed_log().to_csv(log, index=False)
+    content = json.loads(path.read_text(encoding="utf-8"))
+    content["quality"] = {"plausible": False, "warnings": ["s_y is beyond"], "state": "implausible"}
+    path.write_text(json.dumps(content), encoding="utf-8")
+    warnings = level_log(read_calibration(path), log, tmp_path / "out.csv").warnings
+    assert "do not use this calibration: s_y is beyond" in warnings
+
+
+def test_columns_of_the_campaign_that_a_log_lacks_are_said_to_come_from_there(tmp_path):
+    calibration, log = read_calibration(calibration_file(tmp_path)), tmp_path / "log.csv"
+    mixed_log().to_csv(log, index=False)
+    layout = LogLayout(columns={"fx": "ax", "fy": "ay", "fz": "az", "temperature": "T"})
+    known = replace(calibration, log=layout)
+    with pytest.raises(InputError, match=r"no column 'ax'.*log of the campaign, --columns"):
+        level_log(known, log, tmp_path / "out.csv")
+    # A temperature that no effect needs may be missing, unless it is asked for.
+    layout = LogLayout(columns={"fx": "fx", "fy": "fy", "fz": "fz", "temperature": "T"})
+    known = replace(calibration, log=layout)
+    level_log(known, log, tmp_path / "out.csv")
+    level_log(known, log, tmp_path / "out.csv", {"columns": {"temperature": "count"}})
+    with pytest.raises(InputError, match="the rate or the column of time, not both"):
+        level_log(known, log, tmp_path / "never.csv", {"time": "count", "rate_hz": 10})
+    with pytest.raises(InputError, match="no column 'T'"):
+        level_log(known, log, tmp_path / "never.csv", {"columns": {"temperature": "T"}})
+
+
+def test_what_the_calibration_did_not_see_is_counted(tmp_path):
+    calibration = read_calibration(fitted(tmp_path, "thermal_bias", {"b_T_x": 2e-3}))
+    log = pd.DataFrame({"fx": 0.1, "fy": [0.1, 12.5, 0.2, 0.1], "fz": -9.8, "temperature": 20.0})
+    log.loc[2:, "temperature"] = [36.0, 60.0]  # the first is within the margin
+    log.to_csv(tmp_path / "log.csv", index=False)
+    warnings = level_log(calibration, tmp_path / "log.csv", tmp_path / "out.csv").warnings
+    assert len(warnings) == 2
+    assert warnings[0].startswith("temperature beyond what the calibration saw in 1 of 4 rows")
+    assert "up to 60 °C" in warnings[0]
+    assert "force beyond what the calibration saw in 1 of 4 rows: up to 12.5 m/s² r" in warnings[1]
+
+
+def test_a_reading_at_the_end_of_the_range_is_no_measurement(tmp_path):
+    """A sensor that clips has no force for the readings that it clipped."""
+    values = {"k_sat_x": 1.0, "k_sat_y": 1.0, "k_sat_z": 1.0}
+    model = get_model("bias-scale-nonorthogonality+saturation(knee=9)")
+    calibration = read_calibration(calibration_file(tmp_path))
+    clipping = replace(
+        calibration,
+        model=model,
+        parameters=model.vector(values),
+        covariance=np.zeros((12, 12)),
+    )
+    ranged = replace(calibration, content={**calibration.content, "range_mps2": 9.05})
+    (tmp_path / "log.csv").write_text("fx,fy,fz\n0,0,-9.05\n1,5,-8\n", encoding="utf-8")
+    for known in (clipping, ranged):
+        leveled = level_log(known, tmp_path / "log.csv", tmp_path / "out.csv")
+        assert (leveled.rows, leveled.empty) == (2, 1)
+        (warning,) = leveled.warnings
+        assert "line 2: the calibration has no force for such a reading" in warning
+        assert ("± 9.05 m/s²" in warning) == (known is ranged)
+
+
+def test_where_nothing_can_be_written(tmp_path):
+    calibration, log = read_calibration(calibration_file(tmp_path)), tmp_path / "log.csv"
+    log.write_text("fx,fy,fz\n1,2,9\n", encoding="utf-8")
+    for out in (tmp_path, log / "out.csv"):
+        with pytest.raises(InputError, match="cannot be written"):
+            level_log(calibration, log, out)
+
+
+@pytest.mark.parametrize("sigma", [1e300, np.nan, -1.0, 1e-12])
+def test_a_sigma_that_no_reading_has(tmp_path, sigma):
+    calibration, log = read_calibration(calibration_file(tmp_path)), tmp_path / "log.csv"
+    log.write_text("fx,fy,fz\n1,2,-9.6\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"--sigma: must be 0, or from 1e-09 to 1000 m/s²"):
+        level_log(calibration, log, tmp_path / "out.csv", sigma=sigma)
+    assert not (tmp_path / "out.csv").exists()

@@ -1,0 +1,506 @@
+"""Batches of campaigns: configuration, one bad campaign among good ones, public data, summary."""
+
+import hashlib
+import json
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from campaign_helpers import simulated_campaign
+from page_helpers import assert_sound, text_of
+from places import DATA, ROOT
+from snakemake_helpers import ENVIRONMENT, one_line, remains, snakemake
+from test_import_holds import session, write
+
+import accelstudy
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import MGON
+from accelstudy.campaign.batch.config import Task, parse_batch, read_batch
+from accelstudy.campaign.batch.overview import (
+    CAMPAIGN_COLUMNS,
+    PARAMETER_COLUMNS,
+    counts,
+    summarise_batch,
+)
+from accelstudy.campaign.batch.run import run_task
+from accelstudy.campaign.files.format import write_campaign
+from accelstudy.campaign.importing import public
+from accelstudy.campaign.importing.public import public_data, record_public
+from accelstudy.files.tables import read_origin, read_table
+from accelstudy.jobs.code import code_hash
+
+NINE = "bias-scale-nonorthogonality"
+TRUTH = {"b_x": 0.05, "s_y": 3e-4, "alpha_zx": 7e-4}
+
+
+def run(folder, config, *arguments, **options):
+    """Run the workflow of campaigns in a folder."""
+    (folder / "batch.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")
+    fixed = ["--snakefile", ROOT / "workflow" / "campaigns.smk", "--cores", 2]
+    return snakemake(folder, *fixed, "--configfile", "batch.yaml", *arguments, **options)
+
+
+def succeed(*arguments, **options):
+    result = run(*arguments, **options)
+    assert result.returncode == 0, result.stdout
+    return result.stdout
+
+
+def jobs(text):
+    """Rules that a run has run, with the number of jobs."""
+    counts = re.findall(r"^(\w+) +(\d+)$", text.split("Select jobs")[0], re.MULTILINE)
+    return {rule: int(n) for rule, n in counts if rule not in ("campaigns", "total")}
+
+
+def calibrated(text):
+    """Campaigns that a run has calibrated."""
+    return set(re.findall(r"^Job \d+: Calibrate (\S+)$", text, re.MULTILINE))
+
+
+def write_log(folder):
+    """Path of a log of 14 holds."""
+    folder.mkdir(exist_ok=True)
+    return write(folder, session(holds=14, still=300, moving=100)[0])
+
+
+BATCH = {
+    "batch": "bench",
+    "campaigns": [
+        {"campaign": "campaigns/*"},
+        {"campaign": "campaigns/aided", "approach": "robot"},
+        {"campaign": "campaigns/aided", "name": "six", "model": "bias-scale"},
+        {
+            "log": "log.parquet",
+            "name": "session",
+            "import": {"rate_hz": 100},
+            "gravity": {"value_mps2": 9.81},
+        },
+    ],
+}
+NAMES = ["plain", "spoilt", "aided", "six", "session"]
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A finished batch: two good campaigns, one of which has a robot, a bad one, and a log."""
+    folder = tmp_path_factory.mktemp("batch")
+    for name in ("plain", "aided", "spoilt"):
+        write_campaign(simulated_campaign(TRUTH), folder / "campaigns" / name)
+    table = folder / "campaigns" / "spoilt" / "positions.csv"
+    lines = table.read_text(encoding="utf-8").splitlines()
+    lines[5] = re.sub(r",[^,]+", ",x", lines[5], count=1)
+    table.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_log(folder)
+    (folder / "printed.txt").write_text(succeed(folder, BATCH), encoding="utf-8")
+    return folder
+
+
+# --- a batch -------------------------------------------------------------------------------------
+
+
+def test_a_bad_campaign_stops_no_other(made):
+    results = made / "results" / "bench"
+    table = read_table(results / "campaigns.parquet").set_index("campaign")
+    assert table.index.tolist() == NAMES
+    assert table["status"].tolist() == ["ok", "failed", "ok", "ok", "ok"]
+    spoilt = table.loc["spoilt"]
+    assert spoilt["error"].startswith("campaigns/spoilt/positions.csv: fx: position 5: ")
+    assert np.isnan(spoilt["sigma0"])
+    assert remains(made) == []
+    printed = (made / "printed.txt").read_text(encoding="utf-8")
+    one_line(printed, f"not calibrated: spoilt: {spoilt['error']}")
+    one_line(printed, "4 of 5 campaigns calibrated: results/bench/overview.html")
+    log = (results / "logs" / "campaigns" / "spoilt.log").read_text(encoding="utf-8")
+    assert spoilt["error"] in log
+
+
+def test_the_table_of_campaigns(made):
+    results = made / "results" / "bench"
+    table = read_table(results / "campaigns.parquet")
+    assert table.dtypes.astype(str).to_dict() == CAMPAIGN_COLUMNS
+    table = table.set_index("campaign")
+    good = table[table["status"] == "ok"]
+    assert good["model"].tolist() == [NINE, NINE, "bias-scale", NINE]
+    assert good["approach"].tolist() == ["gravity", "robot", "gravity", "gravity"]
+    assert good["kind"].tolist() == 3 * ["campaign"] + ["log"]
+    assert good["redundancy"].tolist() == [15, 63, 18, 5]
+    for name, row in good.iterrows():
+        path = results / "campaigns" / name / "calibration.json"
+        content = json.loads(path.read_text(encoding="utf-8"))
+        test = content["quality"]["global_test"]
+        assert row["sigma0"] ** 2 == pytest.approx(test["statistic"] / test["dof"])
+        assert row["accepted"] == test["accepted"]
+        assert row["verdict"] == content["quality"]["verdict"]
+        assert row["rms_norm_residual_mps2"] == content["rms_norm_residual_mps2"]
+        assert row["sigma_source"] == content["sigma_source"]
+        tilt = content["quality"]["tilt_rms_mgon"]
+        assert row["tilt_pitch_rad"] == pytest.approx(tilt["pitch"] * MGON)
+        held = content["quality"]["held_out"]
+        assert row["held_out_mps2"] == held["rms_mps2"]
+        assert (path.parent / "report.html").exists()
+    assert good.loc["plain", "sigma_priori_mps2"] == 0.002
+    assert good.loc["session", "gravity_mps2"] == 9.81
+    assert good["held_out_roll_rad"].notna().tolist() == [False, True, False, False]
+
+
+def test_the_table_of_parameters(made):
+    path = made / "results" / "bench" / "parameters.parquet"
+    table = read_table(path)
+    assert table.dtypes.astype(str).to_dict() == PARAMETER_COLUMNS
+    assert table.groupby("campaign").size().to_dict() == {
+        **{"plain": 9, "aided": 9, "session": 9, "six": 6}
+    }
+    plain = table[table["campaign"] == "plain"].set_index("parameter")
+    for name, truth in TRUTH.items():
+        assert abs(plain.loc[name, "value"] - truth) < 4.5 * plain.loc[name, "sigma"]
+    assert plain.loc[["b_x", "s_x", "alpha_zx"], "unit"].tolist() == ["m/s^2", "1", "rad"]
+    ratio = plain["sigma_posteriori"] / plain["sigma_priori"]
+    campaigns = read_table(path.with_name("campaigns.parquet")).set_index("campaign")
+    np.testing.assert_allclose(ratio, campaigns.loc["plain", "sigma0"])
+
+
+def test_the_overview(made):
+    results = made / "results" / "bench"
+    page = (results / "overview.html").read_text(encoding="utf-8")
+    assert "5 campaigns: 4 calibrated" in page
+    marks = (">spoilt<", ">plain<", ">aided<", ">six<", ">session<")  # failures first
+    order = [page.index(mark) for mark in marks]
+    assert order == sorted(order)
+    links = re.findall(r'href="([^"]+)"', page)
+    assert len(links) == 5  # four reports and one picture of a log
+    for link in links:
+        assert (results / link).is_file()
+    assert "held out roll, pitch" in text_of(page)
+    assert_sound(page)
+    use = "accelstudy apply results/bench/campaigns/plain/calibration.json LOG --out leveled.csv"
+    assert use in text_of(page)
+
+
+def test_a_calibration_that_no_sensor_has_is_not_among_the_calibrated(made, tmp_path):
+    """One of 103 400 mgon of tilt error was counted as calibrated."""
+    folders = [tmp_path / name for name in ("plain", "spoilt", "aided")]
+    for folder in folders:
+        shutil.copytree(made / "results/bench/campaigns" / folder.name, folder)
+    for folder, state in ((folders[0], "rejected"), (folders[2], "implausible")):
+        path = folder / "calibration.json"
+        content = json.loads(path.read_text(encoding="utf-8"))
+        content["quality"] |= {"state": state, "verdict": f"Why it is {state}."}
+        path.write_text(json.dumps(content), encoding="utf-8")
+    outputs = [tmp_path / name for name in ("c.parquet", "p.parquet", "overview.html")]
+    table = summarise_batch("doubt", folders, *outputs, {"config_hash": "", "seed": None})
+    assert counts(table) == "1 of 3 campaigns calibrated, 1 implausible"
+    page = outputs[2].read_text(encoding="utf-8")
+    assert "3 campaigns: 1 calibrated, 1 implausible, 1 not calibrated." in text_of(page)
+    before, after = page.split("<h2>Calibrated</h2>")
+    assert "Why it is implausible." in before
+    assert 'href="aided/report.html"' in before
+    assert "aided" not in after
+    assert "plain ✗ REJECTED" in text_of(after)
+    assert "accelstudy diagnose campaigns/plain --model" in text_of(after)
+    assert "--approach gravity --out plain-diagnosis" in text_of(after)
+
+
+def test_origin(made, monkeypatch):
+    monkeypatch.chdir(made)  # where the pattern of folders is looked up
+    results = made / "results" / "bench"
+    expected = read_batch(made / "batch.yaml").fingerprint
+    for name in ("campaigns", "parameters"):
+        assert read_origin(results / f"{name}.parquet")["config_hash"] == expected
+
+
+def test_an_imported_log_is_kept_as_a_campaign(made):
+    folder = made / "results" / "bench" / "campaigns" / "session" / "campaign"
+    assert {path.name for path in folder.iterdir()} == {
+        *("campaign.yaml", "positions.csv", "segmentation.png", "segmentation.svg")
+    }
+
+
+# --- what runs again -----------------------------------------------------------------------------
+
+
+def test_a_second_run_does_nothing(made):
+    results = made / "results"
+    before = {path: path.stat().st_mtime_ns for path in results.rglob("*")}
+    assert "Nothing to be done" in succeed(made, BATCH)
+    assert {path: path.stat().st_mtime_ns for path in results.rglob("*")} == before
+
+
+@pytest.fixture(scope="module")
+def changed(made, tmp_path_factory):
+    """The batch, run again with one campaign mended and one spoilt."""
+    folder = Path(shutil.copytree(made, tmp_path_factory.mktemp("changed") / "copy"))
+    campaigns = folder / "campaigns"
+    shutil.copyfile(campaigns / "plain/positions.csv", campaigns / "spoilt/positions.csv")
+    (campaigns / "plain/campaign.yaml").unlink()
+    return folder / "results" / "bench", succeed(folder, BATCH)
+
+
+def test_only_what_changed_runs_again(changed):
+    results, text = changed
+    assert calibrated(text) == {"plain", "spoilt"}
+    assert jobs(text) == {"calibrate": 2, "overview": 1}
+    one_line(text, "4 of 5 campaigns calibrated")
+
+    # And so would one more, and a log that is calibrated otherwise.
+    folder = results.parents[1]
+    shutil.copytree(folder / "campaigns/spoilt", folder / "campaigns/another one")
+    entries = [*BATCH["campaigns"][:3], {**BATCH["campaigns"][3], "model": "bias-scale"}]
+    plan = succeed(folder, {**BATCH, "campaigns": entries}, "--dry-run")
+    assert set(re.findall("Calibrate (\\S+)", plan)) == {"another-one", "session"}
+
+
+def test_a_mended_campaign_is_good(changed, made):
+    before, after = (
+        read_table(results / "campaigns.parquet").set_index("campaign")
+        for results in (made / "results" / "bench", changed[0])
+    )
+    assert after.loc["spoilt", "sigma0"] == before.loc["plain", "sigma0"]
+
+
+def test_a_campaign_that_got_worse_leaves_nothing_old(changed):
+    results, text = changed
+    one_line(text, "not calibrated: plain: campaigns/plain/campaign.yaml: No such file")
+    remaining = {path.name for path in (results / "campaigns/plain").iterdir()}
+    assert remaining <= {"status.json", ".snakemake_timestamp"}
+
+
+def test_what_was_damaged_since_is_refused(changed):
+    folder = changed[0].parents[1]
+    (changed[0] / "campaigns/aided/status.json").unlink()
+    result = run(folder, BATCH)
+    assert result.returncode != 0
+    one_line(result.stdout, "results/bench/campaigns/aided: status.json is missing; delete it")
+
+
+def hash_of(stage):
+    return code_hash(ROOT / "workflow" / "scripts" / f"{stage}.py")
+
+
+def test_code_on_which_it_depends(tmp_path, monkeypatch):
+    package = Path(shutil.copytree(accelstudy.__path__[0], tmp_path / "accelstudy"))
+    stages = ("calibrate", "overview", "simulate")
+    monkeypatch.setattr(accelstudy, "__file__", str(package / "__init__.py"))
+    expected = {
+        "campaign/calibration/fit.py": {"calibrate", "overview"},
+        "campaign/batch/overview.html.j2": {"calibrate", "overview"},
+        "adjustment/quality/positions.py": {"calibrate", "overview"},
+        "effects/bias.py": {*stages},
+        "study/monte_carlo/simulate.py": {"simulate"},
+        "commands/main.py": set(),
+    }
+    for name, changed in expected.items():
+        before = {stage: hash_of(stage) for stage in stages}
+        (package / name).write_text((package / name).read_text() + "\n")
+        assert {stage for stage in stages if hash_of(stage) != before[stage]} == changed
+
+
+# --- public data ---------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def registry(tmp_path, monkeypatch):
+    """The registry of a copy of the package, which is the one of the jobs and here."""
+    package = Path(shutil.copytree(accelstudy.__path__[0], tmp_path / "package" / "accelstudy"))
+    path = package / "campaign" / "public_data.yaml"
+    monkeypatch.setattr(public, "REGISTRY", path)
+    public_data.cache_clear()
+    yield path
+    public_data.cache_clear()
+
+
+def test_what_cannot_be_downloaded_is_reported_and_tried_again(registry, tmp_path):
+    environment = {**ENVIRONMENT, "PYTHONPATH": str(registry.parents[2])}
+    environment["ACCELSTUDY_ANGLE_UNIT"] = "deg"
+    log = write_log(tmp_path / "source")
+    away = log.rename(tmp_path / "away.parquet")
+    digest = hashlib.sha256(away.read_bytes()).hexdigest()
+    entry = {"description": "a log", "url": log.as_uri(), "sha256": digest, "licence": "MIT"}
+    registry.write_text(yaml.safe_dump({"bench-log": {**entry, "import": {"rate_hz": 100}}}))
+    entries = [{"public": "bench-log"}]
+    config = {"batch": "b", "public_folder": "downloads", "campaigns": entries}
+
+    text = succeed(tmp_path, config, environment=environment)
+    one_line(text, f"not calibrated: bench-log: {log.as_uri()}: cannot be downloaded: No such file")
+    one_line(text, "0 of 1 campaigns calibrated")
+
+    away.rename(log)
+    text = succeed(tmp_path, config, environment=environment)
+    assert jobs(text) == {"public": 1, "calibrate": 1, "overview": 1}
+    one_line(text, "1 of 1 campaigns calibrated")
+    assert (tmp_path / "downloads" / "bench-log" / "log.parquet").is_file()
+    for path in ("overview.html", "campaigns/bench-log/report.html"):
+        page = (tmp_path / "results/b" / path).read_text(encoding="utf-8")
+        assert "mdeg" in page
+        assert "mgon" not in page
+    log.unlink()  # what is there is not got again
+    assert "Nothing to be done" in succeed(tmp_path, config, environment=environment)
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason=f"needs the public data in {DATA}")
+def test_public_data_from_a_folder_that_has_them(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    entries = [{"public": name} for name in ("mpu9150-0", "innalabs-24", "ferraris-annotated")]
+    batch = parse_batch({"batch": "public", "public_folder": str(DATA), "campaigns": entries})
+    for task in batch.tasks():
+        record_public(task.source, batch.public_folder, f"{task.name}.json", 1)
+    errors = {task.name: run_task(task, task.name, f"{task.name}.json") for task in batch.tasks()}
+    assert errors["ferraris-annotated"].startswith("6 positions do not determine the model")
+    paths = [Path(name) for name in ("campaigns.parquet", "parameters.parquet", "overview.html")]
+    summarise_batch("public", [Path(e) for e in errors], *paths, {"config_hash": "0", "seed": None})
+    table = read_table(paths[0]).set_index("campaign")
+    assert table["status"].tolist() == ["ok", "ok", "failed"]
+    assert table.loc["innalabs-24", "rms_norm_residual_mps2"] == pytest.approx(
+        0.4256e-3 * 9.80665, rel=1e-3
+    )
+    assert table.loc["mpu9150-0", "rms_norm_residual_mps2"] == pytest.approx(2.1e-3, rel=0.1)
+    assert table.loc["mpu9150-0", "accepted"]
+    assert not Path("resources").exists()
+
+
+# --- configuration -------------------------------------------------------------------------------
+
+
+def test_the_bundled_batch():
+    batch = read_batch(ROOT / "config" / "campaigns.yaml")
+    sources = [task.source for task in batch.tasks()]
+    assert set(sources) <= {*public_data()}
+    assert len(set(sources)) >= 5
+    assert parse_batch({"batch": "b", "campaigns": [{"campaign": "a"}]}).public_folder == (
+        "resources/public"
+    )
+
+
+def test_settings_of_public_data_can_be_overlaid():
+    entry = {"public": "mpu6050", "name": "slow", "import": {"threshold_mps2": 0.2}}
+    (task,) = parse_batch({"batch": "b", "campaigns": [entry]}).tasks()
+    assert (task.name, task.settings.name, task.settings.unit) == ("slow", "slow", "counts")
+    assert task.settings.threshold_mps2 == 0.2
+    assert Task.model_validate(task.model_dump(mode="json")) == task
+
+
+def test_patterns(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("b", "a", "c d"):
+        (tmp_path / "all" / name).mkdir(parents=True)
+    (tmp_path / "all" / "file.csv").touch()
+    (tmp_path / "[1].csv").touch()
+    content = {"batch": "b", "campaigns": [{"campaign": "all/*"}, {"campaign": "./all/a/"}]}
+    tasks = parse_batch(content).tasks()
+    assert [task.name for task in tasks] == ["b", "c-d", "a"]
+    assert [task.source for task in tasks] == ["all/b", "all/c d", "all/a"]
+    content["campaigns"] = [{"log": "all/*"}, {"log": "[1].csv", "name": "one"}]
+    assert [task.source for task in parse_batch(content).tasks()] == ["all/file.csv", "[1].csv"]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"campaings": []}, "campaings: unknown key; did you mean 'campaigns'?"),
+        ({"campaigns": []}, "campaigns: list should have at least 1 item"),
+        ({"campaigns": [{}]}, "campaigns.0: give exactly one of campaign, log, public"),
+        ({"campaigns": [{"log": "a", "public": "b"}]}, "campaigns.0: give exactly one of"),
+        ({"campaigns": [{"logg": "a"}]}, "campaigns.0.logg: unknown key; did you mean 'log'?"),
+        ({"campaigns": [{"campaign": "a", "import": {}}]}, "campaigns.0: import: goes with log"),
+        (
+            {"campaigns": [{"log": "a", "import": {"rate": 100}}]},
+            "campaigns.0.import.rate: unknown key; did you mean 'rate_hz'?",
+        ),
+        ({"campaigns": [{"log": "a", "name": "a/b"}]}, "campaigns.0.name: "),
+        ({"campaigns": [{"public": "xsens"}]}, "campaigns.0: unknown public data 'xsens'; did you"),
+        ({"campaigns": [{"public": "ferraris-sections"}]}, "hold no forces"),
+        ({"campaigns": [{"log": "a", "model": "six"}]}, "campaigns.0: unknown model 'six'"),
+        ({"approach": "gravty"}, "unknown approach 'gravty'; did you mean 'gravity'?"),
+        ({"campaigns": [{"campaign": "no/*"}]}, "campaigns.0: no folder matches no/*"),
+        (
+            {"campaigns": [{"campaign": "x/a"}, {"log": "y/a.csv"}]},
+            "campaigns: x/a and y/a.csv are both named 'a'; give one another `name`",
+        ),
+    ],
+)
+def test_one_line_for_a_wrong_key(change, message):
+    content = {"batch": "b", "campaigns": [{"campaign": "a"}], **change}
+    with pytest.raises(InputError) as caught:
+        parse_batch(content, "batch.yaml")
+    assert str(caught.value).startswith("batch.yaml: ")
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_the_workflow_says_it(tmp_path):
+    result = run(tmp_path, {"batch": "b", "campaigns": [{"campain": "a"}]})
+    assert result.returncode != 0
+    assert "Traceback" not in result.stdout
+    one_line(result.stdout, "batch.yaml: campaigns.0.campain: unknown key; did you mean 'campaign'")
+    assert not (tmp_path / "results").exists()
+
+
+def test_without_configuration(tmp_path):
+    result = snakemake(tmp_path, "--snakefile", ROOT / "workflow/campaigns.smk", "--cores", 1)
+    assert result.returncode != 0
+    one_line(result.stdout, "no campaigns; name them with --configfile")
+
+
+# --- without Snakemake ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("gravity", "error"), [(9.80, None), (98.0, "does not fit the forces")])
+def test_a_gravity_of_its_own(tmp_path, gravity, error):
+    write_campaign(simulated_campaign(TRUTH), tmp_path / "a")
+    content = {"gravity": {"value_mps2": gravity}, "campaign": str(tmp_path / "a")}
+    (task,) = parse_batch({"batch": "b", "campaigns": [content]}).tasks()
+    found = run_task(task, tmp_path / "out")
+    if error is not None:
+        assert error in found
+    else:
+        path = tmp_path / "out" / "calibration.json"
+        assert json.loads(path.read_text(encoding="utf-8"))["gravity_mps2"] == gravity
+
+
+def test_all_failed(tmp_path):
+    content = {"batch": "b", "campaigns": [{"campaign": str(tmp_path / "none")}]}
+    (task,) = parse_batch(content).tasks()
+    error = run_task(task, tmp_path / "out")
+    assert "no such folder" in error
+    paths = [tmp_path / name for name in ("c.parquet", "p.parquet", "o.html")]
+    provenance = {"config_hash": "0", "seed": None}
+    summarise_batch("b", [tmp_path / "out"], *paths, provenance)
+    assert read_table(paths[0]).dtypes.astype(str).to_dict() == CAMPAIGN_COLUMNS
+    assert read_table(paths[1]).empty
+    assert "Calibrated" not in paths[2].read_text(encoding="utf-8")
+
+
+def test_what_a_page_shows_is_escaped(tmp_path):
+    content = {"batch": "b", "campaigns": [{"campaign": str(tmp_path / "<i>&")}]}
+    (task,) = parse_batch(content).tasks()
+    assert task.name == "i-"
+    run_task(task, tmp_path / "out")
+    paths = [tmp_path / name for name in ("c.parquet", "p.parquet", "o.html")]
+    summarise_batch("b", [tmp_path / "out"], *paths, {"config_hash": "0", "seed": None})
+    page = paths[2].read_text(encoding="utf-8")
+    assert "<i>" not in page
+    assert "&lt;i&gt;&amp;: no such folder" in page
+
+
+def test_an_error_that_nobody_has_foreseen_stops_no_other(tmp_path, monkeypatch):
+    """Nor what was written before it, half a calibration, is left."""
+    write_campaign(simulated_campaign({"b_x": 0.05}), tmp_path / "campaign")
+    content = {"batch": "b", "campaigns": [{"campaign": str(tmp_path / "campaign")}]}
+    (task,) = parse_batch(content).tasks()
+
+    def broken(fit, folder):
+        (folder / "report.html").write_text("half")
+        (folder / "figures").mkdir()
+        raise ZeroDivisionError("a\nb")
+
+    monkeypatch.setattr("accelstudy.campaign.batch.run.write_calibration", broken)
+    error = run_task(task, tmp_path / "out", log="results/b/logs/campaigns/campaign.log")
+    assert error == (
+        "internal error, please report it (ZeroDivisionError: a b); the log has the details: "
+        "results/b/logs/campaigns/campaign.log"
+    )
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["status.json"]
+    status = json.loads((tmp_path / "out/status.json").read_text(encoding="utf-8"))
+    assert (status["status"], status["error"]) == ("failed", error)

@@ -1,0 +1,231 @@
+"""Measured data from the command line: calibrate, apply, export, check-sigmas."""
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from campaign_helpers import NINE, simulated_campaign
+from click.testing import CliRunner
+from page_helpers import assert_sound, text_of
+
+from accelstudy.campaign import Campaign, write_campaign
+from accelstudy.campaign.files.layout import LogLayout
+from accelstudy.commands.main import main
+from accelstudy.simulation.sessions import Noise
+
+TRUTH = {"b_x": 0.05, "b_y": 0.01, "b_z": 0.03, "s_x": 2e-4, "alpha_zx": 7e-4}
+
+
+def run(*arguments):
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+@pytest.fixture
+def campaign(tmp_path):
+    write_campaign(simulated_campaign(TRUTH), tmp_path / "campaign")
+    return tmp_path / "campaign"
+
+
+@pytest.mark.parametrize("approach", ["gravity", "robot"])
+def test_calibrate_writes_everything(campaign, tmp_path, approach):
+    result = run("calibrate", campaign, "--approach", approach, "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    content = json.loads((tmp_path / "out/calibration.json").read_text(encoding="utf-8"))
+    errors = [(p["value"] - TRUTH.get(p["name"], 0)) / p["sigma"] for p in content["parameters"]]
+    assert np.abs(errors).max() < 4.5
+    assert content["redundancy"] == (15 if approach == "gravity" else 63)
+    assert content["quality"]["global_test"]["accepted"]
+    assert content["quality"]["verdict"] in result.output
+    positions = pd.read_parquet(tmp_path / "out/positions.parquet")
+    assert positions["redundancy"].sum() == pytest.approx(content["redundancy"])
+    rms = np.sqrt(np.mean(positions["norm_residual_mps2"] ** 2))
+    assert content["rms_norm_residual_mps2"] == pytest.approx(rms)
+    page = (tmp_path / "out/report.html").read_text(encoding="utf-8")
+    assert content["quality"]["verdict"] in text_of(page)
+    assert "✓ ACCEPTED" in text_of(page)
+    assert page.count("<svg") == 2
+    assert_sound(page)
+    for name in ("residuals", "correlations"):
+        assert (tmp_path / f"out/figures/{name}.png").stat().st_size > 1000
+    assert not list((tmp_path / "out").rglob("*.part"))
+
+
+def test_degrees_on_the_page_and_gon_in_the_file(campaign, tmp_path):
+    found = {}
+    for unit, small in (("gon", "mgon"), ("deg", "mdeg")):
+        out = tmp_path / unit
+        result = run(
+            *("calibrate", campaign, "--approach", "robot", "--out", out, "--angle-unit", unit)
+        )
+        assert result.exit_code == 0, result.output
+        page = (out / "report.html").read_text(encoding="utf-8").partition("</style>")[2]
+        for text in (result.stdout, page.partition("1 mdeg = 0.001°")[2] or page):
+            assert small in text
+            assert not ({"mgon", "mdeg"} - {small}) & set(re.findall(r"m(?:gon|deg)", text))
+        found[unit] = json.loads((out / "calibration.json").read_text(encoding="utf-8"))
+        found[unit]["quality"].pop("verdict")
+    assert found["deg"] == found["gon"]
+    shown = re.search(r"alpha_zx = +([\d.-]+) ± ([\d.]+) mdeg", result.stdout)
+    (alpha,) = (p for p in found["deg"]["parameters"] if p["name"] == "alpha_zx")
+    assert float(shown[1]) == pytest.approx(1e3 * np.degrees(alpha["value"]), abs=1e-4)
+    assert float(shown[2]) == pytest.approx(1e3 * np.degrees(alpha["sigma"]), abs=1e-4)
+
+
+def test_quiet(campaign, tmp_path):
+    result = run("calibrate", campaign, "--out", tmp_path / "out", "--quiet")
+    assert (result.exit_code, result.output) == (0, "")
+    assert (tmp_path / "out/report.html").exists()
+
+
+def test_pages_say_what_was_left_out_and_how_the_log_was_read(tmp_path):
+    whole = replace(simulated_campaign(TRUTH), log=LogLayout(frame="flu"))
+    write_campaign(whole.without({5: "moved"}), tmp_path / "campaign")
+    for command, file in (("calibrate", "calibration.json"), ("diagnose", "diagnosis.json")):
+        out = tmp_path / command
+        result = run(command, tmp_path / "campaign", "--out", out)
+        assert result.exit_code == 0, result.output
+        assert (out / file).exists()
+        page = (out / "report.html").read_text(encoding="utf-8")
+        assert "The log's axes are flu" in page
+        assert "Left out of every fit: position 5 (moved)." in page
+        content = json.loads((out / "calibration.json").read_text(encoding="utf-8"))
+        assert content["log"]["frame"] == "flu"
+        assert content["excluded"] == [{"position": 5, "reason": "moved"}]
+        assert content["n_positions"] == whole.n_positions - 1
+        positions = pd.read_parquet(out / "positions.parquet")
+        assert positions["position"].tolist() == [n for n in whole.positions if n != 5]
+
+
+def test_a_bumped_position_is_named(tmp_path):
+    good = simulated_campaign(TRUTH)
+    forces = good.forces.copy()
+    forces[7] *= 1 + 0.03 / np.linalg.norm(forces[7])  # 15 sigma
+    bumped = Campaign("bumped", good.positions, forces, good.gravity, sigma_force=0.002)
+    write_campaign(bumped, tmp_path / "bumped")
+    result = run("calibrate", tmp_path / "bumped", "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    content = json.loads((tmp_path / "out/calibration.json").read_text(encoding="utf-8"))
+    assert [s["position"] for s in content["quality"]["suspects"]] == [8]
+    assert "position 8" in content["quality"]["verdict"]
+    assert content["sigma_source"] == "a posteriori"
+
+
+def test_understated_noise_is_said(tmp_path):
+    drawn = simulated_campaign(TRUTH, noise=Noise(sigma_force=0.006), sigma=0.002)
+    write_campaign(drawn, tmp_path / "loud")
+    result = run("calibrate", tmp_path / "loud", "--out", tmp_path / "out")
+    assert "understated, or an effect is missing" in result.output
+
+
+@pytest.mark.parametrize(("n", "words"), [(9, "no redundancy"), (10, "no power")])
+def test_little_redundancy_is_said(tmp_path, n, words):
+    scheme = "d-optimal-9" if n == 9 else "fibonacci-10"
+    for sigma in (0.002, None):
+        drawn = simulated_campaign(TRUTH, scheme=scheme)
+        plain = Campaign("few", drawn.positions, drawn.forces, drawn.gravity, sigma_force=sigma)
+        write_campaign(plain, tmp_path / "few")
+        result = run("calibrate", tmp_path / "few", "--out", tmp_path / f"out{sigma}")
+        assert result.exit_code == 0, result.output
+        if sigma or n == 9:
+            assert words in result.output
+
+
+def test_apply_levels_a_log(campaign, tmp_path):
+    run("calibrate", campaign, "--approach", "robot", "--out", tmp_path / "out")
+    calibration = tmp_path / "out/calibration.json"
+    f_b = np.array([[0.5, -0.7, -9.0], [0.0, 0.0, -9.8]])
+    readings = NINE.sense(f_b, NINE.vector(TRUTH))
+    log = tmp_path / "log.csv"
+    pd.DataFrame(readings, columns=["fx", "fy", "fz"]).to_csv(log, index=False)
+    result = run("apply", calibration, log, "--out", tmp_path / "level.csv")
+    assert result.exit_code == 0, result.output
+    level = pd.read_csv(tmp_path / "level.csv")
+    roll = np.arctan2(-f_b[:, 1], -f_b[:, 2]) * 200 / np.pi
+    assert np.all(np.abs(level["roll_gon"] - roll) < 5e-3 * level["sigma_roll_mgon"])
+    assert (level["sigma_pitch_mgon"] > 12.9).all()
+    degrees = tmp_path / "degrees.csv"
+    result = run("--angle-unit", "deg", "apply", calibration, log, "--out", degrees)
+    assert result.exit_code == 0, result.output
+    level = level.rename(columns=lambda name: name.replace("gon", "deg"))
+    turned = level * np.where(level.columns.str.contains("deg"), 0.9, 1.0)
+    pd.testing.assert_frame_equal(pd.read_csv(degrees), turned, atol=1e-5)
+
+
+def test_a_bad_log_is_one_line(campaign, tmp_path):
+    run("calibrate", campaign, "--out", tmp_path / "out")
+    log = tmp_path / "log.csv"
+    for content, words in (
+        (None, "no such file"),
+        ("", "the file is empty"),
+        ("fx,fy\n1,2\n", "which column is fz"),
+        ("fx,fy,fz\n1,2,x\n", "line 2, column fz (fz): 'x'"),
+    ):
+        if content is not None:
+            log.write_text(content, encoding="utf-8")
+        result = run("apply", tmp_path / "out/calibration.json", log, "--out", tmp_path / "x.csv")
+        assert result.exit_code == 2
+        assert words in result.stderr
+        assert result.stderr.count("\n") == 1
+        assert not (tmp_path / "x.csv").exists()
+    log.write_text("1,2,9\n", encoding="utf-8")
+    arguments = "apply", tmp_path / "out/calibration.json", log, "--out", tmp_path / "x.csv"
+    assert "--columns: expected fx=1" in run(*arguments, "--columns", "0,1,2").stderr
+    assert run(*arguments, "--columns", "fx=1,fy=0,fz=2", "--unit", "m/s^2").exit_code == 0
+    assert "--force" in run(*arguments).stderr
+    assert "is the input" in run(*arguments[:4], log, "--force").stderr
+    assert log.read_text(encoding="utf-8") == "1,2,9\n"
+
+
+@pytest.mark.parametrize("form", ["json", "yaml", "c", "matrix"])
+def test_export_prints(campaign, tmp_path, form):
+    run("calibrate", campaign, "--out", tmp_path / "out")
+    result = run("export", tmp_path / "out/calibration.json", "--form", form)
+    assert result.exit_code == 0
+    assert len(result.output.splitlines()) >= 3
+
+
+def test_check_sigmas(campaign):
+    result = run("check-sigmas", campaign, "--replicates", 200)
+    assert result.exit_code == 0, result.output
+    assert "alpha_zx" in result.output
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["calibrate", "nowhere", "--out", "out"],
+        ["export", "nowhere.json"],
+        ["check-sigmas", "nowhere"],
+    ],
+)
+def test_what_is_not_there_is_one_line(arguments, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = run(*arguments)
+    assert result.exit_code == 2
+    assert "nowhere" in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_no_position_predicted_by_the_others(tmp_path):
+    """Five positions with a robot and twelve parameters: each is needed by the fit."""
+    drawn = simulated_campaign(TRUTH)
+    few = {name: getattr(drawn, name)[[0, 3, 7, 11, 15]] for name in ("forces", "angles")}
+    write_campaign(
+        Campaign(
+            **{"name": "few", "positions": np.arange(1, 6), "gravity": drawn.gravity, **few},
+            sigma_force=0.002,
+            sigma_angle=drawn.sigma_angle,
+            yaw=np.zeros(5),
+        ),
+        tmp_path / "few",
+    )
+    model = "bias-scale-nonorthogonality-cubic"
+    options = ("--approach", "robot", "--model", model)
+    result = run("calibrate", tmp_path / "few", *options, "--out", tmp_path / "out")
+    assert result.exit_code == 0, repr(result.exception)
+    content = json.loads((tmp_path / "out/calibration.json").read_text(encoding="utf-8"))
+    assert content["quality"]["held_out"] is None

@@ -1,0 +1,235 @@
+"""Calibration of measured campaigns: known parameters, public data, gauges, exports."""
+
+import json
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from campaign_helpers import GRAVITY, NINE, ROBOT, simulated_campaign
+from hypothesis import given
+from hypothesis import strategies as st
+from places import DATA
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import MGON
+from accelstudy.campaign.calibration.assessment import assess
+from accelstudy.campaign.calibration.fit import fit_campaign, initial_values
+from accelstudy.campaign.calibration.gauges import GAUGES, affine_form, in_gauge
+from accelstudy.campaign.calibration.sigma_check import check_sigmas
+from accelstudy.campaign.calibration.verdict import verdict_lines
+from accelstudy.campaign.files.format import Campaign
+from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
+from accelstudy.campaign.use.export import device_matrix, export
+from accelstudy.schemes import get_scheme
+from accelstudy.sensors.models import get_model
+
+needs_data = pytest.mark.skipif(not DATA.is_dir(), reason=f"needs the public data in {DATA}")
+
+
+@pytest.mark.parametrize("approach", [GRAVITY, ROBOT], ids=lambda a: a.name)
+def test_a_poor_sensor_is_calibrated_from_automatic_initial_values(approach):
+    """Biases of 1.5 m/s² and a scale 30 % off are far from the ideal sensor."""
+    truth = {"b_x": 1.5, "b_y": -0.8, "b_z": 0.4, "s_x": 0.3, "s_y": 0.28, "s_z": 0.33}
+    truth |= {"alpha_yz": 0.02, "alpha_zy": -0.03, "alpha_zx": 0.01}
+    fit = fit_campaign(simulated_campaign(truth), NINE, approach)
+    errors = (fit.parameters - NINE.vector(truth)) / fit.sigma
+    assert np.abs(errors).max() < 4.5
+
+
+def test_initial_values_are_the_sphere():
+    directions = get_scheme("fibonacci-30").directions
+    forces = np.array([0.3, -0.2, 0.1]) + 1.05 * 9.81 * directions
+    start = dict(zip(NINE.parameter_names, initial_values(NINE, forces, 9.81), strict=True))
+    assert start == pytest.approx(
+        {"b_x": 0.3, "b_y": -0.2, "b_z": 0.1, "s_x": 0.05, "s_y": 0.05, "s_z": 0.05}
+        | {"alpha_yz": 0, "alpha_zy": 0, "alpha_zx": 0},
+        abs=1e-12,
+    )
+
+
+def test_six_positions_do_not_determine_nine_parameters():
+    with pytest.raises(InputError, match=r"6 positions.*alpha_yz, alpha_zy, alpha_zx"):
+        fit_campaign(simulated_campaign({}, scheme="faces-6"), NINE, GRAVITY)
+
+
+def test_a_robot_is_needed_for_the_robot_approach():
+    campaign = simulated_campaign({})
+    without = Campaign("plain", campaign.positions, campaign.forces, campaign.gravity)
+    with pytest.raises(InputError, match="roll_robot_gon"):
+        fit_campaign(without, NINE, ROBOT)
+
+
+angles = st.floats(-0.05, 0.05)
+
+
+@given(st.lists(angles, min_size=9, max_size=9))
+def test_all_gauges_measure_the_same_norm(values):
+    k = np.eye(3) + np.reshape(values, (3, 3))
+    for gauge in GAUGES:
+        turned = in_gauge(k, gauge)
+        np.testing.assert_allclose(turned.T @ turned, k.T @ k, rtol=0, atol=1e-12)
+        assert np.all(np.diag(turned) > 0)
+    np.testing.assert_allclose(np.tril(in_gauge(k, "upper"), -1), 0, atol=1e-15)
+    np.testing.assert_allclose(np.triu(in_gauge(k, "lower"), 1), 0, atol=1e-15)
+    np.testing.assert_allclose(in_gauge(k, "symmetric"), in_gauge(k, "symmetric").T, atol=1e-12)
+
+
+def test_the_affine_form_is_eq_5():
+    truth = NINE.vector({"b_x": 0.05, "s_y": 1e-3, "alpha_zx": 44 * MGON, "alpha_yz": -0.01})
+    k, bias = affine_form(NINE, truth)
+    forces = np.random.default_rng(3).normal(0, 9.81, (20, 3))
+    np.testing.assert_allclose((forces - bias) @ k.T, NINE.correct(forces, truth), atol=1e-12)
+    t = NINE.axes_matrix(truth)
+    np.testing.assert_allclose(k, t @ np.diag(1 / (1 + truth[3:6])), atol=1e-12)
+
+
+def test_a_nonlinear_model_has_no_matrix():
+    model = get_model("bias-scale-nonorthogonality-quadratic")
+    assert affine_form(model, model.vector({"k2_x": 1e-3})) is None
+
+
+def calibration_in(unit, nominal=None):
+    k, bias = affine_form(NINE, NINE.vector({"b_x": 0.1, "s_x": 0.01, "alpha_yz": 0.02}))
+    return {
+        "campaign": "test",
+        "model": NINE.name,
+        "effects": [effect.spec for effect in NINE.effects],
+        "unit": unit,
+        "nominal": nominal,
+        "gravity_mps2": 9.81,
+        "parameters": [
+            {"name": p.name, "value": 0.0, "sigma": 1.0, "unit": p.unit} for p in NINE.parameters
+        ],
+        "affine": {"matrix": k.tolist(), "bias_mps2": bias.tolist()},
+    }
+
+
+@pytest.mark.parametrize(
+    ("unit", "nominal"),
+    [
+        ("m/s^2", None),
+        ("g", None),
+        ("counts", {"scale": [0.02, 0.021, 0.019], "offset": [33000, 33100, 32900]}),
+    ],
+)
+def test_the_device_matrix_takes_raw_readings(unit, nominal):
+    calibration = calibration_in(unit, nominal)
+    matrix = device_matrix(calibration)
+    raw = np.random.default_rng(1).normal(0, 1, (10, 3))
+    if unit == "counts":
+        raw = 33000 + 400 * raw
+        forces = (raw - nominal["offset"]) * nominal["scale"]
+    else:
+        forces = raw * (9.80665 if unit == "g" else 1)
+    k, bias = (np.array(calibration["affine"][key]) for key in ("matrix", "bias_mps2"))
+    applied = np.column_stack([raw, np.ones(10)]) @ matrix.T
+    np.testing.assert_allclose(applied, (forces - bias) @ k.T, rtol=0, atol=1e-9)
+    plain = np.array([row.split() for row in export(calibration, "matrix").splitlines()], float)
+    np.testing.assert_allclose(plain, matrix, rtol=1e-11)
+    assert json.loads(export(calibration, "json"))["matrix_3x4"] == matrix.tolist()
+    assert "accelerometer_calibration[3][4]" in export(calibration, "c")
+
+
+# Public data: the numbers are those that other implementations found for the same files.
+
+
+def public_means(file, columns=("ax", "ay", "az")):
+    return pd.read_csv(DATA / file)[list(columns)].to_numpy()
+
+
+def campaign_of(forces, gravity, sigma=None):
+    return Campaign("public", np.arange(len(forces)) + 1, forces, gravity, sigma_force=sigma)
+
+
+@needs_data
+@pytest.mark.parametrize(
+    ("imu", "scale", "bias", "myz_deg", "mxz", "mxy"),
+    [
+        (0, (0.363, 0.315, 0.647), (0.103, 0.097, 0.344), 0.123, 0.317, 0.02),
+        (1, (0.471, 0.482, 0.932), (0.09, 0.07, 0.338), -0.284, 0.145, -0.01),
+        (2, (0.382, 0.355, 0.780), (0.096, 0.008, -0.045), 0.26, 0.282, -0.012),
+    ],
+)
+def test_mpu9150_agrees_with_its_authors(imu, scale, bias, myz_deg, mxz, mxy):
+    forces = public_means(f"mpu9150/derived_static_means_imu{imu}.csv")
+    fit = fit_campaign(campaign_of(forces, 9.81), NINE, GRAVITY)
+    k, b = affine_form(NINE, fit.parameters)
+    m = np.linalg.inv(k)
+    np.testing.assert_allclose(100 * (np.diag(m) - 1), scale, rtol=0, atol=0.027 + 0.0005)
+    np.testing.assert_allclose(b, bias, rtol=0, atol=1.8e-3 + 0.0005)
+    off = np.degrees([m[1, 2], m[0, 2], m[0, 1]])
+    np.testing.assert_allclose(off, [myz_deg, mxz, mxy], rtol=0, atol=0.018 + 0.001)
+    assert 1e3 * fit.rms_norm_residual == pytest.approx(2.1, abs=0.05)
+
+
+@needs_data
+def test_xsens_agrees_with_the_recomputation_of_imu_tk():
+    nominal = np.array([0.0024, 0.0024, 0.0024])
+    offset = np.array([33123.0, 33275.0, 32364.0])
+    counts = public_means("imu_tk_xsens/derived_static_means.csv")
+    fit = fit_campaign(campaign_of((counts - offset) * nominal, 9.81744), NINE, GRAVITY)
+    k, b = affine_form(NINE, fit.parameters)
+    np.testing.assert_allclose(
+        1 / (np.diag(k) * nominal), [414.4143, 412.0467, 414.6139], rtol=0, atol=0.03
+    )
+    np.testing.assert_allclose(
+        b / nominal + offset, [33123.885, 33275.159, 32364.571], rtol=0, atol=0.1
+    )
+    t = k / np.diag(k)
+    np.testing.assert_allclose(
+        [-t[0, 1], t[0, 2], -t[1, 2]], [0.003413, -0.009415, 0.021277], rtol=0, atol=5e-4
+    )
+    assert 1e3 * fit.rms_norm_residual == pytest.approx(1.02, abs=0.01)
+    # The unknown sigma stands at 1 mm/s², so this is sigma a posteriori in mm/s².
+    assert math.sqrt(float(fit.adjustment.variance_posteriori[0])) == pytest.approx(1.16, abs=0.01)
+
+
+@pytest.mark.parametrize("approach", [GRAVITY, ROBOT], ids=lambda a: a.name)
+def test_the_claimed_sigmas_hold_in_simulation(approach):
+    fit = fit_campaign(simulated_campaign({"b_x": 0.1, "s_y": 0.01}), NINE, approach)
+    table = check_sigmas(fit, replicates=2000, seed=3)
+    # Nine ratios, each with a standard error of 1/√(2·2000) = 1.6 %.
+    assert np.abs(table["ratio"] - 1).max() < 4.5 / math.sqrt(2 * 2000)
+    assert (table["n_converged"] == 2000).all()
+
+
+@needs_data
+def test_the_sigmas_of_a_real_campaign_hold_in_simulation():
+    forces = public_means("mpu9150/derived_static_means_imu0.csv")
+    fit = fit_campaign(campaign_of(forces, 9.8189), NINE, GRAVITY)
+    table = check_sigmas(fit, replicates=2000, seed=3)
+    assert np.abs(table["ratio"] - 1).max() < 4.5 / math.sqrt(2 * 2000)
+
+
+def test_positions_in_conflict_are_not_blamed_alone():
+    """A bumped hold stands out, and so do those after a knock of the mounting."""
+    measured = simulated_campaign({"b_x": 0.1}, seed=2)
+    one = replace(measured, forces=measured.forces.copy())
+    one.forces[15] += [0.02, 0.02, -0.02]
+    (said,) = _in_conflict(one)
+    assert re.match(r"In conflict with the others: position 16 \(p [=<].*, all positions", said)
+    several = replace(measured, forces=measured.forces.copy())
+    several.forces[[3, 20, 11]] *= [[1.01], [0.994], [1.003]]
+    (said,) = _in_conflict(several)
+    assert said.startswith("In conflict with the others: positions 4, 12 and 21 (each with p")
+    assert said.endswith("They may be bumped, or show what the model lacks.")
+    assert _in_conflict(measured) == []
+
+
+def _in_conflict(campaign):
+    lines = verdict_lines(assess(fit_campaign(campaign, NINE, GRAVITY)))
+    found = [line for line in lines if line.startswith("In conflict")]
+    advised = "What is wrong or missing, “accelstudy diagnose” may tell." in lines
+    assert advised == bool(found)
+    return found
+
+
+def test_repeats_of_too_few_attitudes_are_told():
+    """Noise makes the design regular, but six attitudes hold no nine parameters."""
+    settings = CampaignSettings(scheme="faces-6", repeats=3, approach="gravity")
+    campaign, _ = simulate_campaign(settings)
+    with pytest.raises(InputError, match=r"18 positions hardly determine it .* more attitudes"):
+        fit_campaign(campaign, NINE, GRAVITY)

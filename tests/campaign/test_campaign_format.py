@@ -1,0 +1,663 @@
+"""The campaign format: what is written is read again, and what is wrong ends in one clear line."""
+
+from dataclasses import fields, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+import yaml
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
+from accelstudy.campaign.files.format import Campaign, read_campaign, write_campaign
+from accelstudy.campaign.files.layout import LogLayout
+from accelstudy.leveling.angles import specific_force
+
+ROLL = np.array([0.0, 50.0, 100.0, 150.0, 200.0, -50.0, -100.0, 0.0])
+PITCH = np.array([0.0, 20.0, -40.0, 10.0, 0.0, 80.0, -60.0, -80.0])
+G = 9.81
+
+
+def campaign(**changes):
+    """A small campaign with everything, whose forces fit the robot's angles to 0.02 m/s²."""
+    n = len(ROLL)
+    noise = np.random.default_rng(1).normal(0, 0.02, (n, 3))
+    everything = Campaign(
+        name="small",
+        sensor="a sensor",
+        positions=np.arange(1, n + 1),
+        forces=np.column_stack(specific_force(ROLL * GON, PITCH * GON, G)) + noise,
+        gravity=G,
+        sigma_gravity=1e-5,
+        sigma_force=0.002,
+        angles=np.column_stack([ROLL, PITCH]) * GON,
+        sigma_angle=3.2 * MGON,
+        n_samples=np.full(n, 200),
+        sd=np.full((n, 3), 0.03),
+        slope=noise / 100,
+        sd_slope=np.full((n, 3), 1e-4),
+        full_range=20.0,
+        log=LogLayout(columns={"fx": 0, "fy": "b", "fz": 2}, rate_hz=100, frame="flu"),
+        time=10.0 * np.arange(n),
+        temperature=np.linspace(-5, 30, n),
+        vibration=np.full(n, 0.001),
+        yaw=np.linspace(-1, 1, n),
+    )
+    return replace(everything, **changes)
+
+
+WITHOUT_ROBOT = {"angles": None, "sigma_angle": None, "yaw": None}
+COUNTS = {
+    "unit": "counts",
+    "nominal_scale": np.array([0.0024, -0.0024, 0.0023]),
+    "nominal_offset": np.array([33123.0, 33275, 32364]),
+}
+
+
+def assert_same(read, written):
+    for field in fields(Campaign):
+        one, other = getattr(read, field.name), getattr(written, field.name)
+        if field.name == "source":
+            continue
+        if isinstance(other, np.ndarray):
+            # Counts have an offset, so what is exact is relative to the norm, not to each number.
+            size = np.abs(other).max(initial=0)
+            np.testing.assert_allclose(
+                one, other, rtol=1e-12, atol=1e-12 * size, err_msg=field.name
+            )
+        elif isinstance(other, float):
+            assert one == pytest.approx(other, rel=1e-12), field.name
+        else:
+            assert one == other, field.name
+
+
+def test_holds_that_are_left_out_stay_in_the_file_and_in_the_history(tmp_path):
+    every = campaign(temperature=np.arange(8.0) ** 2)
+    reasons = {3: "moved", 8: "bumped"}
+    write_campaign(every.without({8: "bumped"}).without({3: "moved"}), tmp_path)
+    assert len((tmp_path / "positions.csv").read_text().splitlines()) == 1 + every.n_positions
+    read = read_campaign(tmp_path)
+    assert read.positions.tolist() == [1, 2, 4, 5, 6, 7]
+    assert read.reasons == reasons
+    assert read.exclusions[0] == {"position": 3, "reason": "moved"}
+    assert_same(read.whole, every)
+    kept = read.positions - 1
+    for name in ("step_x", "temperature", "yaw", "roll", "order"):
+        np.testing.assert_allclose(
+            getattr(read.hold, name), getattr(every.hold, name)[kept], atol=1e-12
+        )
+    np.testing.assert_allclose(read.hold.lagged(20), every.hold.lagged(20)[kept], atol=1e-12)
+    untimed = replace(every, time=None).without(reasons)
+    assert untimed.hold.order.tolist() == [1, 2, 4, 5, 6, 7]
+
+
+@pytest.mark.parametrize(
+    ("reasons", "message"),
+    [
+        ({9: "moved"}, "excluded: there is no position 9"),
+        (dict.fromkeys(range(1, 9), "moved"), "excluded: no position is left"),
+    ],
+)
+def test_what_cannot_be_left_out(reasons, message):
+    with pytest.raises(InputError, match=message):
+        campaign().without(reasons)
+
+
+def floats(low, high):
+    return st.floats(low, high, allow_subnormal=False)
+
+
+@st.composite
+def campaigns(draw):
+    n = draw(st.integers(1, 12))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32)))
+    gravity = draw(floats(9.7, 9.9))
+    roll, pitch = rng.uniform(-np.pi, np.pi, n), rng.uniform(-np.pi / 2, np.pi / 2, n)
+    forces = np.column_stack(specific_force(roll, pitch, gravity)) + rng.normal(0, 0.05, (n, 3))
+
+    def maybe(values):
+        return values if draw(st.booleans()) else None
+
+    robot = draw(st.booleans())
+    unit = draw(st.sampled_from(["m/s^2", "g", "counts"]))
+    scale, offset = rng.uniform(1e-4, 1e-2, 3) * rng.choice([-1, 1], 3), rng.normal(0, 3e4, 3)
+    return Campaign(
+        name=draw(st.text(st.characters(exclude_categories=["Cs"]), min_size=1)),
+        sensor=maybe(draw(st.text(st.characters(exclude_categories=["Cs"])))),
+        positions=np.cumsum(rng.integers(1, 3, n)),
+        forces=forces,
+        gravity=gravity,
+        sigma_gravity=draw(st.just(0.0) | floats(1e-9, 1e-3)),
+        unit=unit,
+        sigma_force=maybe(draw(floats(1e-6, 1))),
+        angles=np.column_stack([roll, pitch]) if robot else None,
+        sigma_angle=draw(st.just(0.0) | floats(1e-9, 1e-3)) if robot else None,
+        yaw=rng.normal(size=n) if robot else None,
+        n_samples=maybe(rng.integers(1, 10**6, n)),
+        sd=maybe(rng.uniform(0, 1, (n, 3))),
+        slope=maybe(rng.normal(0, 1e-3, (n, 3))),
+        sd_slope=maybe(rng.uniform(0, 1e-3, (n, 3))),
+        full_range=maybe(draw(floats(20, 200))),
+        time=maybe(np.cumsum(rng.uniform(0, 60, n))),
+        temperature=maybe(rng.uniform(-40, 85, n)),
+        vibration=maybe(rng.uniform(0, 1, n)),
+        nominal_scale=scale if unit == "counts" else None,
+        nominal_offset=offset if unit == "counts" else None,
+    )
+
+
+@given(campaigns(), st.sampled_from(["csv", "parquet"]))
+def test_what_is_written_is_read_again(written, table):
+    with TemporaryDirectory() as folder:
+        write_campaign(written, folder, table)
+        assert_same(read_campaign(folder), written)
+
+
+def test_files_are_those_of_the_format(tmp_path):
+    write_campaign(campaign(), tmp_path / "new" / "folder")
+    assert {path.name for path in (tmp_path / "new" / "folder").iterdir()} == {
+        "campaign.yaml",
+        "positions.csv",
+    }
+    assert yaml.safe_load((tmp_path / "new" / "folder" / "campaign.yaml").read_text()) == {
+        "schema_version": 1,
+        "name": "small",
+        "sensor": "a sensor",
+        "unit": "m/s^2",
+        "gravity": {"value_mps2": 9.81, "sigma_mps2": 1e-5},
+        "sensor_noise": {"sigma_mps2": 0.002},
+        "range_mps2": 20.0,
+        "robot": {"angle_sigma_mgon": pytest.approx(3.2)},
+        "log": {
+            "columns": {"fx": 0, "fy": "b", "fz": 2},
+            "time_unit": "s",
+            "rate_hz": 100.0,
+            "unit": "m/s^2",
+            "frame": "flu",
+        },
+    }
+    header, *rows = (tmp_path / "new" / "folder" / "positions.csv").read_text().splitlines()
+    assert header.split(",")[:5] == ["position", "time_s", "fx", "fy", "fz"]
+    assert len(rows) == len(ROLL)
+
+
+def test_one_table_replaces_the_other(tmp_path):
+    for table in ("csv", "parquet", "csv"):
+        write_campaign(campaign(name=table), tmp_path, table)
+        assert read_campaign(tmp_path).name == table
+
+
+def test_units_of_the_file(tmp_path):
+    """g is standard gravity, whatever local gravity is; an sd in counts is positive."""
+    text = "position,fx,fy,fz,sd_fx,sd_fy,sd_fz\n1,0.5,-1,0,1,1,1\n2,0,0,-1,2,2,2\n"
+    (tmp_path / "positions.csv").write_text(text.replace("-1,0,", "-1,0.1,"))
+    header = {"schema_version": 1, "name": "a", "unit": "g", "gravity": {"value_mps2": 9.82}}
+    (tmp_path / "campaign.yaml").write_text(yaml.safe_dump(header))
+    read = read_campaign(tmp_path)
+    np.testing.assert_allclose(read.forces[1], [0, 0, -STANDARD_GRAVITY])
+    np.testing.assert_allclose(read.sd[1], 2 * STANDARD_GRAVITY)
+    header |= {"unit": "counts", "nominal": {"scale": [9.8, -9.8, 9.8], "offset": [0.1, 0, 0]}}
+    (tmp_path / "campaign.yaml").write_text(yaml.safe_dump(header))
+    read = read_campaign(tmp_path)
+    np.testing.assert_allclose(read.forces[0], [0.4 * 9.8, 9.8, 0.98])
+    np.testing.assert_allclose(read.sd[0], 9.8)
+
+
+def test_yaw_of_a_robot_that_gives_none_is_zero(tmp_path):
+    write_campaign(campaign(yaw=None), tmp_path)
+    np.testing.assert_array_equal(read_campaign(tmp_path).yaw, np.zeros(len(ROLL)))
+    write_campaign(campaign(**WITHOUT_ROBOT), tmp_path)
+    assert read_campaign(tmp_path).yaw is None
+
+
+@pytest.mark.parametrize("table", ["csv", "parquet"])
+def test_unknown_columns_are_named_and_left_out(tmp_path, table):
+    write_campaign(campaign(), tmp_path, table)
+    path = tmp_path / f"positions.{table}"
+    if table == "csv":
+        lines = path.read_text().splitlines()
+        rows = [lines[0] + ",temperature_degc,note", *(f"{line},20,x" for line in lines[1:])]
+        path.write_text("\n".join(rows) + "\n")
+    else:
+        content = pq.read_table(path)
+        for name in ("temperature_degc", "note"):
+            content = content.append_column(name, pa.array(["x"] * len(content)))
+        pq.write_table(content, path)
+    read = read_campaign(tmp_path)
+    assert_same(replace(read, warnings=()), campaign())
+    first, second = read.warnings
+    assert "'temperature_degc'" in first
+    assert "did you mean 'temperature_degC'" in first
+    assert "'note'" in second
+
+
+def test_a_last_line_that_does_not_end_is_mentioned(tmp_path):
+    """A cut in the last number cannot be seen otherwise."""
+    write_campaign(campaign(), tmp_path)
+    path = tmp_path / "positions.csv"
+    path.write_text(path.read_text()[:-3])
+    (warning,) = read_campaign(tmp_path).warnings
+    assert "last line" in warning
+
+
+def test_tolerated_ways_of_writing_csv(tmp_path):
+    """A byte order mark, line ends of Windows, blanks, empty lines."""
+    write_campaign(campaign(), tmp_path)
+    path = tmp_path / "positions.csv"
+    text = path.read_text().replace(",", " , ").replace("\n", "\r\n\r\n")
+    path.write_bytes(b"\xef\xbb\xbf" + text.encode())
+    assert_same(read_campaign(tmp_path), campaign())
+
+
+# Bad input: the file, what is done to it, and what the message must say.
+
+
+def header(**changes):
+    """Change keys of campaign.yaml; None removes one."""
+
+    def change(folder):
+        path = folder / "campaign.yaml"
+        content = yaml.safe_load(path.read_text()) | changes
+        path.write_text(yaml.safe_dump({k: v for k, v in content.items() if v is not None}))
+
+    return change
+
+
+def columns(**changes):
+    """Change columns of the table, by a function of the old one; None removes one."""
+
+    def change(folder):
+        path = folder / "positions.csv"
+        rows = [line.split(",") for line in path.read_text().splitlines()]
+        table = {name: list(values) for name, *values in zip(*rows, strict=True)}
+        for name, new in changes.items():
+            old = table.pop(name, [""] * len(ROLL))
+            if new is not None:
+                table[name] = list(map(str, new(old)))
+        lines = [",".join(row) for row in zip(*([k, *v] for k, v in table.items()), strict=True)]
+        path.write_text("\n".join(lines) + "\n")
+
+    return change
+
+
+def at(position, value):
+    """Column with one other value."""
+    return lambda old: [*old[: position - 1], value, *old[position:]]
+
+
+def times(factor):
+    return lambda old: [float(value) * factor for value in old]
+
+
+def text(name, content):
+    def change(folder):
+        (folder / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+
+    return change
+
+
+def cut(name, share):
+    def change(folder):
+        content = (folder / name).read_bytes()
+        (folder / name).write_bytes(content[: int(share * len(content))])
+
+    return change
+
+
+def remove(name):
+    return lambda folder: (folder / name).unlink()
+
+
+def both(*changes):
+    def change(folder):
+        for one in changes:
+            one(folder)
+
+    return change
+
+
+POSITIONS, YAML = "positions.csv: ", "campaign.yaml: "
+ROBOT_COLUMNS = ("roll_robot_gon", "pitch_robot_gon", "yaw_robot_gon")
+
+BAD = {
+    "no header": (remove("campaign.yaml"), "campaign.yaml", "No such file"),
+    "no table": (remove("positions.csv"), "no table", "positions.csv or positions.parquet"),
+    "two tables": (text("positions.parquet", ""), "two tables", "either positions.csv or"),
+    "no YAML": (text("campaign.yaml", "a: [1"), YAML, "not valid YAML", "line 1"),
+    "odd tag": (text("campaign.yaml", "a: !!int ''"), YAML, "tag does not fit"),
+    "empty YAML": (text("campaign.yaml", ""), YAML, "not a mapping"),
+    "unknown key": (header(sensr="x"), YAML, "sensr: unknown key", "did you mean 'sensor'"),
+    "unknown key below": (
+        header(gravity={"value_mps2": 9.8, "sigma": 0}),
+        YAML,
+        "gravity.sigma: unknown key",
+        "did you mean 'sigma_mps2'",
+    ),
+    "version": (header(schema_version=2), YAML, "schema_version", "be 1, not 2"),
+    "version true": (header(schema_version=True), YAML, "schema_version", "not true"),
+    "no version": (header(schema_version=None), YAML, "schema_version", "required"),
+    "no name": (header(name=None), YAML, "name", "required"),
+    "number for a name": (header(name=2014), YAML, "name", "not 2014"),
+    "unit": (header(unit="mg"), YAML, "unit", "'m/s^2', 'g' or 'counts'", "not 'mg'"),
+    "no gravity": (header(gravity={}), YAML, "gravity.value_mps2", "required"),
+    "negative gravity": (header(gravity={"value_mps2": -9.81}), YAML, "from 0.001 to 1000"),
+    "infinite gravity": (
+        header(gravity={"value_mps2": float("inf")}),
+        YAML,
+        "from 0.001 to 1000 m/s², not inf",
+    ),
+    "gravity in g": (header(gravity={"value_mps2": 1}), "gravity.value_mps2: 1", "some 9.8"),
+    "negative sigma of gravity": (
+        header(gravity={"value_mps2": 9.81, "sigma_mps2": -1}),
+        "gravity.sigma_mps2",
+    ),
+    "no noise at all": (header(sensor_noise={"sigma_mps2": 0}), YAML, "sensor_noise.sigma_mps2"),
+    "counts without nominal": (header(unit="counts"), YAML, "nominal: missing"),
+    "nominal without counts": (
+        header(nominal={"scale": [1, 1, 1], "offset": [0, 0, 0]}),
+        YAML,
+        "nominal: goes with unit: counts, not with unit: m/s^2",
+    ),
+    "two scales": (
+        header(unit="counts", nominal={"scale": [1, 1], "offset": [0, 0, 0]}),
+        "nominal.scale",
+        "at least 3",
+    ),
+    "scale zero": (
+        header(unit="counts", nominal={"scale": [1, 0, 1], "offset": [0, 0, 0]}),
+        "nominal.scale.1",
+        "zero",
+    ),
+    "empty CSV": (text("positions.csv", ""), POSITIONS, "empty", "position, fx, fy, fz"),
+    "names only": (text("positions.csv", "position,fx,fy,fz\n"), POSITIONS, "no positions"),
+    "truncated CSV": (cut("positions.csv", 0.7), POSITIONS, "line", "columns", "whole"),
+    "no text": (text("positions.csv", b"\xff\xfe\x00a"), POSITIONS, "UTF-8"),
+    "open quote": (text("positions.csv", 'position,"fx'), POSITIONS, "not a whole CSV"),
+    "semicolons": (text("positions.csv", "position;fx;fy;fz\n"), POSITIONS, "';'", "comma"),
+    "twice": (text("positions.csv", "position,fx,fx\n1,2,3\n"), POSITIONS, "'fx'", "twice"),
+    "no fy": (columns(fy=None), POSITIONS, "fy: the column is missing", "fx, fz"),
+    "other case": (columns(fx=None, Fx=lambda old: [1] * 8), "fx:", "is 'Fx' meant"),
+    "no positions": (columns(position=None), POSITIONS, "position: the column is missing"),
+    "word": (columns(fx=at(3, "abc")), POSITIONS, "fx: position 3: 'abc' is no number"),
+    "decimal comma": (columns(fx=at(3, '"9"";8"')), "position 3", "is no number"),
+    "underscore": (columns(fx=at(3, "9_8")), "fx: position 3: '9_8' is no number"),
+    "gap": (columns(fz=at(2, "")), POSITIONS, "fz: position 2: empty"),
+    "nan": (columns(fx=at(4, "nan")), POSITIONS, "fx: position 4: nan is not finite"),
+    "inf": (columns(sd_fx=at(4, "-inf")), POSITIONS, "sd_fx: position 4: -inf is not finite"),
+    "overflow": (columns(fx=at(4, "1e999")), POSITIONS, "fx: position 4", "not finite"),
+    "stuck channel": (columns(fy=lambda old: [1.5] * 8), POSITIONS, "fy: 1.5 in all positions"),
+    "same position": (columns(position=at(3, 2)), POSITIONS, "position: position 2: 2 follows"),
+    "unordered": (columns(position=lambda old: old[::-1]), POSITIONS, "position 7", "acquisition"),
+    "position zero": (
+        columns(position=at(1, 0)),
+        POSITIONS,
+        "position 0: must be from 1 to",
+        "not 0",
+    ),
+    "half a position": (columns(position=at(3, 2.5)), POSITIONS, "2.5 is no whole number"),
+    "no samples": (
+        columns(n_samples=at(2, 0)),
+        POSITIONS,
+        "n_samples: position 2: must be from 1 to",
+    ),
+    "many samples": (columns(n_samples=at(2, 1e300)), "n_samples: position 2", "not 1e+300"),
+    "negative sd": (columns(sd_fy=at(5, -0.1)), POSITIONS, "sd_fy: position 5: must be from 0 to"),
+    "one sd": (columns(sd_fx=None), POSITIONS, "sd_fx: the column is missing", "sd_fy, sd_fz"),
+    "too cold": (
+        columns(temperature_degC=at(1, -300)),
+        "temperature_degC: position 1: ",
+        "not -300",
+    ),
+    "negative vibration": (
+        columns(vibration_mps2=at(1, -1)),
+        "vibration_mps2: position 1: ",
+        "not -1",
+    ),
+    "time runs back": (columns(time_s=at(4, 15)), POSITIONS, "time_s: position 4: 15 is before"),
+    "roll only": (
+        columns(pitch_robot_gon=None),
+        POSITIONS,
+        "pitch_robot_gon: the column is missing (it goes with roll_robot_gon)",
+    ),
+    "yaw only": (
+        both(header(robot=None), columns(pitch_robot_gon=None, roll_robot_gon=None)),
+        POSITIONS,
+        "yaw_robot_gon: goes with roll_robot_gon and pitch_robot_gon",
+    ),
+    "robot without sigma": (header(robot=None), "robot.angle_sigma_mgon: missing"),
+    "sigma without robot": (
+        columns(**dict.fromkeys(ROBOT_COLUMNS)),
+        "robot.angle_sigma_mgon: is given, but positions.csv has no roll_robot_gon",
+    ),
+    "degrees": (
+        columns(roll_robot_gon=times(0.9), pitch_robot_gon=times(0.9)),
+        POSITIONS,
+        "roll_robot_gon, pitch_robot_gon: the angles look like degrees, not gon",
+    ),
+    "radians": (
+        columns(roll_robot_gon=times(GON), pitch_robot_gon=times(GON)),
+        POSITIONS,
+        "look like radians, not gon",
+    ),
+    "opposite sign": (
+        columns(fx=times(-1), fy=times(-1), fz=times(-1)),
+        POSITIONS,
+        "opposite sign",
+        "(0, 0, -g)",
+    ),
+    "g for m/s^2": (
+        columns(fx=times(1 / G), fy=times(1 / G), fz=times(1 / G)),
+        POSITIONS,
+        "norm is about 1",
+        "looks like g, not m/s^2",
+    ),
+    "m/s^2 for g": (header(unit="g"), "looks like m/s^2, not g", "`unit` in campaign.yaml"),
+    "counts for m/s^2": (
+        columns(fx=times(1e3), fy=times(1e3), fz=times(1e3)),
+        "looks like counts, not m/s^2",
+    ),
+    "m/s^2 for counts": (
+        header(unit="counts", nominal={"scale": [0.01] * 3, "offset": [0, 0, 0]}),
+        "looks like m/s^2, not counts",
+    ),
+    "wrong nominal": (
+        both(
+            header(unit="counts", nominal={"scale": [0.01] * 3, "offset": [0, 0, 0]}),
+            columns(fx=times(400), fy=times(400), fz=times(400)),
+        ),
+        POSITIONS,
+        "nowhere near gravity",
+        "`nominal`",
+    ),
+    "no unit fits": (
+        columns(fx=times(0.3), fy=times(0.3), fz=times(0.3)),
+        "nowhere near gravity, 9.81 m/s^2",
+    ),
+    "one huge cell": (columns(fy=at(3, 1e11)), "fx, fy, fz: position 3: more than 1000 times"),
+    "huge": (
+        columns(fx=times(1e300), fy=times(1e300), fz=times(1e300)),
+        "fx: position 1: must be from -1e+12 to",
+    ),
+}
+
+
+@pytest.mark.parametrize(("change", "parts"), [(c, p) for c, *p in BAD.values()], ids=BAD)
+def test_bad_input_ends_with_one_line_that_says_where(tmp_path, change, parts):
+    write_campaign(campaign(), tmp_path)
+    change(tmp_path)
+    with pytest.raises(InputError) as caught:
+        read_campaign(tmp_path)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert str(tmp_path) in message
+    for part in parts:
+        assert part in message
+
+
+@pytest.mark.parametrize(
+    ("column", "part"),
+    [
+        (pa.array(["a"] * 8), "fx: position 1: 'a' is no number"),
+        (pa.array([None, *range(7)]), "fx: position 1: empty"),
+        (pa.array([True] * 8), "fx: position 1: True is no number"),
+        (pa.array([[1.0]] * 8), "fx: position 1: [1.0] is no number"),
+        (pa.array([1.0, *[float("nan")] * 7]), "fx: position 2: nan is not finite"),
+    ],
+)
+def test_bad_columns_of_parquet(tmp_path, column, part):
+    write_campaign(campaign(), tmp_path, "parquet")
+    path = tmp_path / "positions.parquet"
+    table = pq.read_table(path)
+    pq.write_table(table.set_column(table.column_names.index("fx"), "fx", column), path)
+    with pytest.raises(InputError, match=r"positions\.parquet") as caught:
+        read_campaign(tmp_path)
+    assert part in str(caught.value)
+
+
+@pytest.mark.parametrize("share", [0, 0.5, 0.99])
+def test_truncated_parquet(tmp_path, share):
+    write_campaign(campaign(), tmp_path, "parquet")
+    cut("positions.parquet", share)(tmp_path)
+    with pytest.raises(InputError, match=r"positions\.parquet: not a whole Parquet file"):
+        read_campaign(tmp_path)
+
+
+def test_a_column_that_stands_twice_in_parquet(tmp_path):
+    write_campaign(campaign(), tmp_path, "parquet")
+    table = pq.read_table(tmp_path / "positions.parquet")
+    twice = table.append_column("fx", table["fx"])
+    pq.write_table(twice, tmp_path / "positions.parquet")
+    with pytest.raises(InputError, match="'fx': the column stands twice"):
+        read_campaign(tmp_path)
+
+
+def test_no_folder(tmp_path):
+    with pytest.raises(InputError, match=r"no such folder.*campaign\.yaml and positions\.csv"):
+        read_campaign(tmp_path / "absent")
+
+
+@pytest.mark.parametrize("change", [{"angles": 1e-4}, {"angles": 0.0}], ids=["small", "level"])
+def test_angles_that_tell_nothing_are_no_error(tmp_path, change):
+    """Near level degrees, radians and gon are alike, and a poor sensor is not the robot's fault."""
+    angles = np.full((len(ROLL), 2), change["angles"])
+    forces = np.array([0, 0, -G]) + np.random.default_rng(1).normal(0, 0.3, (len(ROLL), 3))
+    write_campaign(campaign(angles=angles, forces=forces), tmp_path)
+    assert_same(read_campaign(tmp_path), campaign(angles=angles, forces=forces))
+
+
+def test_a_poor_sensor_is_no_error(tmp_path):
+    """Biases of 1 m/s² and scales 20 % off are what calibration is for."""
+    poor = campaign(forces=1.2 * campaign().forces + [1.0, -0.5, 0.7])
+    write_campaign(poor, tmp_path)
+    assert_same(read_campaign(tmp_path), poor)
+
+
+@pytest.mark.parametrize(
+    ("changes", "part"),
+    [
+        ({"name": ""}, "name"),
+        ({"name": "\ud800"}, "name"),
+        ({"unit": "mg"}, "unit"),
+        ({"unit": "counts"}, "nominal"),
+        ({"forces": np.full((8, 3), np.nan)}, "not finite"),
+        ({"time": np.arange(7)}, r"time: shape \(7,\), not \(8,\)"),
+        ({"positions": np.arange(8)}, "position 0"),
+        ({"angles": None}, "yaw"),
+        ({"sigma_angle": None}, "robot"),
+    ],
+)
+def test_what_could_not_be_read_again_is_not_written(tmp_path, changes, part):
+    with pytest.raises(InputError, match=part):
+        write_campaign(campaign(**changes), tmp_path / "folder")
+    assert not (tmp_path / "folder").exists()
+
+
+def test_a_folder_that_cannot_be_written(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="cannot be written"):
+        write_campaign(campaign(), tmp_path / "file")
+
+
+@st.composite
+def damages(draw):
+    """What may happen to bytes: some are replaced, removed or inserted, or the end is missing."""
+    steps = draw(
+        st.lists(
+            st.tuples(st.floats(0, 1, exclude_max=True), st.integers(0, 8), st.binary(max_size=4)),
+            min_size=1,
+            max_size=4,
+        )
+    )
+    end = draw(st.just(1.0) | st.floats(0, 1))
+
+    def damage(content):
+        for place, removed, new in steps:
+            i = int(place * len(content))
+            content = content[:i] + new + content[i + removed :]
+        return content[: int(end * len(content))]
+
+    return damage
+
+
+WORDS = (
+    *("1", "-1", "0", "1e308", ".inf", "nan", "", "true", "null", "[]", "{}", "&a [*a]", "a: b"),
+    *("!!int ''", "!!bool x", "!!map [a]", "!!timestamp x", "2001-99-99", "'", '"', "#", "\t"),
+    *("counts", "g", "fx", "position", ",", "\r", "\x85", "\0", "\ud7ff", "?", "<<", "- "),
+)
+
+
+@st.composite
+def edits(draw):
+    """Text of YAML or CSV with some of its words replaced by others that mean something there."""
+    word = st.sampled_from(WORDS)
+    changes = draw(st.lists(st.tuples(st.floats(0, 1, exclude_max=True), word), min_size=1))
+
+    def edit(content):
+        words = content.decode().replace(",", " , ").split(" ")
+        for place, new in changes:
+            words[int(place * len(words))] = new
+        return " ".join(words).encode()
+
+    return edit
+
+
+def fuzz(name, table, damage, **changes):
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / name
+        write_campaign(campaign(**changes), folder, table)
+        path.write_bytes(damage(path.read_bytes()))
+        message = ""
+        try:
+            read = read_campaign(folder)
+        except InputError as error:
+            message = str(error)
+        else:
+            # What was taken for a campaign is one: it can be written, which checks it, and read.
+            write_campaign(read, folder, table)
+            read_campaign(folder)
+        assert len(message.splitlines()) <= 1
+
+
+@pytest.mark.parametrize("changes", [{}, WITHOUT_ROBOT | COUNTS], ids=["robot", "counts"])
+@settings(max_examples=200)
+@given(damage=damages() | edits())
+@example(damage=lambda content: content + b"a: !!bool x")
+def test_fuzzed_header(damage, changes):
+    fuzz("campaign.yaml", "csv", damage, **changes)
+
+
+@settings(max_examples=200)
+@given(damage=damages() | edits())
+def test_fuzzed_csv(damage):
+    fuzz("positions.csv", "csv", damage)
+
+
+@settings(max_examples=200)
+@given(damage=damages())
+def test_fuzzed_parquet(damage):
+    fuzz("positions.parquet", "parquet", damage)

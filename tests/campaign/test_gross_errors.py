@@ -1,0 +1,297 @@
+"""Gross errors: what each does to a campaign, how it is undone, and what is refused."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from accelstudy.approaches import get_approach
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.files.format import read_campaign, write_campaign
+from accelstudy.campaign.gross_errors import get_gross_error, gross_error_names
+from accelstudy.campaign.gross_errors.axis_error import SIGNED_PERMUTATIONS
+from accelstudy.campaign.gross_errors.recognition import recognise
+from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
+from accelstudy.diagnosis.pipeline import diagnose
+from accelstudy.sensors.models import get_model
+
+CLEAN, _ = simulate_campaign(CampaignSettings(n_samples=50, yaw="random"))
+BLIND = replace(CLEAN, angles=None, sigma_angle=None, yaw=None)
+
+
+def spoiled(spec, seed=1, campaign=CLEAN):
+    return get_gross_error(spec).apply(campaign, np.random.default_rng(seed))
+
+
+def drawn(spec, seed, campaign=CLEAN):
+    return get_gross_error(spec).drawn(campaign, np.random.default_rng(seed))
+
+
+def test_the_catalogue_is_complete():
+    assert set(gross_error_names()) == {
+        *("outlier_position", "row_order", "axis_error", "unit_error")
+    }
+
+
+@pytest.mark.parametrize("name", gross_error_names())
+def test_what_is_drawn_is_told_and_can_be_given(name):
+    error = drawn(name, 3)
+    again = get_gross_error(error.spec).apply(CLEAN, np.random.default_rng(99))
+    np.testing.assert_allclose(again.forces, spoiled(name, 3).forces, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(again.angles, spoiled(name, 3).angles, rtol=0, atol=1e-9)
+    assert len({drawn(name, seed).spec for seed in range(20)}) > 2
+    assert np.any(again.forces != CLEAN.forces) or np.any(again.angles != CLEAN.angles)
+
+
+@pytest.mark.parametrize("name", gross_error_names())
+def test_a_campaign_with_it_can_be_written_and_read(name, tmp_path):
+    for seed in range(4):
+        error = spoiled(name, seed)
+        write_campaign(error, tmp_path, plausible=False)
+        read = read_campaign(tmp_path, plausible=False)
+        np.testing.assert_allclose(read.forces, error.forces, rtol=1e-14)
+        np.testing.assert_allclose(read.angles, error.angles, rtol=1e-14, atol=1e-15)
+
+
+def test_an_outlier_is_in_one_position():
+    e = spoiled("outlier_position(position=7, y=0.3)").forces - CLEAN.forces
+    assert np.flatnonzero(e.any(axis=1)).tolist() == [6]
+    np.testing.assert_allclose(e[6], [0, 0.3, 0], atol=1e-14)
+    e = spoiled("outlier_position").forces - CLEAN.forces
+    assert np.count_nonzero(e.any(axis=1)) == 1
+    assert np.linalg.norm(e) == pytest.approx(0.1)
+
+
+def test_rows_of_the_forces_are_exchanged_and_nothing_else():
+    campaign = spoiled("row_order(first=2, second=5)")
+    order = [0, 4, 2, 3, 1, *range(5, 24)]
+    np.testing.assert_array_equal(campaign.forces, CLEAN.forces[order])
+    np.testing.assert_array_equal(campaign.sd, CLEAN.sd[order])
+    np.testing.assert_array_equal(campaign.angles, CLEAN.angles)
+    np.testing.assert_array_equal(campaign.time, CLEAN.time)
+
+
+def test_exchanged_rows_are_in_different_attitudes():
+    settings = CampaignSettings(scheme="faces-6", repeats=4)
+    campaign, _ = simulate_campaign(settings)
+    for seed in range(30):
+        changed = spoiled("row_order", seed, campaign).forces - campaign.forces
+        assert np.abs(changed).max() > 1
+
+
+def test_axes():
+    campaign = spoiled("axis_error(x=2, y=-1, z=3)")
+    x, y, z = CLEAN.forces.T
+    np.testing.assert_array_equal(campaign.forces, np.stack([y, -x, z], axis=1))
+    np.testing.assert_array_equal(campaign.sd, CLEAN.sd[:, [1, 0, 2]])
+    assert len(set(SIGNED_PERMUTATIONS)) == 48
+    assert SIGNED_PERMUTATIONS[0] == (1, 2, 3)
+    assert all(drawn("axis_error", seed).spec != "axis_error(x=1, y=2, z=3)" for seed in range(99))
+
+
+@pytest.mark.parametrize(
+    ("spec", "unit", "expected"),
+    [
+        ("unit_error(force=0.101971621297793)", "forces", lambda f: f / STANDARD_GRAVITY),
+        ("unit_error(angle=0.9)", "angles", lambda a: np.deg2rad(np.rad2deg(a) * 180 / 200)),
+        ("unit_error(angle=0.015707963267949)", "angles", lambda a: a * np.pi / 200),
+    ],
+)
+def test_units(spec, unit, expected):
+    campaign = spoiled(spec)
+    np.testing.assert_allclose(getattr(campaign, unit), expected(getattr(CLEAN, unit)), rtol=1e-12)
+    other = {"forces": "angles", "angles": "forces"}[unit]
+    np.testing.assert_array_equal(getattr(campaign, other), getattr(CLEAN, other))
+
+
+def test_unit_errors_that_are_drawn_are_those_that_plausibility_checks_know(tmp_path):
+    specs = {drawn("unit_error", seed).spec for seed in range(40)}
+    assert len(specs) == 3
+    for spec in specs:
+        with pytest.raises(InputError, match="look"):
+            write_campaign(spoiled(spec), tmp_path / "refused")
+        write_campaign(spoiled(spec), tmp_path / "written", plausible=False)
+        with pytest.raises(InputError, match="look"):
+            read_campaign(tmp_path / "written")
+    assert not (tmp_path / "refused").exists()
+    assert {drawn("unit_error", seed, BLIND).spec for seed in range(20)} == {
+        "unit_error(force=0.101971621298)"
+    }
+
+
+def test_other_checks_stay_without_plausibility(tmp_path):
+    broken = replace(CLEAN, forces=np.where(np.arange(3) == 1, np.nan, CLEAN.forces))
+    with pytest.raises(InputError, match="fy: position 1: nan is not finite"):
+        write_campaign(broken, tmp_path, plausible=False)
+
+
+def test_47_axis_errors_that_the_norm_of_gravity_does_not_see():
+    """An axis error only renames parameters there; the residuals are the same."""
+    nine, gravity = get_model("bias-scale-nonorthogonality"), get_approach("gravity")
+    usual = fit_campaign(BLIND, nine, gravity).adjustment.omega[0]
+    for x, y, z in SIGNED_PERMUTATIONS[1:]:
+        spec = f"axis_error(x={x}, y={y}, z={z})"
+        found = fit_campaign(spoiled(spec, campaign=BLIND), nine, gravity).adjustment.omega[0]
+        assert found == pytest.approx(usual, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("spec", "expected"),
+    [
+        ("axis_eror", "unknown gross error 'axis_eror'; did you mean 'axis_error'?"),
+        ("axis_error(x=1, y=1, z=3)", "must be 1, 2, 3 in some order, each with a sign"),
+        ("axis_error(x=2)", "must be 1, 2, 3 in some order"),
+        ("outlier_position(position=25)", "position=25 is no position of simulated; they are 1 to"),
+        ("row_order(first=2)", "give first and second, or neither"),
+        ("unit_error(force=0)", "force=0 must be a number above 0"),
+        ("unit_error(angle=nan)", "angle=nan must be a number above 0"),
+    ],
+)
+def test_what_is_wrong(spec, expected):
+    with pytest.raises(InputError) as error:
+        spoiled(spec)
+    assert expected in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_no_angles_no_unit_of_angles():
+    with pytest.raises(InputError, match="simulated has no angles"):
+        spoiled("unit_error(angle=0.9)", campaign=BLIND)
+    level = replace(CLEAN, forces=np.tile(CLEAN.forces[0], (24, 1)))
+    with pytest.raises(InputError, match="all positions are in the same attitude"):
+        spoiled("row_order", campaign=level)
+
+
+# --- recognition ---------------------------------------------------------------------------------
+
+GRAVITY, ROBOT = get_approach("gravity"), get_approach("robot")
+TEMPERATURE = {"temperature": (10.0, 40.0), "temperature_order": "ABBA"}
+DESIGNS = {
+    "plain": {"scheme": "faces-edges-18"},
+    "symmetric": {"scheme": "mclaren-24", "sigma": 0.01},
+    "repeated": {"scheme": "faces-6", "repeats": 4, "order": "random", "effects": ("warm_up",)},
+    "hot": {"scheme": "dodecahedron-20", "effects": ("thermal_bias",), "size": 3.0, **TEMPERATURE},
+    "clipped": {"scheme": "fibonacci-24", "effects": ("saturation",), "size": 2.0},
+    "turned": {"scheme": "rings-24", "effects": ("mounting_rotation",), "size": 5.0},
+    "many": {
+        "scheme": "fibonacci-50",
+        "repeat_first": 10,
+        "effects": ("cubic_scale",),
+        "size": 9.0,
+    },
+}
+"""Campaigns without a gross error, some with effects that are far too large for any sensor."""
+
+
+@pytest.fixture(scope="module")
+def designs():
+    return {
+        name: simulate_campaign(CampaignSettings(seed=7, **settings))[0]
+        for name, settings in DESIGNS.items()
+    }
+
+
+def exchanged(campaign, rows, places):
+    order = np.arange(campaign.n_positions)
+    order[rows] = places
+    return replace(campaign, forces=campaign.forces[order])
+
+
+@pytest.mark.parametrize("design", DESIGNS)
+def test_nothing_is_recognised_where_nothing_is_wrong(design, designs):
+    assert recognise(designs[design], ROBOT) is None
+    assert recognise(replace(designs[design], angles=None), GRAVITY) is None
+
+
+@pytest.mark.parametrize("design", DESIGNS)
+def test_all_axes_and_units_are_recognised_and_undone(design, designs):
+    right = designs[design]
+    wrong = [f"axis_error(x={x}, y={y}, z={z})" for x, y, z in SIGNED_PERMUTATIONS[1:]]
+    wrong += [
+        f"unit_error(force={factor})" for factor in (0.1019716212978, 101.9716212978, 9.80665)
+    ]
+    wrong += [f"unit_error(angle={factor})" for factor in (0.9, 0.015707963267949)]
+    for spec in wrong:
+        found = recognise(spoiled(spec, campaign=right), ROBOT)
+        assert found is not None, spec
+        assert found.name == spec.partition("(")[0], spec
+        np.testing.assert_allclose(found.mended.forces, right.forces, rtol=1e-9, err_msg=spec)
+        np.testing.assert_allclose(found.mended.angles, right.angles, rtol=1e-9, err_msg=spec)
+
+
+@pytest.mark.parametrize("design", DESIGNS)
+def test_exchanged_rows_are_recognised_and_put_back(design, designs):
+    right, rng = designs[design], np.random.default_rng(3)
+    for count in (2, 3, 4, 6):
+        rows = rng.choice(right.n_positions, count, replace=False)
+        first = rng.integers(right.n_positions - count + 1)
+        block = np.arange(first, first + count)
+        for wrong in (rows, block):
+            campaign = exchanged(right, wrong, np.roll(wrong, 1))
+            if np.abs(campaign.forces - right.forces).max() < 0.06:
+                continue  # repeats
+            found = recognise(campaign, ROBOT)
+            assert found is not None, (design, wrong)
+            assert found.name == "row_order"
+            # Which of two repeats is which does not show, and is all the same.
+            assert np.abs(found.mended.forces - right.forces).max() < 0.06, (design, wrong)
+
+
+def test_a_table_that_slipped_by_a_row_is_put_back(designs):
+    right = designs["many"]
+    rows = np.arange(right.n_positions)
+    found = recognise(exchanged(right, rows, np.roll(rows, 1)), ROBOT)
+    assert found.reason.endswith(" and 40 more are exchanged")
+    assert np.abs(found.mended.forces - right.forces).max() < 0.06
+
+
+def test_what_does_not_show_is_not_recognised(designs):
+    """Repeats that were exchanged, and the axes and rows where there is no robot."""
+    repeated = designs["repeated"]
+    alike = np.argsort(np.linalg.norm(repeated.forces - repeated.forces[0], axis=1))[:2]
+    assert recognise(exchanged(repeated, alike, alike[::-1]), ROBOT) is None
+    for spec in ("axis_error(x=-3, y=1, z=2)", "row_order(first=2, second=9)"):
+        assert recognise(spoiled(spec, campaign=BLIND), GRAVITY) is None
+
+
+def test_a_sensor_that_is_mounted_in_its_own_way_is_no_gross_error(designs):
+    angle = np.pi / 6
+    c, s = np.cos(angle), np.sin(angle)
+    for design in ("turned", "plain"):
+        right = designs[design]
+        turned = right.forces @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+        assert recognise(replace(right, forces=turned), ROBOT) is None
+
+
+def test_several_gross_errors_are_undone_together(designs):
+    right = designs["many"]
+    wrong = exchanged(right, [4, 9], [9, 4])
+    wrong.forces[20] += (3, -12, 8)
+    for spec in ("axis_error(x=2, y=-1, z=3)", "unit_error(force=0.1019716212978)"):
+        wrong = spoiled(spec, campaign=wrong)
+    found = recognise(wrong, ROBOT)
+    assert {name for name, _ in found.named} == set(gross_error_names())
+    assert ("outlier_position", 21) in found.named
+    assert found.reasons["unit_error"] == "the forces are in g"
+    assert found.reason.count(";") == len(found.reasons) - 1
+    np.testing.assert_allclose(found.mended.forces, np.delete(right.forces, 20, axis=0), atol=0.06)
+    mended = np.delete(wrong.forces, 20, axis=0) @ found.conversion.T
+    np.testing.assert_allclose(np.sort(mended, axis=0), np.sort(found.mended.forces, axis=0))
+
+
+@pytest.mark.parametrize(("approach", "size"), [("robot", 19.0), ("robot", 2.0), ("gravity", 9.0)])
+def test_a_position_that_no_calibration_bears_is_left_out(approach, size):
+    settings = CampaignSettings(scheme="fibonacci-24", seed=12, approach=approach)
+    campaign, _ = simulate_campaign(settings)
+    right = diagnose(campaign, get_model("bias-scale-nonorthogonality"))
+    outward = campaign.forces[16] / np.linalg.norm(campaign.forces[16])
+    campaign.forces[16] += size * outward
+    found = diagnose(campaign, get_model("bias-scale-nonorthogonality"))
+    assert found.verdict == "gross_error"
+    assert [(named.name, named.position) for named in found.found] == [("outlier_position", 17)]
+    told = re.search(r"position 17 is wrong by ([\d.]+) m/s\^2", found.reason)
+    assert float(told[1]) == pytest.approx(size, rel=0.05)
+    np.testing.assert_allclose(found.base.parameters, right.base.parameters, atol=0.01)

@@ -1,0 +1,113 @@
+"""The Allan deviation, and what it says about the mean of a hold."""
+
+import numpy as np
+import pytest
+from test_import_holds import shared
+
+from accelstudy.campaign.holds.allan import (
+    AllanSums,
+    accuracy_of_mean,
+    allan_deviation,
+    allan_moments,
+    averaging_factors,
+)
+
+N = 2**16
+STEP = 0.01
+
+
+def white(seed=1, n=N):
+    return 0.02 * np.random.default_rng(seed).standard_normal(n)
+
+
+def flicker(seed=1, n=N):
+    """Noise with a spectrum of 1/f."""
+    spectrum = np.fft.rfft(np.random.default_rng(seed).standard_normal(n))
+    frequency = np.fft.rfftfreq(n)
+    frequency[0] = 1
+    return np.fft.irfft(spectrum / np.sqrt(frequency), n)
+
+
+def slope(curve, low, high):
+    chosen = (curve.tau >= low) & (curve.tau <= high)
+    return np.polyfit(np.log(curve.tau[chosen]), np.log(curve.pooled[chosen]), 1)[0]
+
+
+def test_definition():
+    x = np.random.default_rng(1).standard_normal(40)
+    curve = allan_deviation(x, STEP)
+    for tau, found in zip(curve.tau, curve.pooled, strict=True):
+        m = round(tau / STEP)
+        means = np.convolve(x, np.ones(m) / m, "valid")
+        assert found**2 == pytest.approx(0.5 * np.mean((means[m:] - means[:-m]) ** 2))
+    assert averaging_factors(20) == [1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 13, 16, 19]
+    assert averaging_factors(0) == []
+
+
+def test_white_noise_level_and_slope():
+    curve = allan_deviation(white(), STEP)
+    assert slope(curve, STEP, 10) == pytest.approx(-0.5, abs=0.02)
+    reliable = curve.differences > 500
+    expected = 0.02 * np.sqrt(STEP / curve.tau[reliable])
+    np.testing.assert_allclose(curve.pooled[reliable], expected, rtol=0.08)
+
+
+def test_random_walk_and_flicker():
+    walk = allan_deviation(np.cumsum(white()), STEP)
+    assert slope(walk, 0.2, 10) == pytest.approx(0.5, abs=0.06)
+    assert slope(allan_deviation(flicker(), STEP), 0.1, 10) == pytest.approx(0, abs=0.06)
+
+
+def test_records_are_pooled():
+    sums = AllanSums()
+    for seed in range(20):
+        sums.add(allan_moments(white(seed, 3 * 500).reshape(-1, 3) + seed))
+    curve = sums.deviation(STEP)
+    assert curve.deviation.shape == (len(curve.tau), 3)
+    assert curve.tau[-1] <= 2.5
+    assert curve.differences[0] == 20 * 499
+    assert curve.pooled[0] == pytest.approx(0.02, rel=0.02)
+    sums.add(allan_moments(np.zeros((1, 3))))
+    np.testing.assert_array_equal(sums.deviation(STEP).differences, curve.differences)
+
+
+@pytest.mark.parametrize("duration", [0.5, 2.0, 5.0])
+def test_white_noise_is_found_white(duration):
+    sums = AllanSums()
+    for seed in range(30):
+        sums.add(allan_moments(white(seed, 3 * 500).reshape(-1, 3)))
+    n = round(duration / STEP)
+    accuracy = accuracy_of_mean(sums.deviation(STEP), duration, 0.02, n)
+    assert accuracy.white == pytest.approx(0.02 / np.sqrt(n))
+    assert accuracy.ratio == pytest.approx(1, abs=0.2)
+    assert (accuracy.slope is None) == (duration < 2.15)
+
+
+def test_coloured_noise_is_not():
+    """The sigma is that of the means of real holds: half the variance of their differences."""
+    noise = 0.02 * np.random.default_rng(3).standard_normal(N) + np.convolve(
+        white(4, N + 399), np.ones(400) / 20, "valid"
+    )
+    duration, n = 3.0, 300
+    curve = allan_deviation(noise, STEP)
+    accuracy = accuracy_of_mean(curve, duration, noise.std(), n)
+    means = noise[: N // n * n].reshape(-1, n).mean(axis=1)
+    assert accuracy.allan == pytest.approx(np.sqrt(np.mean(np.diff(means) ** 2) / 2), rel=0.15)
+    assert accuracy.ratio > 5
+
+
+def test_hardly_anything_to_go_by():
+    accuracy = accuracy_of_mean(allan_deviation(np.arange(3.0), STEP), 1.0, 2.0, 4)
+    assert accuracy.allan == accuracy.white == 1.0
+    accuracy = accuracy_of_mean(allan_deviation(np.arange(11.0) % 2, STEP), 1.0, 0.5, 100)
+    assert accuracy.slope == -0.5
+
+
+def test_xsens_is_coloured():
+    log = np.loadtxt(shared("imu_tk_xsens/xsens_acc.mat"))
+    first = log[70:5100, 1:] / 415
+    curve = allan_deviation(first, STEP)
+    flat = (curve.tau >= 1) & (curve.tau <= 5)
+    assert np.all((curve.pooled[flat] > 0.5e-3) & (curve.pooled[flat] < 1.5e-3))
+    assert abs(slope(curve, 1, 5)) < 0.25
+    assert first.std(axis=0).mean() / np.sqrt(730) == pytest.approx(0.29e-3, rel=0.05)

@@ -1,0 +1,267 @@
+"""From a log to a campaign folder: what is in it, settings, the figure, and the command."""
+
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from click.testing import CliRunner
+from scipy.io import savemat
+from test_import_holds import G, session, shared, write
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import STANDARD_GRAVITY, angles_in
+from accelstudy.campaign.files.format import read_campaign
+from accelstudy.campaign.importing import segmentation_figure
+from accelstudy.campaign.importing.conversion import (
+    ImportSettings,
+    import_log,
+    import_means,
+    parse_settings,
+    read_settings,
+)
+from accelstudy.commands.importing import import_command
+from accelstudy.commands.main import Commands
+
+XSENS = {
+    "columns": {"fx": 1, "fy": 2, "fz": 3},
+    "time": 0,
+    "unit": "counts",
+    "scale": [1 / 414.4, 1 / 412.0, 1 / 414.6],
+    "offset": [33124, 33275, 32365],
+    "gravity": {"value_mps2": 9.81744},
+}
+
+
+def call(*arguments):
+    # `main` registers the command; a group of its own keeps this test apart from it.
+    group = Commands(commands=[import_command])
+    return CliRunner().invoke(group, ["import", *map(str, arguments)])
+
+
+@pytest.fixture
+def log(tmp_path):
+    forces, _ = session()
+    return write(tmp_path, forces)
+
+
+def test_a_white_log(log):
+    campaign, report = import_log(log, ImportSettings(rate_hz=100))
+    assert campaign.n_positions == report.n_holds == 8
+    assert campaign.positions.tolist() == list(range(1, 9))
+    np.testing.assert_allclose(np.linalg.norm(campaign.forces, axis=1), G, atol=0.01)
+    np.testing.assert_array_equal(campaign.n_samples, report.holds.n_samples)
+    np.testing.assert_allclose(campaign.sd, 0.02, rtol=0.2)
+    assert np.all(np.diff(campaign.time) == pytest.approx(6, abs=0.1))
+    assert campaign.sigma_force == report.sigma_allan
+    assert report.sigma_white == pytest.approx(0.02 / np.sqrt(260), rel=0.05)
+    assert report.ratio == pytest.approx(1, abs=0.35)
+
+
+def test_turning_is_not_noise(tmp_path):
+    """A sensor that turns a little within its holds changes the direction of gravity only."""
+    forces, edges = session(sigma=0.005)
+    for a, b in edges:
+        across = np.cross(forces[a:b].mean(axis=0), [0.6, 0.8, 0])
+        across /= np.linalg.norm(across)
+        forces[a:b] += np.linspace(-0.02, 0.02, b - a)[:, None] * across
+    campaign, report = import_log(write(tmp_path, forces), ImportSettings(rate_hz=100))
+    assert campaign.sigma_force == pytest.approx(0.005 / np.sqrt(260), rel=0.5)
+    (gon,) = (text for text in report.warnings if "the sensor turns" in text)
+    with angles_in("deg"):
+        _, report = import_log(write(tmp_path, forces), ImportSettings(rate_hz=100))
+    (deg,) = (text for text in report.warnings if "the sensor turns" in text)
+    size = [float(re.search(r"by some (\d+) m(?:gon|deg) within", text)[1]) for text in (gon, deg)]
+    assert size[1] == pytest.approx(0.9 * size[0], abs=1)
+
+
+def test_without_offset_no_direction(tmp_path):
+    forces, _ = session()
+    path = write(tmp_path, 10 * forces + [33000, 32000, 31000] * (forces[:, :1] > 0))
+    settings = ImportSettings(rate_hz=100, unit="counts", scale=[0.1])
+    campaign, report = import_log(path, settings)
+    assert any("is an offset missing?" in text for text in report.warnings)
+    assert campaign.warnings == report.warnings
+
+
+def test_means(tmp_path):
+    table = pd.DataFrame(
+        {"n": [400, 100], "fx": [1.0, 0], "fy": [0, 1.0], "fz": [0.0, 0], "t": [1, 2]}
+    )
+    table[["sx", "sy", "sz"]] = 0.02
+    table.to_csv(tmp_path / "means.csv", index=False)
+    campaign, report = import_means(
+        tmp_path / "means.csv", ImportSettings(unit="g", name="two", time="t")
+    )
+    np.testing.assert_allclose(campaign.forces, np.eye(3)[:2] * STANDARD_GRAVITY)
+    np.testing.assert_allclose(campaign.sd, 0.02 * STANDARD_GRAVITY)
+    assert campaign.n_samples.tolist() == [400, 100]
+    assert campaign.time.tolist() == [1, 2]
+    expected = 0.02 * STANDARD_GRAVITY * np.sqrt((1 / 400 + 1 / 100) / 2)
+    assert campaign.sigma_force == pytest.approx(expected)
+    assert "white" in report.warnings[0]
+    assert (report.holds, report.ratio, report.sigma_allan) == (None, None, None)
+
+
+@pytest.mark.parametrize(
+    ("change", "settings", "message"),
+    [
+        ({"n": 0}, {}, "n_samples: must be positive"),
+        ({"sy": -1}, {}, "must not be negative"),
+        ({"fy": np.nan}, {}, r"line 2, column fy \(fy\): nothing"),
+        ({}, {"columns": {"temp": 1}}, "unknown column 'temp'"),
+        ({}, {"columns": {"fx": "q"}}, "no column 'q'"),
+    ],
+)
+def test_bad_means(tmp_path, change, settings, message):
+    row = {"n": 4, "fx": 1.0, "fy": 2.0, "fz": 3.0, "sx": 1.0, "sy": 1.0, "sz": 1.0} | change
+    pd.DataFrame([row, row]).to_csv(tmp_path / "means.csv", index=False)
+    with pytest.raises(InputError, match=message):
+        import_means(tmp_path / "means.csv", parse_settings(settings))
+
+
+def test_means_as_columns(tmp_path):
+    savemat(tmp_path / "means.mat", {"means": np.random.default_rng(1).normal(0, 1, (3, 24))})
+    campaign, _ = import_means(tmp_path / "means.mat", ImportSettings(unit="g"))
+    assert campaign.n_positions == 24
+    assert campaign.sigma_force is None
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ({"rate": 100}, r"settings: rate: unknown key; did you mean 'rate_hz'\?"),
+        ({"rate_hz": -1}, r"settings: rate_hz: must be from 1e-06 to 1e\+09 per second, not -1"),
+        ({"rate_hz": True}, "rate_hz: must be a number, not true"),
+        ({"unit": "ft"}, "unit: input should be"),
+        ({"columns": {"fx": 1.5}}, "columns.fx"),
+        ({"gravity": {"value": 1}}, "gravity.value: unknown key"),
+    ],
+)
+def test_bad_settings(content, message):
+    with pytest.raises(InputError, match=message) as caught:
+        parse_settings(content)
+    assert "\n" not in str(caught.value)
+
+
+def test_settings_are_overlaid(tmp_path):
+    (tmp_path / "settings.yaml").write_text("rate_hz: 50\nscale: 0.1\nunit: counts\n")
+    settings = read_settings(tmp_path / "settings.yaml", {"rate_hz": 100})
+    assert (settings.rate_hz, settings.scale, settings.unit) == (100, [0.1], "counts")
+    with pytest.raises(InputError, match=r"none\.yaml"):
+        read_settings(tmp_path / "none.yaml")
+
+
+# --- The command ---------------------------------------------------------------------------------
+
+
+def test_command(log, tmp_path, monkeypatch):
+    out = tmp_path / "campaign"
+    result = call(log, "--out", out, "--rate", 100, "--name", "mine", "--gravity", G)
+    assert result.exit_code == 0, result.output
+    assert "holds: 8, of 2.6 to 2.6 s" in result.stdout
+    assert "times the noise floor" in result.stdout
+    campaign = read_campaign(out)
+    expected, _ = import_log(log, ImportSettings(rate_hz=100))
+    np.testing.assert_allclose(campaign.forces, expected.forces, rtol=1e-12)
+    assert (campaign.name, campaign.gravity) == ("mine", G)
+    assert campaign.sigma_force == pytest.approx(expected.sigma_force)
+    svg = (out / "segmentation.svg").read_bytes()
+    assert (out / "segmentation.png").stat().st_size > 1e4
+    assert call(log, "--out", out, "--rate", 100, "--force").exit_code == 0
+    assert (out / "segmentation.svg").read_bytes() == svg
+    # A figure that fails takes the campaign not with it, and leaves no older one behind.
+    monkeypatch.setattr(segmentation_figure, "draw_segmentation", lambda *_: 1 / 0)
+    result = call(log, "--out", out, "--rate", 100, "--force")
+    assert result.exit_code == 0
+    assert "The figure 'segmentation' could not be drawn (ZeroDivisionError: div" in result.stderr
+    assert not list(out.glob("segmentation.*"))
+    np.testing.assert_array_equal(read_campaign(out).forces, campaign.forces)
+
+
+def test_no_hold_is_said_to_be_shorter_than_the_shortest(tmp_path):
+    forces, _ = session(holds=8, still=24, moving=30)
+    _, report = import_log(
+        write(tmp_path, forces), ImportSettings(rate_hz=10, trim_s=0.2, threshold_mps2=0.3)
+    )
+    (line,) = [line for line in report.lines() if line.startswith("holds: ")]
+    assert float(re.search(r"of (\S+) to", line)[1]) >= 1.0
+
+
+def test_command_with_everything(tmp_path):
+    forces, _ = session(holds=4)
+    table = np.column_stack([np.arange(len(forces)) * 10.0, 1000 * forces + [1, 2, 3]])
+    np.savetxt(tmp_path / "log.txt", table, "%.1f")
+    content = {"time_unit": "ms", "columns": {"fx": 1, "fy": 2}, "sensor": "A-1"}
+    (tmp_path / "settings.yaml").write_text(yaml.safe_dump(content))
+    result = call(
+        *(tmp_path / "log.txt", "--out", tmp_path / "out", "--settings"),
+        *(tmp_path / "settings.yaml", "--columns", "fz=3", "--time", "0", "--unit", "counts"),
+        *("--scale", "0.001", "--offset", "1,2,3", "--threshold", "0.1", "--no-figure"),
+    )
+    assert result.exit_code == 0, result.output
+    assert "threshold: 0.1 m/s², as given" in result.stdout
+    campaign = read_campaign(tmp_path / "out")
+    assert campaign.n_positions == 4
+    assert campaign.sensor == "A-1"
+    np.testing.assert_allclose(np.linalg.norm(campaign.forces, axis=1), G, atol=0.01)
+    assert not (tmp_path / "out" / "segmentation.svg").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ([], "give the column of time (--time), or the rate (--rate)"),
+        (["--rate", "100", "--columns", "fx"], "--columns: expected fx=1,fy=2,fz=3"),
+        (["--rate", "100", "--unit", "counts", "--scale", "a"], "--scale: expected numbers"),
+        (["--rate", "-5"], "options: rate_hz: must be from 1e-06 to 1e+09 per second"),
+        (["--rate", "nan"], "options: rate_hz"),
+        (["--rate", "100", "--threshold", "1e-9"], "no static hold"),
+    ],
+)
+def test_command_says_what_is_wrong(log, tmp_path, options, message):
+    result = call(log, "--out", tmp_path / "out", *options)
+    assert result.exit_code == 2
+    assert result.stderr.startswith("error: ")
+    assert message in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert not (tmp_path / "out" / "campaign.yaml").exists()
+
+
+# --- Public data ---------------------------------------------------------------------------------
+
+
+def test_xsens(tmp_path):
+    path = shared("imu_tk_xsens/xsens_acc.mat")
+    campaign, report = import_log(path, parse_settings(XSENS))
+    assert report.sigma_white == pytest.approx(0.29e-3, rel=0.05)
+    assert 0.5e-3 < report.sigma_allan < 1.6e-3
+    assert 2 < report.ratio < 6
+    np.testing.assert_allclose(np.linalg.norm(campaign.forces, axis=1), 9.817, atol=0.3)
+
+
+@pytest.mark.parametrize("i", range(3))
+def test_mpu9150_is_as_noisy_as_its_residuals(i):
+    settings = {"columns": {"fx": 0, "fy": 1, "fz": 2}, "rate_hz": 100}
+    campaign, report = import_log(shared(f"mpu9150/imu{i}.log"), parse_settings(settings))
+    assert campaign.sigma_force == pytest.approx(2.7e-3, rel=0.15)
+    assert any("the sensor turns" in text for text in report.warnings)
+
+
+def test_ctu_means(tmp_path):
+    path = shared("ctu_innalabs/CalibrationOfLowCostTriaxialInertialSensors.mat")
+    result = call(path, "--out", tmp_path, "--means", "--unit", "g")
+    assert result.exit_code == 0, result.output
+    assert result.stdout.startswith("24 positions; sigma of a mean: unknown")
+    campaign = read_campaign(tmp_path)
+    np.testing.assert_allclose(np.linalg.norm(campaign.forces, axis=1), STANDARD_GRAVITY, rtol=0.08)
+
+
+def test_derived_means_of_xsens(tmp_path):
+    settings = {key: value for key, value in XSENS.items() if key not in ("columns", "time")}
+    path = shared("imu_tk_xsens/derived_static_means.csv")
+    campaign, report = import_means(path, parse_settings(settings))
+    assert report.n_holds == 38
+    assert report.sigma_white == pytest.approx(0.3e-3, rel=0.1)
+    assert campaign.n_samples[0] == 5101

@@ -1,0 +1,248 @@
+"""The detector of static holds, against logs whose holds are known, and against public ones."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from places import SHARED
+
+from accelstudy.basics.errors import InputError
+from accelstudy.campaign.holds.detection import find_holds
+from accelstudy.campaign.holds.windows import windows
+from accelstudy.campaign.logs.recording import open_log
+
+RATE = 100.0
+G = 9.81
+
+
+def shared(name):
+    path = SHARED / "data" / name
+    if not path.exists():
+        pytest.skip(f"needs {path}; set ACCELSTUDY_SHARED")
+    return path
+
+
+def session(seed=1, holds=8, sigma=0.02, still=400, moving=200):
+    """A log (n, 3), and the first and the end sample of each hold."""
+    rng = np.random.default_rng(seed)
+    pieces, edges, n = [], [], 0
+    for _ in range(holds):
+        force = rng.standard_normal(3)
+        force *= G / np.linalg.norm(force)
+        shake = 4 * np.sin(np.arange(moving)[:, None] * rng.uniform(0.05, 0.2, 3))
+        pieces += [force + shake, np.tile(force, (still, 1))]
+        edges.append((n + moving, n + moving + still))
+        n += moving + still
+    pieces.append(pieces[0])
+    forces = np.concatenate(pieces)
+    return forces + sigma * rng.standard_normal(forces.shape), np.array(edges)
+
+
+def write(folder, forces, time=None):
+    """Parquet, as it is fast and keeps every digit."""
+    path = folder / "log.parquet"
+    table = pd.DataFrame(forces, columns=["fx", "fy", "fz"])
+    if time is not None:
+        table["time"] = time
+    table.to_parquet(path)
+    return path
+
+
+def opened(folder, forces, time=None, **options):
+    rate = RATE if time is None else None
+    return open_log(write(folder, forces, time), rate=rate, **options)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("sigma", [0.0005, 0.02, 0.2])
+def test_known_holds(tmp_path, seed, sigma):
+    forces, edges = session(seed, sigma=sigma)
+    holds = find_holds(opened(tmp_path, forces))
+    assert len(holds) == len(edges)
+    inside = (holds.start >= edges[:, 0]) & (holds.end <= edges[:, 1])
+    assert inside.all()
+    # Half a window and the trim are lost on both sides, and little else.
+    np.testing.assert_allclose(holds.start - edges[:, 0], 70, atol=15)
+    np.testing.assert_allclose(edges[:, 1] - holds.end, 70, atol=15)
+    np.testing.assert_array_equal(holds.n_samples, holds.end - holds.start)
+    np.testing.assert_allclose(holds.t0, holds.start / RATE)
+    np.testing.assert_allclose(holds.t1, (holds.end - 1) / RATE)
+    for i in range(len(holds)):
+        own = forces[holds.start[i] : holds.end[i]]
+        np.testing.assert_allclose(holds.mean[i], own.mean(axis=0), rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(holds.sd[i], own.std(axis=0, ddof=1), rtol=1e-9)
+    assert holds.threshold.floor == pytest.approx(sigma * 3**0.25, rel=0.1)
+    assert list(holds.table().columns[:5]) == ["start", "end", "t0_s", "t1_s", "n"]
+
+
+def test_chunks_do_not_matter(tmp_path):
+    forces, _ = session()
+    whole = find_holds(opened(tmp_path, forces))
+    for chunk_size in (64, 333, 1000):
+        parts = find_holds(opened(tmp_path, forces, chunk_size=chunk_size))
+        pd.testing.assert_frame_equal(whole.table(), parts.table(), rtol=1e-9)
+        np.testing.assert_allclose(whole.allan.deviation, parts.allan.deviation)
+
+
+def test_windows_are_those_of_numpy(tmp_path):
+    forces, _ = session(holds=2)
+    log = opened(tmp_path, forces, chunk_size=170)
+    batches = [batch for batch in windows(log, 101) if len(batch.time)]
+    found = np.concatenate([batch.variance for batch in batches])
+    sliding = np.lib.stride_tricks.sliding_window_view(forces, 101, axis=0)
+    np.testing.assert_allclose(found, np.linalg.norm(sliding.var(axis=2), axis=1), rtol=1e-9)
+    assert [batch.index for batch in batches] == [
+        50 + sum(len(batch.time) for batch in batches[:i]) for i in range(len(batches))
+    ]
+
+
+def test_no_hold_spans_a_gap(tmp_path):
+    forces, edges = session()
+    time = np.arange(len(forces)) / RATE
+    middle = edges[3].mean().astype(int)
+    time[middle:] += 10
+    log = opened(tmp_path, forces, time, chunk_size=150)
+    holds = find_holds(log, shortest=0.5)
+    assert "1 gap in time; no hold spans one" in holds.warnings
+    assert len(holds) == len(edges) + 1
+    assert not np.any((holds.start < middle) & (holds.end > middle))
+    # Where a chunk begins with the gap it is one gap, too.
+    whole = find_holds(opened(tmp_path, forces, time, chunk_size=middle), shortest=0.5)
+    pd.testing.assert_frame_equal(whole.table(), holds.table(), rtol=1e-9)
+    assert whole.warnings == holds.warnings
+
+
+def test_a_frozen_channel_does_not_lower_the_floor(tmp_path):
+    forces, edges = session()
+    sound = find_holds(opened(tmp_path, forces))
+    frozen = forces.copy()
+    frozen[edges[2, 0] : edges[5, 1]] = frozen[edges[2, 0]]
+    frozen[edges[6, 0] : edges[6, 1], 1] = frozen[edges[6, 0], 1]
+    holds = find_holds(opened(tmp_path, frozen))
+    assert holds.threshold.sd == pytest.approx(sound.threshold.sd, rel=0.05)
+    np.testing.assert_array_equal(holds.start, sound.start[[0, 1, 7]])
+    assert any("does not change over a window in" in text for text in holds.warnings)
+
+
+def test_all_frozen(tmp_path):
+    forces = np.repeat(np.arange(12.0).reshape(4, 3), 300, axis=0)
+    with pytest.raises(InputError, match="frozen"):
+        find_holds(opened(tmp_path, forces), window=0.5)
+
+
+def test_saturated_holds_are_left_out(tmp_path):
+    forces, edges = session()
+    level = forces[edges[4, 0] : edges[4, 1], 0].mean()
+    sign = np.sign(level)
+    clipped = forces.copy()
+    clipped[:, 0] = sign * np.minimum(sign * forces[:, 0], abs(level))
+    beyond = [i for i, (a, b) in enumerate(edges) if sign * forces[a:b, 0].mean() > abs(level)]
+    holds = find_holds(opened(tmp_path, clipped))
+    assert len(holds) == len(edges) - 1 - len(beyond)
+    assert not np.any((holds.start >= edges[4, 0]) & (holds.end <= edges[4, 1]))
+    assert any("saturated" in text for text in holds.warnings)
+
+
+def test_a_coarse_sensor_is_not_saturated(tmp_path):
+    rng = np.random.default_rng(5)
+    forces = np.repeat(np.diag([G] * 3), 400, axis=0) + 0.02 * rng.standard_normal((1200, 3))
+    coarse = np.round(forces / 0.03) * 0.03
+    holds = find_holds(opened(tmp_path, coarse))
+    assert len(holds) == 3
+    assert not any("saturated" in text for text in holds.warnings)
+
+
+def test_override_and_limits(tmp_path):
+    forces, edges = session()
+    log = opened(tmp_path, forces)
+    chosen = find_holds(log)
+    given = find_holds(log, threshold=chosen.threshold.sd)
+    assert given.threshold.reason == "as given"
+    pd.testing.assert_frame_equal(given.table(), chosen.table())
+    assert len(find_holds(log, threshold=100.0)) == 1
+    longer = find_holds(log, trim=0.5)
+    np.testing.assert_array_equal(longer.start, chosen.start + 30)
+    np.testing.assert_array_equal(longer.end, chosen.end - 30)
+    for options, message in [
+        ({"shortest": 5.0}, r"no static hold of 5 s or more \(8 shorter ones"),
+        ({"threshold": 1e-6}, "no static hold"),
+        ({"threshold": 0.0}, "threshold: must be positive"),
+        ({"window": 0.02}, "a window of 0.02 s holds 2 samples, at 100 per second; is the rate"),
+        ({"window": 1e6}, r"is the rate \(--rate\) right"),
+        ({"window": 1e3}, "too few samples for a window of 100001"),
+    ]:
+        with pytest.raises(InputError, match=message):
+            find_holds(log, **options)
+    assert len(edges) == len(chosen)
+
+
+def test_a_log_at_rest_is_one_hold(tmp_path):
+    forces = [0, 0, G] + 0.02 * np.random.default_rng(1).standard_normal((5000, 3))
+    holds = find_holds(opened(tmp_path, forces))
+    assert holds.n_samples.tolist() == [5000 - 2 * 70]
+
+
+def test_few_holds_in_much_motion(tmp_path):
+    forces, edges = session(holds=4, still=400, moving=2500)
+    assert len(find_holds(opened(tmp_path, forces))) == len(edges)
+
+
+# --- Public data ---------------------------------------------------------------------------------
+
+
+def near(holds, reference, scale=1.0):
+    """Largest difference of the means, in sd of a sample, of the holds that both know."""
+    worst, common = 0.0, 0
+    for row in reference.itertuples():
+        overlap = np.minimum(holds.end, row.i1) - np.maximum(holds.start, row.i0)
+        i = int(np.argmax(overlap))
+        if overlap[i] > 0.5 * row.n:
+            common += 1
+            step = (holds.mean[i] / scale - [row.ax, row.ay, row.az]) / [row.sx, row.sy, row.sz]
+            worst = max(worst, np.abs(step).max())
+    return worst, common
+
+
+def test_xsens():
+    log = open_log(
+        shared("imu_tk_xsens/xsens_acc.mat"),
+        columns={"fx": 1, "fy": 2, "fz": 3},
+        time=0,
+        unit="counts",
+        scale=1 / 415,
+    )
+    holds = find_holds(log)
+    assert 38 <= len(holds) <= 42
+    assert holds.t1[0] - holds.t0[0] == pytest.approx(51, abs=0.5)
+    reference = pd.read_csv(shared("imu_tk_xsens/derived_static_means.csv"))
+    worst, common = near(holds, reference, 1 / 415)
+    assert common == len(reference)
+    assert worst < 0.05
+
+
+@pytest.mark.parametrize("i", range(3))
+def test_mpu9150(i):
+    columns = {"fx": 0, "fy": 1, "fz": 2}
+    holds = find_holds(open_log(shared(f"mpu9150/imu{i}.log"), columns=columns, rate=100))
+    reference = pd.read_csv(shared(f"mpu9150/derived_static_means_imu{i}.csv"))
+    assert len(holds) == len(reference) == 23
+    worst, common = near(holds, reference)
+    assert common == 23
+    assert worst < 0.1
+
+
+def test_mpu6050():
+    path = shared("mpu6050/example_data_calibration.csv")
+    holds = find_holds(open_log(path, rate=100, unit="counts", scale=G / 16384))
+    assert len(holds) == 10
+
+
+@pytest.mark.parametrize(("sigma", "factor"), [(0.0003, 6), (0.002, 6), (0.01, 2), (0.1, 2)])
+def test_holds_that_are_noisier_than_the_others(tmp_path, sigma, factor):
+    """A quiet sensor feels a pump that runs now and then, and its holds are holds all the same."""
+    forces, edges = session(seed=2, holds=12, sigma=sigma)
+    rng = np.random.default_rng(1)
+    for start, end in edges[[2, 5, 9]]:
+        forces[start:end] += factor * sigma * rng.standard_normal((end - start, 3))
+    holds = find_holds(opened(tmp_path, forces))
+    assert len(holds) == len(edges)
+    assert np.all((holds.start >= edges[:, 0]) & (holds.end <= edges[:, 1]))

@@ -1,0 +1,385 @@
+"""Readers of raw logs: every layout gives the same numbers, and bad input one clear line."""
+
+import gzip
+import time
+from contextlib import contextmanager
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+from scipy.io import loadmat, savemat
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.campaign.holds.detection import find_holds
+from accelstudy.campaign.logs.recording import open_log
+
+N = 50
+TIME = 0.25 * np.arange(N)
+FORCES = np.round(np.random.default_rng(1).normal(0, 5, (N, 3)), 3)
+TABLE = np.column_stack([TIME, FORCES])
+
+
+def everything(log):
+    times, forces, *_ = zip(*log.chunks(), strict=True)
+    return np.concatenate(times), np.concatenate(forces)
+
+
+def lines(separator=",", decimal=".", before=()):
+    rows = [separator.join(f"{value:.3f}".replace(".", decimal) for value in row) for row in TABLE]
+    return "\n".join([*before, *rows]) + "\n"
+
+
+def written(folder, text, name="log.csv"):
+    path = folder / name
+    path.write_text(text)
+    return path
+
+
+BY_PLACE = {"columns": {"fx": 1, "fy": "2", "fz": 3}, "time": 0}
+
+
+@pytest.mark.parametrize(
+    ("text", "options"),
+    [
+        (lines(before=["t,fx,fy,fz"]), {}),
+        (lines(before=["Fs,100", "Waiting time,3", '"Time_s","Acc X","Acc Y","Acc Z"']), {}),
+        (lines(before=["# made by hand", "# time,ax,ay,az"]), {}),
+        (lines(before=["% a comment", "", "%another"]), BY_PLACE),
+        (lines("\t", before=["time\tfx\tfy\tfz"]), {}),
+        (lines(";", ",", ["time;fx;fy;fz"]), {}),
+        (lines("   "), BY_PLACE),
+        (lines("   ", ","), BY_PLACE),
+        (lines(" , "), BY_PLACE),
+        (lines().replace("\n", ",x_a\n"), BY_PLACE),
+        (lines().replace("\n", "\r\n"), BY_PLACE),
+        (lines().rstrip("\n"), BY_PLACE),
+        ("\ufeff" + lines(before=["t,fx,fy,fz"]), {}),
+        (lines().replace("\n", "\n\n"), BY_PLACE),
+        (lines().replace("\n", "\n# why not\n", 3), BY_PLACE),
+    ],
+)
+@pytest.mark.parametrize("chunk_size", [7, 65536])
+def test_text(tmp_path, text, options, chunk_size):
+    path = written(tmp_path, text)
+    time, forces = everything(open_log(path, chunk_size=chunk_size, **options))
+    np.testing.assert_array_equal(time, TIME)
+    np.testing.assert_array_equal(forces, FORCES)
+
+
+def test_chunks_are_small(tmp_path):
+    log = open_log(written(tmp_path, lines(before=["t,fx,fy,fz"])), chunk_size=7)
+    assert [len(rows.time) for rows in log.chunks()] == [7] * 7 + [1]
+
+
+@pytest.mark.parametrize("array", [TABLE, TABLE.T])
+def test_matlab(tmp_path, array):
+    savemat(tmp_path / "log.mat", {"log": array, "name": "x"})
+    time, forces = everything(open_log(tmp_path / "log.mat", chunk_size=9, **BY_PLACE))
+    np.testing.assert_array_equal(time, TIME)
+    np.testing.assert_array_equal(forces, FORCES)
+
+
+def test_matlab_4_and_a_chosen_array(tmp_path):
+    savemat(tmp_path / "log.mat", {"log": TABLE, "other": FORCES}, format="4")
+    with pytest.raises(InputError, match=r"which array\? There are log, other"):
+        open_log(tmp_path / "log.mat", rate=4)
+    _, forces = everything(open_log(tmp_path / "log.mat", rate=4, variable="other"))
+    np.testing.assert_array_equal(forces, FORCES)
+    with pytest.raises(InputError, match="did you mean 'other'"):
+        open_log(tmp_path / "log.mat", rate=4, variable="othr")
+
+
+def test_parquet(tmp_path):
+    frame = pd.DataFrame(TABLE, columns=["time", "accX", "accY", "accZ"]).assign(label="a")
+    frame.to_parquet(tmp_path / "log.parquet")
+    columns = {"fx": "accX", "fy": "accY", "fz": "accZ"}
+    log = open_log(tmp_path / "log.parquet", columns=columns, chunk_size=9)
+    time, forces = everything(log)
+    np.testing.assert_array_equal(time, TIME)
+    np.testing.assert_array_equal(forces, FORCES)
+    assert log.step == 0.25
+
+
+def test_a_group_of_rows_is_not_held_in_memory(tmp_path):
+    n = 400_000
+    forces = np.random.default_rng(1).normal(0, 5, (n, 3))
+    table = pa.table(dict(zip(("fx", "fy", "fz"), forces.T, strict=True)))
+    pq.write_table(table, tmp_path / "log.parquet", row_group_size=n, use_dictionary=False)
+    del table
+    before, held = pa.total_allocated_bytes(), []
+    for rows in open_log(tmp_path / "log.parquet", rate=100, chunk_size=1000).chunks():
+        held.append(pa.total_allocated_bytes() - before)
+        assert len(rows.forces) == 1000
+    # A whole column is 3.2 MB, and a page of one 1 MB.
+    assert max(held) < 7e6 < forces.nbytes
+
+
+def test_units(tmp_path):
+    path = written(tmp_path, lines())
+    _, forces = everything(open_log(path, unit="g", **BY_PLACE))
+    np.testing.assert_allclose(forces, FORCES * STANDARD_GRAVITY)
+    log = open_log(path, unit="counts", scale=(0.1, 0.2, -0.3), offset=7, **BY_PLACE)
+    np.testing.assert_allclose(everything(log)[1], (FORCES - 7) * (0.1, 0.2, -0.3))
+    time, _ = everything(open_log(path, time_unit="ms", **BY_PLACE))
+    np.testing.assert_allclose(time, TIME * 1e-3)
+    time, _ = everything(open_log(path, columns=BY_PLACE["columns"], rate=50, chunk_size=8))
+    np.testing.assert_allclose(time, np.arange(N) / 50)
+
+
+def test_three_columns_need_no_names(tmp_path):
+    np.savetxt(tmp_path / "log.txt", FORCES, "%.3f")
+    np.testing.assert_array_equal(everything(open_log(tmp_path / "log.txt", rate=1))[1], FORCES)
+
+
+def changed(row, place, value):
+    rows = lines().splitlines()
+    cells = rows[row].split(",")
+    cells[place] = value
+    rows[row] = ",".join(cells)
+    return "\n".join(rows) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "the file is empty"),
+        ("\n\n", "no line of numbers"),
+        ("so,it,goes\nand,goes,on\n", "no line of numbers"),
+        (changed(20, 2, "nan"), r"line 21, column 2 \(fy\): 'nan', not a usable number"),
+        (changed(20, 3, "-inf"), r"line 21, column 3 \(fz\): '-inf', not"),
+        (changed(20, 1, "1.2.3"), r"line 21, column 1 \(fx\): '1.2.3', not"),
+        (changed(20, 1, ""), r"line 21, column 1 \(fx\): nothing, not"),
+        (changed(20, 1, "True"), r"line 21, column 1 \(fx\): 'True', not"),
+        (changed(20, 1, "1e300"), r"line 21, column 1 \(fx\): '1e300', not"),
+        (changed(20, 3, "1,5"), "line 21: 5 columns instead of 4"),
+        (changed(20, 3, "1,5,6"), "line 21: 6 columns instead of 4"),
+        (changed(20, 0, "0.1"), r"line 21, column 0 \(time\): time does not increase \('0.1'\)"),
+        (changed(20, 0, "4.75"), "line 21, .*time does not increase"),
+        (lines()[:-12], r"line 50, column 3 \(fz\): the line ends before it, not"),
+        ("\n".join(f"{i},1,2,{i}" for i in range(9)), r"column 1 \(fx\) is constant"),
+        ("0,1,2,3\n", r"too few samples \(1\)"),
+    ],
+)
+@pytest.mark.parametrize("chunk_size", [7, 65536])
+def test_bad_text(tmp_path, text, message, chunk_size):
+    path = written(tmp_path, text)
+    with pytest.raises(InputError, match=message) as caught:
+        everything(open_log(path, chunk_size=chunk_size, **BY_PLACE))
+    assert str(caught.value).startswith(str(path))
+    assert "\n" not in str(caught.value)
+
+
+def test_the_line_is_that_of_the_file(tmp_path):
+    text = "# one\nt,fx,fy,fz\n\n" + changed(20, 2, "x").replace("\n", "\n\n")
+    with pytest.raises(InputError, match=r"line 44, column fy \(fy\): 'x'"):
+        everything(open_log(written(tmp_path, text)))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({}, r"which column is fx\? The columns are a, b, a, c, counted from 0"),
+        ({"columns": {"fx": "q"}}, "fx: no column 'q'; there are a, b, a, c"),
+        ({"columns": {"fx": 4}}, "fx: no column 4; there are 4, counted from 0"),
+        ({"columns": {"fx": -1}}, "fx: no column -1"),
+        ({"columns": {"fx": "a"}}, "there are several columns 'a'"),
+        ({"columns": {"fx": 1, "fy": 1, "fz": 3}}, "name the same column"),
+        ({"columns": {"gx": 1}}, "unknown column 'gx'"),
+        (
+            {"columns": {"fx": 1, "fy": 2, "fz": 3}},
+            "give the column of time",
+        ),
+        ({**BY_PLACE, "rate": 100}, "not both"),
+        ({"columns": BY_PLACE["columns"], "rate": 0}, "rate must be positive"),
+        ({**BY_PLACE, "unit": "counts"}, "needs a nominal scale"),
+        ({**BY_PLACE, "unit": "counts", "scale": 0}, "must not be 0"),
+        ({**BY_PLACE, "unit": "counts", "scale": (1, 2)}, "one number or three"),
+        ({**BY_PLACE, "unit": "counts", "scale": 1, "offset": np.inf}, "must be finite"),
+        ({**BY_PLACE, "scale": 2}, "goes with unit counts"),
+        ({**BY_PLACE, "unit": "ft"}, "unknown unit of a log 'ft'"),
+        ({**BY_PLACE, "time_unit": "h"}, "unknown unit of time 'h'"),
+    ],
+)
+def test_bad_options(tmp_path, options, message):
+    path = written(tmp_path, lines(before=["a,b,a,c"]))
+    with pytest.raises(InputError, match=message):
+        open_log(path, **options)
+
+
+def test_bad_files(tmp_path):
+    with pytest.raises(InputError, match="no such file"):
+        open_log(tmp_path / "none.csv")
+    with pytest.raises(InputError, match="is a directory"):
+        open_log(tmp_path)
+    frame = pd.DataFrame(TABLE, columns=["time", "fx", "fy", "fz"])
+    whole = tmp_path / "whole.parquet"
+    frame.to_parquet(whole)
+    (tmp_path / "cut.parquet").write_bytes(whole.read_bytes()[:-40])
+    with pytest.raises(InputError, match="not a whole Parquet file"):
+        open_log(tmp_path / "cut.parquet")
+    frame.assign(fy=frame.fy.mask(frame.index == 20)).to_parquet(whole)
+    with pytest.raises(InputError, match=r"row 21, column fy \(fy\): nan, not"):
+        everything(open_log(whole, chunk_size=8))
+    frame.assign(fy="a").to_parquet(whole)
+    with pytest.raises(InputError, match=r"column fy is .*string, not numbers"):
+        everything(open_log(whole))
+    frame.rename(columns={"fx": "q\nx"}).to_parquet(whole)
+    with pytest.raises(InputError, match=r"which column is fx.*time, q x, fy, fz"):
+        open_log(whole)
+    pq.write_table(pa.table({"time": pa.array([], pa.float64())}), whole)
+    with pytest.raises(InputError, match="which column is fx"):
+        open_log(whole)
+    savemat(tmp_path / "whole.mat", {"log": TABLE})
+    (tmp_path / "cut.mat").write_bytes((tmp_path / "whole.mat").read_bytes()[:300])
+    with pytest.raises(InputError, match="not a whole MATLAB file"):
+        open_log(tmp_path / "cut.mat")
+    (tmp_path / "new.mat").write_bytes(b"\x89HDF\r\n")
+    with pytest.raises(InputError, match="save it with -v7"):
+        open_log(tmp_path / "new.mat")
+
+
+def test_a_matlab_file_that_does_not_fit(tmp_path, monkeypatch):
+    def full(*arguments, **options):
+        raise MemoryError
+
+    savemat(tmp_path / "log.mat", {"log": TABLE})
+    monkeypatch.setattr("accelstudy.campaign.logs.sources.loadmat", full)
+    with pytest.raises(InputError, match="too large, as a MATLAB file is held in memory"):
+        open_log(tmp_path / "log.mat", **BY_PLACE)
+
+
+def test_only_the_chosen_array_is_read(tmp_path, monkeypatch):
+    savemat(tmp_path / "log.mat", {"log": TABLE, "other": 1j * FORCES, "name": "x", "none": []})
+    with pytest.raises(InputError, match="which array"):
+        open_log(tmp_path / "log.mat", **BY_PLACE)
+    with pytest.raises(InputError, match="array other has complex numbers"):
+        open_log(tmp_path / "log.mat", variable="other", **BY_PLACE)
+    read = []
+
+    def load(path, variable_names):
+        read.extend(variable_names)
+        return loadmat(path, variable_names=variable_names)
+
+    monkeypatch.setattr("accelstudy.campaign.logs.sources.loadmat", load)
+    _, forces = everything(open_log(tmp_path / "log.mat", variable="log", **BY_PLACE))
+    np.testing.assert_array_equal(forces, FORCES)
+    assert read == ["log"]
+
+
+def test_a_line_without_end_is_not_read(tmp_path):
+    path = written(tmp_path, "1.5," * 20000)
+    with pytest.raises(InputError, match="no end of a line in 65536 characters"):
+        open_log(path, rate=1)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "\n".join(" ".join(["word"] * (i % 200)) for i in range(400)),
+        "\n".join(f"{i},{'a,' * (i % 300)}" for i in range(500)),
+        '"1"\n' * 5000,
+        ",".join(['"1.5"'] * 5000),
+    ],
+)
+def test_no_table_takes_no_time(tmp_path, text):
+    start = time.process_time()
+    with pytest.raises(InputError):
+        open_log(written(tmp_path, text), rate=1)
+    assert time.process_time() - start < 2
+
+
+def test_quoted_numbers(tmp_path):
+    text = lines(before=["t,fx,fy,fz"]).replace(",", '","').replace("\n", '"\n"')
+    moments, forces = everything(open_log(written(tmp_path, f'"{text[:-1]}')))
+    np.testing.assert_array_equal(moments, TIME)
+    np.testing.assert_array_equal(forces, FORCES)
+    with pytest.raises(InputError, match="a quotation mark opens and never closes"):
+        everything(open_log(written(tmp_path, f'"{text[:-3]}')))
+
+
+def test_gzip(tmp_path):
+    packed = gzip.compress(lines(before=["t,fx,fy,fz"]).encode())
+    path = tmp_path / "log.csv.gz"
+    path.write_bytes(packed)
+    np.testing.assert_array_equal(everything(open_log(path))[1], FORCES)
+    path.write_bytes(packed[:-20])
+    with pytest.raises(InputError, match="not a whole gzip file"):
+        everything(open_log(path))
+    path = tmp_path / "log.parquet.gz"
+    path.write_bytes(packed)
+    with pytest.raises(InputError, match="unpack it first"):
+        open_log(path)
+
+
+def test_two_parquet_columns_of_one_name(tmp_path):
+    arrays = [pa.array(column) for column in (*TABLE.T, FORCES[:, 0])]
+    path = tmp_path / "log.parquet"
+    pq.write_table(pa.Table.from_arrays(arrays, ["t", "fx", "fy", "fz", "fx"]), path)
+    with pytest.raises(InputError, match="which column is fx"):
+        everything(open_log(path))
+    with pytest.raises(InputError, match="there are several columns 'fx'"):
+        everything(open_log(path, **BY_PLACE))
+
+
+def test_a_header_does_not_steer_the_terminal(tmp_path):
+    path = written(tmp_path, lines(before=["t,\x1b[2J\x1b[31mfx,\u202ef,fz"]))
+    with pytest.raises(InputError) as caught:
+        open_log(path)
+    assert str(caught.value).isprintable()
+    assert r"\x1b[31mfx" in str(caught.value)
+
+
+@contextmanager
+def one_line_at_most():
+    """Let nothing pass but an `InputError` of one line."""
+    message = ""
+    try:
+        yield
+    except InputError as error:
+        message = str(error)
+    assert len(message.splitlines()) <= 1
+
+
+cells = st.one_of(
+    st.floats(-20, 20).map(str),
+    st.sampled_from(["nan", "", "1e400", "-", '"', "1_0", "a", "0x1", "1,5", "True", "1e15"]),
+    st.text("01.,;# \t%\"'\r\x00eE-+a\u2028é", max_size=6),
+)
+
+
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.lists(st.lists(cells, max_size=6), max_size=40),
+    st.sampled_from([",", ";", " ", "\t", ", "]),
+    st.sampled_from([{"rate": 100.0}, {"rate": 3.0}, {"time": 0}, {}]),
+    st.sampled_from([None, {"fx": 0, "fy": 1, "fz": 2}, {"fx": 3, "fy": 1, "fz": 2}]),
+    st.sampled_from([3, 65536]),
+)
+@example([["1", "2", "3"], ["1", "2", "3", "4"], ["2", "3", "4"]], ",", {"rate": 9.0}, None, 3)
+@example([['"'], ["0.0", "0.0", '"']], ",", {"rate": 100.0}, None, 3)
+@example([["1_0", "\u2028", "1", "1", "\u2028"], ["1e400"]], " ", {"rate": 100.0}, None, 3)
+@example([["1", "", "2", '"\n,1,nan\n"', "\t", "#"]], ",", {"rate": 100.0}, None, 3)
+def test_whatever_the_text(tmp_path, rows, separator, timing, columns, chunk_size):
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(separator.join(row) for row in rows), encoding="utf-8")
+    with one_line_at_most():
+        log = open_log(path, columns=columns, chunk_size=chunk_size, **timing)
+        time, forces = everything(log)
+        assert len(time) == len(forces)
+        assert np.isfinite(forces).all()
+        find_holds(log, shortest=0.1, window=0.5)
+
+
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.binary(max_size=300), st.sampled_from(["log.txt", "log.mat", "log.parquet"]))
+@example(b"\x00\x00\x00\x00" + bytes(100), "log.mat")
+def test_whatever_the_bytes(tmp_path, content, name):
+    path = tmp_path / name
+    path.write_bytes(content)
+    with one_line_at_most():
+        everything(open_log(path, columns={"fx": 0, "fy": 1, "fz": 2}, rate=1))

@@ -1,0 +1,436 @@
+"""What logs look like elsewhere: clocks, axes, several sensors or files, holds mended by hand."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from test_import_campaign import XSENS, call
+from test_import_holds import RATE, G, session, shared, write
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import GON
+from accelstudy.campaign.files.format import read_campaign
+from accelstudy.campaign.files.layout import LogLayout
+from accelstudy.campaign.holds.allan import allan_moments
+from accelstudy.campaign.holds.segments import Moments, Segment
+from accelstudy.campaign.holds.slopes import slope_sigmas
+from accelstudy.campaign.importing import segmentation_figure
+from accelstudy.campaign.importing.conversion import (
+    ImportSettings,
+    import_log,
+    import_means,
+    import_sensors,
+    import_to,
+    parse_settings,
+)
+from accelstudy.campaign.logs.recording import open_log
+from accelstudy.commands.import_options import files_of
+from accelstudy.leveling.angles import specific_force
+from accelstudy.sensors.frames import parse_frame
+
+SINCE_1970 = {"s": 1.7e9, "ms": 1.7e12, "us": 1_700_000_000_123_456, "ns": 17 * 10**17 + 1}
+PER_SECOND = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
+
+
+@pytest.fixture(scope="module")
+def turned():
+    """A session of 8 holds, and their edges."""
+    return session()
+
+
+# --- Clocks --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("unit", SINCE_1970)
+@pytest.mark.parametrize("kind", ["csv", "csv.gz", "parquet"])
+def test_times_since_1970(tmp_path, turned, unit, kind):
+    forces, _ = turned
+    ticks = np.arange(len(forces)) / RATE * PER_SECOND[unit]
+    table = pd.DataFrame(forces, columns=["fx", "fy", "fz"])
+    whole = unit in ("us", "ns")
+    table["time"] = ticks.astype(np.int64) + SINCE_1970[unit] if whole else ticks + SINCE_1970[unit]
+    path = tmp_path / f"log.{kind}"
+    (table.to_parquet if kind == "parquet" else table.to_csv)(path, index=False)
+    log = open_log(path, time_unit=unit, chunk_size=1000)
+    time = np.concatenate([rows.time for rows in log.chunks()])
+    np.testing.assert_allclose(time, ticks / PER_SECOND[unit], atol=1e-6)
+    assert 1 / log.step == pytest.approx(RATE, rel=1e-4)
+
+
+def test_the_unit_of_time_is_suggested(tmp_path, turned):
+    forces, _ = turned
+    time = SINCE_1970["us"] + 10_000 * np.arange(len(forces))
+    path = write(tmp_path, forces, time)
+    result = call(path, "--out", tmp_path / "out")
+    assert result.exit_code == 2
+    assert "if its times are in us, there are 100 samples per second" in result.stderr
+    assert "give --time-unit us" in result.stderr
+    result = call(path, "--out", tmp_path / "out", "--time-unit", "us", "--no-figure")
+    assert result.exit_code == 0, result.output
+    assert read_campaign(tmp_path / "out").log.time_unit == "us"
+
+
+def test_the_rate_is_that_of_the_samples(tmp_path, turned):
+    """Most steps are a tick too long, some much too short, and there is a gap."""
+    forces, _ = turned
+    rng = np.random.default_rng(1)
+    steps = np.where(rng.random(len(forces)) < 0.8, 0.0112, 0.0052)
+    time = np.cumsum(steps)
+    time[len(time) // 2 :] += 500
+    log = open_log(write(tmp_path, forces, time))
+    assert log.step == pytest.approx(np.mean(steps), rel=1e-3)
+    _, report = import_log(tmp_path / "log.parquet", ImportSettings())
+    assert any("1 gap in time" in text for text in report.warnings)
+    assert report.n_holds in (8, 9)
+
+
+# --- Axes, units, conditions ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("unit", ["m/s^2", "counts"])
+def test_frames(tmp_path, turned, unit):
+    """A log in other axes makes the same campaign; counts stay counts, whatever their sign."""
+    forces, _ = turned
+    frame = parse_frame("flu")
+    raw = frame.from_frd(forces)
+    scale, offset = np.array([0.001, 0.002, 0.003]), np.array([100.0, 200.0, 300.0])
+    options = []
+    if unit == "counts":
+        raw = raw / scale + offset
+        options = ["--scale", "0.001,0.002,0.003", "--offset", "100,200,300"]
+    result = call(
+        *(write(tmp_path, raw), "--out", tmp_path / "out", "--rate", 100, "--frame", "FLU"),
+        *("--unit", unit, "--no-figure", *options),
+    )
+    assert result.exit_code == 0, result.output
+    assert "axes: flu in the log" in result.stdout
+    found = read_campaign(tmp_path / "out")
+    (tmp_path / "plain").mkdir()
+    expected, _ = import_log(write(tmp_path / "plain", forces), ImportSettings(rate_hz=100))
+    np.testing.assert_allclose(found.forces, expected.forces, rtol=1e-9)
+    np.testing.assert_allclose(found.sd, expected.sd, rtol=1e-9)
+    np.testing.assert_allclose(found.slope, expected.slope, atol=1e-9)
+    assert found.log.frame == "flu"
+    if unit == "counts":
+        np.testing.assert_array_equal(found.nominal_scale, [0.001, -0.002, -0.003])
+
+
+def test_temperature_vibration_and_range(tmp_path, turned):
+    forces, edges = turned
+    n = len(forces)
+    table = pd.DataFrame(forces, columns=["fx", "fy", "fz"])
+    # The thermometer is slower than the accelerometer.
+    table["temp"] = np.where(np.arange(n) % 10 == 0, np.linspace(10, 20, n), np.nan)
+    table["shake"] = 0.3
+    table.to_parquet(tmp_path / "log.parquet")
+    limit = 0.97 * np.abs(forces[edges[0, 0] : edges[0, 1]].mean(axis=0)).max()
+    result = call(
+        *(tmp_path / "log.parquet", "--out", tmp_path / "out", "--rate", 100, "--no-figure"),
+        *("--columns", "vibration=shake", "--range", f"{limit / 9.80665:.6f}g"),
+    )
+    assert result.exit_code == 0, result.output
+    assert "left out: the sensor is saturated there" in result.stderr
+    campaign = read_campaign(tmp_path / "out")
+    assert campaign.full_range == pytest.approx(limit, rel=1e-5)
+    assert campaign.n_positions < len(edges)
+    expected = 10 + 10 * campaign.time * RATE / (n - 1)
+    np.testing.assert_allclose(campaign.temperature, expected, atol=0.05)
+    np.testing.assert_allclose(campaign.vibration, 0.3)
+    table.loc[edges[1, 0] : edges[1, 1], "temp"] = np.nan
+    table.to_parquet(tmp_path / "log.parquet")
+    campaign, report = import_log(tmp_path / "log.parquet", ImportSettings(rate_hz=100))
+    assert campaign.temperature is None
+    assert any("hold 2 has no temperature" in text for text in report.warnings)
+
+
+def test_the_figure_shows_forces_without_the_offset_that_was_found(tmp_path, turned, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(segmentation_figure, "save", lambda figure, *_: drawn.append(figure))
+    raw = turned[0] / 0.001 + [33000, 33100, 32900]
+    settings = parse_settings({"rate_hz": RATE, "unit": "counts", "scale": 0.001})
+    import_to(tmp_path / "out", write(tmp_path, raw), settings)
+    low, high = drawn[0].axes[0].dataLim.intervaly
+    assert -30 < low < -5
+    assert 5 < high < 30
+
+
+def test_sigma_does_not_depend_on_the_offset():
+    path = shared("imu_tk_xsens/xsens_acc.mat")
+    sigmas = []
+    for offset in (None, 32768, XSENS["offset"]):
+        settings = {k: v for k, v in XSENS.items() if k != "offset"}
+        campaign, report = import_log(path, parse_settings(settings | {"offset": offset}))
+        sigmas.append(campaign.sigma_force)
+        assert report.holds.directed
+        np.testing.assert_allclose(np.linalg.norm(campaign.forces, axis=1), 9.8, atol=2)
+        if offset is None:
+            np.testing.assert_allclose(campaign.nominal_offset, XSENS["offset"], atol=10)
+            assert any("from the positions, as none was given" in note for note in report.notes)
+    np.testing.assert_allclose(sigmas, sigmas[0], rtol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("factor", "options", "message"),
+    [
+        (1 / G, [], "look like g; give --unit g"),
+        (1, ["--unit", "g"], "look like m/s^2; give --unit m/s^2"),
+        (1e3, [], "look like counts; give --unit counts and --scale"),
+        (1, ["--gravity", "1.62"], "does not fit a gravity of 1.62 m/s²; give --gravity"),
+        (1, ["--threshold", "1e300"], "threshold_mps2: input should be less than"),
+        (1, ["--frame", "fru"], "is left-handed"),
+        (1, ["--range", "8 feet"], "--range: expected a number"),
+        (1, ["--robot-sigma", "3"], r"its angles go with a table of means"),
+    ],
+)
+def test_options_are_named_and_nothing_is_written(tmp_path, turned, factor, options, message):
+    path = write(tmp_path, factor * turned[0])
+    result = call(path, "--out", tmp_path / "out", "--rate", 100, *options)
+    assert result.exit_code == 2
+    assert message in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert "campaign.yaml" not in result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+# --- Slopes --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("colour", ["white", "flicker"])
+def test_slopes_are_as_well_known_as_they_say(tmp_path, colour):
+    forces, edges = session(seed=4, holds=24, sigma=0.0, still=500)
+    rng = np.random.default_rng(2)
+    noise = rng.standard_normal(forces.shape)
+    if colour == "flicker":
+        frequency = np.fft.rfftfreq(len(forces))
+        frequency[0] = 1
+        spectrum = np.fft.rfft(noise, axis=0) / np.sqrt(frequency)[:, None]
+        noise = np.fft.irfft(spectrum, len(forces), axis=0) + noise
+    drift = np.zeros_like(forces)
+    for start, end in edges:
+        drift[start:end] = 0.002 * np.arange(end - start)[:, None] / RATE
+    campaign, _ = import_log(
+        write(tmp_path, forces + 0.01 * noise + drift), ImportSettings(rate_hz=RATE)
+    )
+    z = (campaign.slope - 0.002) / campaign.sd_slope
+    assert np.std(z) == pytest.approx(1, abs=0.25)
+    assert abs(np.mean(z)) < 3 / np.sqrt(z.size)
+
+
+def test_the_slope_of_a_long_hold_is_no_better_known_than_it_is():
+    """Flicker noise does not fall any further in a long first hold among short ones."""
+    first = []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        ends = np.cumsum([2400, *[200] * 23])
+        frequency = np.maximum(np.fft.rfftfreq(ends[-1]), 1 / ends[-1])
+        spectrum = np.fft.rfft(rng.standard_normal((ends[-1], 3)), axis=0)
+        flicker = np.fft.irfft(spectrum / np.sqrt(frequency)[:, None], ends[-1], axis=0)
+        samples = rng.standard_normal(flicker.shape) + 0.1 * flicker
+        segments = []
+        for forces in np.split(samples, ends[:-1]):
+            time = np.arange(len(forces)) / RATE
+            moments = Moments.of(np.column_stack([time, forces]))
+            slope = moments.products[0, 1:] / moments.products[0, 0]
+            line = (time - time.mean())[:, None] * slope
+            segments.append(
+                Segment(
+                    *(0, len(forces), 0.0, time[-1], moments, np.zeros((3, 0))),
+                    (allan_moments(forces),), (allan_moments(forces - line),),
+                )
+            )  # fmt: skip
+        first.append(segments[0].slope / slope_sigmas(segments, 1 / RATE)[0])
+    assert np.sqrt(np.mean(np.square(first))) < 2
+
+
+# --- What was never still ------------------------------------------------------------------------
+
+
+def turning(rate, n=9000):
+    """Specific force of a sensor that turns about its y axis, rad/s."""
+    angle = rate * np.arange(n) / RATE
+    return G * np.column_stack([np.sin(angle), 0 * angle, -np.cos(angle)])
+
+
+def wobbling(rng, size, cut, n=9000):
+    """Smooth motion below a frequency, Hz."""
+    frequency = np.fft.rfftfreq(n, 1 / RATE)
+    spectrum = np.fft.rfft(rng.standard_normal((n, 3)), axis=0)
+    spectrum[(frequency > cut) | (frequency == 0)] = 0
+    motion = np.fft.irfft(spectrum, n, axis=0)
+    return size * motion / motion.std()
+
+
+@pytest.mark.parametrize(
+    "motion",
+    [
+        lambda rng: turning(0.5) + wobbling(rng, 4.0, 3),  # waved about
+        lambda rng: turning(0.1) + wobbling(rng, 0.4, 2),  # turned gently by hand
+        lambda rng: turning(0.02),  # on a turntable
+        lambda rng: wobbling(rng, 2.0, 3) - [0, 0, G],  # carried upright
+    ],
+)
+def test_what_was_never_still_is_refused(tmp_path, motion):
+    rng = np.random.default_rng(1)
+    path = write(tmp_path, motion(rng) + 0.02 * rng.standard_normal((9000, 3)))
+    with pytest.raises(InputError, match=r"the sensor was never still: .* quietest hundredth"):
+        import_log(path, ImportSettings(rate_hz=RATE))
+
+
+def test_a_machine_that_hums_is_still(tmp_path):
+    rng = np.random.default_rng(1)
+    hum = 2 * np.sin(2 * np.pi * 29.3 * np.arange(9000) / RATE)[:, None] * [1, 0.3, 0.5]
+    path = write(tmp_path, [0, 0, -G] + hum + 0.02 * rng.standard_normal((9000, 3)))
+    _, report = import_log(path, ImportSettings(rate_hz=RATE))
+    assert report.n_holds == 1
+
+
+# --- Holds by hand -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("by", ["number", "time"])
+def test_holds_are_left_out_and_joined(tmp_path, turned, by):
+    forces, edges = turned
+    bumped = forces.copy()
+    middle = int(edges[3].mean())
+    bumped[middle : middle + 20] += 5
+    path = write(tmp_path, bumped)
+    span = f"{edges[6, 0] / RATE:.2f}s-{edges[6, 1] / RATE:.2f}s:somebody passed"
+    both = "4,5" if by == "number" else "{:.2f}s-{:.2f}s".format(*edges[3] / RATE)
+    result = call(
+        *(path, "--out", tmp_path / "out", "--rate", 100, "--join", both),
+        *("--exclude", "2:moved", "--exclude", span),
+        *("--settings", settings(tmp_path, "shortest_s: 0.2")),
+    )
+    assert result.exit_code == 0, result.output
+    assert "left out: 2 holds: 2 (moved), 8 (somebody passed)" in result.stdout
+    campaign = read_campaign(tmp_path / "out")
+    assert campaign.positions.tolist() == [1, 3, 4, 6, 7, 9]
+    assert campaign.reasons == {2: "moved", 8: "somebody passed"}
+    assert campaign.excluded.n_positions == 2
+    whole, _ = import_log(write(tmp_path, forces), ImportSettings(rate_hz=100))
+    np.testing.assert_allclose(campaign.forces[2], whole.forces[3], atol=0.01)
+    assert whole.n_samples[3] - 180 < campaign.n_samples[2] < whole.n_samples[3]
+    svg = (tmp_path / "out" / "segmentation.svg").read_text()
+    assert "2 left out" in svg
+
+
+def settings(folder, text):
+    path = folder / "settings.yaml"
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--exclude", "13:moved"], "exclude: there is no hold 13; they are 1 to 8"),
+        (["--exclude", "13"], "exclude: expected a hold or a time, and why, as 13:moved"),
+        (["--exclude", "1s-2s:x"], "exclude: 1s-2s: no hold lies there"),
+        (["--join", "4"], "join: expected numbers of holds or a time, as 4,5 or"),
+        (["--join", "1s-2s"], "join: 1s-2s: fewer than two holds lie there"),
+        (["--join", "4,5"], "join: holds 4 and 5 differ by"),
+        (["--join", "4,6"], "join: 4, 6: hold 5 lies between them"),
+    ],
+)
+def test_holds_that_are_not_there(tmp_path, turned, options, message):
+    result = call(write(tmp_path, turned[0]), "--out", tmp_path / "out", "--rate", 100, *options)
+    assert result.exit_code == 2
+    assert message in result.stderr
+
+
+# --- Several sensors, several files --------------------------------------------------------------
+
+
+def test_sensors_of_one_log_share_their_holds(tmp_path, turned):
+    forces, edges = turned
+    other = 1.01 * forces[:, [1, 0, 2]] * [1, 1, -1]
+    a, b = edges[2]
+    other[a + 150 : b - 150] += 3 * np.random.default_rng(1).standard_normal((b - a - 300, 3))
+    table = pd.DataFrame(np.column_stack([forces, other]), columns=["a", "b", "c", "d", "e", "f"])
+    table.to_csv(tmp_path / "log.csv", index=False)
+    result = call(
+        *(tmp_path / "log.csv", "--out", tmp_path / "out", "--rate", 100, "--no-figure"),
+        *("--sensor", "imu0=a,b,c", "--sensor", "imu1=d,e,f"),
+    )
+    assert result.exit_code == 0, result.output
+    one, two = (read_campaign(tmp_path / "out" / name) for name in ("imu0", "imu1"))
+    assert one.positions.tolist() == two.positions.tolist() == list(range(1, 8))
+    np.testing.assert_array_equal(one.time, two.time)
+    np.testing.assert_allclose(two.forces, 1.01 * one.forces[:, [1, 0, 2]] * [1, 1, -1], atol=0.02)
+    assert two.log.columns == {"fx": "d", "fy": "e", "fz": "f"}
+    assert (one.sensor, one.name) == ("imu0", "log")
+
+
+@pytest.mark.parametrize("clock", ["one", "each", "rate"])
+def test_one_file_per_position(tmp_path, turned, clock):
+    """Each has a moving start and end; the third has nothing else."""
+    forces, edges = turned
+    folder = tmp_path / "positions"
+    folder.mkdir()
+    for i, (start, end) in enumerate(edges[:5]):
+        piece = slice(start - 100, end + 100) if i != 2 else slice(start - 100, start + 60)
+        time = np.arange(len(forces))[piece] / RATE
+        table = pd.DataFrame(forces[piece], columns=["fx", "fy", "fz"])
+        if clock != "rate":
+            table.insert(0, "t", time if clock == "one" else time - time[0])
+        table.to_csv(folder / f"pos{9 + i}.csv", index=False)
+    options = {"rate_hz": 100} if clock == "rate" else {}
+    files = files_of([folder])
+    assert [path.name for path in files] == [f"pos{9 + i}.csv" for i in range(5)]
+    assert files_of(sorted(folder.iterdir())) == files == files_of([folder / "pos*.csv"])
+    ((campaign, report),) = import_sensors(files, ImportSettings(**options)).values()
+    assert campaign.positions.tolist() == [1, 2, 4, 5]
+    assert "5, with the longest hold of each as one position" in report.notes[0]
+    assert (campaign.time is not None) == (clock == "one")
+    assert campaign.name == "positions"
+    assert not any("gap" in text for text in report.warnings)
+    assert f"{files[2]}: no static hold; position 3 is missing" in report.warnings
+    middles = edges[[0, 1, 3, 4]].mean(axis=1)
+    if clock == "one":
+        np.testing.assert_allclose(np.diff(campaign.time), np.diff(middles) / RATE, atol=0.1)
+    expected = [forces[a:b].mean(axis=0) for a, b in edges[[0, 1, 3, 4]]]
+    np.testing.assert_allclose(campaign.forces, expected, atol=0.01)
+
+
+# --- Means with a robot --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("frame", "unit"), [("frd", "gon"), ("flu", "deg"), ("flu", "rad")])
+def test_means_with_a_robot(tmp_path, frame, unit):
+    roll, pitch, yaw = np.random.default_rng(1).uniform(-60, 60, (3, 12)) * GON
+    forces = np.column_stack(specific_force(roll, pitch, G))
+    axes = parse_frame(frame)
+    size = {"gon": GON, "deg": np.pi / 180, "rad": 1.0}[unit]
+    table = pd.DataFrame(axes.from_frd(forces), columns=["fx", "fy", "fz"])
+    for name, angle, sign in zip(
+        ("roll", "pitch", "yaw"), (roll, pitch, yaw), axes.signs, strict=True
+    ):
+        table[name] = sign * angle / size
+    table.to_csv(tmp_path / "means.csv", index=False)
+    arguments = (tmp_path / "means.csv", "--means", "--frame", frame)
+    result = call(
+        *(*arguments, "--out", tmp_path / "out", "--robot-sigma", 3.2, "--robot-unit", unit)
+    )
+    assert result.exit_code == 0, result.output
+    campaign = read_campaign(tmp_path / "out")
+    np.testing.assert_allclose(campaign.angles, np.column_stack([roll, pitch]), atol=1e-12)
+    np.testing.assert_allclose(campaign.yaw, yaw, atol=1e-12)
+    # Of a log it tells the axes, and not the columns.
+    assert campaign.log == LogLayout(frame=frame)
+    np.testing.assert_allclose(campaign.forces, forces, atol=1e-12)
+    wrong = "rad" if unit != "rad" else "gon"
+    result = call(
+        *(*arguments, "--out", tmp_path / "new", "--robot-sigma", 3.2, "--robot-unit", wrong)
+    )
+    assert result.exit_code == 2
+    assert f"--robot-unit {unit} would be right" in result.stderr
+    result = call(*arguments, "--out", tmp_path / "new")
+    assert "--robot-sigma takes them for the robot's" in result.stderr
+
+
+def test_means_of_a_day(tmp_path):
+    table = pd.DataFrame(np.eye(3)[[0, 1, 2, 0]] * 9.8, columns=["fx", "fy", "fz"])
+    table["t"] = 1_700_000_000_000_000_000 + np.arange(4) * 10**10
+    table.to_csv(tmp_path / "means.csv", index=False)
+    content = {"time": "t", "time_unit": "ns"}
+    campaign, _ = import_means(tmp_path / "means.csv", parse_settings(content))
+    np.testing.assert_allclose(campaign.time, [0, 10, 20, 30])

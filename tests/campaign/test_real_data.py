@@ -1,0 +1,140 @@
+"""The page about public measurements says what a diagnosis of them says."""
+
+import re
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from places import DATA, ROOT
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.wording import number, probability, words
+from accelstudy.campaign.importing.conversion import import_file
+from accelstudy.campaign.importing.public import import_settings, public_data, public_file
+from accelstudy.diagnosis.pipeline import diagnose
+from accelstudy.diagnosis.report.wording import GROUPS, amount, shown_unit, verdict_lines
+from accelstudy.diagnosis.result import Diagnosis
+from accelstudy.effects import get_effect
+from accelstudy.sensors.models import get_model
+
+PAGE = (ROOT / "docs" / "real-data.md").read_text(encoding="utf-8")
+FLAT = " ".join(PAGE.split())
+NINE = get_model("bias-scale-nonorthogonality")
+
+pytestmark = pytest.mark.skipif(
+    not DATA.is_dir(), reason="the public measurements are not on this machine (ACCELSTUDY_SHARED)"
+)
+
+WHITE, UNKNOWN = "white", "not given"
+DIAGNOSED = [
+    *((f"mpu9150-{i}", "") for i in range(3)),
+    *(("xsens-mti", sigma) for sigma in ("", WHITE, UNKNOWN)),
+    *((f"innalabs-{n}", "") for n in (24, 31, 49)),
+    ("lis3dh-phone", ""),
+    ("mpu6050", ""),
+]
+TOO_SMALL = ["mpu6050-static", "ferraris", "ferraris-annotated"]
+
+
+@cache
+def imported(name):
+    return import_file(public_file(name, DATA), import_settings(name))[0]
+
+
+@cache
+def diagnosed(name: str, sigma: str = "") -> Diagnosis:
+    campaign = imported(name)
+    if sigma == WHITE:
+        campaign = replace(campaign, sigma_force=0.000296)
+    elif sigma == UNKNOWN:
+        campaign = replace(campaign, sigma_force=None)
+    return diagnose(campaign, NINE)
+
+
+def row(name, variant):
+    """The line of a diagnosis in the table of the page."""
+    d = diagnosed(name, variant)
+    sigma = d.campaign.sigma_force
+    shown = "" if sigma is None else number(1e3 * float(np.mean(sigma)))
+    given = f"{shown}, {variant or 'Allan'}" if shown else UNKNOWN
+    size = probability(None if d.global_test is None else d.global_test.p_value)
+    pattern = probability(d.screening.p_value if d.screening.p_family else None)
+    verdict = f"`{d.verdict}`" + "".join(f": {words(f.name)}" for f in d.found)
+    cells = (f"`{name}`", d.campaign.n_positions, d.base.redundancy, given, size, pattern, verdict)
+    return f"| {' | '.join(map(str, cells))} |"
+
+
+def limit_rows():
+    """The table of upper limits: largest typical size, Xsens, and worst of the MPU-9150."""
+    sensors = ["xsens-mti"], [f"mpu9150-{i}" for i in range(3)]
+    limits = [
+        [{limit.name: limit.value for limit in diagnosed(name).upper_limits} for name in names]
+        for names in sensors
+    ]
+    for effect in limits[0][0]:
+        known = get_effect(effect)
+        unit = known.parameters[0].unit
+        values = max(known.typical), *(max(one[effect] for one in ones) for ones in limits)
+        shown = [f"{amount(value, unit)} {shown_unit(unit)}" for value in values]
+        yield f"| {words(effect)} | {' | '.join(shown)} |"
+
+
+@pytest.mark.parametrize(("name", "variant"), DIAGNOSED)
+def test_the_table_tells_the_diagnosis(name, variant):
+    assert row(name, variant) in PAGE
+    for line in verdict_lines(diagnosed(name, variant))[:-1]:
+        assert line in FLAT
+
+
+def test_the_table_has_no_other_rows():
+    assert len(re.findall(r"^\| `[a-z0-9-]+` \| \d", PAGE, re.MULTILINE)) == len(DIAGNOSED)
+
+
+def test_upper_limits():
+    assert list(limit_rows()) == re.findall(r"^\| [a-z ]+ \| [\d.]+ .*\|$", PAGE, re.MULTILINE)
+
+
+def test_where_the_residuals_of_white_noise_live():
+    location = diagnosed("xsens-mti", WHITE).location
+    for group in ("slow_time", "repeat", "direction"):
+        assert f"{100 * location[group]:.0f} % {GROUPS[group]}" in FLAT
+
+
+def variances_taken(d):
+    """Variances of the axes, beside their mean."""
+    variances = d.setting.frame.solution.variances[0, :3]
+    return variances / variances.mean()
+
+
+def test_the_y_axis_of_the_innalabs():
+    d = diagnosed("innalabs-49")
+    y = d.campaign.forces[:, 1] / d.campaign.gravity
+    carried = np.abs(y) > 0.8
+    residuals = 1e3 * d.base.misclosures[:, 0]
+    many, few = (number(float(np.sqrt(np.mean(residuals[r] ** 2)))) for r in (carried, ~carried))
+    assert f"the {np.count_nonzero(carried)} in which y carries more than 0.8 g" in FLAT
+    assert f"leave {many} mm/s² rms, the others {few}" in FLAT
+    x, y_taken, z = (number(v) for v in variances_taken(d))
+    assert f"variances are taken as {x}, {y_taken} and {z} of the mean" in FLAT
+    down = residuals[y < -0.95]
+    assert f"from {number(down.min())} to {number(down.max())} mm/s²" in FLAT
+
+
+@pytest.mark.parametrize("name", TOO_SMALL)
+def test_what_cannot_be_diagnosed_is_said(name):
+    with pytest.raises(InputError) as error:
+        diagnosed(name)
+    assert str(error.value).split(": ")[1] in FLAT
+
+
+def test_what_is_invisible_to_all():
+    hidden = {diagnosed(name, variant).setting.invisible for name, variant in DIAGNOSED}
+    (names,) = hidden
+    assert all(words(name) in PAGE for name in names)
+
+
+def test_every_public_measurement_is_on_the_page():
+    for name, data in public_data().items():
+        if data.settings is not None:
+            assert f"`{name}`" in PAGE

@@ -1,0 +1,316 @@
+"""The command line: what it lists, and that bad input ends with one line and exit status 2."""
+
+import re
+import subprocess
+import sys
+
+import click
+import pandas as pd
+import pytest
+import yaml
+from click.testing import CliRunner
+from study_helpers import NINE, PROVENANCE, content, grid
+
+import accelstudy
+from accelstudy.basics.errors import InputError
+from accelstudy.campaign.gross_errors import gross_error_names
+from accelstudy.commands.main import main
+from accelstudy.effects import effect_names, get_effect
+from accelstudy.files.tables import write_table
+from accelstudy.noise_effects import noise_effect_names
+from accelstudy.schemes import get_scheme, scheme_families, scheme_names
+from accelstudy.sensors.models import MODELS, PRESETS, compose, get_model
+
+
+def call(*arguments):
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+def output(*arguments):
+    result = call(*arguments)
+    assert result.exit_code == 0, result.output
+    assert result.stderr == ""
+    return result.stdout
+
+
+def test_version():
+    assert output("--version").split()[-1] == accelstudy.__version__
+
+
+def test_help_names_every_command():
+    text = output("--help")
+    assert "..." not in text.partition("Campaigns")[2]  # what each does fits into its line
+    for name, command in main.commands.items():
+        assert re.search(rf"^  {name} ", text, re.MULTILINE)
+        assert "Usage:" in output(name, "--help")
+        for option in command.params:
+            if isinstance(option, click.Option):
+                assert re.match(r"[A-Z'].*[.\]]$", option.help or ""), (name, option.name)
+
+
+def completed(words, shell="bash"):
+    """What the shell offers for the last of `words`."""
+    *_, last = words = ["accelstudy", *words]
+    environment = {"_ACCELSTUDY_COMPLETE": f"{shell}_complete", "COMP_WORDS": " ".join(words)}
+    number = last if shell == "fish" else str(len(words) - 1)
+    result = CliRunner().invoke(
+        main, env={**environment, "COMP_CWORD": number}, prog_name="accelstudy"
+    )
+    return [line.split(",", 1)[-1].split("\t")[0] for line in result.stdout.splitlines()]
+
+
+def test_the_shell_completes_commands_and_names():
+    assert completed(["cali"]) == completed(["cali"], "fish") == ["calibrate"]
+    assert completed(["calibrate", "--ang"]) == ["--angle-unit"]
+    assert completed(["calibrate", "--angle-unit", "d"]) == ["deg"]
+    assert completed(["calibrate", "--model", "bias-scale"]) == [*MODELS]
+    assert completed(["calibrate", "--model", "bias+warm"]) == ["bias+warm_up"]
+    assert completed(["calibrate", "--model", "diag"]) == ["diag"]  # maybe a file
+    assert completed(["schemes", "--approach", "r"]) == ["robot"]
+    assert completed(["scheme", "mcl"]) == ["mclaren-24"]
+    assert completed(["simulate-campaign", "--effect", "warm"]) == ["warm_up"]
+    assert completed(["simulate-campaign", "--noise-effect", "heavy"]) == ["heavy_tails"]
+    assert completed(["simulate-campaign", "--gross", "row"]) == ["row_order"]
+
+
+def test_help_imports_nothing_that_takes_long():
+    code = (
+        "import sys\nfrom accelstudy.commands.main import main\n"
+        "main(['--help'], standalone_mode=False)\n"
+        "slow = 'numpy', 'scipy', 'pandas', 'sympy', 'matplotlib', 'importlib.metadata'\n"
+        "print([m for m in slow if m in sys.modules])"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.splitlines()[-1] == "[]"
+
+
+# --- schemes -------------------------------------------------------------------------------------
+
+
+def rows_of(text, names):
+    return {
+        line.split()[0]: line.split() for line in text.splitlines() if line.strip() and
+        line.split()[0] in names
+    }  # fmt: skip
+
+
+def test_schemes_with_every_model_and_approach():
+    wanted = ("faces-6", "mclaren-24", "random-20-7")
+    for model in MODELS:
+        u = get_model(model).n_parameters
+        for approach, conditions in (("gravity", 1), ("robot", 3)):
+            text = output("schemes", "--model", model, "--approach", approach, *wanted)
+            assert f"model {model}, approach {approach}" in text
+            rows = rows_of(text, wanted)
+            assert [*rows] == [*wanted]
+            for name, row in rows.items():
+                n = get_scheme(name).n_positions
+                assert int(row[1]) == n
+                assert row[3].endswith(f"/{u}")
+                assert int(row[5]) == conditions * n - u
+
+
+def test_all_schemes_by_default():
+    text = output("schemes")
+    assert [*rows_of(text, scheme_names())] == [*scheme_names()]
+    for family in scheme_families():
+        assert family in text
+    faces = rows_of(text, scheme_names())["faces-6"]
+    assert faces[3:5] == ["6/9", "-"]
+    assert faces[-3:] == ["alpha_yz,", "alpha_zy,", "alpha_zx"]
+    assert rows_of(text, scheme_names())["mclaren-24"][6] == "0.0667"  # m = 1/15
+    table = output("schemes", "--quiet").strip("\n")
+    assert table in text
+    assert len(table.splitlines()) == 1 + len(scheme_names())
+
+
+def test_directions_of_a_scheme():
+    text = output("scheme", "faces-6")
+    head, *table = text.splitlines()
+    assert head.startswith("# ")
+    assert get_scheme("faces-6").source in head
+    assert table[0] == "position,x,y,z,roll_gon,pitch_gon"
+    numbers = pd.DataFrame([line.split(",") for line in table[1:]]).astype(float)
+    assert numbers.shape == (6, 6)
+    assert (numbers.iloc[:, 1:4] ** 2).sum(axis=1).tolist() == pytest.approx(6 * [1])
+    level = numbers[numbers[3] == 1].iloc[0]  # z down
+    assert level[[4, 5]].tolist() == pytest.approx([0, 0])
+    nose = numbers[numbers[1] == 1].iloc[0]  # x down
+    assert nose[5] == pytest.approx(-100)
+
+
+# --- the unit of angles --------------------------------------------------------------------------
+
+
+def test_angles_in_degrees(monkeypatch):
+    gon = output("schemes", "mclaren-24")
+    assert "pole/gon" in gon
+    assert "100 gon = 90°" in gon
+    for arguments in (
+        ("--angle-unit", "deg", "scheme", "faces-6"),
+        ("scheme", "faces-6", "--angle-unit", "deg"),
+        ("--angle-unit", "gon", "scheme", "faces-6", "--angle-unit", "deg"),
+    ):
+        table = output(*arguments).splitlines()
+        assert table[1].endswith("roll_deg,pitch_deg")
+        assert table[4].endswith(",-90.000000")  # nose up
+        assert output("schemes", "mclaren-24") == gon  # the choice ends with its command
+    assert "alpha_zx [mdeg]" in output("effects", "--angle-unit", "deg")
+    assert "alpha_zx [mgon]" in output("effects")
+    monkeypatch.setenv("ACCELSTUDY_ANGLE_UNIT", "deg")
+    assert "pole/deg" in output("schemes", "mclaren-24")
+    assert output("schemes", "mclaren-24", "--angle-unit", "gon") == gon
+
+
+def test_an_unknown_angle_unit(monkeypatch):
+    line = "error: unknown angle unit 'grad' (known: gon, deg)\n"
+    monkeypatch.delenv("ACCELSTUDY_ANGLE_UNIT", raising=False)
+    for arguments in (["--angle-unit", "grad", "models"], ["effects", "--angle-unit", "grad"]):
+        result = call(*arguments)
+        assert (result.exit_code, result.stdout, result.stderr) == (2, "", line)
+    monkeypatch.setenv("ACCELSTUDY_ANGLE_UNIT", "grad")
+    result = call("models")
+    assert (result.exit_code, result.stdout, result.stderr) == (2, "", line)
+
+
+# --- models and effects --------------------------------------------------------------------------
+
+
+def test_models():
+    text = output("models")
+    for name in MODELS:
+        model = get_model(name)
+        line = f"{name} ({model.n_parameters}): {', '.join(model.parameter_names)}"
+        assert line in text.splitlines()
+    for preset in PRESETS:
+        assert re.search(f"{re.escape(preset.source)} +{preset.model} in {preset.scheme}$", text, 8)
+    assert "s_x, s_y, s_z" in text
+
+
+def entries(text):
+    """Lines below each name of a catalogue, by heading and name."""
+    found = {}
+    for block in re.split(r"\n\n(?=\S)", text.strip()):
+        lines = block.splitlines()
+        if "100 gon = 90°" in block:
+            continue
+        if len(lines) == 1 and ":" not in lines[0]:
+            found[lines[0]] = current = {}
+            continue
+        for line in lines:
+            if not line.startswith(" "):
+                name, equation = line.split(": ", 1)
+                current[name] = [equation]
+            else:
+                current[name].append(line.strip())
+    return found
+
+
+def test_effects():
+    found = entries(output("effects"))
+    effects = {**found["Effects of the sensor"], **found["Effects of the rig"]}
+    assert set(effects) == set(effect_names())
+    assert set(found["Noise effects"]) == set(noise_effect_names())
+    assert set(found["Gross errors"]) == set(gross_error_names())
+    for name, (equation, *lines) in effects.items():
+        effect = get_effect(name)
+        assert equation == effect.equation
+        assert ", ".join(p.name for p in effect.parameters) in lines[1]
+        assert any("needs the" in line for line in lines) == bool(
+            {"temperature", "time", "vibration"} & {*compose(name, (name,)).hold_columns}
+        )
+    assert "base_tilt" in found["Effects of the rig"]
+    assert "b_x, b_y, b_z [mm/s^2], typically 20 … 500" in effects["bias"]
+    assert "alpha_yz, alpha_zy, alpha_zx [mgon], typically" in effects["nonorthogonality"][2]
+    assert "s_T_x, s_T_y, s_T_z [ppm/K], typically 10 … 200" in effects["thermal_scale"]
+    assert "settings: tau=600 s" in effects["warm_up"]
+    assert "needs the temperature of each hold" in effects["thermal_bias"]
+    assert "nu typically 3 … 10" in found["Noise effects"]["heavy_tails"]
+    assert "settings: first drawn, second drawn" in found["Gross errors"]["row_order"]
+
+
+# --- a study -------------------------------------------------------------------------------------
+
+
+def test_cells(tmp_path):
+    base, over = tmp_path / "base.yaml", tmp_path / "over.yaml"
+    base.write_text(yaml.safe_dump(content(grids=[grid(schemes=["faces-6", "mclaren-24"])])))
+    *lines, gap, effort = output("cells", base).splitlines()
+    assert len(lines) == 4
+    assert gap == ""
+    assert effort.startswith("4 cells, up to 240 calibrations: ")
+    assert f"{NINE}/mclaren-24/gravity: r = 15, 60 replicates" in lines
+    assert f"{NINE}/mclaren-24/robot: r = 63, 60 replicates" in lines
+    assert lines[0].startswith(f"{NINE}/faces-6/gravity: rank 6 of 9: alpha_yz, ")
+    over.write_text(yaml.safe_dump({"grids": [grid(approaches="robot", replicates=7)]}))
+    assert output("cells", base, over).startswith(
+        f"{NINE}/mclaren-24/robot: r = 63, 7 replicates\n\n"
+    )
+
+
+def test_claims(tmp_path):
+    row = {
+        "claim": "c", "section": "4.2", "statement": "it holds", "unit": "%", "paper": 50.0,
+        "ours": 41.25, "ci95_low": 40.0, "ci95_high": 42.0, "verdict": "reproduced",
+        "sentence": "So it is.",
+    }  # fmt: skip
+    write_table(tmp_path / "claims.parquet", pd.DataFrame([row]), PROVENANCE)
+    assert output("claims", tmp_path).splitlines()[2:] == [
+        "| 4.2 | it holds | 50.0 % | 41.2 % (40.0 … 42.0) | **reproduced** | So it is. |"
+    ]
+
+
+# --- bad input -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["scheme", "mclaren-42"], "unknown scheme 'mclaren-42'"),
+        (["scheme", "../etc"], "../etc: No such file"),
+        (["schemes", "faces-6", "nothing"], "unknown scheme 'nothing'"),
+        (["schemes", "--model", "bias-scales"], "did you mean 'bias-scale'?"),
+        (["schemes", "--approach", "robots"], "did you mean 'robot'?"),
+        (["cells", "/nowhere/study.yaml"], "/nowhere/study.yaml: No such file"),
+        (["claims", "/nowhere"], "/nowhere/claims.parquet: no such file"),
+    ],
+)
+def test_unknown_names_and_files(arguments, expected):
+    result = call(*arguments)
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    assert result.stderr.startswith("error: ")
+    assert expected in result.stderr
+    assert len(result.stderr.splitlines()) == 1
+
+
+def test_usage_errors():
+    for arguments in (["scheme"], ["cells"], ["nothing"], ["schemes", "--nothing"]):
+        result = call(*arguments)
+        assert result.exit_code == 2
+        assert "Usage:" in result.stderr
+
+
+def test_a_defect_is_not_taken_for_bad_input(monkeypatch):
+    """Only InputError is the user's to mend."""
+
+    def broken(name):
+        raise ValueError("a defect")
+
+    monkeypatch.setattr("accelstudy.schemes.get_scheme", broken)
+    assert isinstance(call("scheme", "faces-6").exception, ValueError)
+    monkeypatch.setattr(
+        "accelstudy.schemes.get_scheme", lambda name: (_ for _ in ()).throw(InputError("bad"))
+    )
+    assert call("scheme", "faces-6").stderr == "error: bad\n"
+
+
+def test_as_a_program():
+    run = subprocess.run(
+        [sys.executable, "-m", "accelstudy", "scheme", "nothing"],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert run.returncode == 2
+    assert run.stdout == ""
+    assert run.stderr.startswith("error: unknown scheme 'nothing'")
+    assert "Traceback" not in run.stderr

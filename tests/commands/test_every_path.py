@@ -1,0 +1,123 @@
+"""Each effect, noise effect and gross error of the catalogue through the commands, pages included.
+
+What is registered is taken from the registries, so that something new is covered by itself.
+"""
+
+import json
+
+import pytest
+from click.testing import CliRunner
+from page_helpers import assert_sound, text_of
+
+from accelstudy.campaign.gross_errors import gross_error_names
+from accelstudy.commands.main import main
+from accelstudy.effects import effect_names
+from accelstudy.noise_effects import noise_effect_names
+from accelstudy.sensors.models import get_model
+
+BASE = {effect.name for effect in get_model("bias-scale-nonorthogonality").effects}
+HOLDS = ("--temperature", "15:40", "--temperature-order", "random", "--vibration", "0:1",
+         "--yaw", "random", "--order", "random")  # fmt: skip
+ADDED = [
+    *(("--effect", name) for name in effect_names() if name not in BASE),
+    *(("--noise-effect", name) for name in noise_effect_names()),
+    *(("--gross", name) for name in gross_error_names()),
+]
+CASES = {
+    "nothing": (),
+    "nothing-unknown-sigma": ("--sigma-unknown",),
+    "sigma-too-small": ("--noise-effect", "noise_level(kappa=6)"),
+    "sigma-too-large": ("--noise-effect", "noise_level(kappa=0.1)"),
+    "axes-negated": ("--gross", "axis_error(x=1, y=-2, z=-3)"),
+    "fx-fy": ("--scheme", "fibonacci-30", "--gross", "axis_error(x=2, y=1, z=3)"),
+    **{name: (option, name) for option, name in ADDED},
+    "thermal-lag": ("--effect", "thermal_bias(tau=300)"),
+    "slip-without-time": ("--no-time", "--effect", "mounting_slip(t=12.5)"),
+    "gravity-saturation": ("--approach", "gravity", "--effect", "saturation"),
+    "gravity-outlier": ("--approach", "gravity", "--gross", "outlier_position"),
+    "gravity-few": ("--approach", "gravity", "--scheme", "fibonacci-10"),
+    "gravity-few-loud": ("--approach", "gravity", "--scheme", "fibonacci-10",
+                         "--noise-effect", "noise_level(kappa=10)"),
+}  # fmt: skip
+SAID = {
+    "axes-negated": "axes have the wrong sign: y is read as −y, z is read as −z",
+    "fx-fy": "axes are swapped: x is read as y, y is read as x",
+}
+DRAWN = {"gravity-outlier"}
+"""Cases whose figures are rendered; of the others they are only composed, which takes less time."""
+
+
+def run(*arguments, fails=False):
+    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
+    assert result.exit_code in ((0, 2) if fails else (0,)), f"{arguments}: {result.output}"
+    assert "could not be" not in result.output
+    return result
+
+
+def read(path):
+    def refuse(constant):
+        raise AssertionError(f"{constant} in {path.name}")
+
+    return json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_three_commands_end_well_and_agree(case, tmp_path, request):
+    if case not in DRAWN:
+        request.getfixturevalue("not_rendered")
+    campaign, options = tmp_path / "c", CASES[case]
+    scheme = () if "--scheme" in options else ("--scheme", "fibonacci-20")
+    run("simulate-campaign", "--out", campaign, *scheme, *HOLDS, *options)
+    approach = "gravity" if "gravity" in options else "robot"
+    with_approach = ("--approach", approach)
+    gross = "--gross" in options
+    told = run("calibrate", campaign, *with_approach, "--out", tmp_path / "cal", fails=gross)
+    calibration = None
+    if told.exit_code:  # a unit that is not read, or no solution
+        assert told.stderr.count("\n") == 1
+        assert "look" in told.stderr, "no cause is named"
+    else:
+        calibration = read(tmp_path / "cal/calibration.json")["quality"]
+        page = (tmp_path / "cal/report.html").read_text(encoding="utf-8")
+        assert_sound(page)
+        assert " ".join(calibration["verdict"].split()) in text_of(page)
+        assert f"{calibration['state'].upper()}: " in told.stdout
+    said = run("diagnose", campaign, *with_approach, "--out", tmp_path / "dia",
+               "--replicates", 100)  # fmt: skip
+    diagnosis = read(tmp_path / "dia/diagnosis.json")
+    page = (tmp_path / "dia/report.html").read_text(encoding="utf-8")
+    assert_sound(page)
+    assert said.stdout.splitlines()[0] in text_of(page)
+    assert "What to do next" in text_of(page)
+    if calibration is None:
+        assert diagnosis["verdict"] == "gross_error"
+    else:
+        _assert_agree(calibration, diagnosis)
+    if case in SAID:
+        assert SAID[case] in calibration["warnings"]
+        assert calibration["verdict"].startswith(
+            f"This looks like a gross error (axis error): {SAID[case]}"
+        )
+
+
+def _assert_agree(calibration, diagnosis):
+    """What one command says, the other does not contradict."""
+    state, verdict = calibration["state"], diagnosis["verdict"]
+    names = {effect["name"] for effect in diagnosis["effects"]}
+    gross = calibration["gross_error"]
+    if gross is not None:
+        assert state == "implausible"
+        assert verdict == "gross_error"
+        assert gross["name"] in names
+        return  # the diagnosis goes on with mended data
+    assert not names & {"unit_error", "axis_error", "row_order"}
+    test = calibration["global_test"]
+    if test is not None:
+        assert diagnosis["global_test"]["p_value"] == pytest.approx(test["p_value"], rel=1e-6)
+    if state == "rejected":
+        assert verdict != "no_effect"
+    if state == "accepted":
+        assert "noise_level" not in names
+    known = {s["position"] for s in diagnosis["suspects"]}
+    known |= {effect.get("position") for effect in diagnosis["effects"]}
+    assert {s["position"] for s in calibration["suspects"]} <= known

@@ -1,0 +1,126 @@
+"""Walk the README and every example in the help as a stranger: an empty folder, a package."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from places import ROOT
+from study_helpers import PROVENANCE
+
+from accelstudy.commands.main import main
+from accelstudy.files.tables import write_table
+from accelstudy.schemes import get_scheme
+
+README = ROOT / "README.md"
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """A folder in which the package is installed from its wheel, without any network."""
+    folder = tmp_path_factory.mktemp("installed")
+    python = [sys.executable, "-m"]
+    wheel = ["hatchling", "build", "--target", "wheel", "--directory", folder]
+    subprocess.run([*python, *wheel], cwd=ROOT, check=True, capture_output=True)
+    install = ["uv", "pip", "install", "--offline", "--no-deps", "--python", sys.executable]
+    (built,) = folder.glob("*.whl")
+    subprocess.run([*python, *install, "--target", folder, built], check=True, capture_output=True)
+    return folder
+
+
+def log_csv(path):
+    """A log as a logger writes it: three columns without a header; 24 holds, a turn before each."""
+    rng = np.random.default_rng(1)
+    rows = []
+    forces = -9.81 * get_scheme("fibonacci-24").directions
+    for before, after in zip(np.roll(forces, 1, axis=0), forces, strict=True):
+        rows += [np.linspace(before, after, 100), np.tile(after, (400, 1))]
+    readings = np.concatenate(rows) * [1.002, 0.999, 1.001] + [0.05, 0.01, 0.03]
+    readings += 0.005 * rng.standard_normal(readings.shape)
+    np.savetxt(path, readings, "%.5f", delimiter=",")
+
+
+@pytest.fixture(scope="module")
+def steps(site, tmp_path_factory):
+    """What came of all commands, in a folder that holds what a reader has.
+
+    That is a log of a sensor and, for studies, the configurations and the verdicts of one.
+    """
+    folder = tmp_path_factory.mktemp("walk")
+    log_csv(folder / "log.csv")
+    shutil.copytree(ROOT / "config", folder / "config")
+    claim = {
+        "claim": "c", "section": "4.2", "statement": "it holds", "unit": "%", "paper": 50.0,
+        "ours": 41.25, "ci95_low": 40.0, "ci95_high": 42.0, "verdict": "reproduced",
+        "sentence": "So it is.",
+    }  # fmt: skip
+    path = folder / "results/paper/claims.parquet"
+    path.parent.mkdir(parents=True)
+    write_table(path, pd.DataFrame([claim]), PROVENANCE)
+
+    known = ("PATH", "HOME", "LANG", "OPENBLAS_NUM_THREADS")
+    environment = {name: os.environ[name] for name in known if name in os.environ}
+    environment |= {"PYTHONPATH": str(site), "MPLBACKEND": "agg"}
+    environment["PATH"] = f"{site / 'bin'}:{environment['PATH']}"
+    done = subprocess.run(
+        [sys.executable, ROOT / "tests/walk.py", README, "steps.json"],
+        cwd=folder, env=environment, capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    content = json.loads((folder / "steps.json").read_text(encoding="utf-8"))
+    assert Path(content["package"]).is_relative_to(site)
+    return content["steps"]
+
+
+def test_the_package_has_all_its_files(site):
+    for path in (ROOT / "accelstudy").rglob("*.*"):
+        if path.suffix != ".pyc":
+            assert (site / path.relative_to(ROOT)).exists(), path
+
+
+@pytest.mark.parametrize("source", ["README", "help"])
+def test_each_command_runs_and_writes_what_it_says(steps, source):
+    for step in steps:
+        if step["source"] == source and "skipped" not in step:
+            assert step["status"] == 0, f"{step['command']}\n{step['output']}"
+            assert not step["missing"], f"{step['command']} did not write {step['missing']}"
+
+
+def test_the_readme_has_what_a_reader_needs(steps):
+    run = [s for s in steps if s["source"] == "README" and "skipped" not in s]
+    for command in ("import", "calibrate", "apply", "export", "diagnose", "effects --campaign"):
+        assert any(s["command"].startswith(f"accelstudy {command} ") for s in run), command
+    (python,) = (s for s in run if s["command"].startswith("import "))
+    assert len(re.findall(r"\d", python["output"])) > 50  # three arrays of numbers
+
+
+def test_the_answer_that_the_readme_quotes_is_the_commands_own(steps):
+    text = README.read_text(encoding="utf-8").partition("## Do I need a robot?")[2]
+    quoted = re.search(r"```\n(.*?)```", text, re.DOTALL)[1]
+    run = [s for s in steps if s["source"] == "README" and "skipped" not in s]
+    (plan,) = (s for s in run if s["command"].startswith("accelstudy plan "))
+    assert plan["output"].startswith(quoted)
+
+
+def test_each_help_has_an_example(steps):
+    found = {s["command"].split()[1] for s in steps if s["source"] == "help"}
+    assert found == set(main.commands)
+
+
+def test_make_targets_and_files_of_the_readme_exist():
+    text = README.read_text(encoding="utf-8")
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    targets = set(re.findall(r"(?:^    |`)make ([a-z-]+)", text, re.M)) - {"help"}
+    assert {"reproduce", "test", "smoke"} <= targets
+    for target in targets:
+        assert re.search(rf"^{target}:", makefile, re.M), target
+    for name in re.findall(r"`((?:config|benchmarks|docs|accelstudy)/[\w/.]+)`", text):
+        assert (ROOT / name).exists(), name
+    for name in re.findall(r"^ +(?:snakemake|accelstudy) .*?(config/[\w/.-]+)", text, re.M):
+        assert (ROOT / name).exists(), name

@@ -1,0 +1,274 @@
+"""What a scheme can determine: ranks, conditions, reasons, and the numbers of linear theory."""
+
+from itertools import permutations, product
+
+import numpy as np
+import pytest
+
+from accelstudy.adjustment import calibrate
+from accelstudy.approaches import get_approach
+from accelstudy.basics.units import MGON
+from accelstudy.design.closed_forms import (
+    gravity_scale_correlation,
+    gravity_sigma,
+    has_octahedral_moments,
+    perfect_robot_ratio,
+)
+from accelstudy.design.estimability import diagnose
+from accelstudy.effects import Effect
+from accelstudy.effects.base import per_axis
+from accelstudy.schemes import Scheme, get_scheme, scheme_names
+from accelstudy.schemes.mclaren import mclaren_orbit
+from accelstudy.sensors.models import get_model
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.simulation.sessions import Noise, session
+
+NINE = get_model("bias-scale-nonorthogonality")
+TWELVE = get_model("bias-scale-nonorthogonality-crossaxis")
+QUADRATIC = get_model("bias-scale-nonorthogonality-quadratic")
+CUBIC = get_model("bias-scale-nonorthogonality-cubic")
+GRAVITY, ROBOT = get_approach("gravity"), get_approach("robot")
+ANGLES = ("alpha_yz", "alpha_zy", "alpha_zx")
+BOTH = pytest.mark.parametrize("approach", [GRAVITY, ROBOT], ids=lambda a: a.name)
+# bias (m/s²), scale, non-orthogonality (rad) in the order of the parameters
+KINDS = {"bias": slice(0, 3), "scale": slice(3, 6), "nonorthogonality": slice(6, 9)}
+TRUTH = NINE.vector(
+    {
+        **{"b_x": 0.05, "b_y": 0.01, "b_z": 0.03, "s_x": 200e-6, "s_y": 200e-6, "s_z": 200e-6},
+        **{"alpha_yz": 12 * MGON, "alpha_zy": 12 * MGON, "alpha_zx": 44 * MGON},
+    }
+)
+
+
+def design(scheme, model=NINE, approach=GRAVITY, **more):
+    scheme = get_scheme(scheme) if isinstance(scheme, str) else scheme
+    return diagnose(scheme, model, approach, **more)
+
+
+def aligned(directions):
+    return Scheme("aligned", "aligned", directions, "generated", "test")
+
+
+# --- ranks and reasons ---------------------------------------------------------------------------
+
+
+def test_six_faces_do_not_see_the_angles_between_the_axes():
+    found = design("faces-6")
+    assert found.rank == 6
+    assert found.not_estimable == ANGLES
+    assert not found.estimable
+    assert found.condition == np.inf
+    assert found.redundancy == -3
+    assert "rank 6 of 9" in found.reason
+    assert "these positions" in found.reason
+    assert np.isnan(found.sigma).all()
+
+
+def test_six_faces_determine_six_parameters_without_redundancy():
+    found = design("faces-6", get_model("bias-scale"))
+    assert found.estimable
+    assert found.reason == ""
+    assert (found.rank, found.redundancy) == (6, 0)
+    assert found.condition == pytest.approx(1)
+
+
+@pytest.mark.parametrize("scheme", scheme_names())
+def test_gravity_is_blind_to_rotations_in_every_scheme(scheme):
+    found = design(scheme, TWELVE)
+    assert found.rank == (6 if scheme == "faces-6" else 9)
+    assert found.not_estimable == TWELVE.parameter_names[6:]
+    assert "gravity approach in any scheme" in found.reason
+
+
+@pytest.mark.parametrize("scheme", scheme_names())
+def test_a_robot_sees_all_twelve_parameters_in_every_scheme(scheme):
+    assert design(scheme, TWELVE, ROBOT).estimable
+
+
+@pytest.mark.parametrize("scheme", [name for name in scheme_names() if name != "faces-6"])
+def test_nine_parameters_in_every_other_scheme(scheme):
+    assert design(scheme).estimable
+
+
+@pytest.mark.parametrize(
+    ("scheme", "gravity", "robot"),
+    [("d-optimal-9", 0, 18), ("faces-edges-18", 9, 45), ("mclaren-24", 15, 63)],
+)
+def test_redundancy(scheme, gravity, robot):
+    assert design(scheme).redundancy == gravity
+    assert design(scheme, approach=ROBOT).redundancy == robot
+
+
+GOLDEN = (1 + np.sqrt(5)) / 2
+TRIBONACCI = 1.8392867552141612
+SIGNS = list(product((1, -1), repeat=2))
+ALIGNED = {
+    "6 faces": np.concatenate([np.eye(3), -np.eye(3)]),
+    "12 edges": [np.roll((0, a, b), k) for a, b in SIGNS for k in range(3)],
+    "24 McLaren": mclaren_orbit(),
+    "24 snub cube": [
+        s * np.array((1, 1 / TRIBONACCI, TRIBONACCI))[list(order)]
+        for s in product((1, -1), repeat=3)
+        for order in permutations(range(3))
+        if np.linalg.det(np.diag(s)[list(order)]) > 0
+    ],
+    "24 truncated octahedron": [
+        np.array(p) for p in product((0, 1, -1, 2, -2), repeat=3) if sorted(np.abs(p)) == [0, 1, 2]
+    ],
+    "20 faces of the icosahedron": [
+        *product((1, -1), repeat=3),
+        *(np.roll((0, a / GOLDEN, b * GOLDEN), k) for a, b in SIGNS for k in range(3)),
+    ],
+}
+
+
+@pytest.mark.parametrize("name", ALIGNED)
+def test_gravity_does_not_see_cubic_terms_in_aligned_orbits(name):
+    """One orbit of the cube's rotations: Σ f⁴ over the axes is a multiple of Σ f²."""
+    found = design(aligned(ALIGNED[name]), CUBIC)
+    assert {"s_x", "s_y", "s_z", "k3_x", "k3_y", "k3_z"} <= set(found.not_estimable)
+    assert "these positions" in found.reason
+
+
+@pytest.mark.parametrize(
+    "name", ["24 McLaren", "24 truncated octahedron", "20 faces of the icosahedron"]
+)
+def test_a_generic_rotation_makes_cubic_terms_estimable(name):
+    turned = aligned(ALIGNED[name]).rotated(np.radians([15, 25, 35]))
+    assert design(turned, CUBIC).estimable
+
+
+def test_condition_of_cubic_terms_in_mclarens_scheme():
+    assert design("mclaren-24", CUBIC).condition == pytest.approx(16, abs=0.5)
+
+
+@pytest.mark.parametrize(
+    "scheme", [s for s in scheme_names() if s not in ("faces-6", "d-optimal-9")]
+)
+def test_quadratic_terms_are_estimable_from_twelve_positions_on(scheme):
+    assert design(scheme, QUADRATIC).estimable
+
+
+class _Quintic(Effect):
+    name = "quintic_of_the_test"
+    parameters = per_axis("k5", "1", "k_{5%}")
+
+    def output(self, f, p, g, hold, xp):
+        return tuple(k * f_i**5 / g**4 for k, f_i in zip(p, f, strict=True))
+
+
+def test_rings_see_three_sizes_of_force_and_so_one_odd_nonlinearity():
+    model = SensorModel("cubic and quintic", (*CUBIC.effects, _Quintic()))
+    rings = design("rings-24", model, ROBOT)
+    assert rings.rank == 12
+    assert set(rings.not_estimable) == {
+        f"{name}_{axis}" for name in ("s", "k3", "k5") for axis in "xyz"
+    }
+    assert design("mclaren-24", model, ROBOT).estimable
+
+
+def test_observed_gravity_is_a_further_parameter():
+    found = design("mclaren-24", noise=Noise(sigma_gravity=1e-5))
+    assert found.parameter_names == (*NINE.parameter_names, "g")
+    assert found.estimable
+    assert found.redundancy == 15
+    assert found.sigma[-1] == pytest.approx(1e-5)
+
+
+# --- linear theory -------------------------------------------------------------------------------
+
+
+@BOTH
+@pytest.mark.parametrize("scheme", ["mclaren-24", "faces-edges-18", "rings-24"])
+@pytest.mark.parametrize("noise", [Noise(), Noise(sigma_gravity=1e-3)], ids=["fixed g", "sigma g"])
+def test_sigma_is_that_of_the_adjustment_at_the_truth(scheme, approach, noise):
+    ideal = session(NINE, TRUTH, get_scheme(scheme).directions)
+    result = calibrate(NINE, approach, ideal.observations(noise))
+    found = design(scheme, approach=approach, noise=noise, parameters=TRUTH)
+    np.testing.assert_allclose(found.sigma, result.sigma_priori[0], rtol=1e-7)
+    np.testing.assert_allclose(found.cofactors, result.cofactors[0], rtol=0, atol=1e-14)
+
+
+OCTAHEDRAL = ["mclaren-24", "faces-edges-18", "rings-24", "rhombicuboctahedron-24"]
+
+
+@pytest.mark.parametrize("scheme", OCTAHEDRAL)
+def test_closed_forms_of_the_gravity_based_calibration(scheme):
+    directions = get_scheme(scheme).directions
+    assert has_octahedral_moments(directions)
+    found = design(scheme)
+    for kind, sigma in gravity_sigma(directions, 0.002).items():
+        np.testing.assert_allclose(found.sigma[KINDS[kind]], sigma, rtol=1e-9)
+    correlation = found.cofactors / np.outer(found.sigma, found.sigma)
+    expected = np.eye(9)
+    expected[3:6, 3:6] += gravity_scale_correlation(directions) * (1 - np.eye(3))
+    np.testing.assert_allclose(correlation, expected, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("scheme", OCTAHEDRAL)
+def test_closed_forms_of_a_perfect_robot(scheme):
+    noise = Noise(sigma_angle=0.0)
+    ratio = design(scheme, approach=ROBOT, noise=noise).sigma / design(scheme, noise=noise).sigma
+    for kind, expected in perfect_robot_ratio(get_scheme(scheme).directions).items():
+        np.testing.assert_allclose(ratio[KINDS[kind]], expected, rtol=1e-9)
+
+
+def test_schemes_without_octahedral_moments_are_told_apart():
+    assert not has_octahedral_moments(get_scheme("random-38").directions)
+    assert not has_octahedral_moments(get_scheme("mclaren-24").directions[:-1])
+
+
+# Scheme, m, correlation of the scales, sds of gravity and robot: misalignment (mgon), scale (ppm),
+# bias (mm/s²), each of the worst axis.
+TABLE = [
+    ("faces-edges-18", 0.0556, -0.200, (13.0, 107, 0.82), (5.4, 84, 0.48)),
+    ("rings-24", 0.0417, -0.143, (13.0, 85, 0.71), (4.7, 73, 0.42)),
+    ("rhombicuboctahedron-24", 0.0688, -0.260, (10.1, 104, 0.71), (4.7, 73, 0.42)),
+    ("mclaren-24", 0.0667, -0.250, (10.3, 102, 0.71), (4.7, 73, 0.42)),
+    ("faces-edges-corners-26", 0.0726, -0.279, (9.4, 104, 0.68), (4.5, 70, 0.40)),
+]
+
+
+@pytest.mark.parametrize(("scheme", "m", "correlation", "gravity", "robot"), TABLE)
+def test_table_of_schemes(scheme, m, correlation, gravity, robot):
+    of_gravity, of_robot = design(scheme), design(scheme, approach=ROBOT)
+    assert of_gravity.fourth_moment == pytest.approx(m, abs=5e-5)
+    cofactors, sigma = of_gravity.cofactors, of_gravity.sigma
+    assert cofactors[3, 4] / (sigma[3] * sigma[4]) == pytest.approx(correlation, abs=5e-4)
+    for found, (misalignment, scale, bias) in ((of_gravity, gravity), (of_robot, robot)):
+        worst = {kind: found.sigma[KINDS[kind]].max() for kind in KINDS}
+        assert worst["nonorthogonality"] / MGON == pytest.approx(misalignment, abs=0.05)
+        assert worst["scale"] * 1e6 == pytest.approx(scale, abs=0.5)
+        assert worst["bias"] * 1e3 == pytest.approx(bias, abs=0.005)
+
+
+@pytest.mark.parametrize(
+    ("scheme", "reductions", "gravity_correlation", "robot_correlation"),
+    [
+        ("mclaren-24", {"bias": 41, "scale": 28, "nonorthogonality": 54}, 0.25, 0.012),
+        ("rings-24", {"bias": 41, "scale": 15, "nonorthogonality": 64}, 0.14, 0.007),
+    ],
+)
+def test_what_a_robot_gains(scheme, reductions, gravity_correlation, robot_correlation):
+    """The paper says 50, 30, 70 % of one simulation; linear theory says this of the worst axis."""
+    gravity, robot = design(scheme), design(scheme, approach=ROBOT)
+    for kind, percent in reductions.items():
+        gain = 1 - robot.sigma[KINDS[kind]].max() / gravity.sigma[KINDS[kind]].max()
+        assert 100 * gain == pytest.approx(percent, abs=0.5)
+    for found, correlation, digit in (
+        (gravity, gravity_correlation, 0.005),
+        (robot, robot_correlation, 0.0005),
+    ):
+        matrix = found.cofactors / np.outer(found.sigma, found.sigma)
+        largest = np.abs(matrix[3:6, 3:6] - np.eye(3)).max()
+        assert largest == pytest.approx(correlation, abs=digit)
+
+
+def test_sigma_scales_with_the_noise():
+    one = design("mclaren-24", approach=ROBOT).sigma
+    noise = Noise(sigma_force=0.004, sigma_angle=6.4 * MGON)
+    np.testing.assert_allclose(design("mclaren-24", approach=ROBOT, noise=noise).sigma, 2 * one)
+
+
+def test_pole_distance_of_mclarens_scheme():
+    assert np.degrees(design("mclaren-24").pole_distance) == pytest.approx(13.8, abs=0.05)

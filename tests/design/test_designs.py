@@ -1,0 +1,301 @@
+"""The command `design`, its file, and where a scheme of a file is used."""
+
+import numpy as np
+import pytest
+import yaml
+from click.testing import CliRunner
+
+from accelstudy.approaches import get_approach
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import GON, MGON
+from accelstudy.commands.main import main
+from accelstudy.design.estimability import diagnose
+from accelstudy.design.optimal.information import position_rows
+from accelstudy.design.optimal.task import Task
+from accelstudy.design.proposal.config import DesignsConfig
+from accelstudy.design.proposal.efficiency import efficiency_table
+from accelstudy.design.proposal.figure import efficiency_figure
+from accelstudy.design.proposal.order import _drift_shown, field_order
+from accelstudy.design.proposal.request import Request
+from accelstudy.leveling.error import cap_forces, tilt_error
+from accelstudy.plan.example import parse_example, parse_section
+from accelstudy.schemes import files, get_scheme
+from accelstudy.sensors.models import get_model
+from accelstudy.study.cells.cell import Cell, study_cells
+from accelstudy.study.config import parse_study
+
+NINE = get_model("bias-scale-nonorthogonality")
+
+
+def run(*arguments, code=0):
+    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
+    assert result.exit_code == code, result.output
+    return result
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A design, and what the command said."""
+    path = tmp_path_factory.mktemp("designs") / "mine.yaml"
+    said = run("design", "--positions", 8, "--tilt-range", "30gon", "--starts", 1,
+               "--least-angle", "15gon", "--roll", "-110gon", "110gon", "--out", path)  # fmt: skip
+    return path, said.output
+
+
+def test_a_design_says_what_it_brings(made):
+    path, said = made
+    scheme = get_scheme(str(path))
+    zero, f_b = np.zeros(9), cap_forces(30 * GON, 200)
+    error = tilt_error(NINE, zero, NINE, zero, f_b)
+    for directions, line in {
+        scheme: "these 8 positions",
+        get_scheme("mclaren-24"): "the 24 of",
+    }.items():
+        roll, pitch = error.rms_of_all(diagnose(directions, NINE, get_approach("robot")).cofactors)
+        expected = f": roll {roll / MGON:.2f} mgon, pitch {pitch / MGON:.2f} mgon"
+        assert any(line in row and expected in row for row in said.splitlines())
+    content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    assert content["design"]["rms_roll_mgon"] == pytest.approx(
+        error.rms_of_all(diagnose(scheme, NINE, get_approach("robot")).cofactors)[0] / MGON,
+        rel=1e-5,
+    )
+    assert content["design"]["constraints"] == [
+        "roll from -110 gon to 110 gon",
+        "at least 15 gon between positions",
+    ]
+    assert 0.5 < content["design"]["efficiency"] <= 1
+    rolls = [row["roll_gon"] for row in content["positions"]]
+    assert min(rolls) >= -110.001
+    assert f"\n        2 {rolls[1]:8.2f}" in said
+
+
+def test_a_design_is_made_again_to_the_bit_and_replaces_nothing(made, tmp_path):
+    path, _ = made
+    before = path.read_bytes()
+    again = ["design", "--positions", 8, "--tilt-range", "30gon", "--starts", 1, "--least-angle",
+             "15gon", "--roll", "-110gon", "110gon", "--out"]  # fmt: skip
+    assert "is there already; --force replaces it" in run(*again, path, code=2).stderr
+    assert path.read_bytes() == before
+    copy = tmp_path / "mine.yaml"
+    run(*again, copy)
+    assert copy.read_bytes() == before
+    told = run("design", "--after", path, "--out", path, "--force", code=2)
+    assert "is the input" in told.stderr
+    assert "must end in .yaml" in run("design", "--out", tmp_path / "mine", code=2).stderr
+
+
+def test_commands_take_the_file_for_a_scheme(made, tmp_path):
+    path, _ = made
+    name = get_scheme(str(path)).name
+    assert f"{name}  8" in run("schemes", "--approach", "robot", path).output
+    run("simulate-campaign", "--scheme", path, "--out", tmp_path / "c", "--name", "c")
+    assert len((tmp_path / "c/positions.csv").read_text().splitlines()) == 9
+    assert "visible" in run("effects", "--scheme", path, "--approach", "robot").output
+
+
+@pytest.mark.parametrize(
+    ("asked", "said", "held"),
+    [
+        (("--attitudes", "hand"), "if a hand misses them by 5°", "steps of 30°"),
+        (("--mountings", 2), "turned about", "2 mountings"),
+        (("--discriminate", "quadratic_scale", "cubic_scale", "--attitudes", "cube"),
+         "Size from which a parameter is found, and told from the other effect:", "discriminate"),
+        (("--neglect", "quadratic_scale=500ppm", "--attitudes", "cube"),
+         "the neglected effects included", "neglected"),
+    ],
+)  # fmt: skip
+def test_what_a_design_is_for_is_said(asked, said, held, tmp_path):
+    path = tmp_path / "d.yaml"
+    told = run("design", "--positions", 8, "--starts", 1, *asked, "--out", path).output
+    assert said in told
+    share = float(told.partition("Efficiency at least ")[2].partition(" %")[0])
+    assert 50 < share <= 100
+    assert held in path.read_text(encoding="utf-8")
+    assert get_scheme(str(path)).n_positions == 8
+
+
+def study(path, **more):
+    grid = {"models": "bias-scale", "schemes": [str(path)], "approaches": "robot", "replicates": 2}
+    return parse_study({"study": "own", "seed": 1, "grids": [grid], **more})
+
+
+def test_a_study_depends_on_what_the_file_holds(tmp_path):
+    path = tmp_path / "some.yaml"
+
+    def write(*directions):
+        path.write_text(yaml.safe_dump({"scheme": "mine", "directions": directions}))
+        return study(path)
+
+    first = write([0, 0, 2], [0, 1, 0], [1, 0, 0], [0, -1, 0])
+    (cell,) = study_cells(first)
+    assert cell.scheme.startswith("mine@")
+    np.testing.assert_array_equal(cell.positions.directions[0], [0, 0, 1])
+    second = write([0, 0, 2], [0, 1, 0], [1, 0, 0], [0, 1, 1])
+    (other,) = study_cells(second)
+    assert other.scheme != cell.scheme
+    assert second.fingerprint != first.fingerprint
+    assert other.seed(1, 0).entropy != cell.seed(1, 0).entropy
+    moved = path.rename(tmp_path / "elsewhere.yaml")
+    assert study_cells(study(moved)) == [other]
+
+
+def test_a_job_needs_no_file(tmp_path, monkeypatch):
+    path = tmp_path / "some.yaml"
+    path.write_text("directions: [[0, 0, 1], [0, 1, 0], [1, 0, 0]]\n")
+    (cell,) = study_cells(study(path))
+    plain = study(path).model_dump(mode="json")
+    path.unlink()
+    monkeypatch.setattr(files, "_read", {})
+    same = Cell.from_dict(cell.to_dict())
+    assert same == cell
+    np.testing.assert_array_equal(same.positions.directions, np.eye(3)[::-1])
+    with pytest.raises(InputError, match="unknown scheme 'some@"):
+        get_scheme(cell.scheme)
+    again = parse_study(plain)
+    assert study_cells(again) == [cell]
+    assert again.fingerprint == parse_study(plain).fingerprint
+    np.testing.assert_array_equal(get_scheme(cell.scheme).directions, same.positions.directions)
+    plain["schemes"][cell.scheme]["directions"][0] = [0, 1, 1]
+    with pytest.raises(InputError, match=r"schemes.*is the name of other positions"):
+        parse_study(plain)
+    usual = parse_study(
+        {"study": "s", "seed": 1, "grids": [{"models": "bias-scale", "schemes": "faces-6",
+                                            "approaches": "robot", "replicates": 2}]}
+    )  # fmt: skip
+    assert "directions" not in study_cells(usual)[0].to_dict()
+
+
+@pytest.mark.parametrize(
+    ("text", "wrong"),
+    {
+        "": "not a mapping",
+        "scheme: a\n": "directions: must be a list of rows",
+        "directions: [[1, 2]]\n": "row 1 is not",
+        "directions: [[0, 0, 1], [0, 0, 0]]\n": "row 2 is not",
+        "directions: [[0, 0, .inf]]\n": "row 1 is not",
+        "directions: [[0, 0, true]]\n": "row 1 is not",
+        "direction: [[0, 0, 1]]\n": "unknown key 'direction'; did you mean 'directions'",
+        "scheme: a/b\ndirections: [[0, 0, 1]]\n": "scheme: 'a/b' cannot be",
+        "scheme: 3\ndirections: [[0, 0, 1]]\n": "scheme: must be a text",
+    }.items(),
+)
+def test_a_file_that_is_no_scheme(tmp_path, text, wrong):
+    path = tmp_path / "bad.yaml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=wrong) as error:
+        get_scheme(str(path))
+    assert str(error.value).startswith(str(path))
+    with pytest.raises(InputError, match=r"config: grids.0.schemes.*bad.yaml"):
+        study(path)
+
+
+@pytest.mark.parametrize(
+    ("asked", "wrong"),
+    [
+        ({"criterion": "E"}, "unknown criterion 'E'"),
+        (
+            {"criterion": "D", "neglect": ("cubic_scale",)},
+            "criterion D: effects that are neglected",
+        ),
+        ({"neglect": ("cubic_scale",), "discriminate": ("a", "b")}, "exclude each other"),
+        ({"neglect": ("bias",)}, "'bias' is in the model"),
+        ({"neglect": ("quadratic_scale=5mm",)}, "neglect: quadratic_scale=5mm: .*unit must be"),
+        ({"discriminate": ("cubic_scale", "cubic_scale")}, "twice; give two effects"),
+        ({"prior": ("bias",)}, "expected NAME=SIZE"),
+        ({"prior": ("bias=0",)}, "must be more than 0"),
+        ({"prior": ("bise=1mg",)}, "did you mean 'bias'"),
+        ({"positions": 0}, "positions: must be from 1 to 300"),
+        ({"attitudes": "cub"}, "did you mean 'cube'"),
+        ({"mountings": 10}, "mountings: must be from 1 to 9"),
+        ({"mountings": 2, "attitudes": "cube"}, "mountings: need all attitudes"),
+        ({"roll": (0.1, -0.1)}, "roll: the first angle must be less"),
+    ],
+)
+def test_contradictory_wishes_are_said_in_one_line(asked, wrong):
+    with pytest.raises(InputError, match=wrong):
+        Request(**{"positions": 8, **asked}).find()
+
+
+def test_what_is_known_before_and_what_is_neglected():
+    known = Request(6, approach="gravity", prior=("scale=500ppm", "b_x=1mg")).task.prior_sigmas
+    assert known == {"s_x": 5e-4, "s_y": 5e-4, "s_z": 5e-4, "b_x": pytest.approx(9.80665e-3)}
+    task = Request(6, neglect=("quadratic_scale=20ppm", "warm")[:1]).task
+    assert task.neglected == {"quadratic_scale": pytest.approx(2e-5)}
+    after = Request(6, approach="gravity", after="faces-6", starts=1)
+    assert (
+        Request(6, approach="gravity", after="faces-6").task.missing(after.find().directions) == ""
+    )
+
+
+def test_two_effects_are_told_apart_by_what_neither_can_imitate():
+    """The Schur complement is the sum of squares that is left of a column by least squares."""
+    request = Request(16, approach="gravity", discriminate=("quadratic_scale", "cubic_scale"))
+    directions = get_scheme("fibonacci-24").directions
+    task, criterion = request.task, request.chosen
+    rows = position_rows(task.extended, task.approach, task.noise, directions)[:, 0] / task.scale
+    left = []
+    for own, rival in ((slice(9, 12), slice(12, 15)), (slice(12, 15), slice(9, 12))):
+        rest = np.hstack([rows[:, :9], rows[:, rival]])
+        for column in rows[:, own].T:
+            missed = column - rest @ np.linalg.lstsq(rest, column, rcond=None)[0]
+            left.append(missed @ missed)
+    np.testing.assert_allclose(criterion.left(task.normal(directions)), left, rtol=1e-6)
+
+
+def test_the_order_is_a_round_trip_of_small_turns():
+    task, directions = Task(NINE, get_approach("robot")), get_scheme("random-16-3").directions
+    order = field_order(task, directions)
+    assert sorted(order) == list(range(16))
+
+    def length(tour):
+        cosines = np.sum(directions[tour] * directions[np.roll(tour, -1)], axis=1)
+        return np.arccos(np.clip(cosines, -1, 1)).sum()
+
+    rng = np.random.default_rng(1)
+    assert length(order) < 0.85 * min(length(rng.permutation(16)) for _ in range(200))
+    sweep = np.argsort(directions[:, 0])
+    assert _drift_shown(task, directions[order]) > 3 * _drift_shown(task, directions[sweep])
+    groups = np.arange(16) % 3
+    apart = groups[field_order(task, directions, groups)]
+    assert np.count_nonzero(np.diff(apart)) == 2
+
+
+# Schemes against the best there can be
+
+
+def test_efficiencies_of_schemes_as_a_table_and_a_figure():
+    config = DesignsConfig(
+        schemes=["faces-6", "mclaren-24"], approaches=["gravity"], positions=[16]
+    )
+    tasks = [config.task(approach) for approach in config.chosen_approaches]
+    table = efficiency_table(tasks, map(get_scheme, config.chosen_schemes), config.positions, 1)
+    by = table.set_index(["approach", "scheme", "criterion"])
+    assert by.loc[("gravity", "mclaren-24", "D"), "efficiency"] == pytest.approx(1, abs=1e-4)
+    assert by.loc[("gravity", "mclaren-24", "I"), "efficiency"] == pytest.approx(0.676, abs=2e-3)
+    assert by.loc[("gravity", "I-optimal 16", "I"), "efficiency"] > 0.97
+    faces = by.loc[("gravity", "faces-6", "A")]
+    assert faces["efficiency"] == 0
+    assert faces["reason"].startswith("rank 6 of 9")
+    rows = table[(table["criterion"] == "I") & (table["reason"] == "")]
+    rms = np.sqrt((rows["rms_roll"] ** 2 + rows["rms_pitch"] ** 2) / 2)
+    np.testing.assert_allclose(rms**2 * rows["efficiency"], rows["least_rms"] ** 2, rtol=1e-6)
+    figure = efficiency_figure(table)
+    above, below = figure.axes
+    assert above.get_title() == "gravity: share of the best there can be"
+    assert [text.get_text() for text in above.get_yticklabels()][-1] == "16 I-optimal"
+    assert below.get_xlabel() == "positions"
+
+
+@pytest.mark.parametrize(
+    ("section", "wrong"),
+    [
+        ({"positions": [8]}, "designs.*positions: must be from 9 to 300, not 8"),
+        ({"schemes": "faces-7"}, "unknown scheme 'faces-7'"),
+        ({"model": "bias-scale+hysteresis"}, "depends on the order of the positions"),
+        ({"tilt_range_gon": 100}, "designs.tilt_range_gon"),
+    ],
+)
+def test_a_section_that_cannot_be_done(section, wrong):
+    example = parse_example({"study": "x", "designs": section})
+    with pytest.raises(InputError, match=wrong):
+        parse_section(example, "designs", DesignsConfig)

@@ -1,0 +1,363 @@
+"""Optimal schemes: criteria, constraints, search, and known optima."""
+
+from itertools import combinations_with_replacement
+
+import numpy as np
+import pytest
+
+from accelstudy.adjustment import calibrate, whitened_jacobian
+from accelstudy.approaches import get_approach
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import GON
+from accelstudy.design.estimability import diagnose
+from accelstudy.design.optimal.constraints import (
+    Constraints,
+    LeastAngle,
+    OffPole,
+    PitchRange,
+    RollRange,
+)
+from accelstudy.design.optimal.continuous import continuous_optimum
+from accelstudy.design.optimal.criteria import get_criterion, rivals
+from accelstudy.design.optimal.information import information, position_rows
+from accelstudy.design.optimal.repeats import with_repeats
+from accelstudy.design.optimal.search import optimal_design
+from accelstudy.design.optimal.spaces import (
+    Listed,
+    Mountings,
+    Sphere,
+    attitudes,
+    by_eye,
+    cube,
+    listed_in,
+)
+from accelstudy.design.optimal.task import Task
+from accelstudy.design.proposal.separation import Explained, Separation
+from accelstudy.leveling.error import cap_forces, tilt_error
+from accelstudy.schemes import get_scheme
+from accelstudy.sensors.models import get_model
+from accelstudy.simulation.sessions import Noise, session
+
+NINE, GRAVITY = get_model("bias-scale-nonorthogonality"), get_approach("gravity")
+MCLAREN = get_scheme("mclaren-24").directions
+NEGLECTED = {"quadratic_scale": 1e-4, "cubic_scale": 1e-5}
+
+
+def random_directions(n, seed=1):
+    points = np.random.default_rng(seed).standard_normal((n, 3))
+    return points / np.linalg.norm(points, axis=1, keepdims=True)
+
+
+@pytest.mark.parametrize("approach", ["gravity", "robot"])
+@pytest.mark.parametrize("sigma_gravity", [0.0, 1e-5])
+def test_the_rows_of_positions_add_up_to_the_normal_matrix(approach, sigma_gravity):
+    noise, directions = Noise(sigma_gravity=sigma_gravity), get_scheme("mclaren-24").directions
+    truth = NINE.vector({"b_x": 0.05, "s_y": 0.004, "gamma_yz": 0.003})
+    rows = position_rows(NINE, get_approach(approach), noise, directions, truth)
+    assert rows.shape == (24, 1 if approach == "gravity" else 3, 9 + (sigma_gravity > 0))
+    seen = session(NINE, truth, directions).observations(noise)
+    whole = whitened_jacobian(NINE, get_approach(approach), seen, truth)
+    normal = whole.T @ whole
+    if sigma_gravity:
+        normal[-1, -1] -= sigma_gravity**-2
+    np.testing.assert_allclose(information(rows).sum(axis=0), normal, rtol=1e-9, atol=1e-6)
+    alone = position_rows(NINE, get_approach(approach), noise, directions[5:6], truth)
+    np.testing.assert_allclose(alone[0], rows[5], rtol=1e-9, atol=1e-9)
+
+
+# Criteria
+
+
+def efficiency(task, name, scheme, bound):
+    criterion = get_criterion(name, task)
+    value = float(criterion.value(task.normal(get_scheme(scheme).directions)))
+    return criterion.efficiency(value, bound)
+
+
+@pytest.mark.parametrize("approach", ["gravity", "robot"])
+def test_the_i_criterion_is_the_tilt_error_of_linear_theory(approach):
+    task = Task(NINE, get_approach(approach), tilt_range=30 * GON)
+    scheme = get_scheme("fibonacci-24")
+    design = diagnose(scheme, NINE, task.approach)
+    zero, f_b = np.zeros(9), cap_forces(30 * GON, 200)
+    rms = tilt_error(NINE, zero, NINE, zero, f_b).rms_of_all(design.cofactors)
+    np.testing.assert_allclose(task.rms_tilt(scheme.directions), rms, rtol=1e-9)
+    value = get_criterion("I", task).value(task.normal(scheme.directions))
+    assert float(np.exp(value)) == pytest.approx(np.mean(rms**2), rel=1e-9)
+
+
+def test_gravity_and_a_factory_calibration_are_prior_information():
+    sigmas = {name: 5e-4 for name in ("s_x", "s_y", "s_z")}
+    task = Task(NINE, GRAVITY, Noise(sigma_gravity=1e-5), prior_sigmas=sigmas)
+    directions = get_scheme("mclaren-24").directions
+    found = np.sqrt(np.diag(task.covariance(directions))) / task.scale
+    assert task.names[-1] == "g"
+    assert found[-1] == pytest.approx(1e-5, rel=1e-2)  # positions tell nothing beside scales
+    assert np.all(found[3:6] < 5e-4)
+    free = Task(NINE, GRAVITY, Noise(sigma_gravity=1e-5))
+    assert np.all(task.rms_tilt(directions) < free.rms_tilt(directions))
+    with pytest.raises(InputError, match="no parameter 's_w'; it has b_x"):
+        Task(NINE, GRAVITY, prior_sigmas={"s_w": 1.0})
+
+
+@pytest.mark.parametrize("name", ["D", "A", "I", "robust", "discriminate"])
+def test_gradients(name):
+    task = Task(NINE, GRAVITY, neglected=NEGLECTED)
+    normal = task.normal(get_scheme("fibonacci-24").directions)
+    criterion = rivals(task, *NEGLECTED) if name == "discriminate" else get_criterion(name, task)
+    turn = np.random.default_rng(1).standard_normal((2, *normal.shape))
+    for change in turn + turn.swapaxes(1, 2):
+        ahead, behind = (criterion.value(normal + h * change) for h in (1e-4, -1e-4))
+        slope = np.sum(criterion.gradient(normal) * change)
+        assert (ahead - behind) / 2e-4 == pytest.approx(slope, rel=1e-5, abs=1e-8)
+
+
+def test_the_error_by_a_neglected_effect_is_that_of_calibrations_without_it():
+    """Sessions of a sensor with the effect, adjusted without: linear theory against the rest."""
+    task = Task(NINE, GRAVITY, neglected={"quadratic_scale": 2e-4})
+    model, directions = task.extended, get_scheme("fibonacci-24").directions
+    f_b = cap_forces(task.tilt_range, 200)
+    squares = []
+    for axis in range(3):  # the effects of the axes are independent of each other
+        truth = np.zeros(12)
+        truth[9 + axis] = 2e-4
+        seen = session(model, truth, directions).observations(Noise())
+        fit = calibrate(NINE, GRAVITY, seen)
+        error = tilt_error(model, truth, NINE, fit.parameters[0], f_b)
+        squares.append(error.constant)
+    alone = Task(NINE, GRAVITY).rms_tilt(directions) ** 2
+    expected = alone + np.sum(squares, axis=0)
+    assert np.all(expected > 1.3 * alone)
+    np.testing.assert_allclose(task.rms_tilt(directions) ** 2, expected, rtol=2e-3)
+    value = get_criterion("robust", task).value(task.normal(directions))
+    assert float(np.exp(value)) == pytest.approx(expected.mean(), rel=2e-3)
+
+
+def test_no_positions_are_below_the_bound_of_a_neglected_effect():
+    task = Task(NINE, GRAVITY, neglected={"quadratic_scale": 2.5e-3})
+    criterion = get_criterion("robust", task)
+    found = optimal_design(task, criterion, 24, starts=1)
+    assert 0.9 < found.efficiency < 1
+    others = [random_directions(24, seed) for seed in range(50)]
+    assert min(criterion.value(task.normal(each)) for each in others) > found.value
+    plain = optimal_design(task, get_criterion("I", task), 24, starts=1, bounded=False)
+    assert np.all(task.rms_tilt(found.directions) < 0.5 * task.rms_tilt(plain.directions))
+
+
+# Known optima
+
+
+def test_moments_of_the_sphere_are_d_optimal_for_the_norm_of_gravity():
+    """The general equivalence theorem: d(x) ≤ p everywhere, with equality on the support."""
+    task = Task(NINE, GRAVITY)
+    criterion = get_criterion("D", task)
+    anywhere = random_directions(500)
+    for name in ("mclaren-24", "icosahedron-12", "dodecahedron-20"):
+        directions = get_scheme(name).directions
+        slope = -criterion.gradient(task.normal(directions))
+        each = len(directions) * np.einsum("kuw,uw->k", task.informations(anywhere), slope)
+        np.testing.assert_allclose(each, 9.0, rtol=1e-6)
+    bound = continuous_optimum(task, criterion, Sphere(), Constraints(), 24).bound
+    assert efficiency(task, "D", "mclaren-24", bound) == pytest.approx(1, abs=2e-5)
+    assert efficiency(task, "D", "faces-edges-18", bound) < 0.99
+
+
+def test_nine_d_optimal_positions_are_the_extremal_points_of_degree_2():
+    task = Task(NINE, GRAVITY)
+    criterion = get_criterion("D", task)
+    known = float(criterion.value(task.normal(get_scheme("d-optimal-9").directions)))
+    found = optimal_design(task, criterion, 9, starts=6)
+    assert found.value == pytest.approx(known, abs=1e-6)
+    assert found.efficiency < 1
+    values = [criterion.value(task.normal(random_directions(9, seed))) for seed in range(300)]
+    assert min(values) > known
+
+
+@pytest.mark.parametrize(("approach", "name"), [("gravity", "I"), ("robot", "I"), ("robot", "D")])
+def test_a_continuous_optimum_has_its_own_equivalence_theorem(approach, name):
+    """No direction has a larger derivative than those that have a share, which are all equal."""
+    task = Task(NINE, get_approach(approach), tilt_range=30 * GON)
+    criterion = get_criterion(name, task)
+    best = continuous_optimum(task, criterion, Sphere(), Constraints(), 24)
+    assert 0 <= best.value - best.bound < 2e-4
+    normal = 24 * np.einsum("k,kuw->uw", best.shares, task.informations(best.directions))
+    assert float(criterion.value(normal)) == pytest.approx(best.value, abs=1e-9)
+    slope = -24 * criterion.gradient(normal)
+    whole = 9 if name == "D" else 1  # of a logarithm of a homogeneous function, times its degree
+    anywhere = np.einsum("kuw,uw->k", task.informations(random_directions(3000)), slope)
+    assert anywhere.max() <= whole + 3e-4
+    held = task.informations(best.directions[best.shares > 1e-3])
+    np.testing.assert_allclose(np.einsum("kuw,uw->k", held, slope), whole, atol=2e-3)
+
+
+def test_optimal_positions_level_better_than_those_of_the_literature():
+    task = Task(NINE, GRAVITY)
+    found = optimal_design(task, get_criterion("I", task), 24, starts=2)
+    assert found.efficiency > 0.995
+    assert efficiency(task, "I", "mclaren-24", found.bound) == pytest.approx(0.676, abs=5e-3)
+    assert np.all(task.rms_tilt(found.directions) < task.rms_tilt(MCLAREN))
+
+
+def test_the_exchange_finds_the_best_of_all_choices():
+    task = Task(get_model("bias-scale"), get_approach("robot"))
+    points = random_directions(8, 5)
+    for name in "DAI":
+        criterion = get_criterion(name, task)
+        choices = combinations_with_replacement(range(8), 3)
+        best = min(float(criterion.value(task.normal(points[list(c)]))) for c in choices)
+        found = optimal_design(task, criterion, 3, Listed(points, "eight"), bounded=False)
+        assert found.value == pytest.approx(best, abs=1e-9)
+
+
+def test_the_same_arguments_give_the_same_positions():
+    task = Task(NINE, GRAVITY)
+    one, two = (
+        optimal_design(task, get_criterion("I", task), 10, starts=2, bounded=False)
+        for _ in range(2)
+    )
+    np.testing.assert_array_equal(one.directions, two.directions)
+    with pytest.raises(InputError, match="8 positions do not determine 9 parameters; at least 9"):
+        get_scheme("d-optimal-8")
+
+
+# Constraints
+
+
+@pytest.fixture(scope="module")
+def free():
+    """Twelve positions without a constraint."""
+    task = Task(NINE, get_approach("robot"))
+    return optimal_design(task, get_criterion("I", task), 12, starts=2)
+
+
+LEVEL = Constraints((RollRange(-60 * GON, 60 * GON), PitchRange(-60 * GON, 60 * GON)))
+
+
+@pytest.mark.parametrize(
+    "constraints",
+    [
+        LEVEL,
+        Constraints((), LeastAngle(35 * GON)),
+        Constraints((OffPole(50 * GON), *LEVEL.single), LeastAngle(12 * GON)),
+    ],
+)
+def test_constraints_are_kept_and_cost_efficiency(constraints, free):
+    task = Task(NINE, get_approach("robot"))
+    criterion = get_criterion("I", task)
+    found = optimal_design(task, criterion, 12, constraints=constraints, starts=2)
+    assert constraints.kept(found.directions)
+    assert free.value < found.value < free.value + 0.2
+    assert found.efficiency > 0.9
+    roll, pitch = attitudes(found.directions).T
+    if constraints.single:
+        assert np.abs(roll).max() < 60 * GON + 1e-6
+        assert np.abs(pitch).max() > 59 * GON or np.abs(roll).max() > 59 * GON  # moved to the edge
+    pairs = np.arccos(np.clip(found.directions @ found.directions.T, -1, 1))[np.triu_indices(12, 1)]
+    if constraints.pair is not None:
+        assert pairs.min() > constraints.pair.angle - 1e-6
+
+
+def test_few_mountings_turn_about_few_axes():
+    task, space = Task(NINE, get_approach("robot")), Mountings(2)
+    assert len(space.axes) == 9
+    found = optimal_design(task, get_criterion("I", task), 10, space, starts=1)
+    axes = np.array(space.axes) / np.linalg.norm(space.axes, axis=1, keepdims=True)
+    horizontal = np.abs(found.directions @ axes.T) < 1e-9
+    assert any(np.all(horizontal[:, i] | horizontal[:, j]) for i in range(9) for j in range(i))
+    assert found.efficiency > 0.98
+
+
+def test_attitudes_of_a_cube_of_a_hand_and_of_a_file(tmp_path):
+    assert len(cube().directions(0)) == 26
+    np.testing.assert_allclose(
+        np.unique(np.degrees(attitudes(by_eye(np.pi / 6).points)[:, 1]).round(6)),
+        np.arange(-90, 91, 30),
+        atol=1e-6,
+    )
+    path = tmp_path / "mine.csv"
+    path.write_text("roll_deg,pitch_deg\n0,0\n90,0\n0,-45\n", encoding="utf-8")
+    listed = listed_in(path)
+    np.testing.assert_allclose(
+        sorted(attitudes(listed.points).tolist()),
+        [[0, -np.pi / 4], [0, 0], [np.pi / 2, 0]],
+        atol=1e-9,
+    )
+    task = Task(NINE, get_approach("robot"))
+    criterion = get_criterion("I", task)
+    with pytest.raises(InputError, match=r"the allowed attitudes do not suffice: rank"):
+        optimal_design(task, criterion, 9, Listed(listed.points[:2], "two"))
+    for text, wrong in {
+        "a,b\n1,2\n": "expected x, y, z; roll_gon, pitch_gon",
+        "x,y,z\n1,0,0\n1,?,0\n": "row 2: x, y, z must be numbers",
+        "": "no CSV table",
+    }.items():
+        path.write_text(text, encoding="utf-8")
+        with pytest.raises(InputError, match=wrong):
+            listed_in(path)
+
+
+def test_what_cannot_be_is_said_in_one_line():
+    task = Task(NINE, GRAVITY)
+    criterion = get_criterion("D", task)
+    with pytest.raises(
+        InputError, match=r"9 positions at least 150 gon between positions were not"
+    ):
+        optimal_design(task, criterion, 9, constraints=Constraints((), LeastAngle(150 * GON)))
+    nowhere = Constraints((PitchRange(90 * GON, 100 * GON), OffPole(30 * GON)))
+    with pytest.raises(
+        InputError, match="no attitude is left of all attitudes with pitch from 90 gon"
+    ):
+        optimal_design(task, criterion, 9, constraints=nowhere)
+    with pytest.raises(InputError, match=r"depends on the order of the positions \(step_x\)"):
+        Task(get_model("bias-scale+hysteresis"), GRAVITY)
+    with pytest.raises(InputError, match="needs the time of each position"):
+        Task(get_model("bias-scale+bias_drift"), GRAVITY)
+
+
+# Telling two explanations apart
+
+
+def test_the_separation_grows_by_what_the_wrong_explanation_misses():
+    """One after the other, positions add what a fit of all of them together misses more."""
+    rng = np.random.default_rng(7)
+    old, new = rng.standard_normal((2, 12, 4)), rng.standard_normal((2, 3, 2, 4))
+    seen = rng.standard_normal(12)
+    inverses = [np.linalg.pinv(rows) for rows in old]
+    first, second = (Explained(i @ seen, i @ i.T) for i in inverses)
+    separation, grown = Separation.of(first, second), 0.0
+    for k in range(3):
+        columns = (new[0, k], new[1, k])
+        grown += separation.gains((columns[0][None], columns[1][None]))[0]
+        separation = separation.taking(columns)
+
+    def left(rows, values):
+        return values @ (values - rows @ np.linalg.lstsq(rows, values, rcond=None)[0])
+
+    expected = 0.0
+    for right, wrong, one in ((0, 1, first), (1, 0, second)):
+        shown = np.concatenate([seen, new[right].reshape(6, 4) @ one.values])
+        rows = np.concatenate([old[wrong], new[wrong].reshape(6, 4)])
+        expected += (left(rows, shown) - left(old[wrong], seen)) / 2
+    assert grown == pytest.approx(expected, rel=1e-9)
+
+
+def test_positions_that_hardly_differ_are_one_that_is_repeated():
+    task = Task(NINE, get_approach("robot"))
+    criterion = get_criterion("I", task)
+    best = optimal_design(task, criterion, 12, starts=3, bounded=False).directions
+    cosines = (best @ best.T)[np.triu_indices(12, 1)]
+    same = cosines > 1 - 1e-12
+    assert same.any()
+    assert cosines[~same].max() < np.cos(1 * GON)
+
+    apart = random_directions(12)
+    assert with_repeats(task, criterion, Constraints(), apart) is apart
+    beside = np.cross(apart[0], apart[1])
+    near = apart[0] + 0.01 * GON * beside / np.linalg.norm(beside)
+    thirteen = np.vstack([apart, near / np.linalg.norm(near)])
+    joined = with_repeats(task, criterion, Constraints(), thirteen)
+    np.testing.assert_array_equal(joined[0], joined[12])
+    np.testing.assert_array_equal(joined[1:12], thirteen[1:12])
+    assert any(np.array_equal(joined[0], thirteen[i]) for i in (0, 12))
+    kept = Constraints(pair=LeastAngle(0.001 * GON))
+    assert with_repeats(task, criterion, kept, thirteen) is thirteen

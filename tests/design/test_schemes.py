@@ -1,0 +1,389 @@
+"""Position schemes: what the literature and geometry say of them."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from places import SHARED
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from accelstudy.schemes import (
+    Scheme,
+    UnknownSchemeError,
+    get_scheme,
+    register,
+    registry,
+    scheme_families,
+    scheme_names,
+)
+from accelstudy.schemes.mclaren import mclaren_orbit
+from accelstudy.schemes.polyhedra import generic
+
+# Neither symmetric nor of unit length; the last one is on the roll pole.
+LOPSIDED = np.array([[0.0, 0.0, 2.0], [1.0, 0.0, 1.0], [3.0, 0.0, 0.0]])
+
+
+def scheme(directions):
+    return Scheme("test", "Test", directions, "generated", "test")
+
+
+def angles(directions):
+    """Angles between all pairs, rad."""
+    i, j = np.triu_indices(len(directions), 1)
+    cosine = np.einsum("ij,ij->i", directions[i], directions[j])
+    return np.arccos(np.clip(cosine, -1, 1))
+
+
+def condition(design):
+    """Condition number of a design with columns scaled to unit length."""
+    return np.linalg.cond(design / np.linalg.norm(design, axis=0))
+
+
+def gravity_design(u):
+    """Design of the nine parameters under the gravity norm, in units of g."""
+    x, y, z = u.T
+    return np.column_stack([u, u**2, x * y, x * z, y * z])
+
+
+def sphere_moment(*powers):
+    """Mean of x^a y^b z^c over the sphere."""
+    if any(power % 2 for power in powers):
+        return 0.0
+    odd = [np.prod(np.arange(power - 1, 0, -2)) for power in (*powers, sum(powers) + 2)]
+    return odd[0] * odd[1] * odd[2] / odd[3]
+
+
+# The registry
+
+
+def test_names_are_those_of_the_literature_and_more():
+    assert scheme_names() == (
+        "faces-6",
+        "d-optimal-9",
+        "icosahedron-12",
+        "faces-edges-18",
+        "dodecahedron-20",
+        "antipodal-free-24",
+        "fibonacci-24",
+        "mclaren-24",
+        "rhombicuboctahedron-24",
+        "rings-24",
+        "faces-edges-corners-26",
+        "icosidodecahedron-30",
+        "fibonacci-36",
+        "random-38",
+        "xsens-38",
+        "fibonacci-50",
+    )
+    assert scheme_families() == (
+        "antipodal-free-N",
+        "d-optimal-N",
+        "fibonacci-N",
+        "i-optimal-N",
+        "random-N",
+        "random-N-SEED",
+    )
+
+
+@pytest.mark.parametrize("name", scheme_names())
+def test_a_scheme_is_what_its_name_says(name):
+    found = get_scheme(name)
+    n = int(name.rsplit("-", 1)[1])
+    assert found.name == name
+    assert found.n_positions == n
+    assert found.directions.shape == (n, 3)
+    assert found.title.startswith(f"{n} ")
+    assert found.source
+    assert found.status in {"exact", "standard", "stand-in", "generated"}
+    np.testing.assert_allclose(np.linalg.norm(found.directions, axis=1), 1, rtol=1e-15)
+
+
+def test_directions_are_read_only():
+    with pytest.raises(ValueError, match="read-only"):
+        get_scheme("mclaren-24").directions[0, 0] = 1
+
+
+@pytest.mark.parametrize(
+    ("name", "close"),
+    [
+        ("mclaren", "mclaren-24"),
+        ("McLaren-24", "mclaren-24"),
+        ("face-6", "faces-6"),
+        ("fibonacci-0", "fibonacci-50"),
+        ("fibonacci-024", "fibonacci-24"),
+        ("fibonaci-12", "fibonacci-12"),
+        ("randm-20-7", "random-20-7"),
+        ("random-38-01", "random-38"),
+    ],
+)
+def test_unknown_names_are_answered_with_the_valid_ones(name, close):
+    with pytest.raises(UnknownSchemeError) as error:
+        get_scheme(name)
+    message = str(error.value)
+    assert f"unknown scheme {name!r}" in message
+    assert f"Did you mean {close!r}?" in message
+    for known in (*scheme_names(), *scheme_families()):
+        assert known in message
+
+
+def test_nothing_is_suggested_for_a_name_like_no_other():
+    with pytest.raises(UnknownSchemeError, match=r"unknown scheme 'zzz'\. Schemes: faces-6"):
+        get_scheme("zzz")
+
+
+def test_a_name_is_registered_once():
+    with pytest.raises(ValueError, match="'mclaren-24' is registered already"):
+        register("mclaren-24", title="", status="generated", source="")(mclaren_orbit)
+
+
+def test_a_registered_scheme_is_found_by_its_name_and_its_family(monkeypatch):
+    monkeypatch.setattr(registry, "_entries", dict(registry._entries))
+
+    @register("test-ring-N", title="ring from {0}", status="generated", source="a test")
+    def ring(n):
+        angle = 2 * np.pi * np.arange(n) / n
+        return np.column_stack([np.zeros(n), np.sin(angle), np.cos(angle)])
+
+    assert get_scheme("test-ring-7").title == "7 ring from 7"
+    assert "test-ring-N" in scheme_families()
+
+
+@pytest.mark.parametrize(
+    "directions", [np.zeros((0, 3)), np.ones(3), np.ones((4, 2)), np.zeros((1, 3)), [[np.nan] * 3]]
+)
+def test_directions_that_are_none_are_refused(directions):
+    with pytest.raises(ValueError, match="directions must"):
+        scheme(directions)
+
+
+def test_properties():
+    found = scheme(LOPSIDED)
+    np.testing.assert_allclose(found.directions[1], [np.sqrt(0.5), 0, np.sqrt(0.5)])
+    assert found.n_positions == 3
+    assert found.fourth_moment == pytest.approx(1 / 4 / 9)
+    assert found.pole_distance == 0
+    assert scheme(LOPSIDED[:2]).pole_distance == pytest.approx(np.pi / 4)
+    assert scheme(-LOPSIDED[:2]).pole_distance == pytest.approx(np.pi / 4)
+
+
+def test_rotation_is_about_fixed_axes():
+    angle = np.radians([15, 25, 35])
+    turned = scheme(LOPSIDED).rotated(angle)
+    (cx, cy, cz), (sx, sy, sz) = np.cos(angle), np.sin(angle)
+    about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
+    expected = scheme(LOPSIDED).directions @ (about_z @ about_y @ about_x).T
+    np.testing.assert_allclose(turned.directions, expected, atol=1e-15)
+    assert turned.name == "test-rotated"
+    assert not turned.directions.flags.writeable
+
+
+# Geometry
+
+
+@pytest.mark.parametrize(
+    ("name", "m"),
+    [
+        ("faces-6", 0),
+        ("faces-edges-18", 0.0556),
+        ("rings-24", 0.0417),
+        ("rhombicuboctahedron-24", 0.0688),
+        ("mclaren-24", 0.0667),
+        ("icosahedron-12", 0.0667),
+        ("dodecahedron-20", 0.0667),
+        ("icosidodecahedron-30", 0.0667),
+        ("faces-edges-corners-26", 0.0726),
+    ],
+)
+def test_fourth_moments(name, m):
+    assert get_scheme(name).fourth_moment == pytest.approx(m, abs=5e-5)
+
+
+@pytest.mark.parametrize(
+    ("name", "separation", "edges"),
+    [
+        ("faces-6", np.pi / 2, 12),
+        ("icosahedron-12", np.arccos(np.sqrt(1 / 5)), 30),
+        ("dodecahedron-20", np.arccos(np.sqrt(5) / 3), 30),
+        ("rhombicuboctahedron-24", np.arccos((3 + 2 * np.sqrt(2)) / (5 + 2 * np.sqrt(2))), 48),
+        ("icosidodecahedron-30", np.pi / 5, 60),
+    ],
+)
+def test_polyhedra_have_their_edges(name, separation, edges):
+    found = angles(get_scheme(name).directions)
+    assert found.min() == pytest.approx(separation)
+    assert np.isclose(found, separation).sum() == edges
+
+
+def test_faces_edges_and_corners_are_distinct_and_paired():
+    for name in ("faces-6", "faces-edges-18", "faces-edges-corners-26"):
+        directions = get_scheme(name).directions
+        assert len(np.unique(directions.round(9), axis=0)) == len(directions)
+        np.testing.assert_array_equal(directions[::2], -directions[1::2])
+        np.testing.assert_array_equal(directions[0], [0, 0, 1])
+        np.testing.assert_array_equal(directions[:6], get_scheme("faces-6").directions)
+
+
+def test_rings_visit_faces_twice():
+    directions, counts = np.unique(
+        get_scheme("rings-24").directions.round(9), axis=0, return_counts=True
+    )
+    assert len(directions) == 18
+    np.testing.assert_array_equal(counts, np.where(np.count_nonzero(directions, axis=1) == 1, 2, 1))
+
+
+def test_mclaren_is_a_7_design():
+    for directions in (mclaren_orbit(), get_scheme("mclaren-24").directions):
+        for powers in product(range(8), repeat=3):
+            if sum(powers) <= 7:
+                moment = np.mean(np.prod(directions**powers, axis=1))
+                assert moment == pytest.approx(sphere_moment(*powers), abs=1e-14), powers
+
+
+def test_mclaren_positions_are_apart_and_never_opposite():
+    found = np.degrees(angles(get_scheme("mclaren-24").directions))
+    assert found.min() == pytest.approx(41.4, abs=0.05)
+    assert found.max() < 170
+
+
+def test_mclaren_is_the_orbit_of_its_point():
+    orbit = mclaren_orbit()
+    point = np.array([0.2666354, 0.42251865, 0.86624682])
+    np.testing.assert_allclose(np.sort(np.abs(orbit)), np.tile(point, (24, 1)), atol=5e-9)
+    assert len(np.unique(orbit.round(9), axis=0)) == 24
+    turned = scheme(orbit).rotated(np.radians([15, 25, 35]))
+    np.testing.assert_allclose(turned.directions, get_scheme("mclaren-24").directions, atol=1e-15)
+
+
+def test_mclaren_is_turned_off_the_roll_pole():
+    assert np.degrees(get_scheme("mclaren-24").pole_distance) == pytest.approx(13.8, abs=0.05)
+
+
+def test_the_generic_orientation_is_by_the_angles_it_names():
+    turned = Rotation.from_euler("xyz", [15, 25, 35], degrees=True).apply(np.eye(3))
+    np.testing.assert_allclose(generic(np.eye(3)), turned, rtol=0, atol=3e-16)
+
+
+@pytest.mark.parametrize("name", ["mclaren-24", "dodecahedron-20", "icosidodecahedron-30"])
+def test_generic_orientations_determine_cubic_terms_by_gravity(name):
+    """An error k_i f_i³ changes the norm by k_i u_i⁴."""
+    u = get_scheme(name).directions
+    assert condition(np.hstack([gravity_design(u), u**4])) < 40
+    assert np.degrees(get_scheme(name).pole_distance) > 9
+
+
+def test_aligned_orbits_do_not_determine_cubic_terms_by_gravity():
+    for u in (mclaren_orbit(), get_scheme("rhombicuboctahedron-24").directions):
+        assert condition(np.hstack([gravity_design(u), u**4])) > 1e9
+    u = get_scheme("mclaren-24").directions
+    assert condition(np.hstack([gravity_design(u), u**4])) == pytest.approx(16, abs=0.5)
+
+
+@pytest.mark.parametrize(
+    "name", [name for name in scheme_names() if get_scheme(name).n_positions > 17]
+)
+def test_orders_keep_a_drift_apart_from_the_parameters(name):
+    """A linear drift of each bias, beside the 9 parameters (norm) and beside the affine ones."""
+    u = get_scheme(name).directions
+    time = np.linspace(-1, 1, len(u))[:, None]
+    assert condition(np.hstack([gravity_design(u), time * u])) < 20
+    assert condition(np.hstack([np.ones_like(time), u, time])) < 3
+
+
+# Families
+
+
+@given(n=st.integers(1, 2000))
+@settings(deadline=None, max_examples=50)
+def test_fibonacci(n):
+    found = get_scheme(f"fibonacci-{n}")
+    assert found.n_positions == n
+    np.testing.assert_allclose(np.linalg.norm(found.directions, axis=1), 1, rtol=1e-15)
+    assert found.pole_distance == pytest.approx(np.arccos(1 - 1 / n))
+    if n > 1:
+        # Among n points on the sphere, two are at most about √(8 π / √3 / n) apart.
+        assert angles(found.directions).min() * np.sqrt(n) > 2.5
+
+
+@given(n=st.integers(2, 500))
+@settings(deadline=None, max_examples=50)
+def test_antipodal_free(n):
+    directions = get_scheme(f"antipodal-free-{n}").directions
+    between_axes = np.minimum(angles(directions), np.pi - angles(directions))
+    assert between_axes.min() * np.sqrt(n) > 1
+
+
+@given(n=st.integers(1, 200), seed=st.integers(0, 10**18 - 1))
+@settings(deadline=None, max_examples=50)
+def test_random(n, seed):
+    found = get_scheme(f"random-{n}-{seed}")
+    assert found.n_positions == n
+    assert found.title == f"{n} hand placed, seed {seed}"
+    np.testing.assert_allclose(np.linalg.norm(found.directions, axis=1), 1, rtol=1e-15)
+    registry._registered.cache_clear()
+    np.testing.assert_array_equal(get_scheme(found.name).directions, found.directions)
+
+
+def test_random_has_a_default_seed():
+    default = get_scheme("random-38").directions
+    np.testing.assert_array_equal(default, get_scheme("random-38-0").directions)
+    assert not np.allclose(default, get_scheme("random-38-1").directions)
+
+
+def test_random_positions_are_faces_and_free_in_turn():
+    directions = get_scheme("random-1200").directions
+    to_face = np.degrees(np.arccos(np.abs(directions).max(axis=1)))
+    assert np.sqrt(np.mean(to_face[::2] ** 2) / 2) == pytest.approx(2, rel=0.1)
+    sides = directions[::2].round().reshape(100, 6, 3)
+    for turn in sides:  # each face once
+        np.testing.assert_array_equal(turn.sum(axis=0), 0)
+        np.testing.assert_array_equal(np.abs(turn).sum(axis=0), 2)
+    np.testing.assert_allclose(
+        directions[1::2].T @ directions[1::2] / 600, np.eye(3) / 3, atol=0.05
+    )
+
+
+# The Xsens log
+
+
+@pytest.fixture(scope="module")
+def xsens_counts():
+    path = SHARED / "data" / "imu_tk_xsens" / "derived_static_means.csv"
+    if not path.exists():
+        pytest.skip(f"needs {path}; set ACCELSTUDY_SHARED")
+    table = np.genfromtxt(path, delimiter=",", names=True)
+    return np.column_stack([table["ax"], table["ay"], table["az"]])
+
+
+def test_xsens_directions_are_those_of_the_log(xsens_counts):
+    g = 9.81744
+
+    def force(parameters):
+        offset, scale, (yz, zy, zx) = parameters[:3], parameters[3:6], parameters[6:]
+        matrix = np.array([[1, -yz, zy], [0, 1, -zx], [0, 0, 1]])
+        return (xsens_counts - 100 * offset) / scale @ matrix.T
+
+    fit = least_squares(
+        lambda parameters: np.linalg.norm(force(parameters), axis=1) - g,
+        [331, 333, 324, 415, 415, 415, 0, 0, 0],
+        x_scale="jac",
+    )
+    np.testing.assert_allclose(fit.x[3:6], [414.4143, 412.0467, 414.6139], atol=0.03)
+    np.testing.assert_allclose(
+        get_scheme("xsens-38").directions, scheme(-force(fit.x)).directions, atol=2e-5
+    )
+
+
+def test_xsens_log_begins_level_with_z_up():
+    first = get_scheme("xsens-38").directions[0]
+    assert np.degrees(np.arccos(-first[2])) < 1.5
+
+
+def test_xsens_holds_come_to_faces_again():
+    """The figures that the hand-placed family is modelled on."""
+    to_face = np.degrees(np.arccos(np.abs(get_scheme("xsens-38").directions).max(axis=1)))
+    assert np.sum(to_face < 5) == 21

@@ -1,0 +1,381 @@
+"""Bad and odd input of a diagnosis: it works sensibly, or says in one line why not."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from click.testing import CliRunner
+from diagnosis_helpers import NINE, ROTATIONS, campaign
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from accelstudy.basics.errors import InputError
+from accelstudy.campaign import write_campaign
+from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
+from accelstudy.commands.main import main
+from accelstudy.diagnosis.pipeline import diagnose
+from accelstudy.diagnosis.report.document import diagnosis_document
+from accelstudy.effects import effect_names
+from accelstudy.leveling.angles import specific_force
+
+N = 36
+pytestmark = pytest.mark.usefixtures("not_rendered")
+VERDICTS = {"no_effect", "named", "unknown", "noise_model", "gross_error"}
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return campaign()[0]
+
+
+@pytest.fixture(scope="module")
+def gravity():
+    return campaign(approach="gravity")[0]
+
+
+def command(folder, measured, *options, header=None, table=None, out="out"):
+    """Write a campaign, change its files, and diagnose it by the command."""
+    write_campaign(measured, folder / "c", plausible=False)
+    if header is not None:
+        path = folder / "c/campaign.yaml"
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+        header(content)
+        path.write_text(yaml.safe_dump(content), encoding="utf-8")
+    if table is not None:
+        path = folder / "c/positions.csv"
+        table(pd.read_csv(path)).to_csv(path, index=False)
+    arguments = ["diagnose", str(folder / "c"), "--out", str(folder / out), "--replicates", "100"]
+    return CliRunner().invoke(main, [*arguments, *options])
+
+
+def document(folder, run):
+    assert run.exit_code == 0, run.output
+    return json.loads((folder / "out/diagnosis.json").read_text(encoding="utf-8"))
+
+
+def cell(column, row, value):
+    def change(table):
+        table = table.astype(object)
+        table.loc[row, column] = value
+        return table
+
+    return change
+
+
+# --- bad input -----------------------------------------------------------------------------------
+
+TABLES = {
+    "NaN": (cell("fx", 3, "NaN"), ("fx: position 4", "not finite")),
+    "nothing": (cell("fy", 3, ""), ("fy: position 4", "empty")),
+    "no fy": (lambda t: t.drop(columns="fy"), ("fy: the column is missing",)),
+    "no position": (lambda t: t.drop(columns="position"), ("position: the column is missing",)),
+    "a label twice": (cell("position", 5, 5), ("position: position 5", "follows no smaller")),
+    "no label": (cell("position", 5, ""), ("position: row 6: empty",)),
+    "shuffled": (
+        lambda t: t.sample(frac=1, random_state=1),
+        ("follows no smaller", "in order of acquisition"),
+    ),
+    "backwards": (
+        lambda t: t.assign(time_s=t["time_s"].to_numpy()[::-1]),
+        ("time_s: position 2", "in order of acquisition"),
+    ),
+    "endless force": (
+        lambda t: t.assign(fx=t["fx"] * 1e300),
+        ("fx: position 1", "must be from -1e+12"),
+    ),
+    "no force": (
+        lambda t: t.assign(**{f: 1e-300 * np.arange(N) for f in ("fx", "fy", "fz")}),
+        ("fx, fy, fz", "no unit"),
+    ),
+    "endless angles": (
+        lambda t: t.assign(roll_robot_gon=t["roll_robot_gon"] * 1e300),
+        ("roll_robot_gon: position 1", "must be from -400 to 400 gon"),
+    ),
+    "endless heat": (
+        lambda t: t.assign(temperature_degC=t["temperature_degC"] * 1e300),
+        ("temperature_degC: position 1", "must be from -273.15 to 10000 °C"),
+    ),
+    "feet": (
+        lambda t: t.assign(**{f: 3.28 * t[f] for f in ("fx", "fy", "fz")}),
+        ("fx, fy, fz", "nowhere near gravity"),
+    ),
+}
+HEADERS = {
+    "no sigma at all": (("sensor_noise", "sigma_mps2", 0.0), "sensor_noise.sigma_mps2"),
+    "tiny sigma": (("sensor_noise", "sigma_mps2", 1e-12), "sensor_noise.sigma_mps2"),
+    "endless sigma": (("sensor_noise", "sigma_mps2", 1e160), "sensor_noise.sigma_mps2"),
+    "endless angle sigma": (("robot", "angle_sigma_mgon", 1e300), "robot.angle_sigma_mgon"),
+    "endless gravity": (("gravity", "value_mps2", 1e200), "gravity.value_mps2"),
+    "no gravity": (("gravity", "value_mps2", 1e-200), "gravity.value_mps2"),
+    "endless gravity sigma": (("gravity", "sigma_mps2", 1e300), "gravity.sigma_mps2"),
+}
+
+
+def assert_one_line(run, folder, *words):
+    assert run.exit_code == 2, run.output
+    assert run.stdout == ""
+    assert run.stderr.startswith("error: ")
+    assert run.stderr.count("\n") == 1
+    for word in words:
+        assert word in run.stderr
+    assert not (folder / "out").exists()
+
+
+@pytest.mark.parametrize("case", TABLES)
+def test_a_bad_table_is_one_line(robot, case, tmp_path):
+    change, words = TABLES[case]
+    assert_one_line(command(tmp_path, robot, table=change), tmp_path, *words)
+
+
+@pytest.mark.parametrize("case", HEADERS)
+def test_a_bad_header_is_one_line(robot, case, tmp_path):
+    (block, key, value), words = HEADERS[case]
+    run = command(tmp_path, robot, header=lambda content: content[block].update({key: value}))
+    assert_one_line(run, tmp_path, "campaign.yaml", words)
+
+
+def test_counts_without_their_scale_are_one_line(robot, tmp_path):
+    counts = replace(
+        robot, unit="counts", nominal_scale=np.full(3, 1e-6), nominal_offset=np.zeros(3)
+    )
+    run = command(tmp_path, counts, header=lambda content: content.pop("nominal"))
+    assert_one_line(run, tmp_path, "campaign.yaml: nominal: missing")
+
+
+def test_a_sigma_that_vanishes_beside_the_robot_is_one_line(robot, tmp_path):
+    """A radian of the robot against 1e-9 m/s²: their variances differ by more than 1e16."""
+    run = command(tmp_path, replace(robot, sigma_force=1e-9, sigma_angle=1.0))
+    assert_one_line(run, tmp_path, "sensor_noise.sigma_mps2", "robot.angle_sigma_mgon")
+
+
+def test_a_robot_that_is_not_there_is_one_line(gravity, tmp_path):
+    run = command(tmp_path, gravity, "--approach", "robot")
+    assert_one_line(run, tmp_path, "roll_robot_gon")
+
+
+@pytest.mark.parametrize(
+    ("scheme", "words"), [("faces-6", "do not determine"), ("d-optimal-9", "no redundancy")]
+)
+def test_too_few_positions_are_one_line(scheme, words, tmp_path):
+    few, _ = simulate_campaign(CampaignSettings(scheme=scheme, approach="gravity"))
+    assert_one_line(command(tmp_path, few), tmp_path, words)
+
+
+def test_a_file_where_the_folder_should_be_is_left_alone(robot, tmp_path):
+    (tmp_path / "out").write_text("mine", encoding="utf-8")
+    run = command(tmp_path, robot)
+    assert run.exit_code == 2
+    assert "not a folder" in run.stderr
+    assert (tmp_path / "out").read_text(encoding="utf-8") == "mine"
+
+
+def test_forces_at_random_are_one_line(gravity, tmp_path):
+    noise = replace(gravity, forces=6 * np.random.default_rng(1).standard_normal((N, 3)))
+    assert_one_line(command(tmp_path, noise), tmp_path, "does not converge")
+
+
+# --- odd input that works ------------------------------------------------------------------------
+
+
+def test_what_needs_a_missing_column_is_untestable_with_the_reason(robot, tmp_path):
+    gone = ["temperature_degC", "vibration_mps2", "time_s"]
+    found = document(tmp_path, command(tmp_path, robot, table=lambda t: t.drop(columns=gone)))
+    reasons = found["untestable_reasons"]
+    needs = {
+        "time": {"bias_drift", "bias_jump", "warm_up"},
+        "temperature": {"thermal_bias", "thermal_curve", "thermal_scale"},
+        "vibration": {"vibration_rectification"},
+    }
+    assert set(found["untestable_effects"]) == set(reasons) == set().union(*needs.values())
+    for column, effects in needs.items():
+        assert all(repr(column) in reasons[effect] for effect in effects)
+
+
+def test_what_does_not_change_shows_nothing(robot, tmp_path):
+    still = replace(robot, temperature=np.full(N, 20.0), vibration=np.ones(N), time=np.zeros(N))
+    run = command(tmp_path, still)
+    hidden = {
+        *("thermal_bias", "thermal_scale", "vibration_rectification", "gravity_error"),
+        *("bias_drift", "bias_jump", "warm_up", "thermal_curve", "mounting_slip"),
+    }
+    found = document(tmp_path, run)
+    assert set(found["invisible_effects"]) == hidden
+    assert found["untestable_effects"] == []
+    assert "cannot see" in run.stdout
+    assert "thermal bias" in run.stdout
+
+
+def test_no_effect_is_silently_absent(gravity):
+    """Every effect is in the model, tested, invisible, or untestable with the reason."""
+    few, _ = simulate_campaign(CampaignSettings(scheme="icosahedron-12", approach="gravity"))
+    for measured in (gravity, few, replace(gravity, temperature=None, time=None)):
+        found = diagnosis_document(diagnose(measured, NINE))
+        tested = {c["name"] for c in found["screening"]["candidates"]}
+        listed = [*found["invisible_effects"], *found["untestable_effects"]]
+        known = {effect.name for effect in NINE.effects}
+        assert (tested | set(listed) | known) >= set(effect_names())
+        assert not tested & set(listed)
+        assert all(found["untestable_reasons"][name] for name in found["untestable_effects"])
+
+
+def test_the_robot_is_not_used_if_told_so(robot, tmp_path):
+    found = document(tmp_path, command(tmp_path, robot, "--approach", "gravity"))
+    assert found["approach"] == "gravity"
+    assert set(found["invisible_effects"]) >= ROTATIONS
+
+
+def test_counts_are_diagnosed_like_what_they_count(robot):
+    """Up to the rounding of the conversion, the numbers are the same."""
+    scale, offset = np.array([0.0236, -0.0236, 0.0236]), np.array([33123.0, 33275.0, 32364.0])
+    counts = replace(robot, unit="counts", nominal_scale=scale, nominal_offset=offset)
+    plain, counted = (diagnosis_document(diagnose(c, NINE)) for c in (robot, counts))
+    assert plain["verdict"] == counted["verdict"]
+    assert plain["global_test"] == pytest.approx(counted["global_test"])
+
+
+def test_counts_that_are_coarse_are_named_as_such(robot, tmp_path):
+    """0.0236 m/s² a count and 0.002 m/s² of noise: the step is found as it is."""
+    scale = np.full(3, 0.0236)
+    counts = replace(robot, unit="counts", nominal_scale=scale, nominal_offset=np.full(3, 33000.0))
+    whole = {f: lambda t, f=f: t[f].round() for f in ("fx", "fy", "fz")}
+    found = document(tmp_path, command(tmp_path, counts, table=lambda t: t.assign(**whole)))
+    assert found["effects"][0]["name"] == "quantisation"
+    assert "23.60 mm/s²" in found["reason"]
+
+
+@pytest.mark.parametrize("approach", ["robot", "gravity"])
+def test_an_observed_gravity_does_not_change_the_verdict(approach):
+    """It takes one unknown and gives one condition, and only scales all axes alike."""
+    measured, _ = campaign(4, approach=approach, effects=("hysteresis",), size=3.0)
+    fixed, free = (diagnose(replace(measured, sigma_gravity=s), NINE) for s in (0.0, 1e-3))
+    assert [f.name for f in fixed.found] == [f.name for f in free.found] == ["hysteresis"]
+    assert fixed.gap.before == pytest.approx(free.gap.before, rel=1e-3)
+    assert fixed.setting.invisible == free.setting.invisible
+
+
+@pytest.mark.parametrize("repeat_first", [0, 1])
+def test_one_repeat_or_none_is_enough(repeat_first):
+    found = diagnose(campaign(repeat_first=repeat_first)[0], NINE)
+    assert found.verdict == "no_effect"
+    assert ("repeat" in found.location) == bool(repeat_first)
+
+
+def test_a_label_may_be_missing(robot, tmp_path):
+    found = document(tmp_path, command(tmp_path, robot, table=lambda t: t.drop(index=7)))
+    assert found["verdict"] == "no_effect"
+    positions = pd.read_parquet(tmp_path / "out/positions.parquet")["position"]
+    assert positions.tolist() == [i for i in range(1, N + 1) if i != 8]
+
+
+def test_a_folder_of_an_earlier_diagnosis_is_written_anew(robot, gravity, tmp_path):
+    assert document(tmp_path, command(tmp_path, robot))["approach"] == "robot"
+    assert document(tmp_path, command(tmp_path, gravity))["approach"] == "gravity"
+
+
+def test_positions_that_are_needed_to_hold_some_out_are_counted():
+    """Gravity: 9 + 3 parameters and 3 to spare are 15 conditions, and 3 to predict make 18."""
+    measured, _ = simulate_campaign(
+        CampaignSettings(
+            **{"scheme": "fibonacci-16", "approach": "gravity", "order": "random", "size": 4.0},
+            **{"effects": ("thermal_scale",), "temperature": (10.0, 40.0)},
+            temperature_order="random",
+        )
+    )
+    found = diagnose(measured, NINE)
+    assert [f.name for f in found.found] == ["thermal_scale"]
+    assert not found.gap.confirmed
+    assert "needs 15 positions" in found.gap.reason
+    assert "18 in all; there are 16" in found.gap.reason
+
+
+def exact(measured):
+    """A campaign of a real sensor without any noise."""
+    truth = np.array([0.05, -0.02, 0.03, 2e-3, -1e-3, 1e-3, 1e-3, -2e-3, 1e-3])
+    f_b = np.column_stack(specific_force(*measured.angles.T, measured.gravity))
+    return replace(measured, forces=NINE.sense(f_b, truth, measured.gravity, measured.hold))
+
+
+@pytest.mark.parametrize("approach", ["robot", "gravity"])
+@pytest.mark.parametrize("digits", [16, 6])
+def test_no_effect_is_named_in_what_is_its_own_model(robot, approach, digits, tmp_path):
+    """Residuals of rounding only, in which sigma is known to be far larger."""
+    measured = exact(robot)
+    measured = replace(measured, forces=np.round(measured.forces, digits))
+    found = document(tmp_path, command(tmp_path, measured, "--approach", approach))
+    assert found["verdict"] in {"no_effect", "noise_model"}
+    assert found["gap"]["sigma0_squared"]["before"] < 1e-6
+
+
+@pytest.mark.parametrize("sigma", [1e-6, 1e3])
+@pytest.mark.parametrize("approach", ["robot", "gravity"])
+def test_a_sigma_out_of_all_bounds_is_the_noise(robot, sigma, approach, tmp_path):
+    measured = replace(robot, sigma_force=sigma)
+    found = document(tmp_path, command(tmp_path, measured, "--approach", approach))
+    assert found["verdict"] == "noise_model"
+    assert found["noise"]["sigma_source"] == "residuals"
+
+
+@pytest.mark.parametrize("sigma_angle", [0.0, 1e-9])
+def test_a_perfect_robot_is_none_too_good(robot, sigma_angle, tmp_path):
+    found = document(tmp_path, command(tmp_path, replace(robot, sigma_angle=sigma_angle)))
+    assert found["verdict"] == "no_effect"
+
+
+def test_many_positions_are_no_trouble():
+    measured, truth = simulate_campaign(
+        CampaignSettings(
+            **{"scheme": "fibonacci-500", "approach": "gravity"},
+            **{"order": "random", "effects": ("hysteresis",)},
+        )
+    )
+    found = diagnose(measured, NINE)
+    assert [f.name for f in found.found] == ["hysteresis"]
+    assert found.gap.confirmed
+    true = {p["name"]: p["value"] for p in truth["effects"][0]["parameters"]}
+    for name, value, sigma, _ in found.found[0].parameters:
+        assert abs(value - true[name]) < 4.5 * sigma
+
+
+# --- fuzzing -------------------------------------------------------------------------------------
+
+SETTINGS = st.fixed_dictionaries(
+    {
+        "seed": st.integers(0, 10_000),
+        "scheme": st.integers(6, 30).map("fibonacci-{}".format),
+        "repeats": st.integers(1, 2),
+        "repeat_first": st.integers(0, 6),
+        "order": st.sampled_from(["scheme", "random"]),
+        "approach": st.sampled_from(["robot", "gravity"]),
+        "effects": st.sampled_from(effect_names()).map(lambda name: (name,)),
+        "size": st.sampled_from([1e-3, 1.0, 30.0]),
+        "sigma": st.sampled_from([1e-5, 2e-3, 0.1]),
+        "sigma_known": st.booleans(),
+        "temperature": st.just((10.0, 40.0)),
+        "temperature_order": st.sampled_from(["linear", "ABBA", "random"]),
+        "vibration": st.just((0.0, 2.0)),
+        "yaw": st.sampled_from(["none", "random"]),
+        "n_samples": st.sampled_from([None, 2, 200]),
+        "gross_errors": st.sampled_from(
+            [(), ("outlier_position",), ("unit_error",), ("axis_error",), ("row_order",)]
+        ),
+        "noise_effects": st.sampled_from([(), ("quantisation",), ("coloured_noise",)]),
+    }
+)
+
+
+@given(SETTINGS)
+@settings(
+    max_examples=25, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
+)
+def test_every_campaign_has_a_verdict_or_a_reason(keys):
+    """Nothing but `InputError`, and a document that JSON takes."""
+    try:
+        found = diagnosis_document(diagnose(simulate_campaign(CampaignSettings(**keys))[0], NINE))
+    except InputError:
+        return
+    assert found["verdict"] in VERDICTS
+    assert (found["verdict"] in {"named", "noise_model", "gross_error"}) == bool(found["effects"])
+    json.dumps(found, allow_nan=False)

@@ -1,0 +1,177 @@
+"""Signatures of effects: derivatives of the observations, and what a design shows of them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, campaign, design, shuffled, some_holds
+
+from accelstudy.diagnosis.space.hypotheses import cosines, same_space
+from accelstudy.diagnosis.space.signatures import signature
+from accelstudy.diagnosis.worth.limits import signature_columns, upper_limits, visibilities
+from accelstudy.diagnosis.worth.visibility import campaign_setting
+from accelstudy.effects import effect_names, get_effect
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.simulation.sessions import Noise, session
+
+USUAL = [effect.name for effect in NINE.effects]
+OTHERS = [name for name in effect_names() if name not in USUAL]
+EACH = pytest.mark.parametrize("name", effect_names())
+
+
+def full_session(model=NINE, parameters=None, scheme="mclaren-24"):
+    directions = shuffled(scheme)
+    hold = some_holds(len(directions))
+    if parameters is None:
+        parameters = np.zeros(model.n_parameters)
+    return session(model, parameters, directions, G, hold)
+
+
+FULL = full_session()
+
+
+@pytest.fixture(scope="module")
+def robot():
+    """All columns, in varied yaw."""
+    directions = shuffled("fibonacci-30")
+    return design(directions, ROBOT, some_holds(len(directions)))
+
+
+@pytest.fixture(scope="module")
+def gravity():
+    directions = shuffled("fibonacci-30")
+    return design(directions, GRAVITY, some_holds(len(directions)))
+
+
+def alike(setting, one, other):
+    return any(same_space(a, b) for a in setting.candidates[one] for b in setting.candidates[other])
+
+
+def inside(setting, small, large):
+    """Smallest cosine between a space and the one that should contain it."""
+    (a,), (b,) = setting.candidates[small], setting.candidates[large]
+    return cosines(a.ideal, b.ideal)[-1]
+
+
+# --- derivatives ---------------------------------------------------------------------------------
+
+
+@EACH
+def test_a_signature_is_the_derivative_of_what_is_observed(name):
+    """Finite differences of a sensor that has the model's effects and this one.
+
+    The knee of the saturation and the signs of the forces stay on one side of a small step.
+    """
+    effect = get_effect(name)
+    others = tuple(e for e in NINE.effects if e.name != name)
+    model = SensorModel("both", (*others, effect))
+    first = sum(len(e.parameters) for e in others)
+    k = len(effect.parameters)
+    # Effects act on the force along the sensitive axes, at an ideal sensor that of the body.
+    shown = signature(effect, FULL.f_b, FULL.angles, G, FULL.hold)
+    assert shown.force.shape == (len(FULL.f_b), 3, k)
+    step = 1e-6 * effect.typical[0]
+    for j in range(k):
+        change = np.zeros(model.n_parameters)
+        change[first + j] = step
+        force = (
+            model.sense(FULL.f_b, change, G, FULL.hold)
+            - model.sense(FULL.f_b, -change, G, FULL.hold)
+        ) / (2 * step)
+        reading = (
+            model.reading_errors(FULL.angles, change, FULL.hold)
+            - model.reading_errors(FULL.angles, -change, FULL.hold)
+        ) / (2 * step)
+        rounding = 1e-14 * G / step
+        assert np.abs(force).max() + np.abs(reading).max() > 100 * rounding
+        np.testing.assert_allclose(shown.force[..., j], force, rtol=1e-6, atol=rounding)
+        np.testing.assert_allclose(shown.angles[..., j], reading, rtol=1e-6, atol=rounding)
+
+
+@EACH
+def test_a_signature_is_linear_in_the_parameters(name):
+    effect = get_effect(name)
+    directions = np.random.default_rng(1).standard_normal((len(effect.parameters), 2))
+    shown = signature(effect, FULL.f_b, FULL.angles, G, FULL.hold)
+    model = SensorModel("one", (effect,))
+    reduced = shown.reduced(directions)
+    p = effect.typical[0] * 1e-3 * directions[:, 1]
+    if any(np.any(np.array(effect.axes(tuple(np.eye(len(p))[0]), np), dtype=float)) for _ in [0]):
+        return_to = np.array(effect.axes(tuple(p), np), dtype=float)
+        expected = FULL.f_b @ (np.linalg.inv(np.eye(3) + return_to).T - np.eye(3))
+        tolerance = {"rtol": 1e-3, "atol": 1e-4 * np.abs(expected).max()}
+    else:
+        expected = model.sense(FULL.f_b, p, G, FULL.hold) - FULL.f_b
+        tolerance = {"rtol": 1e-9, "atol": 1e-14 * G}
+    found = reduced.force[..., 1] * effect.typical[0] * 1e-3
+    np.testing.assert_allclose(found, expected, **tolerance)
+
+
+@pytest.mark.parametrize("approach", [ROBOT, GRAVITY], ids=lambda a: a.name)
+@pytest.mark.parametrize("name", OTHERS)
+def test_what_an_effect_leaves_in_the_residuals(name, approach):
+    """z of an adjustment of data with a small effect, in which no noise was drawn."""
+    effect = get_effect(name)
+    directions = shuffled("fibonacci-30")
+    hold = some_holds(len(directions))
+    setting = design(directions, approach, hold)
+    if name in setting.invisible:
+        pytest.skip("invisible, which is tested below") if False else None
+        columns = np.zeros((len(setting.frame.residuals.design), len(effect.parameters)))
+    else:
+        (h, *_) = [h for h in setting.candidates[name]]
+        effect = h.effect
+        columns = signature_columns(setting.frame, h)
+    model = SensorModel("with", (*NINE.effects, effect))
+    rng = np.random.default_rng(5)
+    p = 1e-3 * effect.typical[0] * rng.choice([-1.0, 1.0], len(effect.parameters))
+    truth = np.concatenate([np.zeros(NINE.n_parameters), p])
+    observed = session(model, truth, directions, G, hold).observations(Noise())
+    # The sensitivity to previous positions is that of the sensor's own readings.
+    from accelstudy.adjustment.quality import solve
+    from accelstudy.diagnosis.space.residuals import Residuals
+
+    left = Residuals.of(solve(NINE, approach, observed))
+    fitted = left.z
+    expected = columns @ p
+    scale = np.linalg.norm(
+        setting.frame.residuals.whitened(
+            signature(effect, setting.frame.forces, setting.frame.angles, G, setting.frame.hold)
+        )
+        @ p
+    )
+    assert np.linalg.norm(fitted - expected) < 2e-3 * scale + 1e-9
+
+
+# --- what can be seen ----------------------------------------------------------------------------
+
+
+def test_an_effect_is_judged_in_the_settings_that_a_diagnosis_tries():
+    """A jump before the last holds, which point the same way, hardly shows; one in the middle does.
+
+    What is excluded by the residuals and what they would show go together.
+    """
+    directions = shuffled("fibonacci-30")
+    directions[-3:] = [[0, 0, 1], [0, 0.01, 1], [0.01, 0, 1]]
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    setting = design(directions, GRAVITY, some_holds(30), seed=1)
+    rows = {row.name: row for row in visibilities(setting)}
+    jump = rows["bias_jump"]
+    tried = [h.effect.spec for h in setting.candidates["bias_jump"]]
+    assert {jump.easiest.spec, jump.hardest.spec} <= set(tried)
+    assert 600 < jump.easiest.shape["t"] < 1200 < jump.hardest.shape["t"]
+    assert jump.hardest_mdb > 5 * jump.mdb
+    limits = {limit.name: limit.value for limit in upper_limits(setting, 1.0, ())}
+    for name in ("bias_jump", "warm_up", "saturation"):
+        assert rows[name].mdb < 3 * limits[name], name
+    for row in rows.values():
+        if row.status == "visible" and len(setting.candidates[row.name]) == 1:
+            assert row.mdb == row.hardest_mdb, row.name
+    assert rows["bias_drift"].easiest.shape == {}
+
+
+def test_a_sensor_whose_range_is_far_beyond_gravity_does_not_saturate():
+    measured, _ = campaign(3)
+    assert "saturation" in campaign_setting(measured, NINE).candidates
+    wide = campaign_setting(replace(measured, full_range=8 * G), NINE)
+    assert wide.invisible == ("gravity_error", "saturation")

@@ -1,0 +1,112 @@
+"""The workflow of a diagnosis: all is made, once, and what cannot be used is said in a line."""
+
+import json
+import os
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+import yaml
+from places import ROOT
+from snakemake_helpers import one_line, remains, snakemake
+
+from accelstudy.study.config import read_study
+
+TINY = {
+    "campaign": {
+        "name": "tiny",
+        "seed": 7,
+        "scheme": "fibonacci-18",
+        "order": "random",
+        "effects": ["thermal_bias: 0.003, -0.002, 0.001"],
+        "temperature": [20, 40],
+        "temperature_order": "ABBA",
+    },
+    "replicates": 100,
+}
+
+
+def run(folder, config, *words):
+    (folder / "tiny.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")
+    fixed = ["--snakefile", ROOT / "workflow" / "diagnose.smk", "--cores", 2]
+    return snakemake(folder, *fixed, "--configfile", "tiny.yaml", *words)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("diagnosed")
+    result = run(folder, TINY)
+    assert result.returncode == 0, result.stdout
+    return folder
+
+
+def test_all_is_made(made):
+    results = made / "results" / "tiny"
+    diagnosis = results / "diagnosis"
+    document = json.loads((diagnosis / "diagnosis.json").read_text(encoding="utf-8"))
+    assert document["verdict"] == "named"
+    assert document["effects"][0]["name"] == "thermal_bias"
+    files = {path.name for path in diagnosis.iterdir() if not path.name.startswith(".")}
+    assert files == {
+        "calibration.json", "diagnosis.json", "report.html", "model.yaml", "positions.parquet",
+        "loop.parquet", "figures",
+    }  # fmt: skip
+    for name in ("evidence", "gap", "location", "loop", "residuals"):
+        assert (diagnosis / "figures" / f"{name}.svg").stat().st_size > 1000
+        assert (diagnosis / "figures" / f"{name}.png").stat().st_size > 1000
+    assert {path.name for path in (results / "campaign").iterdir()} >= {
+        "campaign.yaml", "positions.csv",
+    }  # fmt: skip
+    truth = yaml.safe_load((results / "truth.yaml").read_text(encoding="utf-8"))
+    assert truth["effects"][0]["name"] == "thermal_bias"
+    log = (results / "logs" / "diagnose.log").read_text(encoding="utf-8")
+    # With two temperatures a curve would be the same.
+    assert "The model lacks thermal bias or thermal curve." in log
+    assert remains(made) == []
+
+
+def test_what_was_found_is_a_study(made):
+    study = read_study(ROOT / "config/config.yaml", made / "results/tiny/diagnosis/model.yaml")
+    assert "thermal_bias" in study.simulated_effects
+
+
+def test_a_second_run_does_nothing(made):
+    before = {path: path.stat().st_mtime_ns for path in (made / "results").rglob("*")}
+    result = run(made, TINY)
+    assert result.returncode == 0, result.stdout
+    assert "Nothing to be done" in result.stdout
+    assert {path: path.stat().st_mtime_ns for path in (made / "results").rglob("*")} == before
+
+
+def test_what_was_damaged_since_is_refused(made, tmp_path):
+    folder = Path(shutil.copytree(made, tmp_path / "copy"))
+    page = folder / "results/tiny/diagnosis/report.html"
+    stamp = page.stat().st_mtime_ns
+    page.write_text(page.read_text(encoding="utf-8")[:-100], encoding="utf-8")
+    os.utime(page, ns=(stamp, stamp))
+    result = run(folder, TINY)
+    assert result.returncode != 0
+    one_line(result.stdout, "results/tiny/diagnosis: report.html is damaged; delete it and run")
+    shutil.rmtree(page.parent)
+    assert "Diagnose the campaign" in run(folder, TINY, "--dry-run").stdout
+
+
+def test_a_campaign_that_is_too_small(tmp_path):
+    campaign = {"name": "tiny", "scheme": "d-optimal-9", "approach": "gravity"}
+    result = run(tmp_path, {"campaign": campaign})
+    assert result.returncode != 0
+    assert "Traceback" not in result.stdout
+    one_line(result.stdout, "error: tiny: 9 positions leave no redundancy", "more positions")
+    results = tmp_path / "results" / "tiny"
+    assert (results / "campaign" / "campaign.yaml").exists()
+    assert not (results / "diagnosis").exists()
+    assert remains(tmp_path) == []
+
+
+def test_a_wrong_key(tmp_path):
+    result = run(tmp_path, {**TINY, "replicate": 100})
+    assert result.returncode != 0
+    assert not re.search("Traceback|Building DAG", result.stdout)
+    one_line(result.stdout, "tiny.yaml: replicate: unknown key; did you mean 'replicates'?")
+    assert not (tmp_path / "results").exists()

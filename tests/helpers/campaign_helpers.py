@@ -1,0 +1,28 @@
+"""A campaign as a sensor of the nine parameters would give it."""
+
+import numpy as np
+
+from accelstudy.approaches import get_approach
+from accelstudy.campaign import Campaign
+from accelstudy.schemes import get_scheme
+from accelstudy.sensors.models import get_model
+from accelstudy.simulation.sessions import Noise, session
+
+NINE = get_model("bias-scale-nonorthogonality")
+GRAVITY, ROBOT = get_approach("gravity"), get_approach("robot")
+
+
+def simulated_campaign(values, scheme="mclaren-24", seed=1, noise=None, sigma=0.002):
+    noise = noise or Noise(sigma_force=sigma)
+    simulated = session(NINE, NINE.vector(values), get_scheme(scheme).directions)
+    drawn = simulated.draw(noise, 1, np.random.default_rng(seed))
+    n = len(simulated.forces)
+    return Campaign(
+        name="simulated",
+        positions=np.arange(1, n + 1),
+        forces=drawn.forces[0],
+        gravity=simulated.gravity,
+        sigma_force=sigma,
+        angles=drawn.angles[0],
+        sigma_angle=noise.sigma_angle,
+    )

@@ -1,0 +1,75 @@
+"""Simulated campaigns for the tests of the diagnosis, and their settings without noise."""
+
+import numpy as np
+from scipy.stats import binom
+
+from accelstudy.adjustment.quality import solve
+from accelstudy.approaches import get_approach
+from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
+from accelstudy.diagnosis.space.hypotheses import setting_of
+from accelstudy.effects import Hold
+from accelstudy.schemes import get_scheme
+from accelstudy.sensors.models import get_model
+from accelstudy.simulation.sessions import Noise, session
+
+G = STANDARD_GRAVITY
+NINE = get_model("bias-scale-nonorthogonality")
+GRAVITY, ROBOT = get_approach("gravity"), get_approach("robot")
+
+FULL = {
+    **{"scheme": "fibonacci-30", "repeat_first": 6, "order": "random", "interval": 60.0},
+    **{"temperature": (10.0, 40.0), "temperature_order": "ABBA", "vibration": (0.0, 2.0)},
+    **{"yaw": "random", "n_samples": 500},
+}
+"""A campaign with all columns, in which no effect of the catalogue hides behind another, but a
+thermal curve behind a thermal bias: there are two temperatures."""
+
+ROTATIONS = {
+    *("cross_axis_misalignment", "mounting_rotation", "base_tilt", "encoder_offset"),
+    *("encoder_scale", "encoder_eccentricity", "axis_nonperpendicularity", "joint_compliance"),
+    "mounting_slip",
+}
+"""Effects that only turn the sensor or misread its attitude."""
+
+
+def campaign(seed=1, **keys):
+    """A simulated campaign with all columns; `keys` change the settings."""
+    return simulate_campaign(CampaignSettings(seed=seed, **{**FULL, **keys}))
+
+
+def some_holds(n, seed=3, **columns):
+    """Holds with everything that is not implied by the attitudes, at random."""
+    rng = np.random.default_rng(seed)
+    known = {
+        "temperature": rng.uniform(10, 40, n),
+        "time": 60.0 * np.arange(n),
+        "vibration": rng.uniform(0, 2, n),
+        "yaw": rng.uniform(-np.pi, np.pi, n),
+    }
+    return Hold(**{**known, **columns})
+
+
+def shuffled(scheme, seed=4):
+    return np.random.default_rng(seed).permutation(get_scheme(scheme).directions)
+
+
+def design(directions, approach=ROBOT, hold=None, model=NINE, noise=None, seed=None):
+    """The setting of a session of an ideal sensor: without noise, or with noise of a seed."""
+    noise = noise or Noise()
+    ideal = session(model, np.zeros(model.n_parameters), directions, G, hold)
+    if seed is None:
+        observed = ideal.observations(noise)
+    else:
+        observed = ideal.draw(noise, 1, np.random.default_rng(seed))
+    return setting_of(solve(model, approach, observed))
+
+
+def most(count, level, error=1e-4):
+    """Number of rejections in `count` tests at `level` that is exceeded with `error` only."""
+    return int(binom.isf(error, count, level))
+
+
+def least(count, level, error=1e-4):
+    """Number of rejections that is undercut with `error` only."""
+    return int(binom.ppf(error, count, level))

@@ -1,0 +1,61 @@
+"""Sessions of the nine-parameter model whose quality the tests look at."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from accelstudy.adjustment import calibrate
+from accelstudy.adjustment.quality import solve
+from accelstudy.approaches import get_approach
+from accelstudy.basics.units import MGON, STANDARD_GRAVITY
+from accelstudy.schemes import get_scheme
+from accelstudy.sensors.models import get_model
+from accelstudy.simulation.sessions import Noise, session
+
+NINE = get_model("bias-scale-nonorthogonality")
+GRAVITY, ROBOT = get_approach("gravity"), get_approach("robot")
+BOTH = pytest.mark.parametrize("approach", [GRAVITY, ROBOT], ids=lambda a: a.name)
+SIGMA = Noise().sigma_force
+STANDARD_ERRORS = 4.5
+TRUTH = {
+    **{"b_x": 0.05, "b_y": 0.01, "b_z": 0.03, "s_x": 200e-6, "s_y": 200e-6, "s_z": 200e-6},
+    **{"alpha_yz": 12 * MGON, "alpha_zy": 12 * MGON, "alpha_zx": 44 * MGON},
+}
+
+
+def ideal_session(scheme="mclaren-24", model=NINE, hold=None):
+    directions = get_scheme(scheme).directions
+    return session(model, model.vector(TRUTH), directions, STANDARD_GRAVITY, hold)
+
+
+def draw(seed, scheme="mclaren-24", model=NINE, noise=None, replicates=1):
+    ideal = ideal_session(scheme, model)
+    return ideal.draw(noise or Noise(), replicates, np.random.default_rng(seed))
+
+
+def one(observed, i):
+    """Session i of several."""
+    gravity = np.asarray(observed.gravity)
+    return replace(
+        observed,
+        forces=observed.forces[i : i + 1],
+        angles=observed.angles[i : i + 1],
+        gravity=gravity[i : i + 1] if gravity.ndim else gravity,
+    )
+
+
+def solutions(approach, observed):
+    """All sessions, calibrated together and linearised one by one."""
+    together = calibrate(NINE, approach, observed)
+    arrays = [a.name for a in fields(together) if a.name not in ("redundancy", "variance_priori")]
+    for i in range(len(observed.forces)):
+        part = replace(together, **{name: getattr(together, name)[i : i + 1] for name in arrays})
+        yield solve(NINE, approach, one(observed, i), part)
+
+
+def with_error(observed, position, error):
+    """Add an error (3,) to the forces of a position."""
+    forces = observed.forces.copy()
+    forces[:, position] += error
+    return replace(observed, forces=forces)

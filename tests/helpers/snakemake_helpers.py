@@ -1,0 +1,80 @@
+"""Snakemake as the tests run it."""
+
+import gc
+import os
+import subprocess
+import sys
+import warnings
+from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout
+from pathlib import Path
+from tempfile import TemporaryFile
+
+import pytest
+from places import ROOT
+from snakemake.cli import main
+
+SNAKEMAKE = [sys.executable, "-m", "snakemake", "--workflow-profile", ROOT / "profiles" / "default"]
+ENVIRONMENT = {
+    **os.environ,
+    "PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]),
+    "OPENBLAS_NUM_THREADS": "1",
+    "NO_COLOR": "1",
+}
+ENVIRONMENT.pop("SNAKEMAKE_PROFILE", None)
+
+
+def snakemake(folder, *words, environment=ENVIRONMENT):
+    """Run Snakemake in a folder, within this process; exit status, and both streams together.
+
+    It is what the command calls, and jobs are processes in any case. To start Python and to import
+    everything would take ten times as long as a run that makes nothing.
+    """
+    with pytest.MonkeyPatch.context() as patch, chdir(folder), TemporaryFile() as said:
+        for name in os.environ.keys() - environment.keys():
+            patch.delenv(name)
+        for name, value in environment.items():
+            patch.setenv(name, value)
+        patch.setattr(sys, "executable", sys.executable)  # which the workflow quotes
+        patch.setattr(sys, "path", sys.path.copy())
+        # Jobs print where this process does, whatever was there when Snakemake was imported.
+        patch.setattr(sys.modules["snakemake.shell"], "STDOUT", None)
+        with warnings.catch_warnings(), _output_to(said):
+            warnings.simplefilter("ignore")
+            try:
+                main([str(word) for word in (*SNAKEMAKE[3:], *words)])
+                status = 0
+            except SystemExit as end:
+                status = end.code or 0
+            gc.collect()  # a temporary folder that Snakemake leaves to Python to remove
+        said.seek(0)
+        return subprocess.CompletedProcess(words, status, said.read().decode())
+
+
+@contextmanager
+def _output_to(file):
+    """Let this process, and those that it starts, print to a file."""
+    kept = [os.dup(number) for number in (1, 2)]
+    try:
+        for number in (1, 2):
+            os.dup2(file.fileno(), number)
+        with (
+            open(os.dup(1), "w", encoding="utf-8", buffering=1) as stream,
+            redirect_stdout(stream),
+            redirect_stderr(stream),
+        ):
+            yield
+    finally:
+        for number, copy in zip((1, 2), kept, strict=True):
+            os.dup2(copy, number)
+            os.close(copy)
+
+
+def remains(folder):
+    """Temporary files that are left."""
+    return [str(path) for path in folder.rglob("*") if path.name.endswith(".part")]
+
+
+def one_line(text, *parts):
+    """The only line with all parts."""
+    (line,) = (line for line in text.splitlines() if all(part in line for part in parts))
+    return line

@@ -1,0 +1,309 @@
+"""The generator of the hidden-effect study: rotations, sizes, noise, and its independence."""
+
+import ast
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import accelstudy.hidden.physics as physics
+from accelstudy.approaches import get_approach
+from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.files.format import read_campaign, write_campaign
+from accelstudy.campaign.files.header import COLUMNS
+from accelstudy.diagnosis.space.signatures import signature
+from accelstudy.effects import effect_names, get_effect
+from accelstudy.hidden.physics import (
+    APPROACHES,
+    NOISES,
+    Case,
+    generate,
+    invisible_effects,
+    visible_effects,
+    visible_gross,
+    visible_outside,
+)
+from accelstudy.hidden.physics.atlas import atlas
+from accelstudy.hidden.physics.designs import session
+from accelstudy.hidden.physics.effects import EFFECTS
+from accelstudy.hidden.physics.measuring import Cause, Sensor, observe
+from accelstudy.hidden.physics.noise import Noise
+from accelstudy.hidden.physics.oracle import oracle
+from accelstudy.hidden.physics.rotations import in_turned_frame, rotated
+from accelstudy.hidden.physics.session import GRAVITY
+from accelstudy.sensors.models import get_model
+
+NINE = get_model("bias-scale-nonorthogonality")
+
+
+def seeded(*key):
+    return np.random.SeedSequence(20180309, spawn_key=key)
+
+
+def omega(campaign, approach):
+    adjustment = fit_campaign(campaign, NINE, get_approach(approach)).adjustment
+    assert adjustment.converged.all()
+    return float(adjustment.omega[0]), adjustment.redundancy
+
+
+def imports(folder):
+    """All that the modules in a folder import of the project, (file, module)."""
+    for path in sorted(folder.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            yield from ((path.name, name) for name in names if name.startswith("accelstudy"))
+
+
+def test_the_generator_and_the_diagnosis_know_nothing_of_each_other():
+    allowed = (
+        "accelstudy.campaign.files.session",
+        "accelstudy.campaign.files.format",
+        "accelstudy.basics.errors",
+        "accelstudy.basics.units",
+        "accelstudy.hidden.physics",
+    )
+    own = Path(physics.__file__).parent
+    assert [one for one in imports(own) if not one[1].startswith(allowed)] == []
+    package = own.parents[1]
+    for folder in (package / "diagnosis", package / "effects", package / "gross_errors"):
+        assert [one for one in imports(folder) if one[1].startswith("accelstudy.hidden")] == []
+
+
+def test_each_effect_of_the_catalogue_can_be_hidden():
+    assert {*EFFECTS} == {*effect_names()} - {effect.name for effect in NINE.effects}
+
+
+def test_rotations_are_rotations():
+    rng = np.random.default_rng(1)
+    vectors, turns = rng.standard_normal((2, 5, 3))
+    for turned in (
+        rotated(np.eye(3), turns[0]),
+        np.array([in_turned_frame(v, axis, 0.7) for axis in (0,) for v in np.eye(3)]),
+    ):
+        np.testing.assert_allclose(turned @ turned.T, np.eye(3), atol=1e-15)
+        assert np.linalg.det(turned) == pytest.approx(1)
+    # A quarter turn about z takes x to y; seen from a frame so turned, y is where x was.
+    np.testing.assert_allclose(
+        rotated(np.eye(3)[0], np.pi / 2 * np.eye(3)[2]), [0, 1, 0], atol=1e-15
+    )
+    np.testing.assert_allclose(in_turned_frame(np.eye(3)[1], 2, np.pi / 2), [1, 0, 0], atol=1e-15)
+    np.testing.assert_allclose(rotated(rotated(vectors, turns), -turns), vectors, atol=1e-14)
+
+
+def test_a_seed_gives_the_same_campaign_whatever_ran_before():
+    case = Case("two", "long-60", "robot", True, ("thermal_bias", "base_tilt"), (20.0, 30.0))
+    first, truth = generate(case, seeded(1))
+    generate(Case("null", "snub-24", "gravity", False), seeded(2))
+    second, again = generate(case, seeded(1))
+    np.testing.assert_array_equal(first.forces, second.forces)
+    np.testing.assert_array_equal(first.angles, second.angles)
+    assert truth == again
+    other, _ = generate(case, seeded(3))
+    assert not np.array_equal(first.forces, other.forces)
+
+
+@pytest.mark.parametrize("design", ["long-60", "repeats-30", "snub-24"])
+def test_a_campaign_can_be_written_and_read(design, tmp_path):
+    for approach in APPROACHES:
+        campaign, _ = generate(Case("null", design, approach, True), seeded(4))
+        write_campaign(campaign, tmp_path / approach)
+        again = read_campaign(tmp_path / approach)
+        for name in COLUMNS:
+            one, other = getattr(campaign, name), getattr(again, name)
+            assert (one is None) == (other is None), name
+            if one is not None:
+                np.testing.assert_allclose(other, one, err_msg=name)
+        assert (again.angles is None) == (approach == "gravity")
+
+
+@pytest.mark.parametrize("approach", APPROACHES)
+def test_campaigns_without_effects_fit_as_well_as_their_sigma_says(approach):
+    total, freedom = 0.0, 0
+    for i, design in enumerate(("spread-24", "hand-18", "repeats-30")):
+        for j in range(10):
+            campaign, _ = generate(Case("null", design, approach, True), seeded(5, i, j))
+            value, redundancy = omega(campaign, approach)
+            total, freedom = total + value, freedom + redundancy
+    assert total / freedom == pytest.approx(1, abs=4 * np.sqrt(2 / freedom))
+
+
+@pytest.mark.parametrize("approach", APPROACHES)
+def test_the_misfit_of_an_adjustment_is_the_noncentrality_that_was_asked_for(approach):
+    """Σ v²/σ² of data without noise, fitted by the adjustment of the project."""
+    design, lam = "repeats-30", 100.0
+    for i, name in enumerate(visible_effects(design, approach)):
+        case = Case("one", design, approach, True, (name,), (lam,))
+        campaign, truth = generate(case, seeded(6, i))
+        (effect,), parts = truth.effects, truth.sensor
+        sensor = Sensor(*(np.array(parts[key]) for key in ("bias", "scale", "lean")))
+        cause = Cause(EFFECTS[name], effect.settings, np.array([effect.parameters]))
+        forces, angles = observe(session(design), sensor, [cause])
+        robot = None if campaign.angles is None else angles[0]
+        value, _ = omega(replace(campaign, forces=forces[0], angles=robot), approach)
+        assert value == pytest.approx(lam, rel=0.01), name
+        assert name in truth.classes[0]
+
+
+@pytest.mark.parametrize("approach", APPROACHES)
+@pytest.mark.parametrize("name", EFFECTS)
+def test_effects_leave_what_those_of_the_catalogue_leave(name, approach):
+    """Two sets of formulas, written apart, say the same of small effects of an ideal sensor."""
+    # Only here does the temperature change linearly from hold to hold, as one must guess of a lag.
+    design = "abba-48" if name == "thermal_bias" else "long-60"
+    own, effect = atlas(design, approach), EFFECTS[name]
+    settings = effect.draw(own.session, np.random.default_rng(12))
+    if name == "thermal_bias":
+        assert settings["tau"] > 0
+    shape = own.shape(effect, settings)
+    campaign, _ = generate(Case("null", design, "robot", True), seeded(7))
+    forces, angles = (part[0] for part in observe(own.session, Sensor(), ()))
+    hold = replace(campaign, forces=forces, angles=angles).hold
+    other = type(get_effect(name))(**settings)
+    found = signature(other, forces, angles, GRAVITY, hold)
+    step = 1e-4 / max(np.abs(found.force).max(), np.abs(found.angles).max())
+    left = [
+        own.conditions.seen(
+            forces + sign * step * np.moveaxis(found.force, 2, 0),
+            angles + sign * step * np.moveaxis(found.angles, 2, 0),
+        )
+        for sign in (1, -1)
+    ]
+    theirs = (left[0] - left[1]).T / (2 * step)
+    size = np.linalg.norm(theirs)
+    if shape is None:
+        scale = np.linalg.norm(found.force) + GRAVITY * np.linalg.norm(found.angles)
+        assert size < 1e-4 * scale / own.session.sigma
+        return
+    mine = shape.basis
+    assert np.linalg.norm(theirs - mine @ (mine.T @ theirs)) < 1e-4 * size
+    assert np.linalg.matrix_rank(theirs, tol=1e-4 * size) == shape.dim
+
+
+@pytest.mark.parametrize("design", ["abba-48", "snub-24", "repeats-30"])
+def test_what_is_called_invisible_leaves_nothing_and_what_is_outside_no_effect_explains(design):
+    for approach in APPROACHES:
+        own = atlas(design, approach)
+        for name in invisible_effects(design, approach):
+            case = Case("invisible", design, approach, True, (name,))
+            effect = generate(case, seeded(9))[1].effects[0]
+            cause = Cause(EFFECTS[name], effect.settings, np.array([effect.parameters]))
+            left = own.conditions.seen(*observe(own.session, Sensor(), [cause]))
+            assert np.sum(left**2) < 0.05, name
+            assert effect.parameters != (0.0,) * EFFECTS[name].k
+        for name in visible_outside(design, approach):
+            case = Case("outside", design, approach, True, (name,), (200.0,))
+            truth = generate(case, seeded(10))[1]
+            assert not any(truth.classes)
+            one, two = truth.left
+            assert 200 > one > two > 20, name
+
+
+def test_gross_errors_are_what_they_are_called():
+    for name in visible_gross("spread-24", "robot"):
+        case = Case("gross", "spread-24", "robot", True)
+        right, _ = generate(case, seeded(11))
+        wrong, truth = generate(replace(case, gross=name), seeded(11))
+        assert truth.gross["name"] == name
+        norms, others = (np.linalg.norm(c.forces, axis=1) for c in (right, wrong))
+        changed = np.flatnonzero(np.any(right.forces != wrong.forces, axis=1))
+        if name == "axis_error":
+            np.testing.assert_allclose(norms, others)
+            assert len(changed) == right.n_positions
+        elif name == "row_order":
+            np.testing.assert_allclose(np.sort(norms), np.sort(others))
+            assert 2 <= len(changed) <= 6
+            np.testing.assert_array_equal(right.angles, wrong.angles)
+        elif name == "unit_error":
+            factor = truth.gross["settings"].get("force", 1.0)
+            np.testing.assert_allclose(others, norms * factor)
+        else:
+            assert list(changed + 1) == [truth.gross["settings"]["position"]]
+
+
+@pytest.mark.parametrize("kind", [None, *NOISES])
+def test_the_noise_is_what_it_is_said_to_be(kind):
+    own, rng = session("repeats-30"), np.random.default_rng(12)
+    errors, axes, steps, expected = [], [], [], []
+    for _ in range(60):
+        noise = Noise.drawn(kind, own, rng)
+        output = rng.uniform(-9, 9, (own.n, 3))
+        error = (noise.read(output, own, rng) - output) / own.sigma
+        factor = noise.settings.get("factor", 1.0)
+        total = np.hypot(factor, noise.settings.get("ratio", 0.0))
+        errors.append(error / total)
+        axes.append(noise.axes)
+        rho = noise.settings.get("correlation", 0.0)
+        steps.append(np.mean((error[1:] - rho * error[:-1]) ** 2) / (1 - rho**2))
+        expected.append(total**2)
+    scaled = np.array(errors) / np.array(axes)[:, None, :]
+    count = scaled.size
+    if kind == "coarse":
+        assert np.mean(scaled**2) > 1.5
+        return
+    excess = 20 if kind == "tails" else 2
+    assert np.mean(scaled**2) == pytest.approx(1, abs=4 * np.sqrt(excess / count * 2))
+    if kind == "autoregressive":
+        np.testing.assert_allclose(np.mean(steps), 1, atol=0.1)
+        assert np.mean(scaled[:, 1:] * scaled[:, :-1]) > 0.3
+    elif kind is None or kind != "tails":
+        assert abs(np.mean(scaled[:, 1:] * scaled[:, :-1])) < 4 / np.sqrt(count)
+    if kind == "tails":
+        assert np.mean(scaled**4) > 4.5
+
+
+def test_samples_within_the_holds_tell_the_noise_and_what_drifts():
+    own = session("spread-24")
+    campaign, truth = generate(
+        Case("one", "spread-24", "gravity", True, ("bias_drift",), (1e6,)), seeded(13)
+    )
+    mean_sd = np.sqrt(np.mean(campaign.sd**2) / campaign.n_samples[0])
+    assert mean_sd == pytest.approx(own.sigma, rel=0.02)
+    off = (campaign.slope - truth.effects[0].parameters) / campaign.sd_slope
+    assert np.mean(off**2) == pytest.approx(1, abs=4 * np.sqrt(2 / off.size))
+    # The least-squares slope of one hold, by the samples themselves.
+    t = np.arange(campaign.n_samples[0]) * own.length / campaign.n_samples[0]
+    by_samples = campaign.sd[0, 0] / np.sqrt(np.sum((t - t.mean()) ** 2))
+    assert campaign.sd_slope[0, 0] == pytest.approx(by_samples, rel=1e-3)
+
+
+# --- the oracle ----------------------------------------------------------------------------------
+
+
+def test_the_oracle_keeps_its_level_and_knows_what_is_large():
+    knowing = oracle("snub-24", "robot")
+    rng, m = np.random.default_rng(14), len(knowing.atlas.together)
+    nothing = knowing.atlas.conditions.left(rng.standard_normal((600, m)))
+    alarms = np.mean([knowing.judge(z, ()).detected for z in nothing])
+    assert alarms == pytest.approx(0.05, abs=4 * np.sqrt(0.05 * 0.95 / 600))
+    right = []
+    for i, name in enumerate(knowing.atlas.visible):
+        case = Case("one", "snub-24", "robot", False, (name,), (2000.0,))
+        truth = generate(case, seeded(15, i))[1]
+        (told,) = truth.oracle["told"]
+        right.append(bool({*told} & {*truth.classes[0]}))
+        assert truth.oracle["alternatives"] <= 2
+        assert truth.oracle["detected"]
+        assert truth.oracle["best"] == truth.oracle["told"]
+    assert np.mean(right) > 0.85
+
+
+def test_pairs_hold_what_a_least_squares_fit_of_both_effects_explains():
+    knowing = oracle("hand-18", "robot")
+    pairs, shapes = knowing.pairs, knowing.atlas.shapes
+    z = knowing.atlas.conditions.left(np.random.default_rng(16).standard_normal((1, 54)))[0]
+    found = pairs.parts(z)
+    for k in range(0, len(found), 37):
+        both = np.column_stack([shapes[pairs.first[k]].basis, shapes[pairs.second[k]].basis])
+        fitted = both @ np.linalg.lstsq(both, z, rcond=1e-2)[0]
+        assert found[k] == pytest.approx(fitted @ fitted, rel=1e-6)
+        assert pairs.dims[k] == np.linalg.matrix_rank(both, tol=1e-2)
+
+
+def test_the_oracle_tells_two_effects():
+    names = ("hysteresis", "encoder_offset")
+    case = Case("two", "yaw-50", "robot", True, names, (300.0, 300.0))
+    truth = generate(case, seeded(17))[1].to_dict()
+    assert [set(one) for one in truth["oracle"]["best"]] == [{"hysteresis"}, {"encoder_offset"}]
+    assert [effect["lam"] for effect in truth["effects"]] == [300.0, 300.0]

@@ -1,0 +1,265 @@
+"""The score of hand-made truths and answers, of which all numbers are known."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.shares import clopper_pearson
+from accelstudy.hidden.figures import figures
+from accelstudy.hidden.judging import all_true, judge, same_effects
+from accelstudy.hidden.page import score_page
+from accelstudy.hidden.rates import share_of
+from accelstudy.hidden.score import score_tables
+from accelstudy.hidden.tables import SCHEMA
+from accelstudy.hidden.targets import targets
+
+DRIFT, WARM, SQUARE, MOUNTED = (
+    ["bias_drift"], ["warm_up"], ["quadratic_scale"],
+    ["cross_axis_misalignment", "mounting_rotation"],
+)  # fmt: skip
+
+
+def truth(set_, classes=(), size=np.nan, oracle=None, **more):
+    """A row of the table of truths; the oracle is right, wrong, or finds nothing."""
+    best = {"right": classes, "wrong": [["settling"]], "nothing": []}.get(oracle, [])
+    return {
+        "set": set_, "what": "+".join(one[0] for one in classes), "size": size,
+        "design": "spread-24", "approach": "robot", "sigma": "given",
+        "classes": json.dumps(list(classes)), "effects": "[]", "noise": "null", "gross": "{}",
+        "gross_name": "", "oracle_detected": None if oracle is None else oracle != "nothing",
+        "oracle_best": json.dumps(list(best)), "oracle_told": json.dumps(list(classes)),
+        "oracle_alternatives": 1,
+        "left": "[]", "sensor": "null", "seed": "[]", "failed": "", **more,
+    }  # fmt: skip
+
+
+def answer(verdict, *found, among=(), place=None, **more):
+    """A row of the table of outcomes; the set is what was found at 0.8, and more at 0.15 each."""
+    explanations = [] if verdict == "no_effect" else [(list(found) or ["unknown"], 0.8)]
+    explanations += [(names, 0.15) for names in among]
+    return {
+        "verdict": verdict, "found": json.dumps(found), "specs": "[]", "found_classes": "[]",
+        "positions": json.dumps([place] + [None] * (len(found) - 1)), "posteriors": "[]",
+        "credible_set": json.dumps(
+            [{"names": n, "classes": [[i] for i in n], "posterior": p} for n, p in explanations]
+        ),
+        "confirmed": False, "statement": "", "held_out_z": np.nan, "sigma0_before": 2.0,
+        "sigma0_after": 1.0, "p_size": 0.1, "redundancy": 63, "positions_used": 24, "reason": "",
+        "error": "", **more,
+    }  # fmt: skip
+
+
+GIVEN_AWAY = {"verdict": None, "found": None, "credible_set": None, "confirmed": None}
+"""What there is of a diagnosis that failed."""
+
+BUMPED = {"gross_name": "outlier_position", "gross": '{"settings": {"position": 7.0}}'}
+
+CASES = [
+    *[(truth("null", sigma=s), answer("no_effect")) for s in ("given", "not given")] * 19,
+    (truth("null"), answer("named", "settling", confirmed=True)),
+    (truth("null", sigma="not given"), answer("unknown")),
+    (truth("one", [DRIFT], 25, "right"), answer("named", "bias_drift", confirmed=True)),
+    (truth("one", [DRIFT], 25, "right"), answer("narrowed", "warm_up", among=[["bias_drift"]])),
+    (truth("one", [MOUNTED], 25, "wrong"), answer("named", "mounting_rotation")),
+    (truth("one", [SQUARE], 25, "nothing"), answer("no_effect")),
+    (truth("one", [SQUARE], 60, "right"), answer("named", "quadratic_scale", "settling")),
+    (truth("one", [SQUARE], 60, "right"), {**answer("named"), **GIVEN_AWAY, "error": "refused"}),
+    (truth("two", [DRIFT, SQUARE], 40, "right"), answer("named", "quadratic_scale", "bias_drift")),
+    (truth("two", [DRIFT, SQUARE], 40, "right"), answer("named", "bias_drift")),
+    (truth("two", [DRIFT, WARM], 40, "wrong"), answer("named", "warm_up", "settling")),
+    (truth("noise", what="level"), answer("noise_model", "noise_level")),
+    (truth("removed", size=400.0, what="warm_up"), answer("unknown")),
+    (truth("removed", size=60.0, what="warm_up"), answer("named", "bias_drift")),
+    (truth("outside", size=150.0, what="fifth"), answer("narrowed", "settling")),
+    (truth("gross", gross_name="axis_error"), answer("gross_error", "axis_error", "bias_drift")),
+    (truth("gross", gross_name="row_order"), answer("unknown")),
+    (truth("gross", **BUMPED), answer("gross_error", "outlier_position", place=7)),
+    (truth("gross", **BUMPED), answer("gross_error", "outlier_position", place=8)),
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def parts():
+    """Truths and outcomes."""
+    keys = [{"cell": f"cell {i}", "campaign": i % 3} for i in range(len(CASES))]
+    tables = {}
+    for i, name in enumerate(("truths", "outcomes")):
+        rows = [{**key, **case[i]} for key, case in zip(keys, CASES, strict=True)]
+        tables[name] = pd.DataFrame(rows).astype(SCHEMA[name])
+    return tables
+
+
+@pytest.fixture(scope="module")
+def tables(parts):
+    one = parts["truths"].query("set == 'one'")
+    answers = one[["cell", "campaign"]].assign(
+        method="F test", detected=True, found='["bias_drift"]'
+    )
+    limit = {"design": "spread-24", "approach": "robot", "mdb": 1.0, "mib": 2.0, "unit": "m/s^2",
+             "nearest": "warm_up", "lambda_mdb": 15.0, "lambda_mib": 50.0}  # fmt: skip
+    known = [{"what": what, **limit} for what in ("bias_drift", "quadratic_scale")]
+    shuffled = parts["outcomes"].sample(frac=1, random_state=1)
+    return score_tables(parts["truths"], shuffled, answers, pd.DataFrame(known))
+
+
+ORIGIN = {"config_hash": "0123", "seed": 5, "version": "1.2", "commit": "abcdef012345+"}
+
+
+def target(tables, figure, cases=""):
+    table = tables["targets"]
+    found = table[(table["figure"] == figure) & table["cases"].str.contains(cases, regex=False)]
+    (row,) = found.to_dict("records")
+    return row
+
+
+def test_names_are_right_in_any_order_and_each_for_another_effect():
+    assert same_effects([["b"], ["a"]], [["a", "x"], ["b"]])
+    assert not same_effects([["a"], ["x"]], [["a", "x"], ["b"]])
+    assert not same_effects([["a"]], [["a"], ["b"]])
+    assert all_true([["a"]], [["a"], ["b"]])
+    assert not all_true([], [["a"]])
+    assert not same_effects([], [])
+    assert not all_true([["a"], ["b"]], [["a"]])
+
+
+@pytest.mark.parametrize(
+    ("figure", "cases", "measured", "n", "met"),
+    [
+        ("campaigns without an answer", "all", 1 / len(CASES), len(CASES), "no"),
+        ("false alarm", "sigma given", 1 / 20, 20, "yes"),
+        ("false alarm", "sigma not given", 1 / 20, 20, "yes"),
+        ("named or narrowed to effects", "wrong noise", 0, 1, "yes"),
+        # Drift is right, and the mounting by its other name; narrowed to the wrong one is not.
+        ("best name right, named or narrowed", "λ = 25", 2 / 4, 4, "yes"),
+        # A second name beside the right one is wrong, and so is no answer.
+        ("best name right, named or narrowed", "λ = 60", 0, 2, "no"),
+        ("best name right, named or narrowed", "over all λ", 2 / 6, 6, "no"),
+        ("named, and wrong", "one and two", 2 / 6, 6, "no"),
+        ("90 % set holds the truth", "λ = 25", 3 / 3, 3, "yes"),
+        ("90 % set holds the truth", "λ = 60", 0, 1, "no"),
+        ("names in a 90 % set", "λ = 25", 4 / 3, 3, "yes"),
+        ("names in a 90 % set", "λ = 60", 2, 1, "no"),
+        ("both of two right", "λ = 40", 1 / 3, 3, "no"),
+        ("named or narrowed wrongly", "never in the catalogue", 1, 1, "no"),
+        ("named or narrowed wrongly", "family taken out", 0, 1, "yes"),
+        ("confirmed", "nothing missing", None, None, "no"),
+        # A bumped hold is recognised where it is.
+        ("recognised", "gross errors", 2 / 4, 4, "no"),
+    ],
+)
+def test_targets(tables, figure, cases, measured, n, met):
+    row = target(tables, figure, cases)
+    assert row["met"] == met
+    if n is not None:
+        assert row["measured"] == pytest.approx(measured)
+        assert row["n"] == n
+        if figure != "names in a 90 % set":
+            low, high = clopper_pearson(round(measured * n), n)
+            assert (row["ci95_low"], row["ci95_high"]) == pytest.approx((float(low), float(high)))
+
+
+def test_the_oracle_sets_the_target(tables):
+    row = target(tables, "best name right, named or narrowed", "λ = 25")
+    assert row["wanted"] == "≥ 0.47 (oracle 0.50 − 0.03)"
+    assert row["least"] == pytest.approx(0.47)
+    assert target(tables, "both of two right")["least"] == pytest.approx(2 / 3 - 0.1)
+
+
+def test_what_was_not_measured_is_not_met(parts):
+    truths = parts["truths"].query("set == 'one'")
+    judged = judge(truths.merge(parts["outcomes"]))
+    table = targets(judged)
+    row = table[table["figure"] == "recognised"].iloc[0]
+    assert row["met"] == "–"
+    assert np.isnan(row["measured"])
+    assert (row["ci95_low"], row["ci95_high"]) == (0, 1)
+
+
+def test_exact_intervals():
+    """Clopper & Pearson (1934): none of 10, 1 of 20, all of 5."""
+    low, high = clopper_pearson([0, 1, 5], [10, 20, 5])
+    assert low == pytest.approx([0, 0.0012651, 0.4781762], abs=1e-6)
+    assert high == pytest.approx([0.3084971, 0.2487328, 1], abs=1e-6)
+
+
+def test_shares(tables):
+    table = tables["shares"]
+    row = share_of(table, "alarm", "null", sigma="given")
+    assert (row["count"], row["n"]) == (1, 20)
+    assert share_of(table, "wrong, of those named", "two")["share"] == pytest.approx(1 / 3)
+    # Narrowed to a set that holds the truth is not wrong; of the outside no set holds anything.
+    assert share_of(table, "wrong", "one", size=25.0)["count"] == 0
+    assert share_of(table, "wrong", "outside")["share"] == 1
+    assert share_of(table, "one of two", "two", size=40.0)["share"] == pytest.approx(1 / 3)
+    assert share_of(table, "confirmed, of those answered", "null")["share"] == 1
+    assert share_of(table, "oracle found", "one", size=25.0)["share"] == 3 / 4
+    assert share_of(table, "alarm", "invisible") is None
+    # Every division counts each campaign once.
+    alarms = table[(table["quantity"] == "alarm") & (table["set"] == "one")]
+    for by in (["size"], ["what"], ["sigma"]):
+        divided = alarms[alarms[by[0]].notna() & (alarms[by[0]] != "all")]
+        others = [c for c in ("what", "size", "design", "approach", "sigma") if c not in by]
+        alone = divided[
+            (divided[[c for c in others if c != "size"]] == "all").all(axis=1)
+            & (divided["size"].isna() if "size" in others else True)
+        ]
+        assert alone["n"].sum() == 6
+
+
+def test_confusion(tables):
+    table = tables["confusion"].set_index(["truth", "answer"])["share"]
+    assert table["slow change in time", "slow change in time"] == 1  # warm-up for a drift, too
+    assert table["even nonlinearity", "nothing"] == 1 / 2
+    assert table.groupby("truth").sum().tolist() == pytest.approx([1, 1, 1])
+
+
+def test_calibration(tables):
+    table = tables["calibration"].set_index("of")
+    # Of all with a set, singles and pairs: three names of the first place are right in the end.
+    assert (table.loc["explanation", "count"], table.loc["explanation", "n"]) == (3, 7)
+    assert table.loc["explanation", "stated"] == pytest.approx(0.8)
+    assert table.loc["set"]["n"].sum() == 7
+    assert table.loc["set"]["count"].sum() == 4
+
+
+def test_methods(tables):
+    table = tables["baselines"]
+    whole = table[table["size"].isna()].set_index(["method", "quantity"])["share"]
+    assert whole["F test", "detected"] == 1
+    assert whole["F test", "right"] == pytest.approx(2 / 6)
+    assert whole["F test", "wrong"] == pytest.approx(4 / 6)
+    assert whole["oracle", "right"] == pytest.approx(4 / 6)
+    assert whole["diagnosis", "right"] == pytest.approx(2 / 6)
+
+
+def test_limits(tables):
+    table = tables["limits"].set_index("what")
+    assert table.loc["bias_drift", ["above_mdb", "above_mib"]].tolist() == [2, 0]
+    assert table.loc["quadratic_scale", "above_mib"] == 2
+    assert table.loc["quadratic_scale", "right"] == 0
+    assert table.loc["quadratic_scale", "detected"] == pytest.approx(2 / 3 - 1 / 3)
+
+
+def test_a_page_with_every_target_and_every_error(tables):
+    seconds = pd.DataFrame({"seconds": [0.1, 0.2, 0.3]})
+    page = score_page(tables, seconds, ORIGIN)
+    assert "configuration `0123`, seed 5, accelstudy 1.2, commit `abcdef0123`" in page
+    for row in tables["targets"].to_dict("records"):
+        assert f"| {row['figure']} | {row['cases']} | {row['wanted']} |" in page
+    assert "| refused | 1 |" in page
+    assert "nan" not in page
+
+
+def test_figures_of_much_and_of_nothing(tables):
+    empty = {name: table[:0] for name, table in tables.items()}
+    for made in (tables, empty):
+        for draw in figures(made).values():
+            assert draw().axes
+
+
+def test_a_truth_without_an_outcome(parts):
+    with pytest.raises(InputError, match=r"cell 0, campaign 0: has no outcome; 1 in all"):
+        score_tables(parts["truths"], parts["outcomes"][1:], pd.DataFrame(), pd.DataFrame())

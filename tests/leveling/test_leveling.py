@@ -1,0 +1,106 @@
+"""Leveling: equations (6) and (7) of Thalmann & Neuner (2018), and the accuracy they imply."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
+from accelstudy.leveling.angles import jacobian, roll_pitch, sigma_roll_pitch, specific_force
+
+G = STANDARD_GRAVITY
+SIGMA = 0.002
+ROLLS = st.floats(-199 * GON, 199 * GON)
+PITCHES = st.floats(-95 * GON, 95 * GON)
+EQUAL_NOISE = SIGMA**2 * np.eye(3)
+
+
+def force(roll, pitch):
+    return np.array(specific_force(roll, pitch, G))
+
+
+@given(roll=ROLLS, pitch=PITCHES)
+def test_leveling_inverts_the_specific_force(roll, pitch):
+    np.testing.assert_allclose(roll_pitch(tuple(force(roll, pitch))), [roll, pitch], atol=1e-12)
+
+
+@given(roll=ROLLS, pitch=PITCHES, g=st.floats(1e-3, 1e3))
+def test_the_specific_force_has_the_norm_of_gravity(roll, pitch, g):
+    assert np.linalg.norm(specific_force(roll, pitch, g)) == pytest.approx(g, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("f", "roll", "pitch"),
+    [
+        ((0, 0, -G), 0, 0),  # level
+        ((0, -G, 0), 100, 0),  # on the right side
+        ((0, G, 0), -100, 0),
+        ((G, 0, 0), None, 100),  # nose up: no roll
+        ((-G, 0, 0), None, -100),
+        ((G * np.sin(10 * GON), 0, -G * np.cos(10 * GON)), 0, 10),
+        ((0, -G * np.sin(30 * GON), -G * np.cos(30 * GON)), 30, 0),
+    ],
+)
+def test_signs_of_the_convention(f, roll, pitch):
+    """North-east-down: f_b = g (sin θ, −cos θ sin φ, −cos θ cos φ), in gon."""
+    found = np.array(roll_pitch(f)) / GON
+    assert found[1] == pytest.approx(pitch, abs=1e-12)
+    if roll is not None:
+        assert found[0] == pytest.approx(roll, abs=1e-12)
+        np.testing.assert_allclose(force(roll * GON, pitch * GON), f, atol=1e-15 * G)
+
+
+def test_upside_down_has_a_roll_of_200_gon():
+    roll, pitch = roll_pitch((0.0, 0.0, G))
+    assert abs(roll) == pytest.approx(np.pi)
+    assert pitch == 0
+
+
+def test_components_may_be_arrays():
+    roll, pitch = np.meshgrid(np.linspace(-3, 3, 7), np.linspace(-1.5, 1.5, 5))
+    found = roll_pitch(specific_force(roll, pitch, G))
+    np.testing.assert_allclose(found, [roll, pitch], atol=1e-12)
+
+
+@given(roll=ROLLS, pitch=PITCHES)
+def test_jacobian_is_equation_7(roll, pitch):
+    f_x, f_y, f_z = f = force(roll, pitch)
+    f_yz2 = f_y**2 + f_z**2
+    f_yz, f_xyz2 = np.sqrt(f_yz2), f_x**2 + f_yz2
+    expected = [
+        [0, f_z / f_yz2, -f_y / f_yz2],
+        [f_yz / f_xyz2, -f_x * f_y / (f_xyz2 * f_yz), -f_x * f_z / (f_xyz2 * f_yz)],
+    ]
+    np.testing.assert_allclose(jacobian(f), expected, rtol=1e-9, atol=1e-14)
+
+
+def test_jacobian_of_many_forces():
+    f = np.random.default_rng(0).standard_normal((4, 5, 3))
+    found = jacobian(f)
+    assert found.shape == (4, 5, 2, 3)
+    np.testing.assert_allclose(found[2, 3], jacobian(f[2, 3]), rtol=1e-14)
+
+
+def test_sigma_at_level_is_13_mgon():
+    sigma = sigma_roll_pitch(force(0, 0), EQUAL_NOISE) / MGON
+    np.testing.assert_allclose(sigma, 12.98, atol=0.005)
+
+
+def test_sigma_at_a_pitch_of_50_gon():
+    sigma = sigma_roll_pitch(force(0, 50 * GON), EQUAL_NOISE) / MGON
+    np.testing.assert_allclose(sigma, [18.36, 12.98], atol=0.005)
+
+
+@given(roll=ROLLS, pitch=PITCHES, sigma=st.floats(1e-6, 0.1))
+def test_sigma_of_equal_noise(roll, pitch, sigma):
+    """Roll loses accuracy with pitch, and with nothing else; pitch never."""
+    found = sigma_roll_pitch(force(roll, pitch), sigma**2 * np.eye(3))
+    np.testing.assert_allclose(found, [sigma / (G * np.cos(pitch)), sigma / G], rtol=1e-9)
+
+
+def test_sigma_of_correlated_noise_by_simulation():
+    cov = np.array([[4.0, 1.5, -1.0], [1.5, 3.0, 0.5], [-1.0, 0.5, 2.0]]) * 1e-6
+    f = force(35 * GON, -40 * GON)
+    draws = np.random.default_rng(7).multivariate_normal(f, cov, size=40_000)
+    spread = np.std(roll_pitch(tuple(draws.T)), axis=1)
+    np.testing.assert_allclose(sigma_roll_pitch(f, cov), spread, rtol=4.5 / np.sqrt(2 * 40_000))

@@ -1,0 +1,157 @@
+"""The tilt error that a calibration leaves, against brute force and against closed forms."""
+
+import numpy as np
+import pytest
+from study_helpers import NINE, PAPER_TRUTH
+
+from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
+from accelstudy.leveling.angles import roll_pitch
+from accelstudy.leveling.error import cap_forces, leveling_error, tilt_error
+from accelstudy.sensors.models import compose, get_model
+
+G = STANDARD_GRAVITY
+MODEL = get_model(NINE)
+TRUTH = MODEL.vector(PAPER_TRUTH)
+# What the gravity-based calibration of 24 positions leaves.
+SIGMA = np.repeat([0.707e-3, 102e-6, 10.26 * MGON], 3)
+BIAS, SCALE = compose("bias", ("bias",)), compose("scale", ("scale",))
+CUBIC = compose("cubic", ("bias", "scale", "nonorthogonality", "cubic_scale"))
+
+
+def angles_of(f):
+    return np.stack(roll_pitch(tuple(np.moveaxis(f, -1, 0))), axis=-1)
+
+
+def brute_force(simulated, truth, estimated, estimates, f_b, g=G):
+    """Level every attitude with every calibration, without any linearisation; rms (R, 2)."""
+    output = simulated.sense(f_b, truth, g)
+    corrected = estimated.correct(
+        np.broadcast_to(output, (len(estimates), *f_b.shape)), estimates, g
+    )
+    error = angles_of(corrected) - angles_of(f_b)
+    error = (error + np.pi) % (2 * np.pi) - np.pi
+    return np.sqrt(np.mean(error**2, axis=1))
+
+
+def estimates_about(center, sigma, replicates=200, seed=1):
+    draws = np.random.default_rng(seed).standard_normal((replicates, len(center)))
+    return center + sigma * draws
+
+
+# --- attitudes -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("tilt", [10 * GON, 50 * GON, 99 * GON])
+def test_attitudes_are_spread_evenly_over_the_cap(tilt):
+    f_b = cap_forces(tilt, 4000, 9.81)
+    np.testing.assert_allclose(np.linalg.norm(f_b, axis=1), 9.81, rtol=1e-14)
+    u = -f_b / 9.81
+    assert np.arccos(u[:, 2]).max() < tilt
+    # Uniform over a cap: z is uniform in (cos tilt, 1), and the azimuth over the circle.
+    quantiles = np.quantile(u[:, 2], [0, 0.25, 0.5, 0.75, 1])
+    expected = 1 - (1 - np.cos(tilt)) * np.array([1, 0.75, 0.5, 0.25, 0])
+    np.testing.assert_allclose(quantiles, expected, atol=1e-3 * (1 - np.cos(tilt)))
+    assert u[:, 2].mean() == pytest.approx((1 + np.cos(tilt)) / 2, rel=1e-12)
+    azimuth = np.arctan2(u[:, 1], u[:, 0])
+    for half in (azimuth[:2000], azimuth[2000:]):
+        counts, _ = np.histogram(half, bins=8, range=(-np.pi, np.pi))
+        assert np.abs(counts - 250).max() <= 5
+
+
+def test_one_attitude():
+    assert cap_forces(50 * GON, 1).shape == (1, 3)
+
+
+# --- brute force ---------------------------------------------------------------------------------
+
+
+def test_scatter_of_calibrations():
+    f_b = cap_forces(50 * GON, 60)
+    estimates = estimates_about(TRUTH, SIGMA)
+    error = leveling_error(MODEL, TRUTH, MODEL, estimates, f_b)
+    expected = brute_force(MODEL, TRUTH, MODEL, estimates, f_b)
+    np.testing.assert_allclose(error.per_replicate, expected, rtol=2e-3)
+    np.testing.assert_allclose(error.rms, np.sqrt(np.mean(expected**2, axis=0)), rtol=1e-3)
+
+
+@pytest.mark.parametrize("g", [9.78, 9.83])
+def test_an_effect_that_the_model_lacks(g):
+    """Bias of the model and scatter of the calibration together."""
+    f_b = cap_forces(40 * GON, 50, g)
+    truth = CUBIC.vector({**PAPER_TRUTH, "k3_x": 100e-6, "k3_y": 60e-6, "k3_z": -900e-6})
+    estimates = estimates_about(TRUTH, SIGMA)
+    error = leveling_error(CUBIC, truth, MODEL, estimates, f_b, g)
+    expected = brute_force(CUBIC, truth, MODEL, estimates, f_b, g)
+    np.testing.assert_allclose(error.per_replicate, expected, rtol=5e-3)
+    without = leveling_error(MODEL, TRUTH, MODEL, estimates, f_b, g)
+    assert (error.rms > 1.2 * without.rms).all()
+
+
+def test_a_large_error_of_the_mean_is_not_linearised():
+    f_b = cap_forces(50 * GON, 40)
+    estimates = np.tile(BIAS.vector({}), (3, 1))
+    truth = BIAS.vector({"b_x": 1.5, "b_y": -2.0, "b_z": 1.0})  # tilts of 10 gon
+    error = leveling_error(BIAS, truth, BIAS, estimates, f_b)
+    expected = brute_force(BIAS, truth, BIAS, estimates, f_b)
+    np.testing.assert_allclose(error.per_replicate, expected, rtol=1e-12)
+    assert error.rms.min() > 5 * GON
+
+
+# --- closed forms --------------------------------------------------------------------------------
+
+
+def test_a_perfect_calibration_leaves_nothing():
+    error = leveling_error(MODEL, TRUTH, MODEL, np.tile(TRUTH, (4, 1)), cap_forces(1.0, 30))
+    assert error.per_replicate.shape == (4, 2)
+    assert error.per_replicate.max() < 1e-12
+
+
+def test_a_bias_at_level():
+    """atan(b_y/g) in roll, and atan(b_x/g) in pitch."""
+    level = np.array([[0.0, 0.0, -G]])
+    truth = BIAS.vector({"b_x": 0.03, "b_y": 0.05})
+    error = leveling_error(BIAS, truth, BIAS, np.zeros((1, 3)), level)
+    roll = np.arctan(0.05 / G)
+    pitch = np.arctan(0.03 / np.hypot(G, 0.05))
+    np.testing.assert_allclose(error.per_replicate, [[roll, pitch]], rtol=1e-9)
+
+
+@pytest.mark.parametrize("pitch_gon", [-50, 0, 30])
+def test_scattering_biases_at_a_pitch(pitch_gon):
+    """σ_φ = σ_b/(g cos θ) and σ_θ = σ_b/g (eq. 7), at a roll of zero."""
+    pitch = pitch_gon * GON
+    f_b = G * np.array([[np.sin(pitch), 0.0, -np.cos(pitch)]])
+    estimates = estimates_about(np.zeros(3), 1e-3, replicates=20_000)
+    rms = leveling_error(BIAS, np.zeros(3), BIAS, estimates, f_b).rms
+    expected = 1e-3 / G * np.array([1 / np.cos(pitch), 1])
+    np.testing.assert_allclose(rms, expected, rtol=4.5 / np.sqrt(2 * 20_000))
+
+
+def test_a_common_scale_does_not_tilt():
+    f_b = cap_forces(50 * GON, 30)
+    error = leveling_error(SCALE, np.full(3, 1e-3), SCALE, np.zeros((2, 3)), f_b)
+    assert error.per_replicate.max() < 1e-12
+    unequal = leveling_error(SCALE, np.array([1e-3, 0, 0]), SCALE, np.zeros((2, 3)), f_b)
+    assert unequal.rms[1] > 1e-4
+    assert unequal.rms[0] < 1e-12  # roll does not contain f_x
+
+
+def test_roll_wraps():
+    """Upside down, roll lies beside ±π, and an error across it is still small."""
+    f_b = np.array([[0.0, -1e-6, G]])
+    error = leveling_error(BIAS, np.array([0, 2e-3, 0]), BIAS, np.zeros((1, 3)), f_b)
+    np.testing.assert_allclose(error.rms[0], 2e-3 / G, rtol=1e-3)
+
+
+def test_rms_of_all_follows_from_the_covariance_alone():
+    """That is how it is known of calibrations that nobody kept."""
+    truth = CUBIC.vector(PAPER_TRUTH) + np.array([0] * 9 + [1e-4, 2e-4, -1e-4])
+    estimates = estimates_about(TRUTH, SIGMA)
+    f_b = cap_forces(0.8, 40)
+    error = tilt_error(CUBIC, truth, MODEL, estimates.mean(axis=0), f_b)
+    found = error.rms_of_all(np.cov(estimates.T, bias=True))
+    expected = leveling_error(CUBIC, truth, MODEL, estimates, f_b).rms
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    # About another reference, a few standard deviations away, it is the same in the fourth digit.
+    elsewhere = tilt_error(CUBIC, truth, MODEL, estimates[0], f_b).rms(estimates)
+    np.testing.assert_allclose(elsewhere, error.rms(estimates), rtol=1e-3)

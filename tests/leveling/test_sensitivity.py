@@ -1,0 +1,205 @@
+"""Total effects: a published function, the closed forms of leveling, and the paper's shares."""
+
+import numpy as np
+import pytest
+from SALib.analyze.sobol import analyze
+from SALib.sample.sobol import sample
+from scipy.stats import norm
+from study_helpers import NINE, PAPER_TRUTH, PROVENANCE, grid, make_study, run_study
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import GON, MGON
+from accelstudy.files.tables import read_table
+from accelstudy.leveling.sensitivity import FORCES, leveling_sensitivity, total_effects
+from accelstudy.sensors.models import get_model
+from accelstudy.study.results.sensitivity import analyse_sensitivity
+
+SETTINGS = {"base_samples": 1024, "resamples": 50, "seed": 1}
+# Confidence intervals are of 95 %: 2.5 half widths are 4.9 standard deviations.
+WIDTHS = 2.5
+
+
+def ishigami(x):
+    """Ishigami & Homma (1990) with a = 7, b = 0.1, of normal inputs made uniform on (−π, π)."""
+    x1, x2, x3 = np.pi * (2 * norm.cdf(x.T) - 1)
+    return (np.sin(x1) + 7 * np.sin(x2) ** 2 + 0.1 * x3**4 * np.sin(x1))[:, None]
+
+
+ISHIGAMI = [0.5575889, 0.4424111, 0.2436837]
+
+
+def test_ishigami():
+    total, ci95, sd = total_effects(ishigami, [0, 0, 0], [1, 1, 1], 4096, 50, 1)
+    assert np.all(np.abs(total[0] - ISHIGAMI) < WIDTHS * ci95[0])
+    np.testing.assert_allclose(total[0], ISHIGAMI, atol=0.02)
+    assert np.all((ci95 > 1e-3) & (ci95 < 0.06))
+    # Variance a²/8 + bπ⁴/5 + b²π⁸/18 + 1/2.
+    variance = 49 / 8 + np.pi**4 / 50 + np.pi**8 / 1800 + 0.5
+    assert sd[0] == pytest.approx(np.sqrt(variance), rel=0.01)
+
+
+def test_confidence_intervals_hold_the_published_values():
+    """Over 20 seeds, 60 intervals of 95 %."""
+    inside = 0
+    for seed in range(20):
+        total, ci95, _ = total_effects(ishigami, np.zeros(3), np.ones(3), 512, 100, seed)
+        inside += int(np.count_nonzero(np.abs(total[0] - ISHIGAMI) <= ci95[0]))
+    assert inside >= 50  # of Sobol points they are rather too wide
+
+
+def test_linear_function():
+    """(aσ)² over the sum, whatever the means; an input without sigma has no effect."""
+    coefficients, sigma = np.array([1.0, -2.0, 3.0, 50.0]), np.array([2.0, 1.0, 0.5, 0.0])
+    total, ci95, sd = total_effects(
+        lambda x: x @ coefficients[:, None], [5, 0, -3, 100], sigma, 1024, 50, 3
+    )
+    variance = (coefficients * sigma) ** 2
+    assert total[0, 3] == ci95[0, 3] == 0
+    assert np.all(np.abs(total[0] - variance / variance.sum())[:3] < WIDTHS * ci95[0, :3])
+    assert sd[0] == pytest.approx(np.sqrt(variance.sum()), rel=0.01)
+
+
+def test_effects_and_intervals_are_those_of_salib():
+    """To the last bit, from the same samples and resamples."""
+    problem = {"num_vars": 3, "names": [*"abc"], "bounds": [[0, 1]] * 3, "dists": ["norm"] * 3}
+    outputs = ishigami(sample(problem, 256, calc_second_order=False, seed=5))[:, 0]
+    normalised = (outputs - outputs.mean()) / outputs.std()
+    expected = analyze(problem, normalised, calc_second_order=False, num_resamples=20, seed=5)
+    total, ci95, _ = total_effects(ishigami, np.zeros(3), np.ones(3), 256, 20, 4)
+    assert total[0].tolist() == expected["ST"].tolist()
+    assert ci95[0].tolist() == expected["ST_conf"].tolist()
+
+
+def test_a_product_is_all_interaction():
+    total, ci95, _ = total_effects(lambda x: x[:, :1] * x[:, 1:], [0, 0], [1, 3], 4096, 50, 1)
+    assert np.all(np.abs(total - 1) < WIDTHS * ci95)
+
+
+def test_an_output_without_variance_has_no_effects():
+    total, ci95, sd = total_effects(
+        lambda x: np.stack([x[:, 0], np.full(len(x), 7.0)], axis=1), [0, 0], [1, 1], 64, 10, 1
+    )
+    assert np.isfinite(total[0]).all()
+    assert np.isnan(total[1]).all()
+    assert np.isnan(ci95[1]).all()
+    assert sd[1] == 0
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2018])
+def test_a_seed_gives_the_same_table(seed):
+    def table(seed):
+        return leveling_sensitivity([0, 30], [20], 0.002, 64, 10, seed)
+
+    assert table(seed).equals(table(seed))
+    assert not table(seed).equals(table(seed + 7))
+
+
+def test_the_seed_leaves_the_generator_of_numpy_alone():
+    np.random.seed(5)  # noqa: NPY002 - the legacy state is what is looked at
+    before = np.random.get_state()[1].copy()  # noqa: NPY002
+    leveling_sensitivity([0], [20], 0.002, 64, 10, 0)
+    np.testing.assert_array_equal(np.random.get_state()[1], before)  # noqa: NPY002
+
+
+# --- leveling without parameters (figure 4) ------------------------------------------------------
+
+ATTITUDES = [(0, 0), (50, 0), (-30, 20), (20, -50), (80, 60), (0, 50)]
+
+
+@pytest.mark.parametrize(("roll", "pitch"), ATTITUDES)
+def test_forces_alone(roll, pitch):
+    """Roll: cos²φ, sin²φ. Pitch: cos²θ, sin²θ sin²φ, sin²θ cos²φ (linear limit)."""
+    table = leveling_sensitivity([roll], [pitch], 0.002, **SETTINGS)
+    phi, theta = roll * GON, pitch * GON
+    expected = {
+        "roll": [0, np.cos(phi) ** 2, np.sin(phi) ** 2],
+        "pitch": [
+            np.cos(theta) ** 2,
+            (np.sin(theta) * np.sin(phi)) ** 2,
+            (np.sin(theta) * np.cos(phi)) ** 2,
+        ],
+    }
+    for output, effects in expected.items():
+        rows = table[table["output"] == output]
+        assert rows["input"].tolist() == [*FORCES]
+        assert rows["defined"].all()
+        limit = WIDTHS * rows["ci95"].to_numpy() + 1e-6  # 1e-6: what is not linear
+        assert np.all(np.abs(rows["total_effect"].to_numpy() - effects) <= limit)
+    roll_rows = table[table["output"] == "roll"].set_index("input")
+    assert roll_rows.loc["f_x", "total_effect"] == 0
+    assert roll_rows.loc["f_x", "ci95"] == 0
+
+
+@pytest.mark.parametrize(("roll", "pitch"), ATTITUDES)
+def test_sd_of_the_tilt_angles(roll, pitch):
+    """σ/(g cos θ) and σ/g: 12.98 mgon at level, 18.36 mgon of roll at a pitch of 50 gon."""
+    table = leveling_sensitivity([roll], [pitch], 0.002, **SETTINGS).groupby("output")
+    sd = table["sd_output_mgon"].first()
+    assert sd["pitch"] == pytest.approx(12.98, rel=0.01)
+    assert sd["roll"] == pytest.approx(12.98 / np.cos(pitch * GON), rel=0.01)
+    if (roll, pitch) == (0, 50):
+        assert sd["roll"] == pytest.approx(18.36, rel=0.01)
+
+
+def test_the_table_is_the_grid():
+    table = leveling_sensitivity([0, -10], [5, 0, 50], 0.002, 16, 5, 1)
+    assert len(table) == 2 * 3 * 2 * 3
+    attitudes = table[["roll_gon", "pitch_gon"]].drop_duplicates().to_numpy().tolist()
+    assert attitudes == [[0, 5], [0, 0], [0, 50], [-10, 5], [-10, 0], [-10, 50]]
+
+
+def test_a_force_without_noise_gives_no_variance():
+    table = leveling_sensitivity(
+        [30], [20], 0.0, 1024, 5, 1, get_model("bias-scale"), np.zeros(6), 1e-3 * np.eye(6)[0]
+    ).set_index(["output", "input"])
+    assert not table.loc["roll", "defined"].any()  # b_x alone varies, and roll lacks it
+    assert table.loc["roll", "total_effect"].isna().all()
+    assert table.loc["pitch", "defined"].all()
+    assert table.loc[("pitch", "b_x"), "total_effect"] == pytest.approx(1, abs=0.02)
+
+
+# --- with the parameters of a calibration (figures 5 and 6) --------------------------------------
+
+MODEL = get_model(NINE)
+TRUTH = MODEL.vector(PAPER_TRUTH)
+SIGMA = np.repeat([0.70711e-3, 101.97e-6, 10.264 * MGON], 3)
+
+
+def test_shares_at_level_are_those_of_the_paper():
+    """f_y 57 %, α_zx 36 %, b_y 7 % of the variance of roll, with sds from gravity."""
+    table = leveling_sensitivity(
+        [0], [0], 0.002, **SETTINGS, model=MODEL, parameters=TRUTH, sigma_parameters=SIGMA
+    )
+    roll = table[table["output"] == "roll"].set_index("input")
+    for name, share in {"f_y": 0.571, "alpha_zx": 0.357, "b_y": 0.071}.items():
+        assert abs(roll.loc[name, "total_effect"] - share) < WIDTHS * roll.loc[name, "ci95"]
+        assert roll.loc[name, "total_effect"] == pytest.approx(share, abs=0.01)
+    others = roll.drop(index=["f_y", "alpha_zx", "b_y"])["total_effect"]
+    assert others.max() < 1e-3
+    assert list(roll.index) == [*FORCES, *MODEL.parameter_names]
+
+
+def test_the_study_takes_the_sds_from_the_simulation(tmp_path):
+    """The same shares, of the sds that a Monte Carlo of the calibration shows."""
+    sensitivity = {"base_samples": 512, "resamples": 20, "roll_gon": [0], "pitch_gon": [0]}
+    keys = {"grids": [grid(replicates=2000)], "sensitivity": sensitivity}
+    run_study(tmp_path, **keys)
+    study, summary = make_study(**keys), tmp_path / "summary.parquet"
+    analyse_sensitivity(study, summary, tmp_path / "sensitivity.parquet", PROVENANCE)
+    table = read_table(tmp_path / "sensitivity.parquet").query("output == 'roll'")
+    by_analysis = table.set_index("input").groupby("analysis")["total_effect"]
+    tables = {str(name): its for name, its in by_analysis}
+    assert [*tables] == ["forces", "gravity", "robot"]
+    assert tables["forces"]["f_y"] == pytest.approx(1, abs=0.01)
+    assert tables["gravity"]["f_y"] == pytest.approx(0.571, abs=0.03)
+    assert tables["gravity"]["alpha_zx"] == pytest.approx(0.357, abs=0.03)
+    # The robot determines α_zx more than twice as well.
+    assert tables["robot"]["alpha_zx"] < 0.5 * tables["gravity"]["alpha_zx"]
+
+
+def test_a_cell_without_estimates_is_an_input_error(tmp_path):
+    sensitivity = {"base_samples": 16, "resamples": 5, "roll_gon": [0], "pitch_gon": [0]}
+    run_study(tmp_path, grids=[grid(schemes="rings-24", replicates=5)])
+    study = make_study(sensitivity=sensitivity)
+    with pytest.raises(InputError, match=f"no estimates of the cell {NINE}/mclaren-24/gravity"):
+        analyse_sensitivity(study, tmp_path / "summary.parquet", tmp_path / "out", PROVENANCE)

@@ -1,0 +1,220 @@
+"""Shapley effects: closed forms, the definition itself, and Monte Carlo against what is exact."""
+
+from itertools import permutations
+
+import numpy as np
+import pytest
+from study_helpers import NINE, PAPER_TRUTH
+
+from accelstudy.approaches import get_approach
+from accelstudy.basics.units import GON, STANDARD_GRAVITY
+from accelstudy.design.estimability import diagnose
+from accelstudy.leveling.angles import specific_force
+from accelstudy.leveling.sensitivity import leveled, leveling_sensitivity
+from accelstudy.leveling.shapley import linear_shapley, sampled_shapley
+from accelstudy.leveling.shares import leveling_shares, leveling_slope, overtaken
+from accelstudy.schemes import get_scheme
+from accelstudy.sensors.models import get_model
+from accelstudy.simulation.sessions import Noise
+
+# Confidence intervals are of 95 %: 2.5 half widths are 4.9 standard deviations.
+WIDTHS = 2.5
+
+
+def random_covariance(d, seed):
+    a = np.random.default_rng(seed).normal(size=(d, d))
+    return a @ a.T
+
+
+@pytest.mark.parametrize("rho", [-0.9, 0.0, 0.5, 1.0])
+def test_two_correlated_inputs(rho):
+    """Iooss & Prieur (2019), section 4.1."""
+    (b1, b2), (s1, s2) = (1.0, 3.0), (2.0, 0.5)
+    covariance = [[s1**2, rho * s1 * s2], [rho * s1 * s2, s2**2]]
+    shares, variance = linear_shapley([b1, b2], covariance)
+    common = rho * b1 * b2 * s1 * s2
+    total = (b1 * s1) ** 2 + 2 * common + (b2 * s2) ** 2
+    first = (b1 * s1) ** 2 * (1 - rho**2 / 2) + common + (b2 * s2) ** 2 * rho**2 / 2
+    assert variance == pytest.approx(total)
+    np.testing.assert_allclose(shares, [[first / total, 1 - first / total]])
+
+
+def test_the_definition():
+    """What each input adds to the explained variance, on average over all orders."""
+    covariance, slope = random_covariance(4, 1), np.array([1.0, -2.0, 0.3, 0.0])
+    with_output = covariance @ slope
+
+    def explained(known):
+        own = covariance[np.ix_(known, known)]
+        return with_output[known] @ np.linalg.solve(own, with_output[known])
+
+    gained = np.zeros(4)
+    orders = list(permutations(range(4)))
+    for order in orders:
+        values = [0.0, *(explained(list(order[: j + 1])) for j in range(4))]
+        gained[list(order)] += np.diff(values)
+    shares, variance = linear_shapley(slope, covariance)
+    np.testing.assert_allclose(shares[0] * variance, gained / len(orders))
+    assert shares[0, 3] > 0.01  # of no influence of its own, but it tells of the others
+
+
+def test_independent_inputs_have_their_sobol_indices():
+    slope, sigma = np.array([[1.0, -2.0, 3.0, 9.0], [0, 0, 0, 1]]), np.array([2.0, 1.0, 0.5, 0.0])
+    shares, variance = linear_shapley(slope, np.diag(sigma**2))
+    np.testing.assert_allclose(shares[0], (slope[0] * sigma) ** 2 / variance[0])
+    assert np.isnan(shares[1]).all()  # only what does not vary
+    assert variance[1] == 0
+
+
+def test_independent_groups_are_games_of_their_own():
+    """What a group has as a whole is its share of the variance, in whatever coordinates."""
+    order = [3, 0, 5, 1, 4, 2]  # so that no group is in one piece
+    blocks = [random_covariance(2, 2), random_covariance(4, 3)]
+    slope = np.random.default_rng(4).normal(size=6)
+    whole = np.zeros((6, 6))
+    whole[:2, :2], whole[2:, 2:] = blocks
+    shares, variance = linear_shapley(slope[order], whole[np.ix_(order, order)])
+    shares = shares[0, np.argsort(order)]
+    for part, block in zip((slice(0, 2), slice(2, 6)), blocks, strict=True):
+        alone, its = linear_shapley(slope[part], block)
+        np.testing.assert_allclose(shares[part], alone[0] * its / variance)
+        turned = np.random.default_rng(5).normal(size=block.shape)
+        mixed, _ = linear_shapley(np.linalg.solve(turned.T, slope[part]), turned @ block @ turned.T)
+        assert mixed.sum() == pytest.approx(1)
+        assert np.abs(mixed - alone).max() > 0.01
+    # One group of all, connected by a correlation that is as good as none.
+    whole[0, 5] = whole[5, 0] = 1e-13
+    np.testing.assert_allclose(linear_shapley(slope, whole)[0][0], shares, rtol=1e-9)
+
+
+def test_shares_do_not_depend_on_units():
+    """Forces, ppm and rad are many powers of ten apart."""
+    covariance, units = random_covariance(5, 6), 10.0 ** np.array([-9, 0, 6, -3, 3])
+    slope = np.ones(5)
+    shares, _ = linear_shapley(slope, covariance)
+    scaled, _ = linear_shapley(slope / units, covariance * np.outer(units, units))
+    np.testing.assert_allclose(scaled, shares, rtol=1e-9)
+    assert (shares >= 0).all()
+    assert shares.sum() == pytest.approx(1)
+
+
+# --- Monte Carlo ---------------------------------------------------------------------------------
+
+
+def test_a_square_and_a_product_of_correlated_inputs():
+    """x₁² leaves ρ⁴/2 to x₂, of which it is no function; x₁x₂ is shared out evenly."""
+    rho = 0.8
+
+    def function(x):
+        return np.stack([x[:, 0] ** 2, x[:, 0] * x[:, 1]], axis=-1)
+
+    shares, ci95, variance = sampled_shapley(
+        function, [0, 0], [[1, rho], [rho, 1]], np.zeros((2, 2)), 20_000, np.random.default_rng(1)
+    )
+    expected = [[1 - rho**4 / 2, rho**4 / 2], [0.5, 0.5]]
+    assert np.all(np.abs(shares - expected) < WIDTHS * ci95)
+    assert np.all((ci95 > 1e-3) & (ci95 < 0.03))
+    np.testing.assert_allclose(variance, [2, 1 + rho**2], rtol=0.1)
+
+
+def test_sampled_shares_of_a_linear_function_are_the_exact_ones():
+    covariance, slope = random_covariance(5, 7), np.random.default_rng(8).normal(size=(2, 5))
+    exact, variance = linear_shapley(slope, covariance)
+    arguments = (lambda x: 3 + x @ slope.T), np.full(5, 9.0), covariance
+    shares, ci95, _ = sampled_shapley(*arguments, 0 * slope, 4000, np.random.default_rng(9))
+    assert np.all(np.abs(shares - exact) < WIDTHS * ci95)
+    np.testing.assert_allclose(shares.sum(axis=1), 1)
+    # With the linear function as control nothing is left to chance.
+    shares, ci95, found = sampled_shapley(*arguments, slope, 50, np.random.default_rng(9))
+    np.testing.assert_allclose(shares, exact, atol=1e-9)
+    np.testing.assert_allclose(found, variance)
+    assert np.all(ci95 < 1e-9)
+
+
+# --- leveling ------------------------------------------------------------------------------------
+
+MODEL = get_model(NINE)
+TRUTH = MODEL.vector(PAPER_TRUTH)
+NAMES = ["f_x", "f_y", "f_z", *MODEL.parameter_names]
+SIGMA_FORCE = 0.002
+
+
+def shares_of(scheme, roll, pitch, base_samples=64):
+    design = diagnose(get_scheme(scheme), MODEL, get_approach("gravity"), Noise(), TRUTH)
+    return leveling_shares(
+        roll, pitch, SIGMA_FORCE, MODEL, TRUTH, design.cofactors, base_samples, 1
+    )
+
+
+def test_the_slope_is_the_derivative():
+    attitude = np.array([30.0, -20.0]) * GON
+    f_s = MODEL.sense(np.array(specific_force(*attitude, STANDARD_GRAVITY))[None], TRUTH)
+    mean, function = np.concatenate([f_s[0], TRUTH]), leveled(attitude, MODEL)
+    step = 1e-5 * np.eye(len(NAMES))
+    numeric = (function(mean + step) - function(mean - step)).T / 2e-5
+    slope = leveling_slope(MODEL, TRUTH, f_s, STANDARD_GRAVITY)[0]
+    np.testing.assert_allclose(slope, numeric, rtol=1e-6, atol=1e-8)
+
+
+def test_total_effects_are_those_of_the_paper():
+    """The linear ones beside the Shapley effects, against Sobol's method."""
+    design = diagnose(get_scheme("mclaren-24"), MODEL, get_approach("gravity"), Noise(), TRUTH)
+    sampled = leveling_sensitivity(
+        [0, 50], [25], SIGMA_FORCE, 256, 20, 1, MODEL, TRUTH, design.sigma
+    )
+    table = shares_of("mclaren-24", [0, 50], [25])
+    keys = ["output", "roll_gon", "pitch_gon", "input"]
+    both = table.merge(sampled, on=keys, suffixes=("", "_sampled"), validate="one_to_one")
+    assert len(both) == len(table)
+    apart = (both["total_effect"] - both["total_effect_sampled"]).abs()
+    assert (apart < WIDTHS * both["ci95_sampled"] + 1e-4).all()
+
+
+def test_correlated_scales_gain_and_overtake_the_biases():
+    """Roll depends on s_y − s_z, whose variance a correlation of −0.25 makes a quarter larger."""
+    table = shares_of("mclaren-24", [0, 50], [0, 25])
+    assert (table["method"] == "linear").all()
+    assert table["defined"].all()
+    shares = table.set_index(["output", "roll_gon", "pitch_gon", "input"]).sort_index()
+    tilted = shares.loc["roll", 50.0, 25.0]
+    effects = tilted[["shapley_effect", "total_effect"]]
+    gain = effects.loc[["s_x", "s_y", "s_z"]].sum() / effects.loc["b_y"]
+    assert gain["shapley_effect"] / gain["total_effect"] == pytest.approx(1.25, rel=1e-3)
+    assert effects.loc["s_x", "shapley_effect"] > 10 * effects.loc["s_x", "total_effect"]
+    level = shares.loc["roll", 0.0, 0.0]
+    np.testing.assert_allclose(level["shapley_effect"], level["total_effect"], atol=1e-4)
+
+    changed = overtaken(table)
+    at = changed[["output", "roll_gon", "pitch_gon"]].drop_duplicates().to_numpy().tolist()
+    assert at == [["roll", 50.0, 25.0]]
+    pairs = set(zip(changed["input"], changed["over"], strict=True))
+    assert pairs == {("s_y", "b_y"), ("s_y", "b_z"), ("s_z", "b_y"), ("s_z", "b_z")}
+
+
+def test_near_the_pole_shares_are_sampled():
+    """Linear theory still serves at a pitch of 90 gon, and fails at 0.01 gon from the pole."""
+    table = shares_of("mclaren-24", [10], [90, 99.99])
+    table = table.set_index(["pitch_gon", "output", "input"]).sort_index()
+    design = diagnose(get_scheme("mclaren-24"), MODEL, get_approach("gravity"), Noise(), TRUTH)
+    whole = np.zeros((len(NAMES), len(NAMES)))
+    whole[:3, :3] = SIGMA_FORCE**2 * np.eye(3)
+    whole[3:, 3:] = design.cofactors
+    for pitch, near_linear in ((90.0, True), (99.99, False)):
+        attitude = np.array([10.0, pitch]) * GON
+        f_s = MODEL.sense(np.array(specific_force(*attitude, STANDARD_GRAVITY))[None], TRUTH)
+        slope = leveling_slope(MODEL, TRUTH, f_s, STANDARD_GRAVITY)[0]
+        exact, _ = linear_shapley(slope, whole)
+        mean = np.concatenate([f_s[0], TRUTH])
+        # Without the linear function as control.
+        shares, ci95, variance = sampled_shapley(
+            leveled(attitude, MODEL), mean, whole, 0 * slope, 4000, np.random.default_rng(2)
+        )
+        rows = table.loc[pitch].loc["roll"].loc[NAMES]
+        assert (rows["method"] == ("linear" if near_linear else "Monte Carlo")).all()
+        assert (rows["ci95"] == 0).all() == near_linear
+        apart = np.abs(shares[0] - rows["shapley_effect"])
+        assert (apart <= WIDTHS * np.hypot(ci95[0], rows["ci95"])).all()
+        fits = (np.abs(shares - exact) < WIDTHS * ci95 + 1e-12).all()
+        assert fits == near_linear
+        sd = rows["sd_output_mgon"].iloc[0] / 1e3 * GON
+        assert sd == pytest.approx(np.sqrt(variance[0]), rel=0.05)

@@ -1,0 +1,203 @@
+"""Data sheets: the sensors that come along, files of a user's, and what follows from them."""
+
+import math
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.commands.main import main
+from accelstudy.data_sheets import (
+    QUANTITIES,
+    DataSheet,
+    data_sheet_names,
+    get_data_sheet,
+    of_sigma,
+    parse_data_sheet,
+)
+from accelstudy.data_sheets.flicker import FLICKER, flicker_change
+from accelstudy.plan.sensors import get_sensor
+
+
+@pytest.mark.parametrize("name", data_sheet_names())
+def test_each_value_of_a_sensor_that_comes_along_has_its_source(name):
+    sheet = get_data_sheet(name)
+    assert sheet.name == name
+    assert sheet.title
+    assert sheet.source
+    assert all(sheet.sources[quantity] for quantity in sheet.known)
+    assert set(sheet.known) | set(sheet.unknown) <= set(QUANTITIES)
+    assert 1e-6 < sheet.sigma_mean(10.0) < 0.01
+
+
+def test_a_one_sided_density_is_sqrt_2_times_the_random_walk():
+    # A mean over τ passes white noise of one-sided density n with the variance n²/(2τ).
+    sheet = parse_data_sheet({"noise_density": "400 µg/√Hz"})
+    assert sheet.sigma_mean(1.0) == pytest.approx(400e-6 * STANDARD_GRAVITY / math.sqrt(2))
+    # STIM300: 0.06 m/s/√h is 1 mm/s² after one second.
+    walk = parse_data_sheet({"velocity_random_walk": "0.06 m/s/sqrt(h)"})
+    assert walk.sigma_mean(1.0) == pytest.approx(1e-3)
+
+
+def test_averaging_lowers_white_noise_and_not_the_floor():
+    sheet = DataSheet("s", velocity_random_walk=1e-3, bias_instability=1e-4)
+    assert sheet.sigma_mean(1.0) == pytest.approx(math.hypot(1e-3, 0.664e-4), rel=1e-3)
+    assert sheet.sigma_mean(1e6) == pytest.approx(0.664e-4, rel=1e-3)
+
+
+def test_the_wander_of_the_bias_during_a_session_is_that_of_a_simulated_random_walk():
+    rng = np.random.default_rng(5)
+    tau, n, walk = 10.0, 40, 2e-5
+    steps = 20
+    path = np.cumsum(walk * np.sqrt(tau / steps) * rng.standard_normal((4000, n * steps)), axis=1)
+    means = path.reshape(4000, n, steps).mean(axis=2)
+    scatter = np.sqrt(np.mean(means.var(axis=1, ddof=1)))
+    sheet = DataSheet("s", velocity_random_walk=1e-12, acceleration_random_walk=walk)
+    assert sheet.sigma_mean(tau, n * tau) == pytest.approx(scatter, rel=0.05)
+    assert sheet.sigma_mean(tau) < scatter / 3
+
+
+def test_the_bias_changes_with_time_temperature_and_switching_on():
+    sheet = DataSheet(
+        "s", velocity_random_walk=1e-3, acceleration_random_walk=1e-5,
+        bias_per_kelvin=1e-3, repeatability=5e-3,
+    )  # fmt: skip
+    assert sheet.bias_change(0.0) == 0
+    assert sheet.bias_change(3600.0) == pytest.approx(6e-4)
+    assert sheet.bias_change(3600.0, 10.0) == pytest.approx(math.hypot(6e-4, 1e-2))
+    assert sheet.bias_change(0.0, restarted=True) == pytest.approx(5e-3)
+
+
+def test_flicker_noise_carries_the_bias_ever_farther():
+    """Against the integral over its density, of two means of τ that begin m τ apart."""
+    instability, tau = 2e-4, 50.0
+    white = FLICKER * instability * math.sqrt(tau)
+    f = np.geomspace(1e-9, 1e2, 2_000_001)
+    mean = 2 * np.sinc(f * tau) ** 2 * instability**2 / (2 * np.pi * f)  # of ±f
+    for m in (1, 3, 100):
+        variance = np.trapezoid(mean * 4 * np.sin(np.pi * f * m * tau) ** 2, f)
+        change = flicker_change(instability, white, m * tau)
+        assert change == pytest.approx(math.sqrt(variance), rel=2e-3)
+    # Next to each other two means differ by the Allan deviation; shorter ones by no less.
+    beside = math.sqrt(2) * FLICKER * instability
+    assert flicker_change(instability, white, tau) == pytest.approx(beside)
+    assert flicker_change(instability, white, 1e-3) == pytest.approx(beside)
+    far = flicker_change(instability, white, 1e9)
+    assert far == pytest.approx(instability * math.sqrt((2 * math.log(2e7) + 3) / math.pi))
+    sheet = DataSheet("s", velocity_random_walk=white, bias_instability=instability)
+    assert sheet.bias_change(100 * tau) == flicker_change(instability, white, 100 * tau)
+    assert sheet.bias_change(0.0) == 0
+
+
+def test_a_nonlinearity_is_taken_as_a_parabola_or_a_cubic_of_the_same_deviation():
+    sheet = parse_data_sheet({
+        "position_sigma": "2mm/s2", "nonlinearity": "0.5%", "full_scale": "2g"
+    })  # fmt: skip
+    # The line of least largest deviation leaves the Chebyshev polynomial of that degree; 0.5 % of
+    # 2 g is 0.01 g.
+    for size, power in ((sheet.quadratic_scale, 2), (sheet.cubic_scale, 3)):
+        curve = np.polynomial.Polynomial([0] * power + [size], domain=[-2, 2], window=[-2, 2])
+        left = curve.convert(kind=np.polynomial.Chebyshev, domain=[-2, 2]).coef[power]
+        assert left == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ({}, "noise is missing"),
+        ({"noise_density": 5}, "noise_density: expected a number with its unit"),
+        ({"noise_density": "5 mgon"}, "noise_density: '5 mgon': the unit must be one of"),
+        ({"noise_density": "-5 ug/sqrt(Hz)"}, "must be more than 0"),
+        ({"noise_density": {"value": "5 ug/sqrt(Hz)", "page": 3}}, "unknown key of noise_density"),
+        ({"noise_density": ["5 ug/sqrt(Hz)"]}, "must be a number with its unit"),
+        ({"noise": "5 ug/sqrt(Hz)"}, "unknown key 'noise'"),
+        ({"position_sigma": "2 mm/s2", "noise_density": "5 ug/sqrt(Hz)"}, "give one of them"),
+        ({"position_sigma": "2 mm/s2", "nonlinearity": "1%"}, "full_scale: missing"),
+    ],
+)
+def test_what_is_no_data_sheet_ends_with_one_line(content, message):
+    with pytest.raises(InputError, match="mine") as error:
+        parse_data_sheet(content, "mine")
+    assert message in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_a_users_file_is_read_and_an_unknown_sensor_names_those_there_are(tmp_path):
+    path = tmp_path / "my-sensor.yaml"
+    path.write_text("noise_density: 100 ug/sqrt(Hz)\nbias_instability: 20 ug\n")
+    assert get_data_sheet(str(path)).name == "my-sensor"
+    with pytest.raises(InputError, match=r"unknown sensor 'adxl35'; did you mean 'adxl355'"):
+        get_data_sheet("adxl35")
+
+
+def test_a_sensor_of_which_only_the_noise_is_known_keeps_it_however_long_the_hold():
+    assert of_sigma(0.002).sigma_mean(1.0) == of_sigma(0.002).sigma_mean(100.0, 1000.0) == 0.002
+
+
+# --- from what was measured ----------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def still_log(tmp_path_factory):
+    """Ten minutes at rest with N = 1 mm/s²/√Hz and K = 0.05 mm/s²/√s."""
+    rng, rate, n = np.random.default_rng(1), 20, 20 * 600
+    walk = np.cumsum(5e-5 / np.sqrt(rate) * rng.standard_normal((n, 3)), axis=0)
+    samples = [0.1, 0.2, -9.8] + 1e-3 * np.sqrt(rate) * rng.standard_normal((n, 3)) + walk
+    path = tmp_path_factory.mktemp("still") / "still.csv"
+    np.savetxt(path, samples, "%.6f", delimiter=",")
+    return path
+
+
+READ = ("--rate", "20", "--columns", "fx=0,fy=1,fz=2")
+
+
+def call(*words):
+    return CliRunner().invoke(main, [str(word) for word in words])
+
+
+def test_a_log_at_rest_makes_a_data_sheet_that_can_be_read(still_log, tmp_path):
+    out = tmp_path / "mine.yaml"
+    result = call("data-sheet", still_log, *READ, "--out", out)
+    assert result.exit_code == 0, result.output
+    sheet = get_data_sheet(str(out))
+    assert sheet.velocity_random_walk == pytest.approx(1e-3, rel=0.05)
+    assert sheet.acceleration_random_walk == pytest.approx(5e-5, rel=0.5)
+    assert sheet.sigma_mean(10.0) == pytest.approx(math.hypot(1e-3 / 10**0.5, 9e-5), rel=0.05)
+    assert "still.csv" in sheet.sources["velocity_random_walk"]
+    assert "# repeatability:" in out.read_text(encoding="utf-8")
+    again = call("data-sheet", still_log, *READ, "--out", out)
+    assert again.exit_code == 2
+    assert "--force replaces it" in again.stderr
+
+
+def test_a_campaign_tells_the_noise_of_its_positions(still_log, tmp_path):
+    made = call("import", still_log, *READ, "--out", tmp_path / "c", "--no-figure")
+    assert made.exit_code == 0, made.output
+    result = call("data-sheet", tmp_path / "c", "--out", tmp_path / "mine.yaml")
+    assert result.exit_code == 0, result.output
+    sheet = get_data_sheet(str(tmp_path / "mine.yaml"))
+    assert sheet.position_sigma is not None
+    assert get_sensor(str(tmp_path / "c")).position_sigma == pytest.approx(
+        sheet.position_sigma, rel=1e-3
+    )
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [(40, "no static hold"), (2, "")],
+)
+def test_a_log_that_is_too_short_ends_with_one_line(rows, message, tmp_path):
+    path = tmp_path / "short.csv"
+    np.savetxt(path, np.random.default_rng(1).standard_normal((rows, 3)), delimiter=",")
+    result = call("data-sheet", path, *READ, "--out", tmp_path / "mine.yaml")
+    assert result.exit_code == 2
+    assert result.stderr.count("\n") == 1
+    assert message in result.stderr
+    assert not (tmp_path / "mine.yaml").exists()
+
+
+def test_a_log_is_no_sensor_and_says_how_to_make_one(still_log):
+    with pytest.raises(InputError, match=r"accelstudy data-sheet .*still\.csv --out still\.yaml"):
+        get_sensor(str(still_log))

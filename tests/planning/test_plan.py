@@ -1,0 +1,407 @@
+"""The plan of a calibration: linear theory, ranking, simulation, words and files."""
+
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from click.testing import CliRunner
+from places import ROOT
+
+from accelstudy.approaches import get_approach
+from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY, angles_in
+from accelstudy.commands.main import main
+from accelstudy.data_sheets import DataSheet, data_sheet_names, get_data_sheet, of_sigma
+from accelstudy.design.closed_forms import gravity_sigma
+from accelstudy.design.estimability import diagnose
+from accelstudy.files.tables import read_origin, read_table
+from accelstudy.leveling.error import cap_forces, leveling_error, tilt_error
+from accelstudy.plan import candidates as planned
+from accelstudy.plan.advice import in_use, limits, needs, spoilers
+from accelstudy.plan.answer import answer
+from accelstudy.plan.candidates import NINE, candidates
+from accelstudy.plan.question import BY_HAND, ROBOT, Question
+from accelstudy.plan.simulated import simulate, study_of
+from accelstudy.plan.theory import theory_of
+from accelstudy.plan.wording import answer_lines, effort, reason_lines, table_lines, unreachable
+from accelstudy.schemes import get_scheme
+from accelstudy.sensors.models import get_model
+from accelstudy.simulation.sessions import Noise
+from accelstudy.study.cells.cell import study_cells
+from accelstudy.study.config import parse_study, read_study
+from accelstudy.study.monte_carlo.simulate import blocks
+
+MODEL = get_model(NINE)
+MCLAREN = get_scheme("mclaren-24")
+HAS = ("bias", "scale", "nonorthogonality", "quadratic_scale")
+
+
+@pytest.fixture(autouse=True)
+def few_schemes(monkeypatch):
+    """A few schemes are enough, and optimal ones take long."""
+    monkeypatch.setattr(planned, "SIZES", (9, 12, 20, 30, 40, 80))
+    monkeypatch.setattr(planned, "OPTIMAL_SIZES", ())
+
+
+def asked(sheet=None, **options):
+    return Question(10 * MGON, 30 * GON, sheet or of_sigma(0.002), **options)
+
+
+# --- linear theory -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("approach", "rms", "q95"),
+    [("gravity", (10.7, 10.6), (20.1, 19.1)), ("robot", (5.4, 5.3), (9.9, 9.4))],
+)
+def test_the_numbers_of_the_readme_come_from_linear_theory(approach, rms, q95):
+    theory = theory_of(50 * GON)
+    rows = theory.rows(MCLAREN.directions, approach, Noise())
+    expected = theory.expected(rows, MODEL, {})
+    np.testing.assert_allclose(expected.rms / MGON, rms, atol=0.06)
+    np.testing.assert_allclose(expected.quantile(0.95) / MGON, q95, atol=0.1)
+
+
+@pytest.mark.parametrize("model", [NINE, f"{NINE}-quadratic-cubic", "bias-scale"])
+def test_columns_of_one_model_are_the_designs_of_all(model):
+    model, robot = get_model(model), get_approach("robot")
+    theory = theory_of(30 * GON)
+    rows = theory.rows(MCLAREN.directions, "robot", Noise())
+    zeros = np.zeros(model.n_parameters)
+    error = tilt_error(model, zeros, model, zeros, cap_forces(30 * GON, 200))
+    own = diagnose(MCLAREN, model, robot)
+    expected = theory.expected(rows, model, {})
+    np.testing.assert_allclose(expected.rms, error.rms_of_all(own.cofactors), rtol=1e-8)
+    assert expected.redundancy == own.redundancy
+
+
+def test_at_level_it_is_the_closed_form_of_bias_and_axes():
+    sigma = gravity_sigma(MCLAREN.directions, 0.002)
+    theory = theory_of(1e-4)
+    rows = theory.rows(MCLAREN.directions, "gravity", Noise())
+    level = math.hypot(sigma["bias"] / STANDARD_GRAVITY, sigma["nonorthogonality"])
+    roll, pitch = theory.expected(rows, MODEL, {}).rms
+    assert roll == pytest.approx(level, rel=1e-3)
+    assert pitch == pytest.approx(level, rel=1e-3)
+
+
+def test_what_is_neglected_leaves_what_a_calibration_of_such_a_sensor_leaves():
+    # Ten sensors of quadratic scales drawn with the size that is expected, without noise.
+    size, theory = 300e-6, theory_of(30 * GON)
+    rows = theory.rows(MCLAREN.directions, "gravity", Noise(sigma_force=1e-9))
+    expected = theory.expected(rows, MODEL, {"quadratic_scale": size})
+    draws = size * np.random.default_rng(3).standard_normal((10, 3))
+    whitened = np.cov(draws.T, bias=True) + np.outer(draws.mean(0), draws.mean(0))
+    draws = draws @ np.linalg.inv(np.linalg.cholesky(whitened)).T * size  # of just that size
+    question = asked()
+    config = study_of(question, [_candidate(question)], 1, 1)
+    squares = []
+    for draw in draws:
+        sensor = {**config["sensor"], "quadratic_scale": {"value": draw.tolist(), "unit": "1"}}
+        zero = {"value": [0.0] * 3, "unit": "m/s^2"}
+        mine = {**config, "sensor": {**sensor, "bias": zero}, "simulated_effects": [*HAS]}
+        mine["noise"] = {"sensor": {"sigma_mps2": 1e-8}}
+        squares.append(simulate(mine)[0].rms ** 2)
+    np.testing.assert_allclose(np.sqrt(np.mean(squares, axis=0)), expected.rms, rtol=0.02)
+
+
+def _candidate(question, scheme="mclaren-24", equipment="gravity", model=NINE):
+    return next(
+        c
+        for c in candidates(question)
+        if (c.scheme.name, c.equipment.name, c.model.name) == (scheme, equipment, model)
+    )
+
+
+def test_the_quantile_is_that_of_draws():
+    theory = theory_of(30 * GON)
+    rows = theory.rows(MCLAREN.directions, "robot", Noise())
+    expected = theory.expected(rows, MODEL, {"quadratic_scale": 200e-6, "cubic_scale": 200e-6})
+    rng = np.random.default_rng(1)
+    draws = rng.standard_normal((20_000, expected.scatter.shape[1])) @ expected.scatter.T
+    squares = np.stack([np.einsum("ru,uw,rw->r", draws, q, draws) for q in expected.quadratic], 1)
+    np.testing.assert_allclose(np.sqrt(squares.mean(axis=0)), expected.rms, rtol=0.02)
+    for share in (0.5, 0.9, 0.95, 0.99):
+        drawn = np.sqrt(np.quantile(squares, share, axis=0))
+        np.testing.assert_allclose(expected.quantile(share), drawn, rtol=0.03)
+
+
+def test_a_rotation_that_gravity_cannot_see_makes_no_candidate():
+    theory = theory_of(30 * GON)
+    turned = get_model(f"{NINE}-crossaxis")
+    for approach, seen in (("gravity", False), ("robot", True)):
+        rows = theory.rows(MCLAREN.directions, approach, Noise())
+        assert (theory.expected(rows, turned, {}) is not None) is seen
+
+
+# --- candidates and their ranking ----------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def found():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(planned, "SIZES", (9, 12, 20, 30, 40, 80, 120))
+        patch.setattr(planned, "OPTIMAL_SIZES", (27,))
+        return answer(asked(), replicates=1000)
+
+
+def test_the_answer_is_the_cheapest_that_reaches_the_target(found):
+    first = found.first
+    assert first.candidate.equipment == BY_HAND
+    assert first.candidate.model.name == NINE
+    assert first.simulated.rms.max() <= 10 * MGON
+    cheaper = [
+        c for c in found.compared
+        if c.equipment == BY_HAND and c.seconds < first.candidate.seconds and c.rms <= 10 * MGON
+    ]  # fmt: skip
+    assert all(c.rms > 9.6 * MGON for c in cheaper)  # linear theory may be optimistic, by little
+    times = [r.candidate.seconds for r in found.ranked]
+    assert times == sorted(times)
+    assert len({r.candidate.kind[:2] for r in found.ranked}) == len(found.ranked)
+    assert found.stricter.scheme.n_positions >= 100  # as the README says: 100 for 95 %
+
+
+def test_simulation_agrees_with_linear_theory(found):
+    for ranked in found.ranked:
+        if ranked.simulated is not None:
+            expected, simulated = ranked.candidate.expected.rms, ranked.simulated
+            assert simulated.simulated == 1000
+            assert np.all(np.abs(simulated.rms - expected) < 4 * simulated.error + 0.01 * expected)
+
+
+def test_the_study_of_a_plan_makes_its_numbers_again(found, tmp_path):
+    path = tmp_path / "study.yaml"
+    path.write_text(yaml.safe_dump(found.study), encoding="utf-8")
+    study = read_study(ROOT / "config/config.yaml", path)  # as Snakemake lays one over the other
+    cells = {cell.name: cell for cell in study_cells(study)}
+    told = {r.simulated.cell: r.simulated for r in found.ranked if r.simulated}
+    assert set(cells) == set(told)
+    cell = cells[found.first.simulated.cell]
+    (one, two) = blocks(cell, study.seed, 0, 2)
+    error = leveling_error(
+        cell.simulated_model,
+        cell.simulated_model.vector(cell.truth),
+        cell.estimated_model,
+        np.concatenate([one.estimates, two.estimates]),
+        cap_forces(30 * GON, 200),
+    )
+    np.testing.assert_allclose(error.rms, found.first.simulated.rms, rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", data_sheet_names())
+@pytest.mark.parametrize("equipment", [BY_HAND, ROBOT], ids=lambda e: e.name)
+def test_each_sensor_with_each_equipment_has_candidates_and_reasons(name, equipment):
+    question = asked(get_data_sheet(name), equipment=(equipment,), holds=(10.0,))
+    compared = candidates(question)
+    best = min(compared, key=lambda c: c.rms)
+    assert best.equipment == equipment
+    assert 0 < best.rms < 100 * MGON
+    assert limits(question, best)
+    for need in needs(question, best):
+        assert need.verdict
+    assert all(spoiler.size > 0 for spoiler in spoilers(question, best))
+    assert in_use(question).reading > 0
+
+
+def test_longer_holds_lower_white_noise_and_not_the_bias_instability():
+    loud = DataSheet("s", velocity_random_walk=5e-3, nonlinearity=0.0, full_scale=20.0)
+    wandering = replace(loud, velocity_random_walk=1e-4, bias_instability=2e-3)
+    for sheet, gains in ((loud, True), (wandering, False)):
+        question = asked(sheet, equipment=(BY_HAND,), holds=(1.0, 100.0), most_positions=30)
+        short, long = (
+            min(c.rms for c in candidates(question) if c.hold == hold) for hold in question.holds
+        )
+        assert (long < short / 5) is gains
+    limiting = _candidate(asked(wandering, holds=(10.0,)))
+    assert limits(asked(wandering, holds=(10.0,)), limiting) == "wander of the sensor's bias"
+
+
+def test_neglected_effects_decide_the_model():
+    bent = DataSheet("s", position_sigma=0.5e-3, nonlinearity=0.005, full_scale=19.6133)
+    result = answer(asked(bent, equipment=(BY_HAND,)), replicates=500)
+    names = [effect.name for effect in result.first.candidate.model.effects]
+    assert {"quadratic_scale", "cubic_scale"} <= set(names)
+    verdicts = {n.effect: n.verdict for n in needs(result.question, result.first.candidate)}
+    assert verdicts["quadratic_scale"] == "needed"
+    text = "\n".join(reason_lines(result))
+    assert "quadratic nonlinearity (3536 ppm, data sheet): must be in the model" in text
+    straight = replace(bent, nonlinearity=1e-6)
+    small = {n.effect: n for n in needs(asked(straight), _candidate(asked(straight)))}
+    assert small["quadratic_scale"].verdict == "not needed"
+    assert small["quadratic_scale"].cost > small["quadratic_scale"].left
+
+
+def test_what_would_spoil_a_plan_is_of_the_size_that_leaves_the_target():
+    question = asked(of_sigma(0.002))
+    candidate = _candidate(question, equipment="robot")
+    sizes = {s.effect: s for s in spoilers(question, candidate)}
+    assert math.isinf(sizes["gravity_error"].size)
+    assert sizes["base_tilt"].size < 20 * MGON
+    theory = theory_of(question.tilt_range)
+    rows = theory.rows(MCLAREN.directions, "robot", Noise(0.002, question.sigma_angle))
+    for name, spoiler in sizes.items():
+        if math.isfinite(spoiler.size):
+            alone = theory.expected(rows, MODEL, {name: spoiler.size}).neglected[name]
+            assert np.sqrt(alone.max()) == pytest.approx(question.target, rel=1e-9)
+
+
+# --- words ---------------------------------------------------------------------------------------
+
+
+def test_the_answer_stands_in_the_first_line(found):
+    lines = answer_lines(found)
+    n = found.first.candidate.scheme.n_positions
+    minutes = math.ceil(found.first.candidate.seconds / 60)
+    assert lines[0] == (
+        f"You need no robot. Measure {n} positions by hand, 10 s each: about {minutes} minutes."
+    )
+    assert "95 stay below" in lines[1]
+    assert lines[2].startswith("For 95 of 100 calibrations to stay below 10 mgon: ")
+    assert "with a robot" in lines[3]
+    table = table_lines(found)
+    assert len(table) == len(found.ranked) + 3
+    assert "noise of the sensor" in table[1]
+    with angles_in("deg"):
+        assert " mdeg" in answer_lines(found)[1]
+        assert "roll/mdeg" in table_lines(found)[0]
+
+
+def test_set_up_is_told_in_its_own_unit():
+    candidate = replace(_candidate(asked(), equipment="robot"), hold=600.0)
+    assert effort(candidate).endswith("600 s each, about 4.57 hours, with 30 minutes to set it up")
+
+
+@pytest.mark.parametrize(
+    ("options", "parts"),
+    [
+        ({"equipment": (BY_HAND,)}, ("No calibration tried here reaches 0.1 mgon (rms) by hand",)),
+        ({"most_seconds": 600.0}, ("within 10 min",)),
+        (
+            {"most_seconds": 60.0},
+            ("No calibration fits within 1 min: the shortest takes 9 positions by hand",),
+        ),
+        (
+            {"most_positions": 5, "equipment": (BY_HAND,)},
+            ("No calibration fits with at most 5 positions by hand: the shortest takes 9",),
+        ),
+        ({"sigma_angle": 1 * GON, "equipment": (ROBOT,)}, ("the best leaves", "with a robot")),
+        ({"confidence": 0.95}, ("(95 % of them)",)),
+    ],
+)
+def test_what_cannot_be_reached_is_one_line_with_what_can(options, parts):
+    question = Question(0.1 * MGON, 30 * GON, of_sigma(0.002), **options)
+    result = answer(question, replicates=200)
+    assert result.ranked == []
+    (line,) = answer_lines(result)
+    assert line == unreachable(result)
+    for part in parts:
+        assert part in line
+    assert "\n" not in line
+
+
+def test_by_hand_alone_it_is_said_that_a_robot_would_do():
+    question = Question(3 * MGON, 30 * GON, of_sigma(0.002), equipment=(BY_HAND,))
+    (line,) = answer_lines(answer(question, replicates=200))
+    assert re.search(r"It takes a robot: \d+ positions with a robot, 10 s each", line)
+
+
+def test_the_way_by_hand_stays_in_the_table_however_long_it_takes():
+    slow = replace(BY_HAND, moving=600.0)
+    result = answer(asked(equipment=(slow, ROBOT)), replicates=500)
+    assert result.first.candidate.equipment == slow
+    assert len(result.ranked) <= 8
+    assert result.ranked[-1].candidate.equipment == slow
+    assert answer_lines(result)[0].startswith("You need no robot.")
+
+
+# --- the command ---------------------------------------------------------------------------------
+
+ASKED = ("plan", "--tilt-accuracy", "20mgon", "--sigma", "2mm/s2", "--replicates", "200")
+
+
+def call(*words):
+    return CliRunner().invoke(main, [str(word) for word in words])
+
+
+def test_the_command_writes_what_it_says(tmp_path):
+    out = tmp_path / "plan"
+    result = call(*ASKED, "--equipment", "gravity", "--out", out, "--angle-unit", "deg")
+    assert result.exit_code == 0, result.output
+    assert result.stdout.startswith("Measure ")
+    names = {path.name for path in out.iterdir()}
+    assert names == {"plan.parquet", "plan.md", "plan.svg", "plan.png", "study.yaml"}
+    table = read_table(out / "plan.parquet")
+    top = table[table["rank"] == 1].iloc[0]
+    assert top["roll_rms_simulated_mgon"] <= 20
+    assert pd.isna(table["rank"]).sum() > 50
+    assert read_origin(out / "plan.parquet")["seed"] == 1
+    study = parse_study(yaml.safe_load((out / "study.yaml").read_text(encoding="utf-8")))
+    assert study.leveling.max_tilt_gon == 30
+    assert result.stdout.splitlines()[0] in (out / "plan.md").read_text(encoding="utf-8")
+    again = call(*ASKED, "--equipment", "gravity", "--out", out, "--quiet")
+    assert again.exit_code == 0
+    assert len(again.stdout.splitlines()) < 10
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "mine.txt").write_text("mine")
+    refused = call(*ASKED, "--equipment", "gravity", "--out", tmp_path / "full")
+    assert refused.exit_code == 2
+    assert "--force" in refused.stderr
+
+
+def test_a_scheme_of_a_file_is_compared_and_named_by_its_path(tmp_path):
+    path = tmp_path / "mine.yaml"
+    directions = (-get_scheme("fibonacci-20").directions).tolist()
+    path.write_text(yaml.safe_dump({"scheme": "mine", "directions": directions}))
+    question = asked(equipment=(BY_HAND,), schemes=(str(path),))
+    (mine,) = {c.scheme.name for c in candidates(question)} & {get_scheme(str(path)).name}
+    config = study_of(question, [_candidate(question, mine)], 1, 200)
+    assert config["grids"][0]["schemes"] == str(path)
+    (result,) = simulate(config)
+    assert mine in result.cell
+    assert result.simulated == 200
+
+
+def test_optimal_positions_are_as_few_as_suffice(monkeypatch):
+    monkeypatch.setattr(planned, "OPTIMAL_SIZES", (10, 27, 80))
+    question = asked(equipment=(BY_HAND,))
+    names = {c.scheme.name for c in candidates(question)}
+    assert "i-optimal-27" in names  # fewer than the 30 that are known to suffice
+    assert "i-optimal-10" not in names  # which would be far too few
+    assert "i-optimal-80" not in names
+
+
+def test_an_unreachable_target_has_an_exit_status_of_its_own():
+    result = call(
+        "plan", "--tilt-accuracy", "0.01mgon", "--sigma", "2mm/s2", "--equipment", "gravity"
+    )
+    assert result.exit_code == 1
+    assert result.stdout.count("\n") == 1
+    assert result.stderr == ""
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ((), "--tilt-accuracy"),
+        (("--tilt-accuracy", "10"), "expected a number with its unit"),
+        (("--tilt-accuracy", "10mgon"), "give the sensor by --sensor, or its noise by --sigma"),
+        (("--tilt-accuracy", "10mgon", "--sensor", "paper", "--sigma", "2mm/s2"), "not both"),
+        (("--tilt-accuracy", "10mgon", "--sensor", "adxl35"), "did you mean 'adxl355'"),
+        (("--tilt-accuracy", "10mgon", "--sensor", "no.yaml"), "no.yaml: No such file"),
+        (("--tilt-accuracy", "10mgon", "--sigma", "0mm/s2"), "must be at least"),
+        (("--tilt-accuracy", "10mgon", "--sigma", "2mm/s2", "--tilt-range", "95gon"), "at most 90"),
+        (
+            ("--tilt-accuracy", "10mgon", "--sigma", "2mm/s2", "--confidence", "120%"),
+            "--confidence: must be rms, or a share",
+        ),
+        (("--tilt-accuracy", "10mgon", "--sigma", "2mm/s2", "--equipment", "crane"), "crane"),
+    ],
+)
+def test_bad_input_ends_with_exit_status_2(words, message):
+    result = call("plan", *words)
+    assert result.exit_code == 2
+    assert message in result.stderr
+    assert result.stdout == ""

@@ -1,0 +1,71 @@
+"""The ways that the benchmarks compare solve the same problem."""
+
+import numpy as np
+import pytest
+from places import ROOT
+
+from accelstudy.approaches import get_approach
+
+BENCHMARKS = ROOT / "benchmarks"
+
+
+@pytest.fixture(autouse=True, scope="module")
+def in_benchmarks():
+    """Modules of the benchmarks import each other by their names."""
+    patch = pytest.MonkeyPatch()
+    patch.syspath_prepend(BENCHMARKS)
+    yield
+    patch.undo()
+
+
+# Not that of Ceres, which takes 20 s to compile; each run of the benchmarks compares all of them.
+@pytest.mark.parametrize("approach", ["gravity", "robot"])
+@pytest.mark.parametrize("name", ["compiled", "numpy", "scipy", "scipy_jacobian", "jax"])
+def test_a_way_gives_the_estimates_of_the_adjustment(name, approach):
+    from problem import drawn, ideal_session
+    from ways import WAYS
+
+    way = WAYS.get(name)
+    if needs := way.missing():
+        pytest.skip(f"needs: {needs}")
+    approach = get_approach(approach)
+    observed = drawn(ideal_session(), approach).first(3)
+    expected = WAYS.get("numpy")(approach).solve(observed)
+    estimates, sigma = way(approach).solve(observed)
+    tolerance = max(way.difference, 1e-10)
+    np.testing.assert_array_less(np.abs(estimates - expected[0]), tolerance * expected[1])
+    np.testing.assert_allclose(sigma, expected[1], rtol=tolerance)
+
+
+def test_a_way_that_is_not_installed_says_what_it_needs(monkeypatch):
+    import speeds
+    from ways import WAYS
+
+    monkeypatch.setattr(WAYS.get("jax"), "missing", lambda: "uv pip install jax")
+    rates = {way: np.array([1e5, 2e5]) for way in WAYS.names() if way != "jax"}
+    both = dict.fromkeys(("gravity", "robot"), rates)
+    found = speeds.tables((both, dict.fromkeys(both, dict.fromkeys(rates, 0.0))))
+    (row,) = [line for line in found.splitlines() if "JAX" in line]
+    assert row.count("not measured: uv pip install jax") == 2
+
+
+def test_tables_of_a_page_are_replaced_and_the_rest_is_kept():
+    from page import put
+
+    page = "Before\n\n<!-- speeds -->\n\nold\n\n<!-- end of speeds -->\nafter\n"
+    new = put(page, "speeds", r"| \1 |")
+    assert new == "Before\n\n<!-- speeds -->\n\n| \\1 |\n\n<!-- end of speeds -->\nafter\n"
+    with pytest.raises(ValueError, match="roofline"):
+        put(page, "roofline", "x")
+
+
+def test_the_page_of_speed_has_a_place_for_each_table(monkeypatch):
+    for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+        monkeypatch.setenv(variable, "1")  # as `run` sets them, until this test ends
+    from page import put
+    from run import NAMES
+
+    page = (BENCHMARKS.parent / "docs" / "speed.md").read_text()
+    assert page.count("<!-- end of ") == len(NAMES)
+    for name in NAMES:
+        put(page, name, "")

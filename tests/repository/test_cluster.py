@@ -1,0 +1,68 @@
+"""The profiles for clusters fit the workflow; `make test-cluster` runs the one for SLURM."""
+
+import re
+
+import cluster
+import one_machine_slurm
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+import yaml
+from places import ROOT
+
+RULE = re.compile(
+    r"^(?:rule|use rule \w+ as) (\w+)(?: with)?:\n(.*?)(?=^\S|\Z)", re.MULTILINE | re.DOTALL
+)
+INCLUDED = re.compile(r'^include: "(rules/\w+.smk)"', re.MULTILINE)
+
+
+def rules(*files):
+    return {name: text for path in files for name, text in RULE.findall(path.read_text())}
+
+
+WORKFLOW = ROOT / "workflow"
+STUDY = rules(*(WORKFLOW / name for name in INCLUDED.findall((WORKFLOW / "Snakefile").read_text())))
+HIDDEN = rules(WORKFLOW / "hidden.smk")
+
+
+def profile(name):
+    return yaml.safe_load((ROOT / "profiles" / name / "config.yaml").read_text())
+
+
+@pytest.mark.parametrize("name", ["slurm", "kubernetes"])
+def test_a_profile_names_rules_that_there_are_and_groups_those_of_a_study(name):
+    settings = profile(name)
+    assert set(STUDY) <= set(settings["groups"]) <= {*STUDY, *HIDDEN}
+    assert set(settings.get("set-resources", {})) <= set(settings["groups"])
+    assert set(settings["group-components"]) == set(settings["groups"].values())
+
+
+def test_the_profiles_differ_in_where_they_run_only():
+    slurm, kubernetes = profile("slurm"), profile("kubernetes")
+    for key in ("groups", "group-components", "cores", "retries"):
+        assert slurm[key] == kubernetes[key]
+
+
+@pytest.mark.parametrize("rule", [name for name, text in STUDY.items() if "script:" in text])
+def test_a_rule_says_what_it_takes(rule):
+    assert re.search(r"^    threads: \d+$", STUDY[rule], re.MULTILINE)
+    assert re.search(r"^        mem_mb=", STUDY[rule], re.MULTILINE)
+
+
+def test_without_slurm_one_line_says_what_to_install(monkeypatch, capsys):
+    monkeypatch.setattr(one_machine_slurm.shutil, "which", lambda *_, **__: None)
+    with pytest.raises(SystemExit) as ended:
+        cluster.main()
+    assert ended.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "apt-get install slurm-wlm munge" in line
+
+
+def test_tables_are_compared_to_the_bit(tmp_path):
+    for folder, value in (("one", 1.0), ("same", 1.0), ("other", 1.0 + 2**-52)):
+        (tmp_path / folder / "sub").mkdir(parents=True)
+        pq.write_table(pa.table({"x": [0.0, value]}), tmp_path / folder / "sub" / "t.parquet")
+    assert cluster.differences(tmp_path / "one", tmp_path / "same") == []
+    assert cluster.differences(tmp_path / "one", tmp_path / "other") == ["sub/t.parquet"]
+    (tmp_path / "same" / "sub" / "t.parquet").unlink()
+    assert cluster.differences(tmp_path / "one", tmp_path / "same") == ["sub/t.parquet"]

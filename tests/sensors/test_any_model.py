@@ -1,0 +1,413 @@
+"""Compositions in all that takes a model: commands, studies, batches and the round trip."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from click.testing import CliRunner
+from study_helpers import content, grid
+
+from accelstudy.adjustment.quality import solve
+from accelstudy.adjustment.quality.redundancy import _leveling_slope
+from accelstudy.approaches import get_approach
+from accelstudy.basics.errors import InputError
+from accelstudy.campaign.batch.config import parse_batch
+from accelstudy.campaign.calibration.document import calibration_document
+from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.files.format import read_campaign
+from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
+from accelstudy.campaign.use.applying import read_calibration
+from accelstudy.campaign.use.export import export
+from accelstudy.campaign.use.readings import readings_of
+from accelstudy.commands.main import main
+from accelstudy.diagnosis.pipeline import diagnose
+from accelstudy.diagnosis.report.calibration import diagnosed_calibration
+from accelstudy.diagnosis.report.model_file import study_overlay
+from accelstudy.diagnosis.round_trip import parse_round_trip
+from accelstudy.drawing.style import model_title
+from accelstudy.effects import Hold
+from accelstudy.sensors.frames import parse_frame
+from accelstudy.sensors.models import get_model
+from accelstudy.study.cells.cell import study_cells
+from accelstudy.study.config import parse_study
+
+NINE = "bias-scale-nonorthogonality"
+HIDDEN = f"{NINE}+warm_up(tau=400)+thermal_bias"
+
+
+TURNED = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+
+
+def run_out(*arguments):
+    """Standard output only."""
+    return CliRunner().invoke(main, [str(argument) for argument in arguments]).stdout
+
+
+def run(*arguments, code=0):
+    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
+    assert result.exit_code == code, result.output
+    return result.output
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A campaign of a sensor that warms up and whose bias follows the temperature."""
+    folder = tmp_path_factory.mktemp("any-model")
+    run(
+        "simulate-campaign", "--out", folder / "c", "--truth", folder / "truth.yaml", "--seed", "4",
+        "--scheme", "fibonacci-30", "--order", "random", "--temperature", "15:40",
+        "--temperature-order", "ABBA", "--model", f"{NINE}+warm_up(tau=400)",
+        "--effect", "thermal_bias",
+    )  # fmt: skip
+    return folder
+
+
+def parameters(path):
+    document = json.loads(path.read_text(encoding="utf-8"))
+    return {p["name"]: (p["value"], p["sigma"]) for p in document["parameters"]}
+
+
+def test_a_composition_is_calibrated_and_checked(made):
+    truth = yaml.safe_load((made / "truth.yaml").read_text(encoding="utf-8"))
+    known = {p["name"]: p["value"] for e in truth["sensor"] + truth["effects"]
+             for p in e["parameters"]}  # fmt: skip
+    run("calibrate", made / "c", "--model", HIDDEN, "--approach", "robot", "--out", made / "k")
+    found = parameters(made / "k/calibration.json")
+    assert set(found) == set(known)
+    assert max(abs(value - known[name]) / sigma for name, (value, sigma) in found.items()) < 4.5
+    document = json.loads((made / "k/calibration.json").read_text(encoding="utf-8"))
+    assert document["model"] == HIDDEN
+    assert document["quality"]["global_test"]["accepted"]
+    assert 1 < document["quality"]["tilt_rms_mgon"]["roll"] < 20
+    text = run("check-sigmas", made / "c", "--model", HIDDEN, "--replicates", "50")
+    assert text.count("b_T_") == 3
+    assert "thermal_scale" in run("effects", "--campaign", made / "c", "--model", HIDDEN)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["calibrate", "c", "--out", "no"], "no vibration_mps2"),
+        (["diagnose", "c", "--out", "no"], "no vibration_mps2"),
+        (["check-sigmas", "c"], "no vibration_mps2"),
+        (["effects", "--campaign", "c"], "no vibration_mps2"),
+        (["effects", "--scheme", "mclaren-24"], "which a scheme does not tell"),
+        (["schemes", "mclaren-24"], "which a scheme does not tell"),
+        (["simulate-campaign", "--out", "no"], "vibration: missing"),
+    ],
+)
+def test_what_cannot_feed_a_model_says_so_in_one_line(arguments, words, made, monkeypatch):
+    monkeypatch.chdir(made)
+    text = run(*arguments, "--model", "bias-scale+vibration_rectification", code=2)
+    assert "'vibration_rectification'" in text
+    assert words in text
+    assert text.count("\n") == 1
+    assert not (made / "no").exists()
+
+
+def test_a_study_of_compositions(tmp_path):
+    path = tmp_path / "model.yaml"
+    path.write_text(yaml.safe_dump({"models": {"mine": ["bias", "scale", "quadratic_scale"]}}))
+    plain = parse_study(content(grids=[grid()]))
+    study = parse_study(
+        content(
+            grids=[grid(), grid(models=[f"{NINE} + warm_up( tau=300 )", str(path)])],
+            holds={"interval_s": 60},
+        )
+    )
+    old, new = study_cells(plain), study_cells(study)
+    assert [cell.model for cell in new[len(old) :: 2]] == [
+        f"{NINE}+warm_up(tau=300)", "bias-scale+quadratic_scale",
+    ]  # fmt: skip
+    assert {cell.name for cell in old} < {cell.name for cell in new}
+    assert new[len(old)].estimated_model.n_parameters == 12
+    assert len({cell.name for cell in new}) == len(new)
+    assert all(len(cell.name.split("/")) == 3 for cell in new)
+    assert model_title(new[len(old)].model) == "9 + warm up (300)"
+    # The condition of the holds is part of a cell, so seeds are compared without it.
+    beside = parse_study(content(grids=[grid(), grid(models="bias-scale+quadratic_scale")]))
+    seeds = {cell.name: cell.seed(1, 0).entropy for cell in study_cells(beside)}
+    assert all(seeds[cell.name] == cell.seed(1, 0).entropy for cell in old)
+    with pytest.raises(InputError, match=r"holds\.interval_s: missing; the effect 'warm_up'"):
+        parse_study(content(grids=[grid(models=f"{NINE}+warm_up(tau=300)")]))
+    with pytest.raises(InputError, match=r"grids\.0\.models.*unknown model or effect 'warmup'"):
+        parse_study(content(grids=[grid(models=f"{NINE}+warmup")]))
+
+
+def test_the_sensitivity_of_a_composition():
+    name = f"{NINE}+quadratic_scale+cubic_scale"
+    settings = {"roll_gon": [0], "pitch_gon": [0], "model": "bias+scale + nonorthogonality"}
+    study = parse_study(content(grids=[grid()], sensitivity=settings))
+    assert study.sensitivity.model == NINE
+    settings["model"] = f"{NINE}+ cross_coupling"
+    study = parse_study(content(grids=[grid(models=settings["model"])], sensitivity=settings))
+    assert study.sensitivity.model == study_cells(study)[0].model == f"{NINE}+cross_coupling"
+    assert parse_study(content(grids=[grid(models=name)])).grids[0].models == [
+        f"{NINE}-quadratic-cubic"
+    ]
+
+
+def test_batches_and_the_round_trip_take_a_composition():
+    batch = parse_batch({"batch": "b", "model": f"{NINE} +thermal_bias",
+                         "campaigns": [{"campaign": "c"}]})  # fmt: skip
+    assert batch.tasks()[0].model == f"{NINE}+thermal_bias"
+    with pytest.raises(InputError, match="model: unknown model or effect 'thermal'"):
+        parse_batch({"batch": "b", "model": f"{NINE}+thermal", "campaigns": [{"campaign": "c"}]})
+    trip = parse_round_trip({"campaign": {"name": "t"}, "model": "bias+scale"})
+    assert trip.model == "bias-scale"
+
+
+# --- what a diagnosis found, used the next day ----------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def diagnosed(made):
+    """Folder of the diagnosis of the campaign, which lacks both effects."""
+    run("diagnose", made / "c", "--out", made / "d", "--replicates", "100")
+    return made / "d"
+
+
+def test_a_diagnosis_writes_the_calibration_of_what_it_found(made, diagnosed):
+    found = parameters(diagnosed / "calibration.json")
+    run("calibrate", made / "c", "--model", diagnosed / "model.yaml", "--approach", "robot",
+        "--out", made / "again")  # fmt: skip
+    again = parameters(made / "again/calibration.json")
+    assert list(found) == list(again)
+    for name, (value, sigma) in found.items():
+        assert again[name][0] == pytest.approx(value, abs=1e-6 * sigma)
+        assert again[name][1] == pytest.approx(sigma)
+    documents = [
+        json.loads((made / folder / "calibration.json").read_text(encoding="utf-8"))
+        for folder in ("d", "again")
+    ]
+    assert {"b_T_z", "w_z"} < set(found)
+    assert documents[0]["model"] == documents[1]["model"]
+    assert documents[0].keys() == documents[1].keys()
+    assert documents[0]["quality"].keys() == documents[1]["quality"].keys()
+    effects = json.loads((diagnosed / "diagnosis.json").read_text(encoding="utf-8"))["effects"]
+    for entry in (p for effect in effects for p in effect["parameters"]):
+        assert found[entry["name"]] == pytest.approx((entry["value"], entry["sigma"]))
+    table = run("check-sigmas", made / "c", "--model", diagnosed / "model.yaml", "--approach",
+                "robot", "--replicates", "40")  # fmt: skip
+    shown = next(line.split() for line in table.splitlines() if "b_T_x" in line)
+    assert float(shown[2]) == pytest.approx(1e3 * found["b_T_x"][0], rel=1e-3)
+    page = (diagnosed / "report.html").read_text(encoding="utf-8")
+    assert "accelstudy apply calibration.json LOG" in page
+    assert "accelstudy calibrate CAMPAIGN --model model.yaml --approach robot" in page
+
+
+def calibration_of(**settings):
+    campaign, _ = simulate_campaign(CampaignSettings(scheme="fibonacci-30", **settings))
+    diagnosis = diagnose(campaign, get_model(NINE))
+    return campaign, diagnosis, diagnosed_calibration(diagnosis)
+
+
+@pytest.fixture(scope="module")
+def whole():
+    """Calibration of a campaign without a gross error."""
+    return calibration_of()[2]
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        ("axis_error(x=-2, y=1, z=3)", "axes are swapped: x is read as y, y is read as −x"),
+        ("unit_error(force=0.1019716212978)", "the forces are in g"),
+        ("unit_error(angle=0.9)", "the robot's angles are in degrees"),
+    ],
+)
+def test_a_calibration_of_mended_data_says_so(error, words, whole):
+    assert whole["mended"] is None
+    campaign, diagnosis, content = calibration_of(gross_errors=(error,))
+    assert (content["mended"]["reason"], whole["warnings"]) == (words, [])
+    assert words in content["warnings"][0]
+    for ours, right in zip(content["parameters"], whole["parameters"], strict=True):
+        assert ours["value"] == pytest.approx(right["value"], abs=1e-6)
+    matrix = np.eye(3) if "angle" in error else content["mended"]["matrix"]
+    np.testing.assert_allclose(campaign.forces @ np.transpose(matrix), diagnosis.campaign.forces)
+    assert (content["mended"]["matrix"] is None) == ("angle" in error)
+
+
+def test_a_calibration_without_a_bumped_position():
+    gross = ("outlier_position(position=21, x=0.1)",)
+    _, diagnosis, content = calibration_of(gross_errors=gross)
+    assert [hold["position"] for hold in content["excluded"]] == [21]
+    assert content["n_positions"] == 29
+    truth = diagnosis.final.frame.solution.parameters
+    np.testing.assert_allclose([p["value"] for p in content["parameters"]], truth, atol=1e-12)
+    assert content["quality"]["global_test"]["accepted"]
+
+
+def test_a_calibration_with_the_noise_that_was_found():
+    _, diagnosis, content = calibration_of(noise_effects=("noise_level(kappa=3)",))
+    assert diagnosis.verdict == "noise_model"
+    assert content["sigma_source"] == "a posteriori"
+    assert content["sigma_position_mps2"] == pytest.approx(diagnosis.sigma_position)
+    _, diagnosis, content = calibration_of(
+        noise_effects=("axis_noise(kappa_x=1, kappa_y=1, kappa_z=4)",)
+    )
+    assert content["sigma_position_mps2"] == pytest.approx(diagnosis.sigma_position)
+    assert np.mean(content["sigma_position_axes_mps2"]) == pytest.approx(diagnosis.sigma_position)
+    assert content["sigma_position_axes_mps2"][2] > 2 * content["sigma_position_axes_mps2"][0]
+    assert "weighted by their noise" in content["warnings"][0]
+
+
+# --- forms for devices ---------------------------------------------------------------------------
+
+
+def by_the_export(text, raw, **conditions):
+    """Calibrate readings as a stranger would, by nothing but the exported JSON."""
+    given = json.loads(text)
+    readings, effects = given["readings"], [e for e in given["effects"] if e["part"] == "sensor"]
+    names = {p["name"]: p["value"] for e in effects for p in e["parameters"]}
+    to_frd = np.array(readings["to_frd"])
+    forces = (raw - np.array(readings["offset"])) * np.array(readings["scale"])
+    f_s = forces @ (np.array(readings["mending"]) @ to_frd).T
+
+    def evaluated(formula, f):
+        known = {"f_x": f[:, 0], "f_y": f[:, 1], "f_z": f[:, 2], "g": given["gravity_mps2"]}
+        functions = {"exp": np.exp, "sign": np.sign, "Abs": np.abs}
+        return eval(formula, {}, {**functions, **known, **names, **conditions}) + np.zeros(len(f))
+
+    f_a = f_s
+    for _ in range(60):
+        added = [[evaluated(o, f_a) for o in e["output"]] for e in effects if "output" in e]
+        f_a = f_s - np.sum(added, axis=0).T
+    turned = [
+        [[evaluated(part, f_a)[0] for part in row] for row in e["axes"]]
+        for e in effects
+        if "axes" in e
+    ]
+    return f_a @ (np.eye(3) + np.sum(turned, axis=0)).T @ to_frd
+
+
+def test_a_stranger_implements_an_exported_calibration(diagnosed):
+    path = diagnosed / "calibration.json"
+    raw = np.random.default_rng(1).normal(0, 5, (5, 3))
+    time, temperature = np.linspace(0, 1000, 5), np.linspace(10, 40, 5)
+    expected = read_calibration(path).correct(raw, Hold(time=time, temperature=temperature))
+    text = run("export", path)
+    found = by_the_export(text, raw, time=time, temperature=temperature)
+    np.testing.assert_allclose(found, expected, atol=1e-9)
+    assert json.loads(text)["matrix_3x4"] is None
+    assert set(json.loads(text)["symbols"]) == {"f_x", "g", "time", "temperature"}
+    assert yaml.safe_load(run("export", path, "--form", "yaml")) == json.loads(text)
+    for form in ("c", "matrix"):
+        line = run("export", path, "--form", form, code=2)
+        assert "no matrix can hold thermal_bias and warm_up" in line
+        assert "json and yaml" in line
+        assert line.count("\n") == 1
+
+
+@pytest.mark.parametrize("frame", ["frd", "flu", "rfu"])
+def test_forms_take_and_give_the_axes_of_the_log(frame, whole, tmp_path):
+    """With data of a campaign whose axes were mended, in counts of a log with axes of its own."""
+    scale, offset = [0.02, 0.021, 0.019], [500, 510, 490]
+    log = {"unit": "counts", "scale": scale, "offset": offset, "frame": frame}
+    mended = {"error": "axis_error", "reason": "x is read as −y", "matrix": TURNED}
+    path = tmp_path / "calibration.json"
+    path.write_text(json.dumps({**whole, "log": log, "mended": mended}), encoding="utf-8")
+    calibration = read_calibration(path)
+    raw = np.random.default_rng(2).normal(500, 300, (6, 3))
+    axes = parse_frame(frame)
+    forces = axes.to_frd((raw - offset) * scale) @ np.transpose(TURNED)
+    expected = axes.from_frd(calibration.correct(forces))
+    result = CliRunner().invoke(main, ["export", str(path), "--form", "matrix"])
+    assert result.stderr == "warning: the calibration is of mended data: x is read as −y\n"
+    matrix = np.array([row.split() for row in result.stdout.splitlines()], float)
+    np.testing.assert_allclose(raw @ matrix[:, :3].T + matrix[:, 3], expected, atol=1e-8)
+    np.testing.assert_allclose(by_the_export(run_out("export", path), raw), expected, atol=1e-8)
+    header = run_out("export", path, "--form", "c")
+    assert f"in the axes {frame}:" in header
+    assert ("x forward, y left, z up." in header) == (frame == "flu")
+    assert "x, y, z in counts" in header
+    assert "x is read as −y" in header
+    readings = readings_of(log_of(raw, tmp_path), calibration, {"columns": COLUMNS})
+    ((_, read, _),) = readings.chunks()
+    np.testing.assert_allclose(axes.from_frd(calibration.correct(read)), expected, atol=1e-8)
+
+
+COLUMNS = {"fx": 0, "fy": 1, "fz": 2}
+
+
+def log_of(forces, folder):
+    path = folder / "log.csv"
+    pd.DataFrame(forces, columns=["fx", "fy", "fz"]).to_csv(path, index=False)
+    return path
+
+
+def test_apply_mends_readings_as_the_data_were(tmp_path):
+    campaign, _, content = calibration_of(gross_errors=("unit_error(force=0.1019716212978)",))
+    path = tmp_path / "calibration.json"
+    path.write_text(json.dumps(content), encoding="utf-8")
+    log, right = log_of(campaign.forces, tmp_path), read_calibration(path)
+    expected = right.correct(campaign.forces * 9.80665)
+    for options, words in (
+        ([], "the forces are in g; readings are mended likewise"),
+        (["--unit", "g"], "the forces are in g; readings are taken as the options say"),
+    ):
+        arguments = ["apply", path, log, "--columns", "fx=0,fy=1,fz=2", *options]
+        result = CliRunner().invoke(
+            main, [*map(str, arguments), "--out", str(tmp_path / "out.csv"), "--force"]
+        )
+        assert result.exit_code == 0, result.output
+        assert f"warning: the calibration is of mended data: {words}" in result.stderr
+        leveled = pd.read_csv(tmp_path / "out.csv")
+        columns = [f"f{axis}_calibrated_mps2" for axis in "xyz"]
+        np.testing.assert_allclose(leveled[columns], expected, atol=1e-5)
+
+
+def test_the_rig_stays_where_it_was():
+    """What belongs to the rig is exported with a note, and is in no matrix."""
+    campaign, _ = simulate_campaign(CampaignSettings(scheme="fibonacci-30", order="random"))
+    model = get_model(f"{NINE}+encoder_scale")
+    content = calibration_document(fit_campaign(campaign, model, get_approach("robot")))
+    assert content["affine"] is not None
+    effects = json.loads(export(content, "json"))["effects"]
+    assert [effect["spec"] for effect in effects if "note" in effect] == ["encoder_scale"]
+    assert len(export(content, "matrix").splitlines()) == 3
+
+
+def test_positions_are_judged_by_leveling_at_the_reference_temperature(made):
+    """A change of what temperature does is no change there, and one of the rig nowhere."""
+    campaign = read_campaign(made / "c")
+    model = get_model(f"{NINE}+thermal_bias+encoder_scale")
+    fit = fit_campaign(campaign, model, get_approach("robot"))
+    slope = _leveling_slope(solve(model, fit.approach, fit.observed), 0.5, 10)
+    zero = np.all(slope == 0, axis=(0, 1))
+    names = [p.name for p, is_zero in zip(model.parameters, zero, strict=True) if is_zero]
+    assert names == ["b_T_x", "b_T_y", "b_T_z", "k_roll", "k_pitch"]
+
+
+def test_a_model_that_becomes_a_registered_one_is_a_study_too():
+    campaign, _ = simulate_campaign(CampaignSettings(scheme="fibonacci-30"))
+    diagnosis = diagnose(campaign, get_model("bias-scale"))
+    assert diagnosis.extended.name == NINE
+    overlay = study_overlay(diagnosis)
+    assert overlay["models"] == {"extended": ["bias", "scale", "nonorthogonality"]}
+    assert parse_study({**overlay, "seed": 1}).grids[0].models == ["bias-scale", "extended"]
+
+
+def test_a_large_effect_is_fitted_from_the_affine_part_on():
+    settings = CampaignSettings(
+        scheme="fibonacci-30", repeat_first=6, order="random", approach="gravity", seed=3,
+        effects=("saturation: 0.5, -0.5, -0.5",),
+    )  # fmt: skip
+    campaign, _ = simulate_campaign(settings)
+    model = get_model(f"{NINE}+saturation(knee=9.3163175)")
+    fit = fit_campaign(campaign, model, get_approach("gravity"))
+    np.testing.assert_allclose(fit.parameters[9:], [0.5, -0.5, -0.5], atol=0.05)
+
+
+def test_a_part_of_an_effect_is_calibrated_and_read_again(made, tmp_path):
+    model = get_model(f"{NINE}+saturation(knee=9)[k_sat_z]")
+    path = tmp_path / "calibration.json"
+    fit = fit_campaign(read_campaign(made / "c"), model, get_approach("robot"))
+    path.write_text(json.dumps(calibration_document(fit)), encoding="utf-8")
+    calibration = read_calibration(path)
+    assert calibration.model.parameter_names[9:] == ("k_sat_z",)
+    effect = json.loads(run("export", path))["effects"][-1]
+    assert effect["spec"] == "saturation(knee=9)[k_sat_z]"
+    assert effect["output"][:2] == ["0", "0"]

@@ -1,0 +1,183 @@
+"""What people write for a model, and effects that say no more than they must."""
+
+import re
+
+import numpy as np
+import pytest
+import yaml
+from click.testing import CliRunner
+
+from accelstudy.basics.errors import InputError
+from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
+from accelstudy.commands.main import main
+from accelstudy.drawing.style import _parameters, model_title
+from accelstudy.effects import Effect, base, effect_names, get_effect, register
+from accelstudy.effects.base import per_axis
+from accelstudy.effects.defaults import equation_of, formulas, typical_of
+from accelstudy.sensors.models import MODELS, get_model
+from accelstudy.sensors.plausibility import largest
+from accelstudy.study.config import parse_study
+
+NINE = "bias-scale-nonorthogonality"
+
+
+def run(*arguments):
+    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "number"),
+    [
+        (NINE, NINE, 9),
+        ("bias+scale+nonorthogonality", NINE, 9),
+        (f" {NINE} + warm_up( tau=300 )", f"{NINE}+warm_up(tau=300)", 12),
+        (f"{NINE}+warm_up+quadratic_scale", f"{NINE}+warm_up(tau=600)+quadratic_scale", 15),
+        ("warm_up(tau=1e+3)+bias", "warm_up(tau=1000)+bias", 6),
+        ("bias-scale+saturation(knee=9)[k_sat_z]", "bias-scale+saturation(knee=9)[k_sat_z]", 7),
+    ],
+)
+def test_a_composition_has_one_name(text, name, number):
+    model = get_model(text)
+    assert (model.name, model.n_parameters) == (name, number)
+    assert get_model(model.name) is model
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("bias-scal", "unknown model 'bias-scal'; did you mean 'bias-scale'"),
+        ("bias-scale+warmup", "unknown model or effect 'warmup'; did you mean 'warm_up'"),
+        ("bias-scale+bias", "'bias' is in it twice"),
+        ("bias+warm_up(tau=1)+warm_up(tau=2)", "'warm_up' is in it twice"),
+        ("bias+warm_up(tau=1,tau=2)", "tau is given twice"),
+        ("bias++scale", "a part is empty"),
+        ("bias+saturation[k_sat]", "did you mean 'k_sat_"),
+        ("nowhere/model.yaml", "nowhere/model.yaml: No such file"),
+        (f"{'x' * 300}.yaml", "File name too long"),
+        ("x" * 5000, "unknown model"),
+    ],
+)
+def test_what_is_no_model_is_one_line(text, words):
+    with pytest.raises(InputError, match=re.escape(words)) as error:
+        get_model(text)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        ({"models": {"mine": ["bias", "scale", "warm_up(tau=80)"]}}, "bias-scale+warm_up(tau=80)"),
+        ({"models": {"mine": "bias"}}, "bias"),
+        ({"models": {}, "simulated_effects": ["bias", "scale"]}, "bias-scale"),
+        ({"models": {"a": ["bias"], "b": ["scale"]}}, InputError("several models (a, b)")),
+        ({"models": {"mine": ["bias", "bais"]}}, InputError("models.mine: unknown effect 'bais'")),
+        ({"models": {"mine": 3}}, InputError("models.mine: must be a list of effects")),
+        ({"models": [1]}, InputError("models: must be a mapping")),
+        ({"study": "x"}, InputError("no model in it")),
+    ],
+)
+def test_the_model_of_a_file(content, expected, tmp_path):
+    path = tmp_path / "model.yaml"
+    path.write_text(yaml.safe_dump(content), encoding="utf-8")
+    with pytest.raises(InputError, match=re.escape(f"a folder, not a model; take {path}")):
+        get_model(str(tmp_path))
+    if isinstance(expected, str):
+        assert get_model(str(path)).name == expected
+        return
+    with pytest.raises(InputError, match=re.escape(f"{path}: {expected}")):
+        get_model(str(path))
+    if len(content.get("models", ())) == 2:
+        assert get_model(f"{path}:b").name == "scale"
+        with pytest.raises(InputError, match="no model 'c' in it; it has a, b"):
+            get_model(f"{path}:c")
+
+
+def test_titles_of_compositions():
+    assert model_title(f"{NINE}+warm_up(tau=300)+quadratic_scale") == (
+        "9 + warm up (300) + quadratic scale"
+    )
+    assert model_title("bias+warm_up(tau=300)") == "bias + warm up (300)"
+
+
+def test_a_part_of_an_effect_takes_its_share_of_the_true_values():
+    study = parse_study(
+        {
+            "study": "part",
+            "seed": 1,
+            "sensor": {"saturation": {"value": [0.1, 0.2, 0.3], "unit": "1"}},
+            "grids": [{"models": "all", "schemes": "faces-6", "replicates": 2}],
+        }
+    )
+    assert study.truth(["saturation(knee=9)[k_sat_z]"]) == {"k_sat_z": 0.3}
+
+
+# --- what an effect need not say -----------------------------------------------------------------
+
+
+@pytest.fixture
+def squared():
+    """The example of the README under another name, registered for the time of a test."""
+
+    @register
+    class SquaredScale(Effect):
+        """Second-order nonlinearity k_i f_i²/g (K2 of IEEE Std 1293, in units of g)."""
+
+        name = "squared_scale"
+        parameters = per_axis("k2", "1", "k_{2%}")
+
+        def output(self, f, p, g, hold, xp):
+            return tuple(k * f_i * f_i / g for k, f_i in zip(p, f, strict=True))
+
+    _parameters.cache_clear()
+    yield SquaredScale.name
+    del base._registry._items[SquaredScale.name]
+    get_effect.cache_clear()
+    _parameters.cache_clear()
+
+
+def test_an_effect_that_says_no_more_than_it_must_serves_everywhere(squared, tmp_path):
+    text = run("effects")
+    assert "squared_scale: f_i² k2_i/g" in text
+    assert squared in run("effects", "--scheme", "mclaren-24")
+    run("simulate-campaign", "--out", tmp_path / "c", "--seed", "3", "--model", NINE,
+        "--effect", squared, "--size", "5")  # fmt: skip
+    assert squared in run("effects", "--campaign", tmp_path / "c")
+    text = run("diagnose", tmp_path / "c", "--out", tmp_path / "d", "--replicates", "100")
+    assert "squared scale" in text
+    page = (tmp_path / "d/report.html").read_text(encoding="utf-8")
+    assert "squared scale" in page
+    run("calibrate", tmp_path / "c", "--model", f"{NINE}+{squared}", "--out", tmp_path / "k")
+    assert largest(get_effect(squared)) == np.inf
+
+
+@pytest.mark.parametrize("name", effect_names())
+def test_defaults_come_from_the_formulas(name):
+    effect = get_effect(name)
+    assert formulas(effect)
+    assert equation_of(effect)
+    low, high = typical_of(effect)
+    assert 0 < low < high < 1
+
+
+def test_formulas_are_those_of_the_effect():
+    assert formulas(get_effect("warm_up(tau=312.5)")) == {
+        "output": [f"w_{i}*exp(-0.0032*time)" for i in "xyz"]
+    }
+    assert formulas(get_effect("saturation(knee=9)[k_sat_y]"))["output"][::2] == ["0", "0"]
+    assert formulas(get_effect("encoder_offset")) == {"reading": ["c_roll", "c_pitch"]}
+    assert equation_of(get_effect("quadratic_scale")) == "f_i² k2_i/g"
+    assert set(MODELS[NINE]) <= set(effect_names())
+
+
+def test_a_campaign_of_a_composition_has_each_effect_once():
+    settings = CampaignSettings(
+        model=f"{NINE}+warm_up(tau=300)", effects=("warm_up(tau=500): 0.1, 0.2, 0.3",)
+    )
+    _, truth = simulate_campaign(settings)
+    assert [e["name"] for e in truth["sensor"]] == ["bias", "scale", "nonorthogonality"]
+    assert [e["name"] for e in truth["effects"]] == ["warm_up"]
+    twice = CampaignSettings(effects=("warm_up", "warm_up(tau=3)"))
+    with pytest.raises(InputError, match="occur in two effects"):
+        simulate_campaign(twice)

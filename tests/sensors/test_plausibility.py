@@ -1,0 +1,27 @@
+"""What no sensor can have, beside what the positions hardly determine."""
+
+import numpy as np
+
+from accelstudy.effects import get_effect
+from accelstudy.sensors.plausibility import implausible_parameters, largest
+
+DRIFT = get_effect("bias_drift")
+
+
+def found(value, sigma):
+    values = np.array([0.0, value, 0.0])
+    return implausible_parameters([DRIFT], values, np.array([np.nan, sigma, 0.0]))
+
+
+def test_a_parameter_is_implausible_only_if_it_is_clearly_beyond_its_bound():
+    bound = largest(DRIFT)
+    assert found(0.9 * bound, 0.0) == []
+    (said,) = found(2 * bound, 0.1 * bound)
+    assert said.startswith("d_y = ")
+    assert found(2 * bound, bound) == [], "the positions hardly determine it"
+
+
+def test_an_unknown_sigma_excuses_nothing():
+    assert len(found(2 * largest(DRIFT), np.nan)) == 1
+    assert len(found(2 * largest(DRIFT), np.inf)) == 1
+    assert len(found(np.nan, 0.0)) == 1

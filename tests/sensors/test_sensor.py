@@ -1,0 +1,266 @@
+"""Sensor models: forwards and backwards, against plain matrices and the effects themselves."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.units import MGON, STANDARD_GRAVITY
+from accelstudy.effects import Effect, Hold, Parameter, effect_names, get_effect, register
+from accelstudy.schemes import get_scheme
+from accelstudy.sensors.models import MODELS, PRESETS, TITLES, get_model
+from accelstudy.sensors.sensor import SensorModel
+
+G = STANDARD_GRAVITY
+NINE = "bias-scale-nonorthogonality"
+TWELVE = "bias-scale-nonorthogonality-crossaxis"
+# Realistic sizes by unit: 0.5 m/s² of bias, 2 % of scale and nonlinearity, 2 gon of angle.
+SIZE = {"m/s^2": 0.5, "1": 0.02, "rad": 2000 * MGON}
+ALL_MODELS = pytest.mark.parametrize("name", MODELS)
+
+
+def draw_parameters(model, data):
+    unit_cube = st.lists(st.floats(-1, 1), min_size=model.n_parameters, max_size=model.n_parameters)
+    return np.array(data.draw(unit_cube)) * [SIZE[p.unit] for p in model.parameters]
+
+
+def random_parameters(model, *shape, seed=0):
+    rng = np.random.default_rng(seed)
+    size = [SIZE[p.unit] for p in model.parameters]
+    return rng.uniform(-1, 1, (*shape, model.n_parameters)) * size
+
+
+def forces():
+    return -G * get_scheme("mclaren-24").directions
+
+
+def t_matrix(yz, zy, zx, xz=0.0, xy=0.0, yx=0.0):
+    """Eq. (3) of Thalmann & Neuner (2018)."""
+    return np.array([[1, -yz, zy], [xz, 1, -zx], [-xy, yx, 1]])
+
+
+@ALL_MODELS
+@given(data=st.data())
+def test_correct_inverts_sense(name, data):
+    model = get_model(name)
+    p = draw_parameters(model, data)
+    f_b = forces()
+    back = model.correct(model.sense(f_b, p), p)
+    np.testing.assert_allclose(back, f_b, rtol=0, atol=1e-12 * G)
+
+
+@ALL_MODELS
+@given(data=st.data())
+def test_sense_inverts_correct(name, data):
+    model = get_model(name)
+    p = draw_parameters(model, data)
+    f_s = forces()
+    np.testing.assert_allclose(model.sense(model.correct(f_s, p), p), f_s, rtol=0, atol=1e-12 * G)
+
+
+@given(data=st.data())
+def test_nine_parameters_are_equation_5(data):
+    model = get_model(NINE)
+    p = draw_parameters(model, data)
+    b, s, angles = p[:3], p[3:6], p[6:]
+    expected = forces() @ (np.diag(1 + s) @ np.linalg.inv(t_matrix(*angles))).T + b
+    np.testing.assert_allclose(model.sense(forces(), p), expected, rtol=0, atol=1e-14 * G)
+
+
+@given(data=st.data())
+def test_twelve_parameters_are_equation_3(data):
+    model = get_model(TWELVE)
+    p = draw_parameters(model, data)
+    b, s, angles = p[:3], p[3:6], p[6:]
+    np.testing.assert_allclose(model.axes_matrix(p), t_matrix(*angles), rtol=0, atol=1e-16)
+    expected = forces() @ (np.diag(1 + s) @ np.linalg.inv(t_matrix(*angles))).T + b
+    np.testing.assert_allclose(model.sense(forces(), p), expected, rtol=0, atol=1e-14 * G)
+
+
+@pytest.mark.parametrize("g", [9.78, 9.83])
+def test_nonlinear_scale_in_units_of_gravity(g):
+    model = get_model("bias-scale-nonorthogonality-quadratic-cubic")
+    p = model.vector({"k2_x": 300e-6, "k3_y": 500e-6})
+    f_s = model.sense([[g, g, g]], p, g)
+    np.testing.assert_allclose(f_s, [[g * (1 + 300e-6), g * (1 + 500e-6), g]], rtol=1e-15)
+
+
+@ALL_MODELS
+def test_generated_functions_equal_the_effects_in_numpy(name):
+    model = get_model(name)
+    p = random_parameters(model, seed=5)
+    f_b = forces()
+    own, start = [], 0
+    for effect in model.effects:
+        own.append((effect, tuple(p[start : start + len(effect.parameters)])))
+        start += len(effect.parameters)
+    matrix = np.eye(3) + sum(np.array(effect.axes(q, np), dtype=float) for effect, q in own)
+    f_a = tuple(np.linalg.inv(matrix) @ f_b.T)
+    expected = np.array(f_a)
+    for effect, q in own:
+        added = effect.output(f_a, q, G, Hold(), np)
+        expected = expected + [np.broadcast_to(a, len(f_b)) for a in added]
+    np.testing.assert_allclose(model.sense(f_b, p), expected.T, rtol=0, atol=1e-14 * G)
+
+
+@ALL_MODELS
+def test_derivative_of_the_correction_against_finite_differences(name):
+    model = get_model(name)
+    p = random_parameters(model, seed=6)
+    found = model.correction_jacobian(forces(), p)
+    assert found.shape == (24, 3, model.n_parameters)
+    for i, step in enumerate(1e-5 * np.eye(len(p))):
+        difference = model.correct(forces(), p + step) - model.correct(forces(), p - step)
+        np.testing.assert_allclose(found[..., i], difference / 2e-5, rtol=0, atol=1e-6)
+
+
+def test_a_perfect_sensor_changes_nothing():
+    model = get_model(TWELVE)
+    np.testing.assert_array_equal(model.sense(forces(), np.zeros(12)), forces())
+
+
+def test_order_names_and_units_of_the_parameters():
+    model = get_model("bias-scale-nonorthogonality-crossaxis")
+    names = "b_x b_y b_z s_x s_y s_z alpha_yz alpha_zy alpha_zx alpha_xz alpha_xy alpha_yx"
+    assert model.parameter_names == tuple(names.split())
+    units = [p.unit for p in model.parameters]
+    assert units == ["m/s^2"] * 3 + ["1"] * 3 + ["rad"] * 6
+    assert model.n_parameters == 12
+
+
+@ALL_MODELS
+def test_number_of_parameters_is_that_of_the_title(name):
+    assert get_model(name).n_parameters == int(TITLES[name].split(":")[0])
+
+
+def test_vector_orders_a_mapping_and_fills_in_zeros():
+    p = get_model(NINE).vector({"alpha_zx": 3.0, "b_y": 1.0})
+    np.testing.assert_array_equal(p, [0, 1, 0, 0, 0, 0, 0, 0, 3])
+
+
+# --- batches -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("forces_batch", "parameters_batch", "gravity_batch", "batch"),
+    [
+        ((), (), (), ()),
+        ((), (5,), (), (5,)),
+        ((5,), (), (), (5,)),
+        ((5,), (5,), (5,), (5,)),
+        ((), (), (5,), (5,)),
+        ((4, 1), (5,), (), (4, 5)),
+    ],
+)
+def test_batches_broadcast(forces_batch, parameters_batch, gravity_batch, batch):
+    model = get_model("bias-scale-nonorthogonality-quadratic-cubic")
+    rng = np.random.default_rng(1)
+    f_b = forces() + rng.standard_normal((*forces_batch, 24, 3))
+    p = random_parameters(model, *parameters_batch)
+    g = G + 0.01 * rng.standard_normal(gravity_batch)
+    f_s = model.sense(f_b, p, g)
+    assert f_s.shape == (*batch, 24, 3)
+    np.testing.assert_allclose(
+        model.correct(f_s, p, g), np.broadcast_to(f_b, f_s.shape), rtol=0, atol=1e-12 * G
+    )
+    for index in np.ndindex(*batch):
+        one = model.sense(
+            np.broadcast_to(f_b, (*batch, 24, 3))[index],
+            np.broadcast_to(p, (*batch, model.n_parameters))[index],
+            np.broadcast_to(g, batch)[index],
+        )
+        np.testing.assert_allclose(f_s[index], one, rtol=1e-14)
+
+
+def test_an_inverse_that_does_not_exist_is_not_a_number():
+    """Beyond its turning point a quadratic has no inverse; the others of the batch have one."""
+    model = SensorModel.of("quadratic", ["quadratic_scale"])
+    p = np.array([[0.0, 0.0, 0.0], [-5.0, 0.0, 0.0]])
+    result = model.correct(np.array([[G, 0.0, 0.0]]), p)
+    np.testing.assert_allclose(result[0], [[G, 0, 0]], rtol=1e-15)
+    assert np.isnan(result[1, 0, 0])
+
+
+def test_an_axis_without_sensitivity_has_no_inverse():
+    model = SensorModel.of("scale", ["scale"])
+    result = model.correct(np.array([[1.0, 2.0, 3.0]]), [-1.0, 0.0, 0.0])
+    assert np.isnan(result[0, 0])
+
+
+# --- names ---------------------------------------------------------------------------------------
+
+
+def test_a_parameter_name_stands_for_one_thing():
+    with pytest.raises(InputError, match="parameters b_x, b_y, b_z occur in two effects"):
+        SensorModel.of("twice", ["bias", "scale", "bias"])
+
+
+def test_an_unknown_effect_is_named_with_a_suggestion():
+    with pytest.raises(UnknownNameError, match="unknown effect 'bais'; did you mean 'bias'") as e:
+        SensorModel.of("wrong", ["bais"])
+    for name in effect_names():
+        assert name in str(e.value)
+
+
+def test_an_unknown_model_is_named_with_a_suggestion():
+    with pytest.raises(UnknownNameError, match=f"did you mean '{NINE}'"):
+        get_model("bias-scale-nonortogonality")
+
+
+def test_a_model_of_the_caller():
+    model = get_model("mine", {"mine": ["scale", "bias"]})
+    assert model.parameter_names == ("s_x", "s_y", "s_z", "b_x", "b_y", "b_z")
+    with pytest.raises(UnknownNameError, match="unknown effect 'friction'"):
+        get_model("mine", {"mine": ["friction"]})
+
+
+def test_registered_effects_are_complete():
+    for name in effect_names():
+        effect = get_effect(name)
+        assert effect.name == name
+        assert effect.parameters
+        assert all(p.symbol.startswith("$") and p.symbol.endswith("$") for p in effect.parameters)
+
+
+def test_presets_name_models_and_schemes_that_exist():
+    assert len({preset.name for preset in PRESETS}) == len(PRESETS)
+    for preset in PRESETS:
+        assert get_model(preset.model).n_parameters >= 6
+        assert get_scheme(preset.scheme).n_positions >= 6
+
+
+# --- the robot's reading -------------------------------------------------------------------------
+
+
+class _EncoderScale(Effect):
+    name = "encoder_scale_of_the_test"
+    parameters = (Parameter("k_roll", "1", "$k_1$"), Parameter("k_pitch", "1", "$k_2$"))
+
+    def reading(self, angles, p, hold, xp):
+        return tuple(k * a for k, a in zip(p, angles, strict=True))
+
+
+def test_reading_errors_are_functions_of_what_is_read():
+    """r = a + k r, so r = a / (1 − k)."""
+    model = SensorModel("encoder", (_EncoderScale(),))
+    angles = np.array([[0.3, -0.2], [3.0, 1.5], [0.0, 0.0]])
+    k = np.array([2e-3, -1e-3])
+    expected = angles / (1 - k) - angles
+    np.testing.assert_allclose(model.reading_errors(angles, k), expected, rtol=1e-12)
+
+
+def test_effects_of_the_sensor_leave_the_robot_alone():
+    model = get_model(TWELVE)
+    errors = model.reading_errors(np.array([[0.3, -0.2]]), random_parameters(model))
+    np.testing.assert_array_equal(errors, [[0.0, 0.0]])
+
+
+def test_an_effect_is_registered_once():
+    class Again(Effect):
+        name = "bias"
+        parameters = ()
+
+    with pytest.raises(ValueError, match="effect 'bias' is registered twice"):
+        register(Again)
+    assert get_effect("bias").parameters

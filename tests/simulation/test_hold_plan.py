@@ -1,0 +1,192 @@
+"""Conditions of the holds, and studies of effects that depend on them."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+from study_helpers import NINE, grid, make_cells, make_study, run_study, simulated
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import MGON, STANDARD_GRAVITY
+from accelstudy.effects import get_effect
+from accelstudy.leveling.error import cap_forces, leveling_error
+from accelstudy.sensors.models import get_model
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.simulation.hold_plan import HoldPlan
+from accelstudy.study.cells.cell import Cell
+
+FULL = HoldPlan(30.0, (10.0, 40.0), "random", (0.5, 2.0), "random", seed=3)
+
+
+# --- conditions ----------------------------------------------------------------------------------
+
+
+def test_without_a_plan_nothing_is_known_but_that_the_yaw_is_zero():
+    hold = HoldPlan().hold(5)
+    assert hold.time is hold.temperature is hold.vibration is None
+    assert hold.yaw.tolist() == [0.0] * 5
+
+
+def test_what_is_drawn_is_uniform_and_independent():
+    n = 5000
+    hold = FULL.hold(n)
+    assert hold.time.tolist() == [30.0 * i for i in range(n)]
+    ranges = {"temperature": (10, 30), "vibration": (0.5, 1.5), "yaw": (-np.pi, 2 * np.pi)}
+    for name, (low, width) in ranges.items():
+        assert stats.kstest(hold.column(name), stats.uniform(low, width).cdf).pvalue > 1e-4
+    drawn = np.stack([hold.column(name) for name in ranges])
+    assert np.abs(np.corrcoef(drawn)[np.triu_indices(3, 1)]).max() < 4.5 / math.sqrt(n)
+    np.testing.assert_array_equal(FULL.hold(n).yaw, hold.yaw)
+
+
+def test_use_is_in_the_ranges_of_the_calibration_and_in_random_order():
+    forces = cap_forces(0.8, 300)
+    hold = FULL.use(forces, 24)
+    for name, (low, high) in {
+        "time": (0, 690), "temperature": (10, 40), "vibration": (0.5, 2)
+    }.items():  # fmt: skip
+        values = hold.column(name)
+        assert low <= values.min() < low + 0.1 * (high - low)
+        assert high - 0.1 * (high - low) < values.max() <= high
+    steps = np.stack([hold.step_x, hold.step_y, hold.step_z], axis=1)
+    before = forces - steps
+    # Each attitude but the last comes before another one; the first has none before it.
+    distance = np.abs(before[:, None] - forces).max(axis=-1)
+    assert np.sort(distance.min(axis=1)).max() < 0.02 * math.sqrt(3)
+    assert not np.array_equal(np.argmin(distance, axis=1), np.arange(-1, 299))
+
+
+@pytest.mark.parametrize(
+    ("effect", "column"),
+    [("thermal_scale", "temperature"), ("bias_drift", "time"), ("settling", None), ("bias", None)],
+)
+def test_what_is_missing_for_an_effect(effect, column):
+    assert HoldPlan().missing(get_effect(effect)) == column
+    assert FULL.missing(get_effect(effect)) is None
+
+
+# --- leveling ------------------------------------------------------------------------------------
+
+
+def test_the_rig_stays_behind_when_the_sensor_levels():
+    """Neither a tilted base nor what was estimated of it tilts the sensor elsewhere."""
+    model = SensorModel.of("m", ["bias", "base_tilt", "gravity_error"])
+    forces = cap_forces(0.8, 50)
+    truth = np.array([0.01, 0, 0, 1e-3, 2e-3, 1e-3])
+    estimates = np.array([[0.01, 0, 0, 5e-3, 0, 7e-3]])
+    error = leveling_error(model, truth, model, estimates, forces, hold=FULL.use(forces, 9))
+    np.testing.assert_allclose(error.rms, 0, atol=1e-12)
+
+
+def test_what_depends_on_temperature_tilts_if_it_is_not_estimated():
+    """A bias of b (T − 20 °C) on x at T uniform in 10 to 40 °C is a pitch of b (T − 20)/g."""
+    simulated, estimated = get_model("t", {"t": ["bias", "thermal_bias"]}), SensorModel.of(
+        "b", ["bias"]
+    )  # fmt: skip
+    forces = cap_forces(0.01, 20_000)
+    truth = np.array([0, 0, 0, 0.01, 0, 0])
+    hold = FULL.use(forces, 9)
+    error = leveling_error(simulated, truth, estimated, np.zeros((2, 3)), forces, hold=hold)
+    mean_square = (20**3 + 10**3) / 3 / 30
+    expected = 0.01 / STANDARD_GRAVITY * math.sqrt(mean_square)
+    assert error.rms[1] == pytest.approx(expected, rel=0.02)
+
+
+# --- studies -------------------------------------------------------------------------------------
+
+HOLDS = {
+    "interval_s": 60, "temperature_degC": [20, 40], "temperature_order": "random",
+    "vibration_mps2": [0, 1], "yaw": "random",
+}  # fmt: skip
+MINE = ["bias", "scale", "nonorthogonality", "thermal_bias", "warm_up(tau=400)", "base_tilt"]
+SENSOR = {
+    "thermal_bias": {"value": [1, -1, 2], "unit": "mg/K"},
+    "warm_up": {"value": [3, 3, 3], "unit": "mg"},
+    "warm_up(tau=400)": {"value": [1, 2, 3], "unit": "mg"},
+    "base_tilt": {"value": [20, -20], "unit": "mgon"},
+}
+
+
+def test_cells_know_their_holds():
+    cells = make_cells(grid("mine"), models={"mine": MINE}, holds=HOLDS, sensor=SENSOR, seed=8)
+    cell = cells["mine/mclaren-24/robot"]
+    assert cell.holds == HoldPlan(60.0, (20.0, 40.0), "random", (0.0, 1.0), "random", seed=8)
+    assert Cell.from_dict(cell.to_dict()) == cell
+    assert [cell.truth[f"w_{i}"] for i in "xyz"] == pytest.approx(
+        [i * 9.80665e-3 for i in (1, 2, 3)]
+    )
+    assert cell.truth["tilt_a"] == pytest.approx(20 * MGON)
+    plain = make_cells(grid(), seed=8)[f"{NINE}/mclaren-24/robot"]
+    other = make_cells(grid(), seed=8, holds=HOLDS)[f"{NINE}/mclaren-24/robot"]
+    assert tuple(plain.seed(1, 0).generate_state(2)) != tuple(other.seed(1, 0).generate_state(2))
+
+
+def test_a_study_of_effects_that_depend_on_the_holds(tmp_path):
+    """With the effects the calibration is as linear theory says, and without it is off."""
+    tables = run_study(
+        tmp_path, models={"mine": MINE}, holds=HOLDS, sensor=SENSOR, simulated_effects=MINE,
+        grids=[grid(["mine", NINE], approaches="robot", replicates=1000)],
+    )  # fmt: skip
+    summary = tables["summary"]
+    full = summary[summary["model"] == "mine"]
+    assert len(full) == 17
+    assert np.abs(full["sd_empirical"] / full["sd_linear"] - 1).max() < 4.5 / math.sqrt(2000)
+    error = full["sd_linear"] / math.sqrt(1000)
+    assert (np.abs(full["bias"]) < 4.5 * error).all()
+    short = summary[(summary["model"] == NINE) & summary["parameter"].isin(["b_x", "b_y", "b_z"])]
+    assert (np.abs(short["bias"]) > 20 * short["sd_linear"]).all()
+    leveling = tables["leveling"].set_index("model")
+    assert leveling["pitch_rms_mgon"][NINE] > 5 * leveling["pitch_rms_mgon"]["mine"]
+
+
+@pytest.mark.parametrize("name", ["vibration_rectification", "hysteresis", "encoder_scale"])
+def test_any_effect_can_be_switched_on(name):
+    cells = make_cells(grid(), simulated_effects=["bias", name], holds=HOLDS)
+    assert np.isfinite(simulated(cells[f"{NINE}/mclaren-24/robot"]).estimates).all()
+
+
+@pytest.mark.parametrize(
+    ("keys", "expected"),
+    [
+        (
+            {"simulated_effects": ["thermal_bias"]},
+            "holds.temperature_degC: missing; the effect 'thermal_bias' needs the temperature of",
+        ),
+        (
+            {"models": {"mine": MINE}, "grids": [grid("mine")], "holds": {"interval_s": 1}},
+            "holds.temperature_degC: missing; the effect 'thermal_bias'",
+        ),
+        (
+            {"simulated_effects": ["warm_up"], "holds": {**HOLDS, "interval_s": None}},
+            "holds.interval_s: missing; the effect 'warm_up' needs the time",
+        ),
+        (
+            {"holds": {"temperature_degC": [-300, 20]}},
+            "holds.temperature_degC.0: must be from -273.15 to 10000 °C, not -300",
+        ),
+        ({"holds": {"temperature_degC": [20]}}, "holds.temperature_degC.1: field required"),
+        ({"holds": {"interval_s": 0}}, "holds.interval_s: must be from 1e-06 to 1000000 s, not 0"),
+        ({"holds": {"yaw": "all"}}, "holds.yaw: input should be 'none' or 'random'"),
+        ({"holds": {"vibration": [0, 1]}}, "did you mean 'vibration_mps2'?"),
+        ({"sensor": {"warm_up(t=3)": {"value": 1, "unit": "mg"}}}, "unknown setting of the effect"),
+        (
+            {"sensor": {"thermal_bias": {"value": [1, 1, 1], "unit": "mg"}}},
+            "unknown unit of a quantity in m/s^2/K 'mg'",
+        ),
+    ],
+)
+def test_what_is_wrong_with_a_configuration(keys, expected):
+    with pytest.raises(InputError) as error:
+        make_study(**keys)
+    assert expected in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_sensitivity_is_of_models_that_need_no_holds():
+    settings = {"roll_gon": [0], "pitch_gon": [0], "model": "mine"}
+    with pytest.raises(InputError, match=r"sensitivity.model: 'mine' depends on the temperature"):
+        make_study(
+            models={"mine": ["bias", "thermal_bias"]}, holds=HOLDS, sensitivity=settings,
+            grids=[grid("mine")],
+        )  # fmt: skip

@@ -1,0 +1,263 @@
+"""Simulated campaigns: the truth is told, estimated again, and drawn from separate streams."""
+
+import math
+
+import numpy as np
+import pytest
+import yaml
+from click.testing import CliRunner
+from scipy import stats
+
+from accelstudy.approaches import get_approach
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import MGON
+from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.files.format import read_campaign
+from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
+from accelstudy.commands.main import main
+from accelstudy.effects import get_effect
+from accelstudy.schemes import get_scheme
+from accelstudy.sensors.models import get_model
+
+NINE = get_model("bias-scale-nonorthogonality")
+
+
+def simulate(**settings):
+    return simulate_campaign(CampaignSettings(**settings))
+
+
+def values(entries):
+    return {p["name"]: p["value"] for entry in entries for p in entry["parameters"]}
+
+
+def call(*arguments):
+    return CliRunner().invoke(main, ["simulate-campaign", *map(str, arguments)])
+
+
+# --- what is simulated ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("approach", ["gravity", "robot"])
+def test_a_campaign_is_calibrated_to_its_truth(approach):
+    """Errors over sigma of many campaigns are standard normal, and Ω is χ²."""
+    standardised, omega = [], []
+    for seed in range(60):
+        campaign, truth = simulate(seed=seed, approach=approach)
+        fit = fit_campaign(campaign, NINE, get_approach(approach))
+        known = NINE.vector(values(truth["sensor"]))
+        standardised.append((fit.parameters - known) / fit.adjustment.sigma_priori[0, :9])
+        omega.append(fit.adjustment.omega[0])
+    z = np.array(standardised)
+    assert np.abs(z.mean(axis=0)).max() < 4 / math.sqrt(60)
+    # The parameters are correlated; each has 60 independent values.
+    assert np.abs(z.var(axis=0) - 1).max() < 4.5 * math.sqrt(2 / 60)
+    r = fit.adjustment.redundancy
+    assert np.mean(omega) == pytest.approx(r, rel=4.5 * math.sqrt(2 / r / 60))
+
+
+def test_hidden_effects_are_found_where_they_were_put():
+    effects = ("thermal_bias: 0.004, -0.002, 0.001", "warm_up(tau=400)")
+    campaign, truth = simulate(effects=effects, temperature=(20, 40), temperature_order="random")
+    assert values(truth["effects"]) == {
+        "b_T_x": 0.004, "b_T_y": -0.002, "b_T_z": 0.001,
+        **{name: pytest.approx(math.copysign(0.05, value))
+           for name, value in values(truth["effects"]).items() if name.startswith("w_")},
+    }  # fmt: skip
+    full = get_model("full", {"full": [*NINE_EFFECTS, "thermal_bias", "warm_up(tau=400)"]})
+    fit = fit_campaign(campaign, full, get_approach("robot"))
+    known = full.vector({**values(truth["sensor"]), **values(truth["effects"])})
+    assert np.abs((fit.parameters - known) / fit.adjustment.sigma_priori[0]).max() < 4.5
+    assert truth["effects"][1]["settings"] == {"tau": {"value": 400.0, "unit": "s"}}
+
+
+NINE_EFFECTS = ("bias", "scale", "nonorthogonality")
+
+
+def test_an_effect_of_the_model_can_be_given():
+    _, truth = simulate(effects=("bias: 1, 2, 3",))
+    assert [entry["name"] for entry in truth["sensor"]] == ["scale", "nonorthogonality"]
+    assert values(truth["effects"]) == {"b_x": 1.0, "b_y": 2.0, "b_z": 3.0}
+
+
+def test_sizes_are_typical():
+    found = np.abs([[*values(simulate(seed=s)[1]["sensor"]).values()] for s in range(200)])
+    for i, name in enumerate(NINE_EFFECTS):
+        low, high = get_effect(name).typical
+        part = found[:, 3 * i : 3 * i + 3].ravel()
+        assert stats.kstest(np.log(part / low) / np.log(high / low), "uniform").pvalue > 1e-4
+    _, truth = simulate(effects=("quadratic_scale",), size=0.5)
+    assert {abs(v) for v in values(truth["effects"]).values()} == {2500e-6 / 2}
+
+
+def test_a_seed_gives_the_same_campaign_and_another_a_different_one():
+    one, same, other = (simulate(seed=seed) for seed in (4, 4, 5))
+    np.testing.assert_array_equal(one[0].forces, same[0].forces)
+    assert one[1] == same[1]
+    assert not np.any(one[0].forces == other[0].forces)
+
+
+def test_what_is_added_changes_nothing_else_that_is_drawn():
+    plain, truth = simulate(order="random")
+    more, more_truth = simulate(
+        order="random", effects=("thermal_bias: 0, 0, 0",), temperature=(20, 40), vibration=(0, 1),
+        temperature_order="random", n_samples=9,
+    )  # fmt: skip
+    np.testing.assert_allclose(more.forces, plain.forces, rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(more.angles, plain.angles)
+    assert more_truth["sensor"] == truth["sensor"]
+
+
+# --- columns -------------------------------------------------------------------------------------
+
+
+def test_columns_are_those_of_the_settings():
+    campaign, _ = simulate(interval=None, sigma_known=False, approach="gravity", yaw="random")
+    for name in ("time", "temperature", "vibration", "yaw", "angles", "sigma_angle", "n_samples"):
+        assert getattr(campaign, name) is None
+    assert campaign.sigma_force is None
+    campaign, _ = simulate(
+        interval=30, temperature=(10, 50), vibration=(0.2, 0.4), yaw="random", n_samples=100
+    )
+    assert campaign.time.tolist() == [30.0 * i for i in range(24)]
+    np.testing.assert_allclose(campaign.temperature, np.linspace(10, 50, 24))
+    assert 0.2 <= campaign.vibration.min() < campaign.vibration.max() <= 0.4
+    assert np.ptp(campaign.yaw) > np.pi
+    assert set(campaign.n_samples) == {100}
+    assert campaign.sigma_angle == 3.2 * MGON
+
+
+def test_courses_of_temperature():
+    abba, _ = simulate(temperature=(20, 40), temperature_order="ABBA")
+    assert abba.temperature.tolist() == [20.0] * 6 + [40.0] * 12 + [20.0] * 6
+    random = np.concatenate(
+        [
+            simulate(seed=s, temperature=(20, 40), temperature_order="random")[0].temperature
+            for s in range(40)
+        ]
+    )
+    assert stats.kstest(random, stats.uniform(20, 20).cdf).pvalue > 1e-4
+
+
+def test_repeats_and_order():
+    directions = get_scheme("faces-6").directions
+
+    def attitudes(**settings):
+        campaign, _ = simulate(scheme="faces-6", effects=ZERO, sigma=1e-9, **settings)
+        return np.round(-campaign.forces / campaign.gravity, 6)
+
+    np.testing.assert_array_equal(attitudes(repeats=2), np.tile(directions, (2, 1)))
+    np.testing.assert_array_equal(
+        attitudes(repeat_first=4), np.concatenate([directions, directions[:4]])
+    )
+    mixed = attitudes(repeats=3, order="random", repeat_first=2)
+    assert not np.array_equal(mixed[:18], np.tile(directions, (3, 1)))
+    np.testing.assert_array_equal(mixed[18:], mixed[:2])
+    found, counts = np.unique(mixed[:18], axis=0, return_counts=True)
+    assert len(found) == 6
+    assert set(counts) == {3}
+
+
+ZERO = ("bias: 0, 0, 0", "scale: 0, 0, 0", "nonorthogonality: 0, 0, 0")
+
+
+def test_sds_within_the_holds():
+    """(n − 1) s²/σ² of the samples is χ², and s/√n estimates the sigma of the mean."""
+    n, sigma = 25, 0.003
+    sd = np.concatenate(
+        [simulate(seed=s, n_samples=n, sigma=sigma)[0].sd.ravel() for s in range(20)]
+    )
+    assert stats.kstest((n - 1) * sd**2 / (n * sigma**2), stats.chi2(n - 1).cdf).pvalue > 1e-4
+    noisy, _ = simulate(n_samples=n, sigma=sigma, noise_effects=("axis_noise(kappa_z=4)",))
+    quiet, _ = simulate(n_samples=n, sigma=sigma, noise_effects=("coloured_noise",))
+    np.testing.assert_allclose(noisy.sd / quiet.sd, [[1, 1, 2]] * 24, rtol=1e-12)
+
+
+def test_slopes_within_the_holds():
+    """They are the rates of the effects of time, with the noise of a line through the samples."""
+    settings = {
+        **{"n_samples": 25, "duration": 40.0, "sigma": 0.003, "temperature": (20, 40)},
+        "effects": ("warm_up(tau=300): 0.5, 0, 0", "thermal_bias: 0, 0.1, 0"),
+    }
+    drawn = [simulate(seed=s, **settings)[0] for s in range(10)]
+    time = drawn[0].time
+    # Of e^(−t/τ) over a hold, beside its derivative in the middle: 1 + (T/τ)²/40.
+    settling = -0.5 / 300 * np.exp(-time / 300) * (1 + (40 / 300) ** 2 / 40)
+    warming = np.full(len(time), 0.1 * 20 / time[-1])
+    expected = np.column_stack([settling, warming, 0 * time])
+    z = [(c.slope - expected) / c.sd_slope for c in drawn]
+    assert stats.kstest(np.ravel(z), "norm").pvalue > 1e-4
+    np.testing.assert_allclose(drawn[0].sd_slope, np.sqrt(12) * 0.003 / 40)
+    ordered = simulate(**settings | {"temperature_order": "ABBA", "sigma": 1e-6})[0]
+    np.testing.assert_allclose(ordered.slope[:, 1], 0, atol=1e-6)
+    assert (
+        drawn[0].forces.tolist()
+        == simulate(seed=0, **settings | {"duration": None})[0].forces.tolist()
+    )
+
+
+# --- the command ---------------------------------------------------------------------------------
+
+
+def test_the_command_writes_a_campaign_and_apart_from_it_the_truth(tmp_path):
+    folder, truth_path = tmp_path / "one", tmp_path / "truth" / "one.yaml"
+    result = call(
+        "--out", folder, "--truth", truth_path, "--seed", 7, "--effect", "warm_up(tau=300)",
+        "--noise-effect", "heavy_tails(nu=3)", "--gross", "unit_error(force=0.1)",
+        "--temperature", "20:40", "--temperature-order", "ABBA", "--vibration", "0:1",
+        "--yaw", "random", "--samples-per-hold", 50, "--sigma-unknown", "--robot-sigma-mgon", 5,
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    assert sorted(path.name for path in folder.iterdir()) == ["campaign.yaml", "positions.csv"]
+    campaign = read_campaign(folder, plausible=False)
+    expected, truth = simulate(
+        name="one", seed=7, effects=("warm_up(tau=300)",), noise_effects=("heavy_tails(nu=3)",),
+        gross_errors=("unit_error(force=0.1)",), temperature=(20, 40), temperature_order="ABBA",
+        vibration=(0, 1), yaw="random", n_samples=50, sigma_known=False, sigma_angle=5 * MGON,
+    )  # fmt: skip
+    np.testing.assert_allclose(campaign.forces, expected.forces, rtol=1e-14)
+    np.testing.assert_allclose(campaign.yaw, expected.yaw, rtol=1e-13)
+    assert campaign.sigma_force is None
+    assert yaml.safe_load(truth_path.read_text()) == truth
+    text = (folder / "campaign.yaml").read_text()
+    assert not any(word in text for word in ("warm_up", "heavy", "seed", "truth"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["--effect", "thermal_bias"], "temperature: missing; the effect 'thermal_bias' needs"),
+        (["--effect", "warm_up", "--no-time"], "interval: missing; the effect 'warm_up' needs"),
+        (["--effect", "thermal_bia"], "did you mean 'thermal_bias'?"),
+        (["--effect", "bias: 1, 2"], "expected 3 numbers after the colon (b_x in m/s^2, b_y in"),
+        (["--effect", "bias: 1, x, 2"], "expected 3 numbers after the colon"),
+        (["--effect", "warm_up(tau=1)", "--effect", "warm_up"], "occur in two effects"),
+        (["--noise-effect", "white"], "unknown noise effect 'white'"),
+        (["--gross", "row_order(first=1, second=99)"], "second=99 is no position"),
+        (["--sigma", "0"], "sigma: must be from 1e-09 to 1000 m/s², not 0"),
+        (["--repeats", "0"], "repeats: must be from 1 to 100000, not 0"),
+        (["--repeat-first", "25"], "repeat_first: must be at most 24"),
+        (["--temperature", "20"], "temperature: expected two numbers, as 20:40, not '20'"),
+        (["--temperature", "-300:20"], "temperature: must be from -273.15 to 10000 °C, not -300"),
+        (["--temperature-order", "abba"], "unknown temperature_order 'abba'"),
+        (["--yaw", "some"], "unknown yaw 'some'"),
+        (["--samples-per-hold", "1"], "n_samples: must be from 2 to 1000000000, not 1"),
+        (["--hold", "30"], "duration: slopes need n_samples, too"),
+        (["--hold", "90", "--samples-per-hold", "9"], "90 s are more than the interval between"),
+        (["--scheme", "mclaren-25"], "unknown scheme"),
+        (["--truth", "/dev/null/truth.yaml"], "/dev/null is not a folder"),
+    ],
+)
+def test_bad_input_ends_with_one_line_and_leaves_nothing(arguments, expected, tmp_path):
+    result = call("--out", tmp_path / "one", *arguments)
+    assert result.exit_code == 2
+    assert result.stderr.startswith("error: ")
+    assert expected in result.stderr
+    assert len(result.stderr.splitlines()) == 1
+    assert not (tmp_path / "one").exists()
+
+
+def test_settings_are_checked_in_python_too():
+    with pytest.raises(InputError, match="size: must be from 1e-06 to 1000000, not -1"):
+        CampaignSettings(size=-1)
+    with pytest.raises(InputError, match="vibration: must be from 0 to 10000"):
+        simulate(vibration=(-1, 1))

@@ -1,0 +1,662 @@
+"""Configurations: those of the repository are valid, and bad ones end with one clear line."""
+
+import json
+import math
+
+import pytest
+import yaml
+from click.testing import CliRunner
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from places import ROOT
+from snakemake.exceptions import WorkflowError
+from snakemake.utils import validate
+from study_helpers import NINE, content, grid, make_study
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import GON, MGON
+from accelstudy.commands.main import main
+from accelstudy.effects import effect_names
+from accelstudy.files.layers import overlay, read_layer
+from accelstudy.schemes import scheme_names
+from accelstudy.sensors.models import MODELS
+from accelstudy.study.cells.batches import batches
+from accelstudy.study.cells.cell import Cell, study_cells
+from accelstudy.study.config import StudyConfig, config_schema, parse_study, read_study
+
+CONFIG = ROOT / "config" / "config.yaml"
+OVERLAYS = [ROOT / "config" / "smoke.yaml", *sorted((ROOT / "config" / "sweeps").glob("*.yaml"))]
+
+
+# --- the files of the repository -----------------------------------------------------------------
+
+
+def test_the_study_of_the_paper():
+    study = read_study(CONFIG)
+    assert study.gravity_mps2 == 9.80665
+    assert study.sigma_force == 0.002
+    assert study.noise.robot.sigma_mgon == 3.2
+    truth = study.truth(["bias", "scale", "nonorthogonality"])
+    assert [truth[f"b_{axis}"] for axis in "xyz"] == [0.05, 0.01, 0.03]
+    assert [truth[f"s_{axis}"] for axis in "xyz"] == pytest.approx(3 * [200e-6], rel=1e-15)
+    assert truth["alpha_zx"] == pytest.approx(44 * MGON, rel=1e-15)
+    names = {cell.name for cell in study_cells(study)}
+    for model in MODELS:
+        for scheme in scheme_names():
+            assert {f"{model}/{scheme}/gravity", f"{model}/{scheme}/robot"} <= names
+
+
+@pytest.mark.parametrize("path", OVERLAYS, ids=lambda path: path.stem)
+def test_overlays_are_valid(path):
+    study = read_study(CONFIG, path)
+    assert study.study != "paper"
+    assert study_cells(study)
+    paper = read_study(CONFIG).sensor
+    assert {name: study.sensor[name] for name in paper} == paper
+
+
+def test_there_are_sweeps():
+    assert len(OVERLAYS) >= 5
+
+
+def test_overlay_replaces_lists_and_merges_mappings(tmp_path):
+    over = tmp_path / "over.yaml"
+    over.write_text("noise: {robot: {sigma_mgon: 7}}\nsensor: {bias: {value: [1, 2, 3]}}\n")
+    study = read_study(CONFIG, over)
+    assert study.noise.robot.sigma_mgon == 7
+    assert study.noise.sensor.sigma_mps2 == 0.002
+    assert study.sensor["bias"].value == [1, 2, 3]
+    assert study.sensor["bias"].unit == "m/s^2"
+
+
+def test_the_schema_file_is_that_of_the_models():
+    """Regenerate with `accelstudy config-schema > workflow/schemas/config.schema.json`."""
+    printed = CliRunner().invoke(main, ["config-schema"])
+    assert printed.exit_code == 0
+    path = ROOT / "workflow" / "schemas" / "config.schema.json"
+    assert path.read_text(encoding="utf-8") == printed.stdout
+    assert json.loads(printed.stdout) == config_schema()
+
+
+def test_the_schema_accepts_what_the_models_accept():
+    schema = str(ROOT / "workflow" / "schemas" / "config.schema.json")
+    base = yaml.safe_load(CONFIG.read_text())
+    validate(base, schema, set_default=False)
+    for path in OVERLAYS:
+        validate(overlay(base, read_layer(path)), schema, set_default=False)
+    for changes in ({"seeed": 1}, {"grids": [grid(models=[])]}, {"seed": -1}):
+        with pytest.raises(WorkflowError):
+            validate({**base, **changes}, schema, set_default=False)
+
+
+def blocks_of(schema):
+    return [schema, *schema["$defs"].values()]
+
+
+def test_the_schema_explains_every_key():
+    for block in blocks_of(config_schema()):
+        assert block["description"]
+        for name, key in block["properties"].items():
+            assert "description" in key or "$ref" in key, name
+        assert block["additionalProperties"] is False
+
+
+def test_config_yaml_has_every_top_level_key():
+    assert set(yaml.safe_load(CONFIG.read_text())) == set(StudyConfig.model_fields)
+
+
+def undocumented(text):
+    """Numbers of the lines with keys that no comment explains.
+
+    A key is explained by a comment in its line or in the line above it, by the comment of the
+    sibling in the line above (a group), by that of its parent, or if all its own keys are.
+    """
+    lines = text.splitlines()
+
+    def indent(line):
+        return len(line) - len(line.lstrip(" -"))
+
+    explained = set()
+    missing = []
+    for i, line in enumerate(lines):
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        above = lines[i - 1] if i else ""
+        below = lines[i + 1] if i + 1 < len(lines) else ""
+        if (
+            " #" in line
+            or above.lstrip().startswith("#")
+            or (above.strip() and indent(above) <= indent(line) and i - 1 in explained)
+            or (above.strip() and indent(above) > indent(line) and group(lines, i, explained))
+            or (below.lstrip().startswith("#") and indent(below) > indent(line))
+        ):
+            explained.add(i)
+        else:
+            missing.append(i + 1)
+    return missing
+
+
+def group(lines, i, explained):
+    """Whether the sibling before line i, above its nested keys, is explained by its parent."""
+    own = len(lines[i]) - len(lines[i].lstrip(" -"))
+    for j in range(i - 1, -1, -1):
+        if not lines[j].strip() or lines[j].lstrip().startswith("#"):
+            return False
+        if len(lines[j]) - len(lines[j].lstrip(" -")) <= own:
+            return j in explained
+    return False
+
+
+def test_every_key_of_config_yaml_is_commented():
+    text = CONFIG.read_text()
+    assert undocumented(text) == []
+    # The check notices when a top-level key loses its comment.
+    for key in ("study", "seed", "gravity_mps2", "sensor", "models", "paper"):
+        bare = f"\n\n{key}:" + text.split(f"\n{key}:", 1)[1]
+        assert undocumented(bare)[0] == 3
+
+
+# --- bad input -----------------------------------------------------------------------------------
+
+SENSITIVITY = {"roll_gon": [0, 50], "pitch_gon": [0, 50], "base_samples": 16, "resamples": 5}
+
+BAD = {
+    "unknown key": ({"seeed": 1}, "seeed: unknown key; did you mean 'seed'? (known: study, seed,"),
+    "unknown key below": (
+        {"noise": {"sensor": {"sigma": 1}}},
+        "noise.sensor.sigma: unknown key",
+        "sigma_mps2",
+    ),
+    "unknown key in a grid": (
+        {"grids": [grid(replicate=3)]},
+        "grids.0.replicate: unknown key; did you mean 'replicates'?",
+    ),
+    "unknown key of a quantity": (
+        {"sensor": {"bias": {"value": [1, 2, 3], "units": "g"}}},
+        "sensor.bias.unit",
+    ),
+    "not a number": ({"seed": "many"}, "seed", "valid integer", "'many'"),
+    "not whole": ({"grids": [grid(replicates=1.5)]}, "grids.0.replicates", "1.5"),
+    "truth value": ({"grids": [grid(replicates=True)]}, "grids.0.replicates: must be a number"),
+    "truth value in a list": (
+        {"sensor": {"bias": {"value": [True, 0, 0], "unit": "g"}}},
+        "sensor.bias.value.0: must be a number, not true",
+    ),
+    "no truth value": ({"paper": "perhaps"}, "paper", "'perhaps'"),
+    "a list for a mapping": ({"noise": [1]}, "noise", "[1]"),
+    "a mapping for a list": ({"grids": grid()}, "grids", "valid list"),
+    "nothing": ({"study": None}, "study", "valid string"),
+    "name": ({"study": "../elsewhere"}, "study", "'../elsewhere'"),
+    "name with a newline": ({"study": "a\n"}, "study"),
+    "unknown model": (
+        {"grids": [grid(models="bias-scales")]},
+        "grids.0.models: unknown model 'bias-scales'; did you mean 'bias-scale'?",
+    ),
+    "unknown scheme": (
+        {"grids": [grid(), grid(schemes=["mclaren-42"])]},
+        "grids.1.schemes: unknown scheme 'mclaren-42'",
+        "mclaren-24",
+    ),
+    "unknown approach": (
+        {"grids": [grid(approaches="robots")]},
+        "grids.0.approaches: unknown approach 'robots'; did you mean 'robot'?",
+    ),
+    "unknown approach of the presets": (
+        {"presets": {"replicates": 5, "approaches": ["ship"]}},
+        "presets.approaches: unknown approach 'ship'",
+        "gravity",
+    ),
+    "unknown effect": (
+        {"sensor": {"bais": {"value": [1, 2, 3], "unit": "g"}}},
+        "sensor.bais: unknown effect 'bais'; did you mean 'bias'?",
+    ),
+    "unknown simulated effect": (
+        {"simulated_effects": ["bias", "magic"]},
+        "simulated_effects: unknown effect 'magic'",
+    ),
+    "simulated effect twice": ({"simulated_effects": ["bias", "bias"]}, "simulated_effects"),
+    "unknown effect of a model": (
+        {"models": {"mine": ["bias", "scales"]}},
+        "models.mine: unknown effect 'scales'; did you mean 'scale'?",
+    ),
+    "effect twice in a model": ({"models": {"mine": ["bias", "bias"]}}, "models.mine", "b_x"),
+    "model of a taken name": ({"models": {"bias-scale": ["bias"]}}, "models.bias-scale"),
+    "model named all": ({"models": {"all": ["bias"]}}, "models.all"),
+    "model with a slash": ({"models": {"a/b": ["bias"]}}, "models.a/b"),
+    "unknown unit": (
+        {"sensor": {"bias": {"value": [1, 2, 3], "unit": "m/s"}}},
+        "sensor.bias: unknown unit",
+        "'m/s'",
+        "did you mean 'm/s^2'?",
+    ),
+    "unit of another quantity": (
+        {"sensor": {"scale": {"value": [1, 2, 3], "unit": "mgon"}}},
+        "sensor.scale",
+        "ppm",
+    ),
+    "too few values": (
+        {"sensor": {"scale": {"value": [1, 2], "unit": "ppm"}}},
+        "sensor.scale: value: 2 numbers",
+        "s_x, s_y, s_z",
+    ),
+    "negative sigma": ({"noise": {"sensor": {"sigma_mps2": -1}}}, "noise.sensor.sigma_mps2", "-1"),
+    "sensor without noise": ({"noise": {"sensor": {"sigma_mps2": 0}}}, "noise.sensor.sigma_mps2"),
+    "negative sigma in a grid": (
+        {"grids": [grid(robot_sigma_mgon=[1, -2])]},
+        "grids.0.robot_sigma_mgon.1",
+    ),
+    "infinite": ({"gravity_mps2": math.inf}, "gravity_mps2", "finite"),
+    "not a number, NaN": ({"noise": {"gravity": {"error_mps2": math.nan}}}, "noise.gravity.error"),
+    "NaN in a list": ({"grids": [grid(gravity_error_mps2=[0, math.nan])]}, "gravity_error_mps2.1"),
+    "no replicates": (
+        {"grids": [grid(replicates=0)]},
+        "grids.0.replicates",
+        "from 1 to 100000000000",
+    ),
+    "no models": ({"grids": [grid(models=[])]}, "grids.0.models", "at least 1 item"),
+    "no schemes": ({"grids": [grid(schemes=[])]}, "grids.0.schemes", "at least 1 item"),
+    "no approaches": ({"grids": [grid(approaches=[])]}, "grids.0.approaches", "at least 1"),
+    "no sigmas": ({"grids": [grid(sensor_sigma_mps2=[])]}, "grids.0.sensor_sigma_mps2"),
+    "no simulated effects": ({"simulated_effects": []}, "simulated_effects", "at least 1 item"),
+    "no effects": ({"models": {"mine": []}}, "models.mine", "at least 1 item"),
+    "no rolls": ({"sensitivity": {**SENSITIVITY, "roll_gon": []}}, "sensitivity.roll_gon"),
+    "no cells": ({"grids": []}, "neither grids nor presets"),
+    "no attitudes": ({"leveling": {"attitudes": 0}}, "leveling.attitudes"),
+    "tilt beyond the horizon": ({"leveling": {"max_tilt_gon": 100}}, "leveling.max_tilt_gon"),
+    "pitch at the pole": ({"sensitivity": {**SENSITIVITY, "pitch_gon": [100]}}, "pitch_gon.0"),
+    "base samples": (
+        {"sensitivity": {**SENSITIVITY, "base_samples": 1000}},
+        "sensitivity.base_samples: must be a power of two",
+    ),
+    "paper without sensitivity": ({"paper": True}, "paper: true needs", "`sensitivity`"),
+    "paper without the robot's cell": (
+        {"paper": True, "sensitivity": SENSITIVITY, "grids": [grid(approaches="gravity")]},
+        "sensitivity: needs",
+        f"{NINE}/mclaren-24/robot",
+        "`grids`",
+    ),
+    "sensitivity of an absent scheme": (
+        {"sensitivity": {**SENSITIVITY, "scheme": "rings-24"}},
+        f"{NINE}/rings-24/gravity",
+    ),
+    "sensitivity of an absent noise": (
+        {"sensitivity": SENSITIVITY, "grids": [grid(sensor_sigma_mps2=[0.001, 0.004])]},
+        f"{NINE}/mclaren-24/gravity",
+    ),
+    "sensitivity of one replicate": (
+        {"sensitivity": SENSITIVITY, "grids": [grid(replicates=1)]},
+        "at least 2 replicates",
+    ),
+    "sensitivity without estimates": (
+        {
+            "sensitivity": {**SENSITIVITY, "scheme": "faces-6"},
+            "grids": [grid(schemes="faces-6")],
+        },
+        f"{NINE}/faces-6/gravity cannot be estimated: rank 6 of 9",
+    ),
+    "paper without redundancy": (
+        {
+            "paper": True,
+            "sensitivity": {**SENSITIVITY, "scheme": "d-optimal-9"},
+            "grids": [grid(schemes="d-optimal-9")],
+        },
+        f"{NINE}/d-optimal-9/gravity has no redundancy",
+    ),
+    "paper with a small model": (
+        {
+            "paper": True,
+            "sensitivity": {**SENSITIVITY, "model": "bias-scale"},
+            "grids": [grid(models="bias-scale")],
+        },
+        "sensitivity.model",
+        "lacks nonorthogonality",
+    ),
+    "paper without the level": (
+        {"paper": True, "sensitivity": {**SENSITIVITY, "pitch_gon": [10, 20]}},
+        "sensitivity.pitch_gon: must contain 0",
+    ),
+    "unknown model of the sensitivity": (
+        {"sensitivity": {**SENSITIVITY, "model": "none"}},
+        "sensitivity.model: unknown model 'none'",
+    ),
+    "long value": ({"study": "x" * 10_000 + "!"}, "study"),
+}
+
+
+def fails(path):
+    """Message of a configuration that is refused, by the function and by the command line."""
+    with pytest.raises(InputError) as caught:
+        read_study(path)
+    run = CliRunner().invoke(main, ["cells", str(path)])
+    assert run.exit_code == 2
+    assert run.stdout == ""
+    assert run.stderr == f"error: {caught.value}\n"
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(("changes", "expected"), [(c, e) for c, *e in BAD.values()], ids=[*BAD])
+def test_bad_content(changes, expected, tmp_path):
+    path = tmp_path / "study.yaml"
+    path.write_text(yaml.safe_dump(content(**changes)))
+    message = fails(path)
+    assert message.startswith(f"{path}: ")
+    for part in expected:
+        assert part in message
+    assert "\n" not in message
+    assert len(message) < len(str(path)) + 700
+
+
+BAD_FILES = {
+    "syntax": ("study: [tiny\nseed: 1\n", "not valid YAML", "line 2"),
+    "tab": ("study:\n\tseed: 1\n", "not valid YAML", "line 2"),
+    "a list": ("- study\n- seed\n", "not a mapping"),
+    "a word": ("study", "not a mapping"),
+    "empty": ("", "not a mapping"),
+    "a key twice": ("study: a\nseed: 1\nstudy: b\n", "'study' stands twice", "line 3"),
+    "a key twice below": (
+        "grids:\n  - models: all\n    models: bias-scale\n",
+        "'models' stands twice",
+        "line 3",
+    ),
+    "impossible date": ("study: 2018-13-45\n", "not valid YAML"),
+    "endless number": (f"seed: {'9' * 5000}\n", "not valid YAML"),
+    "deep": ("study: " + "[" * 5000, "not valid YAML: nested too deeply"),
+    "code": ("study: !!python/object/apply:os.getcwd []\n", "not valid YAML"),
+    "unknown anchor": ("study: *nothing\n", "not valid YAML"),
+}
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"), [(t, e) for t, *e in BAD_FILES.values()], ids=[*BAD_FILES]
+)
+def test_bad_file(text, expected, tmp_path):
+    path = tmp_path / "study.yaml"
+    path.write_text(text)
+    message = fails(path)
+    assert message.startswith(f"{path}: ")
+    for part in expected:
+        assert part in message
+    assert "\n" not in message
+
+
+def test_missing_file_folder_and_binary(tmp_path):
+    missing, binary = tmp_path / "none.yaml", tmp_path / "binary.yaml"
+    binary.write_bytes(bytes(range(256)))
+    assert fails(missing) == f"{missing}: No such file or directory"
+    assert fails(tmp_path) == f"{tmp_path}: Is a directory"
+    assert fails(binary).startswith(f"{binary}: not valid YAML")
+
+
+def test_the_number_of_further_errors_is_told():
+    with pytest.raises(InputError, match=r"\(and 2 more\)"):
+        make_study(seed=-1, gravity_mps2=0, paper="x")
+
+
+def test_overlaid_files_are_all_named(tmp_path):
+    over = tmp_path / "over.yaml"
+    over.write_text("seed: -1\n")
+    with pytest.raises(InputError, match=rf"^{CONFIG}, {over}: seed: "):
+        read_study(CONFIG, over)
+
+
+# --- what is accepted ----------------------------------------------------------------------------
+
+
+def test_one_may_stand_for_a_list():
+    one = make_study(
+        models={"mine": "bias"},
+        simulated_effects="bias",
+        grids=[grid(models="mine", approaches="robot", robot_sigma_mgon=2)],
+    )
+    many = make_study(
+        models={"mine": ["bias"]},
+        simulated_effects=["bias"],
+        grids=[
+            grid(
+                models=["mine"], schemes=["mclaren-24"], approaches=["robot"], robot_sigma_mgon=[2]
+            )
+        ],
+    )
+    assert one == many
+    assert one.fingerprint == many.fingerprint
+
+
+def test_numbers_as_yaml_1_1_reads_them():
+    """YAML 1.1 takes 2e-3 for text, as it has no point."""
+    assert yaml.safe_load("2e-3") == "2e-3"
+    assert make_study(noise={"sensor": {"sigma_mps2": "2e-3"}}).sigma_force == 2e-3
+
+
+def test_noise_per_sample():
+    noise = {"sensor": {"sigma_mps2": 0.02, "per": "sample", "rate_hz": 50, "duration_s": 8}}
+    assert make_study(noise=noise).sigma_force == pytest.approx(0.001, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "unit", "expected"),
+    [
+        ("bias", [1, 2, 3], "mm/s^2", [1e-3, 2e-3, 3e-3]),
+        ("bias", [1, 0, -1], "mg", [9.80665e-3, 0, -9.80665e-3]),
+        ("scale", [1, 2, 3], "%", [0.01, 0.02, 0.03]),
+        ("nonorthogonality", [1, 2, 3], "gon", [GON, 2 * GON, 3 * GON]),
+        ("nonorthogonality", [180, 0, 0], "deg", [math.pi, 0, 0]),
+    ],
+)
+def test_truth_in_si(effect, values, unit, expected):
+    study = make_study(sensor={effect: {"value": values, "unit": unit}})
+    assert [*study.truth([effect]).values()] == pytest.approx(expected, rel=1e-15)
+    assert set(study.truth(["cubic_scale"]).values()) == {0.0}
+
+
+def test_fingerprint_is_of_the_content():
+    assert make_study().fingerprint == make_study(paper=False).fingerprint
+    assert make_study().fingerprint != make_study(seed=2).fingerprint
+
+
+@pytest.mark.parametrize("overlay", [CONFIG, *OVERLAYS], ids=lambda path: path.stem)
+def test_a_checked_configuration_is_one_again(overlay):
+    """With all defaults written out, as jobs get it."""
+    study = read_study(CONFIG, overlay)
+    again = parse_study(study.model_dump(mode="json"))
+    assert again == study
+    assert again.fingerprint == study.fingerprint
+
+
+def test_paper_with_all_it_needs():
+    study = make_study(paper=True, sensitivity=SENSITIVITY)
+    assert study.paper
+    # A preset's cell will do as well.
+    preset = {**SENSITIVITY, "scheme": "faces-edges-18"}
+    assert make_study(paper=True, sensitivity=preset, grids=[], presets={"replicates": 5}).paper
+    # The gravity-based cell is the same whatever the robot's accuracy, the robot's is not.
+    with pytest.raises(InputError, match=f"{NINE}/mclaren-24/robot"):
+        make_study(sensitivity=SENSITIVITY, grids=[grid(robot_sigma_mgon=[1])])
+
+
+# --- anything at all -----------------------------------------------------------------------------
+
+KEYS = sorted(
+    {name for block in blocks_of(config_schema()) for name in block["properties"]}
+    | {"bias", "scale", "mine"}
+)
+SCALARS = (
+    st.none()
+    | st.booleans()
+    | st.integers(-3, 2**70)
+    | st.floats()
+    | st.text(max_size=5)
+    | st.sampled_from(["all", "model", "robot", NINE, "fibonacci-0", "random-3", "", "rings-24"])
+)
+JUNK = st.recursive(
+    SCALARS,
+    lambda inner: (
+        st.lists(inner, max_size=3)
+        | st.dictionaries(st.sampled_from(KEYS) | st.text(max_size=3), inner, max_size=4)
+    ),
+    max_leaves=12,
+)
+
+
+def accept_or_refuse(given_content):
+    """Either a study with cells or a message of one line, which is returned."""
+    message = None
+    try:
+        study = parse_study(given_content)
+    except InputError as error:
+        message = str(error)
+    if message is None:
+        assert study_cells(study)
+        return ""
+    assert message.startswith("config: ")
+    assert len(message.splitlines()) == 1
+    return message
+
+
+@settings(max_examples=300)
+@given(junk=st.dictionaries(st.sampled_from(KEYS) | st.text(max_size=3), JUNK, max_size=5))
+def test_junk_is_refused_in_one_line(junk):
+    accept_or_refuse(junk)
+    accept_or_refuse(content(**junk))
+
+
+@settings(max_examples=200)
+@given(data=st.data())
+def test_one_junk_value_is_refused_in_one_line(data):
+    """Any one value of a whole configuration replaced by something else."""
+    base = content(
+        noise={"sensor": {"sigma_mps2": 0.002}, "robot": {}, "gravity": {}},
+        presets={"replicates": 5},
+        leveling={"attitudes": 5},
+        sensitivity=SENSITIVITY,
+        models={"mine": ["bias"]},
+    )
+    place, parent = base, None
+    while isinstance(place, dict | list) and place and (parent is None or data.draw(st.booleans())):
+        parent = place
+        key = data.draw(
+            st.sampled_from(sorted(place) if isinstance(place, dict) else range(len(place)))
+        )
+        place = parent[key]
+    changed = json.loads(json.dumps(base))
+    _replace(changed, base, parent, key, data.draw(JUNK))
+    accept_or_refuse(changed)
+
+
+def _replace(copy, original, parent, key, value):
+    if original is parent:
+        copy[key] = value
+        return
+    for k in original if isinstance(original, dict) else range(len(original)):
+        if isinstance(original[k], dict | list):
+            _replace(copy[k], original[k], parent, key, value)
+
+
+POSITIVE = st.floats(1e-6, 1.0)
+GRIDS = st.fixed_dictionaries(
+    {
+        "models": st.just("all") | st.lists(st.sampled_from([*MODELS, "mine"]), min_size=1),
+        "schemes": st.just("all")
+        | st.lists(st.sampled_from([*scheme_names(), "random-7-3"]), min_size=1, max_size=5),
+        "replicates": st.integers(1, 5000),
+    },
+    optional={
+        "approaches": st.sampled_from(["all", "robot", ["gravity"], ["robot", "gravity"]]),
+        "sensor_sigma_mps2": st.lists(POSITIVE | st.just(0.002), min_size=1, max_size=3),
+        "robot_sigma_mgon": st.lists(st.just(0) | POSITIVE, min_size=1, max_size=3),
+        "gravity_sigma_mps2": st.lists(st.just(0) | POSITIVE, min_size=1, max_size=2),
+        "gravity_error_mps2": st.lists(st.floats(-1, 1), min_size=1, max_size=2),
+    },
+)
+VALID = st.fixed_dictionaries(
+    {
+        "grids": st.lists(GRIDS, min_size=1, max_size=3),
+        "models": st.just({"mine": ["bias", "cubic_scale"]}),
+        # Some effects need them.
+        "holds": st.just(
+            {"interval_s": 30, "temperature_degC": [10, 30], "vibration_mps2": [0, 1]}
+        ),
+    },
+    optional={
+        "presets": st.none() | st.fixed_dictionaries({"replicates": st.integers(1, 5000)}),
+        "simulated_effects": st.just("model")
+        | st.lists(st.sampled_from(effect_names()), min_size=1, unique=True),
+    },
+)
+
+
+@settings(max_examples=25)
+@given(keys=VALID, size=st.integers(1, 20_000))
+def test_cells_of_any_valid_study(keys, size):
+    study = make_study(**keys)
+    assert parse_study(study.model_dump()) == study
+    assert parse_study(json.loads(json.dumps(study.model_dump(mode="json")))) == study
+
+    cells = study_cells(study)
+    assert cells
+    assert len({cell.name for cell in cells}) == len(cells)
+    for cell in cells:
+        assert Cell.from_dict(cell.to_dict()) == cell
+        assert Cell.from_dict(json.loads(json.dumps(cell.to_dict()))) == cell
+        assert set(cell.truth) >= set(cell.simulated_model.parameter_names)
+    # One cell, one set-up.
+    setups = {(c.effects, c.scheme, c.approach, c.noise, c.model) for c in cells}
+    assert len(setups) == len(cells)
+
+    divided = batches(cells, size)
+    assert [cell for batch in divided for cell in batch.cells] == cells
+    for batch in divided:
+        assert len(batch.cells) == 1 or sum(cell.replicates for cell in batch.cells) <= size
+        shares = [share for job in batch.jobs for share in job]
+        assert [share.cell for share in shares if share.first == 0] == [*batch.cells]
+        assert sum(share.count for share in shares) == sum(cell.n_chunks for cell in batch.cells)
+
+
+def test_aliases_cannot_make_a_file_huge(tmp_path):
+    """Two hundred bytes that mean 10^11 values, in a known key; and a value that holds itself."""
+
+    def tens(start, form):
+        """Levels of which each means ten of the one before."""
+        levels = range(1, 12)
+        return "\n".join([start, *(form.format(i, ", ".join([f"*x{i - 1}"] * 10)) for i in levels)])
+
+    for name, text in {
+        "many.yaml": tens("x0: &x0 [a, b]", "x{0}: &x{0} [{1}]") + "\nmodels: *x11",
+        "merged.yaml": tens("x0: &x0 {a: 1}", "x{0}: &x{0} {{<<: [{1}]}}"),
+        "itself.yaml": "models: &a [*a]",
+    }.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+        with pytest.raises(InputError, match=r"more than 100000 values|a value holds itself"):
+            read_study(tmp_path / name)
+    (tmp_path / "few.yaml").write_text("a: &a {b: 1}\nc: *a\nd: {<<: *a}\n", encoding="utf-8")
+    assert read_layer(tmp_path / "few.yaml") == {"a": {"b": 1}, "c": {"b": 1}, "d": {"b": 1}}
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({"study": "x" * 101}, "study: string should have at most 100 characters"),
+        ({"gravity_mps2": 1e10}, "gravity_mps2: must be from 0.001 to 1000 m/s², not 1e+10"),
+        ({"seed": 10**400}, "seed: must be from 0 to 18446744073709551615, not a huge number"),
+        (
+            {"grids": [grid(replicates=10**400)]},
+            "grids.0.replicates: must be from 1 to 100000000000",
+        ),
+        ({"leveling": {"attitudes": 10**9}}, "leveling.attitudes: must be from 1 to 100000, not"),
+        (
+            {"sensitivity": {"roll_gon": 0, "pitch_gon": 0, "base_samples": 2**40}},
+            "sensitivity.base_samples: must be from 2 to 1048576",
+        ),
+        (
+            {"sensitivity": {"roll_gon": 9e11, "pitch_gon": 0}},
+            "sensitivity.roll_gon.0: must be from -400 to 400 gon, not 9e+11",
+        ),
+        ({"noise": {"sensor": {"sigma_mps2": 1e-12}}}, "noise.sensor.sigma_mps2: must be from"),
+        ({"noise": {"robot": {"sigma_mgon": 1e10}}}, "noise.robot.sigma_mgon: must be 0, or from"),
+        ({"models": {"m": ["a" * 10**6]}}, "models.m: unknown effect 'aaa"),
+    ],
+)
+def test_no_number_is_beyond_all_bounds(keys, message):
+    with pytest.raises(InputError) as error:
+        parse_study({**content(), **keys})
+    assert message in str(error.value)
+    assert len(str(error.value)) < 1000

@@ -1,0 +1,399 @@
+"""Figures draw from the tables of a study, small or incomplete, and show the right numbers."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from places import ROOT
+from study_helpers import run_study
+
+from accelstudy.basics.errors import InputError
+from accelstudy.drawing import style
+from accelstudy.effects import effect_names
+from accelstudy.files.tables import read_table
+from accelstudy.sensors.models import MODELS
+from accelstudy.study.config import StudyConfig, parse_study
+from accelstudy.study.figures import (
+    draw,
+    figure_names,
+    figure_tables,
+    get_figure,
+    render,
+    total_effects,
+)
+from accelstudy.study.figures.entries import TABLES
+from accelstudy.study.figures.factors import FACTORS
+from accelstudy.study.results.figure_files import draw_figures
+from accelstudy.study.results.sensitivity import analyse_sensitivity, analyse_shapley
+
+CAPTIONS = ROOT / "workflow" / "report" / "figures"
+PROVENANCE = {"config_hash": "test", "seed": 1}
+NINE = "bias-scale-nonorthogonality"
+SENSOR = {
+    "bias": {"value": [0.05, 0.01, 0.03], "unit": "m/s^2"},
+    "scale": {"value": [200, 200, 200], "unit": "ppm"},
+    "nonorthogonality": {"value": [12, 12, 44], "unit": "mgon"},
+}
+PAPER = {
+    "study": "tiny",
+    "seed": 1,
+    "sensor": SENSOR,
+    "grids": [
+        {"models": NINE, "schemes": ["faces-6", "mclaren-24"], "replicates": 30},
+        {"models": f"{NINE}-crossaxis", "schemes": "mclaren-24", "replicates": 10},
+    ],
+    "presets": {"replicates": 5},
+    "leveling": {"attitudes": 10},
+    "sensitivity": {
+        "base_samples": 32,
+        "resamples": 10,
+        "roll_gon": [-50, 0, 50],
+        "pitch_gon": [-25, 0, 25],
+    },
+    "paper": True,
+}
+
+
+def run(keys: dict, folder: Path) -> dict[str, pd.DataFrame]:
+    """All tables of a study."""
+    study, tables = parse_study(keys), run_study(folder, **keys)
+    if study.sensitivity:
+        summary, correlations, *written = (
+            folder / f"{name}.parquet"
+            for name in ("summary", "correlations", "sensitivity", "shapley")
+        )
+        analyse_sensitivity(study, summary, written[0], PROVENANCE)
+        analyse_shapley(study, summary, correlations, written[1], PROVENANCE)
+        tables |= {path.stem: read_table(path) for path in written}
+    return tables
+
+
+@pytest.fixture(autouse=True)
+def _few_pixels(monkeypatch):
+    monkeypatch.setattr("accelstudy.drawing.style.DPI", 40)
+
+
+@pytest.fixture(scope="module")
+def paper() -> StudyConfig:
+    return parse_study(PAPER)
+
+
+@pytest.fixture(scope="module")
+def tables(tmp_path_factory) -> dict[str, pd.DataFrame]:
+    return run(PAPER, tmp_path_factory.mktemp("paper"))
+
+
+def paint(drawn: Figure) -> None:
+    """Draw everything, without the time that a good layout takes."""
+    drawn.set_layout_engine("none")
+    drawn.draw_without_rendering()
+
+
+def texts(drawn: Figure) -> list[str]:
+    """All axis labels."""
+    return [
+        text
+        for ax in drawn.findobj(lambda artist: hasattr(artist, "get_xlabel"))
+        for text in (ax.get_xlabel(), ax.get_ylabel())
+        if text
+    ]
+
+
+ALL = figure_names(parse_study(PAPER))
+OTHERS = [*(f"sweep-{factor.name}" for factor in FACTORS), "rare-events"]
+
+
+def test_a_paper_study_has_the_figures_of_the_paper_and_of_every_study():
+    expected = [f"figure-{n}" for n in range(2, 9)] + ["figure-5-robot", "figure-6-robot"]
+    expected += ["closed-forms", "leveling-overview", "shapley", "table-1"]
+    assert sorted(ALL) == sorted(expected)
+
+
+@pytest.mark.parametrize("name", [*ALL, *OTHERS])
+def test_every_figure_has_a_caption_and_a_title(name):
+    entry = get_figure(name)
+    caption = (CAPTIONS / f"{entry.caption}.rst").read_text(encoding="utf-8")
+    assert len(caption.split()) > 20
+    assert caption.endswith(f'\n{{{{ snakemake.params.notes["{entry.caption}"] }}}}\n')
+    assert entry.title
+    assert entry.category
+    assert set(entry.tables) <= set(TABLES)
+    assert callable(entry.draw)
+
+
+def test_every_caption_has_a_figure():
+    captions = {get_figure(name).caption for name in (*ALL, *OTHERS)}
+    assert {path.stem for path in CAPTIONS.glob("*.rst")} == captions
+
+
+# One of each kind: a map, lines, a matrix, points.
+@pytest.mark.parametrize("name", ["figure-4", "figure-6", "leveling-overview", "closed-forms"])
+def test_svg_and_png_are_the_same_bytes_each_time(name, tables, paper, tmp_path):
+    for folder in ("first", "second"):
+        render(name, tables, paper, tmp_path / folder / "a.svg", tmp_path / folder / "a.png")
+    for kind in ("svg", "png"):
+        first, second = (tmp_path / f / f"a.{kind}" for f in ("first", "second"))
+        assert first.read_bytes() == second.read_bytes()
+    assert not list(tmp_path.rglob("*.part"))
+
+
+@pytest.mark.parametrize("name", sorted(set(ALL) - {"figure-8", "closed-forms"}))
+def test_labels_have_units(name, tables, paper):
+    quantities = texts(draw(name, tables, paper))
+    assert any(
+        unit in text for text in quantities for unit in ("mgon", "gon", "ppm", "mm/s²", "share")
+    )
+    assert not any("m/s^2" in text for text in quantities)
+
+
+def test_figure_2_shows_the_closed_form(paper):
+    roll, pitch = (ax.collections[0] for ax in draw("figure-2", {}, paper).axes[:2])
+    mesh = roll.get_coordinates()
+    level = np.abs(mesh[..., 1]) < 1e-9
+    tilted = np.abs(np.abs(mesh[..., 1]) - 50) < 1e-9
+    sigma = np.reshape(roll.get_array(), mesh.shape[:2])
+    assert level.any()
+    assert tilted.any()
+    np.testing.assert_allclose(sigma[level], 12.9836, atol=1e-3)
+    np.testing.assert_allclose(sigma[tilted], 18.3616, atol=1e-3)
+    np.testing.assert_allclose(pitch.get_array(), 12.9836, atol=1e-3)
+
+
+def test_figure_3_marks_the_closed_form(paper):
+    lines = draw("figure-3", {}, paper).axes[0].get_lines()
+    marks = {round(float(line.get_ydata()[0]), 2) for line in lines if len(line.get_xdata()) == 1}
+    assert marks == {12.98, 18.36}
+
+
+def test_figure_4_shows_sobol_over_linear_theory_and_marks_what_does_not_vary(tables, paper):
+    table = tables["sensitivity"].copy()
+    gone = (table["roll_gon"] == 0) & (table["output"] == "roll")
+    table.loc[gone, ["total_effect", "ci95"]] = np.nan
+    table.loc[gone, "defined"] = False
+    drawn = draw("figure-4", {"sensitivity": table}, paper)
+    ax = drawn.axes[1]  # f_y on roll: cos² of roll
+    theory, half, circles = ax.collections
+    assert set(circles.get_offsets()[:, 0]) == {-50, 50}
+    np.testing.assert_allclose(circles.get_array(), 0.5, atol=0.2)  # of 32 samples
+    assert set(ax.get_lines()[-1].get_xdata()) == {0}
+    np.testing.assert_allclose(np.abs(half.get_paths()[0].vertices[:, 0]), 50, atol=0.1)
+    assert np.max(theory.get_array()) > 0.999
+    draw("figure-5", {"sensitivity": table}, paper)
+
+
+def test_total_effects_are_labelled_and_their_lines_go_through_zero(tables, paper):
+    drawn = draw("figure-5", tables, paper)
+    ax = drawn.axes[0]
+    labels = {text.get_text(): text.get_color() for text in ax.texts}
+    assert {"$f_y$", "$f_z$", r"$\alpha_{zx}$", "$b_y$"} <= labels.keys()
+    assert labels["$b_y$"] == style.group_colour("bias")
+    rows = tables["sensitivity"].query("analysis == 'gravity' and output == 'roll'")
+    small = rows.groupby("input")["total_effect"].max().loc[lambda share: share < 0.005].index
+    legend = drawn.legends[0].get_texts()[-1].get_text()
+    assert legend.startswith("below 1 % everywhere")
+    assert all(style.symbol(name) in legend for name in small)
+    assert not {style.symbol(name) for name in small} & labels.keys()
+    f_z = [line for line in ax.get_lines() if line.get_marker() in ("", "None", None)]
+    assert all(np.isfinite(line.get_ydata()).all() for line in f_z)
+
+
+def test_shapley_effects_name_what_overtakes(tables, paper):
+    table = tables["shapley"].assign(shapley_effect=tables["shapley"]["total_effect"])
+    drawn = draw("shapley", {"shapley": table}, paper)
+    assert len(drawn.axes) == 2  # one row, as no order changes
+
+    at = table["output"].eq("roll") & table["roll_gon"].eq(50) & table["pitch_gon"].eq(25)
+    table.loc[at & table["input"].eq("s_y"), "shapley_effect"] = 0.9
+    drawn = draw("shapley", {"shapley": table}, paper)
+    roll, pitch = drawn.axes
+    text, _ = (each for each in roll.texts if each.get_position()[1] > 1.25)  # before the label
+    assert (text.get_text(), text.get_position()[0]) == ("$s_y$", 50)
+    assert text.get_color() == style.group_colour("scale")
+    assert not [each for each in pitch.texts if each.get_position()[1] > 1.25]
+
+
+def test_numbers_stand_in_table_1(tables, paper):
+    drawn = draw("table-1", tables, paper)
+    written = {text.get_text() for ax in drawn.axes for text in ax.texts}
+    tilt = tables["leveling"].set_index("cell")["roll_rms_mgon"][f"{NINE}/fibonacci-36/robot"]
+    assert f"{tilt:.1f}" in written
+
+
+def test_the_tilt_overview_shows_rms_quantile_and_the_noise_of_a_reading(tables, paper):
+    drawn = draw("leveling-overview", tables, paper)
+    row = tables["leveling"].set_index("cell").loc[f"{NINE}/mclaren-24/gravity"]
+    written = {text.get_text() for text in drawn.axes[0].texts}
+    assert {f"{row['roll_rms_mgon']:.1f}", f"{row['roll_rms_q95_mgon']:.1f}"} <= written
+    legend = " ".join(text.get_text() for text in drawn.legends[0].get_texts())
+    assert "95 % of the calibrations" in legend
+    assert "13.0 mgon" in legend
+
+
+def test_figure_7_draws_the_mean_sd_and_the_first_simulation(tables, paper):
+    rows = tables["estimates"].astype({"cell": str})
+    rows = rows[(rows["parameter"] == "b_x") & (rows["cell"] == f"{NINE}/mclaren-24/gravity")]
+    rows = rows.assign(error=rows["estimate"] - rows["truth"])
+    sigma = np.sqrt(rows["omega"] / rows["redundancy"]) * rows["sigma_priori"]
+    axes = draw("figure-7", tables, paper).axes
+    bars = [patch.get_height() for patch in axes[1].patches]
+    assert 1e3 * sigma.mean() == pytest.approx(bars[0])
+    errors = [y for line in axes[0].get_lines() for y in np.atleast_1d(line.get_ydata())]
+    assert np.isclose(errors, 1e3 * rows.loc[rows["replicate"] == 0, "error"].iloc[0]).any()
+    ends = axes[0].collections[0].get_segments()[0][:, 1]
+    np.testing.assert_allclose(ends, 1e3 * np.quantile(rows["error"], [0.025, 0.975]))
+
+
+def test_figure_8_has_no_diagonal(tables, paper):
+    for ax in draw("figure-8", tables, paper).axes[:2]:
+        matrix = np.asarray(ax.images[0].get_array())
+        np.testing.assert_allclose(np.diag(matrix), 0, atol=1e-12)
+        assert matrix.shape == (9, 9)
+
+
+def test_what_cannot_be_estimated_is_marked(tables, paper):
+    overview = draw("leveling-overview", tables, paper)
+    assert sum(len(ax.patches) for ax in overview.axes[:4]) > 0
+    crosses = [
+        line
+        for ax in draw("table-1", tables, paper).axes
+        for line in ax.get_lines()
+        if line.get_marker() == "x"
+    ]
+    assert len(crosses) == 3 * 5  # three rows with the cross-axis angles, by gravity
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_study_without_estimable_cells_draws(name, tables, paper):
+    cells, summary = tables["cells"].copy(), tables["summary"].copy()
+    cells["estimable"] = summary["estimable"] = False
+    numbers = summary.columns[summary.columns.str.startswith(("bias", "sd_", "coverage"))]
+    summary[numbers] = np.nan
+    summary["n_converged"] = 0
+    nothing = {
+        "cells": cells,
+        "summary": summary,
+        "leveling": pd.DataFrame(),
+        "correlations": pd.DataFrame(),
+        "quantiles": tables["quantiles"].iloc[:0],
+        "sensitivity": tables["sensitivity"].iloc[:0],
+        "shapley": tables["shapley"].iloc[:0],
+    }
+    needed = {key: nothing[key] for key in figure_tables(name)}
+    paint(draw(name, needed, paper))
+
+
+def test_effects_of_the_models_causes_and_approaches_have_colours_of_their_own():
+    modelled = {effect for effects in MODELS.values() for effect in effects}
+    groups = [style.group_colour(name) for name in ("force", *modelled)]
+    approaches = [style.approach_colour(name) for name in ("gravity", "robot")]
+    causes = [*style.CAUSES.values()]
+    assert len({*groups, *approaches, *causes}) == len(groups) + len(approaches) + len(causes)
+    for name in set(effect_names()) - modelled:
+        assert style.group_colour(name) == style.CAUSES[style.cause(name)]
+    assert {style.cause(name) for name in set(effect_names()) - modelled} == set(style.CAUSES)
+
+
+# Machado, Oliveira & Fernandes (2009), linear RGB, severity 1.
+EYES = {
+    "normal": np.eye(3),
+    "protanopia": [
+        [0.152286, 1.052583, -0.204868],
+        [0.114503, 0.786281, 0.099216],
+        [-0.003882, -0.048116, 1.051998],
+    ],
+    "deuteranopia": [
+        [0.367322, 0.860646, -0.227968],
+        [0.280085, 0.672501, 0.047413],
+        [-0.011820, 0.042940, 0.968881],
+    ],
+}
+
+
+def seen(colour, eye):
+    """Colour as CIE L*a*b* to an eye (D65)."""
+    rgb = np.array(to_rgb(colour))
+    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    to_xyz = [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
+    x, y, z = np.cbrt(to_xyz @ np.clip(np.array(EYES[eye]) @ linear, 1e-3, 1) / [0.95, 1, 1.09])
+    return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
+
+
+@pytest.mark.parametrize("eye", EYES)
+def test_colours_of_causes_keep_apart(eye):
+    """A difference of 2 can be seen side by side; far apart in a figure it takes some more."""
+    others = [colour for _, colour in style.GROUPS.values()]
+    others += [*style.APPROACH_COLOURS.values(), *style.CAUSES.values()]
+    for colour in style.CAUSES.values():
+        distances = [np.linalg.norm(seen(colour, eye) - seen(o, eye)) for o in others]
+        assert sorted(distances)[1] > 15, colour
+
+
+def test_parameters_of_one_colour_differ_in_line_and_marker():
+    names = ["b_x", "b_y", "b_z", "k_xy", "k_xz", "k_yx", "k_yz", "k_zx", "k_zy"]
+    names += ["k_abs_x", "k_abs_y", "k_abs_z"]
+    styles = [tuple(s.values()) for s in total_effects.styles_of(names).values()]
+    assert len(set(styles)) == len(names)
+
+
+def test_colours_are_the_same_in_every_figure(tables, paper):
+    robot = style.approach_colour("robot")
+    for name in ("figure-7", "table-1", "closed-forms"):
+        lines = draw(name, tables, paper).findobj(lambda artist: hasattr(artist, "get_marker"))
+        assert robot in {line.get_color() for line in lines}
+    legend = draw("figure-5", tables, paper).legends[0]
+    colours = {
+        text.get_text().split()[0]: line.get_color()
+        for text, line in zip(legend.get_texts(), legend.get_lines(), strict=True)
+    }
+    for group in ("force", "bias", "scale"):
+        assert colours[group] == style.group_colour(group)
+
+
+@pytest.mark.parametrize(
+    ("model", "title"),
+    [
+        ("bias-scale-nonorthogonality", "9: + non-orthogonality"),
+        ("bias-scale-nonorthogonality-thermal_bias", "9 + thermal bias"),
+        ("bias-scale-base_tilt-hysteresis", "6 + base tilt + hysteresis"),
+        ("mine", "mine"),
+    ],
+)
+def test_titles_of_models_are_short(model, title):
+    assert style.model_title(model) == title
+
+
+def test_an_unknown_figure_is_an_input_error_that_names_a_near_one():
+    with pytest.raises(InputError, match="figure-2"):
+        get_figure("figure-22")
+
+
+def test_a_figure_that_cannot_be_drawn_is_named(tables, paper, tmp_path):
+    tables["summary"].to_parquet(tmp_path / "summary.parquet")
+    tables["quantiles"].iloc[:, :3].to_parquet(tmp_path / "quantiles.parquet")
+    paths = {name: tmp_path / f"{name}.parquet" for name in ("summary", "quantiles")}
+    with pytest.raises(KeyError) as error:
+        draw_figures(paper, ["closed-forms", "figure-7"], paths, tmp_path)
+    (note,) = error.value.__notes__
+    assert note.startswith("The figure 'figure-7' could not be drawn")
+    assert "closed-forms and figure-7" in note
+    assert {path.stem for path in tmp_path.glob("*.svg")} == {"closed-forms"}
+
+
+IMPORTED = """\
+import sys
+import accelstudy.study.figures, accelstudy.study.cells.effort
+import accelstudy.jobs.earlier, accelstudy.jobs.job
+print([name for name in ("matplotlib", "pandas", "scipy.stats") if name in sys.modules])
+"""
+
+
+def test_the_start_of_the_workflow_loads_nothing_that_draws():
+    ran = subprocess.run(
+        [sys.executable, "-c", IMPORTED], capture_output=True, text=True, check=True
+    )
+    assert ran.stdout.strip() == "[]"

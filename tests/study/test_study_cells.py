@@ -1,0 +1,223 @@
+"""Cells of a study: what they are, and that nothing outside a cell changes its numbers."""
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from study_helpers import NINE, PAPER_TRUTH, grid, make_cells, make_study, run_study, simulated
+
+from accelstudy.basics.units import MGON
+from accelstudy.sensors.models import MODELS, PRESETS
+from accelstudy.simulation.sessions import Noise
+from accelstudy.study.cells.batches import batches
+from accelstudy.study.cells.cell import BLOCK, study_cells
+from accelstudy.study.monte_carlo.simulate import blocks
+
+GRAVITY, ROBOT = f"{NINE}/mclaren-24/gravity", f"{NINE}/mclaren-24/robot"
+
+
+def estimates(cell, seed=1):
+    return simulated(cell, seed).estimates
+
+
+# --- what a cell is ------------------------------------------------------------------------------
+
+
+def test_a_cell_of_the_paper():
+    cells = make_cells(grid(replicates=7))
+    assert [*cells] == [GRAVITY, ROBOT]
+    cell = cells[ROBOT]
+    assert cell.noise == Noise(0.002, 3.2 * MGON, 0.0, 0.0)
+    assert cell.effects == cell.simulated_effects == ("bias", "scale", "nonorthogonality")
+    assert cell.simulated_model is cell.estimated_model
+    assert (cell.replicates, cell.gravity) == (7, 9.80665)
+    assert cell.truth == pytest.approx(PAPER_TRUTH, rel=1e-15)
+    assert cell.positions.n_positions == 24
+    assert cell.conditions.uses_angles
+
+
+def test_all_is_every_combination():
+    cells = make_cells(
+        grid(models="all", schemes=["faces-6", "rings-24"], approaches="all"),
+        models={"mine": ["bias", "cubic_scale"]},
+    )
+    expected = itertools.product([*MODELS, "mine"], ["faces-6", "rings-24"], ["gravity", "robot"])
+    assert [*cells] == ["/".join(names) for names in expected]
+
+
+def test_noise_of_a_grid_is_in_the_name_and_in_the_cell():
+    cells = make_cells(
+        grid(
+            approaches="robot",
+            sensor_sigma_mps2=[0.002, 0.01],
+            robot_sigma_mgon=[0, 3.2],
+            gravity_sigma_mps2=1e-4,
+            gravity_error_mps2=-3e-4,
+        )
+    )
+    rest = "gravity_sigma_mps2=0.0001/gravity_error_mps2=-0.0003"
+    assert {name.removeprefix(f"{ROBOT}/"): cell.noise for name, cell in cells.items()} == {
+        f"robot_sigma_mgon=0/{rest}": Noise(0.002, 0.0, 1e-4, -3e-4),
+        rest: Noise(0.002, 3.2 * MGON, 1e-4, -3e-4),
+        f"sensor_sigma_mps2=0.01/robot_sigma_mgon=0/{rest}": Noise(0.01, 0.0, 1e-4, -3e-4),
+        f"sensor_sigma_mps2=0.01/{rest}": Noise(0.01, 3.2 * MGON, 1e-4, -3e-4),
+    }
+
+
+def test_close_numbers_are_different_cells():
+    cells = make_cells(grid(approaches="gravity", sensor_sigma_mps2=[0.001, 0.0010000001]))
+    assert [cell.noise.sigma_force for cell in cells.values()] == [0.001, 0.0010000001]
+
+
+def test_noise_per_sample():
+    sensor = {"per": "sample", "rate_hz": 100, "duration_s": 4}
+    cells = make_cells(grid(sensor_sigma_mps2=[0.002, 0.04]), noise={"sensor": sensor})
+    assert cells[GRAVITY].noise.sigma_force == pytest.approx(0.0001, rel=1e-15)
+    other = cells[f"{GRAVITY}/sensor_sigma_mps2=0.04"]
+    assert other.noise.sigma_force == pytest.approx(0.002, rel=1e-15)
+
+
+def test_the_robot_does_not_concern_the_gravity_approach():
+    usual = make_cells(grid())[GRAVITY]
+    swept = make_cells(grid(robot_sigma_mgon=[0, 1, 50]))
+    other = make_cells(grid(), noise={"robot": {"sigma_mgon": 9}})[GRAVITY]
+    assert [name for name in swept if "gravity" in name.split("/")] == [GRAVITY]
+    assert usual == swept[GRAVITY] == other
+    assert usual.noise.sigma_angle == 0
+
+
+def test_model_of_the_user():
+    cells = make_cells(grid(models="mine"), models={"mine": ["scale", "bias"]})
+    cell = cells["mine/mclaren-24/robot"]
+    assert cell.estimated_model.parameter_names == ("s_x", "s_y", "s_z", "b_x", "b_y", "b_z")
+    result = simulated(cell)
+    truth = [cell.truth[name] for name in cell.estimated_model.parameter_names]
+    errors = (result.estimates.mean(axis=0) - truth) / result.sigma_priori[0]
+    assert np.abs(errors).max() < 4.5 / np.sqrt(cell.replicates)
+
+
+def test_effects_of_the_simulated_sensor():
+    cells = make_cells(
+        grid(models=["bias-scale", NINE]), simulated_effects=["bias", "nonorthogonality"]
+    )
+    for cell in cells.values():
+        assert cell.simulated_effects == ("bias", "nonorthogonality")
+        assert cell.simulated_model.parameter_names[3:] == ("alpha_yz", "alpha_zy", "alpha_zx")
+        assert {**PAPER_TRUTH, **cell.truth} == pytest.approx(PAPER_TRUTH)
+    assert cells[GRAVITY].estimated_model.n_parameters == 9
+    assert cells["bias-scale/mclaren-24/gravity"].estimated_model.n_parameters == 6
+
+
+def test_a_repeated_cell_runs_once_with_the_larger_number():
+    cells = make_cells(grid(replicates=20), grid(replicates=30), grid(replicates=10))
+    assert [*cells] == [GRAVITY, ROBOT]
+    assert {cell.replicates for cell in cells.values()} == {30}
+
+
+def test_presets_are_the_rows_of_table_1():
+    study = make_study(grids=[], presets={"replicates": 5, "approaches": "robot"})
+    names = [cell.name for cell in study_cells(study)]
+    assert sorted(names) == sorted({f"{p.model}/{p.scheme}/robot" for p in PRESETS})
+    for row in ("bias-scale/faces-6/robot", f"{NINE}-quadratic/mclaren-24/robot"):
+        assert row in names
+
+
+def test_batches():
+    cells = [*make_cells(grid(schemes="all", replicates=40)).values()]
+    cells[3] = replace(cells[3], replicates=1000)
+    shared = batches(cells[:8], 100)
+    sizes = [[cell.replicates for cell in batch.cells] for batch in shared]
+    assert sizes == [[40, 40], [40], [1000], [40, 40], [40, 40]]
+    assert all(len(batch.jobs) == 1 for batch in shared)  # none has more than a chunk
+    assert batches([], 100) == []
+
+
+# --- seeds ---------------------------------------------------------------------------------------
+
+
+def test_every_cell_and_block_has_its_own_seed():
+    more = grid(sensor_sigma_mps2=[1e-3, 3e-3], robot_sigma_mgon=[0, 3.2])
+    study = make_study(grids=[grid("all", "all", 1), more])
+    cells = study_cells(study)
+    words = {tuple(cell.seed(1, block).generate_state(4)) for cell in cells for block in range(3)}
+    assert len(words) == 3 * len(cells)
+    assert not words & {tuple(cell.seed(2, 0).generate_state(4)) for cell in cells}
+
+
+def test_more_replicates_extend_the_fewer():
+    cell = make_cells(grid(replicates=BLOCK + 30))[ROBOT]
+    many = estimates(cell)
+    assert len(many) == BLOCK + 30
+    for fewer in (1, 20, BLOCK, BLOCK + 1):
+        np.testing.assert_array_equal(estimates(replace(cell, replicates=fewer)), many[:fewer])
+
+
+def test_a_block_does_not_depend_on_those_before_it():
+    cell = make_cells(grid(replicates=BLOCK + 30))[ROBOT]
+    (last,) = blocks(cell, 1, 1, 5)
+    np.testing.assert_array_equal(last.estimates, estimates(cell)[BLOCK:])
+    assert last.correlation_sum.diagonal() == pytest.approx(np.full(9, 30), rel=1e-12)
+
+
+def test_no_two_replicates_are_alike():
+    many = estimates(make_cells(grid(replicates=BLOCK + 30))[GRAVITY])
+    assert len(np.unique(many[:, 0])) == BLOCK + 30
+
+
+def test_another_seed_changes_everything():
+    cell = make_cells(grid())[ROBOT]
+    assert not np.any(estimates(cell, 1) == estimates(cell, 2))
+    np.testing.assert_array_equal(estimates(cell, 1), estimates(cell, 1))
+
+
+def test_cells_are_independent():
+    """Errors of different cells are uncorrelated, those of one cell with itself are the same."""
+    cells = make_cells(grid(schemes=["mclaren-24", "rings-24"], replicates=2000)).values()
+    errors = np.stack([estimates(cell)[:, 0] for cell in cells])
+    correlation = np.corrcoef(errors)[np.triu_indices(4, 1)]
+    assert np.abs(correlation).max() < 4.5 / np.sqrt(2000)
+
+
+BASE = {"grids": [grid(["bias-scale", NINE], ["mclaren-24", "faces-6"], 60)]}
+BIGGER = {
+    "grids": [
+        grid(NINE, ["rings-24", "faces-6", "mclaren-24"], 60, approaches=["robot", "gravity"]),
+        grid("all", "mclaren-24", 90, sensor_sigma_mps2=[0.001, 0.002]),
+        grid("bias-scale", ["faces-6"], 700),
+    ],
+    "presets": {"replicates": 10},
+    "study": "other",
+}
+
+
+@pytest.fixture(scope="module")
+def base(tmp_path_factory):
+    return run_study(tmp_path_factory.mktemp("base"), **BASE)
+
+
+def test_other_cells_and_another_order_change_no_number(base, tmp_path):
+    """Bitwise: more cells, other grids, another order, more replicates, batches of other sizes."""
+    other = run_study(tmp_path, batch_size=200, **BIGGER)
+    keys = ["cell", "replicate", "parameter"]
+    small, large = (
+        run["estimates"].astype({"cell": str, "parameter": str, "unit": str})
+        for run in (base, other)
+    )
+    assert len(large) > 3 * len(small)
+    found = large.merge(small[keys], on=keys).sort_values(keys, ignore_index=True)
+    pd.testing.assert_frame_equal(
+        found, small.sort_values(keys, ignore_index=True), check_exact=True
+    )
+
+
+@pytest.mark.parametrize("size", [1, 130, 10_000])
+def test_batches_change_nothing(base, size, tmp_path):
+    other = run_study(tmp_path, batch_size=size, **BASE)
+    for name, table in base.items():
+        expected = table
+        if name == "estimates":  # their categories are those of the file
+            labels = dict.fromkeys(("cell", "parameter", "unit"), str)
+            expected, other[name] = table.astype(labels), other[name].astype(labels)
+        pd.testing.assert_frame_equal(other[name], expected, check_exact=True)

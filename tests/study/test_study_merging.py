@@ -1,0 +1,182 @@
+"""However a cell is shared out to jobs, and whether its replicates are kept: the same tables."""
+
+from itertools import pairwise
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+from study_helpers import grid, make_cells, make_study, parts_in, run_study
+
+from accelstudy.study.cells import batches as batching
+from accelstudy.study.cells import cell as cells_module
+from accelstudy.study.cells.batches import batches, job_size
+from accelstudy.study.cells.cell import study_cells
+from accelstudy.study.claims import evidence_from
+from accelstudy.study.monte_carlo import distributions, simulate
+from accelstudy.study.monte_carlo.moments import Moments, Node, Tree, moments_of
+from accelstudy.study.results.estimates import TABLES
+
+RNG = np.random.default_rng(3)
+# 330 replicates are 7 chunks of 50, the last one not full.
+SMALL = {
+    "grids": [
+        grid(approaches="gravity", replicates=330, sensor_sigma_mps2=2),  # a part fails
+        grid("bias-scale", "mclaren-24", 330, approaches="robot"),
+        grid("bias-scale", "faces-6", 60, approaches="all"),
+    ],
+    "leveling": {"attitudes": 5},
+}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _small_chunks():
+    """Blocks of 25 replicates and chunks of 2 blocks."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (cells_module, simulate, batching):
+            patch.setattr(module, "BLOCK", 25)
+            patch.setattr(module, "CHUNK", 2)
+        yield
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("kept")
+    tables = run_study(folder, batch_size=10**9, **SMALL)
+    (path,) = folder.glob("*/*/estimates.parquet")
+    assert pq.ParquetFile(path).num_row_groups == 7 + 7 + 2 + 2  # a chunk each
+    return tables
+
+
+@pytest.fixture(scope="module")
+def summed(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("summed")
+    return run_study(folder, batch_size=10**9, keep="summary", **SMALL)
+
+
+def assert_same(first, second):
+    for name in TABLES:
+        pd.testing.assert_frame_equal(first[name], second[name], check_exact=True)
+
+
+# --- the same bits -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("size", [50, 151])
+def test_splitting_a_cell_changes_no_bit(kept, summed, size, tmp_path):
+    parts = run_study(tmp_path / "kept", batch_size=size, **SMALL)
+    assert_same(parts, kept)
+    labels = dict.fromkeys(("cell", "parameter", "unit"), str)
+    pd.testing.assert_frame_equal(
+        parts["estimates"].astype(labels), kept["estimates"].astype(labels), check_exact=True
+    )
+    assert_same(run_study(tmp_path / "summed", batch_size=size, keep="summary", **SMALL), summed)
+    assert len(list((tmp_path / "summed").glob("*/*/sketches.parquet"))) > 5
+
+
+def test_a_tree_does_not_depend_on_how_its_leaves_come():
+    q = 4
+    leaves = [
+        moments_of(RNG.standard_normal((n, q)), 5, 3, np.full(q, n), np.full((q, q), 0.1 * n))
+        for n in (5, 0, 3, 5, 5, 5, 1, 5, 5, 4, 5)
+    ]
+    whole = Tree(Node(i, 1, leaf) for i, leaf in enumerate(leaves)).total
+    for ends in ([0, 11], [0, 1, 11], [0, 3, 4, 9, 11], range(12)):
+        tree = Tree()
+        for first, end in pairwise(ends):
+            for node in Tree(Node(i, 1, leaves[i]) for i in range(first, end)).nodes:
+                tree.add(node)
+        for field in ("mean", "comoment", "correlation_sum", "inside", "first"):
+            np.testing.assert_array_equal(getattr(tree.total, field), getattr(whole, field))
+    assert (whole.simulated, whole.converged) == (55, 43)
+    with pytest.raises(ValueError, match="chunk 12 does not follow"):
+        Tree([Node(0, 1, leaves[0])]).add(Node(12, 1, leaves[0]))
+
+
+def test_merged_moments_are_those_of_all():
+    """Though the mean is far from zero."""
+    values = 1e3 + 1e-4 * RNG.standard_normal((100, 3))
+    none = np.zeros(3, int), np.zeros((3, 3))
+    tree = Tree(Node(i, 1, moments_of(part, 10, 1, *none)) for i, part in
+                enumerate(np.split(values, 10)))  # fmt: skip
+    total: Moments = tree.total
+    np.testing.assert_allclose(total.mean, values.mean(axis=0), rtol=1e-14)
+    centred = values - values.mean(axis=0)
+    np.testing.assert_allclose(total.comoment, centred.T @ centred, rtol=1e-7)
+
+
+# --- nothing is kept -----------------------------------------------------------------------------
+
+
+def test_without_replicates_the_tables_are_the_same(kept, summed):
+    """Bit by bit but for quantiles, which are within a thousandth of the exact ones."""
+    assert "estimates" not in summed
+    for name in ("cells", "summary", "correlations"):
+        pd.testing.assert_frame_equal(summed[name], kept[name], check_exact=True)
+    exact = [name for name in kept["leveling"] if "q95" not in name]
+    pd.testing.assert_frame_equal(summed["leveling"][exact], kept["leveling"][exact])
+    keys = ["cell", "quantity", "name", "probability"]
+    both = kept["quantiles"].merge(summed["quantiles"], on=keys, suffixes=("", "_sketched"))
+    assert len(both) == len(kept["quantiles"]) > 100
+    assert (both["relative_error"] == 0).all()
+    assert (both["relative_error_sketched"] == 2**-10).all()
+    near = both[(both["quantity"] != "tilt") & (both["probability"] != 0.5)]
+    np.testing.assert_allclose(near["value_sketched"], near["value"], rtol=0.002)
+
+
+def test_a_tilt_error_is_that_about_the_pilot(kept, summed):
+    """The calibration about which tilt errors are linear is the mean of a block, not of all."""
+    column = ["roll_rms_q95_mgon", "pitch_rms_q95_mgon"]
+    rows = kept["leveling"]["model"] == "bias-scale"
+    np.testing.assert_allclose(
+        summed["leveling"].loc[rows, column], kept["leveling"].loc[rows, column], rtol=0.002
+    )
+
+
+def test_many_kept_replicates_are_sketched(kept, monkeypatch, tmp_path):
+    monkeypatch.setattr(distributions, "EXACT", 100)
+    tables = run_study(tmp_path, batch_size=200, **SMALL)
+    for name in ("cells", "summary", "correlations"):
+        pd.testing.assert_frame_equal(tables[name], kept[name], check_exact=True)
+    by_cell = tables["quantiles"].groupby("cell")["relative_error"].unique()
+    assert by_cell["bias-scale/mclaren-24/robot"].tolist() == [2**-10]
+    assert by_cell["bias-scale/faces-6/robot"].tolist() == [0.0]
+
+
+def test_claims_need_no_replicates(tmp_path):
+    """Each session with each, rather than those of one number: the same within Monte Carlo."""
+    keys = {
+        "grids": [grid(replicates=600)],
+        "leveling": {"attitudes": 5},
+    }
+    ratios = {}
+    for keep in ("replicates", "summary"):
+        run_study(tmp_path / keep, batch_size=200, keep=keep, **keys)
+        evidence = evidence_from(
+            study_cells(make_study(**keys)), parts_in(tmp_path / keep), scheme="mclaren-24",
+            correlations=None, sensitivity=None, shapley=None, base_samples=2, resamples=1, seed=1,
+        )  # fmt: skip
+        ratios[keep] = evidence.ratios["mclaren-24", "bias"]
+    for p, limit in ((0.025, 0.08), (0.5, 0.04), (0.975, 0.08)):
+        kept, summed = (float(np.squeeze(ratio.quantile(p))) for ratio in ratios.values())
+        assert summed == pytest.approx(kept, rel=limit)
+    assert ratios["summary"].share_below(0.6) == pytest.approx(
+        ratios["replicates"].share_below(0.6), abs=0.06
+    )
+
+
+# --- jobs ----------------------------------------------------------------------------------------
+
+
+def test_jobs_grow_with_the_study():
+    """No study has more jobs than Snakemake can plan."""
+    for replicates, jobs in ((10, 1), (10**6, 3), (10**8, 63), (10**11, 1954)):
+        (batch,) = batches([*make_cells(grid(approaches="robot", replicates=replicates)).values()])
+        assert len(batch.jobs) == pytest.approx(jobs, rel=0.01)
+        first = [share.first for (share,) in batch.jobs]
+        ends = [share.first + share.count for (share,) in batch.jobs]
+        assert first == [0, *ends[:-1]]
+        assert ends[-1] == batch.cells[0].n_chunks
+    assert job_size([]) == 400_000
+    few = [*make_cells(grid(schemes="all", replicates=2_000_000)).values()]
+    assert job_size(few) == job_size(few[:-1]) == 800_000

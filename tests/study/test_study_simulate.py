@@ -1,0 +1,265 @@
+"""The Parquet files of a study: content, origin, and that none is left half-written."""
+
+import json
+import subprocess
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+import scipy
+from study_helpers import (
+    NINE,
+    PAPER_TRUTH,
+    PROVENANCE,
+    grid,
+    make_cells,
+    run_study,
+    simulate_cells,
+    simulated,
+)
+
+import accelstudy
+from accelstudy.basics.errors import InputError
+from accelstudy.design.estimability import diagnose
+from accelstudy.files import tables
+from accelstudy.files.tables import (
+    collect,
+    git_commit,
+    parquet_writer,
+    read_origin,
+    read_table,
+    whole_file,
+    write_table,
+)
+from accelstudy.study.monte_carlo import simulate as module
+from accelstudy.study.monte_carlo.moments import MOMENTS
+from accelstudy.study.monte_carlo.simulate import ESTIMATES, blocks
+from accelstudy.study.results.estimates import read_estimates
+
+GRAVITY, ROBOT = f"{NINE}/mclaren-24/gravity", f"{NINE}/mclaren-24/robot"
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    cells = make_cells(grid(schemes=["faces-6", "mclaren-24"], approaches="gravity"), grid())
+    folder = tmp_path_factory.mktemp("batch")
+    estimates = simulate_cells(folder, cells.values())
+    return cells, estimates, folder / "moments.parquet"
+
+
+# --- content -------------------------------------------------------------------------------------
+
+
+def test_schema(written):
+    _, estimates, moments = written
+    assert pq.read_schema(estimates).equals(ESTIMATES)
+    assert pq.read_schema(moments).equals(MOMENTS)
+    assert not read_table(estimates).drop(columns="omega").isna().any().any()
+
+
+def test_rows_of_the_estimates(written):
+    cells, estimates, _ = written
+    table = read_estimates(estimates, GRAVITY)
+    result = simulated(cells[GRAVITY])
+    assert table["replicate"].tolist() == np.repeat(np.arange(60), 9).tolist()
+    assert table["parameter"].tolist() == 60 * [*PAPER_TRUTH]
+    np.testing.assert_array_equal(table["estimate"], result.estimates.ravel())
+    np.testing.assert_array_equal(table["omega"], np.repeat(result.omega, 9))
+    assert table["truth"].tolist() == pytest.approx(60 * [*PAPER_TRUTH.values()], rel=1e-15)
+    units = table.groupby("parameter", observed=True)["unit"].first().astype(str)
+    assert units.to_dict() == {
+        **dict.fromkeys(("b_x", "b_y", "b_z"), "m/s^2"),
+        **dict.fromkeys(("s_x", "s_y", "s_z"), "1"),
+        **dict.fromkeys(("alpha_yz", "alpha_zy", "alpha_zx"), "rad"),
+    }
+    assert set(table["redundancy"]) == {15}
+    assert set(read_estimates(estimates, [ROBOT])["redundancy"]) == {63}
+
+
+def test_what_follows_from_the_stored_columns(written):
+    table = read_estimates(written[1], ROBOT)
+    np.testing.assert_array_equal(table["error"], table["estimate"] - table["truth"])
+    np.testing.assert_allclose(table["sigma0_squared"], table["omega"] / 63, rtol=1e-15)
+    np.testing.assert_allclose(
+        table["sigma_posteriori"], np.sqrt(table["omega"] / 63) * table["sigma_priori"], rtol=1e-14
+    )
+    # Mean of χ²/r is 1, with variance 2/r.
+    mean = table.groupby("replicate")["sigma0_squared"].first().mean()
+    assert abs(mean - 1) < 4.5 * np.sqrt(2 / 63 / 60)
+
+
+def test_observed_gravity_is_a_parameter(tmp_path):
+    cells = make_cells(grid(approaches="robot", gravity_sigma_mps2=1e-4))
+    table = read_estimates(simulate_cells(tmp_path, cells.values()))
+    g = table[table["parameter"] == "g"]
+    assert set(g["unit"]) == {"m/s^2"}
+    assert set(g["truth"]) == {9.80665}
+    # One observed value, which the positions can hardly improve: scales take up all of g.
+    assert abs(g["error"].std() / 1e-4 - 1) < 4.5 / np.sqrt(2 * 59)
+
+
+def test_a_cell_that_is_not_estimable_leaves_no_rows(written):
+    cells, estimates, moments = written
+    assert f"{NINE}/faces-6/gravity" in cells
+    for path in (estimates, moments):
+        assert set(read_table(path)["cell"].astype(str)) == {GRAVITY, ROBOT}
+
+
+def test_correlations_of_a_block(written):
+    result = simulated(written[0][GRAVITY])
+    matrix = result.correlation_sum / 60
+    np.testing.assert_allclose(np.diag(matrix), 1, rtol=1e-12)
+    np.testing.assert_allclose(matrix, matrix.T, atol=1e-12)
+    names = [*PAPER_TRUTH]
+    scales = matrix[names.index("s_x"), names.index("s_y")]
+    assert scales == pytest.approx(-0.25, abs=2e-3)  # −3m/(1 − 3m), m = 1/15
+
+
+# --- origin --------------------------------------------------------------------------------------
+
+
+def test_origin_is_in_every_file(tmp_path):
+    run_study(tmp_path, grids=[grid()])
+    paths = sorted(tmp_path.rglob("*.parquet"))
+    assert len(paths) == 2 + (5 + 2) + 5
+    for path in paths:
+        assert read_origin(path) == {
+            **PROVENANCE,
+            "version": accelstudy.__version__,
+            "commit": git_commit(),
+            "numpy": np.__version__,
+            "scipy": scipy.__version__,
+            "llvmlite": tables._version("llvmlite"),
+        }
+        assert json.loads(pq.read_schema(path).metadata[b"accelstudy"]) == read_origin(path)
+
+
+def test_commit(monkeypatch):
+    git_commit.cache_clear()
+    try:
+        head = subprocess.run(
+            ["git", "rev-parse", "HEAD"],
+            capture_output=True, text=True, check=True, cwd=accelstudy.__path__[0],
+        ).stdout.strip()  # fmt: skip
+    except (OSError, subprocess.CalledProcessError):
+        head = "unknown"  # an export of the repository
+    assert git_commit().rstrip("+") == head
+    git_commit.cache_clear()
+    monkeypatch.setenv("PATH", "/nowhere")
+    assert git_commit() == "unknown"
+    git_commit.cache_clear()
+
+
+# --- whole or not at all -------------------------------------------------------------------------
+
+
+def files(folder):
+    return sorted(path.name for path in folder.rglob("*") if path.is_file())
+
+
+@pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt, SystemExit])
+def test_nothing_is_left_of_an_interrupted_file(error, tmp_path):
+    table = simulate_cells(tmp_path / "source", make_cells(grid(replicates=3)).values())
+    content = pq.read_table(table)
+    path = tmp_path / "target" / "estimates.parquet"
+
+    def write(then):
+        with parquet_writer(path, ESTIMATES, PROVENANCE) as writer:
+            writer(content)
+            if then:
+                raise then
+
+    with pytest.raises(error):
+        write(error)
+    assert files(path.parent) == []
+    write(None)
+    before = path.read_bytes()
+    with pytest.raises(error):
+        write(error)
+    assert files(path.parent) == ["estimates.parquet"]
+    assert path.read_bytes() == before
+
+
+def test_nothing_is_left_when_the_disk_is_full(monkeypatch, tmp_path):
+    def write(path, table, **options):
+        path.write_bytes(b"PAR1")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(tables, "write_parquet", write)
+    with pytest.raises(OSError, match="No space"):
+        write_table(tmp_path / "table.parquet", pd.DataFrame({"a": [1]}), PROVENANCE)
+    assert files(tmp_path) == []
+
+
+def test_a_whole_file_appears_at_once_and_overwrites_remains(tmp_path):
+    path = tmp_path / "page.html"
+    with whole_file(path) as temporary:
+        temporary.write_text("remains of a killed job")
+        remains, text = temporary, temporary.read_text()
+    path.unlink()
+    remains.parent.mkdir()
+    remains.write_text(text)
+    with whole_file(path) as temporary:
+        temporary.write_text("new")
+        assert not path.exists()
+    assert files(tmp_path) == ["page.html"]
+    assert path.read_text() == "new"
+
+
+def test_nothing_is_left_of_an_interrupted_batch(monkeypatch, tmp_path):
+    calls = []
+
+    def broken(cell, *which):
+        calls.append(cell.name)
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        return blocks(cell, *which)
+
+    monkeypatch.setattr(module, "blocks", broken)
+    with pytest.raises(KeyboardInterrupt):
+        simulate_cells(tmp_path, make_cells(grid()).values())
+    assert calls == [GRAVITY, ROBOT]
+    assert files(tmp_path) == []
+
+
+# --- reading -------------------------------------------------------------------------------------
+
+
+def test_reading_what_is_no_table(written, tmp_path):
+    path = tmp_path / "table.parquet"
+    with pytest.raises(InputError, match=rf"^{path}: no such file$"):
+        read_table(path)
+    content = written[1].read_bytes()
+    for broken in (b"", b"PAR1", content[:100], content[: len(content) // 2], content[:-1]):
+        path.write_bytes(broken)
+        with pytest.raises(InputError, match=rf"^{path}: not a whole Parquet file .*delete it"):
+            read_table(path)
+
+
+def test_reading_files_and_folders(tmp_path):
+    paths = [tmp_path / f"{name}.parquet" for name in "ab"]
+    for i, path in enumerate(paths):
+        write_table(path, pd.DataFrame({"x": [i, i + 10]}), PROVENANCE)
+    assert read_table(paths[1])["x"].tolist() == [1, 11]
+    assert read_table(paths)["x"].tolist() == read_table(tmp_path)["x"].tolist() == [0, 10, 1, 11]
+    assert read_table(paths, filters=[("x", ">", 5)])["x"].tolist() == [10, 11]
+    collect(paths, tmp_path / "c.parquet", PROVENANCE)
+    assert read_table(tmp_path / "c.parquet")["x"].tolist() == [0, 10, 1, 11]
+
+
+def test_estimates_of_some_cells(written):
+    whole = read_estimates(written[1])
+    one = read_estimates([written[1]], ROBOT)
+    assert len(whole) == 2 * len(one) == 2 * 60 * 9
+    assert isinstance(pq.read_schema(written[1]).field("cell").type, pa.DictionaryType)
+
+
+def test_sigmas_that_no_weights_span_are_said():
+    """The cell has no weights to compute with, and does not end the study."""
+    keys = {"sensor_sigma_mps2": 1e-9, "robot_sigma_mgon": 4e5}
+    (cell,) = make_cells(grid(schemes="mclaren-24", approaches="robot", **keys)).values()
+    design = diagnose(cell.positions, cell.estimated_model, cell.conditions, cell.noise)
+    assert not design.estimable
+    assert "the sigmas differ too much" in design.reason

@@ -1,0 +1,367 @@
+"""Summary tables: statistics against closed forms and published numbers, and what is flagged.
+
+Limits of single statistics are 4.5 standard errors.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.special import gammaln
+from scipy.stats import binom
+from study_helpers import NINE, PAPER_SENSOR, grid, run_study
+
+from accelstudy.schemes import get_scheme
+from accelstudy.study.cells.compiling import calibrator
+from accelstudy.study.monte_carlo import simulate as module
+from accelstudy.study.results.estimates import read_estimates
+
+STANDARD_ERRORS = 4.5
+REPLICATES = 2000
+SCHEMES = ["mclaren-24", "rings-24", "faces-edges-18", "rhombicuboctahedron-24", "faces-6"]
+MCLAREN = f"{NINE}/mclaren-24"
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    return run_study(
+        tmp_path_factory.mktemp("summary"),
+        grids=[
+            grid(["bias-scale", NINE], SCHEMES, REPLICATES),
+            grid(NINE, "mclaren-24", REPLICATES, robot_sigma_mgon=0, approaches="robot"),
+        ],
+        leveling={"attitudes": 20},
+    )
+
+
+@pytest.fixture(scope="module")
+def summary(study):
+    table = study["summary"]
+    return table[table["n_converged"] > 0]
+
+
+def of(table, cell):
+    return table[table["cell"] == cell].set_index("parameter")
+
+
+def mean_of_chi(r):
+    """Mean of √(χ²_r / r), by which sigma a posteriori is on average too small."""
+    return np.sqrt(2 / r) * np.exp(gammaln((r + 1) / 2) - gammaln(r / 2))
+
+
+# --- accuracy ------------------------------------------------------------------------------------
+
+
+def test_sds_are_those_of_the_closed_forms(summary):
+    known = summary[summary["sd_closed_form"].notna()]
+    # Gravity in all octahedral schemes, and the perfect robot.
+    assert known["cell"].nunique() >= 8
+    assert f"{MCLAREN}/robot/robot_sigma_mgon=0" in set(known["cell"])
+    deviation = known["sd_empirical"] / known["sd_closed_form"] - 1
+    assert deviation.abs().max() < STANDARD_ERRORS / np.sqrt(2 * (REPLICATES - 1))
+    # The true parameters, up to 0.5 % of g, are all that linear theory has in addition.
+    np.testing.assert_allclose(known["sd_linear"], known["sd_closed_form"], rtol=0.01)
+
+
+def test_sds_are_those_of_linear_theory(summary):
+    deviation = summary["sd_empirical"] / summary["sd_linear"] - 1
+    limit = STANDARD_ERRORS / np.sqrt(2 * (REPLICATES - 1))
+    assert deviation.abs().max() < limit
+    np.testing.assert_allclose(summary["sd_priori_mean"], summary["sd_linear"], rtol=2e-3)
+
+
+def test_gravity_based_sds_of_24_positions(summary):
+    """0.707 mm/s², 101.9 ppm and 10.26 mgon, for n = 24 and m = 1/15."""
+    rows = of(summary, f"{MCLAREN}/gravity")
+    assert [*rows["unit"]] == 3 * ["mm/s^2"] + 3 * ["ppm"] + 3 * ["mgon"]
+    published = np.repeat([0.7071, 101.97, 10.264], 3)
+    limit = STANDARD_ERRORS / np.sqrt(2 * (REPLICATES - 1))
+    np.testing.assert_allclose(rows["sd_empirical"], published, rtol=limit)
+    np.testing.assert_allclose(rows["sd_closed_form"], published, rtol=2e-3)
+
+
+def test_estimates_are_unbiased(summary):
+    error = summary["sd_empirical"] / np.sqrt(REPLICATES)
+    assert (summary["bias"].abs() / error).max() < STANDARD_ERRORS
+    low, high = summary["bias_ci95_low"], summary["bias_ci95_high"]
+    np.testing.assert_allclose(high - low, 2 * 1.96 * error, rtol=2e-3)
+    np.testing.assert_allclose((high + low) / 2, summary["bias"], atol=1e-12)
+    assert_share_of_intervals((low <= 0) & (high >= 0))
+
+
+def assert_share_of_intervals(holds):
+    """About 95 % of the intervals hold the true value."""
+    assert len(holds) > 100
+    assert holds.sum() >= binom.ppf(1e-4, len(holds), 0.95)
+
+
+def test_coverage_of_the_confidence_intervals(summary):
+    known = summary[summary["coverage_95"].notna()]
+    assert_share_of_intervals(
+        (known["coverage_95_low"] <= 0.95) & (known["coverage_95_high"] >= 0.95)
+    )
+    single = np.sqrt(0.05 * 0.95 / REPLICATES)
+    assert (known["coverage_95"] - 0.95).abs().max() < STANDARD_ERRORS * single
+    # Parameters of a cell share σ̂0, so that the cells alone count as independent.
+    cells = known["cell"].nunique()
+    assert abs(known["coverage_95"].mean() - 0.95) < STANDARD_ERRORS * single / np.sqrt(cells)
+
+
+def test_wilson_interval_of_the_coverage(summary):
+    row = of(summary, f"{MCLAREN}/robot").loc["b_x"]
+    p, n, z = row["coverage_95"], REPLICATES, 1.959964
+    centre = (p + z**2 / (2 * n)) / (1 + z**2 / n)
+    half = z / (1 + z**2 / n) * np.sqrt(p * (1 - p) / n + z**2 / (4 * n**2))
+    assert row["coverage_95_low"] == pytest.approx(centre - half, rel=1e-6)
+    assert row["coverage_95_high"] == pytest.approx(centre + half, rel=1e-6)
+
+
+def test_ratio_of_sigma_a_posteriori_to_the_empirical_one(study, summary):
+    redundancy = summary["cell"].map(study["cells"].set_index("cell")["redundancy"])
+    known = summary[redundancy > 0]
+    expected = mean_of_chi(redundancy[redundancy > 0].to_numpy(dtype=float))
+    assert mean_of_chi(15.0) == pytest.approx(0.98348, abs=1e-5)
+    inside = (known["sd_ratio_ci95_low"] <= expected) & (known["sd_ratio_ci95_high"] >= expected)
+    assert_share_of_intervals(inside)
+    deviation = known["sd_ratio"] / expected - 1
+    assert deviation.abs().max() < STANDARD_ERRORS * np.sqrt(
+        1 / (2 * (REPLICATES - 1)) + 1 / (2 * 12 * REPLICATES)
+    )
+
+
+# --- cells ---------------------------------------------------------------------------------------
+
+
+def test_rank_and_redundancy(study):
+    cells = study["cells"].set_index("cell")
+    redundancy = cells["redundancy"]
+    assert redundancy[f"{MCLAREN}/gravity"] == 24 - 9
+    assert redundancy[f"{MCLAREN}/robot"] == 72 - 9
+    assert redundancy["bias-scale/faces-6/gravity"] == 0
+    assert cells.loc[f"{MCLAREN}/gravity", "fourth_moment"] == pytest.approx(1 / 15, rel=1e-9)
+    assert cells.loc[f"{MCLAREN}/gravity", "rank"] == 9
+
+
+def test_without_redundancy_there_is_no_sigma_a_posteriori(summary):
+    rows = of(summary, "bias-scale/faces-6/gravity")
+    undefined = ["sd_posteriori_mean", "sd_ratio", "coverage_95", "coverage_95_low"]
+    assert rows[undefined].isna().all().all()
+    assert rows["n_converged"].tolist() == 6 * [REPLICATES]
+    # Two positions an axis: b = (f₊ + f₋)/2, s = (f₊ − f₋)/2g.
+    sigma = [2 / np.sqrt(2)] * 3 + [0.002 / 9.80665 / np.sqrt(2) * 1e6] * 3
+    np.testing.assert_allclose(rows["sd_priori_mean"], sigma, rtol=2e-3)
+
+
+def test_a_cell_that_is_not_estimable_is_reported_with_the_reason(study):
+    name = f"{NINE}/faces-6/gravity"
+    cell = study["cells"].set_index("cell").loc[name]
+    assert not cell["estimable"]
+    assert cell["not_estimable"] == "alpha_yz, alpha_zy, alpha_zx"
+    assert cell["reason"].startswith("rank 6 of 9: alpha_yz, alpha_zy, alpha_zx cannot be told")
+    assert (cell["n_replicates"], cell["n_converged"]) == (0, 0)
+    rows = of(study["summary"], name)
+    assert [*rows.index[~rows["estimable"]]] == ["alpha_yz", "alpha_zy", "alpha_zx"]
+    assert set(rows["reason"]) == {cell["reason"]}
+    numbers = rows.filter(regex="^(bias|sd|coverage)")
+    assert numbers.drop(columns="sd_closed_form").isna().all().all()
+    for table in ("leveling", "correlations", "estimates"):
+        assert name not in set(study[table]["cell"])
+
+
+def test_only_cells_that_are_not_estimable(tmp_path):
+    tables = run_study(tmp_path, grids=[grid(schemes="faces-6", approaches="gravity")])
+    assert len(tables["cells"]) == 1
+    assert len(tables["summary"]) == 9
+    for name in ("leveling", "correlations", "estimates"):
+        assert len(tables[name]) == 0
+        assert "cell" in tables[name]
+
+
+def test_one_replicate_has_no_spread(tmp_path):
+    rows = run_study(tmp_path, grids=[grid(replicates=1)])["summary"]
+    assert rows[["sd_empirical", "sd_ratio", "bias_ci95_low"]].isna().all().all()
+    assert rows[["bias", "sd_posteriori_mean", "coverage_95"]].notna().all().all()
+
+
+# --- correlations --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("cell", "published", "digits"),
+    [
+        (f"{MCLAREN}/gravity", 0.25, 0.005),
+        (f"{MCLAREN}/robot", 0.012, 0.0005),
+        (f"{NINE}/rings-24/gravity", 0.14, 0.005),
+        (f"{NINE}/rings-24/robot", 0.007, 0.0005),
+    ],
+)
+def test_correlation_of_the_scales(study, cell, published, digits):
+    table = study["correlations"]
+    rows = table[
+        (table["cell"] == cell)
+        & table["parameter_1"].str.startswith("s_")
+        & table["parameter_2"].str.startswith("s_")
+        & (table["parameter_1"] < table["parameter_2"])
+    ]
+    assert len(rows) == 3
+    assert abs(rows["adjustment"].abs().mean() - published) < digits + 1e-3
+    limit = STANDARD_ERRORS / np.sqrt(REPLICATES)
+    np.testing.assert_allclose(rows["empirical"], rows["adjustment"], atol=limit)
+
+
+def test_empirical_correlations_are_those_of_the_adjustment(study):
+    table = study["correlations"]
+    limit = STANDARD_ERRORS / np.sqrt(REPLICATES)
+    assert (table["empirical"] - table["adjustment"]).abs().max() < limit
+
+
+# --- what did not converge -----------------------------------------------------------------------
+
+
+def assert_flagged(tables, cell, failed):
+    """Replicates that failed are NaN and counted; the others alone make the statistics."""
+    rows = tables["estimates"]
+    rows = rows[rows["cell"] == cell]
+    bad = rows[~rows["converged"]]
+    assert bad["replicate"].nunique() == failed
+    assert bad[["estimate", "sigma_priori", "omega"]].isna().all().all()
+    good = rows[rows["converged"]]
+    assert good[["estimate", "sigma_priori", "omega"]].notna().all().all()
+
+    summary = of(tables["summary"], cell)
+    for name, found in good.groupby("parameter", observed=True):
+        in_si = {"mm/s^2": 1e-3, "ppm": 1e-6, "mgon": np.pi / 200e3}[summary.loc[name, "unit"]]
+        error = (found["estimate"] - found["truth"]) / in_si
+        assert summary.loc[name, "bias"] == pytest.approx(error.mean(), rel=1e-9)
+        assert summary.loc[name, "sd_empirical"] == pytest.approx(error.std(), rel=1e-9)
+    n = good["replicate"].nunique()
+    assert set(summary["n_converged"]) == {n}
+    assert set(summary["n_replicates"]) == {n + failed}
+    row = tables["cells"].set_index("cell").loc[cell]
+    assert (row["n_replicates"], row["n_converged"]) == (n + failed, n)
+
+
+def test_absurd_noise_is_flagged(tmp_path):
+    tables = run_study(tmp_path, grids=[grid(sensor_sigma_mps2=3, approaches="gravity")])
+    cell = f"{MCLAREN}/gravity/sensor_sigma_mps2=3"
+    failed = int((~tables["estimates"]["converged"]).sum()) // 9
+    assert 0 < failed < 60
+    assert_flagged(tables, cell, failed)
+    assert tables["leveling"]["n_converged"].tolist() == [60 - failed]
+
+
+def test_some_replicates_fail(monkeypatch, tmp_path):
+    """Replicates with a hopeless observation fail, and the others do not notice."""
+    whole = run_study(tmp_path / "whole", grids=[grid(approaches="gravity")])
+
+    def spoilt(cell):
+        def calibrate(model, approach, observed):
+            forces = observed.forces.copy()
+            forces[[3, 50]] = np.nan
+            return calibrator(cell)(model, approach, replace(observed, forces=forces))
+
+        return calibrate
+
+    monkeypatch.setattr(module, "calibrator", spoilt)
+    tables = run_study(tmp_path / "spoilt", grids=[grid(approaches="gravity")])
+    assert_flagged(tables, f"{MCLAREN}/gravity", 2)
+    kept = ~tables["estimates"]["replicate"].isin([3, 50])
+    pd.testing.assert_frame_equal(
+        tables["estimates"][kept], whole["estimates"][kept], check_exact=True
+    )
+
+
+def test_no_replicate_converges(tmp_path):
+    tables = run_study(
+        tmp_path, grids=[grid(sensor_sigma_mps2=1e3, approaches="gravity", replicates=20)]
+    )
+    cell = tables["cells"].iloc[0]
+    assert cell["estimable"]
+    assert (cell["n_replicates"], cell["n_converged"]) == (20, 0)
+    numbers = ["bias", "sd_empirical", "sd_posteriori_mean", "sd_priori_mean", "coverage_95"]
+    assert tables["summary"][numbers].isna().all().all()
+    assert tables["leveling"].filter(like="_mgon").filter(like="rms").isna().all().all()
+    assert tables["correlations"][["adjustment", "empirical"]].isna().all().all()
+
+
+# --- wrong gravity, missing effects --------------------------------------------------------------
+
+
+def test_a_wrong_gravity_biases_the_scales_alone(tmp_path):
+    """Held at g + e, the sensor seems to measure too little: 1 + s becomes (1 + s) g/(g + e)."""
+    errors = [-0.01, 0.001, 0.03]
+    table = run_study(tmp_path, grids=[grid(replicates=1000, gravity_error_mps2=errors)])
+    assert len(table["summary"]) == 2 * 3 * 9
+    for row in table["summary"].to_dict("records"):
+        e, expected = row["gravity_error_mps2"], 0.0
+        if row["parameter"].startswith("s_"):
+            expected = -1e6 * (1 + 200e-6) * e / (9.80665 + e)
+        limit = STANDARD_ERRORS * row["sd_empirical"] / np.sqrt(1000)
+        assert abs(row["bias"] - expected) < limit
+        if row["parameter"].startswith("s_"):
+            assert abs(row["bias"]) > 2 * limit
+
+
+def test_tilt_does_not_feel_a_wrong_gravity(tmp_path):
+    """A common factor of the force changes no angle."""
+    grids = [grid(replicates=300, gravity_error_mps2=[0, 0.03])]
+    table = run_study(tmp_path, grids=grids)["leveling"].set_index("cell")
+    wrong = table.loc[f"{MCLAREN}/gravity/gravity_error_mps2=0.03", "roll_rms_mgon"]
+    right = table.loc[f"{MCLAREN}/gravity", "roll_rms_mgon"]
+    assert wrong == pytest.approx(right, rel=STANDARD_ERRORS * 2 / np.sqrt(2 * 300))
+    # A bias of the scales of 3 060 ppm would tilt by far more, were it not common to them.
+
+
+def test_an_effect_that_the_model_lacks_shows_in_the_tilt(tmp_path):
+    """At level the axes' angles tilt by themselves: roll by α_zx, pitch by α_zy."""
+    tables = run_study(
+        tmp_path,
+        simulated_effects=["bias", "scale", "nonorthogonality"],
+        grids=[grid(["bias-scale", NINE], approaches="gravity", sensor_sigma_mps2=1e-5)],
+        leveling={"max_tilt_gon": 0.01, "attitudes": 20},
+    )
+    table = tables["leveling"].set_index("model")
+    assert table.loc["bias-scale", "roll_rms_mgon"] == pytest.approx(44, rel=0.01)
+    assert table.loc["bias-scale", "pitch_rms_mgon"] == pytest.approx(12, rel=0.01)
+    # With the effect in the model only the calibration's own error is left, here of 0.1 mgon.
+    assert table.loc[NINE, ["roll_rms_mgon", "pitch_rms_mgon"]].max() < 0.2
+
+
+def test_tilt_of_a_calibrated_sensor(study, tmp_path):
+    """At level σ_φ² = (σ_b/g)² + σ_α²: 11.24 mgon, and as much in pitch."""
+    grids = [grid(replicates=3000, approaches="gravity")]
+    near = {"max_tilt_gon": 0.01, "attitudes": 3}
+    level = run_study(tmp_path, grids=grids, leveling=near)["leveling"].iloc[0]
+    expected = np.hypot(0.70711e-3 / 9.80665 / np.pi * 200e3, 10.264)
+    assert expected == pytest.approx(11.24, abs=0.005)
+    for angle in ("roll", "pitch"):
+        limit = STANDARD_ERRORS / np.sqrt(2 * 3000)
+        assert level[f"{angle}_rms_mgon"] == pytest.approx(expected, rel=limit)
+        # One normal error: 95 % of the calibrations stay below 1.96 σ.
+        q95 = level[f"{angle}_rms_q95_mgon"] / expected
+        density = 2 * np.exp(-(1.96**2) / 2) / np.sqrt(2 * np.pi)
+        assert abs(q95 - 1.96) < STANDARD_ERRORS * np.sqrt(0.95 * 0.05 / 3000) / density
+
+    table = study["leveling"].set_index("cell")
+    gravity, robot = (table.loc[f"{MCLAREN}/{name}"] for name in ("gravity", "robot"))
+    assert (robot.filter(like="_rms") < gravity.filter(like="_rms")).all()
+
+
+def test_units_and_truth(summary):
+    rows = of(summary, f"{MCLAREN}/robot")
+    truth = np.concatenate([1e3 * np.array([0.05, 0.01, 0.03]), [200] * 3, [12, 12, 44]])
+    assert PAPER_SENSOR["bias"]["value"] == [0.05, 0.01, 0.03]
+    np.testing.assert_allclose(rows["truth"], truth, rtol=1e-12)
+
+
+def test_what_is_read_back_is_what_was_summarised(study, tmp_path):
+    """The summary follows from the estimates alone."""
+    path = tmp_path / "estimates.parquet"
+    study["estimates"].to_parquet(path)
+    table = read_estimates(path, f"{MCLAREN}/robot")
+    half = table["sigma_posteriori"] * 1.9983405  # Student's t, 63 degrees of freedom
+    inside = (table["error"].abs() <= half).groupby(table["parameter"], observed=True).mean()
+    rows = of(study["summary"], f"{MCLAREN}/robot")
+    np.testing.assert_allclose(inside[rows.index], rows["coverage_95"], atol=1e-12)
+    assert get_scheme("mclaren-24").n_positions == 24
