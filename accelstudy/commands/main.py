@@ -229,12 +229,12 @@ def effects(campaign: Path | None, scheme: str | None, model: str, approach: str
     with stage("what can be shown"):
         if campaign is not None:
             named = None if approach is None else get_approach(approach)
-            setting = visibility.campaign_setting(read_campaign(campaign), chosen, named)
+            examined = visibility.examine_campaign(read_campaign(campaign), chosen, named)
         else:
-            setting = visibility.scheme_setting(
+            examined = visibility.examine_scheme(
                 get_scheme(str(scheme)), chosen, get_approach(approach or "robot")
             )
-        table = visibility.visibility_table(setting).to_string(index=False)
+        table = visibility.visibility_table(examined).to_string(index=False)
     click.echo(table)
     say(
         "\nMDB: size of one parameter that a test at 0.1 % detects with a probability of 80 %;"

@@ -57,7 +57,7 @@ class Beside:
             spaces = [space for name, space in groups.items() if name != LACK_OF_FIT]
             left = [float((z @ z - q.parts(z)[0]) / (r - q.dims[0])) for q in spaces]
             variance = min([variance, *left])
-        bumped = self.search.setting.candidates.get(OUTLIER)
+        bumped = self.search.examined.candidates.get(OUTLIER)
         return locate(groups, bumped, residuals, self.search.chance, variance)
 
     @cached_property
@@ -65,7 +65,7 @@ class Beside:
         """Tilt error without and with what was found, rad; see `leveling_rms`."""
         if not self.finding.chosen:
             return None
-        final, hold = self.finding.setting.frame.solution, self.search.setting.frame.hold
+        final, hold = self.finding.examined.frame.solution, self.search.examined.frame.hold
         return leveling_rms(self.search.first, final, hold, self.variance)
 
     @cached_property
@@ -75,7 +75,7 @@ class Beside:
         added = [effect for effect in effects if effect is not None]
         if not added or len(added) < len(effects):
             return ()
-        final, frame = self.finding.setting.frame.solution, self.search.setting.frame
+        final, frame = self.finding.examined.frame.solution, self.search.examined.frame
         return parameter_changes(self.search.first, final, frame, added, self.variance)
 
     @cached_property
@@ -85,7 +85,7 @@ class Beside:
         if self.finding.verdict == "narrowed":
             classes = [alike for one in self.finding.credible_set for alike in one.classes]
             names += [name for alike in classes for name in alike]
-        return tuple(upper_limits(self.finding.setting, self.variance, names))
+        return tuple(upper_limits(self.finding.examined, self.variance, names))
 
     @cached_property
     def next_positions(self) -> tuple[NextPosition, ...]:
@@ -98,7 +98,7 @@ class Beside:
         if len(rivals) < 2:
             return ()
         with stage("next positions"):
-            return tuple(next_positions(self.search.setting.frame, *rivals[:2]))
+            return tuple(next_positions(self.search.examined.frame, *rivals[:2]))
 
     @cached_property
     def suspects(self) -> tuple[tuple[int, float], ...]:

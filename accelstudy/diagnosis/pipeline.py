@@ -109,9 +109,9 @@ class _Run:
                 for name, position in self.recognised.named
             )
             found = (*gross, *found)
-        final, variance = finding.setting, self.noise.unit_variance(finding.setting)
+        final, variance = finding.examined, self.noise.unit_variance(finding.examined)
         known = self.fit.sigma_known
-        trusted = known and self.noise.level(search.setting).p_value >= REFUTED
+        trusted = known and self.noise.level(search.examined).p_value >= REFUTED
         with stage("held-out positions"):
             gap = self.gap(finding, variance)
         return Diagnosis(
@@ -123,7 +123,7 @@ class _Run:
             credible_set=finding.credible_set,
             found=found,
             base=self.first,
-            setting=search.setting,
+            examined=search.examined,
             final=final,
             sigma_known=known,
             sigma_source=self.noise.sigma_source(final),
@@ -159,14 +159,14 @@ class _Run:
         search = self.search
         if search.exact:
             reason = "the campaign is its own model: what is left are rounding errors"
-            return Finding("no_effect", search.setting, reason), ()
+            return Finding("no_effect", search.examined, reason), ()
         if search.detection.p_value < level_of_effects(self.fit.sigma_known):
             finding = find(search)
-            return finding, self.noise.tests(finding.setting)
-        tests = self.noise.tests(search.setting)
+            return finding, self.noise.tests(finding.examined)
+        tests = self.noise.tests(search.examined)
         worst = self.noise.worst(tests)
         if worst is None:
-            return Finding("no_effect", search.setting), tests
+            return Finding("no_effect", search.examined), tests
         return self.noise.judged(worst), tests
 
     # --- what else is said ----------------------------------------------------------------------
@@ -181,8 +181,8 @@ class _Run:
             name = top if worst is None else worst.name
             p = search.detection.p_value if worst is None else worst.p_value
             return (Named(name, name, (name,), p, posterior.of_noise),)
-        solution = finding.setting.frame.solution
-        sigma = np.sqrt(np.diag(solution.cofactors) * self.noise.unit_variance(finding.setting))
+        solution = finding.examined.frame.solution
+        sigma = np.sqrt(np.diag(solution.cofactors) * self.noise.unit_variance(finding.examined))
         columns = {name: i for i, name in enumerate(solution.model.parameter_names)}
         found = []
         for choice in finding.chosen:
@@ -220,7 +220,7 @@ class _Run:
         before = self.first.omega / self.first.redundancy
         if not finding.chosen:
             return Gap(before)
-        final = finding.setting.frame.solution
+        final = finding.examined.frame.solution
         after = final.omega / final.redundancy
         if finding.verdict not in ("named", "narrowed"):
             return Gap(before, after)

@@ -16,7 +16,7 @@ from accelstudy.diagnosis.beside import Beside
 from accelstudy.diagnosis.decision.explanations import Explanation
 from accelstudy.diagnosis.evidence.detection import Detection
 from accelstudy.diagnosis.evidence.noise import NoiseTest
-from accelstudy.diagnosis.space.hypotheses import Setting
+from accelstudy.diagnosis.space.hypotheses import ExaminedFit
 from accelstudy.diagnosis.worth.changes import Change
 from accelstudy.diagnosis.worth.gap import HeldOutGap
 from accelstudy.diagnosis.worth.limits import UpperLimit
@@ -89,7 +89,7 @@ class Diagnosis:
     credible_set : tuple of Explanation, most probable first; empty if nothing is missing
     found : tuple of Named
     base : Solution, of the base model with equal axes
-    setting : Setting, of the base fit, with unequal axes weighted
+    examined : ExaminedFit, of the base fit, with unequal axes weighted
     final : Setting, of the extended fit, or the same
     sigma_known : bool
     sigma_source : str
@@ -112,8 +112,8 @@ class Diagnosis:
     credible_set: tuple[Explanation, ...]
     found: tuple[Named, ...]
     base: Solution
-    setting: Setting
-    final: Setting
+    examined: ExaminedFit
+    final: ExaminedFit
     sigma_known: bool
     sigma_source: str
     unit_variance: float

@@ -19,7 +19,7 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign import Campaign
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis, setting_of
+from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis, examine
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -56,9 +56,11 @@ class Problem:
         for _ in range(0 if known else 2):
             fit = fit_campaign(replace(campaign, sigma_force=fit.sigma_position_posteriori),
                                model, approach)  # fmt: skip
-        setting = setting_of(solve(fit.model, fit.approach, fit.observed, fit.adjustment))
-        shapes = [h for name, found in setting.candidates.items() if name != OUTLIER for h in found]
-        residuals = setting.frame.residuals
+        examined = examine(solve(fit.model, fit.approach, fit.observed, fit.adjustment))
+        shapes = [
+            h for name, found in examined.candidates.items() if name != OUTLIER for h in found
+        ]
+        residuals = examined.frame.residuals
         return cls(residuals.z, residuals.redundancy, shapes, known)
 
     def left(self, chosen: list[Hypothesis]) -> Array:

@@ -8,7 +8,7 @@ import pandas as pd
 from accelstudy.adjustment.quality import noncentrality
 from accelstudy.campaign import Campaign
 from accelstudy.diagnosis.worth.limits import POWER, visibilities
-from accelstudy.diagnosis.worth.visibility import campaign_setting
+from accelstudy.diagnosis.worth.visibility import examine_campaign
 from accelstudy.hidden.cells import limit_cells
 from accelstudy.hidden.config import HiddenConfig
 from accelstudy.hidden.physics import generate
@@ -38,7 +38,7 @@ def limit_rows(campaign: Campaign, model: SensorModel) -> list[dict[str, object]
             "lambda_mdb": least,
             "lambda_mib": least * (row.mib / row.mdb) ** 2,
         }
-        for row in visibilities(campaign_setting(campaign, model), ALPHA)
+        for row in visibilities(examine_campaign(campaign, model), ALPHA)
         if row.status == "visible" and np.isfinite(row.mdb)
     ]
 

@@ -28,7 +28,7 @@ from accelstudy.diagnosis.evidence import chance
 from accelstudy.diagnosis.evidence.colour import LENGTHS, quadratic_forms, restricted
 from accelstudy.diagnosis.evidence.noise import axis_factors
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.space.hypotheses import setting_of
+from accelstudy.diagnosis.space.hypotheses import examine
 from accelstudy.diagnosis.space.location import groups
 from accelstudy.diagnosis.space.repeats import clusters
 from accelstudy.effects import Hold, get_effect
@@ -174,7 +174,7 @@ def complement(columns):
 
 
 @pytest.fixture(scope="module", params=["gravity", "robot"])
-def setting(request):
+def examined(request):
     """A campaign with a repeated scheme, all columns and observed gravity."""
     campaign, _ = simulate_campaign(
         CampaignSettings(
@@ -187,29 +187,29 @@ def setting(request):
         )
     )
     fit = fit_campaign(replace(campaign, sigma_gravity=1e-3), NINE, get_approach(request.param))
-    return setting_of(solve(NINE, fit.approach, fit.observed, fit.adjustment))
+    return examine(solve(NINE, fit.approach, fit.observed, fit.adjustment))
 
 
-def test_residuals_are_those_of_a_basis_of_the_residual_space(setting):
-    residuals = setting.frame.residuals
+def test_residuals_are_those_of_a_basis_of_the_residual_space(examined):
+    residuals = examined.frame.residuals
     n = complement(residuals.design)
     np.testing.assert_allclose(residuals.z, n @ n.T @ residuals.errors, atol=1e-9)
     assert residuals.redundancy == n.shape[1]
     rows = np.random.default_rng(1).standard_normal((len(n), 4))
     np.testing.assert_allclose(residuals.project(rows), n @ n.T @ rows, atol=1e-12)
     errors = residuals.project(rows)
-    for shapes in setting.candidates.values():
+    for shapes in examined.candidates.values():
         for h, part in zip(shapes, shapes.parts(errors.T).T, strict=True):
             np.testing.assert_allclose(h.basis.T @ h.basis, np.eye(h.dim), atol=1e-9)
             np.testing.assert_allclose(residuals.absorbed.T @ h.basis, 0, atol=1e-9)
             np.testing.assert_allclose(part, np.sum((h.basis.T @ errors) ** 2, axis=0), rtol=1e-7)
 
 
-def test_repeats_and_lack_of_fit_share_the_residual_space(setting):
+def test_repeats_and_lack_of_fit_share_the_residual_space(examined):
     """Against a basis of all differences between conditions of one attitude."""
-    residuals = setting.frame.residuals
+    residuals = examined.frame.residuals
     n, c = residuals.whitening.shape[:2]
-    labels = clusters(setting.frame.forces)
+    labels = clusters(examined.frame.forces)
     assert len(np.unique(labels)) == n / 2
     differences = []
     for i in range(n):
@@ -218,7 +218,7 @@ def test_repeats_and_lack_of_fit_share_the_residual_space(setting):
             change[i, axis], change[labels[i], axis] = 1, -1
             differences.append(residuals.rows(change))
     basis = np.linalg.qr(residuals.project(np.concatenate(differences, axis=1)))[0]
-    found = groups(setting)
+    found = groups(examined)
     errors = residuals.project(np.random.default_rng(1).standard_normal((len(residuals.z), 5))).T
     repeated = np.sum((errors @ basis) ** 2, axis=1)
     assert found["repeat"].dims[0] == basis.shape[1]
@@ -228,8 +228,8 @@ def test_repeats_and_lack_of_fit_share_the_residual_space(setting):
     np.testing.assert_allclose(found["lack_of_fit"].parts(errors)[:, 0], rest, rtol=1e-9)
 
 
-def test_coloured_noise_has_the_likelihood_of_whole_covariance_matrices(setting):
-    residuals = setting.frame.residuals
+def test_coloured_noise_has_the_likelihood_of_whole_covariance_matrices(examined):
+    residuals = examined.frame.residuals
     n, c = residuals.whitening.shape[:2]
     basis, i = complement(residuals.design), np.arange(n)
     z, r = basis.T @ residuals.z, residuals.redundancy
@@ -247,8 +247,8 @@ def test_coloured_noise_has_the_likelihood_of_whole_covariance_matrices(setting)
             assert determinants[k, j] == pytest.approx(np.linalg.slogdet(covariance)[1], rel=1e-9)
 
 
-def test_factors_of_the_axes_are_those_of_whole_matrices(setting):
-    residuals = setting.frame.residuals
+def test_factors_of_the_axes_are_those_of_whole_matrices(examined):
+    residuals = examined.frame.residuals
     n, c = residuals.whitening.shape[:2]
     basis = complement(residuals.design)
     g = np.einsum("ncr,nca->arn", basis[: n * c].reshape(n, c, -1), residuals.force_noise)

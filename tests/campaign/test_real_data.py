@@ -103,7 +103,7 @@ def test_where_the_residuals_of_white_noise_live():
 
 def variances_taken(d):
     """Variances of the axes, beside their mean."""
-    variances = d.setting.frame.solution.variances[0, :3]
+    variances = d.examined.frame.solution.variances[0, :3]
     return variances / variances.mean()
 
 
@@ -129,7 +129,7 @@ def test_what_cannot_be_diagnosed_is_said(name):
 
 
 def test_what_is_invisible_to_all():
-    hidden = {diagnosed(name, variant).setting.invisible for name, variant in DIAGNOSED}
+    hidden = {diagnosed(name, variant).examined.invisible for name, variant in DIAGNOSED}
     (names,) = hidden
     assert all(words(name) in PAGE for name in names)
 

@@ -188,19 +188,19 @@ def test_gravity_alone_is_blind_and_says_so():
     measured, _ = campaign(3, approach="gravity", effects=("mounting_rotation",))
     found = diagnose(measured, NINE)
     assert found.verdict == "no_effect"
-    assert set(found.setting.invisible) == {"gravity_error", *ROTATIONS}
+    assert set(found.examined.invisible) == {"gravity_error", *ROTATIONS}
 
 
 def test_a_wrong_gravity_is_never_seen():
     measured, _ = campaign(3, effects=("gravity_error",))
     found = diagnose(measured, NINE)
     assert found.verdict == "no_effect"
-    assert found.setting.invisible == ("gravity_error",)
+    assert found.examined.invisible == ("gravity_error",)
 
 
 def test_columns_that_are_missing_are_named():
     measured = replace(campaign(3)[0], temperature=None, vibration=None)
-    untestable = diagnose(measured, NINE).setting.untestable
+    untestable = diagnose(measured, NINE).examined.untestable
     thermal = {"thermal_bias", "thermal_curve", "thermal_scale"}
     assert set(untestable) == {*thermal, "vibration_rectification"}
     assert "'temperature'" in untestable["thermal_bias"]

@@ -56,14 +56,14 @@ def test_densities_are_mixtures_of_t_distributions(known):
 
 
 @pytest.fixture(scope="module", params=[ROBOT, GRAVITY], ids=lambda approach: approach.name)
-def setting(request):
+def examined(request):
     return design(shuffled("fibonacci-30"), request.param, seed=7)
 
 
-def test_the_level_of_the_test_is_what_it_says(setting):
+def test_the_level_of_the_test_is_what_it_says(examined):
     """The value exceeded with 5 % and 1 %, found by importance sampling, in noise drawn apart."""
-    residuals = setting.frame.residuals
-    field = Field.of(setting.candidates, groups(setting))
+    residuals = examined.frame.residuals
+    field = Field.of(examined.candidates, groups(examined))
     evidence = Evidence(Level.given(), residuals.redundancy)
     chance = Chance(np.random.SeedSequence(1), len(residuals.design))
     by_chance = detect(field, evidence, residuals, chance).by_chance
@@ -81,10 +81,10 @@ def test_the_level_of_the_test_is_what_it_says(setting):
         assert np.mean(odds > value) <= np.exp(-value)
 
 
-def test_noise_is_not_noise_with_an_effect(setting):
+def test_noise_is_not_noise_with_an_effect(examined):
     """What is drawn with an effect is found, and its weight takes it out again."""
-    residuals, rng = setting.frame.residuals, np.random.default_rng(3)
-    field = Field.of(setting.candidates, {})
+    residuals, rng = examined.frame.residuals, np.random.default_rng(3)
+    field = Field.of(examined.candidates, {})
     changed = field.with_effects(np.zeros((400, len(residuals.design))), rng)
     noise = rng.standard_normal(changed.shape) + residuals.project(changed.T).T
     parts = field.parts(residuals.project(noise.T).T)
@@ -95,12 +95,12 @@ def test_noise_is_not_noise_with_an_effect(setting):
     assert np.sum(weights * squares) / np.sum(weights) == pytest.approx(r, rel=0.25)
 
 
-def test_a_pair_is_worth_the_space_of_both(setting):
+def test_a_pair_is_worth_the_space_of_both(examined):
     """Of two candidates with one shape each the density is that of their joint space."""
-    residuals = setting.frame.residuals
+    residuals = examined.frame.residuals
     evidence = Evidence(Level.unknown(), residuals.redundancy)
-    names = [n for n, s in setting.candidates.items() if len(s) == 1][:3]
-    found = all_pairs({n: setting.candidates[n] for n in names}, residuals, evidence)
+    names = [n for n, s in examined.candidates.items() if len(s) == 1][:3]
+    found = all_pairs({n: examined.candidates[n] for n in names}, residuals, evidence)
     assert found
     for pair in found:
         joint = np.linalg.qr(np.concatenate([h.basis for h in pair.best], axis=1))[0]

@@ -25,7 +25,7 @@ def parts(request):
     observed = ideal.draw(Noise(), 1, np.random.default_rng(5))
     seed = np.random.SeedSequence(1)
     search = Search(solve(NINE, ROBOT, observed), seed, request.param)
-    frame = search.setting.frame
+    frame = search.examined.frame
     fitted, held = split_positions(frame.forces, frame.hold, 10, np.random.default_rng(2))
     part = Search(solve(NINE, ROBOT, observed.take(fitted)), seed, request.param)
     return search, part, LinearSplit(frame, fitted, held)

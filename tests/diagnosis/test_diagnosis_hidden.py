@@ -17,7 +17,7 @@ from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.decision.priors import SURE
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.space.hypotheses import OUTLIER, same_space, setting_of
+from accelstudy.diagnosis.space.hypotheses import OUTLIER, examine, same_space
 from accelstudy.diagnosis.worth.limits import signature_columns
 from accelstudy.effects import get_effect
 
@@ -51,18 +51,20 @@ def hidden(design, approach, size, seed, count=1):
     keys = {**DESIGNS[design], "approach": approach, "seed": seed}
     without, _ = simulate_campaign(CampaignSettings(**{**keys, "sigma_known": True}))
     fit = fit_campaign(without, NINE, ROBOT if approach == "robot" else GRAVITY)
-    setting = setting_of(solve(NINE, fit.approach, fit.observed, fit.adjustment))
-    names = sorted(name for name in setting.candidates if name != OUTLIER)
+    examined = examine(solve(NINE, fit.approach, fit.observed, fit.adjustment))
+    names = sorted(name for name in examined.candidates if name != OUTLIER)
     effects, classes = [], []
     for name in rng.choice(names, count, replace=False):
         effect = get_effect(random_shape(name, without.n_positions, rng))
-        shown = setting.hypothesis(effect)
+        shown = examined.hypothesis(effect)
         n_parameters = len(effect.parameters)
         p = rng.uniform(0.3, 1, n_parameters) * rng.choice([-1.0, 1.0], n_parameters)
-        p *= np.sqrt(size / np.sum((signature_columns(setting.frame, shown) @ p) ** 2))
+        p *= np.sqrt(size / np.sum((signature_columns(examined.frame, shown) @ p) ** 2))
         effects.append(f"{effect.spec}: {', '.join(map(repr, p.tolist()))}")
         same = {
-            other for other in names if any(same_space(shown, h) for h in setting.candidates[other])
+            other
+            for other in names
+            if any(same_space(shown, h) for h in examined.candidates[other])
         }
         classes.append({*same, effect.name})
     return simulate_campaign(CampaignSettings(**keys, effects=tuple(effects)))[0], classes

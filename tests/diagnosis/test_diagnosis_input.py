@@ -253,7 +253,7 @@ def test_an_observed_gravity_does_not_change_the_verdict(approach):
     fixed, free = (diagnose(replace(measured, sigma_gravity=s), NINE) for s in (0.0, 1e-3))
     assert [f.name for f in fixed.found] == [f.name for f in free.found] == ["hysteresis"]
     assert fixed.gap.before == pytest.approx(free.gap.before, rel=1e-3)
-    assert fixed.setting.invisible == free.setting.invisible
+    assert fixed.examined.invisible == free.examined.invisible
 
 
 @pytest.mark.parametrize("repeat_first", [0, 1])

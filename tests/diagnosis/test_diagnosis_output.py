@@ -36,7 +36,7 @@ from accelstudy.diagnosis.report.output import diagnose_folder, write_diagnosis
 from accelstudy.diagnosis.report.wording import headline
 from accelstudy.diagnosis.result import Gap
 from accelstudy.diagnosis.round_trip import parse_round_trip
-from accelstudy.diagnosis.space.hypotheses import setting_of
+from accelstudy.diagnosis.space.hypotheses import examine
 from accelstudy.diagnosis.worth.loop import CASES as CASES_OF_LOOP
 from accelstudy.diagnosis.worth.loop import Loop, close_loop
 from accelstudy.diagnosis.worth.next_positions import next_positions
@@ -167,7 +167,7 @@ def explained(*explanations):
 
 
 def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
-    shapes = named.setting.candidates
+    shapes = named.examined.candidates
     thermal, drift = (shapes[name][0] for name in ("thermal_bias", "thermal_scale"))
     weighed = [
         Weighed((name,), ((name,),), np.log(p), best)
@@ -215,8 +215,8 @@ def test_what_is_certain_of_the_unknown_is_its_headline(named, tmp_path):
     diagnosis = replace(
         named,
         **{"verdict": "unknown", "found": (), "gap": Gap(named.gap.before)},
-        beside=replace(named.beside, finding=Finding("unknown", named.setting)),
-        **{"extended": named.model, "final": named.setting, "reason": "too much is open"},
+        beside=replace(named.beside, finding=Finding("unknown", named.examined)),
+        **{"extended": named.model, "final": named.examined, "reason": "too much is open"},
         credible_set=explained(*(("thermal_bias", name, 0.19) for name in others)),
     )
     content = write_diagnosis(diagnosis, tmp_path)
@@ -248,18 +248,18 @@ def test_effects_of_time_are_told_apart_by_repeats_later():
         )
     )
     fit = fit_campaign(campaign, NINE, get_approach("robot"))
-    setting = setting_of(solve(fit.model, fit.approach, fit.observed))
-    drift, warm = (setting.candidates[name][0] for name in ("bias_drift", "warm_up"))
-    found = next_positions(setting.frame, (drift,), (warm,))
+    examined = examine(solve(fit.model, fit.approach, fit.observed))
+    drift, warm = (examined.candidates[name][0] for name in ("bias_drift", "warm_up"))
+    found = next_positions(examined.frame, (drift,), (warm,))
     assert all(position.anywhere and position.temperature is None for position in found)
     assert [position.later for position in found] == pytest.approx([30 * 60.0] * 3)
     assert [found[0].roll, found[0].pitch] == pytest.approx(campaign.angles[0], abs=0.01)
     assert found[0].separates == (("bias_drift",), ("warm_up",))
 
-    quadratic = setting.candidates["quadratic_scale"][0]
-    both = next_positions(setting.frame, (drift, quadratic), (warm, quadratic))
+    quadratic = examined.candidates["quadratic_scale"][0]
+    both = next_positions(examined.frame, (drift, quadratic), (warm, quadratic))
     assert both[0].separates == (("bias_drift",), ("warm_up",))
-    one = next_positions(setting.frame, (quadratic,), (setting.candidates["scale_asymmetry"][0],))
+    one = next_positions(examined.frame, (quadratic,), (examined.candidates["scale_asymmetry"][0],))
     assert not one[0].anywhere
     assert one[0].later is None
 

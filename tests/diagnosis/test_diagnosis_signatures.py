@@ -9,7 +9,7 @@ from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, campaign, design, shuffle
 from accelstudy.diagnosis.space.hypotheses import cosines, same_space
 from accelstudy.diagnosis.space.signatures import signature
 from accelstudy.diagnosis.worth.limits import signature_columns, upper_limits, visibilities
-from accelstudy.diagnosis.worth.visibility import campaign_setting
+from accelstudy.diagnosis.worth.visibility import examine_campaign
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise, session
@@ -43,13 +43,15 @@ def gravity():
     return design(directions, GRAVITY, some_holds(len(directions)))
 
 
-def alike(setting, one, other):
-    return any(same_space(a, b) for a in setting.candidates[one] for b in setting.candidates[other])
+def alike(examined, one, other):
+    return any(
+        same_space(a, b) for a in examined.candidates[one] for b in examined.candidates[other]
+    )
 
 
-def inside(setting, small, large):
+def inside(examined, small, large):
     """Smallest cosine between a space and the one that should contain it."""
-    (a,), (b,) = setting.candidates[small], setting.candidates[large]
+    (a,), (b,) = examined.candidates[small], examined.candidates[large]
     return cosines(a.ideal, b.ideal)[-1]
 
 
@@ -114,14 +116,14 @@ def test_what_an_effect_leaves_in_the_residuals(name, approach):
     effect = get_effect(name)
     directions = shuffled("fibonacci-30")
     hold = some_holds(len(directions))
-    setting = design(directions, approach, hold)
-    if name in setting.invisible:
+    examined = design(directions, approach, hold)
+    if name in examined.invisible:
         pytest.skip("invisible, which is tested below") if False else None
-        columns = np.zeros((len(setting.frame.residuals.design), len(effect.parameters)))
+        columns = np.zeros((len(examined.frame.residuals.design), len(effect.parameters)))
     else:
-        (h, *_) = [h for h in setting.candidates[name]]
+        (h, *_) = [h for h in examined.candidates[name]]
         effect = h.effect
-        columns = signature_columns(setting.frame, h)
+        columns = signature_columns(examined.frame, h)
     model = SensorModel("with", (*NINE.effects, effect))
     rng = np.random.default_rng(5)
     p = 1e-3 * effect.typical[0] * rng.choice([-1.0, 1.0], len(effect.parameters))
@@ -135,8 +137,8 @@ def test_what_an_effect_leaves_in_the_residuals(name, approach):
     fitted = left.z
     expected = columns @ p
     scale = np.linalg.norm(
-        setting.frame.residuals.whitened(
-            signature(effect, setting.frame.forces, setting.frame.angles, G, setting.frame.hold)
+        examined.frame.residuals.whitened(
+            signature(effect, examined.frame.forces, examined.frame.angles, G, examined.frame.hold)
         )
         @ p
     )
@@ -154,24 +156,24 @@ def test_an_effect_is_judged_in_the_settings_that_a_diagnosis_tries():
     directions = shuffled("fibonacci-30")
     directions[-3:] = [[0, 0, 1], [0, 0.01, 1], [0.01, 0, 1]]
     directions /= np.linalg.norm(directions, axis=1)[:, None]
-    setting = design(directions, GRAVITY, some_holds(30), seed=1)
-    rows = {row.name: row for row in visibilities(setting)}
+    examined = design(directions, GRAVITY, some_holds(30), seed=1)
+    rows = {row.name: row for row in visibilities(examined)}
     jump = rows["bias_jump"]
-    tried = [h.effect.spec for h in setting.candidates["bias_jump"]]
+    tried = [h.effect.spec for h in examined.candidates["bias_jump"]]
     assert {jump.easiest.spec, jump.hardest.spec} <= set(tried)
     assert 600 < jump.easiest.shape["t"] < 1200 < jump.hardest.shape["t"]
     assert jump.hardest_mdb > 5 * jump.mdb
-    limits = {limit.name: limit.value for limit in upper_limits(setting, 1.0, ())}
+    limits = {limit.name: limit.value for limit in upper_limits(examined, 1.0, ())}
     for name in ("bias_jump", "warm_up", "saturation"):
         assert rows[name].mdb < 3 * limits[name], name
     for row in rows.values():
-        if row.status == "visible" and len(setting.candidates[row.name]) == 1:
+        if row.status == "visible" and len(examined.candidates[row.name]) == 1:
             assert row.mdb == row.hardest_mdb, row.name
     assert rows["bias_drift"].easiest.shape == {}
 
 
 def test_a_sensor_whose_range_is_far_beyond_gravity_does_not_saturate():
     measured, _ = campaign(3)
-    assert "saturation" in campaign_setting(measured, NINE).candidates
-    wide = campaign_setting(replace(measured, full_range=8 * G), NINE)
+    assert "saturation" in examine_campaign(measured, NINE).candidates
+    wide = examine_campaign(replace(measured, full_range=8 * G), NINE)
     assert wide.invisible == ("gravity_error", "saturation")

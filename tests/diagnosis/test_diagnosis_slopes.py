@@ -10,7 +10,7 @@ from accelstudy.adjustment.quality import solve
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.space.hypotheses import Frame, setting_of
+from accelstudy.diagnosis.space.hypotheses import Frame, examine
 from accelstudy.diagnosis.space.signatures import signature, temperature_rate
 from accelstudy.diagnosis.space.slopes import Slopes, trimmed_mean_square
 from accelstudy.effects import Hold, effect_names, get_effect
@@ -191,10 +191,10 @@ def test_a_sensor_that_settles_in_the_first_hold_is_recognised_by_its_slope():
         campaign, ahead = settling(seed), []
         for one in (campaign, mute(campaign)):
             fit = fit_campaign(one, NINE, GRAVITY)
-            setting = setting_of(solve(fit.model, fit.approach, fit.observed, fit.adjustment))
+            examined = examine(solve(fit.model, fit.approach, fit.observed, fit.adjustment))
             explained = {
-                name: shapes.parts(setting.frame.residuals.z).max()
-                for name, shapes in setting.candidates.items()
+                name: shapes.parts(examined.frame.residuals.z).max()
+                for name, shapes in examined.candidates.items()
             }
             best = explained.pop("warm_up")
             ahead.append(best - max(explained.values()))
@@ -210,4 +210,4 @@ def test_a_sensor_that_settles_is_no_noise():
 
 def test_without_sigma_the_slopes_are_left_out():
     campaign = replace(settling(1), sigma_force=None)
-    assert diagnose(campaign, NINE).setting.frame.residuals.slopes == 0
+    assert diagnose(campaign, NINE).examined.frame.residuals.slopes == 0

@@ -1,4 +1,4 @@
-"""Simulated campaigns for the tests of the diagnosis, and their settings without noise."""
+"""Simulated campaigns for the tests of the diagnosis, and examined fits of ideal sensors."""
 
 import numpy as np
 from scipy.stats import binom
@@ -7,7 +7,7 @@ from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
-from accelstudy.diagnosis.space.hypotheses import setting_of
+from accelstudy.diagnosis.space.hypotheses import examine
 from accelstudy.effects import Hold
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
@@ -55,14 +55,14 @@ def shuffled(scheme, seed=4):
 
 
 def design(directions, approach=ROBOT, hold=None, model=NINE, noise=None, seed=None):
-    """The setting of a session of an ideal sensor: without noise, or with noise of a seed."""
+    """The examined fit of a session of an ideal sensor: without noise, or with noise of a seed."""
     noise = noise or Noise()
     ideal = session(model, np.zeros(model.n_parameters), directions, G, hold)
     if seed is None:
         observed = ideal.observations(noise)
     else:
         observed = ideal.draw(noise, 1, np.random.default_rng(seed))
-    return setting_of(solve(model, approach, observed))
+    return examine(solve(model, approach, observed))
 
 
 def most(count, level, error=1e-4):

@@ -15,7 +15,7 @@ from accelstudy.diagnosis.decision.search import Search
 from accelstudy.diagnosis.decision.verdict import Finding, lack_of_fit
 from accelstudy.diagnosis.evidence import noise as noises
 from accelstudy.diagnosis.evidence.noise import NoiseTest
-from accelstudy.diagnosis.space.hypotheses import Setting
+from accelstudy.diagnosis.space.hypotheses import ExaminedFit
 from accelstudy.diagnosis.space.residuals import Residuals
 
 LEVEL_NOISE = 0.01
@@ -30,14 +30,14 @@ class NoiseJudge:
     search: Search
     campaign: Campaign
 
-    def tests(self, setting: Setting) -> tuple[NoiseTest, ...]:
+    def tests(self, examined: ExaminedFit) -> tuple[NoiseTest, ...]:
         """All tests of the noise that the campaign allows, on the residuals of a fit."""
-        residuals, campaign = setting.frame.residuals.positions, self.campaign
+        residuals, campaign = examined.frame.residuals.positions, self.campaign
         chance = self.search.chance
         sigma = float(np.mean(residuals.sigmas[:, :3]))
         tests = []
         if self.search.level.known:
-            tests.append(self.level(setting))
+            tests.append(self.level(examined))
         tests += [
             noises.axis_test(residuals, chance),
             noises.colour_test(residuals, chance),
@@ -48,11 +48,11 @@ class NoiseJudge:
             tests.append(noises.within_hold_test(residuals, sigma, campaign.sd, campaign.n_samples))
         return tuple(tests)
 
-    def level(self, setting: Setting) -> NoiseTest:
+    def level(self, examined: ExaminedFit) -> NoiseTest:
         """Test the level of the noise; of the base fit as the calibration does, by its own Ω."""
-        if setting is self.search.setting:
+        if examined is self.search.examined:
             return noises.level_test(Residuals.of(self.search.first))
-        return noises.level_test(setting.frame.residuals.positions)
+        return noises.level_test(examined.frame.residuals.positions)
 
     @cached_property
     def resolution(self) -> NoiseTest:
@@ -80,33 +80,33 @@ class NoiseJudge:
 
     def judged(self, worst: NoiseTest) -> Finding:
         """Judge a finding about the noise, when no effect was significant."""
-        setting, posterior = self.search.setting, self.search.posterior
+        examined, posterior = self.search.examined, self.search.posterior
         if lack_of_fit(self.search) < REFUTED and worst.name != noises.STEPS:
             reason = (
                 "repeated positions agree better with each other than with the model, so it is not "
                 "the noise"
             )
-            return Finding("unknown", setting, reason, posterior=posterior)
+            return Finding("unknown", examined, reason, posterior=posterior)
         if worst.name != noises.LEVEL or worst.estimate[0] < 1:
-            return Finding("noise_model", setting, worst.remark, posterior=posterior)
+            return Finding("noise_model", examined, worst.remark, posterior=posterior)
         # Larger residuals may be an effect that the test for a pattern could not see.
         noise = posterior.of_noise
         if noise >= priors.MORE_PROBABLE:
-            return Finding("noise_model", setting, worst.remark, posterior=posterior)
+            return Finding("noise_model", examined, worst.remark, posterior=posterior)
         name = next(n for e in posterior.explanations for n in e.names if n not in noises.NOISES)
         reason = (
             f"{worst.remark}; it may be the noise (probability {noise:.2f}), but "
             f"{'something' if name == 'unknown' else 'an effect such as ' + name} is not excluded"
         )
-        return Finding("unknown", setting, reason, posterior=posterior)
+        return Finding("unknown", examined, reason, posterior=posterior)
 
-    def unit_variance(self, final: Setting) -> float:
+    def unit_variance(self, final: ExaminedFit) -> float:
         """Variance of unit weight: 1 if sigma is known and not refuted, else a posteriori."""
         if self.search.level.known and self.level(final).p_value >= REFUTED:
             return 1.0
         return final.frame.residuals.positions.variance
 
-    def sigma_source(self, final: Setting) -> str:
+    def sigma_source(self, final: ExaminedFit) -> str:
         """Where the noise level comes from."""
         return (
             "a-priori"

@@ -10,7 +10,7 @@ import numpy as np
 
 from accelstudy.adjustment.quality import Solution, solve
 from accelstudy.basics.errors import InputError
-from accelstudy.diagnosis.space.hypotheses import Hypothesis, Setting, Shapes
+from accelstudy.diagnosis.space.hypotheses import ExaminedFit, Hypothesis, Shapes
 from accelstudy.diagnosis.space.refinement import shaped as reshaped
 from accelstudy.diagnosis.space.refinement import strongest
 from accelstudy.sensors.models import composition_name
@@ -28,17 +28,17 @@ class Refits:
 
     Attributes
     ----------
-    setting : Setting, of the base fit
+    examined : ExaminedFit, of the base fit
     shapes : dict of name to shapes, refined
     """
 
-    setting: Setting
+    examined: ExaminedFit
     shapes: Mapping[str, Shapes]
 
     @property
     def base(self) -> Solution:
         """The base fit."""
-        return self.setting.frame.solution
+        return self.examined.frame.solution
 
     def extended_model(self, chosen: Sequence[Hypothesis]) -> SensorModel:
         """The base model with the effects of hypotheses added."""
@@ -81,12 +81,12 @@ class Refits:
                 continue
             from scipy.optimize import minimize_scalar  # slow to import, and seldom needed
 
-            values = [h.value for h in self.setting.candidates[start.name]]
+            values = [h.value for h in self.examined.candidates[start.name]]
             low = max((v for v in values if v < start.value), default=start.value / BEYOND)
             high = min((v for v in values if v > start.value), default=start.value * BEYOND)
 
             def omega(log: float, k: int = k, start: Hypothesis = start) -> float:
-                shaped = reshaped(self.setting, start, float(np.exp(log)))
+                shaped = reshaped(self.examined, start, float(np.exp(log)))
                 if shaped is None:
                     return self.base.omega
                 trial = self.refit([*sharp[:k], shaped, *sharp[k + 1 :]])
@@ -95,7 +95,7 @@ class Refits:
             found = minimize_scalar(
                 omega, bounds=np.log([low, high]), method="bounded", options={"xatol": 1e-4}
             )
-            shaped = reshaped(self.setting, start, float(np.exp(found.x)))
+            shaped = reshaped(self.examined, start, float(np.exp(found.x)))
             if shaped is not None and found.fun < omega(float(np.log(start.value))):
                 sharp[k] = shaped
         return sharp
@@ -111,7 +111,7 @@ class Refits:
         ----------
         chosen : hypotheses, each with the names of its class
         """
-        z = self.setting.frame.residuals.z
+        z = self.examined.frame.residuals.z
         alternatives = [
             [
                 best if name == best.name else strongest(self.shapes[name], z)

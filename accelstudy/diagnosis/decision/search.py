@@ -23,7 +23,7 @@ from accelstudy.diagnosis.evidence.field import UNKNOWN, Field, shape_weights
 from accelstudy.diagnosis.evidence.pairs import all_pairs
 from accelstudy.diagnosis.evidence.size import Evidence, Level, log_mean
 from accelstudy.diagnosis.evidence.unknown import unknown_beside
-from accelstudy.diagnosis.space.hypotheses import Hypothesis, Setting, Shapes, setting_of
+from accelstudy.diagnosis.space.hypotheses import ExaminedFit, Hypothesis, Shapes, examine
 from accelstudy.diagnosis.space.location import groups
 from accelstudy.diagnosis.space.refinement import refined, strongest
 from accelstudy.diagnosis.space.residuals import Residuals
@@ -81,9 +81,9 @@ class Search:
     # --- the fit --------------------------------------------------------------------------------
 
     @cached_property
-    def equal(self) -> Setting:
+    def equal(self) -> ExaminedFit:
         """The fit with equal axes."""
-        return setting_of(self.first)
+        return examine(self.first)
 
     @cached_property
     def axes(self) -> UnequalAxes:
@@ -93,7 +93,7 @@ class Search:
         return UnequalAxes.of(residuals, evidence, self.within)
 
     @cached_property
-    def setting(self) -> Setting:
+    def examined(self) -> ExaminedFit:
         """The base fit and the hypotheses about it.
 
         The axes are weighted by their noise where that they differ is the best that can be said of
@@ -115,22 +115,22 @@ class Search:
         mean = np.mean(np.sqrt(self.first.variances[:, :3]))
         shaped = np.broadcast_to(mean * sigma / np.mean(sigma), (len(self.first.variances), 3))
         observed = replace(self.first.observed, sigma_force=shaped)
-        return setting_of(solve(self.first.model, self.first.approach, observed))
+        return examine(solve(self.first.model, self.first.approach, observed))
 
     @property
     def residuals(self) -> Residuals:
         """Those of the base fit."""
-        return self.setting.frame.residuals
+        return self.examined.frame.residuals
 
     @cached_property
     def groups(self) -> dict[str, Spaces]:
         """Groups of regressors: direction, time and so on."""
-        return groups(self.setting)
+        return groups(self.examined)
 
     @cached_property
     def field(self) -> Field:
         """All candidates, side by side."""
-        return Field.of(self.setting.candidates, self.groups)
+        return Field.of(self.examined.candidates, self.groups)
 
     @cached_property
     def detection(self) -> Detection:
@@ -139,7 +139,7 @@ class Search:
 
     def first_shape(self, name: str) -> Hypothesis:
         """Shape of a candidate that explains most, of those that are tried at first."""
-        return strongest(self.setting.candidates[name], self.residuals.z)
+        return strongest(self.examined.candidates[name], self.residuals.z)
 
     # --- single hypotheses ----------------------------------------------------------------------
 
@@ -152,8 +152,8 @@ class Search:
         found = dict(zip(self.field.names, logs, strict=True))
         top = max(logs, default=0.0)
         return {
-            name: refined(self.setting, shapes) if found[name] > top - WORTH else shapes
-            for name, shapes in self.setting.candidates.items()
+            name: refined(self.examined, shapes) if found[name] > top - WORTH else shapes
+            for name, shapes in self.examined.candidates.items()
         }
 
     @cached_property
@@ -207,7 +207,7 @@ class Search:
             return (hypothesis.name,)
         if hypothesis.name not in self._members:
             own = self.probable_shapes(hypothesis.name)
-            names = self.setting.alike(own)
+            names = self.examined.alike(own)
             self._members[hypothesis.name] = tuple(sorted({*names, hypothesis.name}))
         return self._members[hypothesis.name]
 
@@ -226,7 +226,7 @@ class Search:
             return ()
         return tuple(
             (name, cosine)
-            for name, cosine in self.setting.nearest(best)
+            for name, cosine in self.examined.nearest(best)
             if cosine >= RIVAL and name not in members
         )
 
@@ -275,7 +275,7 @@ class Search:
         nothing = float(np.logaddexp.reduce(by_level))
         # Where the axes are weighted, that they differ needs no further evidence.
         unequal = nothing + np.log(priors.AXES) + self.axes.log_evidence
-        if self.setting is not self.equal:
+        if self.examined is not self.equal:
             unequal = float(by_level[0])
         tails = noises.tail_test(residuals.positions, self.chance)
         known = {
@@ -305,4 +305,4 @@ class Search:
     @cached_property
     def refits(self) -> Refits:
         """Rigorous fits with hypotheses."""
-        return Refits(self.setting, self.shapes)
+        return Refits(self.examined, self.shapes)

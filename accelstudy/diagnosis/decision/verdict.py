@@ -17,7 +17,7 @@ from accelstudy.diagnosis.decision.posterior import Posterior, Weighed, of_effec
 from accelstudy.diagnosis.decision.search import Search
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.noise import NOISES
-from accelstudy.diagnosis.space.hypotheses import Hypothesis, Setting, setting_of
+from accelstudy.diagnosis.space.hypotheses import ExaminedFit, Hypothesis, examine
 from accelstudy.diagnosis.space.location import LACK_OF_FIT
 from accelstudy.diagnosis.space.repeats import clusters
 from accelstudy.diagnosis.space.residuals import Residuals
@@ -50,14 +50,14 @@ class Finding:
     Attributes
     ----------
     verdict : str, "no_effect", "named", "narrowed", "gross_error", "noise_model" or "unknown"
-    setting : Setting, of the fit with what was chosen, or of the base fit
+    examined : ExaminedFit, of the fit with what was chosen, or of the base fit
     reason : str
     chosen : tuple of Choice
     posterior : Posterior or None, where something is missing
     """
 
     verdict: str
-    setting: Setting
+    examined: ExaminedFit
     reason: str = ""
     chosen: tuple[Choice, ...] = ()
     posterior: Posterior | None = None
@@ -80,13 +80,13 @@ def find(search: Search) -> Finding:
     fit = search.refits.best(list(zip(top.best, top.classes, strict=True)))
     if fit is None:
         reason = f"{_explained(top.names)} most of it, but a model with it has no solution"
-        return Finding("unknown", search.setting, reason, posterior=posterior)
+        return Finding("unknown", search.examined, reason, posterior=posterior)
     best, solution = fit
     left = _misfit(search, solution)
     if left:
         said = joined([words(name) for name in top.names])
         reason = f"with {said} added, the residuals are still {left}"
-        return Finding("unknown", search.setting, reason, posterior=posterior)
+        return Finding("unknown", search.examined, reason, posterior=posterior)
     return _with_a_fit(search, posterior, best, solution)
 
 
@@ -108,7 +108,7 @@ def _with_a_fit(
         verdict = "narrowed"
     else:
         return _without_a_fit(search, posterior)
-    return Finding(verdict, setting_of(solution), "", chosen, posterior)
+    return Finding(verdict, examine(solution), "", chosen, posterior)
 
 
 def _of_effects(credible: Sequence[Explanation]) -> float:
@@ -121,7 +121,7 @@ def _without_a_fit(search: Search, posterior: Posterior) -> Finding:
     first = posterior.explanations[0]
     if first.names[0] in NOISES and first.posterior >= priors.SURE:
         reason = NOISES[first.names[0]]
-        return Finding("noise_model", search.setting, reason, posterior=posterior)
+        return Finding("noise_model", search.examined, reason, posterior=posterior)
     if UNKNOWN in first.names:
         reason = "no effect or pair of effects of the catalogue explains it"
     else:
@@ -130,7 +130,7 @@ def _without_a_fit(search: Search, posterior: Posterior) -> Finding:
             f"{_explained(first.names)} it with a probability of {first.posterior:.2f} only, and "
             f"{second} with {posterior.explanations[1].posterior:.2f}"
         )
-    return Finding("unknown", search.setting, reason, posterior=posterior)
+    return Finding("unknown", search.examined, reason, posterior=posterior)
 
 
 def _explained(names: Sequence[str]) -> str:
@@ -213,7 +213,7 @@ def _misfit(search: Search, solution: Solution) -> str:
     ratio = float(np.sqrt(solution.omega / solution.redundancy))
     than_stated = f"{ratio:.2g} times the stated noise" if known else ""
     left = Residuals.of(solution)
-    labels = clusters(search.setting.frame.forces)
+    labels = clusters(search.examined.frame.forces)
     if len(labels) != len(solution.misclosures) or len(np.unique(labels)) == len(labels):
         return than_stated
     square, freedom = _of_repeats(left, LackOfFit.of(left, labels))

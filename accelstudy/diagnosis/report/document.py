@@ -79,9 +79,9 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
             }
             for change in d.changes
         ],
-        "invisible_effects": list(d.setting.invisible),
-        "untestable_effects": list(d.setting.untestable),
-        "untestable_reasons": dict(d.setting.untestable),
+        "invisible_effects": list(d.examined.invisible),
+        "untestable_effects": list(d.examined.untestable),
+        "untestable_reasons": dict(d.examined.untestable),
         "upper_limits": [
             {
                 "name": limit.name,
@@ -106,7 +106,7 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
             }
             for position in d.next_positions
         ],
-        "redundancy": d.setting.frame.residuals.redundancy,
+        "redundancy": d.examined.frame.residuals.redundancy,
         "n_positions": d.campaign.n_positions,
         "warnings": list(d.campaign.warnings),
     }
@@ -122,7 +122,7 @@ def _certain(d: Diagnosis) -> list[dict[str, Any]]:
             "posterior": number(part.posterior),
             "purity": number(part.purity),
         }
-        for part in statement(d.credible_set, cosine=cosine_in(d.setting)).certain
+        for part in statement(d.credible_set, cosine=cosine_in(d.examined)).certain
     ]
 
 

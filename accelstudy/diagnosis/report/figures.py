@@ -163,7 +163,7 @@ def _percent(probability: float | None) -> str:
 def residual_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
     """Residuals before and after against direction, time and temperature."""
     panels = _panels(diagnosis, positions)
-    refitted = diagnosis.final is not diagnosis.setting
+    refitted = diagnosis.final is not diagnosis.examined
     explained = diagnosis.extended is not diagnosis.model
     rows = ("before", "after") if refitted else ("before",)
     figure = new_figure(FULL, 12 + 46 * len(rows))
@@ -199,7 +199,7 @@ def _panels(
     diagnosis: Diagnosis, positions: pd.DataFrame
 ) -> dict[str, Callable[[str], NDArray[np.float64]]]:
     """Abscissas of the panels by their labels, each a function of the component."""
-    frame = diagnosis.setting.frame
+    frame = diagnosis.examined.frame
     unit = frame.forces / frame.solution.gravity
     panels: dict[str, Callable[[str], Array]] = {}
     if "residual_norm_before_mps2" in positions:

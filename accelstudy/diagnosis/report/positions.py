@@ -40,7 +40,7 @@ def positions_table(diagnosis: Diagnosis) -> pd.DataFrame:
     def column(values: Array | None) -> Array:
         return np.full(n, np.nan) if values is None else values
 
-    angles = d.setting.frame.angles
+    angles = d.examined.frame.angles
     table = {
         "position": campaign.positions,
         "time_s": column(campaign.time),

@@ -14,7 +14,7 @@ from itertools import combinations, product
 
 from accelstudy.diagnosis.decision.explanations import CREDIBLE, Explanation
 from accelstudy.diagnosis.report.families import family_of
-from accelstudy.diagnosis.space.hypotheses import Setting, cosines
+from accelstudy.diagnosis.space.hypotheses import ExaminedFit, cosines
 
 Names = tuple[str, ...]
 
@@ -156,11 +156,11 @@ def _without(explanation: Explanation, names: Sequence[str]) -> Explanation:
     )
 
 
-def cosine_in(setting: Setting) -> Callable[[str, str], float]:
+def cosine_in(examined: ExaminedFit) -> Callable[[str, str], float]:
     """Return what tells the largest canonical cosine of two effects; 0 of what is no effect."""
 
     def cosine(one: str, other: str) -> float:
-        shapes = [setting.candidates.get(name, ()) for name in (one, other)]
+        shapes = [examined.candidates.get(name, ()) for name in (one, other)]
         return max((float(cosines(a.ideal, b.ideal)[0]) for a, b in product(*shapes)), default=0.0)
 
     return cosine

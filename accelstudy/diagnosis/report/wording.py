@@ -113,9 +113,9 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
         )
     if judged(d):
         lines.append(confirmation(d))
-    if d.setting.invisible:
+    if d.examined.invisible:
         lines.append(
-            f"This campaign cannot see {joined([words(n) for n in d.setting.invisible])}, however "
+            f"This campaign cannot see {joined([words(n) for n in d.examined.invisible])}, however "
             "large."
         )
     return lines
@@ -124,11 +124,11 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
 def advice(diagnosis: Diagnosis) -> list[str]:
     """Say what, beside further positions, would show more."""
     d = diagnosis
-    hidden = [words(name) for name in d.setting.invisible if name != "gravity_error"]
+    hidden = [words(name) for name in d.examined.invisible if name != "gravity_error"]
     lines = []
     if hidden and not d.approach.uses_angles:
         lines.append(f"The angles of a robot in each position could show {joined(hidden)}.")
-    if "gravity_error" in d.setting.invisible:
+    if "gravity_error" in d.examined.invisible:
         lines.append("No position shows an error of g; it takes another measurement of gravity.")
     if "repeat" not in d.location and (d.verdict == "noise_model" or not d.sigma_known):
         lines.append("Repeated attitudes would show the noise from hold to hold without any model.")
@@ -226,8 +226,8 @@ def _refuted(d: Diagnosis) -> list[str]:
 
 def _weights(d: Diagnosis) -> list[str]:
     """Say how unequal axes are weighted."""
-    variances = d.setting.frame.solution.variances[0, :3]
-    if d.setting.frame.solution is d.base:
+    variances = d.examined.frame.solution.variances[0, :3]
+    if d.examined.frame.solution is d.base:
         return []
     parts = joined([number(float(v)) for v in variances / variances.mean()])
     return [f"The axes are weighted by their noise: x, y and z have {parts} of the mean variance."]

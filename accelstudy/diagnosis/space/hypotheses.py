@@ -333,7 +333,7 @@ class Frame:
 
 
 @dataclass(frozen=True)
-class Setting:
+class ExaminedFit:
     """A calibrated session and the hypotheses about it, evaluated when they are asked for first.
 
     Attributes
@@ -449,9 +449,9 @@ def implied_hold(solution: Solution, angles: Array) -> Hold:
     return replace(hold, roll=angles[:, 0], pitch=angles[:, 1], yaw=yaw)
 
 
-def setting_of(solution: Solution) -> Setting:
-    """Return the setting of a calibrated session."""
-    return Setting(Frame.of(solution))
+def examine(solution: Solution) -> ExaminedFit:
+    """Examine a calibrated session."""
+    return ExaminedFit(Frame.of(solution))
 
 
 def same_space(a: Hypothesis, b: Hypothesis) -> bool:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.diagnosis.evidence.chance import Chance
-from accelstudy.diagnosis.space.hypotheses import Frame, Setting
+from accelstudy.diagnosis.space.hypotheses import ExaminedFit, Frame
 from accelstudy.diagnosis.space.repeats import clusters
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.signatures import Moment, Signature, rate_of
@@ -26,9 +26,9 @@ LACK_OF_FIT = "lack_of_fit"
 """Everything but the differences of repeated positions, which are noise alone (pure error)."""
 
 
-def groups(setting: Setting) -> dict[str, Spaces]:
+def groups(examined: ExaminedFit) -> dict[str, Spaces]:
     """Groups that the campaign can show, each one space; beside repeats also the lack of fit."""
-    residuals, hold, n = setting.frame.residuals, setting.frame.hold, len(setting.frame.forces)
+    residuals, hold, n = examined.frame.residuals, examined.frame.hold, len(examined.frame.forces)
     found: dict[str, Spaces] = {}
 
     def add(name: str, course: Callable[[Moment], Array]) -> None:
@@ -43,17 +43,17 @@ def groups(setting: Setting) -> dict[str, Spaces]:
         if 0 < basis.shape[1] < residuals.redundancy:
             found[name] = Bases(basis, np.array([basis.shape[1]]))
 
-    for name, signatures in _signatures(setting.frame).items():
+    for name, signatures in _signatures(examined.frame).items():
         rows = [residuals.whitened(s) for s in signatures]
         if name == ROBOT and np.ptp(hold.column("yaw")) > 0:
             change = residuals.by_observations[..., :3] @ _of_yaw(hold.column("yaw"))
             rows.append(residuals.stacked(change))
         add_rows(name, np.concatenate(rows, axis=1))
     if hold.time is not None and np.ptp(hold.time) > 0:
-        add("slow_time", _slow_course(hold, setting.frame.forces))
+        add("slow_time", _slow_course(hold, examined.frame.forces))
     if hold.temperature is not None and np.ptp(hold.temperature) > 0:
-        add("temperature", _thermal_course(hold, setting.frame.forces))
-    labels = clusters(setting.frame.forces)
+        add("temperature", _thermal_course(hold, examined.frame.forces))
+    labels = clusters(examined.frame.forces)
     if len(np.unique(labels)) < n:
         same = LackOfFit.of(residuals, labels)
         repeats = Repeats(same, residuals.redundancy)

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.diagnosis.space.hypotheses import EffectShapes, Hypothesis, Setting, Shapes
+from accelstudy.diagnosis.space.hypotheses import EffectShapes, ExaminedFit, Hypothesis, Shapes
 
 Array = NDArray[np.float64]
 
@@ -22,41 +22,41 @@ def strongest(shapes: Shapes, z: Array) -> Hypothesis:
     return shapes[int(np.argmax(shapes.parts(z)))]
 
 
-def refined(setting: Setting, shapes: Shapes) -> Shapes:
+def refined(examined: ExaminedFit, shapes: Shapes) -> Shapes:
     """Add shapes between the neighbours of the best one, and again between those."""
-    z = setting.frame.residuals.z
+    z = examined.frame.residuals.z
     if not isinstance(shapes, EffectShapes) or len(shapes) < 2:
         return shapes
     if shapes[0].smooth is None:
-        return _completed(setting, shapes)
+        return _completed(examined, shapes)
     for _ in range(ROUNDS):
         best = int(np.argmax(shapes.parts(z)))
         around = (shapes[max(best - 1, 0)].value, shapes[min(best + 1, len(shapes) - 1)].value)
-        tried = _all_shaped(setting, shapes[best], np.geomspace(*around, BETWEEN + 2)[1:-1])
+        tried = _all_shaped(examined, shapes[best], np.geomspace(*around, BETWEEN + 2)[1:-1])
         fine = [*shapes, *(h for h in tried if h is not None)]
         shapes = EffectShapes.of(sorted(fine, key=lambda h: h.value))
     return shapes
 
 
-def shaped(setting: Setting, hypothesis: Hypothesis, value: float) -> Hypothesis | None:
+def shaped(examined: ExaminedFit, hypothesis: Hypothesis, value: float) -> Hypothesis | None:
     """Return a smooth effect with another value of its setting; None if it shows less."""
-    return _all_shaped(setting, hypothesis, [value])[0]
+    return _all_shaped(examined, hypothesis, [value])[0]
 
 
 def _all_shaped(
-    setting: Setting, hypothesis: Hypothesis, values: Iterable[float]
+    examined: ExaminedFit, hypothesis: Hypothesis, values: Iterable[float]
 ) -> list[Hypothesis | None]:
     """Likewise with several values."""
     assert hypothesis.effect is not None
     assert hypothesis.smooth is not None
     kind, name = type(hypothesis.effect), hypothesis.smooth
-    found = setting.frame.hypotheses([kind(**{name: float(f"{v:.6g}")}) for v in values])
+    found = examined.frame.hypotheses([kind(**{name: float(f"{v:.6g}")}) for v in values])
     return [h if h is not None and h.dim == hypothesis.dim else None for h in found]
 
 
-def _completed(setting: Setting, shapes: EffectShapes) -> EffectShapes:
+def _completed(examined: ExaminedFit, shapes: EffectShapes) -> EffectShapes:
     """Add shapes that were passed over next to the best one, until there are none."""
-    z, hold = setting.frame.residuals.z, setting.frame.hold
+    z, hold = examined.frame.residuals.z, examined.frame.hold
     while True:
         best = int(np.argmax(shapes.parts(z)))
         effect = shapes[best].effect
@@ -67,7 +67,7 @@ def _completed(setting: Setting, shapes: EffectShapes) -> EffectShapes:
                 other = shapes[near].effect
                 assert other is not None
                 between = effect.between(other, hold)
-                tried = setting.frame.hypotheses(between) if between else []
+                tried = examined.frame.hypotheses(between) if between else []
                 found = [h for h in tried if h is not None and h.dim == shapes[best].dim]
                 fine[max(best, near) : max(best, near)] = found
         if len(fine) == len(shapes):

@@ -98,7 +98,7 @@ def _on_the_part(
         if names[k] == OUTLIER:
             continue
         places, which = np.unique(shape[candidate == k], return_inverse=True)
-        hypotheses = [part.setting.candidates[names[k]][int(place)] for place in places]
+        hypotheses = [part.examined.candidates[names[k]][int(place)] for place in places]
         rows = np.flatnonzero(candidate == k)
         for i, (fit, rest) in enumerate(split.predictors(hypotheses)):
             some = rows[which == i]

@@ -59,7 +59,7 @@ def held_out(
     level : float, of the test that found something
     seeds : of the split, the resampling, the part, and the simulation
     """
-    frame, first = search.setting.frame, search.first
+    frame, first = search.examined.frame, search.first
     n, c = len(first.misclosures), search.first.approach.n_conditions
     k = sum(choice.best.dim for choice in finding.chosen)
     needed = int(np.ceil((first.design.shape[1] + k + 3) / c))
@@ -131,7 +131,7 @@ def _refit(part: Search, chosen: Sequence[Choice]) -> Solution | str:
     """Fit to a part with what was chosen; why not if that cannot be."""
     alternatives = []
     for choice in chosen:
-        shown = tuple(m for m in choice.members if m in part.setting.candidates)
+        shown = tuple(m for m in choice.members if m in part.examined.candidates)
         if not shown:
             return f"the fitted positions alone cannot show {choice.best.name}"
         alternatives.append((part.best_shape(shown[0]), shown))

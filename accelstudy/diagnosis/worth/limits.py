@@ -12,9 +12,9 @@ from accelstudy.adjustment.quality import noncentrality
 from accelstudy.diagnosis.space.hypotheses import (
     ALIKE,
     OUTLIER,
+    ExaminedFit,
     Frame,
     Hypothesis,
-    Setting,
     cosines,
 )
 from accelstudy.effects import Effect, get_effect
@@ -76,7 +76,7 @@ def whole_shapes(shapes: Sequence[Hypothesis]) -> list[Hypothesis]:
     return [h for h in shapes if h.effect is not None and h.dim == len(h.effect.parameters)]
 
 
-def upper_limits(setting: Setting, variance: float, named: Sequence[str]) -> list[UpperLimit]:
+def upper_limits(examined: ExaminedFit, variance: float, named: Sequence[str]) -> list[UpperLimit]:
     """95 % limits |p̂| + 1.96 σ of the parameters of all effects that were not found.
 
     Each effect is estimated beside the parameters of the model, in the shape that fits best of
@@ -84,17 +84,17 @@ def upper_limits(setting: Setting, variance: float, named: Sequence[str]) -> lis
     which a combination of parameters shows in no shape have no limit.
     """
     limits = []
-    for name, shapes in setting.candidates.items():
+    for name, shapes in examined.candidates.items():
         if name == OUTLIER or name in named:
             continue
         whole = whole_shapes(shapes)
         if not whole:
             continue
-        best = max(whole, key=lambda h: float(np.sum((setting.frame.residuals.z @ h.basis) ** 2)))
+        best = max(whole, key=lambda h: float(np.sum((examined.frame.residuals.z @ h.basis) ** 2)))
         assert best.effect is not None
-        columns = signature_columns(setting.frame, best)
+        columns = signature_columns(examined.frame, best)
         inverse = np.linalg.pinv(columns)
-        values = inverse @ setting.frame.residuals.z
+        values = inverse @ examined.frame.residuals.z
         sigma = np.sqrt(variance * np.sum(inverse**2, axis=1))
         bounds = np.abs(values) + 1.96 * sigma
         worst = int(np.argmax(bounds))
@@ -103,7 +103,9 @@ def upper_limits(setting: Setting, variance: float, named: Sequence[str]) -> lis
     return limits
 
 
-def visibilities(setting: Setting, alpha: float = 0.001, power: float = POWER) -> list[Visibility]:
+def visibilities(
+    examined: ExaminedFit, alpha: float = 0.001, power: float = POWER
+) -> list[Visibility]:
     """What a campaign can show of each effect that is not in its model.
 
     The MDB is the size √(λ0 / dᵀd) of a single parameter whose test of level `alpha` has `power`;
@@ -114,18 +116,18 @@ def visibilities(setting: Setting, alpha: float = 0.001, power: float = POWER) -
     """
     root = np.sqrt(noncentrality(1, alpha, power))
     rows = []
-    for name, shapes in setting.candidates.items():
+    for name, shapes in examined.candidates.items():
         if name == OUTLIER:
             continue
         judged = whole_shapes(shapes) or shapes
-        columns = [signature_columns(setting.frame, h) for h in judged]
+        columns = [signature_columns(examined.frame, h) for h in judged]
         sizes = [np.linalg.norm(c, axis=0) for c in columns]
         mdbs = [_size(root, s) for s in sizes]
         easiest, hardest = int(np.argmin(mdbs)), int(np.argmax(mdbs))
         best = judged[easiest]
-        near = setting.nearest(best)
+        near = examined.nearest(best)
         rivals = [
-            max(setting.candidates[other], key=lambda h: float(cosines(best.ideal, h.ideal)[0]))
+            max(examined.candidates[other], key=lambda h: float(cosines(best.ideal, h.ideal)[0]))
             for other, cosine in near
             if cosine <= ALIKE
         ]
@@ -149,11 +151,11 @@ def visibilities(setting: Setting, alpha: float = 0.001, power: float = POWER) -
         )
     rows += [
         Visibility(name, "invisible", unit=get_effect(name).parameters[0].unit)
-        for name in setting.invisible
+        for name in examined.invisible
     ]
     rows += [
         Visibility(name, "untestable", reason, unit=get_effect(name).parameters[0].unit)
-        for name, reason in setting.untestable.items()
+        for name, reason in examined.untestable.items()
     ]
     return sorted(rows, key=lambda row: row.name)
 

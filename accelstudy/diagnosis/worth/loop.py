@@ -115,7 +115,7 @@ def close_loop(diagnosis: Diagnosis, replicates: int = REPLICATES, seed: int = 1
     d = diagnosis
     if d.extended is d.model or d.leveling is None:
         return None
-    fits, hold = {"base": d.base, "extended": d.final.frame.solution}, d.setting.frame.hold
+    fits, hold = {"base": d.base, "extended": d.final.frame.solution}, d.examined.frame.hold
     kept = np.flatnonzero(kept_positions(d))
     noise = Noise(
         sigma_force=d.sigma_position,

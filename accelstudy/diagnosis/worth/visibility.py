@@ -11,7 +11,7 @@ from accelstudy.basics.units import display_unit, to_display
 from accelstudy.basics.wording import number
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.files.format import Campaign
-from accelstudy.diagnosis.space.hypotheses import Setting, setting_of
+from accelstudy.diagnosis.space.hypotheses import ExaminedFit, examine
 from accelstudy.diagnosis.worth.limits import visibilities
 from accelstudy.effects import Effect, get_effect
 from accelstudy.schemes import Scheme
@@ -20,9 +20,9 @@ from accelstudy.simulation.hold_plan import check_needs_no_plan
 from accelstudy.simulation.sessions import Noise, session
 
 
-def campaign_setting(
+def examine_campaign(
     campaign: Campaign, model: SensorModel, approach: Approach | None = None
-) -> Setting:
+) -> ExaminedFit:
     """Return what a campaign can show beside a model, with its own noise.
 
     Parameters
@@ -34,12 +34,12 @@ def campaign_setting(
     if approach is None:
         approach = get_approach("gravity" if campaign.angles is None else "robot")
     fit = fit_campaign(campaign, model, approach)
-    return setting_of(solve(fit.model, fit.approach, fit.observed, fit.adjustment))
+    return examine(solve(fit.model, fit.approach, fit.observed, fit.adjustment))
 
 
-def scheme_setting(
+def examine_scheme(
     scheme: Scheme, model: SensorModel, approach: Approach, noise: Noise | None = None
-) -> Setting:
+) -> ExaminedFit:
     """Return what a scheme can show beside a model; nothing is known of times and temperatures.
 
     Raises
@@ -50,13 +50,13 @@ def scheme_setting(
     check_needs_no_plan(model)
     ideal = session(model, np.zeros(model.n_parameters), scheme.directions)
     observed = ideal.observations(noise or Noise())
-    return setting_of(solve(model, approach, observed))
+    return examine(solve(model, approach, observed))
 
 
-def visibility_table(setting: Setting) -> pd.DataFrame:
+def visibility_table(examined: ExaminedFit) -> pd.DataFrame:
     """Table for people: one row per effect that is not in the model, in the units shown."""
     rows = []
-    for row in visibilities(setting):
+    for row in visibilities(examined):
 
         def shown(size: float, unit: str = row.unit, seen: bool = row.status == "visible") -> str:
             return number(float(to_display(size, unit))) if seen else "–"
