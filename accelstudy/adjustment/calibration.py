@@ -34,7 +34,7 @@ from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.tracing import TracedFunction, derivative, inverse, symbolic, symbols
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 from accelstudy.sensors.sensor import SensorModel, SensorTrace
 
 Array = NDArray[np.float64]
@@ -55,7 +55,7 @@ class Observations:
     sigma_angle : float or (n, 2) array, rad
     gravity : float or (R,) array, m/s²; one number where it is held fixed
     sigma_gravity : float, m/s²; 0 holds gravity fixed
-    hold : Hold, what else is known of the positions
+    hold : HoldConditions, what else is known of the positions
     initial : (u,) array, SI, initial values of the model's parameters; an ideal sensor if None
     slope, sd_slope : (n, 3) arrays, m/s²/s, of the output within each position, and its standard
         deviation, R = 1; the adjustment does not use them
@@ -67,7 +67,7 @@ class Observations:
     sigma_angle: ArrayLike = 0.0
     gravity: ArrayLike = STANDARD_GRAVITY
     sigma_gravity: float = 0.0
-    hold: Hold | None = None
+    hold: HoldConditions | None = None
     initial: Array | None = None
     slope: Array | None = None
     sd_slope: Array | None = None
@@ -169,7 +169,9 @@ class CalibrationEquations:
         b = sp.Matrix.hstack(sp.eye(3), -by_force * derivative(told, self.angles))
         return sp.Matrix.hstack(sp.Matrix(trace.output) - h, a, b)
 
-    def at(self, settings: Array, gravity: ArrayLike, hold: Hold | None) -> CalibrationConditions:
+    def at(
+        self, settings: Array, gravity: ArrayLike, hold: HoldConditions | None
+    ) -> CalibrationConditions:
         """Return the conditions for settings (s,), gravity (float, where fixed) and holds."""
         return CalibrationConditions(self, settings, gravity, hold)
 
@@ -181,7 +183,7 @@ class CalibrationConditions:
     equations: CalibrationEquations
     settings: Array
     gravity: ArrayLike
-    hold: Hold | None
+    hold: HoldConditions | None
 
     def linearise(self, parameters: Array, adjusted: Array, latent: Array) -> Linearisation:
         """Linearise; `latent` is f_a of the iteration before."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from accelstudy.adjustment import whitened_jacobian
 from accelstudy.approaches import Approach
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 from accelstudy.schemes import Scheme, get_scheme
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.hold_plan import HoldPlan
@@ -71,7 +71,7 @@ def diagnose(
     noise: Noise | None = None,
     parameters: Array | None = None,
     gravity: float = STANDARD_GRAVITY,
-    hold: Hold | None = None,
+    hold: HoldConditions | None = None,
 ) -> Design:
     """Diagnose what a scheme determines.
 
@@ -86,7 +86,7 @@ def diagnose(
     noise : Noise, optional
     parameters : (u,) array, SI, optional; the ideal sensor by default
     gravity : float, m/s²
-    hold : Hold, optional
+    hold : HoldConditions, optional
         What a session knows of its positions beyond their directions (temperature, time, …).
     """
     noise = noise or Noise()
@@ -131,7 +131,7 @@ def _design(
     noise: Noise,
     parameters: Array,
     gravity: float,
-    hold: Hold | None,
+    hold: HoldConditions | None,
 ) -> Array:
     """Design matrix (conditions, u) with unit weights."""
     ideal = session(model, parameters, scheme.directions, gravity, hold)

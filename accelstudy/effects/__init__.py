@@ -8,7 +8,7 @@ definition. To add one, write a module next to this file with a class under `reg
 from accelstudy.basics.registry import Hyper, import_modules
 from accelstudy.effects.base import (
     Effect,
-    Hold,
+    HoldConditions,
     Parameter,
     effect_names,
     effects_without,
@@ -20,7 +20,7 @@ from accelstudy.effects.lag import Course
 __all__ = [
     "Course",
     "Effect",
-    "Hold",
+    "HoldConditions",
     "Hyper",
     "Parameter",
     "effect_names",

@@ -43,7 +43,7 @@ STILL = 0.02
 
 
 OF_ALL = ("course", "full_range")
-"""Attributes of `Hold` that have not one value per position."""
+"""Attributes of `HoldConditions` that have not one value per position."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def after(when: Number, moment: Number, xp: Any) -> Number:
 
 
 @dataclass(frozen=True)
-class Hold:
+class HoldConditions:
     """What is known of the static holds (positions) besides the forces, in order of acquisition.
 
     Every column is optional and holds one value per position; an effect that needs a column that
@@ -102,16 +102,16 @@ class Hold:
     course: Course | None = None
     full_range: float | None = None
 
-    def take(self, positions: NDArray[np.int_]) -> Hold:
+    def take(self, positions: NDArray[np.int_]) -> HoldConditions:
         """Return some of the holds, which keep what came before them: steps and temperatures."""
         columns = {name: getattr(self, name) for name in self.columns()}
-        return Hold(
+        return HoldConditions(
             **{k: None if v is None else np.asarray(v)[positions] for k, v in columns.items()},
             course=self._whole_course(),
             full_range=self.full_range,
         )
 
-    def with_steps(self, forces: NDArray[np.float64]) -> Hold:
+    def with_steps(self, forces: NDArray[np.float64]) -> HoldConditions:
         """Return all holds, in order of acquisition, with what follows from it.
 
         These are the steps of forces (n, 3), m/s², and `order` unless it is known.
@@ -160,9 +160,9 @@ class Effect(Shaped):
     """One systematic effect; subclasses set the class attributes and override what they add.
 
     In the methods `p` is the tuple of the effect's own parameters, in which all formulas are
-    linear, `f` the specific force in sensor axes (f_a), `g` the local gravity, `hold` a `Hold`
-    whose columns are numbers, arrays or symbols, and `xp` the namespace of functions (``np`` or a
-    symbolic twin with the same names).
+    linear, `f` the specific force in sensor axes (f_a), `g` the local gravity, `hold` the
+    `HoldConditions`, whose columns are numbers, arrays or symbols, and `xp` the namespace of
+    functions (``np`` or a symbolic twin with the same names).
 
     Attributes
     ----------
@@ -206,11 +206,13 @@ class Effect(Shaped):
         kept = f"[{', '.join(p.name for p in self.parameters)}]" if self.partial else ""
         return super().spec + kept
 
-    def candidates(self, hold: Hold, f: NDArray[np.float64], g: float) -> Sequence[Effect]:
+    def candidates(
+        self, hold: HoldConditions, f: NDArray[np.float64], g: float
+    ) -> Sequence[Effect]:
         """Shapes of the effect that are worth a search in given holds with forces f (n, 3)."""
         return (self,)
 
-    def between(self, other: Effect, hold: Hold) -> Sequence[Effect]:
+    def between(self, other: Effect, hold: HoldConditions) -> Sequence[Effect]:
         """Shapes between two candidates that were passed over, as there are so many positions."""
         return ()
 

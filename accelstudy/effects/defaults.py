@@ -11,7 +11,7 @@ import sympy as sp
 
 from accelstudy.basics.tracing import symbolic, symbols
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.effects.base import AXES, Effect, Hold, Matrix
+from accelstudy.effects.base import AXES, Effect, HoldConditions, Matrix
 from accelstudy.effects.hold_symbols import HoldSymbols
 
 USUAL = (1e-4, 1e-3)
@@ -27,7 +27,7 @@ def formulas(effect: Effect) -> dict[str, Texts | list[Texts]]:
     -------
     dict
         "output" (3), "axes" (3 × 3) and "reading" (2), as far as they are not zero, of f_x, f_y,
-        f_z (m/s², along the sensitive axes), g, the parameters and the columns of `Hold`.
+        f_z (m/s², along the sensitive axes), g, the parameters and the columns of `HoldConditions`.
     """
     output, axes, reading = _expressions(effect)
     found: dict[str, Texts | list[Texts]] = {}
@@ -55,7 +55,7 @@ def typical_of(effect: Effect) -> tuple[float, float]:
     g, some = STANDARD_GRAVITY, 0.5
     forces = g * np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
     f, n = tuple(forces.T), np.ones(len(forces))
-    hold = Hold(
+    hold = HoldConditions(
         temperature=30.0 * n, time=600.0 * n, vibration=n,
         roll=some * n, pitch=some * n, yaw=some * n, step_x=g * n, step_y=g * n, step_z=g * n,
         order=600.0 * n,

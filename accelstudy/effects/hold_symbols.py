@@ -7,11 +7,11 @@ from typing import Any
 import sympy as sp
 
 from accelstudy.basics.tracing import symbols
-from accelstudy.effects.base import Hold
+from accelstudy.effects.base import HoldConditions
 
 
 class HoldSymbols:
-    """The columns of `Hold` as symbols, and what follows from them.
+    """The columns of `HoldConditions` as symbols, and what follows from them.
 
     Attributes
     ----------
@@ -21,7 +21,7 @@ class HoldSymbols:
 
     def __init__(self, prefix: str = "") -> None:
         self._prefix = prefix
-        names = Hold.columns()
+        names = HoldConditions.columns()
         self.columns = dict(zip(names, symbols(*(prefix + name for name in names)), strict=True))
         self.lagged_by: dict[Any, sp.Symbol] = {}
 

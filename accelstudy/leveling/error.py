@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import jacobian, roll_pitch
 from accelstudy.sensors.sensor import SensorModel
 
@@ -27,12 +27,12 @@ def cap_forces(max_tilt: float, attitudes: int, g: float = STANDARD_GRAVITY) -> 
     return -g * np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), z], axis=-1)
 
 
-def holds_in_use(hold: Hold, n: int, f_b: Array) -> Hold:
+def holds_in_use(hold: HoldConditions, n: int, f_b: Array) -> HoldConditions:
     """Return conditions like those of a calibration, in attitudes in which the sensor is used.
 
     Parameters
     ----------
-    hold : Hold, of the n positions of the calibration
+    hold : HoldConditions, of the n positions of the calibration
     n : int
     f_b : (k, 3) array, m/s², of the attitudes
     """
@@ -84,7 +84,7 @@ def tilt_error(
     reference: Array,
     f_b: Array,
     g: float = STANDARD_GRAVITY,
-    hold: Hold | None = None,
+    hold: HoldConditions | None = None,
 ) -> TiltError:
     """Propagate calibration errors to roll and pitch, without noise of the leveled reading.
 
@@ -98,7 +98,7 @@ def tilt_error(
     reference : (u,) array, SI, of the estimated model, near the estimates: their mean, say
     f_b : (k, 3) array, m/s², attitudes
     g : float, m/s²
-    hold : Hold, optional
+    hold : HoldConditions, optional
         What else is known of the attitudes, where effects depend on it.
     """
     reference = np.where(estimated.stays, reference, 0.0)
@@ -140,7 +140,7 @@ def leveling_error(
     estimates: Array,
     f_b: Array,
     g: float = STANDARD_GRAVITY,
-    hold: Hold | None = None,
+    hold: HoldConditions | None = None,
 ) -> LevelingError:
     """Propagate the errors of R calibrations about their mean; the rest is as in `tilt_error`.
 

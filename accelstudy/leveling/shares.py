@@ -15,7 +15,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import jacobian, specific_force
 from accelstudy.leveling.sensitivity import (
     FORCES,
@@ -43,7 +43,7 @@ Sds of 100 000 calibrations leave 0.6 % of it.
 
 
 def leveling_slope(
-    model: SensorModel, parameters: Array, f_s: Array, g: float, hold: Hold | None = None
+    model: SensorModel, parameters: Array, f_s: Array, g: float, hold: HoldConditions | None = None
 ) -> Array:
     """Derivatives of roll and pitch by the sensor's output and the parameters, (..., 2, 3 + u).
 
@@ -52,7 +52,7 @@ def leveling_slope(
     model, parameters : sensor model and its (u,) parameters, SI
     f_s : (..., 3) array, m/s², output of the sensor
     g : float, m/s²
-    hold : Hold, optional
+    hold : HoldConditions, optional
         What else is known of the attitudes, where effects depend on it.
     """
     by_inputs = [

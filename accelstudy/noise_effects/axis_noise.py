@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from accelstudy.basics.registry import Hyper
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 from accelstudy.noise_effects.base import Array, NoiseEffect, register
 
 
@@ -26,7 +26,9 @@ class AxisNoise(NoiseEffect):
     equation = "Var v_i = κ_i σ²"
     typical = (2.25, 4.0)
 
-    def disturb(self, noise: Array, sigma: float, hold: Hold, rng: np.random.Generator) -> Array:
+    def disturb(
+        self, noise: Array, sigma: float, hold: HoldConditions, rng: np.random.Generator
+    ) -> Array:
         """Return √κ_i v_i."""
         return self.within_hold * noise
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.registry import Shaped, ShapedRegistry
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 
 Array = NDArray[np.float64]
 
@@ -33,14 +33,16 @@ class NoiseEffect(Shaped):
     equation: ClassVar[str]
     typical: ClassVar[tuple[float, float]]
 
-    def disturb(self, noise: Array, sigma: float, hold: Hold, rng: np.random.Generator) -> Array:
+    def disturb(
+        self, noise: Array, sigma: float, hold: HoldConditions, rng: np.random.Generator
+    ) -> Array:
         """Return what becomes of the noise.
 
         Parameters
         ----------
         noise : (R, n, 3) array, m/s²
         sigma : float, m/s², nominal sd of a position mean
-        hold : Hold
+        hold : HoldConditions
         rng : Generator, of what the effect draws beyond the noise
         """
         return noise

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from accelstudy.basics.registry import Hyper
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 from accelstudy.noise_effects.base import Array, NoiseEffect, register
 
 
@@ -43,7 +43,9 @@ class ColouredNoise(NoiseEffect):
     equation = "v + m, ρ(m) = exp(−|Δt|/τ), Var m = share/(1 − share) σ²"
     typical = (0.2, 0.8)
 
-    def disturb(self, noise: Array, sigma: float, hold: Hold, rng: np.random.Generator) -> Array:
+    def disturb(
+        self, noise: Array, sigma: float, hold: HoldConditions, rng: np.random.Generator
+    ) -> Array:
         """Return v + m, with m_k = φ_k m_(k−1) + √(1 − φ_k²) ε_k and φ_k = exp(−Δt_k/τ)."""
         share, tau = self.shape["share"], self.shape["tau"]
         time = np.arange(float(noise.shape[1])) if hold.time is None else hold.time

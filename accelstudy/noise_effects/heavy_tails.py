@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from accelstudy.basics.registry import Hyper
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 from accelstudy.noise_effects.base import Array, NoiseEffect, register
 
 
@@ -22,7 +22,9 @@ class HeavyTails(NoiseEffect):
     equation = "v ~ σ √((ν − 2)/ν) t_ν"
     typical = (3.0, 10.0)
 
-    def disturb(self, noise: Array, sigma: float, hold: Hold, rng: np.random.Generator) -> Array:
+    def disturb(
+        self, noise: Array, sigma: float, hold: HoldConditions, rng: np.random.Generator
+    ) -> Array:
         """Return v √((ν − 2) / χ²_ν)."""
         nu = self.shape["nu"]
         return noise * np.sqrt((nu - 2) / rng.chisquare(nu, noise.shape))

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from accelstudy.basics.registry import Hyper
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 from accelstudy.noise_effects.base import Array, NoiseEffect, register
 
 
@@ -20,7 +20,9 @@ class NoiseLevel(NoiseEffect):
     equation = "Var v = κ σ²"
     typical = (0.6, 4.0)
 
-    def disturb(self, noise: Array, sigma: float, hold: Hold, rng: np.random.Generator) -> Array:
+    def disturb(
+        self, noise: Array, sigma: float, hold: HoldConditions, rng: np.random.Generator
+    ) -> Array:
         """Return √κ v."""
         return math.sqrt(self.shape["kappa"]) * noise
 

@@ -23,7 +23,7 @@ from scipy.special import gammaincinv
 from accelstudy.approaches import get_approach
 from accelstudy.design.estimability import SINGULAR
 from accelstudy.design.optimal.information import position_rows
-from accelstudy.effects import Hold, get_effect
+from accelstudy.effects import HoldConditions, get_effect
 from accelstudy.leveling.error import ATTITUDES, cap_forces, tilt_error
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
@@ -118,7 +118,7 @@ class Theory:
 
     def rows(self, directions: Array, approach: str, noise: Noise) -> Array:
         """Whitened rows of the model with every effect, (conditions, u)."""
-        hold = Hold(yaw=np.zeros(len(directions)))
+        hold = HoldConditions(yaw=np.zeros(len(directions)))
         rows = position_rows(self.model, get_approach(approach), noise, directions, hold=hold)
         return rows.reshape(-1, rows.shape[-1])
 

@@ -15,7 +15,7 @@ from accelstudy.basics.wording import joined
 from accelstudy.campaign.use.applying import read_calibration
 from accelstudy.data_sheets import DataSheet
 from accelstudy.design.estimability import diagnose
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 from accelstudy.effects.base import REFERENCE_TEMPERATURE
 from accelstudy.effects.lag import Course
 from accelstudy.leveling.angles import roll_pitch
@@ -79,7 +79,7 @@ class CalibratedSensor:
         per_kelvin = 0.0 if "scale" in self.corrected else self.sheet.scale_per_kelvin or 0.0
         return bias, per_kelvin * kelvin
 
-    def conditions(self, forces: Array, temperature_change: float) -> Hold | None:
+    def conditions(self, forces: Array, temperature_change: float) -> HoldConditions | None:
         """What effects depend on beside the force, in attitudes with forces (k, 3), m/s².
 
         All columns are (k, 1). The sensor has the temperature of the air and does not vibrate, and
@@ -90,7 +90,7 @@ class CalibratedSensor:
         roll, pitch = (angle[:, None] for angle in roll_pitch(tuple(forces.T)))
         zero = np.zeros_like(roll)
         then, warmth = zero + self.time, zero + self.temperature + temperature_change
-        return Hold(
+        return HoldConditions(
             temperature=warmth,
             time=then,
             vibration=zero,

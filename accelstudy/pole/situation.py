@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import jacobian as leveling_jacobian
 from accelstudy.leveling.angles import roll_pitch
 from accelstudy.pole.geometry import INPUTS, foot, jacobian, leaning
@@ -51,7 +51,7 @@ class Situation:
         return self.sensor.mounting.from_frd(self.forces)
 
     @cached_property
-    def hold(self) -> Hold | None:
+    def hold(self) -> HoldConditions | None:
         """What effects of the sensor depend on beside the force; each attitude is by itself."""
         return self.sensor.conditions(self.sensor_forces, self.setup.temperature_change)
 

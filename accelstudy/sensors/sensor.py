@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.tracing import TracedFunction, derivative, inverse, symbolic, symbols
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.effects import Effect, Hold, Parameter, get_effect
+from accelstudy.effects import Effect, HoldConditions, Parameter, get_effect
 from accelstudy.effects.hold_symbols import HoldSymbols
 
 
@@ -88,7 +88,7 @@ class SensorModel:
 
     @cached_property
     def hold_columns(self) -> tuple[str, ...]:
-        """Columns of `Hold` on which the output of the sensor or the robot's reading depends."""
+        """Columns of `HoldConditions` on which the output or the robot's reading depends."""
         trace = self.trace
         readings = trace.reading_errors(trace.force[:2])
         used = sp.Matrix([*trace.h, *trace.t_matrix, *readings]).free_symbols
@@ -103,7 +103,7 @@ class SensorModel:
         f_b: ArrayLike,
         parameters: ArrayLike,
         g: ArrayLike = STANDARD_GRAVITY,
-        hold: Hold | None = None,
+        hold: HoldConditions | None = None,
     ) -> NDArray[np.float64]:
         """Output of the sensor for a specific force in the body frame (forward, no noise).
 
@@ -112,7 +112,7 @@ class SensorModel:
         f_b : (..., n, 3) array, m/s²
         parameters : (..., u) array, SI
         g : float or (...) array, local gravity, m/s²
-        hold : Hold, optional
+        hold : HoldConditions, optional
             What else is known of the n positions; only effects that depend on it need it.
 
         Returns
@@ -126,7 +126,7 @@ class SensorModel:
         f_s: ArrayLike,
         parameters: ArrayLike,
         g: ArrayLike = STANDARD_GRAVITY,
-        hold: Hold | None = None,
+        hold: HoldConditions | None = None,
     ) -> NDArray[np.float64]:
         """Specific force in the body frame for a sensor output: the inverse of `sense`.
 
@@ -141,7 +141,7 @@ class SensorModel:
         f_s: ArrayLike,
         parameters: ArrayLike,
         g: ArrayLike = STANDARD_GRAVITY,
-        hold: Hold | None = None,
+        hold: HoldConditions | None = None,
     ) -> NDArray[np.float64]:
         """Derivative of `correct` with respect to the parameters, (..., n, 3, u)."""
         return self._corrected_by(self.trace.body_jacobian, f_s, parameters, g, hold)
@@ -151,7 +151,7 @@ class SensorModel:
         f_s: ArrayLike,
         parameters: ArrayLike,
         g: ArrayLike = STANDARD_GRAVITY,
-        hold: Hold | None = None,
+        hold: HoldConditions | None = None,
     ) -> NDArray[np.float64]:
         """Derivative of `correct` with respect to the sensor's output, (..., n, 3, 3)."""
         return self._corrected_by(self.trace.output_jacobian, f_s, parameters, g, hold)
@@ -162,7 +162,7 @@ class SensorModel:
         f_s: ArrayLike,
         parameters: ArrayLike,
         g: ArrayLike,
-        hold: Hold | None,
+        hold: HoldConditions | None,
     ) -> NDArray[np.float64]:
         f_a = np.moveaxis(self.sensitive_force(f_s, parameters, g, hold), -1, 0)
         x = np.moveaxis(np.asarray(parameters, dtype=float), -1, 0)
@@ -176,7 +176,7 @@ class SensorModel:
         f_s: ArrayLike,
         parameters: ArrayLike,
         g: ArrayLike = STANDARD_GRAVITY,
-        hold: Hold | None = None,
+        hold: HoldConditions | None = None,
     ) -> NDArray[np.float64]:
         """Specific force in the sensitive axes, f_a, for a sensor output; else as `correct`."""
         f_s = np.asarray(f_s, dtype=float)
@@ -196,7 +196,7 @@ class SensorModel:
         return self._apply(self.trace.body, np.eye(3), parameters, STANDARD_GRAVITY, None).T
 
     def reading_errors(
-        self, angles: ArrayLike, parameters: ArrayLike, hold: Hold | None = None
+        self, angles: ArrayLike, parameters: ArrayLike, hold: HoldConditions | None = None
     ) -> NDArray[np.float64]:
         """Return what the effects add to a robot's reading of roll and pitch.
 
@@ -207,7 +207,7 @@ class SensorModel:
         ----------
         angles : (n, 2) array, rad, roll and pitch of the attitude
         parameters : (u,) array, SI
-        hold : Hold, optional
+        hold : HoldConditions, optional
 
         Returns
         -------
@@ -222,7 +222,10 @@ class SensorModel:
         return errors
 
     def errors_of_reading(
-        self, reading: NDArray[np.float64], parameters: ArrayLike, hold: Hold | None = None
+        self,
+        reading: NDArray[np.float64],
+        parameters: ArrayLike,
+        hold: HoldConditions | None = None,
     ) -> NDArray[np.float64]:
         """Return the errors (..., n, 2) of a reading (..., n, 2); see `reading_errors`."""
         padded = np.concatenate([reading, np.zeros_like(reading[..., :1])], axis=-1)
@@ -234,7 +237,7 @@ class SensorModel:
         force: ArrayLike,
         parameters: ArrayLike,
         g: ArrayLike,
-        hold: Hold | None,
+        hold: HoldConditions | None,
         output: ArrayLike | None = None,
     ) -> NDArray[np.float64]:
         """Call a function of the trace, of vectors, components last: (..., n, 3) in and out."""
@@ -277,7 +280,7 @@ class SensorTrace:
 
     @property
     def hold(self) -> dict[str, sp.Symbol]:
-        """Symbols of the columns of `Hold`."""
+        """Symbols of the columns of `HoldConditions`."""
         return self._hold.columns
 
     @property
@@ -312,7 +315,7 @@ class SensorTrace:
         parameters: NDArray[np.float64],
         settings: NDArray[np.float64],
         g: NDArray[np.float64],
-        hold: Hold | None,
+        hold: HoldConditions | None,
         *more: NDArray[np.float64],
     ) -> NDArray[np.float64]:
         """Call a generated function, components first.
@@ -320,7 +323,7 @@ class SensorTrace:
         force, output : (3, ..., n); parameters : (u, ...); settings : (s,); g : (...); more :
         (..., n), arguments of the function beyond `arguments`. Returns (rows, columns, ..., n).
         """
-        hold = hold or Hold()
+        hold = hold or HoldConditions()
         columns = [
             hold.column(name) if symbol in function.used else 0.0
             for name, symbol in self.hold.items()

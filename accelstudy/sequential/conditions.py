@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from accelstudy.adjustment import Observations, whitened_jacobian
 from accelstudy.approaches import Approach
 from accelstudy.campaign.files.format import Campaign
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 from accelstudy.effects.base import REFERENCE_TEMPERATURE
 from accelstudy.leveling.angles import roll_pitch
 from accelstudy.sensors.sensor import SensorModel
@@ -20,10 +20,10 @@ INTERVAL = 60.0
 """s between two holds, as long as the session does not tell."""
 
 
-def next_holds(campaign: Campaign, directions: Array) -> Hold:
+def next_holds(campaign: Campaign, directions: Array) -> HoldConditions:
     """Conditions of each of k attitudes if it came next: as in the last position, a hold later."""
     k, n = len(directions), campaign.n_positions
-    last = campaign.hold.take(np.array([n - 1])) if n else Hold()
+    last = campaign.hold.take(np.array([n - 1])) if n else HoldConditions()
 
     def goes_on(value: Array | None, usual: float) -> Array:
         return np.full(k, usual if value is None else float(value[0]))
@@ -36,7 +36,7 @@ def next_holds(campaign: Campaign, directions: Array) -> Hold:
     f_b = -campaign.gravity * directions
     step = f_b - campaign.forces[-1] if n else np.zeros_like(f_b)
     roll, pitch = roll_pitch(tuple(f_b.T))
-    return Hold(
+    return HoldConditions(
         temperature=goes_on(last.temperature, REFERENCE_TEMPERATURE),
         time=time,
         vibration=goes_on(last.vibration, 0.0),

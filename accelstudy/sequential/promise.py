@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 from accelstudy.leveling.error import ATTITUDES, TiltError, cap_forces, holds_in_use, tilt_error
 from accelstudy.sensors.sensor import SensorModel
 
@@ -36,7 +36,7 @@ class Promise:
         model: SensorModel,
         parameters: Array | None = None,
         gravity: float = STANDARD_GRAVITY,
-        hold: Hold | None = None,
+        hold: HoldConditions | None = None,
     ) -> TiltError:
         """Tilt error of a calibration as a function of the errors of its parameters.
 
@@ -45,7 +45,7 @@ class Promise:
         model : SensorModel
         parameters : (u,) array, SI; those of an ideal sensor by default
         gravity : float, m/s²
-        hold : Hold, optional
+        hold : HoldConditions, optional
             Conditions of the positions, where effects depend on them; those in use are like them.
         """
         at = np.zeros(model.n_parameters) if parameters is None else parameters

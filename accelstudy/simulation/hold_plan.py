@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics import bounds
 from accelstudy.basics.errors import InputError, UnknownNameError
-from accelstudy.effects import Effect, Hold
+from accelstudy.effects import Effect, HoldConditions
 from accelstudy.leveling.angles import roll_pitch
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
@@ -63,21 +63,21 @@ class HoldPlan:
             (c for c, key in PROVIDES.items() if c in needed and getattr(self, key) is None), None
         )
 
-    def hold(self, n: int) -> Hold:
+    def hold(self, n: int) -> HoldConditions:
         """Return the holds of a session of n positions, without what follows from attitudes."""
         course = {
             "linear": np.linspace(0, 1, n),
             "ABBA": np.array([0.0, 1.0, 1.0, 0.0])[4 * np.arange(n) // n],
             "random": self._rng(0).uniform(0, 1, n),
         }
-        return Hold(
+        return HoldConditions(
             time=None if self.interval is None else self.interval * np.arange(float(n)),
             temperature=_between(self.temperature, course[self.temperature_order]),
             vibration=_between(self.vibration, self._rng(1).uniform(0, 1, n)),
             yaw=self._rng(2).uniform(-np.pi, np.pi, n) if self.yaw == "random" else np.zeros(n),
         )
 
-    def moved(self, hold: Hold, dt: float) -> Hold:
+    def moved(self, hold: HoldConditions, dt: float) -> HoldConditions:
         """Return conditions a moment later within each hold of a session, s.
 
         A temperature that rises steadily does so within the holds, too; one that is set is kept.
@@ -90,7 +90,7 @@ class HoldPlan:
         same = hold.take(np.arange(len(hold.time)))  # with the course of the whole session
         return replace(same, time=hold.time + dt, temperature=temperature)
 
-    def use(self, forces: Array, n: int) -> Hold:
+    def use(self, forces: Array, n: int) -> HoldConditions:
         """Return conditions in which a sensor is used that was calibrated in n positions.
 
         Parameters
@@ -100,7 +100,7 @@ class HoldPlan:
 
         Returns
         -------
-        Hold
+        HoldConditions
             The ranges of conditions are those of the calibration, and the attitudes are taken in
             random order.
         """
@@ -113,7 +113,7 @@ class HoldPlan:
             for ends in (session, self.temperature, self.vibration)
         )
         order = rng.permutation(k)
-        steps = Hold().with_steps(forces[order])
+        steps = HoldConditions().with_steps(forces[order])
         back = np.argsort(order)
         return replace(
             steps.take(back),

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment import Observations
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import roll_pitch
 from accelstudy.noise_effects import get_noise_effect
 from accelstudy.sensors.sensor import SensorModel
@@ -60,14 +60,14 @@ class Session:
     forces : (n, 3) array, m/s², sensor output without noise
     angles : (n, 2) array, rad, reading of the robot without noise
     gravity : float, m/s²
-    hold : Hold
+    hold : HoldConditions
     """
 
     f_b: Array
     forces: Array
     angles: Array
     gravity: float
-    hold: Hold
+    hold: HoldConditions
 
     def observations(self, noise: Noise) -> Observations:
         """Return the session as it would be observed without any noise, R = 1."""
@@ -111,7 +111,7 @@ def session(
     parameters: Array,
     directions: Array,
     gravity: float = STANDARD_GRAVITY,
-    hold: Hold | None = None,
+    hold: HoldConditions | None = None,
 ) -> Session:
     """Simulate a session without noise.
 
@@ -121,12 +121,12 @@ def session(
     parameters : (u,) array, SI
     directions : (n, 3) array of unit vectors, gravity in the body frame (f_b = −g · direction)
     gravity : float, m/s²
-    hold : Hold, optional
+    hold : HoldConditions, optional
         Columns that the simulation cannot derive from the directions (temperature, time, …).
     """
     f_b = -gravity * np.asarray(directions, dtype=float)
     roll, pitch = roll_pitch(tuple(f_b.T))
-    known = replace(hold or Hold(), roll=roll, pitch=pitch).with_steps(f_b)
+    known = replace(hold or HoldConditions(), roll=roll, pitch=pitch).with_steps(f_b)
     angles = np.stack([roll, pitch], axis=-1)
     return Session(
         f_b=f_b,

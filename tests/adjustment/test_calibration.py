@@ -24,7 +24,7 @@ from accelstudy.design.closed_forms import (
     gravity_sigma,
     perfect_robot_ratio,
 )
-from accelstudy.effects import Effect, Hold, Parameter
+from accelstudy.effects import Effect, HoldConditions, Parameter
 from accelstudy.effects.base import per_axis
 from accelstudy.leveling.angles import specific_force
 from accelstudy.schemes import get_scheme
@@ -464,7 +464,7 @@ class EncoderScale(Effect):
         return tuple(k * a for k, a in zip(p, angles, strict=True))
 
 
-TEMPERATURE = Hold(temperature=15 * np.sin(np.arange(24.0)))
+TEMPERATURE = HoldConditions(temperature=15 * np.sin(np.arange(24.0)))
 EXTENDED = {
     "temperature": (ThermalBias(), {"b_T_x": 2e-3, "b_T_y": -1e-3, "b_T_z": 3e-3}, TEMPERATURE),
     "previous position": (Hysteresis(), {"h_x": 3e-3, "h_y": -2e-3, "h_z": 4e-3}, None),

@@ -11,7 +11,7 @@ from accelstudy.adjustment.block import Block
 from accelstudy.adjustment.calibration import equations_of
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
-from accelstudy.effects import Hold, effect_names
+from accelstudy.effects import HoldConditions, effect_names
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
@@ -44,7 +44,7 @@ def drawn(model, noise, replicates, seed, scheme="mclaren-24"):
     parameters = 1e-3 * rng.standard_normal(model.n_parameters)
     positions = get_scheme(scheme)
     n = positions.n_positions
-    hold = Hold(temperature=rng.uniform(0, 40, n), time=60.0 * np.arange(n))
+    hold = HoldConditions(temperature=rng.uniform(0, 40, n), time=60.0 * np.arange(n))
     ideal = session(model, parameters, positions.directions, hold=hold)
     return ideal.draw(noise, replicates, rng)
 

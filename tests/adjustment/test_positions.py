@@ -31,7 +31,7 @@ from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.space.hypotheses import examine
 from accelstudy.diagnosis.space.location import groups
 from accelstudy.diagnosis.space.repeats import clusters
-from accelstudy.effects import Hold, get_effect
+from accelstudy.effects import HoldConditions, get_effect
 from accelstudy.simulation.sessions import Noise
 
 FEW, MANY = 400, 1600
@@ -262,7 +262,7 @@ def test_factors_of_the_axes_are_those_of_whole_matrices(examined):
 
 def test_a_jump_among_many_holds_is_found_where_it_is():
     """Not all times are searched at first; those next to the best one are looked at then."""
-    hold = Hold(time=60.0 * np.arange(1000))
+    hold = HoldConditions(time=60.0 * np.arange(1000))
     effect = get_effect("bias_jump")
     coarse = effect.candidates(hold, np.zeros((1000, 3)), 9.8)
     assert len(coarse) <= 50

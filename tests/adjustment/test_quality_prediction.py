@@ -26,7 +26,7 @@ from accelstudy.adjustment.quality import (
     solve,
 )
 from accelstudy.basics.units import MGON
-from accelstudy.effects import Effect, Hold
+from accelstudy.effects import Effect, HoldConditions
 from accelstudy.effects.base import per_axis
 from accelstudy.leveling.angles import roll_pitch, specific_force
 from accelstudy.schemes import get_scheme
@@ -47,7 +47,7 @@ class ThermalBias(Effect):
 
 def thermal_session(seed=2):
     model = SensorModel("nine + temperature", (*NINE.effects, ThermalBias()))
-    hold = Hold(temperature=15 * np.sin(np.arange(24.0)))
+    hold = HoldConditions(temperature=15 * np.sin(np.arange(24.0)))
     ideal = ideal_session("mclaren-24", model, hold)
     observed = ideal.draw(Noise(sigma_gravity=1e-5), 1, np.random.default_rng(seed))
     # A standard deviation of its own for each position and axis.

@@ -20,7 +20,7 @@ from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.files.layout import LogLayout
 from accelstudy.campaign.use.applying import read_calibration
 from accelstudy.campaign.use.leveling import level_log
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import specific_force
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.frames import parse_frame
@@ -95,7 +95,7 @@ def fitted(folder, effects, values, approach=GRAVITY, scheme="fibonacci-30", **c
         "vibration": rng.uniform(0, 2, n),
         "yaw": rng.uniform(-3, 3, n),
     }
-    simulated = session(model, model.vector(values), directions, hold=Hold(**conditions))
+    simulated = session(model, model.vector(values), directions, hold=HoldConditions(**conditions))
     drawn = simulated.draw(Noise(sigma_force=SIGMA, sigma_angle=0.1 * MGON), 1, rng)
     angles = {"angles": drawn.angles[0], "sigma_angle": 0.1 * MGON} if approach is ROBOT else {}
     campaign = Campaign(
@@ -119,7 +119,7 @@ def written_log(path, effects, values, **columns):
     """Log of a sensor that has effects, in known attitudes and conditions."""
     model = get_model(f"bias-scale-nonorthogonality+{effects}")
     f_b = np.column_stack(specific_force(*ATTITUDES.T, 9.80665))
-    hold = Hold(**{k: np.broadcast_to(v, len(f_b)) for k, v in columns.items()})
+    hold = HoldConditions(**{k: np.broadcast_to(v, len(f_b)) for k, v in columns.items()})
     forces = model.sense(f_b, model.vector(values), 9.80665, hold.with_steps(f_b))
     table = pd.DataFrame({**dict(zip(("fx", "fy", "fz"), forces.T, strict=True)), **columns})
     table.to_csv(path, index=False)
@@ -217,7 +217,7 @@ def test_a_drift_stays_where_the_session_left_it(tmp_path):
     np.testing.assert_allclose(errors_of(tmp_path / "day.csv")[1][5:], sigmas[5:], rtol=1e-9)
     reading = np.array([[0.1, 0.2, -9.8]])
     for time in (0.0, 300.0, SESSION):  # within the session it is the model's own
-        hold = Hold(time=np.array([time]))
+        hold = HoldConditions(time=np.array([time]))
         expected = calibration.model.correct(
             reading, calibration.parameters, calibration.gravity, hold
         )

@@ -13,7 +13,7 @@ from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.space.hypotheses import Frame, examine
 from accelstudy.diagnosis.space.signatures import signature, temperature_rate
 from accelstudy.diagnosis.space.slopes import Slopes, trimmed_mean_square
-from accelstudy.effects import Hold, effect_names, get_effect
+from accelstudy.effects import HoldConditions, effect_names, get_effect
 from accelstudy.sensors.models import compose
 
 FIRST, LATER, GAP, WHITE = 90.0, 10.0, 5.0, 0.012
@@ -66,8 +66,9 @@ def rate_of(name, hold):
 
 def test_rates_are_derivatives_of_the_definition_by_time():
     time = 60.0 * np.arange(12)
-    hold = Hold(time=time, temperature=20 + 0.01 * time, vibration=0 * time, roll=0 * time,
-                pitch=0 * time, yaw=0 * time).with_steps(np.eye(12, 3))  # fmt: skip
+    still = dict.fromkeys(("vibration", "roll", "pitch", "yaw"), 0 * time)
+    hold = HoldConditions(time=time, temperature=20 + 0.01 * time, **still)
+    hold = hold.with_steps(np.eye(12, 3))
     eye = np.eye(3)
     expected = {
         "bias_drift": np.ones(12),

@@ -8,7 +8,7 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.space.hypotheses import examine
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise, session
@@ -47,7 +47,7 @@ def some_holds(n, seed=3, **columns):
         "vibration": rng.uniform(0, 2, n),
         "yaw": rng.uniform(-np.pi, np.pi, n),
     }
-    return Hold(**{**known, **columns})
+    return HoldConditions(**{**known, **columns})
 
 
 def shuffled(scheme, seed=4):

@@ -27,7 +27,7 @@ from accelstudy.diagnosis.report.calibration import diagnosed_calibration
 from accelstudy.diagnosis.report.model_file import study_overlay
 from accelstudy.diagnosis.round_trip import parse_round_trip
 from accelstudy.drawing.style import model_title
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 from accelstudy.sensors.frames import parse_frame
 from accelstudy.sensors.models import get_model
 from accelstudy.study.cells.cell import study_cells
@@ -287,7 +287,9 @@ def test_a_stranger_implements_an_exported_calibration(diagnosed):
     path = diagnosed / "calibration.json"
     raw = np.random.default_rng(1).normal(0, 5, (5, 3))
     time, temperature = np.linspace(0, 1000, 5), np.linspace(10, 40, 5)
-    expected = read_calibration(path).correct(raw, Hold(time=time, temperature=temperature))
+    expected = read_calibration(path).correct(
+        raw, HoldConditions(time=time, temperature=temperature)
+    )
     text = run("export", path)
     found = by_the_export(text, raw, time=time, temperature=temperature)
     np.testing.assert_allclose(found, expected, atol=1e-9)

@@ -15,7 +15,7 @@ from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.design.estimability import diagnose
 from accelstudy.diagnosis.report.families import family_of
 from accelstudy.diagnosis.report.wording import GROUPS
-from accelstudy.effects import Course, Hold, effect_names, get_effect
+from accelstudy.effects import Course, HoldConditions, effect_names, get_effect
 from accelstudy.effects.base import STILL
 from accelstudy.leveling.angles import roll_pitch, specific_force
 from accelstudy.schemes import get_scheme
@@ -55,7 +55,7 @@ def some_hold(forces, seed=2, **columns):
         "vibration": rng.uniform(0, 1, n),
         "yaw": rng.uniform(-np.pi, np.pi, n),
     }
-    return Hold(**{**known, "roll": roll, "pitch": pitch, **columns}).with_steps(forces)
+    return HoldConditions(**{**known, "roll": roll, "pitch": pitch, **columns}).with_steps(forces)
 
 
 FORCES = G * np.random.default_rng(1).uniform(-1.2, 1.2, (40, 3))
@@ -253,7 +253,7 @@ def test_a_flange_gives_way_where_its_encoders_do_not_see_it():
 
 
 def test_a_slip_counts_the_holds_where_they_have_no_time():
-    hold = Hold().with_steps(FORCES)
+    hold = HoldConditions().with_steps(FORCES)
     found = added(
         get_effect("mounting_slip(t=12.5)"), np.ones(3), FORCES, some_hold(FORCES, time=None)
     )
@@ -293,7 +293,7 @@ def test_a_lag_is_a_setting_of_the_thermal_bias():
     # What came before some holds came before them, though they are left out.
     some = np.array([3, 17, 30])
     np.testing.assert_array_equal(HOLD.take(some).lagged(500), HOLD.lagged(500)[some])
-    assert [c.spec for c in plain.candidates(Hold(), FORCES, G)] == ["thermal_bias"]
+    assert [c.spec for c in plain.candidates(HoldConditions(), FORCES, G)] == ["thermal_bias"]
     lags = [c.shape["tau"] for c in plain.candidates(HOLD, FORCES, G)]
     assert lags[0] == 0
     assert lags[-1] < np.ptp(HOLD.time) / 3
@@ -354,7 +354,7 @@ def test_candidates_fit_the_session():
 @pytest.mark.parametrize("name", ["warm_up", "bias_jump"])
 def test_candidates_need_the_time(name):
     with pytest.raises(InputError, match="needs the column 'time' of each position; it is absent"):
-        get_effect(name).candidates(Hold(), FORCES, G)
+        get_effect(name).candidates(HoldConditions(), FORCES, G)
 
 
 @pytest.mark.parametrize(

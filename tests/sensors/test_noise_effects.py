@@ -8,7 +8,7 @@ from scipy import stats
 from study_helpers import grid, make_cells, make_study, simulated
 
 from accelstudy.basics.errors import InputError
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 from accelstudy.noise_effects import get_noise_effect, noise_effect_names
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
@@ -19,7 +19,7 @@ MODEL = get_model("bias-scale-nonorthogonality")
 SIGMA, R = 0.003, 4000
 TIME = np.cumsum(np.linspace(30, 90, 24))
 DIRECTIONS = get_scheme("mclaren-24").directions
-IDEAL = session(MODEL, np.zeros(9), DIRECTIONS, hold=Hold(time=TIME))
+IDEAL = session(MODEL, np.zeros(9), DIRECTIONS, hold=HoldConditions(time=TIME))
 
 
 def errors(*effects, seed=1, ideal=IDEAL, sigma=SIGMA):

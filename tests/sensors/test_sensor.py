@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY
-from accelstudy.effects import Effect, Hold, Parameter, effect_names, get_effect, register
+from accelstudy.effects import Effect, HoldConditions, Parameter, effect_names, get_effect, register
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import MODELS, PRESETS, TITLES, get_model
 from accelstudy.sensors.sensor import SensorModel
@@ -99,7 +99,7 @@ def test_generated_functions_equal_the_effects_in_numpy(name):
     f_a = tuple(np.linalg.inv(matrix) @ f_b.T)
     expected = np.array(f_a)
     for effect, q in own:
-        added = effect.output(f_a, q, G, Hold(), np)
+        added = effect.output(f_a, q, G, HoldConditions(), np)
         expected = expected + [np.broadcast_to(a, len(f_b)) for a in added]
     np.testing.assert_allclose(model.sense(f_b, p), expected.T, rtol=0, atol=1e-14 * G)
 

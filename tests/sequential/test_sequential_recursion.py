@@ -9,7 +9,7 @@ from accelstudy.adjustment.gauss_helmert import adjust
 from accelstudy.adjustment.quality import position_tests, solve
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.sequential.prior import Prior
@@ -40,7 +40,7 @@ def converged_to_the_end(monkeypatch):
 
 def observed(model, noise=None, n=N, sessions=SESSIONS):
     order = np.random.default_rng(1).permutation(n)
-    hold = Hold(time=60.0 * np.arange(n), yaw=np.zeros(n))
+    hold = HoldConditions(time=60.0 * np.arange(n), yaw=np.zeros(n))
     ideal = session(
         model, model.vector(VALUES), get_scheme(f"fibonacci-{n}").directions[order], hold=hold
     )

@@ -8,7 +8,7 @@ import pytest
 from accelstudy.adjustment import calibrate
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import roll_pitch
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
@@ -160,7 +160,9 @@ def test_the_first_position_makes_no_step():
 
 def test_columns_of_the_caller_are_kept():
     temperature, time = np.linspace(-5, 20, 24), 30.0 * np.arange(24)
-    known = session(MODEL, TRUTH, DIRECTIONS, hold=Hold(temperature=temperature, time=time)).hold
+    known = session(
+        MODEL, TRUTH, DIRECTIONS, hold=HoldConditions(temperature=temperature, time=time)
+    ).hold
     np.testing.assert_array_equal(known.temperature, temperature)
     np.testing.assert_array_equal(known.time, time)
     assert known.vibration is None

@@ -10,7 +10,7 @@ from scipy import special
 
 from accelstudy.adjustment.quality.solution import Solution
 from accelstudy.basics.units import GON
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 from accelstudy.effects.base import REFERENCE_TEMPERATURE
 from accelstudy.leveling.angles import jacobian, roll_pitch
 from accelstudy.leveling.error import cap_forces
@@ -122,8 +122,8 @@ def _leveling_slope(solution: Solution, max_tilt: float, attitudes: int) -> Arra
     p = np.where(model.stays, solution.parameters[: model.n_parameters], 0.0)
     f_b = cap_forces(max_tilt, attitudes, g)
     roll, pitch = roll_pitch(tuple(f_b.T))
-    at_rest = dict.fromkeys(Hold.columns(), np.zeros(attitudes))
+    at_rest = dict.fromkeys(HoldConditions.columns(), np.zeros(attitudes))
     reference = np.full(attitudes, REFERENCE_TEMPERATURE)
-    hold = Hold(**{**at_rest, "roll": roll, "pitch": pitch, "temperature": reference})
+    hold = HoldConditions(**{**at_rest, "roll": roll, "pitch": pitch, "temperature": reference})
     slope = model.correction_jacobian(model.sense(f_b, p, g, hold), p, g, hold)
     return jacobian(f_b) @ slope * model.stays

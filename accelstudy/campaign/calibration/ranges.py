@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.wording import counted
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 
 if TYPE_CHECKING:
     from accelstudy.campaign.calibration.fit import CampaignFit
@@ -64,7 +64,7 @@ class Watch:
         self._rows = dict.fromkeys((what for what, _, _ in known), 0)
         self._worst: dict[str, tuple[float, str, float]] = {}
 
-    def look_at(self, corrected: Array, hold: Hold) -> None:
+    def look_at(self, corrected: Array, hold: HoldConditions) -> None:
         """Take in calibrated forces (n, 3), m/s², and their conditions."""
         columns = {
             "temperature_degC": hold.temperature,

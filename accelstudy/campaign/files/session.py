@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.files.header import COLUMNS
 from accelstudy.campaign.files.layout import LogLayout
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 
 Array = NDArray[np.float64]
 
@@ -83,11 +83,11 @@ class Campaign:
         return len(self.forces)
 
     @property
-    def hold(self) -> Hold:
+    def hold(self) -> HoldConditions:
         """What is known of the holds besides the forces, as the effects take it."""
         # What came before a hold came before it, whether it is used or not.
         whole, used = self._rows()
-        session = Hold(time=whole.get("time"), temperature=whole.get("temperature"))
+        session = HoldConditions(time=whole.get("time"), temperature=whole.get("temperature"))
         session = session.with_steps(whole["forces"]).take(np.flatnonzero(used))
         roll, pitch = (None, None) if self.angles is None else self.angles.T
         return replace(

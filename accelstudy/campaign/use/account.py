@@ -16,7 +16,7 @@ from accelstudy.campaign.files.checks import likely_fault
 from accelstudy.campaign.logs.tables import column_names, numbers
 from accelstudy.campaign.use.applying import Calibration
 from accelstudy.campaign.use.readings import Readings
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 
 Array = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ class Account:
         self._first_empty: tuple[int, str | None] = (0, None)
         self.rows = self.empty = 0
 
-    def take(self, table: pa.Table, forces: Array, corrected: Array, hold: Hold) -> None:
+    def take(self, table: pa.Table, forces: Array, corrected: Array, hold: HoldConditions) -> None:
         """Take in rows, their readings and calibrated forces (k, 3), m/s² in frd, and conditions.
 
         Raises

@@ -17,7 +17,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.wording import one_line
 from accelstudy.campaign.files.header import Nominal, PerAxis
 from accelstudy.campaign.files.layout import LogLayout
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 from accelstudy.files.types import Finite, NotNegative, Number, Positive
 from accelstudy.files.validation import first_error
 from accelstudy.leveling.angles import jacobian, roll_pitch
@@ -52,7 +52,7 @@ class Calibration:
 
     @cached_property
     def needs(self) -> tuple[tuple[str, str], ...]:
-        """Effects that need more than a force, each with one of the columns of `Hold`."""
+        """Effects that need more than a force, each with one of the columns of `HoldConditions`."""
         if not self.model.hold_columns:
             return ()
         return tuple(
@@ -66,13 +66,13 @@ class Calibration:
         """Effects that drift with the session, and are kept as they were at its end."""
         return tuple(effect.name for effect in self.model.effects if effect.drifts)
 
-    def correct(self, forces: ArrayLike, hold: Hold | None = None) -> Array:
+    def correct(self, forces: ArrayLike, hold: HoldConditions | None = None) -> Array:
         """Calibrated specific force of readings.
 
         Parameters
         ----------
         forces : (n, 3) array, m/s², readings
-        hold : Hold, what else is known of them, as far as the effects need it
+        hold : HoldConditions, what else is known of them, as far as the effects need it
 
         Returns
         -------
@@ -82,7 +82,7 @@ class Calibration:
         return self.model.correct(forces, self.parameters, self.gravity, hold)
 
     def level(
-        self, forces: ArrayLike, sigma_force: float, hold: Hold | None = None
+        self, forces: ArrayLike, sigma_force: float, hold: HoldConditions | None = None
     ) -> tuple[Array, Array]:
         """Roll and pitch with standard deviations.
 
@@ -90,7 +90,7 @@ class Calibration:
         ----------
         forces : (n, 3) array, m/s², readings
         sigma_force : float, m/s², noise of a reading, per axis
-        hold : Hold, as in `correct`
+        hold : HoldConditions, as in `correct`
 
         Returns
         -------
@@ -109,7 +109,7 @@ class Calibration:
         variance += np.square(sigma_force) * np.sum(slope**2, axis=-1)
         return np.stack(roll_pitch(tuple(corrected.T)), axis=-1), np.sqrt(variance)
 
-    def _as_continued(self, forces: Array, hold: Hold | None) -> tuple[Array, Array]:
+    def _as_continued(self, forces: Array, hold: HoldConditions | None) -> tuple[Array, Array]:
         """Readings as they would be if drifts had continued, for the model that has it so.
 
         A drift is known in its session only. Beyond, the sensor keeps what it had at the end.
@@ -130,7 +130,7 @@ class Calibration:
             if effect.drifts:
                 f, p = tuple(forces.T), tuple(self.parameters[own])
                 then, end = (
-                    np.stack(effect.output(f, p, self.gravity, Hold(time=t), np), axis=-1)
+                    np.stack(effect.output(f, p, self.gravity, HoldConditions(time=t), np), axis=-1)
                     for t in (time, kept)
                 )
                 forces = forces + (then - end)

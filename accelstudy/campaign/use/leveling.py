@@ -20,7 +20,7 @@ from accelstudy.campaign.logs.tables import chunk_writer, is_parquet
 from accelstudy.campaign.use.account import Account, clipped
 from accelstudy.campaign.use.applying import Calibration
 from accelstudy.campaign.use.readings import Readings, readings_of
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 from accelstudy.sensors.frames import Frame
 
 Array = NDArray[np.float64]
@@ -125,7 +125,7 @@ def noise_of_reading(calibration: Calibration) -> float:
 
 
 def _leveled(
-    calibration: Calibration, frame: Frame, forces: Array, hold: Hold, noise: float
+    calibration: Calibration, frame: Frame, forces: Array, hold: HoldConditions, noise: float
 ) -> tuple[Array, dict[str, Array]]:
     """Calibrated forces in frd of readings (k, 3), m/s², and what is added to their rows."""
     with np.errstate(all="ignore"):  # what is not finite is counted, or a sigma without a meaning

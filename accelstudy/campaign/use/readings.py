@@ -19,7 +19,7 @@ from accelstudy.campaign.logs.sources import CHUNK, Source, open_source
 from accelstudy.campaign.logs.tables import column_names, numbers, read_chunks
 from accelstudy.campaign.use.applying import Calibration
 from accelstudy.campaign.use.export import mending, raw_conversion
-from accelstudy.effects import Course, Hold
+from accelstudy.effects import Course, HoldConditions
 from accelstudy.files.validation import first_error
 from accelstudy.sensors.frames import Frame
 
@@ -63,7 +63,7 @@ class Readings:
 
     def chunks(
         self, chunk_size: int = CHUNK, typed: bool = False
-    ) -> Iterator[tuple[pa.Table, Array, Hold]]:
+    ) -> Iterator[tuple[pa.Table, Array, HoldConditions]]:
         """Rows as they stand, their forces (k, 3) in m/s² in frd, and their conditions.
 
         See `read_chunks` for `typed`.
@@ -86,7 +86,7 @@ class Readings:
                 course = course.then(time, temperature)
             # A log does not tell the position before: effects that need it add nothing.
             still = np.zeros(len(table))
-            hold = Hold(
+            hold = HoldConditions(
                 time=time,
                 temperature=temperature,
                 vibration=values.get("vibration"),

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from accelstudy.adjustment import whitened_jacobian
 from accelstudy.approaches import Approach
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise, session
 
@@ -22,7 +22,7 @@ def position_rows(
     directions: ArrayLike,
     parameters: Array | None = None,
     gravity: float = STANDARD_GRAVITY,
-    hold: Hold | None = None,
+    hold: HoldConditions | None = None,
 ) -> Array:
     """Rows of the design that each position contributes, at unit weight.
 
@@ -40,7 +40,7 @@ def position_rows(
     directions : (k, 3) array of unit vectors, gravity in the body frame
     parameters : (u,) array, SI, optional; the ideal sensor by default
     gravity : float, m/s²
-    hold : Hold, optional
+    hold : HoldConditions, optional
         What else is known of the k positions.
 
     Returns

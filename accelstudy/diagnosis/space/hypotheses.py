@@ -17,7 +17,7 @@ from accelstudy.diagnosis.space.residuals import Residuals, ideal_residuals, pos
 from accelstudy.diagnosis.space.signatures import Moments, Signature, signatures
 from accelstudy.diagnosis.space.slopes import Slopes
 from accelstudy.diagnosis.space.spaces import VISIBLE, Bases, spans
-from accelstudy.effects import Effect, Hold, effect_names, get_effect
+from accelstudy.effects import Effect, HoldConditions, effect_names, get_effect
 from accelstudy.leveling.angles import roll_pitch
 
 Array = NDArray[np.float64]
@@ -231,7 +231,7 @@ class Frame:
     moments: Moments
 
     @property
-    def hold(self) -> Hold:
+    def hold(self) -> HoldConditions:
         """The holds with what is implied filled in."""
         return self.moments.hold
 
@@ -442,9 +442,9 @@ def cosines(a: Array, b: Array) -> Array:
     return np.clip(np.linalg.svd(a.T @ b, compute_uv=False), 0.0, 1.0)
 
 
-def implied_hold(solution: Solution, angles: Array) -> Hold:
+def implied_hold(solution: Solution, angles: Array) -> HoldConditions:
     """Complete the holds with what is implied: the attitude, and yaw 0 where none is given."""
-    hold = solution.observed.hold or Hold()
+    hold = solution.observed.hold or HoldConditions()
     yaw = np.zeros(len(angles)) if hold.yaw is None else hold.yaw
     return replace(hold, roll=angles[:, 0], pitch=angles[:, 1], yaw=yaw)
 

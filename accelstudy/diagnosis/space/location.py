@@ -14,7 +14,7 @@ from accelstudy.diagnosis.space.repeats import clusters
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.signatures import Moment, Signature, rate_of
 from accelstudy.diagnosis.space.spaces import ABSORBED, Bases, LackOfFit, Repeats, Spaces, span
-from accelstudy.effects import Hold, effect_names, get_effect
+from accelstudy.effects import HoldConditions, effect_names, get_effect
 
 Array = NDArray[np.float64]
 
@@ -67,7 +67,7 @@ def _of_yaw(yaw: Array) -> Array:
     return _per_axis(np.column_stack([f(k * yaw) for k in (1, 2) for f in (np.sin, np.cos)]))
 
 
-def _slow_course(hold: Hold, forces: Array) -> Callable[[Moment], Array]:
+def _slow_course(hold: HoldConditions, forces: Array) -> Callable[[Moment], Array]:
     """Biases that change smoothly in the time of holds, and scales that do in proportion to it."""
     unit = _between(hold.column("time"))
 
@@ -80,7 +80,7 @@ def _slow_course(hold: Hold, forces: Array) -> Callable[[Moment], Array]:
     return course
 
 
-def _thermal_course(hold: Hold, forces: Array) -> Callable[[Moment], Array]:
+def _thermal_course(hold: HoldConditions, forces: Array) -> Callable[[Moment], Array]:
     """Biases that change smoothly with temperature, and two orders of the scale in proportion."""
     unit = _between(hold.column("temperature"))
 

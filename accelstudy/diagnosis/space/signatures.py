@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from accelstudy.effects import Effect, Hold
+from accelstudy.effects import Effect, HoldConditions
 
 Array = NDArray[np.float64]
 
@@ -50,18 +50,18 @@ class Signature:
 
 
 class Moment:
-    """The columns of a `Hold` at some moment of each hold.
+    """The columns of a `HoldConditions` at some moment of each hold.
 
     One that is absent raises `InputError` when a formula uses it. They are computed once.
 
     Parameters
     ----------
-    hold : Hold
+    hold : HoldConditions
     dt : float, s, after the middle of each hold
     axes : int, number of axes after that of the holds
     """
 
-    def __init__(self, hold: Hold, dt: float = 0.0, axes: int = 0) -> None:
+    def __init__(self, hold: HoldConditions, dt: float = 0.0, axes: int = 0) -> None:
         self._hold, self._dt, self._axes = hold, dt, axes
         self._known: dict[str | float, Array] = {}
         self.used: set[str] = set()
@@ -104,19 +104,21 @@ class Moments:
 
     Attributes
     ----------
-    hold : Hold
+    hold : HoldConditions
     now : Moment
     around : tuple of Moment, `MOMENT` and twice that before and after; empty without a time, or
         where no rates are wanted
     """
 
-    def __init__(self, hold: Hold, rates: bool = True) -> None:
+    def __init__(self, hold: HoldConditions, rates: bool = True) -> None:
         self.hold, self.now = hold, Moment(hold, axes=2)
         steps = (-2, -1, 1, 2) if rates and hold.time is not None else ()
         self.around = tuple(Moment(hold, step * MOMENT, axes=2) for step in steps)
 
 
-def signature(effect: Effect, forces: Array, angles: Array, g: float, hold: Hold) -> Signature:
+def signature(
+    effect: Effect, forces: Array, angles: Array, g: float, hold: HoldConditions
+) -> Signature:
     """Signature of one effect; see `signatures`."""
     return signatures((effect,), forces, angles, g, Moments(hold))
 
@@ -191,7 +193,7 @@ def _together(shapes: Sequence[Effect]) -> Effect:
     return together
 
 
-def rate_of(output: Callable[[Moment], Array], hold: Hold) -> Array:
+def rate_of(output: Callable[[Moment], Array], hold: HoldConditions) -> Array:
     """Rate at which what depends on the holds changes within them, per s; a jump has none."""
     return _rate(*(output(Moment(hold, step * MOMENT)) for step in (-2, -1, 1, 2)))
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from accelstudy.adjustment import Observations
 from accelstudy.adjustment.calibration import CalibrationProblem
 from accelstudy.adjustment.quality import Solution, whitening_of
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 
 Array = NDArray[np.float64]
 
@@ -63,7 +63,7 @@ class HeldOutGap:
 
 
 def split_positions(
-    forces: Array, hold: Hold, count: int, rng: np.random.Generator
+    forces: Array, hold: HoldConditions, count: int, rng: np.random.Generator
 ) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
     """Split positions into fitted and held-out ones, alike in direction, time and temperature.
 
@@ -73,7 +73,7 @@ def split_positions(
     Parameters
     ----------
     forces : (n, 3) array, of an ideal sensor
-    hold : Hold
+    hold : HoldConditions
     count : int, positions to hold out
     rng : Generator
     """

@@ -21,7 +21,7 @@ from accelstudy.basics.units import MGON
 from accelstudy.diagnosis.report.positions import kept_positions
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.diagnosis.worth.tilt import in_use
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 from accelstudy.leveling.error import leveling_error
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise, session
@@ -162,7 +162,7 @@ def _comparable(variances: ArrayLike) -> NDArray[np.bool_]:
 
 
 def _session_table(
-    simulated: Solution, estimated: Solution, observed: Observations, hold: Hold
+    simulated: Solution, estimated: Solution, observed: Observations, hold: HoldConditions
 ) -> pd.DataFrame | None:
     """Calibrate simulated sessions; None if readings that were corrected so have no tilt."""
     result = _calibrated(estimated, observed)
@@ -199,7 +199,7 @@ def _tilt_errors(
     estimated: SensorModel,
     estimates: Array,
     g: float,
-    hold: Hold,
+    hold: HoldConditions,
 ) -> Array:
     """Rms of roll and pitch that each calibration leaves, in the holds of the campaign, rad."""
     f_b, used = in_use(hold, g)

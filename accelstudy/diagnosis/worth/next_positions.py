@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from accelstudy.design.proposal.separation import Explained, Separation
 from accelstudy.diagnosis.space.hypotheses import Frame, Hypothesis
 from accelstudy.diagnosis.space.signatures import signature
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import roll_pitch
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import compose
@@ -136,7 +136,7 @@ def _apart(forces: Array, order: Iterable[int], gravity: float) -> list[int]:
 
 def _grid(
     frame: Frame, attitudes: Array, needed: set[str], before: Array
-) -> tuple[Array, Hold, Array | None]:
+) -> tuple[Array, HoldConditions, Array | None]:
     """Forces (k, 3), holds and times after the session (k,) of the positions to choose from.
 
     All attitudes stand together for each time and temperature. The times are None where there is
@@ -160,7 +160,7 @@ def _grid(
     vibration = measured.vibration
     roll, pitch = roll_pitch(tuple(grid.T))
     step = grid - before
-    hold = Hold(
+    hold = HoldConditions(
         temperature=(
             None if measured.temperature is None else np.tile(np.repeat(levels, m), len(delays))
         ),
@@ -190,7 +190,7 @@ class _Rivals:
     def of(cls, frame: Frame, first: Explanation, second: Explanation) -> _Rivals:
         return cls(frame, (first, second), Separation.of(_fit(frame, first), _fit(frame, second)))
 
-    def columns(self, forces: Array, hold: Hold) -> tuple[Array, Array]:
+    def columns(self, forces: Array, hold: HoldConditions) -> tuple[Array, Array]:
         """Derivatives of what candidates show, in units of their noise, (k, c, p) of either."""
         angles = np.column_stack([hold.column("roll"), hold.column("pitch")])
         white = _whitening(self.frame, forces)
@@ -207,7 +207,7 @@ def _fit(frame: Frame, explanation: Explanation) -> Explained:
 
 
 def _derivatives(
-    frame: Frame, explanation: Explanation, forces: Array, angles: Array, hold: Hold
+    frame: Frame, explanation: Explanation, forces: Array, angles: Array, hold: HoldConditions
 ) -> Array:
     """Derivatives of the output by the parameters of the model and by those of the effects."""
     g, model = frame.solution.gravity, frame.solution.model

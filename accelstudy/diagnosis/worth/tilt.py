@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import Solution
 from accelstudy.basics.units import GON
-from accelstudy.effects import Hold
+from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import jacobian, roll_pitch
 from accelstudy.leveling.error import ATTITUDES, cap_forces, holds_in_use
 
@@ -16,12 +16,12 @@ Array = NDArray[np.float64]
 MAX_TILT = 50 * GON
 
 
-def in_use(hold: Hold, g: float) -> tuple[Array, Hold]:
+def in_use(hold: HoldConditions, g: float) -> tuple[Array, HoldConditions]:
     """Specific forces (n, 3) of all tilts up to 50 gon, and holds like those of a campaign.
 
     Parameters
     ----------
-    hold : Hold, of the campaign, with the attitudes
+    hold : HoldConditions, of the campaign, with the attitudes
     g : float, m/s²
     """
     f_b = cap_forces(MAX_TILT, ATTITUDES, g)
@@ -29,7 +29,7 @@ def in_use(hold: Hold, g: float) -> tuple[Array, Hold]:
 
 
 def leveling_rms(
-    base: Solution, extended: Solution, hold: Hold, variance: float
+    base: Solution, extended: Solution, hold: HoldConditions, variance: float
 ) -> tuple[float, float] | None:
     """Rms of roll and pitch, rad, that either calibration leaves if the extended model is right.
 
@@ -42,7 +42,7 @@ def leveling_rms(
     Parameters
     ----------
     base, extended : Solution
-    hold : Hold, of the campaign
+    hold : HoldConditions, of the campaign
     variance : float, of unit weight
     """
     g = extended.gravity

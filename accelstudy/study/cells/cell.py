@@ -13,7 +13,7 @@ import numpy as np
 
 from accelstudy.approaches import Approach, approach_names, get_approach
 from accelstudy.basics.units import MGON
-from accelstudy.effects import Hold, get_effect
+from accelstudy.effects import HoldConditions, get_effect
 from accelstudy.noise_effects import get_noise_effect
 from accelstudy.schemes import Scheme, get_scheme, scheme_names
 from accelstudy.schemes.files import held
@@ -91,7 +91,7 @@ class Cell:
         return get_approach(self.approach)
 
     @property
-    def hold(self) -> Hold:
+    def hold(self) -> HoldConditions:
         """What is known of the holds, without what follows from their attitudes."""
         return self.holds.hold(self.positions.n_positions)
 

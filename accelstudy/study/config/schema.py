@@ -100,7 +100,7 @@ class NoiseConfig(Block):
     )
 
 
-class HoldsConfig(Block):
+class HoldPlanConfig(Block):
     """Conditions of the holds, on which some effects depend."""
 
     interval_s: Interval | None = Field(None, description="time between holds")
@@ -196,7 +196,7 @@ class StudyConfig(Block):
     seed: Seed = Field(description="seed of all random numbers")
     gravity_mps2: Gravity = Field(STANDARD_GRAVITY, description="true local gravity")
     noise: NoiseConfig = NoiseConfig()
-    holds: HoldsConfig = HoldsConfig()
+    holds: HoldPlanConfig = HoldPlanConfig()
     sensor: dict[str, Quantity] = Field(
         default_factory=dict,
         description="true parameters of the simulated sensor, by effect: its name, or its name "
