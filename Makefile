@@ -24,7 +24,7 @@ export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: help env test test-cluster test-faults smoke reproduce anew unlock report campaigns diagnose-example plan-example hidden-effects hidden-docs benchmarks lint lock clean
+.PHONY: help env test test-cluster test-faults smoke reproduce anew unlock report campaigns diagnose-example plan-example hidden-effects hidden-docs benchmarks docs lint lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-18s%s\n", $$1, $$2 }' Makefile
@@ -76,12 +76,15 @@ hidden-effects: $(READY) ## study how well the diagnosis finds what is hidden
 # Of the study as it stands in config/, whatever HIDDEN is.
 hidden-docs: $(READY) ## study hidden effects, and take score and figures into docs
 	$(MAKE) hidden-effects HIDDEN=config/hidden-effects.yaml
-	cp results/hidden-effects/score.md docs/hidden-effects-score.md
+	cp results/hidden-effects/score.md docs/guides/hidden-effects-score.md
 	for name in alarms naming methods sets calibration confusion outside limits; do \
 	  cp results/hidden-effects/figures/$$name.png docs/figures/hidden-$$name.png; done
 
 benchmarks: $(READY) ## measure the speed, and take tables and figure into docs
-	python benchmarks/run.py docs/speed.md
+	python benchmarks/run.py docs/guides/speed.md docs/figures/speed.png
+
+docs: $(READY) ## build the documentation in site/, offline; open site/index.html
+	NO_MKDOCS_2_WARNING=1 mkdocs build --strict --quiet
 
 # Snakemake's own check of the workflows is a test, as starting it takes longer.
 lint: $(READY) ## check style and types

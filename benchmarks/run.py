@@ -1,10 +1,10 @@
 """All benchmarks of speed, and the tables and the figure that show them.
 
-    python benchmarks/run.py [PAGE]
+    python benchmarks/run.py [PAGE FIGURE]
 
-PAGE is a Markdown file, such as docs/speed.md: its tables are replaced, and beside it
-figures/speed.png is. Without it the tables are printed, and no more. It takes some minutes. All
-works take turns, and processor time is taken, so that what else the machine does hits all alike.
+PAGE is a Markdown file, such as docs/guides/speed.md: its tables are replaced. FIGURE is the PNG
+to write. Without them the tables are printed, and no more. It takes some minutes. All works take
+turns, and processor time is taken, so that what else the machine does hits all alike.
 """
 
 import os
@@ -65,7 +65,7 @@ def main(arguments):
             page = put(page, name, text)
         path.write_text(page)
         figure.draw(
-            path.parent / "figures" / "speed.png",
+            Path(arguments[1]),
             results[speeds][0], results[growth], results[cores],
         )  # fmt: skip
 

@@ -11,7 +11,7 @@ it does bias Ω/r: who looks after each position and stops when the accuracy see
 Ω/r happens to be small. What is used here is an upper confidence bound of the variance, from some
 redundancy on. As it is looked at again and again, its level is higher than that of the promise.
 By simulation the promise then holds in about 95 % of the sessions or more, whatever is promised
-(docs/sequential.md).
+(docs/guides/sequential.md).
 """
 
 from __future__ import annotations

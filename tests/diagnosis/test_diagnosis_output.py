@@ -76,7 +76,7 @@ HEADLINES = {
 
 
 SCHEMA = Draft202012Validator(
-    yaml.safe_load((ROOT / "docs/diagnosis.schema.yaml").read_text(encoding="utf-8"))
+    yaml.safe_load((ROOT / "docs/reference/diagnosis.schema.yaml").read_text(encoding="utf-8"))
 )
 
 

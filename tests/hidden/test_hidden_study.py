@@ -170,9 +170,9 @@ def test_a_family_that_is_taken_out():
 
 def test_the_score_in_the_documents_is_that_of_the_study():
     """Of this configuration and, where the study was run here, of this very run."""
-    path = ROOT / "docs/hidden-effects-score.md"
+    path = ROOT / "docs/guides/hidden-effects-score.md"
     if not path.exists():
-        pytest.skip("docs/hidden-effects-score.md is not written yet (make hidden-docs)")
+        pytest.skip("docs/guides/hidden-effects-score.md is not written yet (make hidden-docs)")
     text = path.read_text(encoding="utf-8")
     config = parse_hidden(read_layer(ROOT / "config/hidden-effects.yaml"))
     assert f"configuration `{config.fingerprint}`, seed {config.seed}" in text
@@ -181,7 +181,7 @@ def test_the_score_in_the_documents_is_that_of_the_study():
 
 
 def test_the_documents_name_every_figure_set_and_method():
-    text = (ROOT / "docs/hidden-effects.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs/guides/hidden-effects.md").read_text(encoding="utf-8")
     make = (ROOT / "Makefile").read_text(encoding="utf-8")
     for name in (*figures({}), *SETS, *METHODS, *TABLES):
         assert f"| `{name}` |" in text

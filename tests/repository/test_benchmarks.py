@@ -65,7 +65,7 @@ def test_the_page_of_speed_has_a_place_for_each_table(monkeypatch):
     from page import put
     from run import NAMES
 
-    page = (BENCHMARKS.parent / "docs" / "speed.md").read_text()
+    page = (BENCHMARKS.parent / "docs/guides/speed.md").read_text()
     assert page.count("<!-- end of ") == len(NAMES)
     for name in NAMES:
         put(page, name, "")

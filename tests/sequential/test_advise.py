@@ -385,7 +385,7 @@ def test_attitudes_in_degrees():
 
 
 def test_the_page_can_be_followed_word_by_word(tmp_path, monkeypatch):
-    page = (ROOT / "docs/sequential.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/guides/sequential.md").read_text(encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     blocks = re.findall(r"(?:^ {4}.*\n)+", page.partition("## To try it")[2], re.MULTILINE)
     commands, answer, watch, arrive, last = (
@@ -421,7 +421,7 @@ def test_the_page_can_be_followed_word_by_word(tmp_path, monkeypatch):
 
 
 def test_the_python_of_the_page_runs(capsys):
-    page = (ROOT / "docs/sequential.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/guides/sequential.md").read_text(encoding="utf-8")
     (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     exec(code, {})
     lines = capsys.readouterr().out.splitlines()

@@ -55,7 +55,7 @@ CAMPAIGN_COLUMNS = {
     "verdict": "string",
     "warnings": "string",
 }
-"""Columns of the table of campaigns and their types; docs/campaign-format.md says what they are."""
+"""Columns of the table of campaigns and their types (docs/guides/campaign-format.md)."""
 
 PARAMETER_COLUMNS = {
     "campaign": "string",

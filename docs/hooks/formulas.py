@@ -1,0 +1,62 @@
+"""Draw the formulas of a page, so that it needs neither script nor font."""
+
+import html
+import re
+
+from matplotlib.font_manager import FontProperties
+from matplotlib.path import Path
+from matplotlib.textpath import TextPath, text_to_path
+
+FONT = FontProperties(size=100, math_fontfamily="stix")
+"""Its size is 100 units an em."""
+LETTERS = {Path.MOVETO: "M", Path.LINETO: "L", Path.CURVE3: "Q", Path.CURVE4: "C"}
+
+
+def svg(tex):
+    """A formula as SVG, as large as the text around it and on its baseline.
+
+    Parameters
+    ----------
+    tex : str
+        TeX without dollars, of the kind that Matplotlib's mathtext knows.
+    """
+    text = f"${tex}$"
+    width, height, depth = text_to_path.get_text_width_height_descent(text, FONT, ismath=True)
+    parts = []
+    for points, code in TextPath((0, 0), text, prop=FONT).iter_segments():
+        points = [f"{x:.0f} {-y:.0f}" for x, y in points.reshape(-1, 2)]
+        parts.append("Z" if code == Path.CLOSEPOLY else LETTERS[code] + " ".join(points))
+    box = f"0 {depth - height:.0f} {width:.0f} {height:.0f}"
+    style = (
+        f"width:{width / 100:.2f}em;height:{height / 100:.2f}em;vertical-align:{-depth / 100:.2f}em"
+    )
+    return (
+        f'<svg role="img" aria-label="{html.escape(tex)}" viewBox="{box}" style="{style}">'
+        f'<path d="{"".join(parts)}"/></svg>'
+    )
+
+
+def on_page_content(content, page, **_):
+    """Replace the formulas that arithmatex marked; one that cannot be drawn ends the build."""
+
+    def inline(found):
+        return f'<span class="formula">{drawn(found[1])}</span>'
+
+    def block(found):
+        lines = re.split(r"\\\\", html.unescape(found[1]).strip())
+        rows = "".join(f"<span>{drawn(line)}</span>" for line in lines if line.strip())
+        return f'<div class="formula">{rows}</div>'
+
+    def drawn(tex):
+        tex = " ".join(html.unescape(tex).split())
+        try:
+            return svg(tex)
+        except ValueError as error:
+            raise ValueError(f"{page.file.src_uri}: cannot draw ${tex}$: {error}") from None
+
+    content = re.sub(
+        r'<span class="arithmatex">\\\((.*?)\\\)</span>', inline, content, flags=re.DOTALL
+    )
+    return re.sub(
+        r'<div class="arithmatex">\s*\\\[(.*?)\\\]\s*</div>', block, content, flags=re.DOTALL
+    )
