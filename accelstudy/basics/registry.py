@@ -63,16 +63,17 @@ class Registry(Generic[Item]):
 
 
 @dataclass(frozen=True)
-class Hyper:
-    """A number that shapes a thing; it is chosen or searched, not adjusted.
+class Setting:
+    """A number that an effect or error takes; it is chosen or searched for, never adjusted.
 
     Parameters
     ----------
     name, unit : str
-    default : float; NaN leaves it open, and who uses the thing draws it
-    above, below : float, between which it lies
-    none : float, where the thing lacks what is shaped; allowed beside these, and left unsaid
-    smooth : bool, whether the thing changes smoothly with it, so that a search can be refined
+    default : float; NaN leaves it open, and it is drawn where the effect is used
+    above, below : float, limits, both excluded
+    none : float, allowed in spite of the limits: the effect then lacks what the setting describes,
+        and its spec does not name the setting
+    smooth : bool, whether the effect changes smoothly with it, so that a search can be refined
     """
 
     name: str
@@ -84,26 +85,27 @@ class Hyper:
     none: float = math.nan
 
 
-class Shaped:
+class WithSettings:
     """Something with a name and with settings, written as ``name`` or ``name(setting=number)``.
 
     Attributes
     ----------
     kind : str, what it is, for messages
     name : str, canonical
-    family : str, what it has in common with those that are easily taken for it; empty if there are
-        none
-    hypers : tuple of Hyper, its settings, found in ``self.shape``
+    family : str, what it has in common with those that are easily mistaken for it; empty if there
+        are none
+    takes : tuple of Setting, the settings that it takes
+    settings : dict of name to number, the settings that it has
     """
 
     kind: ClassVar[str]
     name: ClassVar[str]
     family: ClassVar[str] = ""
-    hypers: ClassVar[tuple[Hyper, ...]] = ()
+    takes: ClassVar[tuple[Setting, ...]] = ()
 
-    def __init__(self, **shape: float) -> None:
-        known = {hyper.name: hyper for hyper in self.hypers}
-        for name, value in shape.items():
+    def __init__(self, **settings: float) -> None:
+        known = {setting.name: setting for setting in self.takes}
+        for name, value in settings.items():
             if name not in known:
                 raise UnknownNameError(f"setting of the {self.kind} {self.name!r}", name, known)
             above, below, none = known[name].above, known[name].below, known[name].none
@@ -115,7 +117,7 @@ class Shaped:
                     + (" and ".join(bounds) or "that is finite")
                     + ("" if math.isnan(none) else f", or {none:g}")
                 )
-        self.shape = {**{hyper.name: hyper.default for hyper in self.hypers}, **shape}
+        self.settings = {**{setting.name: setting.default for setting in self.takes}, **settings}
 
     @property
     def summary(self) -> str:
@@ -126,21 +128,21 @@ class Shaped:
     def spec(self) -> str:
         """Name with its settings, those left open or at `none` excepted: ``warm_up(tau=300)``."""
         fixed = [
-            f"{hyper.name}={value:.12g}"
-            for hyper in self.hypers
-            if not math.isnan(value := self.shape[hyper.name]) and value != hyper.none
+            f"{setting.name}={value:.12g}"
+            for setting in self.takes
+            if not math.isnan(value := self.settings[setting.name]) and value != setting.none
         ]
         return f"{self.name}({', '.join(fixed)})" if fixed else self.name
 
 
-ShapedItem = TypeVar("ShapedItem", bound=Shaped)
+ItemWithSettings = TypeVar("ItemWithSettings", bound=WithSettings)
 
 
-class ShapedRegistry(Registry[ShapedItem]):
+class RegistryWithSettings(Registry[ItemWithSettings]):
     """Things found by their name, or by their name and settings: ``warm_up(tau=300)``."""
 
-    def get(self, spec: str) -> ShapedItem:
-        """Return the item of that name, shaped as the settings say.
+    def get(self, spec: str) -> ItemWithSettings:
+        """Return the item of that name, with the settings that are given.
 
         Raises
         ------
@@ -153,20 +155,20 @@ class ShapedRegistry(Registry[ShapedItem]):
         if match is None:
             return super().get(spec)
         item = super().get(match[1])
-        shape: dict[str, float] = {}
+        settings: dict[str, float] = {}
         for part in filter(None, map(str.strip, match[2].split(","))):
             key, _, value = part.partition("=")
             key = key.strip()
-            if key in shape:
+            if key in settings:
                 raise InputError(f"{self.kind} {spec!r}: {key} is given twice")
             try:
-                shape[key] = float(value)
+                settings[key] = float(value)
             except ValueError:
                 raise InputError(
                     f"{self.kind} {spec!r}: {part!r} is no setting; expected name=number"
-                    + ("" if not item.hypers else f", such as {item.hypers[0].name}=300")
+                    + ("" if not item.takes else f", such as {item.takes[0].name}=300")
                 ) from None
-        return type(item)(**shape)
+        return type(item)(**settings)
 
 
 def import_modules(package: str, path: Iterable[str]) -> None:

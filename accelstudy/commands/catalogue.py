@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from accelstudy.basics.registry import Shaped
+from accelstudy.basics.registry import WithSettings
 from accelstudy.basics.units import display_unit, to_display
 from accelstudy.campaign.gross_errors import GrossError, get_gross_error, gross_error_names
 from accelstudy.effects import Effect, effect_names, get_effect
@@ -54,7 +54,7 @@ def _noise_effect(effect: NoiseEffect) -> Iterator[str]:
     yield from _head(effect, effect.equation)
     yield from _settings(effect)
     low, high = map(_number, effect.typical)
-    first = effect.hypers[0]
+    first = effect.takes[0]
     yield f"{INDENT}{first.name} typically {low} … {high}{_unit(first.unit)}"
 
 
@@ -63,18 +63,18 @@ def _gross_error(error: GrossError) -> Iterator[str]:
     yield from _settings(error)
 
 
-def _head(item: Shaped, equation: str) -> Iterator[str]:
+def _head(item: WithSettings, equation: str) -> Iterator[str]:
     yield f"{item.name}: {equation}"
     if item.summary:
         yield f"{INDENT}{item.summary}"
 
 
-def _settings(item: Shaped) -> Iterator[str]:
+def _settings(item: WithSettings) -> Iterator[str]:
     settings = [
-        f"{hyper.name} drawn"
+        f"{setting.name} drawn"
         if math.isnan(value)
-        else f"{hyper.name}={_number(value)}" + _unit(hyper.unit)
-        for hyper, value in zip(item.hypers, item.shape.values(), strict=True)
+        else f"{setting.name}={_number(value)}" + _unit(setting.unit)
+        for setting, value in zip(item.takes, item.settings.values(), strict=True)
     ]
     if settings:
         yield f"{INDENT}settings: {', '.join(settings)}"

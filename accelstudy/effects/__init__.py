@@ -5,7 +5,7 @@ Simulation, adjustment, sensitivity analysis and diagnosis evaluate or different
 definition. To add one, write a module next to this file with a class under `register`.
 """
 
-from accelstudy.basics.registry import Hyper, import_modules
+from accelstudy.basics.registry import Setting, import_modules
 from accelstudy.effects.base import (
     Effect,
     HoldConditions,
@@ -21,8 +21,8 @@ __all__ = [
     "Course",
     "Effect",
     "HoldConditions",
-    "Hyper",
     "Parameter",
+    "Setting",
     "effect_names",
     "effects_without",
     "get_effect",

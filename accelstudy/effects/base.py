@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
-from accelstudy.basics.registry import Shaped, ShapedRegistry
+from accelstudy.basics.registry import RegistryWithSettings, WithSettings
 from accelstudy.effects.lag import Course
 
 AXES = ("x", "y", "z")
@@ -156,7 +156,7 @@ class HoldConditions:
         return Course(np.asarray(self.time), np.asarray(self.temperature))
 
 
-class Effect(Shaped):
+class Effect(WithSettings):
     """One systematic effect; subclasses set the class attributes and override what they add.
 
     In the methods `p` is the tuple of the effect's own parameters, in which all formulas are
@@ -170,7 +170,7 @@ class Effect(Shaped):
     family : str, what it has in common with effects that are easily taken for it, in plain words
     group : str, in which `location` of a diagnosis counts it; empty where in none
     parameters : tuple of Parameter
-    hypers : tuple of Hyper, numbers that shape the effect
+    takes : tuple of Setting, the settings that it takes
     equation : str, what is added, for people; by default as the methods have it
     typical : (float, float), usual size of a parameter from good to cheap equipment, SI; by default
         what changes a reading by 0.1 to 1 thousandth of g
@@ -218,7 +218,7 @@ class Effect(Shaped):
 
     def only(self, kept: tuple[int, ...]) -> Effect:
         """Return the effect with some of its parameters; the others are zero."""
-        return _part(type(self), kept)(**self.shape)  # type: ignore[arg-type]
+        return _part(type(self), kept)(**self.settings)  # type: ignore[arg-type]
 
     def axes(self, p: tuple[Number, ...], xp: Any) -> Matrix:
         """Add to the matrix T of the sensitive axes."""
@@ -256,7 +256,7 @@ def _part(kind: type[Effect], kept: tuple[int, ...]) -> type[Effect]:
     return type(kind.__name__, (kind,), content)
 
 
-_registry: ShapedRegistry[Effect] = ShapedRegistry("effect")
+_registry: RegistryWithSettings[Effect] = RegistryWithSettings("effect")
 EffectClass = TypeVar("EffectClass", bound=type[Effect])
 
 effect_names = _registry.names

@@ -1,6 +1,6 @@
 """Bias jump: the bias steps after a knock."""
 
-from accelstudy.basics.registry import Hyper
+from accelstudy.basics.registry import Setting
 from accelstudy.effects.base import Effect, after, per_axis, register
 from accelstudy.effects.step_times import step_times, times_between
 
@@ -16,13 +16,13 @@ class BiasJump(Effect):
     family = "sudden change"
     group = "slow_time"
     parameters = per_axis("c", "m/s^2", "c_%")
-    hypers = (Hyper("t", "s", 600.0),)
+    takes = (Setting("t", "s", 600.0),)
     equation = "c_i for t > t_c"
     typical = (0.005, 0.05)
 
     def output(self, f, p, g, hold, xp):
         """Return c where t > t_c."""
-        jumped = after(hold.time, self.shape["t"], xp)
+        jumped = after(hold.time, self.settings["t"], xp)
         return tuple(c * jumped for c in p)
 
     def candidates(self, hold, f, g):
@@ -31,5 +31,5 @@ class BiasJump(Effect):
 
     def between(self, other, hold):
         """Return some times between those of two candidates."""
-        times = times_between(self.shape["t"], other.shape["t"], hold.column("time"))
+        times = times_between(self.settings["t"], other.settings["t"], hold.column("time"))
         return tuple(BiasJump(t=t) for t in times)

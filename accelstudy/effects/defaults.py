@@ -75,9 +75,9 @@ def typical_of(effect: Effect) -> tuple[float, float]:
 def _expressions(effect: Effect) -> tuple[tuple[Any, ...], Matrix, tuple[Any, Any]]:
     """Evaluate an effect with symbols, but with its settings as the numbers they are."""
     numbered = type(effect)()
-    numbered.shape = {
+    numbered.settings = {
         name: sp.Integer(int(value)) if float(value).is_integer() else sp.Float(value)
-        for name, value in effect.shape.items()
+        for name, value in effect.settings.items()
     }
     p = symbols(*(parameter.name for parameter in effect.parameters))
     f, (g,) = symbols(*(f"f_{axis}" for axis in AXES)), symbols("g")

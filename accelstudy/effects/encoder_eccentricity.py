@@ -1,6 +1,6 @@
 """Encoder eccentricity: an angular error that repeats with each turn."""
 
-from accelstudy.basics.registry import Hyper
+from accelstudy.basics.registry import Setting
 from accelstudy.effects.base import Effect, Parameter, register
 
 
@@ -20,14 +20,14 @@ class EncoderEccentricity(Effect):
         Parameter("A_pitch", "rad", r"$A_\theta$"),
         Parameter("B_pitch", "rad", r"$B_\theta$"),
     )
-    hypers = (Hyper("order", "1", 1.0, above=0),)
+    takes = (Setting("order", "1", 1.0, above=0),)
     equation = "δφ = A_φ sin mφ + B_φ cos mφ, same in θ"
     typical = (15e-6, 300e-6)
     part = "rig"
 
     def reading(self, angles, p, hold, xp):
         """Return A sin mφ + B cos mφ of either angle."""
-        order = self.shape["order"]
+        order = self.settings["order"]
         roll, pitch = (order * angle for angle in angles)
         return (
             p[0] * xp.sin(roll) + p[1] * xp.cos(roll),

@@ -1,6 +1,6 @@
 """Mounting slip: the mounting of the sensor gives way once."""
 
-from accelstudy.basics.registry import Hyper
+from accelstudy.basics.registry import Setting
 from accelstudy.effects.base import Effect, after, per_axis, register
 from accelstudy.effects.step_times import step_times, times_between
 
@@ -18,7 +18,7 @@ class MountingSlip(Effect):
     name = "mounting_slip"
     family = "sudden change"
     parameters = per_axis("slip", "rad", "\\varepsilon_{s%}")
-    hypers = (Hyper("t", "s", 600.0),)
+    takes = (Setting("t", "s", 600.0),)
     equation = "ε × f for t > t_c"
     typical = (80e-6, 3e-3)
     part = "rig"
@@ -26,7 +26,7 @@ class MountingSlip(Effect):
     def output(self, f, p, g, hold, xp):
         """Return ε × f where t > t_c."""
         (x, y, z), (a, b, c) = f, p
-        slipped = after(hold.order, self.shape["t"], xp)
+        slipped = after(hold.order, self.settings["t"], xp)
         return (slipped * (b * z - c * y), slipped * (c * x - a * z), slipped * (a * y - b * x))
 
     def candidates(self, hold, f, g):
@@ -35,5 +35,5 @@ class MountingSlip(Effect):
 
     def between(self, other, hold):
         """Return some times between those of two candidates."""
-        times = times_between(self.shape["t"], other.shape["t"], hold.column("order"))
+        times = times_between(self.settings["t"], other.settings["t"], hold.column("order"))
         return tuple(MountingSlip(t=t) for t in times)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from accelstudy.basics.registry import Hyper
+from accelstudy.basics.registry import Setting
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects.base import Effect, per_axis, register
 
@@ -21,13 +21,13 @@ class Saturation(Effect):
     family = "odd nonlinearity"
     group = "direction"
     parameters = per_axis("k_sat", "1", "k_{s%}")
-    hypers = (Hyper("knee", "m/s^2", 0.95 * STANDARD_GRAVITY, above=0, smooth=True),)
+    takes = (Setting("knee", "m/s^2", 0.95 * STANDARD_GRAVITY, above=0, smooth=True),)
     equation = "−k_i sign(f_i) max(0, |f_i| − c)"
     typical = (0.02, 0.5)
 
     def output(self, f, p, g, hold, xp):
         """Return −k sign(f) max(0, |f| − c)."""
-        excess = [xp.abs(f_i) - self.shape["knee"] for f_i in f]
+        excess = [xp.abs(f_i) - self.settings["knee"] for f_i in f]
         return tuple(
             -k * xp.sign(f_i) * (e + xp.abs(e)) / 2 for k, f_i, e in zip(p, f, excess, strict=True)
         )

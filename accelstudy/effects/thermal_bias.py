@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from accelstudy.basics.registry import Hyper
+from accelstudy.basics.registry import Setting
 from accelstudy.effects.base import REFERENCE_TEMPERATURE, Effect, per_axis, register
 
 LAGS = (0.04, 0.1, 0.25)
@@ -21,18 +21,18 @@ class ThermalBias(Effect):
     family = "temperature"
     group = "temperature"
     parameters = per_axis("b_T", "m/s^2/K", "b_{T%}")
-    hypers = (Hyper("tau", "s", 0.0, above=0, smooth=True, none=0.0),)
+    takes = (Setting("tau", "s", 0.0, above=0, smooth=True, none=0.0),)
     typical = (0.5e-3, 7e-3)
 
     @property
     def equation(self):
         """What it adds; the lag is named where there is one."""
         lag = "b_T,i (T_τ − T0), T_τ behind T by the lag τ"
-        return lag if self.shape["tau"] else "b_T,i (T − T0)"
+        return lag if self.settings["tau"] else "b_T,i (T − T0)"
 
     def output(self, f, p, g, hold, xp):
         """Return b_T (T_τ − T0)."""
-        warmer = hold.lagged(self.shape["tau"]) - REFERENCE_TEMPERATURE
+        warmer = hold.lagged(self.settings["tau"]) - REFERENCE_TEMPERATURE
         return tuple(b * warmer for b in p)
 
     def candidates(self, hold, f, g):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from accelstudy.basics.registry import Hyper
+from accelstudy.basics.registry import Setting
 from accelstudy.effects.base import Effect, per_axis, register
 
 
@@ -14,13 +14,13 @@ class WarmUp(Effect):
     family = "slow change in time"
     group = "slow_time"
     parameters = per_axis("w", "m/s^2", "w_%")
-    hypers = (Hyper("tau", "s", 600.0, above=0, smooth=True),)
+    takes = (Setting("tau", "s", 600.0, above=0, smooth=True),)
     equation = "w_i exp(−t/τ)"
     typical = (0.01, 0.05)
 
     def output(self, f, p, g, hold, xp):
         """Return w exp(−t/τ)."""
-        decay = xp.exp(-hold.time / self.shape["tau"])
+        decay = xp.exp(-hold.time / self.settings["tau"])
         return tuple(w * decay for w in p)
 
     def candidates(self, hold, f, g):

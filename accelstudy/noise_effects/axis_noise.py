@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from accelstudy.basics.registry import Hyper
+from accelstudy.basics.registry import Setting
 from accelstudy.effects import HoldConditions
 from accelstudy.noise_effects.base import Array, NoiseEffect, register
 
@@ -18,10 +18,10 @@ class AxisNoise(NoiseEffect):
     """
 
     name = "axis_noise"
-    hypers = (
-        Hyper("kappa_x", "1", 1.0, above=0),
-        Hyper("kappa_y", "1", 1.0, above=0),
-        Hyper("kappa_z", "1", 2.25, above=0),
+    takes = (
+        Setting("kappa_x", "1", 1.0, above=0),
+        Setting("kappa_y", "1", 1.0, above=0),
+        Setting("kappa_z", "1", 2.25, above=0),
     )
     equation = "Var v_i = κ_i σ²"
     typical = (2.25, 4.0)
@@ -35,4 +35,4 @@ class AxisNoise(NoiseEffect):
     @property
     def within_hold(self) -> Array:
         """The samples have it too: √κ_i."""
-        return np.sqrt([self.shape[f"kappa_{i}"] for i in "xyz"])
+        return np.sqrt([self.settings[f"kappa_{i}"] for i in "xyz"])

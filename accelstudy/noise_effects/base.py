@@ -13,13 +13,13 @@ from typing import ClassVar, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.basics.registry import Shaped, ShapedRegistry
+from accelstudy.basics.registry import RegistryWithSettings, WithSettings
 from accelstudy.effects import HoldConditions
 
 Array = NDArray[np.float64]
 
 
-class NoiseEffect(Shaped):
+class NoiseEffect(WithSettings):
     """One departure from white Gaussian noise of a known sigma; subclasses override what they do.
 
     Attributes
@@ -57,7 +57,7 @@ class NoiseEffect(Shaped):
         return np.ones(3)
 
 
-_registry: ShapedRegistry[NoiseEffect] = ShapedRegistry(NoiseEffect.kind)
+_registry: RegistryWithSettings[NoiseEffect] = RegistryWithSettings(NoiseEffect.kind)
 NoiseEffectClass = TypeVar("NoiseEffectClass", bound=type[NoiseEffect])
 
 noise_effect_names = _registry.names

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from accelstudy.basics.registry import Hyper
+from accelstudy.basics.registry import Setting
 from accelstudy.effects import HoldConditions
 from accelstudy.noise_effects.base import Array, NoiseEffect, register
 
@@ -39,7 +39,7 @@ class ColouredNoise(NoiseEffect):
     """
 
     name = "coloured_noise"
-    hypers = (Hyper("share", "1", 0.5, above=0, below=1), Hyper("tau", "s", 600.0, above=0))
+    takes = (Setting("share", "1", 0.5, above=0, below=1), Setting("tau", "s", 600.0, above=0))
     equation = "v + m, ρ(m) = exp(−|Δt|/τ), Var m = share/(1 − share) σ²"
     typical = (0.2, 0.8)
 
@@ -47,7 +47,7 @@ class ColouredNoise(NoiseEffect):
         self, noise: Array, sigma: float, hold: HoldConditions, rng: np.random.Generator
     ) -> Array:
         """Return v + m, with m_k = φ_k m_(k−1) + √(1 − φ_k²) ε_k and φ_k = exp(−Δt_k/τ)."""
-        share, tau = self.shape["share"], self.shape["tau"]
+        share, tau = self.settings["share"], self.settings["tau"]
         time = np.arange(float(noise.shape[1])) if hold.time is None else hold.time
         coloured = rng.standard_normal(noise.shape)
         lasting = memory(np.diff(time), tau)

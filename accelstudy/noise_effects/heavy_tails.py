@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from accelstudy.basics.registry import Hyper
+from accelstudy.basics.registry import Setting
 from accelstudy.effects import HoldConditions
 from accelstudy.noise_effects.base import Array, NoiseEffect, register
 
@@ -18,7 +18,7 @@ class HeavyTails(NoiseEffect):
     """
 
     name = "heavy_tails"
-    hypers = (Hyper("nu", "1", 4.0, above=2),)
+    takes = (Setting("nu", "1", 4.0, above=2),)
     equation = "v ~ σ √((ν − 2)/ν) t_ν"
     typical = (3.0, 10.0)
 
@@ -26,5 +26,5 @@ class HeavyTails(NoiseEffect):
         self, noise: Array, sigma: float, hold: HoldConditions, rng: np.random.Generator
     ) -> Array:
         """Return v √((ν − 2) / χ²_ν)."""
-        nu = self.shape["nu"]
+        nu = self.settings["nu"]
         return noise * np.sqrt((nu - 2) / rng.chisquare(nu, noise.shape))

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from accelstudy.basics.registry import Hyper
+from accelstudy.basics.registry import Setting
 from accelstudy.effects import HoldConditions
 from accelstudy.noise_effects.base import Array, NoiseEffect, register
 
@@ -16,7 +16,7 @@ class NoiseLevel(NoiseEffect):
     """All noise has κ times the variance that it is said to have."""
 
     name = "noise_level"
-    hypers = (Hyper("kappa", "1", 2.25, above=0),)
+    takes = (Setting("kappa", "1", 2.25, above=0),)
     equation = "Var v = κ σ²"
     typical = (0.6, 4.0)
 
@@ -24,9 +24,9 @@ class NoiseLevel(NoiseEffect):
         self, noise: Array, sigma: float, hold: HoldConditions, rng: np.random.Generator
     ) -> Array:
         """Return √κ v."""
-        return math.sqrt(self.shape["kappa"]) * noise
+        return math.sqrt(self.settings["kappa"]) * noise
 
     @property
     def within_hold(self) -> Array:
         """The samples have it too: √κ."""
-        return np.full(3, math.sqrt(self.shape["kappa"]))
+        return np.full(3, math.sqrt(self.settings["kappa"]))

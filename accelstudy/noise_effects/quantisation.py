@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from accelstudy.basics.registry import Hyper
+from accelstudy.basics.registry import Setting
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.noise_effects.base import Array, NoiseEffect, register
 
@@ -18,10 +18,10 @@ class Quantisation(NoiseEffect):
     """
 
     name = "quantisation"
-    hypers = (Hyper("lsb", "m/s^2", STANDARD_GRAVITY / 2048, above=0),)
+    takes = (Setting("lsb", "m/s^2", STANDARD_GRAVITY / 2048, above=0),)
     equation = "LSB · round(f / LSB)"
     typical = (STANDARD_GRAVITY / 16384, STANDARD_GRAVITY / 2048)
 
     def read(self, forces: Array) -> Array:
         """Return the nearest multiples of the LSB."""
-        return np.asarray(self.shape["lsb"] * np.round(forces / self.shape["lsb"]))
+        return np.asarray(self.settings["lsb"] * np.round(forces / self.settings["lsb"]))

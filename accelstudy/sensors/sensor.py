@@ -79,7 +79,9 @@ class SensorModel:
     @cached_property
     def settings(self) -> NDArray[np.float64]:
         """Numbers that shape the effects, (s,), effect after effect."""
-        return np.array([v for effect in self.effects for v in effect.shape.values()], dtype=float)
+        return np.array(
+            [v for effect in self.effects for v in effect.settings.values()], dtype=float
+        )
 
     @property
     def trace(self) -> SensorTrace:
@@ -269,7 +271,7 @@ class SensorTrace:
         parameters = [symbols(*(q.name for q in effect.parameters)) for effect in effects]
         self._effects = list(zip(effects, parameters, strict=True))
         self.p = tuple(symbol for own in parameters for symbol in own)
-        self.settings = tuple(symbol for effect in effects for symbol in effect.shape.values())
+        self.settings = tuple(symbol for effect in effects for symbol in effect.settings.values())
 
         self.t_matrix = sp.eye(3)
         self.h = list(self.force)
@@ -395,7 +397,7 @@ def trace_of(kinds: tuple[type[Effect], ...]) -> SensorTrace:
 def _in_symbols(kind: type[Effect]) -> Effect:
     """Effect of a kind whose settings are symbols."""
     effect = kind()
-    names = tuple(effect.shape)
+    names = tuple(effect.settings)
     values = symbols(*(f"{effect.name}_{name}" for name in names))
-    effect.shape = dict(zip(names, values, strict=True))
+    effect.settings = dict(zip(names, values, strict=True))
     return effect

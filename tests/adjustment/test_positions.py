@@ -266,10 +266,10 @@ def test_a_jump_among_many_holds_is_found_where_it_is():
     effect = get_effect("bias_jump")
     coarse = effect.candidates(hold, np.zeros((1000, 3)), 9.8)
     assert len(coarse) <= 50
-    times = np.array([c.shape["t"] for c in coarse])
+    times = np.array([c.settings["t"] for c in coarse])
     assert (times[0], times[-1]) == (90, 60 * 997.5)
     assert np.all(np.diff(times) > 0)
-    between = [b.shape["t"] for b in coarse[20].between(coarse[21], hold)]
+    between = [b.settings["t"] for b in coarse[20].between(coarse[21], hold)]
     assert 1 <= len(between) <= 7
     assert times[20] < min(between) <= max(between) < times[21]
     campaign, _ = simulate_campaign(

@@ -161,7 +161,7 @@ def test_an_effect_is_judged_in_the_settings_that_a_diagnosis_tries():
     jump = rows["bias_jump"]
     tried = [h.effect.spec for h in examined.candidates["bias_jump"]]
     assert {jump.easiest.spec, jump.hardest.spec} <= set(tried)
-    assert 600 < jump.easiest.shape["t"] < 1200 < jump.hardest.shape["t"]
+    assert 600 < jump.easiest.settings["t"] < 1200 < jump.hardest.settings["t"]
     assert jump.hardest_mdb > 5 * jump.mdb
     limits = {limit.name: limit.value for limit in upper_limits(examined, 1.0, ())}
     for name in ("bias_jump", "warm_up", "saturation"):
@@ -169,7 +169,7 @@ def test_an_effect_is_judged_in_the_settings_that_a_diagnosis_tries():
     for row in rows.values():
         if row.status == "visible" and len(examined.candidates[row.name]) == 1:
             assert row.mdb == row.hardest_mdb, row.name
-    assert rows["bias_drift"].easiest.shape == {}
+    assert rows["bias_drift"].easiest.settings == {}
 
 
 def test_a_sensor_whose_range_is_far_beyond_gravity_does_not_saturate():

@@ -260,7 +260,7 @@ def test_a_slip_counts_the_holds_where_they_have_no_time():
     assert np.flatnonzero(found.output.any(axis=1))[0] == 12
     left = hold.take(np.arange(20, 40)).with_steps(FORCES[20:])
     assert left.order[0] == 21
-    times = [c.shape["t"] for c in get_effect("mounting_slip").candidates(hold, FORCES, G)]
+    times = [c.settings["t"] for c in get_effect("mounting_slip").candidates(hold, FORCES, G)]
     np.testing.assert_array_equal(times, np.arange(3.5, 38))
 
 
@@ -294,7 +294,7 @@ def test_a_lag_is_a_setting_of_the_thermal_bias():
     some = np.array([3, 17, 30])
     np.testing.assert_array_equal(HOLD.take(some).lagged(500), HOLD.lagged(500)[some])
     assert [c.spec for c in plain.candidates(HoldConditions(), FORCES, G)] == ["thermal_bias"]
-    lags = [c.shape["tau"] for c in plain.candidates(HOLD, FORCES, G)]
+    lags = [c.settings["tau"] for c in plain.candidates(HOLD, FORCES, G)]
     assert lags[0] == 0
     assert lags[-1] < np.ptp(HOLD.time) / 3
 
@@ -324,28 +324,28 @@ def test_linear_in_the_parameters(name):
 def test_specs_and_candidates(name):
     effect = get_effect(name)
     candidates = effect.candidates(HOLD, FORCES, G)
-    assert len(candidates) > 1 if effect.hypers else candidates == (effect,)
+    assert len(candidates) > 1 if effect.takes else candidates == (effect,)
     assert len({candidate.spec for candidate in candidates}) == len(candidates)
     for candidate in (effect, *candidates):
         again = get_effect(candidate.spec)
         assert type(again) is type(effect)
-        assert again.shape == pytest.approx(candidate.shape, rel=1e-11)
+        assert again.settings == pytest.approx(candidate.settings, rel=1e-11)
         assert again.spec == candidate.spec
 
 
 def test_candidates_fit_the_session():
-    times = [c.shape["t"] for c in get_effect("bias_jump").candidates(HOLD, FORCES, G)]
+    times = [c.settings["t"] for c in get_effect("bias_jump").candidates(HOLD, FORCES, G)]
     assert len(times) == 37
     for t in times:
         assert min(np.sum(t > HOLD.time), np.sum(t < HOLD.time)) >= 2
     session_length = np.ptp(HOLD.time)
     for candidate in get_effect("warm_up").candidates(HOLD, FORCES, G):
-        assert session_length / 21 < candidate.shape["tau"] < session_length * 1.01
+        assert session_length / 21 < candidate.settings["tau"] < session_length * 1.01
     for candidate in get_effect("saturation").candidates(HOLD, FORCES, G):
-        assert 0.49 * G < candidate.shape["knee"] < G
+        assert 0.49 * G < candidate.settings["knee"] < G
     for full, expected in ((0.82, [0.5, 0.8]), (2.7, [0.7, 0.99]), (8, [])):
         within = replace(HOLD, full_range=full * G).take(np.arange(30))
-        knees = [c.shape["knee"] for c in get_effect("saturation").candidates(within, FORCES, G)]
+        knees = [c.settings["knee"] for c in get_effect("saturation").candidates(within, FORCES, G)]
         np.testing.assert_allclose(np.divide(knees, G)[[0, -1] if knees else []], expected, 1e-3)
     few = some_hold(FORCES[:3], time=np.arange(3.0))
     assert get_effect("bias_jump").candidates(few, FORCES[:3], G) == ()

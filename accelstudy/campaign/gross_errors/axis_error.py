@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.registry import Hyper
+from accelstudy.basics.registry import Setting
 from accelstudy.campaign.gross_errors.base import (
     EVERYWHERE,
     Array,
@@ -44,7 +44,7 @@ class AxisError(GrossError):
     """
 
     name = "axis_error"
-    hypers = tuple(Hyper(axis, "1", math.nan) for axis in "xyz")
+    takes = tuple(Setting(axis, "1", math.nan) for axis in "xyz")
     equation = "f → P f, P one of 48 signed permutations"
     rank = EVERYWHERE
 
@@ -57,7 +57,7 @@ class AxisError(GrossError):
 
     def act(self, campaign: Campaign) -> Campaign:
         """Permute the channels, and turn their signs."""
-        shown = tuple(self.shape[axis] for axis in "xyz")
+        shown = tuple(self.settings[axis] for axis in "xyz")
         if shown not in SIGNED_PERMUTATIONS:
             raise InputError(
                 f"gross error {self.name!r}: x, y, z must be 1, 2, 3 in some order, each with a "

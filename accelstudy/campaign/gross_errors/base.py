@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.registry import Shaped, ShapedRegistry
+from accelstudy.basics.registry import RegistryWithSettings, WithSettings
 
 if TYPE_CHECKING:  # the reader of campaigns takes the units of `unit_error`
     from accelstudy.campaign.files.session import Campaign
@@ -51,7 +51,7 @@ class Mending:
     left_out: tuple[int, ...] = ()
 
 
-class GrossError(Shaped):
+class GrossError(WithSettings):
     """One gross error; subclasses say what it does to a campaign, and draw what is left open.
 
     A setting whose default is NaN is open: it is drawn for the campaign at hand.
@@ -85,20 +85,20 @@ class GrossError(Shaped):
 
     def is_open(self, *names: str) -> bool:
         """Whether none of the settings is given."""
-        return all(math.isnan(self.shape[name]) for name in names)
+        return all(math.isnan(self.settings[name]) for name in names)
 
     def row(self, campaign: Campaign, setting: str) -> int:
         """Row of the position that a setting names."""
-        found = np.flatnonzero(campaign.positions == self.shape[setting])
+        found = np.flatnonzero(campaign.positions == self.settings[setting])
         if not len(found):
             raise InputError(
-                f"gross error {self.name!r}: {setting}={self.shape[setting]:g} is no position of "
-                f"{campaign.name}; they are {campaign.positions[0]} to {campaign.positions[-1]}"
+                f"gross error {self.name!r}: {setting}={self.settings[setting]:g} is no position "
+                f"of {campaign.name}; they are {campaign.positions[0]} to {campaign.positions[-1]}"
             )
         return int(found[0])
 
 
-_registry: ShapedRegistry[GrossError] = ShapedRegistry(GrossError.kind)
+_registry: RegistryWithSettings[GrossError] = RegistryWithSettings(GrossError.kind)
 GrossErrorClass = TypeVar("GrossErrorClass", bound=type[GrossError])
 
 gross_error_names = _registry.names

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from accelstudy.basics.registry import Hyper
+from accelstudy.basics.registry import Setting
 from accelstudy.basics.wording import joined
 from accelstudy.campaign.gross_errors.base import SINGLE, GrossError, Mending, register
 from accelstudy.campaign.gross_errors.real_sensor import LOST
@@ -33,29 +33,29 @@ class OutlierPosition(GrossError):
     """
 
     name = "outlier_position"
-    hypers = (
-        Hyper("position", "1", math.nan),
-        *(Hyper(axis, "m/s^2", math.nan) for axis in "xyz"),
+    takes = (
+        Setting("position", "1", math.nan),
+        *(Setting(axis, "m/s^2", math.nan) for axis in "xyz"),
     )
     equation = "f + e in one position"
     rank = SINGLE[1]
 
     def drawn(self, campaign: Campaign, rng: np.random.Generator) -> Self:
         """Draw the position, and the direction of e."""
-        position = self.shape["position"]
+        position = self.settings["position"]
         if self.is_open("position"):
             position = float(rng.choice(campaign.positions))
         if self.is_open(*"xyz"):
             direction = rng.standard_normal(3)
             e = SIZE * direction / np.linalg.norm(direction)
         else:
-            e = np.nan_to_num([self.shape[axis] for axis in "xyz"])
+            e = np.nan_to_num([self.settings[axis] for axis in "xyz"])
         return type(self)(position=position, **dict(zip("xyz", e.tolist(), strict=True)))
 
     def act(self, campaign: Campaign) -> Campaign:
         """Add e."""
         forces = campaign.forces.copy()
-        forces[self.row(campaign, "position")] += [self.shape[axis] for axis in "xyz"]
+        forces[self.row(campaign, "position")] += [self.settings[axis] for axis in "xyz"]
         return replace(campaign, forces=forces)
 
     def mendings(self, campaign: Campaign, sensor: RealSensor) -> Iterator[Mending]:

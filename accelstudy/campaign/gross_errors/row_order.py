@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.registry import Hyper
+from accelstudy.basics.registry import Setting
 from accelstudy.campaign.gross_errors.base import (
     SINGLE,
     Array,
@@ -44,7 +44,7 @@ class RowOrder(GrossError):
     """
 
     name = "row_order"
-    hypers = (Hyper("first", "1", math.nan), Hyper("second", "1", math.nan))
+    takes = (Setting("first", "1", math.nan), Setting("second", "1", math.nan))
     equation = "f_j ↔ f_k"
     rank = SINGLE[0]
 

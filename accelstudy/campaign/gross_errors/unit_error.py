@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.registry import Hyper
+from accelstudy.basics.registry import Setting
 from accelstudy.basics.units import UNITS
 from accelstudy.campaign.gross_errors.base import (
     EVERYWHERE,
@@ -44,7 +44,7 @@ class UnitError(GrossError):
     """
 
     name = "unit_error"
-    hypers = (Hyper("force", "1", math.nan, above=0), Hyper("angle", "1", math.nan, above=0))
+    takes = (Setting("force", "1", math.nan, above=0), Setting("angle", "1", math.nan, above=0))
     equation = "f → factor · f, or (φ, θ) → factor · (φ, θ)"
     rank = EVERYWHERE
 
@@ -59,7 +59,9 @@ class UnitError(GrossError):
 
     def act(self, campaign: Campaign) -> Campaign:
         """Multiply by the factors; one that is not given is 1."""
-        force, angle = np.nan_to_num([self.shape["force"], self.shape["angle"]], nan=1.0).tolist()
+        force, angle = np.nan_to_num(
+            [self.settings["force"], self.settings["angle"]], nan=1.0
+        ).tolist()
         if angle != 1 and campaign.angles is None:
             raise InputError(f"gross error {self.name!r}: angle: {campaign.name} has no angles")
         return _multiplied(campaign, force, angle)

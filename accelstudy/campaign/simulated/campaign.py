@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from accelstudy.approaches import get_approach
 from accelstudy.basics import bounds
 from accelstudy.basics.errors import InputError, UnknownNameError
-from accelstudy.basics.registry import Shaped
+from accelstudy.basics.registry import WithSettings
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY
 from accelstudy.campaign.files.format import Campaign
 from accelstudy.campaign.gross_errors import GrossError, get_gross_error
@@ -321,14 +321,14 @@ def _truth(
     }
 
 
-def _named(item: Shaped) -> dict[str, Any]:
+def _named(item: WithSettings) -> dict[str, Any]:
     """Name and settings, each setting with its unit."""
-    units = {hyper.name: hyper.unit for hyper in item.hypers}
+    units = {setting.name: setting.unit for setting in item.takes}
     return {
         "name": item.name,
         "settings": {
             name: {"value": float(value), "unit": units[name]}
-            for name, value in item.shape.items()
+            for name, value in item.settings.items()
             if not math.isnan(value)
         },
     }

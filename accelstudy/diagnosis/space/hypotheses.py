@@ -78,8 +78,10 @@ class Hypothesis:
 
         An effect that lacks what the setting shapes is no neighbour of those that do not.
         """
-        shape, hypers = ({}, ()) if self.effect is None else (self.effect.shape, self.effect.hypers)
-        smooth = (h.name for h in hypers if h.smooth and shape[h.name] != h.none)
+        if self.effect is None:
+            return None
+        values = self.effect.settings
+        smooth = (s.name for s in self.effect.takes if s.smooth and values[s.name] != s.none)
         return next(smooth, None)
 
     @property
@@ -93,7 +95,7 @@ class Hypothesis:
         """Value of the smooth setting; NaN if it has none."""
         if self.effect is None or self.smooth is None:
             return np.nan
-        return self.effect.shape[self.smooth]
+        return self.effect.settings[self.smooth]
 
 
 @dataclass(frozen=True)

@@ -112,7 +112,7 @@ def _signatures(frame: Frame) -> dict[str, list[Signature]]:
     """
     found: dict[str, list[Signature]] = {}
     for effect in map(get_effect, effect_names()):
-        if not effect.group or effect.group in COURSES or any(h.smooth for h in effect.hypers):
+        if not effect.group or effect.group in COURSES or any(h.smooth for h in effect.takes):
             continue
         if effect.group == ROBOT and not frame.solution.approach.uses_angles:
             continue

@@ -187,9 +187,10 @@ def _together(shapes: Sequence[Effect]) -> Effect:
     """Shapes of one effect as one, whose settings are arrays (s, 1)."""
     together = type(shapes[0])()
     settings: Any = {
-        name: np.array([shape.shape[name] for shape in shapes])[:, None] for name in together.shape
+        name: np.array([shape.settings[name] for shape in shapes])[:, None]
+        for name in together.settings
     }
-    together.shape = settings
+    together.settings = settings
     return together
 
 

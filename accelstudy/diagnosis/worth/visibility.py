@@ -83,5 +83,7 @@ def _settings(effect: Effect | None) -> str:
     """Settings of an effect as it is written, with their units: ``t=290 s``."""
     if effect is None:
         return ""
-    units = {hyper.name: "" if hyper.unit == "1" else f" {hyper.unit}" for hyper in effect.hypers}
-    return ", ".join(f"{name}={value:.4g}{units[name]}" for name, value in effect.shape.items())
+    units = {
+        setting.name: "" if setting.unit == "1" else f" {setting.unit}" for setting in effect.takes
+    }
+    return ", ".join(f"{name}={value:.4g}{units[name]}" for name, value in effect.settings.items())
