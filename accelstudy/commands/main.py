@@ -117,7 +117,7 @@ def schemes(model: str, approach: str, names: tuple[str, ...]) -> None:
 
     from accelstudy.approaches import get_approach
     from accelstudy.basics.units import angle_note, attitude_unit, to_attitude
-    from accelstudy.design.estimability import diagnose
+    from accelstudy.design.estimability import estimability
     from accelstudy.schemes import get_scheme, scheme_families, scheme_names
     from accelstudy.sensors.models import get_model
     from accelstudy.simulation.hold_plan import check_needs_no_plan
@@ -127,18 +127,18 @@ def schemes(model: str, approach: str, names: tuple[str, ...]) -> None:
     rows = []
     for name in track(names or scheme_names(), "schemes"):
         scheme = get_scheme(name)
-        design = diagnose(scheme, chosen_model, chosen_approach)
+        found = estimability(scheme, chosen_model, chosen_approach)
         rows.append(
             {
                 "scheme": scheme.name,
                 "n": scheme.n_positions,
                 "status": scheme.status,
-                "rank": f"{design.rank}/{len(design.parameter_names)}",
-                "condition": f"{design.condition:.1f}" if design.estimable else "-",
-                "r": design.redundancy,
-                "m": f"{design.fourth_moment:.4f}",
-                f"pole/{attitude_unit()}": f"{to_attitude(design.pole_distance):.1f}",
-                "not estimable": ", ".join(design.not_estimable),
+                "rank": f"{found.rank}/{len(found.parameter_names)}",
+                "condition": f"{found.condition:.1f}" if found.estimable else "-",
+                "r": found.redundancy,
+                "m": f"{found.fourth_moment:.4f}",
+                f"pole/{attitude_unit()}": f"{to_attitude(found.pole_distance):.1f}",
+                "not estimable": ", ".join(found.not_estimable),
             }
         )
     say(f"model {chosen_model.name}, approach {approach}\n")
@@ -254,7 +254,7 @@ def cells(configs: tuple[Path, ...]) -> None:
     Cells that cannot be estimated are listed with the reason. CONFIGS are YAML files; later ones
     overlay earlier ones, as with --configfile.
     """
-    from accelstudy.design.estimability import diagnose
+    from accelstudy.design.estimability import estimability
     from accelstudy.study.cells.cell import study_cells
     from accelstudy.study.cells.effort import study_effort
     from accelstudy.study.config import read_study
@@ -263,10 +263,10 @@ def cells(configs: tuple[Path, ...]) -> None:
     chosen = study_cells(study)
     effort = study_effort(study, chosen)
     for cell in chosen:
-        design = diagnose(
+        found = estimability(
             cell.positions, cell.estimated_model, cell.conditions, cell.noise, hold=cell.hold
         )
-        state = design.reason or f"r = {design.redundancy}, {cell.replicates} replicates"
+        state = found.reason or f"r = {found.redundancy}, {cell.replicates} replicates"
         click.echo(f"{cell.name}: {state}")
     click.echo(f"\n{effort}")
 

@@ -19,22 +19,22 @@ from accelstudy.simulation.sessions import Noise, session
 Array = NDArray[np.float64]
 
 SINGULAR = 1e-7
-"""Singular values of the scaled design below this fraction of the largest count as zero."""
+"""Singular values of the scaled design matrix below this fraction of the largest count as zero."""
 ROUNDING = 1e-14
-"""Columns of the design shorter than this fraction of the longest count as zero."""
+"""Columns of the design matrix shorter than this fraction of the longest count as zero."""
 
 EVERYTHING_VARIES = HoldPlan(60.0, (0.0, 40.0), "random", (0.0, 1.0), "random")
 
 
 @dataclass(frozen=True)
-class Design:
-    """Diagnosis of one scheme with one model and one approach.
+class Estimability:
+    """What one scheme determines of one model with one approach, by linear theory.
 
     Attributes
     ----------
     parameter_names : tuple of str
-    rank : int, of the design at the ideal sensor
-    condition : float, of the design with columns scaled to unit length; inf if singular
+    rank : int, of the design matrix at the ideal sensor
+    condition : float, of the design matrix with columns of unit length; inf if singular
     redundancy : int, r = conditions − unknowns
     fourth_moment : float, m = ⟨x²y²⟩ of the directions, mean over the three pairs of axes
     pole_distance : float, rad, smallest angle of a direction to the x axis, where roll is undefined
@@ -64,7 +64,7 @@ class Design:
         return np.sqrt(np.diag(self.cofactors))
 
 
-def diagnose(
+def estimability(
     scheme: Scheme,
     model: SensorModel,
     approach: Approach,
@@ -72,8 +72,8 @@ def diagnose(
     parameters: Array | None = None,
     gravity: float = STANDARD_GRAVITY,
     hold: HoldConditions | None = None,
-) -> Design:
-    """Diagnose what a scheme determines.
+) -> Estimability:
+    """Work out what a scheme determines, before any simulation.
 
     Rank and condition are those at the ideal sensor (all parameters zero): what is singular there
     is near-singular for every real sensor. The cofactors are taken at `parameters`.
@@ -111,7 +111,7 @@ def diagnose(
             a = _design(scheme, model, approach, noise, at, gravity, hold)
         scale = np.linalg.norm(a, axis=0)
         cofactors = np.linalg.inv((a / scale).T @ (a / scale)) / np.outer(scale, scale)
-    return Design(
+    return Estimability(
         parameter_names=names,
         rank=rank,
         condition=condition,
@@ -139,7 +139,7 @@ def _design(
 
 
 def is_blind(model: SensorModel, approach: Approach, noise: Noise, gravity: float) -> bool:
-    """Whether not even many positions all around, in all conditions, determine the model."""
+    """Whether an approach cannot determine a model even with 60 positions in varied conditions."""
     ideal = np.zeros(model.n_parameters)
     scheme = get_scheme("fibonacci-60")
     hold = EVERYTHING_VARIES.hold(scheme.n_positions)
@@ -148,15 +148,15 @@ def is_blind(model: SensorModel, approach: Approach, noise: Noise, gravity: floa
 
 
 def rank_of(a: Array) -> tuple[int, float, NDArray[np.bool_]]:
-    """Rank, condition and which columns lie in the null space of a design."""
+    """Rank and condition of a design matrix, and which columns its null space involves."""
     if not np.isfinite(a).all():
         return 0, np.inf, np.ones(a.shape[1], dtype=bool)
     length = np.linalg.norm(a, axis=0)
     longest = length.max() or 1.0
-    # A column of rounding errors is no direction, and would be one at unit length.
+    # A column of rounding errors must stay short: scaled to unit length it would count.
     scaled = a / np.where(length > ROUNDING * longest, length, longest)
-    # The whole null space is wanted, also of a design with fewer rows than columns; R of a QR
-    # decomposition has it too, without a matrix of all conditions by all conditions.
+    # The whole null space is wanted, also of a matrix with fewer rows than columns. R of a QR
+    # decomposition has the same null space, and saves a matrix of all conditions by all conditions.
     triangle = np.linalg.qr(scaled, mode="r") if len(scaled) > len(length) else scaled
     _, values, vt = np.linalg.svd(triangle, full_matrices=True)
     rank = int(np.count_nonzero(values > SINGULAR * values[0]))

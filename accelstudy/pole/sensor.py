@@ -14,7 +14,7 @@ from accelstudy.basics.units import STANDARD_GRAVITY, quantity_text
 from accelstudy.basics.wording import joined
 from accelstudy.campaign.use.applying import read_calibration
 from accelstudy.data_sheets import DataSheet
-from accelstudy.design.estimability import diagnose
+from accelstudy.design.estimability import estimability
 from accelstudy.effects import HoldConditions
 from accelstudy.effects.base import REFERENCE_TEMPERATURE
 from accelstudy.effects.lag import Course
@@ -178,16 +178,16 @@ def from_linear_theory(
     check_needs_no_plan(chosen)
     sigma = sheet.sigma_mean(seconds, positions.n_positions * seconds)
     noise = Noise(sigma_force=sigma, sigma_angle=robot_sigma)
-    design = diagnose(positions, chosen, get_approach(approach), noise)
-    if not design.estimable:
-        raise InputError(f"scheme {positions.name}, model {chosen.name}: {design.reason}")
+    found = estimability(positions, chosen, get_approach(approach), noise)
+    if not found.estimable:
+        raise InputError(f"scheme {positions.name}, model {chosen.name}: {found.reason}")
     stays = np.flatnonzero(chosen.stays)
     own = tuple(effect.spec for effect in chosen.effects if effect.part == "sensor")
     used = compose(chosen.name, own)
     return CalibratedSensor(
         used,
         np.zeros(used.n_parameters),
-        design.cofactors[np.ix_(stays, stays)],
+        found.cofactors[np.ix_(stays, stays)],
         sheet,
         mounting=mounting,
         origin=(

@@ -15,7 +15,7 @@ from accelstudy.adjustment import Observations
 from accelstudy.approaches import Approach, get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
-from accelstudy.design.estimability import diagnose
+from accelstudy.design.estimability import estimability
 from accelstudy.design.optimal.information import position_rows
 from accelstudy.leveling.angles import roll_pitch
 from accelstudy.leveling.error import TiltError, tilt_error
@@ -81,11 +81,11 @@ class SetUp:
             If it does not determine the model.
         """
         scheme = get_scheme(self.config.instead_of)
-        design = diagnose(scheme, self.model, self.equipment, self.noise)
-        if not design.estimable:
-            raise InputError(f"sequential.instead_of: {scheme.name}: {design.reason}")
+        found = estimability(scheme, self.model, self.equipment, self.noise)
+        if not found.estimable:
+            raise InputError(f"sequential.instead_of: {scheme.name}: {found.reason}")
         error = Promise(np.inf, self.config.tilt_range_gon * GON).tilt_error(self.model)
-        return error.rms_of_all(design.cofactors)
+        return error.rms_of_all(found.cofactors)
 
     @cached_property
     def promise(self) -> Promise:

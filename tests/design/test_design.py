@@ -14,7 +14,7 @@ from accelstudy.design.closed_forms import (
     has_octahedral_moments,
     perfect_robot_ratio,
 )
-from accelstudy.design.estimability import diagnose
+from accelstudy.design.estimability import estimability
 from accelstudy.effects import Effect
 from accelstudy.effects.base import per_axis
 from accelstudy.schemes import Scheme, get_scheme, scheme_names
@@ -42,7 +42,7 @@ TRUTH = NINE.vector(
 
 def design(scheme, model=NINE, approach=GRAVITY, **more):
     scheme = get_scheme(scheme) if isinstance(scheme, str) else scheme
-    return diagnose(scheme, model, approach, **more)
+    return estimability(scheme, model, approach, **more)
 
 
 def aligned(directions):

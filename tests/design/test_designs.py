@@ -9,7 +9,7 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON
 from accelstudy.commands.main import main
-from accelstudy.design.estimability import diagnose
+from accelstudy.design.estimability import estimability
 from accelstudy.design.optimal.information import position_rows
 from accelstudy.design.optimal.task import Task
 from accelstudy.design.proposal.config import DesignsConfig
@@ -51,12 +51,14 @@ def test_a_design_says_what_it_brings(made):
         scheme: "these 8 positions",
         get_scheme("mclaren-24"): "the 24 of",
     }.items():
-        roll, pitch = error.rms_of_all(diagnose(directions, NINE, get_approach("robot")).cofactors)
+        roll, pitch = error.rms_of_all(
+            estimability(directions, NINE, get_approach("robot")).cofactors
+        )
         expected = f": roll {roll / MGON:.2f} mgon, pitch {pitch / MGON:.2f} mgon"
         assert any(line in row and expected in row for row in said.splitlines())
     content = yaml.safe_load(path.read_text(encoding="utf-8"))
     assert content["design"]["rms_roll_mgon"] == pytest.approx(
-        error.rms_of_all(diagnose(scheme, NINE, get_approach("robot")).cofactors)[0] / MGON,
+        error.rms_of_all(estimability(scheme, NINE, get_approach("robot")).cofactors)[0] / MGON,
         rel=1e-5,
     )
     assert content["design"]["constraints"] == [

@@ -9,7 +9,7 @@ from accelstudy.adjustment import calibrate, whitened_jacobian
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON
-from accelstudy.design.estimability import diagnose
+from accelstudy.design.estimability import estimability
 from accelstudy.design.optimal.constraints import (
     Constraints,
     LeastAngle,
@@ -78,9 +78,9 @@ def efficiency(task, name, scheme, bound):
 def test_the_i_criterion_is_the_tilt_error_of_linear_theory(approach):
     task = Task(NINE, get_approach(approach), tilt_range=30 * GON)
     scheme = get_scheme("fibonacci-24")
-    design = diagnose(scheme, NINE, task.approach)
+    found = estimability(scheme, NINE, task.approach)
     zero, f_b = np.zeros(9), cap_forces(30 * GON, 200)
-    rms = tilt_error(NINE, zero, NINE, zero, f_b).rms_of_all(design.cofactors)
+    rms = tilt_error(NINE, zero, NINE, zero, f_b).rms_of_all(found.cofactors)
     np.testing.assert_allclose(task.rms_tilt(scheme.directions), rms, rtol=1e-9)
     value = get_criterion("I", task).value(task.normal(scheme.directions))
     assert float(np.exp(value)) == pytest.approx(np.mean(rms**2), rel=1e-9)

@@ -8,7 +8,7 @@ from study_helpers import NINE, PAPER_TRUTH
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import GON, STANDARD_GRAVITY
-from accelstudy.design.estimability import diagnose
+from accelstudy.design.estimability import estimability
 from accelstudy.leveling.angles import specific_force
 from accelstudy.leveling.sensitivity import leveled, leveling_sensitivity
 from accelstudy.leveling.shapley import linear_shapley, sampled_shapley
@@ -140,10 +140,8 @@ SIGMA_FORCE = 0.002
 
 
 def shares_of(scheme, roll, pitch, base_samples=64):
-    design = diagnose(get_scheme(scheme), MODEL, get_approach("gravity"), Noise(), TRUTH)
-    return leveling_shares(
-        roll, pitch, SIGMA_FORCE, MODEL, TRUTH, design.cofactors, base_samples, 1
-    )
+    found = estimability(get_scheme(scheme), MODEL, get_approach("gravity"), Noise(), TRUTH)
+    return leveling_shares(roll, pitch, SIGMA_FORCE, MODEL, TRUTH, found.cofactors, base_samples, 1)
 
 
 def test_the_slope_is_the_derivative():
@@ -158,9 +156,9 @@ def test_the_slope_is_the_derivative():
 
 def test_total_effects_are_those_of_the_paper():
     """The linear ones beside the Shapley effects, against Sobol's method."""
-    design = diagnose(get_scheme("mclaren-24"), MODEL, get_approach("gravity"), Noise(), TRUTH)
+    found = estimability(get_scheme("mclaren-24"), MODEL, get_approach("gravity"), Noise(), TRUTH)
     sampled = leveling_sensitivity(
-        [0, 50], [25], SIGMA_FORCE, 256, 20, 1, MODEL, TRUTH, design.sigma
+        [0, 50], [25], SIGMA_FORCE, 256, 20, 1, MODEL, TRUTH, found.sigma
     )
     table = shares_of("mclaren-24", [0, 50], [25])
     keys = ["output", "roll_gon", "pitch_gon", "input"]
@@ -195,10 +193,10 @@ def test_near_the_pole_shares_are_sampled():
     """Linear theory still serves at a pitch of 90 gon, and fails at 0.01 gon from the pole."""
     table = shares_of("mclaren-24", [10], [90, 99.99])
     table = table.set_index(["pitch_gon", "output", "input"]).sort_index()
-    design = diagnose(get_scheme("mclaren-24"), MODEL, get_approach("gravity"), Noise(), TRUTH)
+    found = estimability(get_scheme("mclaren-24"), MODEL, get_approach("gravity"), Noise(), TRUTH)
     whole = np.zeros((len(NAMES), len(NAMES)))
     whole[:3, :3] = SIGMA_FORCE**2 * np.eye(3)
-    whole[3:, 3:] = design.cofactors
+    whole[3:, 3:] = found.cofactors
     for pitch, near_linear in ((90.0, True), (99.99, False)):
         attitude = np.array([10.0, pitch]) * GON
         f_s = MODEL.sense(np.array(specific_force(*attitude, STANDARD_GRAVITY))[None], TRUTH)

@@ -16,7 +16,7 @@ from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY, angles_in
 from accelstudy.commands.main import main
 from accelstudy.data_sheets import DataSheet, data_sheet_names, get_data_sheet, of_sigma
 from accelstudy.design.closed_forms import gravity_sigma
-from accelstudy.design.estimability import diagnose
+from accelstudy.design.estimability import estimability
 from accelstudy.files.tables import read_origin, read_table
 from accelstudy.leveling.error import cap_forces, leveling_error, tilt_error
 from accelstudy.plan import candidates as planned
@@ -72,7 +72,7 @@ def test_columns_of_one_model_are_the_designs_of_all(model):
     rows = theory.rows(MCLAREN.directions, "robot", Noise())
     zeros = np.zeros(model.n_parameters)
     error = tilt_error(model, zeros, model, zeros, cap_forces(30 * GON, 200))
-    own = diagnose(MCLAREN, model, robot)
+    own = estimability(MCLAREN, model, robot)
     expected = theory.expected(rows, model, {})
     np.testing.assert_allclose(expected.rms, error.rms_of_all(own.cofactors), rtol=1e-8)
     assert expected.redundancy == own.redundancy

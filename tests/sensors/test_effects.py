@@ -12,7 +12,7 @@ from accelstudy.adjustment import calibrate
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.design.estimability import diagnose
+from accelstudy.design.estimability import estimability
 from accelstudy.diagnosis.report.families import family_of
 from accelstudy.diagnosis.report.wording import GROUPS
 from accelstudy.effects import Course, HoldConditions, effect_names, get_effect
@@ -389,7 +389,7 @@ def model_of(*effects):
 def design(*effects, approach=ROBOT, scheme=SCHEME, **columns):
     directions = scheme.directions
     hold = some_hold(-G * directions, **columns)
-    return diagnose(scheme, model_of(*effects), approach, hold=hold)
+    return estimability(scheme, model_of(*effects), approach, hold=hold)
 
 
 # What shapes the effect so that these 24 positions see it on every axis.
@@ -407,7 +407,7 @@ def test_every_effect_can_be_estimated(name):
     truth[9:] = np.resize([1, -1], len(truth) - 9) * math.sqrt(math.prod(effect.typical))
     ideal = session(model, truth, SCHEME.directions, hold=hold)
     noise = Noise()
-    expected = diagnose(SCHEME, model, ROBOT, noise, truth, hold=hold)
+    expected = estimability(SCHEME, model, ROBOT, noise, truth, hold=hold)
     assert expected.estimable
     observed = ideal.draw(noise, replicates, np.random.default_rng(5))
     result = calibrate(model, ROBOT, observed)

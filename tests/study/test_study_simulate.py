@@ -22,7 +22,7 @@ from study_helpers import (
 
 import accelstudy
 from accelstudy.basics.errors import InputError
-from accelstudy.design.estimability import diagnose
+from accelstudy.design.estimability import estimability
 from accelstudy.files import tables
 from accelstudy.files.tables import (
     collect,
@@ -260,6 +260,6 @@ def test_sigmas_that_no_weights_span_are_said():
     """The cell has no weights to compute with, and does not end the study."""
     keys = {"sensor_sigma_mps2": 1e-9, "robot_sigma_mgon": 4e5}
     (cell,) = make_cells(grid(schemes="mclaren-24", approaches="robot", **keys)).values()
-    design = diagnose(cell.positions, cell.estimated_model, cell.conditions, cell.noise)
-    assert not design.estimable
-    assert "the sigmas differ too much" in design.reason
+    found = estimability(cell.positions, cell.estimated_model, cell.conditions, cell.noise)
+    assert not found.estimable
+    assert "the sigmas differ too much" in found.reason

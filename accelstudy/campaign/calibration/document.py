@@ -58,7 +58,7 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
         ],
         "covariance": _numbers(covariance),
         "correlation": _numbers(correlation),
-        "condition": number(fit.design.condition),
+        "condition": number(fit.estimability.condition),
         "redundancy": adjustment.redundancy,
         "variance_of_unit_weight": number(adjustment.variance_posteriori[0]),
         "iterations": int(adjustment.iterations[0]),

@@ -19,7 +19,7 @@ from accelstudy.campaign.files.format import Campaign
 from accelstudy.campaign.files.header import COLUMNS
 from accelstudy.campaign.gross_errors.recognition import recognise
 from accelstudy.campaign.holds.sphere import fit_sphere
-from accelstudy.design.estimability import Design, diagnose
+from accelstudy.design.estimability import Estimability, estimability
 from accelstudy.schemes import Scheme
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
@@ -47,7 +47,7 @@ class CampaignFit:
     campaign, model, approach : what was fitted, with what
     observed : Observations, R = 1
     adjustment : Adjustment, R = 1
-    design : Design, of the campaign's own positions
+    estimability : Estimability, of the campaign's own positions
     unit_variance : float, variance of unit weight to quote, where somebody has judged the noise by
         more than this fit; by default its global test does
     """
@@ -57,7 +57,7 @@ class CampaignFit:
     approach: Approach
     observed: Observations
     adjustment: Adjustment
-    design: Design
+    estimability: Estimability
     unit_variance: float | None = None
 
     @property
@@ -221,11 +221,11 @@ def fit_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> 
     """
     check_campaign(campaign, model, approach)
     start_of = partial(initial_values, forces=campaign.forces, gravity=campaign.gravity)
-    design = campaign_design(campaign, model, approach)
-    if not design.estimable:
+    found = campaign_estimability(campaign, model, approach)
+    if not found.estimable:
         raise InputError(
             f"{campaign.name}: {campaign.n_positions} positions do not determine the model "
-            f"{model.name!r}: {design.reason}"
+            f"{model.name!r}: {found.reason}"
         )
     observed = replace(campaign_observations(campaign), initial=start_of(model))
     adjustment = calibrate(model, approach, observed)
@@ -240,16 +240,18 @@ def fit_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> 
     if not adjustment.converged[0]:
         raise InputError(
             f"{campaign.name}: the adjustment of the model {model.name!r} does not converge; "
-            f"{_cause(campaign, design)}"
+            f"{_cause(campaign, found)}"
         )
-    return CampaignFit(campaign, model, approach, observed, adjustment, design)
+    return CampaignFit(campaign, model, approach, observed, adjustment, found)
 
 
-def campaign_design(campaign: Campaign, model: SensorModel, approach: Approach) -> Design:
+def campaign_estimability(
+    campaign: Campaign, model: SensorModel, approach: Approach
+) -> Estimability:
     """Say what the positions of a campaign determine."""
     start = initial_values(model, campaign.forces, campaign.gravity)
     rough = model.correct(campaign.forces, start, campaign.gravity, campaign.hold)
-    return diagnose(
+    return estimability(
         Scheme(campaign.name, campaign.name, -rough, "exact", f"campaign {campaign.name}"),
         model,
         approach,
@@ -259,16 +261,16 @@ def campaign_design(campaign: Campaign, model: SensorModel, approach: Approach) 
     )
 
 
-def _cause(campaign: Campaign, design: Design) -> str:
+def _cause(campaign: Campaign, theory: Estimability) -> str:
     """Say what may keep an adjustment from converging."""
     found = recognise(campaign, get_approach("gravity" if campaign.angles is None else "robot"))
     more = "`accelstudy diagnose` looks for more"
     if found is not None:
         return f"this looks like a gross error ({words(found.name)}): {found.reason}; {more}"
-    if design.condition > HARDLY:
+    if theory.condition > HARDLY:
         return (
             f"the {campaign.n_positions} positions hardly determine it (condition "
-            f"{design.condition:.0f}, up to {HARDLY:.0f} is usual); more attitudes are needed"
+            f"{theory.condition:.0f}, up to {HARDLY:.0f} is usual); more attitudes are needed"
         )
     return f"a gross error in the data or a wrong unit is the usual cause; {more}"
 

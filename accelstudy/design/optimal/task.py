@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, STANDARD_GRAVITY
-from accelstudy.design.estimability import diagnose
+from accelstudy.design.estimability import estimability
 from accelstudy.design.optimal.information import information, position_rows
 from accelstudy.leveling.error import ATTITUDES, TiltError, cap_forces, tilt_error
 from accelstudy.schemes import Scheme, get_scheme
@@ -187,7 +187,9 @@ class Task:
             return ""
         scheme = Scheme("allowed", "allowed", directions, "generated", "")
         hold = HoldPlan().hold(len(directions))
-        found = diagnose(scheme, self.model, self.approach, self.noise, None, self.gravity, hold)
+        found = estimability(
+            scheme, self.model, self.approach, self.noise, None, self.gravity, hold
+        )
         return found.reason or "they hardly determine the model"
 
 

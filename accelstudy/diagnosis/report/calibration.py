@@ -10,7 +10,7 @@ import numpy as np
 from accelstudy.adjustment import calibrate
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.document import calibration_document, quality_document
-from accelstudy.campaign.calibration.fit import CampaignFit, campaign_design
+from accelstudy.campaign.calibration.fit import CampaignFit, campaign_estimability
 from accelstudy.diagnosis.report.missing import explanation_words, missing
 from accelstudy.diagnosis.report.positions import kept_positions
 from accelstudy.diagnosis.result import Diagnosis
@@ -34,7 +34,7 @@ def diagnosed_fit(diagnosis: Diagnosis) -> CampaignFit:
         approach=d.approach,
         observed=observed,
         adjustment=calibrate(d.extended, d.approach, observed),
-        design=campaign_design(campaign, d.extended, d.approach),
+        estimability=campaign_estimability(campaign, d.extended, d.approach),
         unit_variance=d.unit_variance,
     )
 

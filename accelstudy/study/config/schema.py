@@ -18,7 +18,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.names import LONGEST
 from accelstudy.basics.units import STANDARD_GRAVITY, to_si
 from accelstudy.design.config_names import ModelName, SchemeName
-from accelstudy.design.estimability import diagnose
+from accelstudy.design.estimability import estimability
 from accelstudy.effects import Effect, get_effect
 from accelstudy.files.provenance import config_hash
 from accelstudy.files.types import (
@@ -339,10 +339,10 @@ class StudyConfig(Block):
                     "of `noise`; add it to `grids`"
                 )
             noise = Noise(sigma_gravity=self.noise.gravity.sigma_mps2)
-            design = diagnose(scheme, model, get_approach(approach), noise)
-            if not design.estimable:
-                raise ValueError(f"sensitivity: {cell} cannot be estimated: {design.reason}")
-            if self.paper and design.redundancy == 0:
+            found = estimability(scheme, model, get_approach(approach), noise)
+            if not found.estimable:
+                raise ValueError(f"sensitivity: {cell} cannot be estimated: {found.reason}")
+            if self.paper and found.redundancy == 0:
                 raise ValueError(f"sensitivity: {cell} has no redundancy, which paper: true needs")
 
     def _n_cells(self, grid: Grid) -> int:

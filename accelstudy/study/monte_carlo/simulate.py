@@ -14,7 +14,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.block import Block, joined
-from accelstudy.design.estimability import diagnose
+from accelstudy.design.estimability import estimability
 from accelstudy.files.tables import parquet_writer
 from accelstudy.leveling.error import TiltError
 from accelstudy.simulation.sessions import session
@@ -108,7 +108,7 @@ def simulate_batch(
         write_estimates = opened("estimates", ESTIMATES, measured=measured)
         for number, share in enumerate(shares, 1):
             cell = share.cell
-            design = diagnose(
+            found = estimability(
                 cell.positions,
                 cell.estimated_model,
                 cell.conditions,
@@ -116,8 +116,8 @@ def simulate_batch(
                 gravity=cell.gravity,
                 hold=cell.hold,
             )
-            if not design.estimable:
-                log.info("%d/%d %s: %s", number, len(shares), cell.name, design.reason)
+            if not found.estimable:
+                log.info("%d/%d %s: %s", number, len(shares), cell.name, found.reason)
                 continue
             followed, tree = Followed.of(cell), Tree()
             sketches = None

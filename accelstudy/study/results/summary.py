@@ -15,7 +15,7 @@ from scipy import special
 from accelstudy.basics.shares import Z95, wilson
 from accelstudy.basics.units import GON, MGON, recorded_unit, to_recorded
 from accelstudy.design import closed_forms
-from accelstudy.design.estimability import Design, diagnose
+from accelstudy.design.estimability import Estimability, estimability
 from accelstudy.effects import get_effect
 from accelstudy.files.tables import parquet_writer, write_table
 from accelstudy.leveling.error import TiltError
@@ -68,7 +68,7 @@ def summarise_batch(
             for name, schema in (("moments", MOMENTS), ("sketches", SKETCHES))
         )
         for cell in cells:
-            design = diagnose(
+            theory = estimability(
                 cell.positions,
                 cell.estimated_model,
                 cell.conditions,
@@ -88,12 +88,12 @@ def summarise_batch(
                 write_moments(moments_table(cell.name, tree))
                 sketches = {key: its for key, its in found.items() if isinstance(its, Sketch)}
                 write_sketches(sketch_table(cell.name, sketches))
-            rows["cells"].append(_cell_row(cell, design, statistics))
-            rows["summary"].append(_summary_rows(cell, design, statistics))
+            rows["cells"].append(_cell_row(cell, theory, statistics))
+            rows["summary"].append(_summary_rows(cell, theory, statistics))
             rows["correlations"].append(_correlation_rows(cell, statistics))
             rows["quantiles"].append(_quantile_rows(cell, statistics, found))
             row = _leveling_row(cell, statistics, tilt, found)
-            rows["leveling"].append(row if design.estimable else row[:0])
+            rows["leveling"].append(row if theory.estimable else row[:0])
     for name in TABLES:
         write_table(outputs[name], pd.concat(rows[name], ignore_index=True), provenance)
 
@@ -112,20 +112,20 @@ def _labels(cell: Cell) -> dict[str, Any]:
     }
 
 
-def _cell_row(cell: Cell, design: Design, statistics: Statistics) -> pd.DataFrame:
+def _cell_row(cell: Cell, theory: Estimability, statistics: Statistics) -> pd.DataFrame:
     return pd.DataFrame(
         {
             **_labels(cell),
             "n_positions": cell.positions.n_positions,
-            "n_parameters": len(design.parameter_names),
-            "rank": design.rank,
-            "condition": design.condition,
-            "redundancy": design.redundancy,
-            "fourth_moment": design.fourth_moment,
-            "pole_distance_gon": design.pole_distance / GON,
-            "estimable": design.estimable,
-            "not_estimable": ", ".join(design.not_estimable),
-            "reason": design.reason,
+            "n_parameters": len(theory.parameter_names),
+            "rank": theory.rank,
+            "condition": theory.condition,
+            "redundancy": theory.redundancy,
+            "fourth_moment": theory.fourth_moment,
+            "pole_distance_gon": theory.pole_distance / GON,
+            "estimable": theory.estimable,
+            "not_estimable": ", ".join(theory.not_estimable),
+            "reason": theory.reason,
             "n_replicates": statistics.moments.simulated,
             "n_converged": statistics.converged,
         },
@@ -133,7 +133,7 @@ def _cell_row(cell: Cell, design: Design, statistics: Statistics) -> pd.DataFram
     )
 
 
-def _summary_rows(cell: Cell, design: Design, statistics: Statistics) -> pd.DataFrame:
+def _summary_rows(cell: Cell, theory: Estimability, statistics: Statistics) -> pd.DataFrame:
     """Statistics of each parameter, in the units shown to people; NaN where there are none."""
     exact = _closed_forms(cell)
     followed = statistics.followed
@@ -149,7 +149,7 @@ def _summary_rows(cell: Cell, design: Design, statistics: Statistics) -> pd.Data
             "sd_empirical": sd[ERROR][i],
             "sd_posteriori_mean": mean[POSTERIORI][i],
             "sd_priori_mean": mean[PRIORI][i],
-            "sd_linear": design.sigma[i],
+            "sd_linear": theory.sigma[i],
             "sd_closed_form": exact.get(name, np.nan),
             "first_error": first[ERROR][i],
             "first_sd_posteriori": first[POSTERIORI][i],
@@ -164,8 +164,8 @@ def _summary_rows(cell: Cell, design: Design, statistics: Statistics) -> pd.Data
                 **_coverage(statistics, i),
                 "n_replicates": statistics.moments.simulated,
                 "n_converged": n,
-                "estimable": name not in design.not_estimable,
-                "reason": design.reason,
+                "estimable": name not in theory.not_estimable,
+                "reason": theory.reason,
             }
         )
     return pd.DataFrame(rows)
