@@ -50,6 +50,14 @@ def warn(text: str) -> None:
     click.echo(f"warning: {text}", err=True)
 
 
+def failure(what: str, error: Exception) -> str:
+    """Say what failed and by which error, and warn of it on stderr."""
+    reason = " ".join(str(error).split())[:200]
+    said = f"{what} ({type(error).__name__}: {reason})."
+    warn(said)
+    return said
+
+
 @contextmanager
 def stage(what: str, total: float | None = None) -> Iterator[Callable[[float], None]]:
     """Show `what` is being done within a ``with`` block; stages may lie within each other.

@@ -290,7 +290,7 @@ def claims(results: Path) -> None:
     RESULTS is the folder of a study, such as results/paper.
     """
     from accelstudy.files.tables import read_table
-    from accelstudy.study.results.claims_report import claims_markdown
+    from accelstudy.study.claims.page import claims_markdown
 
     click.echo(claims_markdown(read_table(results / "claims.parquet")), nl=False)
 

@@ -15,7 +15,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from accelstudy.basics.progress import warn
+from accelstudy.basics.progress import failure
 from accelstudy.drawing.style import STYLE
 from accelstudy.files.outputs import whole_file
 
@@ -83,14 +83,6 @@ def save_all(figures: Mapping[str, Callable[[], Figure]], folder: Path) -> dict[
             said = failure(f"The figure {name!r} could not be drawn", error)
             elements[name] = f'<p class="failed">{html.escape(said)}</p>'
     return elements
-
-
-def failure(what: str, error: Exception) -> str:
-    """Say what failed and by which error, and warn of it on stderr."""
-    reason = " ".join(str(error).split())[:200]
-    said = f"{what} ({type(error).__name__}: {reason})."
-    warn(said)
-    return said
 
 
 def _simplify(figure: Figure) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, Template
 
+from accelstudy.basics.progress import failure
 from accelstudy.basics.units import (
     GON,
     MGON,
@@ -19,7 +20,6 @@ from accelstudy.basics.units import (
     to_display,
 )
 from accelstudy.basics.wording import interval, joined, number, p_value, probability, words
-from accelstudy.drawing.saving import failure
 from accelstudy.files.outputs import whole_file
 from accelstudy.pages.glossary import explained
 

@@ -304,7 +304,7 @@ def test_code_on_which_it_depends(tmp_path, monkeypatch):
 def registry(tmp_path, monkeypatch):
     """The registry of a copy of the package, which is the one of the jobs and here."""
     package = Path(shutil.copytree(accelstudy.__path__[0], tmp_path / "package" / "accelstudy"))
-    path = package / "campaign" / "public_data.yaml"
+    path = package / "campaign" / "importing" / "public_data.yaml"
     monkeypatch.setattr(public, "REGISTRY", path)
     public_data.cache_clear()
     yield path
@@ -312,7 +312,7 @@ def registry(tmp_path, monkeypatch):
 
 
 def test_what_cannot_be_downloaded_is_reported_and_tried_again(registry, tmp_path):
-    environment = {**ENVIRONMENT, "PYTHONPATH": str(registry.parents[2])}
+    environment = {**ENVIRONMENT, "PYTHONPATH": str(registry.parents[3])}
     environment["ACCELSTUDY_ANGLE_UNIT"] = "deg"
     log = write_log(tmp_path / "source")
     away = log.rename(tmp_path / "away.parquet")

@@ -69,7 +69,7 @@ def steps(site, tmp_path_factory):
     environment |= {"PYTHONPATH": str(site), "MPLBACKEND": "agg"}
     environment["PATH"] = f"{site / 'bin'}:{environment['PATH']}"
     done = subprocess.run(
-        [sys.executable, ROOT / "tests/walk.py", README, "steps.json"],
+        [sys.executable, ROOT / "tests/helpers/walk.py", README, "steps.json"],
         cwd=folder, env=environment, capture_output=True, text=True,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr

@@ -25,9 +25,9 @@ from accelstudy.leveling.sensitivity import leveling_sensitivity
 from accelstudy.sensors.models import get_model
 from accelstudy.study.cells.cell import study_cells
 from accelstudy.study.claims import NOT_REPRODUCED, REPRODUCED, SLIP, evidence_from, judge
+from accelstudy.study.claims.page import claims_markdown, claims_page
 from accelstudy.study.figures import figure_tables
 from accelstudy.study.monte_carlo.distributions import Sample
-from accelstudy.study.results.claims_report import claims_markdown, claims_page
 from accelstudy.study.results.figure_files import draw_figures
 from accelstudy.study.results.judging import judge_claims
 from accelstudy.study.results.sensitivity import analyse_shapley

@@ -43,7 +43,7 @@ TABLE_PATHS = [f"results/tiny/{name}.parquet" for name in TABLES]
 IN_BATCHES = f"""\
 from functools import partial
 
-from accelstudy.study import batches
+from accelstudy.study.cells import batches
 
 batches.batches = partial(batches.batches, size=190)
 
@@ -257,7 +257,7 @@ def hash_of(stage):
         ("drawing/style.py", {"figures"}),
         ("study/figures/sweep.py", {"figures"}),
         ("study/claims/base.py", {"claims"}),
-        ("study/results/claims.html.j2", {"claims"}),
+        ("study/claims/page.html.j2", {"claims"}),
         ("pages/base.html.j2", {"claims"}),
         ("commands/main.py", set()),
         ("commands/catalogue.py", set()),

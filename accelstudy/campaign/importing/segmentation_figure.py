@@ -14,12 +14,12 @@ from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.progress import stage
+from accelstudy.basics.progress import failure, stage
 from accelstudy.basics.wording import counted
 from accelstudy.campaign.holds.detection import Holds
 from accelstudy.campaign.holds.windows import windows
 from accelstudy.campaign.logs.recording import Recording
-from accelstudy.drawing.saving import failure, save
+from accelstudy.drawing.saving import save
 from accelstudy.drawing.style import DPI, FULL, INK, STYLE, new_figure
 
 Array = NDArray[np.float64]

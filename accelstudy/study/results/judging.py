@@ -10,8 +10,8 @@ from accelstudy.files.outputs import whole_file
 from accelstudy.files.tables import read_table, write_table
 from accelstudy.study.cells.cell import study_cells
 from accelstudy.study.claims import evidence_from, judge
+from accelstudy.study.claims.page import claims_page
 from accelstudy.study.config import StudyConfig
-from accelstudy.study.results.claims_report import claims_page
 
 
 def judge_claims(

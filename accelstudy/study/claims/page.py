@@ -17,7 +17,7 @@ def claims_page(claims: pd.DataFrame, by_scheme: pd.DataFrame) -> str:
     from accelstudy.pages import render  # which shows numbers as here
 
     return render(
-        "study/results/claims.html.j2",
+        "study/claims/page.html.j2",
         claims=claims.to_dict("records"),
         schemes=by_scheme.to_dict("records"),
         next_steps=[
