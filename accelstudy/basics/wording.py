@@ -13,7 +13,7 @@ def words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def joined(items: Sequence[str], last: str = "and") -> str:
+def comma_list(items: Sequence[str], last: str = "and") -> str:
     """Join words: a, b and c; nothing of none."""
     if len(items) < 2:
         return "".join(items)
@@ -68,7 +68,7 @@ def counted(number: int, noun: str) -> str:
     return f"{number} {noun}" + ("" if number == 1 else "s")
 
 
-def listed(names: Sequence[str], most: int = 20) -> str:
+def short_list(names: Sequence[str], most: int = 20) -> str:
     """Names, the first ones of many and the beginnings of long ones, in one line."""
     shown = ", ".join(one_line(name, 30) if name.strip() else repr(name) for name in names[:most])
     return shown + (", …" if len(names) > most else "")

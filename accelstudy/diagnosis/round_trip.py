@@ -10,7 +10,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError, UnknownNameError
@@ -19,7 +19,7 @@ from accelstudy.campaign.files.format import write_campaign
 from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign, write_truth
 from accelstudy.design.config_names import ModelName
 from accelstudy.files.types import Seed, Sessions
-from accelstudy.files.validation import Block, first_error
+from accelstudy.files.validation import Block, checked
 from accelstudy.sensors.models import get_model
 
 
@@ -57,10 +57,7 @@ class RoundTrip(Block):
 
 def parse_round_trip(content: Mapping[str, Any], source: str = "config") -> RoundTrip:
     """Check a configuration; raise `InputError` with one line that names the source and the key."""
-    try:
-        return RoundTrip.model_validate(content)
-    except ValidationError as error:
-        raise InputError(f"{source}: {first_error(error, RoundTrip)}") from None
+    return checked(RoundTrip, content, source)
 
 
 def write_simulated(settings: CampaignSettings, folder: str | Path, truth: str | Path) -> None:

@@ -1,15 +1,18 @@
-"""What pydantic finds wrong with a configuration, in one line for a person."""
+"""Checks of what was read from a file; an error is one line that names the key."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
 
-from accelstudy.basics.errors import shown
+from accelstudy.basics.errors import InputError, shown
+
+Model = TypeVar("Model", bound=BaseModel)
 
 
 class Block(BaseModel):
@@ -18,7 +21,35 @@ class Block(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=False)
 
 
-def first_error(error: ValidationError, root: type[BaseModel]) -> str:
+def checked(
+    model: type[Model], content: Mapping[str, Any], source: str | Path, section: str = ""
+) -> Model:
+    """Check what was read from a file against a pydantic model.
+
+    Parameters
+    ----------
+    model : subclass of BaseModel
+    content : mapping, as read from YAML or JSON
+    source : str or path, named in errors
+    section : str, key of `source` under which `content` stands
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    InputError
+        One line that names the source, the key, what is wrong and what would be right.
+    """
+    try:
+        return model.model_validate(content)
+    except ValidationError as error:
+        at = f"{source}: {section}." if section else f"{source}: "
+        raise InputError(f"{at}{_first_error(error, model)}") from None
+
+
+def _first_error(error: ValidationError, root: type[BaseModel]) -> str:
     """Say in one line which key of a `root` is wrong, and what would be right."""
     first, *others = error.errors()
     key = ".".join(str(part)[:100] for part in first["loc"])
@@ -30,6 +61,10 @@ def first_error(error: ValidationError, root: type[BaseModel]) -> str:
         text += f" (known: {', '.join(siblings)})"
     elif first["type"] == "value_error":
         text = ": ".join(filter(None, [key, str(first["ctx"]["error"])]))
+    elif first["type"] == "model_type":
+        text = ": ".join(
+            filter(None, [key, f"expected keys and values, not {shown(first['input'])}"])
+        )
     else:
         value = "" if first["type"] == "missing" else f", not {shown(first['input'])}"
         text = f"{key}: {first['msg'][0].lower()}{first['msg'][1:]}{value}"

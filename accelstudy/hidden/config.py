@@ -7,14 +7,14 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.design.config_names import ModelName
 from accelstudy.effects import effect_names
 from accelstudy.files.types import OneOrMore, PathName, Positive, Replicates, Seed
-from accelstudy.files.validation import Block, first_error
+from accelstudy.files.validation import Block, checked
 from accelstudy.hidden.physics import APPROACHES, DESIGNS, EFFECTS, GROSS, NOISES, OUTSIDE
 from accelstudy.sensors.models import get_model
 
@@ -157,10 +157,7 @@ CAMPAIGNS = Range(1, 1_000_000)
 
 def parse_hidden(content: Mapping[str, Any], source: str = "config") -> HiddenConfig:
     """Check a configuration; raise `InputError` with one line that names the source and the key."""
-    try:
-        return HiddenConfig.model_validate(content)
-    except ValidationError as error:
-        raise InputError(f"{source}: {first_error(error, HiddenConfig)}") from None
+    return checked(HiddenConfig, content, source)
 
 
 def _known(key: str, kind: str, names: Sequence[str], known: Sequence[str]) -> None:

@@ -15,7 +15,7 @@ from types import MappingProxyType
 from typing import Any
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.wording import joined
+from accelstudy.basics.wording import comma_list
 from accelstudy.files.outputs import Kind
 from accelstudy.files.parquet import read_row_groups
 from accelstudy.files.tables import LIBRARIES, REMEDY, origin, read_origin
@@ -79,7 +79,7 @@ def earlier_run(
             f"{_named(other)}. {kept}"
         )
     if changed := _other_software(origins.values()):
-        yield f"{results}: has tables made by {joined(changed)}. {kept}"
+        yield f"{results}: has tables made by {comma_list(changed)}. {kept}"
 
 
 def _locked(results: str) -> bool:
@@ -101,7 +101,7 @@ def _other_software(origins: Iterable[Mapping[str, Any]]) -> list[str]:
     for key, name in _SOFTWARE.items():
         before = {_brief(made.get(key)) for made in origins} - {_brief(now[key])}
         if before:
-            changed.append(f"{name} {joined(sorted(before))} (now {_brief(now[key])})")
+            changed.append(f"{name} {comma_list(sorted(before))} (now {_brief(now[key])})")
     return changed
 
 

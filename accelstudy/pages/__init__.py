@@ -19,7 +19,7 @@ from accelstudy.basics.units import (
     to_attitude,
     to_display,
 )
-from accelstudy.basics.wording import interval, joined, number, p_value, probability, words
+from accelstudy.basics.wording import comma_list, interval, number, p_value, probability, words
 from accelstudy.files.outputs import whole_file
 from accelstudy.pages.glossary import explained
 
@@ -97,7 +97,7 @@ def _template(name: str) -> Template:
         attitude=lambda gon: to_attitude(gon * GON).item(),
         badge=lambda verdict: BADGES[verdict][0],
         colour=lambda verdict: BADGES[verdict][1],
-        joined=joined,
+        comma_list=comma_list,
         number=number,
         p=probability,
         p_value=p_value,

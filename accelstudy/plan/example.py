@@ -7,11 +7,10 @@ import json
 from collections.abc import Mapping
 from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field
 
-from accelstudy.basics.errors import InputError
 from accelstudy.files.types import PathName, Seed
-from accelstudy.files.validation import Block, first_error
+from accelstudy.files.validation import Block, checked
 
 Section = TypeVar("Section", bound=BaseModel)
 
@@ -45,17 +44,11 @@ def parse_example(content: Mapping[str, Any], source: str = "config") -> Example
     InputError
         One line that names the source, the key, what is wrong and what would be right.
     """
-    try:
-        return Example.model_validate(content)
-    except ValidationError as error:
-        raise InputError(f"{source}: {first_error(error, Example)}") from None
+    return checked(Example, content, source)
 
 
 def parse_section(
     example: Example, name: str, block: type[Section], source: str = "config"
 ) -> Section:
     """Check one section by the class of its part; errors are as in `parse_example`."""
-    try:
-        return block.model_validate(getattr(example, name))
-    except ValidationError as error:
-        raise InputError(f"{source}: {name}.{first_error(error, block)}") from None
+    return checked(block, getattr(example, name), source, name)

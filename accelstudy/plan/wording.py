@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from accelstudy.basics.units import angle_note, display_unit, quantity_text, to_display
-from accelstudy.basics.wording import joined, number, words
+from accelstudy.basics.wording import comma_list, number, words
 from accelstudy.data_sheets import ASSUMED
 from accelstudy.effects import get_effect
 from accelstudy.plan.advice import PLAIN, InUse, Need, Spoiler, in_use, limits, needs, spoilers
@@ -71,7 +71,7 @@ def answer_lines(answer: Answer) -> list[str]:
         more.append(f"{_angle(use.drift)} after {number_of(use.hours)} h")
     if not math.isnan(use.warmth):
         more.append(f"{_angle(use.warmth)} where it is {number_of(use.kelvin)} K warmer or colder")
-    lines.append(f"In use comes on top: {joined(more)}.")
+    lines.append(f"In use comes on top: {comma_list(more)}.")
     return lines
 
 
@@ -228,7 +228,7 @@ def _need(need: Need) -> str:
         what.append(f"to estimate it {costs} {_angle(need.cost)}")
     elif not need.in_model:
         what.append("these positions cannot tell it")
-    return f"{effect} ({size}): {VERDICTS[need.verdict]}; {joined(what)}"
+    return f"{effect} ({size}): {VERDICTS[need.verdict]}; {comma_list(what)}"
 
 
 def _spoiler(spoiler: Spoiler) -> str:
@@ -266,7 +266,7 @@ def assumption_lines(question: Question) -> list[str]:
     lines = [f"Sensor: {question.sheet.name}, {question.sheet.title}."]
     assumed = [PLAIN[e] for e, size in question.sizes.items() if size.source == "typical"]
     if assumed:
-        lines.append(f"Of a usual size, as nothing is known of it: {joined(assumed)}.")
+        lines.append(f"Of a usual size, as nothing is known of it: {comma_list(assumed)}.")
     if any(size.source == ASSUMED for size in question.sizes.values()):
         lines.append("Taken to be linear, as only its noise is known.")
     if question.sheet.position_sigma is not None:
@@ -309,4 +309,4 @@ def _angle(value: float) -> str:
 
 def _angles(values: Sequence[float] | np.ndarray) -> str:
     shown = [number(float(v)) for v in to_display(values, "rad")]
-    return f"{joined(list(dict.fromkeys(shown)))} {display_unit('rad')}"
+    return f"{comma_list(list(dict.fromkeys(shown)))} {display_unit('rad')}"

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY, quantity_text
-from accelstudy.basics.wording import joined
+from accelstudy.basics.wording import comma_list
 from accelstudy.campaign.use.applying import read_calibration
 from accelstudy.data_sheets import DataSheet
 from accelstudy.design.estimability import estimability
@@ -123,8 +123,8 @@ def from_calibration(path: str | Path, sheet: DataSheet, mounting: Frame = FRD) 
     ]
     if unknown or not np.isfinite(calibration.covariance).all():
         raise InputError(
-            f"{path}: covariance: unknown for {joined(unknown) or 'some parameters'}; calibrate a "
-            "campaign with more positions, or give the sigma of the sensor in it"
+            f"{path}: covariance: unknown for {comma_list(unknown) or 'some parameters'}; "
+            "calibrate a campaign with more positions, or give the sigma of the sensor in it"
         )
     quality = calibration.content["quality"]
     faults = [] if quality["plausible"] else quality["warnings"]

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from accelstudy.basics.units import GON, attitude_unit, quantity_text, to_attitude
-from accelstudy.basics.wording import joined, words
+from accelstudy.basics.wording import comma_list, words
 from accelstudy.pole.budget import Budget
 from accelstudy.pole.sensor import COEFFICIENTS
 from accelstudy.pole.sources import sources
@@ -76,7 +76,7 @@ def sentences(budget: Budget) -> list[str]:
         )
     parts = {each.title: own[each.name] for each in sources() if each.sensor and own[each.name] > 0}
     inside = float(np.sqrt(sum(value**2 for value in parts.values())))
-    named = joined([f"{title} {_mm(value)}" for title, value in parts.items()])
+    named = comma_list([f"{title} {_mm(value)}" for title, value in parts.items()])
     said.append(f"The tilt sensor makes {_mm(inside)} of it: {named or 'nothing is counted'}.")
     return said
 
@@ -92,11 +92,11 @@ def remarks(budget: Budget) -> list[str]:
     said = []
     if missing := [words(name) for name in sensor.sheet.unknown if name in wanted]:
         said.append(
-            f"The data sheet {sensor.sheet.name!r} does not tell {joined(missing, 'or')}: counted "
-            "as zero."
+            f"The data sheet {sensor.sheet.name!r} does not tell {comma_list(missing, 'or')}: "
+            "counted as zero."
         )
     if setup.temperature_change and sensor.corrected:
-        what = joined([f"the {name}" for name in sensor.corrected])
+        what = comma_list([f"the {name}" for name in sensor.corrected])
         said.append(
             f"The calibration corrects what the temperature does to {what}; that is not counted."
         )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.suggested import calibrate
 from accelstudy.basics.units import attitude_unit, quantity_text, to_attitude
-from accelstudy.basics.wording import counted, joined, p_value, words
+from accelstudy.basics.wording import comma_list, counted, p_value, words
 from accelstudy.campaign.files.format import Campaign
 from accelstudy.effects import Effect
 from accelstudy.leveling.angles import roll_pitch
@@ -108,7 +108,7 @@ def _last(advice: Advice) -> list[str]:
 def _aside(advice: Advice) -> list[str]:
     if not advice.set_aside:
         return []
-    numbers = joined([str(number) for number in advice.set_aside])
+    numbers = comma_list([str(number) for number in advice.set_aside])
     noun = "position" if len(advice.set_aside) == 1 else "positions"
     entries = ", ".join(f"{{position: {n}, reason: in conflict}}" for n in advice.set_aside)
     return [
@@ -137,14 +137,14 @@ def _by_effect(names: Sequence[str], model: SensorModel) -> str:
         if found:
             some = "" if found == own else f" ({', '.join(found)})"
             parts.append(f"{words(effect.name)}{some}{_needs(effect)}")
-    return joined(parts)
+    return comma_list(parts)
 
 
 def _needs(effect: Effect) -> str:
     """What must change between positions for an effect to be seen, besides the attitude."""
     columns = compose(effect.spec, (effect.spec,)).hold_columns
     needed = [f"other {word}" for column, word in CHANGING.items() if column in columns]
-    return f" [needs {joined(needed)}]" if needed else ""
+    return f" [needs {comma_list(needed)}]" if needed else ""
 
 
 def _noise(advice: Advice) -> list[str]:

@@ -23,7 +23,7 @@ from accelstudy.campaign.batch.overview import (
     CAMPAIGN_COLUMNS,
     PARAMETER_COLUMNS,
     counts,
-    summarise_batch,
+    summarise_campaigns,
 )
 from accelstudy.campaign.batch.run import run_task
 from accelstudy.campaign.files.format import write_campaign
@@ -190,7 +190,7 @@ def test_a_calibration_that_no_sensor_has_is_not_among_the_calibrated(made, tmp_
         content["quality"] |= {"state": state, "verdict": f"Why it is {state}."}
         path.write_text(json.dumps(content), encoding="utf-8")
     outputs = [tmp_path / name for name in ("c.parquet", "p.parquet", "overview.html")]
-    table = summarise_batch("doubt", folders, *outputs, {"config_hash": "", "seed": None})
+    table = summarise_campaigns("doubt", folders, *outputs, {"config_hash": "", "seed": None})
     assert counts(table) == "1 of 3 campaigns calibrated, 1 implausible"
     page = outputs[2].read_text(encoding="utf-8")
     assert "3 campaigns: 1 calibrated, 1 implausible, 1 not calibrated." in text_of(page)
@@ -349,7 +349,9 @@ def test_public_data_from_a_folder_that_has_them(tmp_path, monkeypatch):
     errors = {task.name: run_task(task, task.name, f"{task.name}.json") for task in batch.tasks()}
     assert errors["ferraris-annotated"].startswith("6 positions do not determine the model")
     paths = [Path(name) for name in ("campaigns.parquet", "parameters.parquet", "overview.html")]
-    summarise_batch("public", [Path(e) for e in errors], *paths, {"config_hash": "0", "seed": None})
+    summarise_campaigns(
+        "public", [Path(e) for e in errors], *paths, {"config_hash": "0", "seed": None}
+    )
     table = read_table(paths[0]).set_index("campaign")
     assert table["status"].tolist() == ["ok", "ok", "failed"]
     assert table.loc["innalabs-24", "rms_norm_residual_mps2"] == pytest.approx(
@@ -466,7 +468,7 @@ def test_all_failed(tmp_path):
     assert "no such folder" in error
     paths = [tmp_path / name for name in ("c.parquet", "p.parquet", "o.html")]
     provenance = {"config_hash": "0", "seed": None}
-    summarise_batch("b", [tmp_path / "out"], *paths, provenance)
+    summarise_campaigns("b", [tmp_path / "out"], *paths, provenance)
     assert read_table(paths[0]).dtypes.astype(str).to_dict() == CAMPAIGN_COLUMNS
     assert read_table(paths[1]).empty
     assert "Calibrated" not in paths[2].read_text(encoding="utf-8")
@@ -478,7 +480,7 @@ def test_what_a_page_shows_is_escaped(tmp_path):
     assert task.name == "i-"
     run_task(task, tmp_path / "out")
     paths = [tmp_path / name for name in ("c.parquet", "p.parquet", "o.html")]
-    summarise_batch("b", [tmp_path / "out"], *paths, {"config_hash": "0", "seed": None})
+    summarise_campaigns("b", [tmp_path / "out"], *paths, {"config_hash": "0", "seed": None})
     page = paths[2].read_text(encoding="utf-8")
     assert "<i>" not in page
     assert "&lt;i&gt;&amp;: no such folder" in page

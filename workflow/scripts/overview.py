@@ -2,12 +2,12 @@ import os
 
 from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, angles_in
 from accelstudy.campaign.batch.config import parse_batch
-from accelstudy.campaign.batch.overview import counts, summarise_batch
+from accelstudy.campaign.batch.overview import counts, summarise_campaigns
 from accelstudy.jobs.job import logged
 
 with logged(snakemake), angles_in(os.environ.get(ANGLE_UNIT_VARIABLE)):
     batch = parse_batch(snakemake.config)
-    table = summarise_batch(
+    table = summarise_campaigns(
         batch.batch,
         snakemake.input,
         **dict(snakemake.output.items()),

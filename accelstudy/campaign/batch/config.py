@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal, Self
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
@@ -23,7 +23,7 @@ from accelstudy.campaign.importing.settings import GravitySettings, ImportSettin
 from accelstudy.design.config_names import ModelName
 from accelstudy.files.layers import overlay, read_layer
 from accelstudy.files.types import PathName
-from accelstudy.files.validation import Block, first_error
+from accelstudy.files.validation import Block, checked
 from accelstudy.sensors.models import get_model
 
 KINDS = ("campaign", "log", "public")
@@ -165,10 +165,7 @@ class BatchConfig(Block):
 
 def parse_batch(content: Mapping[str, Any], source: str = "config") -> BatchConfig:
     """Check a configuration; raise `InputError` with one line that names the source and the key."""
-    try:
-        return BatchConfig.model_validate(content)
-    except ValidationError as error:
-        raise InputError(f"{source}: {first_error(error, BatchConfig)}") from None
+    return checked(BatchConfig, content, source)
 
 
 def read_batch(path: str | Path) -> BatchConfig:

@@ -69,7 +69,7 @@ PARAMETER_COLUMNS = {
 """Columns of the table of parameters and their types; numbers are in SI."""
 
 
-def summarise_batch(
+def summarise_campaigns(
     batch: str,
     folders: Iterable[str | Path],
     campaigns: str | Path,

@@ -129,7 +129,7 @@ def tilt_shares(fit: CampaignFit) -> dict[str, Array]:
     return shares
 
 
-def positions_table(assessment: Assessment) -> pd.DataFrame:
+def assessed_positions(assessment: Assessment) -> pd.DataFrame:
     """One row per position: residuals, tests and reliability, in the units that the names say."""
     fit, tests, reliability = assessment.fit, assessment.tests, assessment.reliability
     scale = np.sqrt(fit.variance_factor)  # reliability is in terms of the a-priori noise

@@ -36,21 +36,23 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
         "gravity_mps2": fit.gravity,
         "n_positions": campaign.n_positions,
         "sigma_source": "a priori" if fit.trusts_sigma else "a posteriori",
-        "sigma_position_mps2": number(fit.sigma_position),
-        "sigma_position_priori_mps2": number(campaign.sigma_force),
-        "sigma_position_posteriori_mps2": number(fit.sigma_position_posteriori),
+        "sigma_position_mps2": json_number(fit.sigma_position),
+        "sigma_position_priori_mps2": json_number(campaign.sigma_force),
+        "sigma_position_posteriori_mps2": json_number(fit.sigma_position_posteriori),
         "sigma_reading_mps2": _sigma_reading(campaign),
         "parameters": [
             {
                 "name": parameter.name,
                 "value": float(fit.parameters[i]),
-                "sigma": number(sigma[i]),
-                "sigma_priori": number(adjustment.sigma_priori[0, i] if fit.sigma_known else None),
-                "sigma_posteriori": number(adjustment.sigma_posteriori[0, i]),
+                "sigma": json_number(sigma[i]),
+                "sigma_priori": json_number(
+                    adjustment.sigma_priori[0, i] if fit.sigma_known else None
+                ),
+                "sigma_posteriori": json_number(adjustment.sigma_posteriori[0, i]),
                 "unit": parameter.unit,
                 "shown": {
                     "value": float(to_recorded(fit.parameters[i], parameter.unit)),
-                    "sigma": number(to_recorded(sigma[i], parameter.unit)),
+                    "sigma": json_number(to_recorded(sigma[i], parameter.unit)),
                     "unit": recorded_unit(parameter.unit),
                 },
             }
@@ -58,11 +60,11 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
         ],
         "covariance": _numbers(covariance),
         "correlation": _numbers(correlation),
-        "condition": number(fit.estimability.condition),
+        "condition": json_number(fit.estimability.condition),
         "redundancy": adjustment.redundancy,
-        "variance_of_unit_weight": number(adjustment.variance_posteriori[0]),
+        "variance_of_unit_weight": json_number(adjustment.variance_posteriori[0]),
         "iterations": int(adjustment.iterations[0]),
-        "rms_norm_residual_mps2": number(fit.rms_norm_residual),
+        "rms_norm_residual_mps2": json_number(fit.rms_norm_residual),
         "affine": _affine(fit),
         "mended": None,
         "excluded": campaign.exclusions,
@@ -96,30 +98,30 @@ def quality_document(assessment: Assessment) -> dict[str, Any]:
             "remark": test.remark,
         },
         "suspects": [
-            {"position": int(positions[s.position]), "p_value": number(s.p_value)}
+            {"position": int(positions[s.position]), "p_value": json_number(s.p_value)}
             for s in assessment.suspects
         ],
         "held_out": None
         if held is None or held.n_predicted == 0
         else {
             "n_predicted": held.n_predicted,
-            "rms_mps2": number(held.rms),
-            "rms_roll_mgon": None if angles is None else number(angles[0] / MGON),
-            "rms_pitch_mgon": None if angles is None else number(angles[1] / MGON),
+            "rms_mps2": json_number(held.rms),
+            "rms_roll_mgon": None if angles is None else json_number(angles[0] / MGON),
+            "rms_pitch_mgon": None if angles is None else json_number(angles[1] / MGON),
         },
         "variance_components": None
         if components is None
         else {
-            "accelerometer": number(components.factors[0]),
-            "robot": number(components.factors[1]),
-            "sigma": [number(sigma) for sigma in components.sigma],
+            "accelerometer": json_number(components.factors[0]),
+            "robot": json_number(components.factors[1]),
+            "sigma": [json_number(sigma) for sigma in components.sigma],
             "converged": components.converged,
         },
         "tilt_rms_mgon": {
-            "roll": number(assessment.tilt[0] / MGON),
-            "pitch": number(assessment.tilt[1] / MGON),
-            "parameters_roll": number(parameters[0]),
-            "parameters_pitch": number(parameters[1]),
+            "roll": json_number(assessment.tilt[0] / MGON),
+            "pitch": json_number(assessment.tilt[1] / MGON),
+            "parameters_roll": json_number(parameters[0]),
+            "parameters_pitch": json_number(parameters[1]),
             "max_tilt_gon": MAX_TILT_GON,
         },
     }
@@ -127,7 +129,7 @@ def quality_document(assessment: Assessment) -> dict[str, Any]:
 
 def _sigma_reading(campaign: Campaign) -> float | None:
     """Noise of a single reading, m/s², from the samples within the holds."""
-    return None if campaign.sd is None else number(np.sqrt(np.mean(campaign.sd**2)))
+    return None if campaign.sd is None else json_number(np.sqrt(np.mean(campaign.sd**2)))
 
 
 def _nominal(fit: CampaignFit) -> dict[str, list[float]] | None:
@@ -150,10 +152,10 @@ def _affine(fit: CampaignFit) -> dict[str, Any] | None:
 
 
 def _numbers(matrix: np.ndarray) -> list[list[float | None]]:
-    return [[number(value) for value in row] for row in matrix]
+    return [[json_number(value) for value in row] for row in matrix]
 
 
-def number(value: Any) -> float | None:
+def json_number(value: Any) -> float | None:
     """Number for JSON, which knows no NaN."""
     return None if value is None or not np.isfinite(value) else float(value)
 
@@ -168,4 +170,4 @@ def _known(content: Any) -> Any:
         return {key: _known(value) for key, value in content.items()}
     if isinstance(content, (list, tuple)):
         return [_known(value) for value in content]
-    return number(content) if isinstance(content, float) else content
+    return json_number(content) if isinstance(content, float) else content

@@ -10,7 +10,7 @@ import pandas as pd
 from accelstudy.adjustment.quality.whole_model import REFUTED
 from accelstudy.basics.units import display_unit, to_display, unit_label
 from accelstudy.basics.wording import number
-from accelstudy.campaign.calibration.assessment import assess, positions_table
+from accelstudy.campaign.calibration.assessment import assess, assessed_positions
 from accelstudy.campaign.calibration.document import (
     calibration_document,
     json_text,
@@ -50,7 +50,7 @@ def write_calibration(
     assessment = assess(fit)
     document = calibration_document(fit)
     quality = quality_document(assessment)
-    positions = positions_table(assessment)
+    positions = assessed_positions(assessment)
     drawn = save_all(
         {
             "residuals": lambda: residual_figure(fit, positions),

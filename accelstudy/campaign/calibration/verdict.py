@@ -8,7 +8,7 @@ import numpy as np
 
 from accelstudy.basics import suggested
 from accelstudy.basics.units import GON, attitude_unit, display_unit, to_attitude, to_display
-from accelstudy.basics.wording import joined, p_value, words
+from accelstudy.basics.wording import comma_list, p_value, words
 from accelstudy.campaign.calibration.assessment import MAX_TILT_GON, Assessment
 from accelstudy.campaign.calibration.fit import CampaignFit
 from accelstudy.sensors.plausibility import implausible_parameters, implausible_tilt
@@ -99,7 +99,7 @@ def _implausible(assessment: Assessment) -> list[str]:
         lines.append(f"This looks like a gross error ({what}): {gross.reason}.")
     if found:
         cause = "" if gross is not None else " A wrong unit, sign, axis or row is the usual cause."
-        lines.append(f"No sensor is like this: {joined(found)}.{cause}")
+        lines.append(f"No sensor is like this: {comma_list(found)}.{cause}")
     return lines
 
 
@@ -117,7 +117,7 @@ def _conflict(assessment: Assessment) -> list[str]:
         ]
     least = p if "<" in p else f"{p} or less"
     return [
-        f"In conflict with the others: positions {joined(labels)} (each with {least}, all "
+        f"In conflict with the others: positions {comma_list(labels)} (each with {least}, all "
         "positions counted). They may be bumped, or show what the model lacks."
     ]
 

@@ -13,7 +13,6 @@ import numpy as np
 import pyarrow as pa
 import yaml
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
@@ -32,7 +31,7 @@ from accelstudy.campaign.files.session import Campaign
 from accelstudy.files.layers import overlay, read_layer
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.parquet import write_parquet
-from accelstudy.files.validation import first_error
+from accelstudy.files.validation import checked
 
 __all__ = ["Campaign", "read_campaign", "write_campaign"]
 
@@ -147,10 +146,7 @@ def write_campaign(
 
 
 def _parse_header(content: dict[str, Any], path: Path) -> Header:
-    try:
-        return Header.model_validate(content)
-    except ValidationError as error:
-        raise InputError(f"{path}: {first_error(error, Header)}") from None
+    return checked(Header, content, path)
 
 
 def parse_table(columns: Columns, header: Header, path: Path, plausible: bool = True) -> Campaign:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from accelstudy.basics.registry import Setting
-from accelstudy.basics.wording import joined
+from accelstudy.basics.wording import comma_list
 from accelstudy.campaign.gross_errors.base import SINGLE, GrossError, Mending, register
 from accelstudy.campaign.gross_errors.real_sensor import LOST
 
@@ -64,8 +64,8 @@ class OutlierPosition(GrossError):
         bumped = tuple(campaign.positions[far].tolist())
         if not sensor.tells or not 0 < len(bumped) <= campaign.n_positions // PART:
             return
-        sizes = joined([f"{size:.2g}" for size in sensor.distance[far]])
-        reason = f"position {joined([str(p) for p in bumped])} is wrong by {sizes} m/s^2"
+        sizes = comma_list([f"{size:.2g}" for size in sensor.distance[far]])
+        reason = f"position {comma_list([str(p) for p in bumped])} is wrong by {sizes} m/s^2"
         if len(bumped) > 1:
             reason = reason.replace("position", "positions", 1).replace(" is ", " are ", 1)
         left = campaign.without(dict.fromkeys(bumped, reason))

@@ -42,7 +42,7 @@ _SPREAD = 0.25  # rms of the means along their thinnest direction, over gravity;
 
 
 @dataclass(frozen=True)
-class Holds:
+class DetectedHolds:
     """Static holds of a log, n of them, in order of time.
 
     Attributes
@@ -114,7 +114,7 @@ class Holds:
         return pd.DataFrame(columns)
 
 
-def find_holds(log: Recording, **options: Any) -> Holds:
+def find_holds(log: Recording, **options: Any) -> DetectedHolds:
     """Find the static holds of one log; see `find_joint_holds`."""
     return find_joint_holds([log], **options)[0]
 
@@ -129,7 +129,7 @@ def find_joint_holds(
     full_range: float = np.inf,
     selection: Selection | None = None,
     one_each: bool = False,
-) -> list[Holds]:
+) -> list[DetectedHolds]:
     """Find the static holds of sensors that were turned together.
 
     They rest where all of them do: they are on one body, and so a hold has the same number for all.
@@ -150,7 +150,7 @@ def find_joint_holds(
 
     Returns
     -------
-    list of Holds
+    list of DetectedHolds
         For each sensor; a hold in which one sensor is saturated is missing for that one only.
 
     Raises
@@ -251,7 +251,7 @@ def _holds(
     survey: Survey,
     width: int,
     warnings: Sequence[str],
-) -> Holds:
+) -> DetectedHolds:
     """Put together what the segments of a sensor say."""
     used = [segment for number, segment in segments.items() if number not in left_out]
     if not used:
@@ -264,7 +264,7 @@ def _holds(
             sums.add(record, frame)
         spreads.append(np.diag(frame.T @ segment.covariance @ frame))
     every = list(segments.values())
-    return Holds(
+    return DetectedHolds(
         number=np.array(list(segments)),
         start=np.array([hold.start for hold in every]),
         end=np.array([hold.end for hold in every]),

@@ -14,7 +14,7 @@ from accelstudy.basics.units import display_unit, to_display
 from accelstudy.campaign.files.format import write_campaign
 from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.holds.allan import MeanAccuracy, accuracy_of_mean
-from accelstudy.campaign.holds.detection import Holds, find_joint_holds
+from accelstudy.campaign.holds.detection import DetectedHolds, find_joint_holds
 from accelstudy.campaign.importing.imported import imported_campaign, layout_of
 from accelstudy.campaign.importing.means import import_means
 from accelstudy.campaign.importing.report import ImportReport, shown
@@ -201,7 +201,7 @@ def _recording(paths: Sequence[str | Path], settings: ImportSettings) -> Recordi
 
 
 def _campaign(
-    paths: Sequence[str | Path], settings: ImportSettings, log: Recording, holds: Holds
+    paths: Sequence[str | Path], settings: ImportSettings, log: Recording, holds: DetectedHolds
 ) -> tuple[Campaign, ImportReport]:
     accuracy, warnings = _accuracy(holds, settings.gravity.value_mps2)
     notes = [] if settings.frame == "frd" else [_frame_note(settings)]
@@ -248,7 +248,7 @@ def _campaign(
     return campaign, report
 
 
-def _accuracy(holds: Holds, gravity: float) -> tuple[MeanAccuracy, list[str]]:
+def _accuracy(holds: DetectedHolds, gravity: float) -> tuple[MeanAccuracy, list[str]]:
     """How well the mean over a typical hold is known, and what is odd about the holds."""
     typical = int(np.median(holds.n_samples[holds.used]))
 
@@ -277,7 +277,9 @@ def _accuracy(holds: Holds, gravity: float) -> tuple[MeanAccuracy, list[str]]:
     return accuracy, warnings
 
 
-def _with_offset(settings: ImportSettings, holds: Holds) -> tuple[ImportSettings, Array, list[str]]:
+def _with_offset(
+    settings: ImportSettings, holds: DetectedHolds
+) -> tuple[ImportSettings, Array, list[str]]:
     """Offset of counts from the positions, unless zero is right but for a sensor's bias."""
     frame = settings.axes
     radius = float(np.median(np.linalg.norm(holds.mean - holds.center, axis=1)))

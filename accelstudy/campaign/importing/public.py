@@ -14,14 +14,14 @@ from urllib.error import HTTPError
 from urllib.parse import unquote, urlsplit
 from urllib.request import Request, urlopen
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.progress import stage
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.files.layers import read_layer
 from accelstudy.files.outputs import is_temporary, whole_file
-from accelstudy.files.validation import Block, first_error
+from accelstudy.files.validation import Block, checked
 
 REGISTRY = Path(__file__).with_name("public_data.yaml")
 TIMEOUT = 30.0
@@ -61,10 +61,7 @@ class _Registry(Block):
 @cache
 def public_data() -> Mapping[str, PublicData]:
     """Public files by name."""
-    try:
-        return _Registry(sets=read_layer(REGISTRY)).sets
-    except ValidationError as error:
-        raise InputError(f"{REGISTRY}: {first_error(error, _Registry)}") from None
+    return checked(_Registry, {"sets": read_layer(REGISTRY)}, REGISTRY).sets
 
 
 def import_settings(name: str) -> ImportSettings:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from accelstudy.basics.wording import counted
 from accelstudy.campaign.holds.allan import MeanAccuracy
-from accelstudy.campaign.holds.detection import Holds
+from accelstudy.campaign.holds.detection import DetectedHolds
 
 
 @dataclass(frozen=True)
@@ -18,7 +18,7 @@ class ImportReport:
     n_holds : int
     accuracy : MeanAccuracy, of the mean of a typical hold; None from a table of means
     sigma_white : float, m/s², of a mean if the noise were white; None if unknown
-    holds : Holds, None from a table of means
+    holds : DetectedHolds, None from a table of means
     notes : tuple of str, what was taken for what
     warnings : tuple of str
     """
@@ -26,7 +26,7 @@ class ImportReport:
     n_holds: int
     accuracy: MeanAccuracy | None
     sigma_white: float | None
-    holds: Holds | None
+    holds: DetectedHolds | None
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import failure, stage
 from accelstudy.basics.wording import counted
-from accelstudy.campaign.holds.detection import Holds
+from accelstudy.campaign.holds.detection import DetectedHolds
 from accelstudy.campaign.holds.windows import windows
 from accelstudy.campaign.logs.recording import Recording
 from accelstudy.drawing.saving import save
@@ -35,7 +35,7 @@ _DIGITS = 130
 """Digits that stand beside each other; of more only every second, third, … number is shown."""
 
 
-def draw_segmentation(log: Recording, holds: Holds) -> Figure:
+def draw_segmentation(log: Recording, holds: DetectedHolds) -> Figure:
     """Draw specific forces and the standard deviation of the windows over time.
 
     Holds are shaded and numbered, those that are left out hatched. The log is read once more, and
@@ -76,7 +76,7 @@ def draw_segmentation(log: Recording, holds: Holds) -> Figure:
 
 
 def render_segmentation(
-    log: Recording, holds: Holds, svg_path: str | Path, png_path: str | Path
+    log: Recording, holds: DetectedHolds, svg_path: str | Path, png_path: str | Path
 ) -> None:
     """Draw the segmentation and write it as SVG and PNG, each whole or not at all.
 
@@ -92,7 +92,7 @@ def render_segmentation(
         failure("The figure 'segmentation' could not be drawn", error)
 
 
-def _number(ax: Axes, holds: Holds) -> None:
+def _number(ax: Axes, holds: DetectedHolds) -> None:
     """Write the numbers of the holds above them."""
     every = 1 + len(holds) * len(str(holds.number[-1])) // _DIGITS
     for i, (number, used) in enumerate(zip(holds.number, holds.used, strict=True)):
@@ -110,7 +110,7 @@ def _number(ax: Axes, holds: Holds) -> None:
             )
 
 
-def _envelope(log: Recording, holds: Holds) -> tuple[Array, Array, Array]:
+def _envelope(log: Recording, holds: DetectedHolds) -> tuple[Array, Array, Array]:
     """Edges of the spans (k + 1,), and least and largest fx, fy, fz and sd in each (k, 4)."""
     count = max(1, min(COLUMNS, holds.total // 4))
     edges = np.linspace(*holds.span, count + 1)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
@@ -21,7 +21,7 @@ from accelstudy.files.types import (
     SigmaAngle,
     SigmaGravity,
 )
-from accelstudy.files.validation import first_error
+from accelstudy.files.validation import checked
 
 _LARGE = Field(le=1e6)
 
@@ -77,11 +77,9 @@ class ImportSettings(LogLayout):
 
 def parse_settings(content: Mapping[str, Any], source: str = "settings") -> ImportSettings:
     """Check settings; raise `InputError` with one line that names the source and the key."""
+    settings = checked(ImportSettings, content, source)
     try:
-        settings = ImportSettings.model_validate(content)
         parse_selection(settings.exclude, settings.join)
-    except ValidationError as error:
-        raise InputError(f"{source}: {first_error(error, ImportSettings)}") from None
     except InputError as error:
         raise InputError(f"{source}: {error}") from None
     return settings

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
-from accelstudy.basics.wording import listed
+from accelstudy.basics.wording import short_list
 from accelstudy.campaign.logs.sources import CHUNK, Source
 
 Array = NDArray[np.float64]
@@ -67,7 +67,7 @@ def locate(
     if needed and missing:
         raise InputError(
             f"{source.path}: which column is {missing[0]}? "
-            f"The columns are {listed(source.names)}, counted from 0"
+            f"The columns are {short_list(source.names)}, counted from 0"
         )
     if len(set(places.values())) < len(places):
         raise InputError(f"{source.path}: two of {', '.join(places)} name the same column")
@@ -86,7 +86,7 @@ def _place(source: Source, key: str, column: Column) -> int:
         raise InputError(
             f"{source.path}: {key}: no column {column}; there are {len(names)}, counted from 0"
         )
-    raise InputError(f"{source.path}: {key}: no column {column!r}; there are {listed(names)}")
+    raise InputError(f"{source.path}: {key}: no column {column!r}; there are {short_list(names)}")
 
 
 def check_numbers(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import display_unit, to_display
-from accelstudy.basics.wording import counted, listed
+from accelstudy.basics.wording import counted, short_list
 from accelstudy.campaign.calibration.ranges import MARGIN, Watch
 from accelstudy.campaign.files.checks import likely_fault
 from accelstudy.campaign.logs.tables import column_names, numbers
@@ -93,10 +93,10 @@ class Account:
         timed = [e for e, column in needs if column == "time" and e not in warmed]
         lagging = [e for e, column in needs if column == "time" and e in warmed]
         if lagging:
-            yield f"{listed(lagging)}: the sensor is taken to be as warm as the first row says"
+            yield f"{short_list(lagging)}: the sensor is taken to be as warm as the first row says"
         if timed:
             yield (
-                f"{listed(timed)}: the first row is taken for the start of the calibration "
+                f"{short_list(timed)}: the first row is taken for the start of the calibration "
                 "session; if it is not, give the seconds between them by --start"
             )
 
@@ -108,8 +108,9 @@ class Account:
             yield f"{self.empty} {of_all} have no calibrated force, their cells are empty; {first}"
         if self._after:
             yield (
-                f"{listed(self._calibration.drifts)}: kept as it was at the end of the calibration "
-                f"session, at {self._session_end:.0f} s, in {self._after} {of_all} that come later"
+                f"{short_list(self._calibration.drifts)}: kept as it was at the end of the "
+                f"calibration session, at {self._session_end:.0f} s, in {self._after} {of_all} "
+                "that come later"
             )
         moved = dict.fromkeys(e for e, c in self._calibration.needs if c.startswith("step_"))
         for name in moved:

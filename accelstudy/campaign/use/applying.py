@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BaseModel, Field, ValidationError, model_validator
+from pydantic import BaseModel, Field, model_validator
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.wording import one_line
@@ -19,12 +19,15 @@ from accelstudy.campaign.files.header import Nominal, PerAxis
 from accelstudy.campaign.files.layout import LogLayout
 from accelstudy.effects import HoldConditions
 from accelstudy.files.types import Finite, NotNegative, Number, Positive
-from accelstudy.files.validation import first_error
+from accelstudy.files.validation import checked
 from accelstudy.leveling.angles import jacobian, roll_pitch
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
+
+
+NO_CALIBRATION = "not a calibration.json of accelstudy"
 
 
 @dataclass(frozen=True)
@@ -220,18 +223,13 @@ def read_calibration(path: str | Path) -> Calibration:
     if Path(path).is_dir():
         raise InputError(f"{path}: a folder; give the calibration.json in it")
     try:
-        document = _Document.model_validate(json.loads(Path(path).read_text(encoding="utf-8")))
+        content = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}") from None
-    except ValidationError as error:
-        reason = first_error(error, _Document)
-    except RecursionError:
-        reason = "nested too deeply"
-    except (ValueError, OverflowError) as error:
-        reason = one_line(error)
-    else:
-        return _calibration(document)
-    raise InputError(f"{path}: not a calibration.json of accelstudy: {reason}")
+    except (ValueError, RecursionError) as error:
+        reason = "nested too deeply" if isinstance(error, RecursionError) else one_line(error)
+        raise InputError(f"{path}: {NO_CALIBRATION}: {reason}") from None
+    return _calibration(checked(_Document, content, f"{path}: {NO_CALIBRATION}"))
 
 
 def _calibration(document: _Document) -> Calibration:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.basics.wording import joined
+from accelstudy.basics.wording import comma_list
 from accelstudy.campaign.calibration.gauges import not_affine
 from accelstudy.campaign.logs.recording import conversion
 from accelstudy.effects import Effect
@@ -63,7 +63,7 @@ def device_matrix(calibration: Mapping[str, Any]) -> Array:
     """
     if unfit := not_affine(_model(calibration)):
         raise InputError(
-            f"no matrix can hold {joined(list(unfit))} of the model {calibration['model']!r}; "
+            f"no matrix can hold {comma_list(list(unfit))} of the model {calibration['model']!r}; "
             "the forms json and yaml carry all effects"
         )
     affine = calibration["affine"]

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.files.layout import LogLayout
@@ -20,7 +19,7 @@ from accelstudy.campaign.logs.tables import column_names, numbers, read_chunks
 from accelstudy.campaign.use.applying import Calibration
 from accelstudy.campaign.use.export import mending, raw_conversion
 from accelstudy.effects import Course, HoldConditions
-from accelstudy.files.validation import first_error
+from accelstudy.files.validation import checked
 from accelstudy.sensors.frames import Frame
 
 Array = NDArray[np.float64]
@@ -186,10 +185,7 @@ def _layout(calibration: Calibration, given: Mapping[str, Any]) -> LogLayout:
     columns = given.get("columns", {})
     if not set(AXES) <= set(columns):
         columns = {**known.get("columns", {}), **columns}
-    try:
-        return LogLayout.model_validate({**known, **given, "columns": columns})
-    except ValidationError as error:
-        raise InputError(f"options: {first_error(error, LogLayout)}") from None
+    return checked(LogLayout, {**known, **given, "columns": columns}, "options")
 
 
 def _places(

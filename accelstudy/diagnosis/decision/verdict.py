@@ -10,7 +10,7 @@ from scipy import special
 
 from accelstudy.adjustment.quality import Solution
 from accelstudy.adjustment.quality.whole_model import REFUTED
-from accelstudy.basics.wording import joined, words
+from accelstudy.basics.wording import comma_list, words
 from accelstudy.diagnosis.decision import priors
 from accelstudy.diagnosis.decision.explanations import Explanation
 from accelstudy.diagnosis.decision.posterior import Posterior, Weighed, of_effects
@@ -84,7 +84,7 @@ def find(search: Search) -> Finding:
     best, solution = fit
     left = _misfit(search, solution)
     if left:
-        said = joined([words(name) for name in top.names])
+        said = comma_list([words(name) for name in top.names])
         reason = f"with {said} added, the residuals are still {left}"
         return Finding("unknown", search.examined, reason, posterior=posterior)
     return _with_a_fit(search, posterior, best, solution)
@@ -125,7 +125,7 @@ def _without_a_fit(search: Search, posterior: Posterior) -> Finding:
     if UNKNOWN in first.names:
         reason = "no effect or pair of effects of the catalogue explains it"
     else:
-        second = joined([words(name) for name in posterior.explanations[1].names])
+        second = comma_list([words(name) for name in posterior.explanations[1].names])
         reason = (
             f"{_explained(first.names)} it with a probability of {first.posterior:.2f} only, and "
             f"{second} with {posterior.explanations[1].posterior:.2f}"
@@ -135,7 +135,7 @@ def _without_a_fit(search: Search, posterior: Posterior) -> Finding:
 
 def _explained(names: Sequence[str]) -> str:
     """One or two names with the verb that belongs to them."""
-    return f"{joined([words(name) for name in names])} explain{'s' if len(names) == 1 else ''}"
+    return f"{comma_list([words(name) for name in names])} explain{'s' if len(names) == 1 else ''}"
 
 
 def _is_large(search: Search, top: Weighed) -> bool:

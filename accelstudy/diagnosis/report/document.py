@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from accelstudy.basics.units import GON, MGON
-from accelstudy.campaign.calibration.document import number
+from accelstudy.campaign.calibration.document import json_number
 from accelstudy.diagnosis.report.missing import refuted
 from accelstudy.diagnosis.report.statement import cosine_in, statement
 from accelstudy.diagnosis.result import Diagnosis, Named
@@ -23,59 +23,59 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
         "verdict": d.verdict,
         "reason": d.reason,
         "global_test": {
-            "statistic": number(d.base.omega if test is None else test.statistic),
+            "statistic": json_number(d.base.omega if test is None else test.statistic),
             "dof": d.base.redundancy,
-            "p_value": None if test is None else number(test.p_value),
+            "p_value": None if test is None else json_number(test.p_value),
             "sigma": "known" if d.sigma_known else "unknown",
         },
         "noise": {
-            "sigma_mps2": number(d.sigma_position),
+            "sigma_mps2": json_number(d.sigma_position),
             "sigma_source": d.sigma_source,
             "tests": [
                 {
                     "name": test.name,
-                    "statistic": number(test.statistic),
-                    "p_value": number(test.p_value),
+                    "statistic": json_number(test.statistic),
+                    "p_value": json_number(test.p_value),
                     "remark": test.remark,
                 }
                 for test in d.noise_tests
             ],
         },
         "screening": {
-            "p_value": number(d.screening.p_value),
+            "p_value": json_number(d.screening.p_value),
             "simulations": d.simulations,
             "candidates": [
                 {
                     "name": name,
-                    "p_single": number(d.screening.p_candidate[name]),
-                    "p_family": number(d.screening.p_family[name]),
+                    "p_single": json_number(d.screening.p_candidate[name]),
+                    "p_family": json_number(d.screening.p_family[name]),
                 }
                 for name in sorted(d.screening.p_family, key=lambda n: d.screening.p_family[n])
             ],
         },
-        "posterior": {name: number(p) for name, p in d.probabilities.items()},
+        "posterior": {name: json_number(p) for name, p in d.probabilities.items()},
         "credible_set": [
             {
                 "names": list(one.names),
                 "classes": [list(names) for names in one.classes],
-                "posterior": number(one.posterior),
+                "posterior": json_number(one.posterior),
             }
             for one in d.credible_set
         ],
         "certain": _certain(d),
         "effects": [_effect(named) for named in d.found],
-        "suspects": [{"position": label, "p_value": number(p)} for label, p in d.suspects],
-        "location": {name: number(share) for name, share in d.location.items()},
+        "suspects": [{"position": label, "p_value": json_number(p)} for label, p in d.suspects],
+        "location": {name: json_number(share) for name, share in d.location.items()},
         "gap": _gap(d),
         "parameter_changes": [
             {
                 "parameter": change.parameter,
                 "unit": change.unit,
-                "before": number(change.before),
-                "after": number(change.after),
-                "predicted": number(change.predicted),
-                "estimated": number(change.estimated),
-                "sigma": number(change.sigma),
+                "before": json_number(change.before),
+                "after": json_number(change.after),
+                "predicted": json_number(change.predicted),
+                "estimated": json_number(change.estimated),
+                "sigma": json_number(change.sigma),
             }
             for change in d.changes
         ],
@@ -86,7 +86,7 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
             {
                 "name": limit.name,
                 "parameter": limit.parameter,
-                "value": number(limit.value),
+                "value": json_number(limit.value),
                 "unit": limit.unit,
             }
             for limit in d.upper_limits
@@ -100,7 +100,7 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
                     if position.temperature is None
                     else {"temperature_degC": position.temperature}
                 ),
-                **({} if position.later is None else {"later_s": number(position.later)}),
+                **({} if position.later is None else {"later_s": json_number(position.later)}),
                 "any_attitude": position.anywhere,
                 "separates": [name for names in position.separates for name in names],
             }
@@ -119,8 +119,8 @@ def _certain(d: Diagnosis) -> list[dict[str, Any]]:
         {
             "family": part.family,
             "names": [name.name for name in part.names],
-            "posterior": number(part.posterior),
-            "purity": number(part.purity),
+            "posterior": json_number(part.posterior),
+            "purity": json_number(part.purity),
         }
         for part in statement(d.credible_set, cosine=cosine_in(d.examined)).certain
     ]
@@ -132,13 +132,13 @@ def _effect(named: Named) -> dict[str, Any]:
         "spec": named.spec,
         **({} if named.position is None else {"position": named.position}),
         "equivalence_class": list(named.equivalence_class),
-        "p_value": number(named.p_value),
-        "posterior": number(named.posterior),
+        "p_value": json_number(named.p_value),
+        "posterior": json_number(named.posterior),
         "parameters": [
-            {"name": name, "value": number(value), "sigma": number(sigma), "unit": unit}
+            {"name": name, "value": json_number(value), "sigma": json_number(sigma), "unit": unit}
             for name, value, sigma, unit in named.parameters
         ],
-        "rivals": [{"name": name, "cosine": number(cosine)} for name, cosine in named.rivals],
+        "rivals": [{"name": name, "cosine": json_number(cosine)} for name, cosine in named.rivals],
     }
 
 
@@ -146,23 +146,23 @@ def _gap(d: Diagnosis) -> dict[str, Any]:
     gap, held = d.gap, d.gap.held_out
     roll_pitch = None if d.leveling is None else [value / MGON for value in d.leveling]
     return {
-        "sigma0_squared": {"before": number(gap.before), "after": number(gap.after)},
+        "sigma0_squared": {"before": json_number(gap.before), "after": json_number(gap.after)},
         "held_out_mse": {
-            "before": None if held is None else number(held.before),
-            "after": None if held is None else number(held.after),
-            "floor": None if held is None else number(held.floor),
+            "before": None if held is None else json_number(held.before),
+            "after": None if held is None else json_number(held.after),
+            "floor": None if held is None else json_number(held.floor),
             "reduction_ci95": (
-                None if held is None else [number(value) for value in held.reduction_ci95]
+                None if held is None else [json_number(value) for value in held.reduction_ci95]
             ),
         },
-        "held_out_z": None if held is None else number(held.z),
-        "held_out_z_needed": None if held is None else number(held.needed),
+        "held_out_z": None if held is None else json_number(held.z),
+        "held_out_z_needed": None if held is None else json_number(held.needed),
         "held_out_positions": []
         if held is None
         else [int(d.campaign.positions[i]) for i in held.held],
         "leveling_rms_mgon": {
-            "before": None if roll_pitch is None else number(roll_pitch[0]),
-            "after": None if roll_pitch is None else number(roll_pitch[1]),
+            "before": None if roll_pitch is None else json_number(roll_pitch[0]),
+            "after": None if roll_pitch is None else json_number(roll_pitch[1]),
         },
         "confirmed": gap.confirmed,
         "confirmed_statement": gap.statement,

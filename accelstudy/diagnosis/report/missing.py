@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 
-from accelstudy.basics.wording import joined, probability, words
+from accelstudy.basics.wording import comma_list, probability, words
 from accelstudy.diagnosis.decision.explanations import CREDIBLE, Explanation
 from accelstudy.diagnosis.decision.priors import MANY, SURE
 from accelstudy.diagnosis.report.families import family_of
@@ -55,7 +55,7 @@ def missing(credible_set: Sequence[Explanation]) -> str:
 def without_a_name(credible_set: Sequence[Explanation]) -> str:
     """Say in a sentence what is certain of something that has no name as a whole."""
     known = statement(credible_set)
-    said = joined([_part(part) for part in known.certain if _is_effect(part)])
+    said = comma_list([_part(part) for part in known.certain if _is_effect(part)])
     if not said:
         return "Something is missing from the model, and it has no name here."
     if refuted(credible_set):
@@ -118,7 +118,7 @@ def not_told_apart(credible_set: Sequence[Explanation]) -> str:
 
 
 def _listed(alternatives: Sequence[tuple[str, float]], last: str = "and") -> str:
-    return joined([f"{what} ({probability(p)})" for what, p in alternatives], last)
+    return comma_list([f"{what} ({probability(p)})" for what, p in alternatives], last)
 
 
 def separates(positions: Sequence[NextPosition]) -> str:
@@ -126,7 +126,7 @@ def separates(positions: Sequence[NextPosition]) -> str:
     if not positions:
         return ""
     first, second = (" with ".join(map(name_words, names)) for names in positions[0].separates)
-    return joined([first or "nothing more", second or "nothing more"])
+    return comma_list([first or "nothing more", second or "nothing more"])
 
 
 def _missing(known: Statement) -> str:
@@ -135,7 +135,7 @@ def _missing(known: Statement) -> str:
     more = _or([one for one in known.open if one.names and one.posterior >= WORTH])
     if not more and len(known.certain) == 1:
         return _part(known.certain[0], "{family}: {names}")
-    said = joined([_part(part) for part in known.certain])
+    said = comma_list([_part(part) for part in known.certain])
     if not more:
         return said
     surely = _surely_more(known, CREDIBLE * sum(one.posterior for one in known.open))
@@ -153,13 +153,13 @@ def _part(part: Part, pattern: str = "{family} ({names})") -> str:
 def _names(names: Sequence[Name]) -> str:
     """All names, with those that mean the same."""
     said = [other for name in names for other in (name.name, *name.members)]
-    return joined(list(dict.fromkeys(map(name_words, said))), "or")
+    return comma_list(list(dict.fromkeys(map(name_words, said))), "or")
 
 
 def _or(explanations: Sequence[Explanation]) -> str:
     said = [explanation_words(one) for one in explanations]
     pairs = any(len(one.names) > 1 for one in explanations)
-    return ", or ".join(said) if pairs else joined(said, "or")
+    return ", or ".join(said) if pairs else comma_list(said, "or")
 
 
 def _apart(explanations: Sequence[Explanation]) -> tuple[list[Explanation], list[Explanation]]:

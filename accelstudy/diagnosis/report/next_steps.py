@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from accelstudy.basics import suggested
-from accelstudy.basics.wording import joined, words
+from accelstudy.basics.wording import comma_list, words
 from accelstudy.campaign.calibration.gauges import not_affine
 from accelstudy.diagnosis.result import Diagnosis
 
@@ -39,7 +39,7 @@ def next_steps(
     inside = not_affine(d.extended)
     form, why = "c", ""
     if inside:
-        form, why = "json", f"; no matrix can hold {joined([words(name) for name in inside])}"
+        form, why = "json", f"; no matrix can hold {comma_list([words(name) for name in inside])}"
     steps.append((f"Take it to a device{why}", suggested.export(form)))
     if d.extended is not d.model:
         command = suggested.calibrate("CAMPAIGN", "model.yaml", approach, "calibrated")

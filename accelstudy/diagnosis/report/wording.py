@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from accelstudy.basics.units import display_unit, to_display, unit_label
-from accelstudy.basics.wording import joined, number, p_value, words
+from accelstudy.basics.wording import comma_list, number, p_value, words
 from accelstudy.diagnosis.report.missing import (
     explanation_words,
     missing,
@@ -70,7 +70,7 @@ def headline(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "gross_error":
         found = tuple(f for f in found if not _is_effect(f))
     names = {named.name for named in found}
-    return HEADLINES[diagnosis.verdict].format(names=joined([_title(f, names) for f in found]))
+    return HEADLINES[diagnosis.verdict].format(names=comma_list([_title(f, names) for f in found]))
 
 
 def _title(named: Named, known: set[str]) -> str:
@@ -115,8 +115,8 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
         lines.append(confirmation(d))
     if d.examined.invisible:
         lines.append(
-            f"This campaign cannot see {joined([words(n) for n in d.examined.invisible])}, however "
-            "large."
+            f"This campaign cannot see {comma_list([words(n) for n in d.examined.invisible])}, "
+            "however large."
         )
     return lines
 
@@ -127,7 +127,7 @@ def advice(diagnosis: Diagnosis) -> list[str]:
     hidden = [words(name) for name in d.examined.invisible if name != "gravity_error"]
     lines = []
     if hidden and not d.approach.uses_angles:
-        lines.append(f"The angles of a robot in each position could show {joined(hidden)}.")
+        lines.append(f"The angles of a robot in each position could show {comma_list(hidden)}.")
     if "gravity_error" in d.examined.invisible:
         lines.append("No position shows an error of g; it takes another measurement of gravity.")
     if "repeat" not in d.location and (d.verdict == "noise_model" or not d.sigma_known):
@@ -151,7 +151,7 @@ def confirmation(diagnosis: Diagnosis) -> str:
     )
     if not gap.confirmed:
         return f"Not confirmed {tested}" + (f": {gap.reason}." if gap.reason else ".")
-    names = joined([words(named.name) for named in diagnosis.found if _is_effect(named)])
+    names = comma_list([words(named.name) for named in diagnosis.found if _is_effect(named)])
     if gap.statement == "name":
         return f"Confirmed {tested}: that it is {names}."
     return (
@@ -164,8 +164,8 @@ def changed(diagnosis: Diagnosis) -> str:
     """Say what the final fit does otherwise: with what was added, without what was left out."""
     added = [words(named.name) for named in diagnosis.found if _is_effect(named)]
     out = [str(named.position) for named in diagnosis.found if named.position is not None]
-    said = [f"with {joined(added)}"] if added else []
-    return joined([*said, *([f"without position {joined(out)}"] if out else [])])
+    said = [f"with {comma_list(added)}"] if added else []
+    return comma_list([*said, *([f"without position {comma_list(out)}"] if out else [])])
 
 
 def _is_effect(named: Named) -> bool:
@@ -179,7 +179,7 @@ def _effect_line(named: Named) -> str:
         for name, value, sigma, unit in named.parameters
     )
     same = [words(name) for name in named.equivalence_class if name != named.name]
-    alike = f" In these positions {joined(same)} would be the same." if same else ""
+    alike = f" In these positions {comma_list(same)} would be the same." if same else ""
     return f"{words(named.name).capitalize()}, {equation}: {values}.{alike}"
 
 
@@ -229,7 +229,7 @@ def _weights(d: Diagnosis) -> list[str]:
     variances = d.examined.frame.solution.variances[0, :3]
     if d.examined.frame.solution is d.base:
         return []
-    parts = joined([number(float(v)) for v in variances / variances.mean()])
+    parts = comma_list([number(float(v)) for v in variances / variances.mean()])
     return [f"The axes are weighted by their noise: x, y and z have {parts} of the mean variance."]
 
 
@@ -241,7 +241,7 @@ def _suspects(d: Diagnosis) -> list[str]:
     ]
     if not labels:
         return []
-    what = f"position{'' if len(labels) == 1 else 's'} {joined(labels)}"
+    what = f"position{'' if len(labels) == 1 else 's'} {comma_list(labels)}"
     said = f"A calibration with the base model marks {what} as in conflict with the others"
     if d.verdict in ("no_effect", "noise_model"):
         smallest = min(p for label, p in d.suspects if label not in found)
@@ -258,7 +258,7 @@ def _where(d: Diagnosis) -> str:
     ]
     if not shares:
         return "Beside the noise level that is taken, nothing says where it lives."
-    return f"Of what the residuals have too much, {joined(shares)} (shares overlap)."
+    return f"Of what the residuals have too much, {comma_list(shares)} (shares overlap)."
 
 
 def sentence(text: str) -> str:

@@ -6,11 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
-from accelstudy.basics.errors import InputError
 from accelstudy.files.layers import overlay, read_layer
-from accelstudy.files.validation import first_error
+from accelstudy.files.validation import checked
 from accelstudy.study.config.schema import StudyConfig
 
 
@@ -27,10 +24,7 @@ def parse_study(content: Mapping[str, Any], source: str = "config") -> StudyConf
     InputError
         One line that names the source, the key, what is wrong and what would be right.
     """
-    try:
-        return StudyConfig.model_validate(content)
-    except ValidationError as error:
-        raise InputError(f"{source}: {first_error(error, StudyConfig)}") from None
+    return checked(StudyConfig, content, source)
 
 
 def read_study(*paths: str | Path) -> StudyConfig:

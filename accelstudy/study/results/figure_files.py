@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from accelstudy.basics.wording import joined
+from accelstudy.basics.wording import comma_list
 from accelstudy.files.tables import read_table
 from accelstudy.study.config import StudyConfig
 from accelstudy.study.figures import figure_tables, render
@@ -27,6 +27,6 @@ def draw_figures(
         except Exception as error:
             error.add_note(
                 f"The figure {name!r} could not be drawn, so all of its job are missing: "
-                f"{joined(names)}."
+                f"{comma_list(names)}."
             )
             raise
