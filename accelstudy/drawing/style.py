@@ -1,24 +1,28 @@
-"""How all figures look: sizes, fonts, and one colour for each thing wherever it occurs."""
+"""How all figures look: sizes, fonts, and one colour for each thing wherever it occurs.
+
+Matplotlib is loaded where something is drawn, so that a file with a figure is imported quickly.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.axis import Axis
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.textpath import TextPath
-from matplotlib.ticker import Locator, LogLocator, MaxNLocator, NullLocator
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.basics.units import display_unit, recorded_unit, to_display, to_si, unit_label
 from accelstudy.effects import Parameter, effect_names, get_effect
 from accelstudy.sensors.models import TITLES, compose
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+    from matplotlib.ticker import Locator
 
 MM = 1 / 25.4
 """One millimetre in inches."""
@@ -186,11 +190,15 @@ def _part_title(part: str) -> str:
 
 def new_figure(width: float, height_mm: float) -> Figure:
     """Make an empty figure, `width` in inches."""
+    from matplotlib.figure import Figure
+
     return Figure(figsize=(width, height_mm * MM), layout="constrained")
 
 
 def log_ticks(axis: Axis, low: float, high: float) -> None:
     """Ticks of a logarithmic axis from `low` to `high`: a few, all of them labelled."""
+    from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
+
     if high / low > 100:
         locator: Locator = LogLocator()
     elif high / low > 4:
@@ -213,6 +221,8 @@ def spread(places: NDArray[np.float64], apart: float) -> list[int]:
 
 def legend_columns(labels: Iterable[str], width_mm: float = 170.0) -> int:
     """Columns of a legend that fit a figure's width, for the longest of its labels."""
+    from matplotlib.textpath import TextPath
+
     size = STYLE["legend.fontsize"]
     longest = max(TextPath((0, 0), label, size=size).get_extents().width for label in labels)
     # Handle and spaces take about as much as seven letters m.
@@ -227,6 +237,8 @@ def say_empty(ax: Axes, text: str = "no estimable cell") -> None:
 
 def approach_handles(approaches: Iterable[str], **options: Any) -> list[Line2D]:
     """Entries of a legend, one for each approach."""
+    from matplotlib.lines import Line2D
+
     style: Style = {"linestyle": "", **options}
     return [
         Line2D(

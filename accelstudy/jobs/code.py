@@ -13,7 +13,6 @@ import accelstudy
 _FOR_TYPES = re.compile(r"^if \(?\s*TYPE_CHECKING\s*\)?:\n(?:[ \t]+.*\n|\n)+", re.MULTILINE)
 _FROM = re.compile(r"^[ \t]*from (accelstudy[\w.]*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
 _NAMED = re.compile(r"^[ \t]*import (accelstudy[\w.]*)|\"(accelstudy\.[\w.]+)\"", re.MULTILINE)
-_BESIDE = re.compile(r"\"(\w+):\w+\"")
 _ALL_BESIDE = "import_modules(__name__, __path__)"
 _DATA = (".j2", ".yaml")
 
@@ -24,8 +23,7 @@ def code_hash(script: str | Path) -> str:
     Snakemake sees that a script has changed, but not that a package has; as a parameter of a rule
     this shows it. What an import needs at the beginning of a module, or within a function, is found
     by reading; imports for type checkers do not count. A registry depends on all modules of its
-    folder, a function named as ``module:function`` on that module, and a module on the templates
-    and data beside it.
+    folder, and a module on the templates and data beside it.
 
     Parameters
     ----------
@@ -50,32 +48,28 @@ def code_hash(script: str | Path) -> str:
 
 def _imported(root: Path, path: Path) -> Iterator[Path]:
     """Files of the package that a file imports."""
-    _, modules, beside = _read(path, path.stat().st_mtime_ns)
+    _, modules, all_beside = _read(path, path.stat().st_mtime_ns)
     for module in modules:
         yield from _files(root, module)
-    for name in beside:
-        if name == "*":
-            yield from path.parent.glob("*.py")
-        elif (file := path.with_name(f"{name}.py")).is_file():
-            yield file
+    if all_beside:
+        yield from path.parent.glob("*.py")
 
 
 @cache
-def _read(path: Path, modified: int) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
-    """Hash of a file, modules that it names, and modules beside it that it names, `*` for all.
+def _read(path: Path, modified: int) -> tuple[str, tuple[str, ...], bool]:
+    """Hash of a file, modules that it names, and whether it imports all modules beside it.
 
     The time at which it was modified is there so that a file is read again when it has changed.
     """
     content = path.read_text(encoding="utf-8")
     digest = hashlib.sha256(content.encode()).hexdigest()
     if path.suffix in _DATA:
-        return digest, (), ()
+        return digest, (), False
     text = _FOR_TYPES.sub("", content)
     modules = [imported or quoted for imported, quoted in _NAMED.findall(text)]
     for module, names in _FROM.findall(text):
         modules += [module, *(f"{module}.{name}" for name in re.findall(r"\w+", names))]
-    beside = ["*"] if _ALL_BESIDE in text else _BESIDE.findall(text)
-    return digest, tuple(dict.fromkeys(modules)), tuple(dict.fromkeys(beside))
+    return digest, tuple(dict.fromkeys(modules)), _ALL_BESIDE in text
 
 
 @cache

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from docutils.core import publish_string
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
-from places import ROOT
 from study_helpers import run_study
 
 from accelstudy.basics.errors import InputError
@@ -19,19 +19,19 @@ from accelstudy.files.tables import read_table
 from accelstudy.sensors.models import MODELS
 from accelstudy.study.config import StudyConfig, parse_study
 from accelstudy.study.figures import (
+    captions,
     draw,
     figure_names,
     figure_tables,
     get_figure,
+    register,
     render,
     total_effects,
 )
-from accelstudy.study.figures.entries import TABLES
 from accelstudy.study.figures.factors import FACTORS
 from accelstudy.study.results.figure_files import draw_figures
 from accelstudy.study.results.sensitivity import analyse_sensitivity, analyse_shapley
 
-CAPTIONS = ROOT / "workflow" / "report" / "figures"
 PROVENANCE = {"config_hash": "test", "seed": 1}
 NINE = "bias-scale-nonorthogonality"
 SENSOR = {
@@ -114,21 +114,21 @@ def test_a_paper_study_has_the_figures_of_the_paper_and_of_every_study():
     assert sorted(ALL) == sorted(expected)
 
 
-@pytest.mark.parametrize("name", [*ALL, *OTHERS])
-def test_every_figure_has_a_caption_and_a_title(name):
-    entry = get_figure(name)
-    caption = (CAPTIONS / f"{entry.caption}.rst").read_text(encoding="utf-8")
-    assert len(caption.split()) > 20
-    assert caption.endswith(f'\n{{{{ snakemake.params.notes["{entry.caption}"] }}}}\n')
-    assert entry.title
-    assert entry.category
-    assert set(entry.tables) <= set(TABLES)
-    assert callable(entry.draw)
+def test_every_figure_has_a_title_and_a_caption_that_a_report_can_show(paper):
+    assert {*figure_names()} == {*ALL, *OTHERS}
+    for name, caption in captions(ALL, paper).items():
+        entry = get_figure(name)
+        assert entry.title
+        assert entry.category
+        assert len(caption.split()) > 20
+        assert caption.startswith(entry.caption)
+        assert ("mgon = " in caption) == entry.angles
+        publish_string(caption, settings_overrides={"halt_level": 2})  # warnings are errors
 
 
-def test_every_caption_has_a_figure():
-    captions = {get_figure(name).caption for name in (*ALL, *OTHERS)}
-    assert {path.stem for path in CAPTIONS.glob("*.rst")} == captions
+def test_a_figure_of_a_table_that_there_is_not_is_refused():
+    with pytest.raises(ValueError, match="figure 'mine': no such tables: summaries"):
+        register("mine", "Mine", "", tables=("summary", "summaries"))
 
 
 # One of each kind: a map, lines, a matrix, points.
@@ -377,11 +377,13 @@ def test_a_figure_that_cannot_be_drawn_is_named(tables, paper, tmp_path):
     tables["quantiles"].iloc[:, :3].to_parquet(tmp_path / "quantiles.parquet")
     paths = {name: tmp_path / f"{name}.parquet" for name in ("summary", "quantiles")}
     with pytest.raises(KeyError) as error:
-        draw_figures(paper, ["closed-forms", "figure-7"], paths, tmp_path)
+        draw_figures(paper, captions(["closed-forms", "figure-7"], paper), paths, tmp_path)
     (note,) = error.value.__notes__
     assert note.startswith("The figure 'figure-7' could not be drawn")
     assert "closed-forms and figure-7" in note
-    assert {path.stem for path in tmp_path.glob("*.svg")} == {"closed-forms"}
+    assert {path.name for path in tmp_path.glob("*.??[gt]")} == {
+        f"closed-forms.{kind}" for kind in ("svg", "png", "rst")
+    }
 
 
 IMPORTED = """\

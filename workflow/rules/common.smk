@@ -1,11 +1,12 @@
 from functools import cache
+from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
 
 from accelstudy.basics.errors import InputError
 from accelstudy.study.figures import (
     angle_unit,
-    caption_notes,
+    captions,
     figure_names,
     figure_tables,
     get_figure,
@@ -115,11 +116,11 @@ def parts_of_claims():
 
 
 def in_report(name):
-    """A figure as the report shows it."""
+    """A figure as the report shows it, with the caption that its job writes."""
     entry = get_figure(name)
     return report(
         f"{RESULTS}/figures/{name}.svg",
-        caption=f"../report/figures/{entry.caption}.rst",
+        caption=str(Path(f"{RESULTS}/figures/{name}.rst").absolute()),
         category=entry.category,
         labels={"content": entry.title},
     )
@@ -127,7 +128,8 @@ def in_report(name):
 
 def files_of_figures(names):
     """What is drawn of figures."""
-    return [*map(in_report, names), *(f"{RESULTS}/figures/{name}.png" for name in names)]
+    others = [f"{RESULTS}/figures/{name}.{kind}" for name in names for kind in ("png", "rst")]
+    return [*map(in_report, names), *others]
 
 
 def inputs_of_figures(names):

@@ -13,9 +13,8 @@ rule figures:
     resources:
         mem_mb=1000,
     params:
-        figures=CELL_FIGURES,
         study=STUDY.model_dump(mode="json"),
-        notes=caption_notes(CELL_FIGURES, STUDY),
+        captions=captions(CELL_FIGURES, STUDY),
         code=code_hash(workflow.source_path("../scripts/figures.py")),
     message:
         "Draw the figures of the cells"
@@ -33,9 +32,8 @@ use rule figures as sensitivity_figures with:
     benchmark:
         f"{RESULTS}/benchmarks/sensitivity_figures.tsv"
     params:
-        figures=SENSITIVITY_FIGURES,
         study=STUDY.model_dump(mode="json"),
-        notes=caption_notes(SENSITIVITY_FIGURES, STUDY),
+        captions=captions(SENSITIVITY_FIGURES, STUDY),
         code=code_hash(workflow.source_path("../scripts/figures.py")),
     message:
         "Draw the figures of sensitivity"

@@ -7,7 +7,7 @@ from accelstudy.study.results.figure_files import draw_figures
 with job(snakemake):
     draw_figures(
         parse_study(snakemake.config),
-        snakemake.params.figures,
+        snakemake.params.captions,
         dict(snakemake.input.items()),
         Path(snakemake.output[0]).parent,
     )

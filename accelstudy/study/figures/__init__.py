@@ -1,28 +1,31 @@
 """Figures: each draws tables of a study.
 
-To add one, write a function that draws it in a module next to this file, an entry in `entries`, and
-a caption in `workflow/report/figures`.
+To add one, write a module next to this file with a function under `register`.
 """
 
-from accelstudy.study.figures.entries import FigureEntry, Tables
-from accelstudy.study.figures.registry import (
-    angle_unit,
-    caption_notes,
-    draw,
+from accelstudy.basics.registry import import_modules
+from accelstudy.study.figures.base import (
+    FigureEntry,
+    Tables,
     figure_names,
     figure_tables,
     get_figure,
-    render,
+    register,
 )
+from accelstudy.study.figures.rendering import angle_unit, captions, draw, render
 
 __all__ = [
     "FigureEntry",
     "Tables",
     "angle_unit",
-    "caption_notes",
+    "captions",
     "draw",
     "figure_names",
     "figure_tables",
     "get_figure",
+    "register",
     "render",
 ]
+
+# A module registers its figures when it is imported.
+import_modules(__name__, __path__)

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, MultipleLocator
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.basics.units import GON, attitude_unit, display_unit, to_attitude, to_display
 from accelstudy.drawing.style import ANGLE_COLOURS, COLUMN, FULL, new_figure
 from accelstudy.leveling.angles import sigma_roll_pitch, specific_force
-from accelstudy.study.config import StudyConfig
-from accelstudy.study.figures.entries import Tables
+from accelstudy.study.figures.base import Tables, of_the_paper, register
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from accelstudy.study.config import StudyConfig
 
 Array = NDArray[np.float64]
 
@@ -33,8 +37,22 @@ def shown_sigma(
     return to_display(sigma_roll_pitch(force, sigma[..., None, None] ** 2 * np.eye(3)), "rad")
 
 
+@register(
+    "figure-2",
+    "Figure 2: accuracy of roll and pitch over the attitude",
+    """
+    Standard deviation of roll (left) and pitch (right) computed from one measured specific force,
+    over the attitude, for equal noise on all three axes. Both maps share one colour scale. Roll
+    loses accuracy with the cosine of pitch and does not depend on roll itself; pitch is equally
+    accurate everywhere.
+    """,
+    category="Paper",
+    when=of_the_paper,
+)
 def accuracy_over_attitude(tables: Tables, study: StudyConfig) -> Figure:
     """Two maps of the standard deviation over roll and pitch."""
+    from matplotlib.ticker import MultipleLocator
+
     roll, pitch = np.meshgrid(ROLL, PITCH)
     sigma = shown_sigma(roll, pitch, study.sigma_force, study.gravity_mps2)
     roll, pitch = to_attitude(roll * GON), to_attitude(pitch * GON)
@@ -74,6 +92,8 @@ def accuracy_over_attitude(tables: Tables, study: StudyConfig) -> Figure:
 
 def _contours(ax: Axes, roll: Array, pitch: Array, values: Array) -> None:
     """Labelled lines at round values, away from the edges."""
+    from matplotlib.ticker import LogLocator
+
     highest = values[np.abs(pitch) <= 0.94 * pitch.max()].max()
     round_values = LogLocator(subs=(1, 1.5, 2, 3, 5, 7)).tick_values(values.min(), highest)
     levels = [x for x in round_values if values.min() < x < highest]
@@ -86,6 +106,17 @@ def _contours(ax: Axes, roll: Array, pitch: Array, values: Array) -> None:
     ax.clabel(lines, fmt="%g", fontsize=7, manual=places)
 
 
+@register(
+    "figure-3",
+    "Figure 3: accuracy of roll and pitch over the sensor noise",
+    """
+    Standard deviation of roll and pitch over the noise of the accelerometer, in a tilted attitude.
+    Both grow linearly; the dots mark the noise of this study. Roll is the less accurate of the two
+    because the sensor is pitched.
+    """,
+    category="Paper",
+    when=of_the_paper,
+)
 def accuracy_over_noise(tables: Tables, study: StudyConfig) -> Figure:
     """Standard deviations in a tilted attitude, with those at the study's noise marked."""
     fig = new_figure(COLUMN, 62)

@@ -2,36 +2,54 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.collections import QuadMesh
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patheffects import Normal, Stroke
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.basics.units import GON, STANDARD_GRAVITY, attitude_unit, to_attitude
 from accelstudy.drawing.style import FULL, INK, Style, new_figure, say_empty, symbol
 from accelstudy.leveling.angles import jacobian, specific_force
-from accelstudy.leveling.sensitivity import FORCES, OUTPUTS
-from accelstudy.study.config import StudyConfig
-from accelstudy.study.figures.entries import Tables
+from accelstudy.study.figures.base import Tables, of_the_paper, register
 from accelstudy.study.figures.total_effects import NO_DATA, read_shares
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.collections import QuadMesh
+    from matplotlib.figure import Figure
+
+    from accelstudy.study.config import StudyConfig
 
 Array = NDArray[np.float64]
 
 GREEK = {"roll": "$\\phi$", "pitch": "$\\theta$"}
 UNDEFINED: Style = {"linestyle": "", "marker": "x", "markersize": 3.5, "color": "#999999"}
-HALF: Style = {
-    "color": "white",
-    "linewidth": 1,
-    "path_effects": [Stroke(linewidth=1.8, foreground=INK), Normal()],
-}
 
 
+@register(
+    "figure-4",
+    "Figure 4: total effects of the forces on roll and pitch",
+    """
+    Total effects of the three measured forces on roll (upper row) and pitch (lower row) over the
+    attitude, without calibration parameters: the share of the angle's variance that would remain
+    if the other two forces were known. Circles are Sobol's method on the grid of the study, in the
+    colours of the map behind them, which is linear theory; where a circle shows its edge only, the
+    two agree. The line is where a force has half of the variance. Effects within their own
+    confidence interval count as zero, and crosses stand where there is no variance to share. Roll
+    follows from f_y near level and from f_z as the sensor rolls over; pitch follows from f_x and,
+    as the sensor pitches, increasingly from the other two.
+    """,
+    category="Paper",
+    tables=("sensitivity",),
+    when=of_the_paper,
+)
 def effects_of_forces(tables: Tables, study: StudyConfig) -> Figure:
     """Maps over roll and pitch, one for each output and force, by linear theory and by Sobol."""
+    from matplotlib.lines import Line2D
+
+    from accelstudy.leveling.sensitivity import FORCES, OUTPUTS
+
     table = read_shares(tables["sensitivity"], "forces")
     fig = new_figure(FULL, 100)
     axes = fig.subplots(len(OUTPUTS), len(FORCES), sharex=True, sharey=True)
@@ -63,7 +81,7 @@ def effects_of_forces(tables: Tables, study: StudyConfig) -> Figure:
         circle: Style = {"linestyle": "", "marker": "o", "color": INK, "markerfacecolor": "none"}
         fig.legend(
             handles=[
-                Line2D([], [], **HALF, label="a share of 0.5, by linear theory"),
+                Line2D([], [], **_half(), label="a share of 0.5, by linear theory"),
                 Line2D([], [], **circle, label=f"Sobol, at most {largest:.3f} from linear theory"),
                 *undefined,
             ],
@@ -71,6 +89,14 @@ def effects_of_forces(tables: Tables, study: StudyConfig) -> Figure:
             ncols=3,
         )
     return fig
+
+
+def _half() -> Style:
+    """Style of the line at a share of a half."""
+    from matplotlib.patheffects import Normal, Stroke
+
+    edge = [Stroke(linewidth=1.8, foreground=INK), Normal()]
+    return {"color": "white", "linewidth": 1, "path_effects": edge}
 
 
 def linear_shares(roll_gon: ArrayLike, pitch_gon: ArrayLike, *, grid: bool = True) -> Array:
@@ -99,12 +125,14 @@ def _draw_map(ax: Axes, roll: Array, pitch: Array, shares: Array) -> QuadMesh:
     )
     if shares.min() < 0.5 < shares.max():
         lines = ax.contour(x, y, shares, levels=[0.5], colors="white", linewidths=1)
-        lines.set_path_effects(HALF["path_effects"])
+        lines.set_path_effects(_half()["path_effects"])
     return image
 
 
 def _draw_circles(ax: Axes, cells: pd.DataFrame) -> None:
     """Sobol's total effects as circles in the colours of the map; a cross where there is none."""
+    from accelstudy.leveling.sensitivity import OUTPUTS
+
     x, y = (to_attitude(cells[f"{name}_gon"].to_numpy(float) * GON) for name in OUTPUTS)
     share = cells["share"].to_numpy(float)
     known = np.isfinite(share)

@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.colors import LogNorm
-from matplotlib.figure import Figure
-from matplotlib.image import AxesImage
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch, Rectangle
 from numpy.typing import NDArray
 
 from accelstudy.basics.units import display_unit, to_display
@@ -26,8 +21,17 @@ from accelstudy.drawing.style import (
     shown,
 )
 from accelstudy.schemes import get_scheme
-from accelstudy.study.config import StudyConfig
-from accelstudy.study.figures.entries import Tables
+from accelstudy.study.figures.base import Tables, register
+from accelstudy.study.figures.factors import NOISES, varies
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.colors import LogNorm
+    from matplotlib.figure import Figure
+    from matplotlib.image import AxesImage
+
+    from accelstudy.study.config import StudyConfig
 
 Array = NDArray[np.float64]
 
@@ -41,8 +45,28 @@ NOT_ESTIMABLE: Style = {
 }
 
 
+@register(
+    "leveling-overview",
+    "Tilt error that each calibration leaves",
+    """
+    The tilt error of roll (upper) and pitch (lower half) that a calibration leaves, over all
+    attitudes up to the study's largest tilt, for each scheme (rows), model (columns) and approach
+    (left and right). The upper number is the rms over attitudes and calibrations, which also gives
+    the colour; the lower one is what the rms over attitudes of 95 % of the calibrations stays
+    below: decide by it where one calibration must do. The noise of the leveled reading itself
+    comes on top. Hatched cells cannot be estimated; fields left white are not part of the study.
+    Unless the study says otherwise the simulated sensor has just the effects of the model, so that
+    a larger model faces a more difficult sensor: compare schemes and approaches within a column.
+    """,
+    tables=("cells", "leveling"),
+    when=lambda study: not any(varies(study, noise) for noise in NOISES),
+)
 def tilt_errors(tables: Tables, study: StudyConfig) -> Figure:
     """Matrices of scheme × model, one for each angle and approach, with the rms and its q95."""
+    from matplotlib.colors import LogNorm
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch, Rectangle
+
     table = _with_tilt(tables["cells"], tables["leveling"])
     schemes = sorted(set(table["scheme"]), key=lambda name: (get_scheme(name).n_positions, name))
     models = list(dict.fromkeys(table["model"]))
@@ -97,6 +121,8 @@ def tilt_errors(tables: Tables, study: StudyConfig) -> Figure:
 
 def _with_tilt(cells: pd.DataFrame, leveling: pd.DataFrame) -> pd.DataFrame:
     """Cells with the rms of each angle and its 95 % quantile as shown, NaN where there is none."""
+    import pandas as pd
+
     found = leveling.set_index("cell") if len(leveling) else pd.DataFrame()
     columns = {}
     for angle in ANGLES:

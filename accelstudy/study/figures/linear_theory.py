@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
+from typing import TYPE_CHECKING
 
-from accelstudy.basics.shares import Z95
+import numpy as np
+
 from accelstudy.drawing.style import (
     FULL,
     INK,
@@ -22,16 +18,39 @@ from accelstudy.drawing.style import (
     new_figure,
     say_empty,
 )
-from accelstudy.study.config import StudyConfig
-from accelstudy.study.figures.entries import Tables
+from accelstudy.study.figures.base import Tables, register
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from accelstudy.study.config import StudyConfig
 
 BAND = "#DDDDDD"
 GAP = 0.25
 """Between two groups of parameters, which are 1 wide each."""
 
 
+@register(
+    "closed-forms",
+    "Monte Carlo against closed forms and linear theory",
+    """
+    Empirical standard deviation of each parameter of each cell over the expected one: from the
+    closed forms where they apply (left), from linear theory elsewhere (right). The grey band is
+    where 95 % of the points are expected from the number of simulated calibrations alone, and the
+    share that lies in it is written below. Points are ordered by approach and by that number.
+    """,
+    tables=("summary",),
+    angles=False,
+)
 def monte_carlo_against_theory(tables: Tables, study: StudyConfig) -> Figure:
     """Ratios of the empirical to the expected sd: where a closed form exists, and all others."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    from accelstudy.basics.shares import Z95
+
     rows = tables["summary"]
     rows = rows[rows["sd_empirical"].notna() & (rows["n_converged"] > 1)]
     rows = rows.assign(

@@ -4,13 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import groupby
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from accelstudy.basics.units import display_unit, unit_label
@@ -29,8 +25,14 @@ from accelstudy.drawing.style import (
     symbol,
 )
 from accelstudy.sensors.models import get_model
-from accelstudy.study.config import StudyConfig
-from accelstudy.study.figures.entries import Tables
+from accelstudy.study.figures.base import Tables, of_the_paper, register
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from accelstudy.study.config import StudyConfig
 
 APPROACHES = ("gravity", "robot")
 ANNOTATED = 0.005
@@ -39,8 +41,26 @@ WIDTH = 0.36
 """Width of a bar; the parameters are 1 apart."""
 
 
+@register(
+    "figure-7",
+    "Figure 7: errors and standard deviations of the two calibrations",
+    """
+    Left: estimation errors of the first simulated calibration (open markers) before the middle 95
+    % of the errors of all. Right: standard deviations a posteriori, mean of all calibrations
+    (bars), the middle 95 % of single calibrations (lines with caps) and the first one (open
+    markers). All parameters of one calibration share its variance of unit weight, so a single
+    calibration is too low or too high for all of them at once; this spread is wider without the
+    robot, which leaves fewer redundant conditions.
+    """,
+    category="Paper",
+    tables=("summary", "quantiles"),
+    when=of_the_paper,
+)
 def errors_and_sigmas(tables: Tables, study: StudyConfig) -> Figure:
     """One simulation before the distribution of all, a row of panels for each unit."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
     parameters = _parameters(study)
     units = list(dict.fromkeys(unit for _, unit in parameters))
     fig = new_figure(FULL, 16 + 46 * len(units))
@@ -165,6 +185,20 @@ def _draw_range(ax: Axes, at: float, low: float, high: float, colour: str) -> No
     )
 
 
+@register(
+    "figure-8",
+    "Figure 8: correlations of the parameters of the two calibrations",
+    """
+    Absolute correlations of the estimated parameters less the identity, from the covariance matrix
+    of the adjustment, without (left) and with (right) the robot. Both matrices share one colour
+    scale, and values above 0.005 are written out. With evenly spread positions only the scales are
+    correlated, and the robot all but removes that.
+    """,
+    category="Paper",
+    tables=("correlations",),
+    when=of_the_paper,
+    angles=False,
+)
 def correlations(tables: Tables, study: StudyConfig) -> Figure:
     """Absolute correlations less the identity, from the cofactors of the adjustment."""
     names = [name for name, _ in _parameters(study)]

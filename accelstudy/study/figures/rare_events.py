@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
+from typing import TYPE_CHECKING
 
-from accelstudy.basics.shares import clopper_pearson
+import numpy as np
+
 from accelstudy.basics.units import unit_label
 from accelstudy.drawing.style import (
     FULL,
@@ -21,8 +18,14 @@ from accelstudy.drawing.style import (
     say_empty,
     shown,
 )
-from accelstudy.study.config import StudyConfig
-from accelstudy.study.figures.entries import Tables
+from accelstudy.study.figures.base import Tables, register
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from accelstudy.study.config import StudyConfig
 
 LINES: Style = {"roll": "-", "pitch": "--"}
 MOST = 3
@@ -30,11 +33,26 @@ MOST = 3
 NONE: Style = {"linestyle": "", "marker": "v", "markersize": 4, "fillstyle": "none"}
 
 
+@register(
+    "rare-events",
+    "Tails of the tilt error, and calibrations that fail",
+    """
+    What happens once in thousands of calibrations and more. Left: the tilt error, as its rms over
+    all attitudes up to the study's largest tilt, over the share of calibrations that leave more of
+    it, for the least noise of the sensor in the study. Right: the share of calibrations that do
+    not converge, over the noise of the sensor, with intervals of 95 %; a triangle is the upper
+    limit where none failed.
+    """,
+    tables=("cells", "quantiles"),
+    when=lambda study: study.keep == "summary",
+)
 def rare_events(tables: Tables, study: StudyConfig) -> Figure:
     """Tilt error over the share of calibrations that leave more, and shares that do not converge.
 
     The tails are those of the set-ups with the least noise of the sensor.
     """
+    from matplotlib.lines import Line2D
+
     cells, tilt = tables["cells"], tables["quantiles"]
     tilt = tilt[(tilt["quantity"] == "tilt") & (tilt["probability"] >= 0.5)]
     tilt = tilt[tilt["sensor_sigma_mps2"] == tilt["sensor_sigma_mps2"].min()]
@@ -77,6 +95,8 @@ def _draw_tails(ax: Axes, rows: pd.DataFrame) -> None:
 
 
 def _draw_failures(ax: Axes, cells: pd.DataFrame) -> None:
+    from accelstudy.basics.shares import clopper_pearson
+
     for approach, its in cells.groupby("approach", sort=False):
         its = its.sort_values("sensor_sigma_mps2")
         n = its["n_replicates"].to_numpy(float)

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from accelstudy.basics.units import GON, attitude_unit, to_attitude
 from accelstudy.drawing.style import FULL, INK, Style, new_figure, say_empty, symbol
-from accelstudy.leveling.sensitivity import OUTPUTS
-from accelstudy.leveling.shares import overtaken
-from accelstudy.study.config import StudyConfig
-from accelstudy.study.figures.entries import Tables
+from accelstudy.study.figures.base import Tables, of_the_paper, register
 from accelstudy.study.figures.total_effects import (
     NO_DATA,
     SMALLEST,
@@ -22,16 +17,43 @@ from accelstudy.study.figures.total_effects import (
     styles_of,
 )
 
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from accelstudy.study.config import StudyConfig
+
 BAND, TOP = 1.3, 4.5
 """Ends of the band above all shares that says which inputs overtake others."""
 PALE: Style = {"linewidth": 3.0, "alpha": 0.3, "solid_capstyle": "butt"}
 
 
+@register(
+    "shapley",
+    "Shapley effects on roll and pitch, gravity-based calibration",
+    """
+    What the correlations of the calibration's parameters change: Shapley effects on roll (left)
+    and pitch (right), with the covariance matrix of the gravity-based calibration, over the total
+    effects of figures 5 and 6 (pale), which take the parameters as independent. The band on top
+    names the inputs that overtake another one at that roll: they have the larger Shapley effect
+    and the smaller total effect, by more than 2 %. There is a row for each pitch, of those that
+    are not negative, at which this happens.
+    """,
+    category="Paper",
+    tables=("shapley",),
+    when=of_the_paper,
+)
 def shapley(tables: Tables, study: StudyConfig) -> Figure:
     """Draw roll at the left and pitch at the right, a row for each pitch that changes an order.
 
     Where none does, a row for the first pitch that is not negative shows it.
     """
+    from matplotlib.lines import Line2D
+
+    from accelstudy.leveling.sensitivity import OUTPUTS
+    from accelstudy.leveling.shares import overtaken
+
     table = tables["shapley"]
     table = table[(table["analysis"] == "gravity") & (table["pitch_gon"] >= 0)]
     table = table.assign(share=table["shapley_effect"].where(table["defined"].astype(bool)))

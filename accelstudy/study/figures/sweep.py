@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import groupby
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure, SubFigure
-from matplotlib.lines import Line2D
-from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
 from accelstudy.basics.units import display_unit, unit_label
@@ -31,9 +28,35 @@ from accelstudy.drawing.style import (
     spread,
 )
 from accelstudy.schemes import get_scheme
-from accelstudy.study.config import StudyConfig
-from accelstudy.study.figures.entries import Tables
-from accelstudy.study.figures.factors import POSITIONS, Block, Factor, blocks, levels_text
+from accelstudy.study.figures.base import Tables, register
+from accelstudy.study.figures.factors import (
+    FACTORS,
+    POSITIONS,
+    Block,
+    Factor,
+    blocks,
+    factor_note,
+    levels_text,
+    varies,
+)
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+
+    from accelstudy.study.config import StudyConfig
+
+CAPTION = """
+Mean empirical standard deviation of each group of parameters, and the rms error of roll and of
+pitch that the calibration leaves, over one quantity that the study varies. Colours are approaches,
+lines and markers are models and schemes. The title of each part says at which values everything
+else is held: at the study's default where it was run, otherwise at the middle of the values that
+were run (the lower of two). A line without markers is an approach that does not use what varies.
+Crosses at the top stand where a cell cannot be estimated or none of its calibrations converged;
+open markers, where some did not converge. For an error of gravity the bias (rms over the group) is
+drawn too where it is significant for all parameters of the group.
+"""
 
 SYSTEMATIC = "gravity_error_mps2"
 """The quantity whose effect is a bias, which is drawn beside the sd."""
@@ -57,6 +80,17 @@ FAILED_STYLES: dict[str, Style] = {
 def over_factor(tables: Tables, study: StudyConfig, factor: Factor) -> Figure:
     """Panels for each group of parameters and for the tilt error, over one factor."""
     return _draw(tables, factor, blocks(study, factor))
+
+
+for _factor in FACTORS:
+    register(
+        f"sweep-{_factor.name}",
+        f"Standard deviations and tilt error over the {_factor.title}",
+        CAPTION,
+        tables=("cells", "summary", "leveling"),
+        when=partial(varies, factor=_factor),
+        note=partial(factor_note, factor=_factor),
+    )(partial(over_factor, factor=_factor))
 
 
 def _draw(tables: Tables, factor: Factor, found: list[Block]) -> Figure:
@@ -111,6 +145,8 @@ def _parts(block: Block) -> list[Block]:
 
 def _values(block: Block, tables: Tables) -> pd.DataFrame:
     """One row per cell and group: mean sd or rms tilt error, rms bias, and what failed."""
+    import pandas as pd
+
     summary, leveling = tables["summary"], tables["leveling"]
     counts = tables["cells"][["cell", "estimable", "n_converged", "n_replicates"]]
     cells = block.cells[["cell", "model", "subject", "approach", "x"]].merge(counts, on="cell")
@@ -216,6 +252,8 @@ def _series_style(i: int) -> Style:
 
 def _scale_x(ax: Axes, x: NDArray[np.float64]) -> None:
     """Logarithmic axis, linear about zero if zero is among the values, with ticks at the values."""
+    from matplotlib.ticker import NullLocator
+
     if len(x) < 2:
         ax.set_xticks(x)
         return
@@ -249,6 +287,8 @@ def _same_y(axes: list[Axes], failed: bool) -> None:
 def _add_legend(
     part: SubFigure, rows: pd.DataFrame, series: list[tuple[str, str]], factor: Factor
 ) -> None:
+    from matplotlib.lines import Line2D
+
     handles = approach_handles(dict.fromkeys(rows["approach"]), marker="", linestyle="-")
     if len(series) > 1:
         handles += [

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.ticker import LogLocator, NullLocator
 
 from accelstudy.approaches import approach_names
 from accelstudy.drawing.style import (
@@ -27,8 +24,14 @@ from accelstudy.drawing.style import (
 )
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import PRESETS, Preset, get_model
-from accelstudy.study.config import StudyConfig
-from accelstudy.study.figures.entries import Tables
+from accelstudy.study.figures.base import Tables, register
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from accelstudy.study.config import StudyConfig
 
 ROW_MM = 9.5
 CROSS_AT = 0.9
@@ -36,8 +39,25 @@ CROSS_AT = 0.9
 PALE = 0.3
 
 
+@register(
+    "table-1",
+    "Table 1: published calibrations and what they determine",
+    """
+    The calibrations of the paper's Table 1, each with its own model and positions: mean empirical
+    standard deviation of each group of parameters, and the rms error of roll that the calibration
+    leaves, with their numbers. A cross stands where a group cannot be estimated; it is pale where
+    only other parameters of the model prevent the calibration. Gravity alone cannot determine the
+    cross-axis angles. The simulated sensor of a row has the effects of its model, unless the study
+    says otherwise; compare tilt errors between models with this in mind.
+    """,
+    category="Paper",
+    tables=("summary", "leveling"),
+    when=lambda study: study.presets is not None,
+)
 def published_calibrations(tables: Tables, study: StudyConfig) -> Figure:
     """A row for each preset, a column for each group of parameters and one for the tilt error."""
+    from matplotlib.lines import Line2D
+
     assert study.presets is not None
     approaches = _spelled_out(study.presets.approaches)
     summary = tables["summary"]
@@ -171,6 +191,8 @@ def _dash(ax: Axes, y: int) -> None:
 
 def _finish(ax: Axes) -> None:
     """Logarithmic axis about the values, with room for their numbers and for the crosses."""
+    from matplotlib.ticker import LogLocator, NullLocator
+
     values = np.concatenate(
         [np.asarray(line.get_xdata(), float) for line in ax.get_lines() if line.get_marker() != "x"]
         or [np.empty(0)]

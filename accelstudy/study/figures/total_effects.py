@@ -3,15 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patheffects import Normal, Stroke
-from matplotlib.ticker import NullLocator
-from scipy.optimize import isotonic_regression
 
 from accelstudy.basics.units import GON, attitude_unit, to_attitude
 from accelstudy.drawing.style import (
@@ -27,8 +22,15 @@ from accelstudy.drawing.style import (
     say_empty,
     symbol,
 )
-from accelstudy.study.config import StudyConfig
-from accelstudy.study.figures.entries import Tables
+from accelstudy.study.figures.base import Tables, of_the_paper, register
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+    from accelstudy.study.config import StudyConfig
 
 LINE_STYLES = ("-", "--", ":")
 MARKERS = ("o", "^", "s")
@@ -46,6 +48,34 @@ def effects_over_roll(tables: Tables, study: StudyConfig, output: str, approach:
     return _effects_over_roll(read_shares(tables["sensitivity"], approach), output)
 
 
+CAPTION = """
+    Total effects of the measured forces and of the calibration parameters on {output}, on a log
+    scale, with the standard deviations of the gravity-based calibration; one panel for each pitch
+    that is not negative. Bars are 95 % confidence intervals. Shares below 1 %, zero included, run
+    through the grey band, and what never reaches 1 % in a panel is not drawn there. The parameters
+    are sampled independently, although those of a calibration are correlated.
+    """
+CAPTION_ROBOT = """
+    As figure {number}, with the standard deviations of the robot-aided calibration. Compared with
+    figure {number} the share of the non-orthogonality shrinks and that of the measured forces
+    grows, because the robot improves the angles most.
+    """
+
+for _suffix, _approach, _kind, _caption in (
+    ("", "gravity", "gravity-based", CAPTION),
+    ("-robot", "robot", "robot-aided", CAPTION_ROBOT),
+):
+    for _number, _output in ((5, "roll"), (6, "pitch")):
+        register(
+            f"figure-{_number}{_suffix}",
+            f"Figure {_number}: total effects on {_output}, {_kind} calibration",
+            _caption.format(number=_number, output=_output),
+            category="Paper",
+            tables=("sensitivity",),
+            when=of_the_paper,
+        )(partial(effects_over_roll, output=_output, approach=_approach))
+
+
 def read_shares(table: pd.DataFrame, analysis: str) -> pd.DataFrame:
     """Rows of an analysis with `share`: NaN if undefined, 0 if within its confidence interval."""
     rows = table[table["analysis"] == analysis]
@@ -54,6 +84,8 @@ def read_shares(table: pd.DataFrame, analysis: str) -> pd.DataFrame:
 
 
 def _effects_over_roll(table: pd.DataFrame, output: str) -> Figure:
+    from matplotlib.lines import Line2D
+
     table = table[(table["output"] == output) & (table["pitch_gon"] >= 0)]
     pitches = sorted(table["pitch_gon"].unique())
     columns = min(2, max(1, len(pitches)))
@@ -88,6 +120,8 @@ def _effects_over_roll(table: pd.DataFrame, output: str) -> Figure:
 
 def group_handles(inputs: Iterable[str]) -> list[Line2D]:
     """Entries of a legend, one for each group of the inputs."""
+    from matplotlib.lines import Line2D
+
     groups = in_order(group_of(name) for name in inputs)
     return [Line2D([], [], color=group_colour(group), label=group_label(group)) for group in groups]
 
@@ -110,6 +144,8 @@ def styles_of(inputs: list[str]) -> dict[str, Style]:
 
 def draw_pitch(ax: Axes, table: pd.DataFrame, styles: dict[str, Style], top: float = 1.25) -> None:
     """Draw the effects at one pitch, each with its symbol; what never reaches 1 % is left out."""
+    from matplotlib.ticker import NullLocator
+
     ax.set_yscale("log")
     ax.set_ylim(BOTTOM, top)
     ax.set_yticks(
@@ -150,6 +186,9 @@ def draw_pitch(ax: Axes, table: pd.DataFrame, styles: dict[str, Style], top: flo
 
 def _write(ax: Axes, x: float | None, labels: list[tuple[float, str, str]]) -> None:
     """Write symbols (share, text, colour) above a roll, or at the right edge; none over another."""
+    from matplotlib.patheffects import Normal, Stroke
+    from scipy.optimize import isotonic_regression
+
     labels = sorted(labels)
     low, high = np.log(ax.get_ylim())
     wanted = (np.log([share for share, _, _ in labels]) - low) / (high - low)

@@ -1,0 +1,74 @@
+"""How a figure of a study is drawn and written, and what its caption says."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, ANGLE_UNITS, angle_note, angles_in
+from accelstudy.study.figures.base import FigureEntry, Tables, get_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from accelstudy.study.config import StudyConfig
+
+
+def draw(name: str, tables: Tables, study: StudyConfig) -> Figure:
+    """Draw a figure.
+
+    Parameters
+    ----------
+    name : str
+    tables : mapping of table name to table, at least those of `figure_tables`
+    study : StudyConfig
+    """
+    import matplotlib as mpl
+
+    from accelstudy.drawing.style import STYLE
+
+    with mpl.rc_context(STYLE), angles_in(angle_unit(study)):  # type: ignore[arg-type]
+        return get_figure(name).draw(tables, study)
+
+
+def captions(names: Iterable[str], study: StudyConfig) -> dict[str, str]:
+    """Captions of figures by their names, with what they say of this study."""
+    with angles_in(angle_unit(study)):
+        return {entry.name: _caption(entry, study) for entry in map(get_figure, names)}
+
+
+def _caption(entry: FigureEntry, study: StudyConfig) -> str:
+    unit = f"{angle_note()}." if entry.angles else ""
+    notes = " ".join(filter(None, [entry.note(study), unit]))
+    return "\n".join(filter(None, [entry.caption, notes]))
+
+
+def angle_unit(study: StudyConfig) -> str | None:
+    """Unit of angles in figures: that of the study or, where it names none, of the user.
+
+    Raises
+    ------
+    InputError
+        If the environment variable of the user names no such unit.
+    """
+    unit = study.angle_unit or os.environ.get(ANGLE_UNIT_VARIABLE) or None
+    if unit not in (None, *ANGLE_UNITS):
+        known = " or ".join(ANGLE_UNITS)
+        raise InputError(f"{ANGLE_UNIT_VARIABLE}: {unit!r} is no unit of angles; choose {known}")
+    return unit
+
+
+def render(
+    name: str, tables: Tables, study: StudyConfig, svg_path: str | Path, png_path: str | Path
+) -> None:
+    """Draw a figure and write it as SVG and PNG, each whole or not at all.
+
+    The same tables give the same bytes. Parameters as in `draw`.
+    """
+    from accelstudy.drawing.saving import save
+    from accelstudy.drawing.style import DPI
+
+    save(draw(name, tables, study), svg_path, png_path, get_figure(name).title, DPI)
