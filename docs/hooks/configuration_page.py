@@ -1,0 +1,44 @@
+"""The page of all keys of all configurations."""
+
+from markdown_text import page
+from schemas import blocks
+
+from accelstudy.campaign.batch.config import BatchConfig
+from accelstudy.design.proposal.config import DesignsConfig
+from accelstudy.diagnosis.round_trip import RoundTrip
+from accelstudy.field.config import FieldConfig
+from accelstudy.hidden.config import HiddenConfig
+from accelstudy.plan.config import PlanConfig
+from accelstudy.plan.example import Example
+from accelstudy.pole.config import PoleConfig
+from accelstudy.sequential.config import SequentialConfig
+from accelstudy.study.config import config_schema
+
+SECTIONS = {
+    "plan": PlanConfig,
+    "designs": DesignsConfig,
+    "sequential": SequentialConfig,
+    "pole": PoleConfig,
+    "field": FieldConfig,
+}
+"""Sections of the example of plans."""
+
+
+def configuration():
+    """All keys of all configurations."""
+    return page(
+        "# Configuration",
+        "All keys of the configurations, from the schema that checks them. How they work together "
+        "is explained in [Studies and their configuration](../guides/configuration.md). A key that "
+        "is not *required* may be left out. A wrong key or value ends with one line that names it "
+        "and says what it may be.",
+        blocks(config_schema(), "A study"),
+        blocks(BatchConfig.model_json_schema(), "A batch of campaigns", "batch: "),
+        blocks(RoundTrip.model_json_schema(), "A hidden effect, found again", "round trip: "),
+        blocks(HiddenConfig.model_json_schema(), "A study of hidden effects", "hidden: "),
+        blocks(Example.model_json_schema(), "An example of plans"),
+        *(
+            blocks(config.model_json_schema(), f"Plans: `{name}`", f"{name}: ")
+            for name, config in SECTIONS.items()
+        ),
+    )

@@ -1,0 +1,38 @@
+"""Pages that are made from the code while the site is built."""
+
+import catalogue
+import command_pages
+import configuration_page
+from markdown_text import page, table
+from mkdocs.structure.files import File
+
+from accelstudy.pages.glossary import TERMS
+
+
+def terms():
+    """The terms that reports explain."""
+    rows = [(f"**{term}**", meaning) for term, meaning in TERMS.items()]
+    return page(
+        "# Terms", "What the words on reports and on these pages mean.", table(("", ""), rows)
+    )
+
+
+PAGES = {
+    "reference/effects.md": catalogue.effects,
+    "reference/noise-effects.md": catalogue.noise_effects,
+    "reference/gross-errors.md": catalogue.gross_errors,
+    "reference/models.md": catalogue.models,
+    "reference/schemes.md": catalogue.schemes,
+    "reference/approaches.md": catalogue.approaches,
+    "reference/data-sheets.md": catalogue.data_sheets,
+    "reference/commands.md": command_pages.commands,
+    "reference/configuration.md": configuration_page.configuration,
+    "reference/terms.md": terms,
+}
+
+
+def on_files(files, config):
+    """Add the pages."""
+    for path, make in PAGES.items():
+        files.append(File.generated(config, path, content=make()))
+    return files
