@@ -14,10 +14,11 @@ from accelstudy.campaign.calibration.assessment import SUSPECT
 from accelstudy.diagnosis.decision.posterior import of_effects
 from accelstudy.diagnosis.decision.search import Search
 from accelstudy.diagnosis.decision.verdict import Finding
+from accelstudy.diagnosis.space.groups import LACK_OF_FIT
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
-from accelstudy.diagnosis.space.location import LACK_OF_FIT, locate
 from accelstudy.diagnosis.worth.changes import Change, parameter_changes
 from accelstudy.diagnosis.worth.limits import UpperLimit, upper_limits
+from accelstudy.diagnosis.worth.location import locate
 from accelstudy.diagnosis.worth.next_positions import NextPosition, next_positions
 from accelstudy.diagnosis.worth.tilt import leveling_rms
 

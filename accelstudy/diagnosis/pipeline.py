@@ -21,12 +21,12 @@ from accelstudy.diagnosis.beside import Beside
 from accelstudy.diagnosis.decision.noise import NoiseJudge
 from accelstudy.diagnosis.decision.search import Search
 from accelstudy.diagnosis.decision.verdict import Finding, find
-from accelstudy.diagnosis.evidence import noise as noises
 from accelstudy.diagnosis.evidence.chance import SIMULATIONS
-from accelstudy.diagnosis.evidence.noise import NoiseTest
+from accelstudy.diagnosis.evidence.noise import kinds
+from accelstudy.diagnosis.evidence.noise.kinds import NoiseTest
+from accelstudy.diagnosis.held_out.confirmation import held_out
 from accelstudy.diagnosis.result import Diagnosis, Gap, Named, level_of_effects
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
-from accelstudy.diagnosis.worth.held_out import held_out
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -177,7 +177,7 @@ class _Run:
         if finding.verdict == "noise_model":
             worst = self.noise.worst(tests)
             posterior = finding.posterior or search.posterior
-            top = next(e.names[0] for e in posterior.explanations if e.names[0] in noises.NOISES)
+            top = next(e.names[0] for e in posterior.explanations if e.names[0] in kinds.NOISES)
             name = top if worst is None else worst.name
             p = search.detection.p_value if worst is None else worst.p_value
             return (Named(name, name, (name,), p, posterior.of_noise),)

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import GlobalTest, Solution, global_test
 from accelstudy.adjustment.quality.whole_model import REFUTED
@@ -15,10 +16,10 @@ from accelstudy.campaign.gross_errors.recognition import Recognised
 from accelstudy.diagnosis.beside import Beside
 from accelstudy.diagnosis.decision.explanations import Explanation
 from accelstudy.diagnosis.evidence.detection import Detection
-from accelstudy.diagnosis.evidence.noise import NoiseTest
-from accelstudy.diagnosis.space.hypotheses import ExaminedFit
+from accelstudy.diagnosis.evidence.noise.kinds import NoiseTest
+from accelstudy.diagnosis.held_out.gap import HeldOutGap
+from accelstudy.diagnosis.space.examined import ExaminedFit
 from accelstudy.diagnosis.worth.changes import Change
-from accelstudy.diagnosis.worth.gap import HeldOutGap
 from accelstudy.diagnosis.worth.limits import UpperLimit
 from accelstudy.diagnosis.worth.next_positions import NextPosition
 from accelstudy.sensors.sensor import SensorModel
@@ -90,7 +91,7 @@ class Diagnosis:
     found : tuple of Named
     base : Solution, of the base model with equal axes
     examined : ExaminedFit, of the base fit, with unequal axes weighted
-    final : Setting, of the extended fit, or the same
+    final : ExaminedFit, of the extended fit, or the same
     sigma_known : bool
     sigma_source : str
     unit_variance : float, variance of unit weight that is taken for the noise
@@ -125,6 +126,12 @@ class Diagnosis:
     simulations: int
     recognised: Recognised | None
     reason: str
+
+    @property
+    def kept(self) -> NDArray[np.bool_]:
+        """Which positions, (n,), the final fit uses: all but those that were found to be bumped."""
+        bumped = [found.position for found in self.found if found.position is not None]
+        return ~np.isin(self.campaign.positions, bumped)
 
     @property
     def location(self) -> Mapping[str, float]:

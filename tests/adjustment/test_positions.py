@@ -25,11 +25,11 @@ from accelstudy.campaign.calibration.output import write_calibration
 from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.decision import search
 from accelstudy.diagnosis.evidence import chance
-from accelstudy.diagnosis.evidence.colour import LENGTHS, quadratic_forms, restricted
-from accelstudy.diagnosis.evidence.noise import axis_factors
+from accelstudy.diagnosis.evidence.noise.colour import LENGTHS, quadratic_forms, restricted
+from accelstudy.diagnosis.evidence.noise.residual_tests import axis_factors
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.space.hypotheses import examine
-from accelstudy.diagnosis.space.location import groups
+from accelstudy.diagnosis.space.examined import examine
+from accelstudy.diagnosis.space.groups import groups
 from accelstudy.diagnosis.space.repeats import clusters
 from accelstudy.effects import HoldConditions, get_effect
 from accelstudy.simulation.sessions import Noise

@@ -13,7 +13,7 @@ from accelstudy.basics.wording import number, probability, words
 from accelstudy.campaign.importing.conversion import import_file
 from accelstudy.campaign.importing.public import import_settings, public_data, public_file
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.report.wording import GROUPS, amount, shown_unit, verdict_lines
+from accelstudy.diagnosis.report.words.summary import GROUPS, amount, shown_unit, verdict_lines
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.effects import get_effect
 from accelstudy.sensors.models import get_model

@@ -19,8 +19,8 @@ from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.verdict import ACCEPTED, REJECTED, state
 from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
 from accelstudy.commands.main import main
+from accelstudy.diagnosis.held_out import gap
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.worth import gap
 from accelstudy.sensors.models import compose, get_model
 
 NINE = get_model("bias-scale-nonorthogonality")

@@ -12,14 +12,15 @@ from accelstudy.diagnosis.decision.explanations import Explanation, credible_set
 from accelstudy.diagnosis.decision.posterior import Posterior, Weighed
 from accelstudy.diagnosis.decision.search import Search
 from accelstudy.diagnosis.decision.verdict import _misfit
-from accelstudy.diagnosis.evidence.axes import UnequalAxes
 from accelstudy.diagnosis.evidence.chance import Chance
 from accelstudy.diagnosis.evidence.detection import detect
 from accelstudy.diagnosis.evidence.field import Field
-from accelstudy.diagnosis.evidence.noise import NOISES, most_evidence
+from accelstudy.diagnosis.evidence.noise.axes import UnequalAxes
+from accelstudy.diagnosis.evidence.noise.kinds import NOISES
+from accelstudy.diagnosis.evidence.noise.residual_tests import most_evidence
 from accelstudy.diagnosis.evidence.pairs import all_pairs
 from accelstudy.diagnosis.evidence.size import SIZE_WEIGHTS, SIZES, Evidence, Level
-from accelstudy.diagnosis.space.location import groups
+from accelstudy.diagnosis.space.groups import groups
 from accelstudy.schemes import get_scheme
 from accelstudy.simulation.sessions import Noise, session
 

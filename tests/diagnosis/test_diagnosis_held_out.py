@@ -9,10 +9,11 @@ from diagnosis_helpers import NINE, ROBOT, G, shuffled
 from accelstudy.adjustment.quality import solve
 from accelstudy.diagnosis.decision.search import Search
 from accelstudy.diagnosis.evidence.size import Level
+from accelstudy.diagnosis.held_out import confirmation as held_out
+from accelstudy.diagnosis.held_out import given_a_name
+from accelstudy.diagnosis.held_out.gap import SIGNIFICANT, held_out_gap, split_positions
+from accelstudy.diagnosis.held_out.linear import LinearSplit
 from accelstudy.diagnosis.result import LEVEL_EFFECTS
-from accelstudy.diagnosis.worth import given_a_name, held_out
-from accelstudy.diagnosis.worth.gap import SIGNIFICANT, held_out_gap, split_positions
-from accelstudy.diagnosis.worth.linear import LinearSplit
 from accelstudy.simulation.sessions import Noise, session
 
 SETS = 25_000

@@ -17,7 +17,8 @@ from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.decision.priors import SURE
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.space.hypotheses import OUTLIER, examine, same_space
+from accelstudy.diagnosis.space.examined import examine
+from accelstudy.diagnosis.space.hypotheses import OUTLIER, same_space
 from accelstudy.diagnosis.worth.limits import signature_columns
 from accelstudy.effects import get_effect
 

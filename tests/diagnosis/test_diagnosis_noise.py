@@ -10,15 +10,15 @@ from scipy import stats
 
 from accelstudy.adjustment.quality import solve
 from accelstudy.diagnosis.evidence.chance import Chance
-from accelstudy.diagnosis.evidence.noise import (
+from accelstudy.diagnosis.evidence.noise.residual_tests import (
     axis_factors,
     axis_test,
     colour_test,
     level_test,
-    resolution_test,
     tail_test,
     within_hold_test,
 )
+from accelstudy.diagnosis.evidence.noise.resolution import resolution_test
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.simulation.sessions import Noise
 

@@ -30,15 +30,15 @@ from accelstudy.commands.main import main
 from accelstudy.diagnosis.decision.explanations import Explanation
 from accelstudy.diagnosis.decision.posterior import Posterior, Weighed
 from accelstudy.diagnosis.decision.verdict import Finding
+from accelstudy.diagnosis.loop import CASES as CASES_OF_LOOP
+from accelstudy.diagnosis.loop import Loop, close_loop
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.report.figures import gap_figure, loop_figure
+from accelstudy.diagnosis.report.figures.gap import gap_figure, loop_figure
 from accelstudy.diagnosis.report.output import diagnose_folder, write_diagnosis
-from accelstudy.diagnosis.report.wording import headline
+from accelstudy.diagnosis.report.words.summary import headline
 from accelstudy.diagnosis.result import Gap
 from accelstudy.diagnosis.round_trip import parse_round_trip
-from accelstudy.diagnosis.space.hypotheses import examine
-from accelstudy.diagnosis.worth.loop import CASES as CASES_OF_LOOP
-from accelstudy.diagnosis.worth.loop import Loop, close_loop
+from accelstudy.diagnosis.space.examined import examine
 from accelstudy.diagnosis.worth.next_positions import next_positions
 from accelstudy.drawing.style import STYLE
 from accelstudy.sensors.models import get_model
@@ -424,7 +424,9 @@ def test_bad_input_is_one_line(arguments, words, tmp_path, monkeypatch):
 def test_a_figure_that_fails_takes_nothing_with_it(tmp_path, monkeypatch, capsys):
     campaign = simulated("no_effect", tmp_path / "c")
     diagnosis = diagnose(campaign, NINE)
-    monkeypatch.setattr("accelstudy.diagnosis.report.figures.evidence_figure", lambda *_: 1 / 0)
+    monkeypatch.setattr(
+        "accelstudy.diagnosis.report.figures.choice.evidence_figure", lambda *_: 1 / 0
+    )
     write_diagnosis(diagnosis, tmp_path / "out")
     said = "The figure 'evidence' could not be drawn (ZeroDivisionError: division by zero)."
     assert capsys.readouterr().err == f"warning: {said}\n"
@@ -460,7 +462,7 @@ def test_variances_of_unit_weight_that_are_nothing_are_not_compared(tmp_path, mo
     loop_figure(loop)
     diagnosis = diagnose(simulated("gravity", tmp_path / "c"), NINE)
     nothing = sessions[["sigma0_squared", "tilt_error_rad", "converged"]][:1]
-    monkeypatch.setattr("accelstudy.diagnosis.worth.loop._session_table", lambda *_: nothing)
+    monkeypatch.setattr("accelstudy.diagnosis.loop._session_table", lambda *_: nothing)
     assert close_loop(diagnosis, 1) is None
 
 

@@ -3,13 +3,13 @@
 import pytest
 
 from accelstudy.diagnosis.decision.explanations import Explanation
-from accelstudy.diagnosis.report.missing import (
+from accelstudy.diagnosis.report.words.missing import (
     missing,
     most_probable,
     not_told_apart,
     without_a_name,
 )
-from accelstudy.diagnosis.report.statement import statement
+from accelstudy.diagnosis.report.words.statement import statement
 
 SLOW, EVEN = "slow change in time", "even nonlinearity"
 FAMILIES = {

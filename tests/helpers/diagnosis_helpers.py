@@ -7,7 +7,7 @@ from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
-from accelstudy.diagnosis.space.hypotheses import examine
+from accelstudy.diagnosis.space.examined import examine
 from accelstudy.effects import HoldConditions
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model

@@ -14,15 +14,22 @@ from accelstudy.basics.errors import InputError
 from accelstudy.effects import effect_names, effects_without
 from accelstudy.files.layers import overlay, read_layer
 from accelstudy.files.tables import read_table, write_table
-from accelstudy.hidden import diagnosing, making
-from accelstudy.hidden.baselines import METHODS
-from accelstudy.hidden.cells import Cell, chunks, number_of_chunks, planned, study_cells, write_plan
-from accelstudy.hidden.comparing import run_baselines
-from accelstudy.hidden.config import SETS, parse_hidden
-from accelstudy.hidden.diagnosing import run_chunk
-from accelstudy.hidden.figures import figures
+from accelstudy.hidden.page.figures import figures
 from accelstudy.hidden.physics import Case
-from accelstudy.hidden.tables import KEY, TABLES
+from accelstudy.hidden.study import diagnosing, making
+from accelstudy.hidden.study.baselines import METHODS
+from accelstudy.hidden.study.cells import (
+    Cell,
+    chunks,
+    number_of_chunks,
+    planned,
+    study_cells,
+    write_plan,
+)
+from accelstudy.hidden.study.comparing import run_baselines
+from accelstudy.hidden.study.config import SETS, parse_hidden
+from accelstudy.hidden.study.diagnosing import run_chunk
+from accelstudy.hidden.study.tables import KEY, TABLES
 from accelstudy.jobs.code import code_hash
 
 TINY = {
@@ -291,9 +298,9 @@ def test_what_runs_again_after_an_edit(monkeypatch, tmp_path):
     monkeypatch.setattr(accelstudy, "__file__", str(package / "__init__.py"))
     for name, expected in {
         "diagnosis/pipeline.py": {"hidden_diagnose"},
-        "hidden/targets.py": {"hidden_score"},
-        "hidden/baselines.py": {"hidden_baselines"},
-        "hidden/physics/noise.py": {*stages},
+        "hidden/score/targets.py": {"hidden_score"},
+        "hidden/study/baselines.py": {"hidden_baselines"},
+        "hidden/physics/forward/noise.py": {*stages},
         "effects/bias_drift.py": {*stages},
         "commands/main.py": set(),
         "study/results/summary.py": set(),

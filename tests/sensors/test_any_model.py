@@ -23,8 +23,8 @@ from accelstudy.campaign.use.export import export
 from accelstudy.campaign.use.readings import readings_of
 from accelstudy.commands.main import main
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.report.calibration import diagnosed_calibration
-from accelstudy.diagnosis.report.model_file import study_overlay
+from accelstudy.diagnosis.report.document.calibration import diagnosed_calibration
+from accelstudy.diagnosis.report.document.model_file import study_overlay
 from accelstudy.diagnosis.round_trip import parse_round_trip
 from accelstudy.drawing.style import model_title
 from accelstudy.effects import HoldConditions

@@ -13,9 +13,17 @@ from accelstudy.campaign.files.format import Campaign
 from accelstudy.diagnosis.decision import priors
 from accelstudy.diagnosis.decision.search import Search
 from accelstudy.diagnosis.decision.verdict import Finding, lack_of_fit
-from accelstudy.diagnosis.evidence import noise as noises
-from accelstudy.diagnosis.evidence.noise import NoiseTest
-from accelstudy.diagnosis.space.hypotheses import ExaminedFit
+from accelstudy.diagnosis.evidence.noise import kinds
+from accelstudy.diagnosis.evidence.noise.kinds import NoiseTest
+from accelstudy.diagnosis.evidence.noise.residual_tests import (
+    axis_test,
+    colour_test,
+    level_test,
+    tail_test,
+    within_hold_test,
+)
+from accelstudy.diagnosis.evidence.noise.resolution import resolution_test
+from accelstudy.diagnosis.space.examined import ExaminedFit
 from accelstudy.diagnosis.space.residuals import Residuals
 
 LEVEL_NOISE = 0.01
@@ -39,20 +47,20 @@ class NoiseJudge:
         if self.search.level.known:
             tests.append(self.level(examined))
         tests += [
-            noises.axis_test(residuals, chance),
-            noises.colour_test(residuals, chance),
-            noises.tail_test(residuals, chance),
+            axis_test(residuals, chance),
+            colour_test(residuals, chance),
+            tail_test(residuals, chance),
             self.resolution,
         ]
         if campaign.sd is not None and campaign.n_samples is not None:
-            tests.append(noises.within_hold_test(residuals, sigma, campaign.sd, campaign.n_samples))
+            tests.append(within_hold_test(residuals, sigma, campaign.sd, campaign.n_samples))
         return tuple(tests)
 
     def level(self, examined: ExaminedFit) -> NoiseTest:
         """Test the level of the noise; of the base fit as the calibration does, by its own Ω."""
         if examined is self.search.examined:
-            return noises.level_test(Residuals.of(self.search.first))
-        return noises.level_test(examined.frame.residuals.positions)
+            return level_test(Residuals.of(self.search.first))
+        return level_test(examined.frame.residuals.positions)
 
     @cached_property
     def resolution(self) -> NoiseTest:
@@ -61,11 +69,11 @@ class NoiseJudge:
         sigma = float(np.mean(residuals.sigmas[:, :3]))
         # A sigma far too large would take the attitudes for steps.
         noise = sigma * min(1.0, float(np.sqrt(residuals.variance)))
-        return noises.resolution_test(self.campaign.forces, noise)
+        return resolution_test(self.campaign.forces, noise)
 
     def worst(self, tests: Sequence[NoiseTest]) -> NoiseTest | None:
         """Return what is wrong with the noise, the most specific finding first."""
-        level = next((t for t in tests if t.name == noises.LEVEL), None)
+        level = next((t for t in tests if t.name == kinds.LEVEL), None)
         counted = [
             t
             for t in tests
@@ -75,25 +83,25 @@ class NoiseJudge:
         ]  # fmt: skip
         others = LEVEL_NOISE / max(len(counted) - (level is not None), 1)
         found = [t for t in counted if t.p_value < (REFUTED if t is level else others)]
-        order = [noises.STEPS, noises.COLOUR, noises.AXES, noises.TAILS, noises.LEVEL]
+        order = [kinds.STEPS, kinds.COLOUR, kinds.AXES, kinds.TAILS, kinds.LEVEL]
         return min(found, key=lambda t: order.index(t.name), default=None)
 
     def judged(self, worst: NoiseTest) -> Finding:
         """Judge a finding about the noise, when no effect was significant."""
         examined, posterior = self.search.examined, self.search.posterior
-        if lack_of_fit(self.search) < REFUTED and worst.name != noises.STEPS:
+        if lack_of_fit(self.search) < REFUTED and worst.name != kinds.STEPS:
             reason = (
                 "repeated positions agree better with each other than with the model, so it is not "
                 "the noise"
             )
             return Finding("unknown", examined, reason, posterior=posterior)
-        if worst.name != noises.LEVEL or worst.estimate[0] < 1:
+        if worst.name != kinds.LEVEL or worst.estimate[0] < 1:
             return Finding("noise_model", examined, worst.remark, posterior=posterior)
         # Larger residuals may be an effect that the test for a pattern could not see.
         noise = posterior.of_noise
         if noise >= priors.MORE_PROBABLE:
             return Finding("noise_model", examined, worst.remark, posterior=posterior)
-        name = next(n for e in posterior.explanations for n in e.names if n not in noises.NOISES)
+        name = next(n for e in posterior.explanations for n in e.names if n not in kinds.NOISES)
         reason = (
             f"{worst.remark}; it may be the noise (probability {noise:.2f}), but "
             f"{'something' if name == 'unknown' else 'an effect such as ' + name} is not excluded"

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.special import softmax
 
 from accelstudy.diagnosis.decision.explanations import Explanation, credible_set
-from accelstudy.diagnosis.evidence.noise import NOISES
+from accelstudy.diagnosis.evidence.noise.kinds import NOISES
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.effects import effect_names
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from accelstudy.adjustment.quality import Solution, solve
 from accelstudy.basics.errors import InputError
-from accelstudy.diagnosis.space.hypotheses import ExaminedFit, Hypothesis, Shapes
+from accelstudy.diagnosis.space.examined import ExaminedFit
+from accelstudy.diagnosis.space.hypotheses import Hypothesis, Shapes
 from accelstudy.diagnosis.space.refinement import shaped as reshaped
 from accelstudy.diagnosis.space.refinement import strongest
 from accelstudy.sensors.models import composition_name

@@ -14,17 +14,19 @@ from accelstudy.adjustment.quality import Solution, solve
 from accelstudy.diagnosis.decision import priors
 from accelstudy.diagnosis.decision.posterior import Posterior, Weighed
 from accelstudy.diagnosis.decision.refits import Refits
-from accelstudy.diagnosis.evidence import noise as noises
-from accelstudy.diagnosis.evidence.axes import UnequalAxes
 from accelstudy.diagnosis.evidence.chance import Chance
-from accelstudy.diagnosis.evidence.colour import colour_density
 from accelstudy.diagnosis.evidence.detection import Detection, detect
 from accelstudy.diagnosis.evidence.field import UNKNOWN, Field, shape_weights
+from accelstudy.diagnosis.evidence.noise import kinds
+from accelstudy.diagnosis.evidence.noise.axes import UnequalAxes
+from accelstudy.diagnosis.evidence.noise.colour import colour_density
+from accelstudy.diagnosis.evidence.noise.residual_tests import most_evidence, tail_test
 from accelstudy.diagnosis.evidence.pairs import all_pairs
 from accelstudy.diagnosis.evidence.size import Evidence, Level, log_mean
 from accelstudy.diagnosis.evidence.unknown import unknown_beside
-from accelstudy.diagnosis.space.hypotheses import ExaminedFit, Hypothesis, Shapes, examine
-from accelstudy.diagnosis.space.location import groups
+from accelstudy.diagnosis.space.examined import ExaminedFit, examine
+from accelstudy.diagnosis.space.groups import groups
+from accelstudy.diagnosis.space.hypotheses import Hypothesis, Shapes
 from accelstudy.diagnosis.space.refinement import refined, strongest
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.spaces import Spaces
@@ -277,15 +279,15 @@ class Search:
         unequal = nothing + np.log(priors.AXES) + self.axes.log_evidence
         if self.examined is not self.equal:
             unequal = float(by_level[0])
-        tails = noises.tail_test(residuals.positions, self.chance)
+        tails = tail_test(residuals.positions, self.chance)
         known = {
-            noises.COLOUR: np.log(priors.COLOUR) + colour_density(residuals, self.evidence),
-            noises.AXES: unequal,
-            noises.TAILS: nothing + np.log(priors.TAILS) + noises.most_evidence(tails.p_value),
+            kinds.COLOUR: np.log(priors.COLOUR) + colour_density(residuals, self.evidence),
+            kinds.AXES: unequal,
+            kinds.TAILS: nothing + np.log(priors.TAILS) + most_evidence(tails.p_value),
         }
         if len(by_level) > 1:
             # More noise than within the holds is an offset from hold to hold.
-            name = noises.LEVEL if self.level.known else noises.COLOUR
+            name = kinds.LEVEL if self.level.known else kinds.COLOUR
             known[name] = np.logaddexp(known.get(name, -np.inf), by_level[1])
         return [Weighed((name,), ((name,),), float(log)) for name, log in known.items()]
 

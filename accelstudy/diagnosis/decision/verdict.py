@@ -16,9 +16,10 @@ from accelstudy.diagnosis.decision.explanations import Explanation
 from accelstudy.diagnosis.decision.posterior import Posterior, Weighed, of_effects
 from accelstudy.diagnosis.decision.search import Search
 from accelstudy.diagnosis.evidence.field import UNKNOWN
-from accelstudy.diagnosis.evidence.noise import NOISES
-from accelstudy.diagnosis.space.hypotheses import ExaminedFit, Hypothesis, examine
-from accelstudy.diagnosis.space.location import LACK_OF_FIT
+from accelstudy.diagnosis.evidence.noise.kinds import NOISES
+from accelstudy.diagnosis.space.examined import ExaminedFit, examine
+from accelstudy.diagnosis.space.groups import LACK_OF_FIT
+from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.diagnosis.space.repeats import clusters
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.spaces import LackOfFit, Spaces

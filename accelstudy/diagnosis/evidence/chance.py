@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.progress import track
+from accelstudy.diagnosis.evidence.field import Field
 from accelstudy.diagnosis.space.residuals import Residuals
-
-if TYPE_CHECKING:
-    from accelstudy.diagnosis.evidence.field import Field
 
 Array = NDArray[np.float64]
 

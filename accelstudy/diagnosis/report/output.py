@@ -13,13 +13,13 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import stage
 from accelstudy.campaign.calibration.document import json_text
 from accelstudy.campaign.files.format import read_campaign
+from accelstudy.diagnosis.loop import REPLICATES, Loop, close_loop
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.report.calibration import diagnosed_calibration
-from accelstudy.diagnosis.report.document import diagnosis_document
-from accelstudy.diagnosis.report.model_file import study_overlay
-from accelstudy.diagnosis.report.positions import positions_table
+from accelstudy.diagnosis.report.document.calibration import diagnosed_calibration
+from accelstudy.diagnosis.report.document.diagnosis import diagnosis_document
+from accelstudy.diagnosis.report.document.model_file import study_overlay
+from accelstudy.diagnosis.report.document.positions import positions_table
 from accelstudy.diagnosis.result import Diagnosis
-from accelstudy.diagnosis.worth.loop import REPLICATES, Loop, close_loop
 from accelstudy.files.outputs import DIAGNOSIS, result_folder, whole_file
 from accelstudy.sensors.models import get_model
 
@@ -100,7 +100,7 @@ def write_diagnosis(
         path.write_text(MODEL_HEADER + text, encoding="utf-8")
     if report:
         # Drawing takes as long to import as all of the above to compute.
-        from accelstudy.diagnosis.report.page import write_report
+        from accelstudy.diagnosis.report.page.report import write_report
 
         write_report(diagnosis, document, positions, loop, folder, calibration, source)
     with whole_file(folder / "diagnosis.json") as path:

@@ -7,7 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.diagnosis.space.hypotheses import EffectShapes, ExaminedFit, Hypothesis, Shapes
+from accelstudy.diagnosis.space.examined import ExaminedFit
+from accelstudy.diagnosis.space.hypotheses import EffectShapes, Hypothesis, Shapes
 
 Array = NDArray[np.float64]
 

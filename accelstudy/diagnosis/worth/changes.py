@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import Solution
-from accelstudy.diagnosis.space.hypotheses import Frame
+from accelstudy.diagnosis.space.frame import Frame
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.signatures import signature
 from accelstudy.effects import Effect

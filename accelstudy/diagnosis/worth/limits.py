@@ -9,14 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import noncentrality
-from accelstudy.diagnosis.space.hypotheses import (
-    ALIKE,
-    OUTLIER,
-    ExaminedFit,
-    Frame,
-    Hypothesis,
-    cosines,
-)
+from accelstudy.diagnosis.space.examined import ExaminedFit
+from accelstudy.diagnosis.space.frame import Frame
+from accelstudy.diagnosis.space.hypotheses import ALIKE, OUTLIER, Hypothesis, cosines
 from accelstudy.effects import Effect, get_effect
 
 Array = NDArray[np.float64]

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.design.proposal.separation import Explained, Separation
-from accelstudy.diagnosis.space.hypotheses import Frame, Hypothesis
+from accelstudy.diagnosis.space.frame import Frame
+from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.diagnosis.space.signatures import signature
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import roll_pitch

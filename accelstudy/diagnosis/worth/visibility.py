@@ -11,7 +11,7 @@ from accelstudy.basics.units import display_unit, to_display
 from accelstudy.basics.wording import number
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.files.format import Campaign
-from accelstudy.diagnosis.space.hypotheses import ExaminedFit, examine
+from accelstudy.diagnosis.space.examined import ExaminedFit, examine
 from accelstudy.diagnosis.worth.limits import visibilities
 from accelstudy.effects import Effect, get_effect
 from accelstudy.schemes import Scheme

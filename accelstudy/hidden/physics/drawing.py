@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.hidden.physics.atlas import Shape
-from accelstudy.hidden.physics.conditions import Conditions
-from accelstudy.hidden.physics.effects import EFFECTS, Effect
-from accelstudy.hidden.physics.measuring import Cause, observe
-from accelstudy.hidden.physics.oracle import Oracle
-from accelstudy.hidden.physics.outside import OUTSIDE
-from accelstudy.hidden.physics.session import Session
+from accelstudy.hidden.physics.forward.effects import EFFECTS, Effect
+from accelstudy.hidden.physics.forward.measuring import Cause, observe
+from accelstudy.hidden.physics.forward.outside import OUTSIDE
+from accelstudy.hidden.physics.forward.session import Session
+from accelstudy.hidden.physics.seen.atlas import Shape
+from accelstudy.hidden.physics.seen.conditions import Conditions
+from accelstudy.hidden.physics.seen.oracle import Oracle
 
 Array = NDArray[np.float64]
 

@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.campaign.files.session import Campaign
-from accelstudy.hidden.physics.atlas import Atlas
 from accelstudy.hidden.physics.case import Case, HiddenEffect, Truth, plain
-from accelstudy.hidden.physics.conditions import Conditions
 from accelstudy.hidden.physics.drawing import drawn
+from accelstudy.hidden.physics.forward.measuring import Cause, Sensor, observe
+from accelstudy.hidden.physics.forward.noise import NOISES, Noise
+from accelstudy.hidden.physics.forward.session import GRAVITY, Session
 from accelstudy.hidden.physics.gross import GROSS
-from accelstudy.hidden.physics.measuring import Cause, Sensor, observe
-from accelstudy.hidden.physics.noise import NOISES, Noise
-from accelstudy.hidden.physics.oracle import oracle
-from accelstudy.hidden.physics.session import GRAVITY, Session
+from accelstudy.hidden.physics.seen.atlas import Atlas
+from accelstudy.hidden.physics.seen.conditions import Conditions
+from accelstudy.hidden.physics.seen.oracle import oracle
 
 Array = NDArray[np.float64]
 

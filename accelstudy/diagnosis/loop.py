@@ -1,0 +1,206 @@
+"""Closing the loop: whether a simulation with the named effect contains the measurement.
+
+Sessions of the campaign's own positions, holds and noise are simulated with the base model as it
+was fitted (the old simulation) and with the extended one (the new simulation), and calibrated. The
+variance of unit weight of the measurement has to be one of those of the right simulation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from accelstudy.adjustment import Adjustment, Observations, calibrate
+from accelstudy.adjustment.quality import Solution
+from accelstudy.basics.progress import track
+from accelstudy.basics.units import MGON
+from accelstudy.diagnosis.result import Diagnosis
+from accelstudy.diagnosis.worth.tilt import in_use
+from accelstudy.effects import HoldConditions
+from accelstudy.leveling.error import leveling_error
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.simulation.sessions import Noise, session
+
+Array = NDArray[np.float64]
+
+REPLICATES = 1000
+CASES = (("old", "base"), ("new", "base"), ("new", "extended"))
+"""Simulations and the calibrations that are made of them."""
+COLUMNS = [
+    *("simulation", "calibration", "replicate"),
+    *("sigma0_squared", "tilt_error_rad", "converged"),
+]
+POSITIONS = 500_000
+"""Positions of all sessions of a simulation together, at most; they are drawn at once."""
+LEAST = 100
+"""Sessions of a simulation that are simulated all the same."""
+
+
+@dataclass(frozen=True)
+class Loop:
+    """Simulated sessions beside the measured one.
+
+    Attributes
+    ----------
+    sessions : DataFrame, one row per simulated and calibrated session: simulation ("old", "new"),
+        calibration ("base", "extended"), replicate, sigma0_squared, tilt_error_rad (rms of roll and
+        pitch that the calibration leaves of the simulated sensor) and converged
+    measured : dict of calibration to the variance of unit weight of the measurement
+    """
+
+    sessions: pd.DataFrame
+    measured: dict[str, float]
+
+    def case(self, simulation: str, calibration: str) -> pd.DataFrame:
+        """Sessions of one simulation and one calibration that converged to a variance."""
+        s = self.sessions
+        chosen = (s["simulation"] == simulation) & (s["calibration"] == calibration)
+        return s[chosen & s["converged"] & _comparable(s["sigma0_squared"])]
+
+    def interval(self, simulation: str, calibration: str) -> tuple[float, float]:
+        """Where the central 95 % of the simulated variances of unit weight lie."""
+        values = self.case(simulation, calibration)["sigma0_squared"]
+        low, high = np.quantile(values, [0.025, 0.975])
+        return float(low), float(high)
+
+    def contains(self, simulation: str, calibration: str) -> bool:
+        """Whether the measured variance of unit weight lies there."""
+        low, high = self.interval(simulation, calibration)
+        return low <= self.measured[calibration] <= high
+
+    def tilt(self, simulation: str, calibration: str) -> float:
+        """Tilt error, rms over the sessions, rad."""
+        values = self.case(simulation, calibration)["tilt_error_rad"]
+        return float(np.sqrt(np.mean(values**2)))
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """Plain data for `diagnosis.json`."""
+        return {
+            "replicates": int(self.sessions["replicate"].max()) + 1,
+            "measured_sigma0_squared": dict(self.measured),
+            "cases": [
+                {
+                    "simulation": simulation,
+                    "calibration": calibration,
+                    "sigma0_squared_central95": list(self.interval(simulation, calibration)),
+                    "contains_measurement": self.contains(simulation, calibration),
+                    "tilt_rms_mgon": self.tilt(simulation, calibration) / MGON,
+                }
+                for simulation, calibration in CASES
+            ],
+        }
+
+
+def close_loop(diagnosis: Diagnosis, replicates: int = REPLICATES, seed: int = 1) -> Loop | None:
+    """Simulate the campaign with the base and with the extended model, and calibrate.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    replicates : int, sessions of each simulation; `POSITIONS` limits them, but to `LEAST`
+    seed : int
+
+    Returns
+    -------
+    Loop; None if the diagnosis did not extend the model, so that there is nothing to compare, if
+    readings of the extended sensor, which clips, have no tilt, or if the measurement or all
+    simulated sessions of a kind have no solution.
+    """
+    d = diagnosis
+    if d.extended is d.model or d.leveling is None:
+        return None
+    fits, hold = {"base": d.base, "extended": d.final.frame.solution}, d.examined.frame.hold
+    kept = np.flatnonzero(d.kept)
+    noise = Noise(
+        sigma_force=d.sigma_position,
+        sigma_angle=d.campaign.sigma_angle or 0.0,
+        sigma_gravity=d.campaign.sigma_gravity,
+    )
+    # The measurement is weighted like the simulations, or the variances could not be compared.
+    taken = replace(d.base.observed.take(kept), sigma_force=noise.sigma_force)
+    measured = {
+        name: float(_calibrated(fit, taken).variance_posteriori[0]) for name, fit in fits.items()
+    }
+    if not _comparable(list(measured.values())).all():
+        return None
+    n = d.campaign.n_positions
+    replicates = min(replicates, max(LEAST, POSITIONS // n))
+    tables = []
+    for stream, simulation in enumerate(("old", "new")):
+        simulated = fits["base" if simulation == "old" else "extended"]
+        p = simulated.parameters[: simulated.model.n_parameters]
+        f_b = simulated.model.correct(d.campaign.forces, p, simulated.gravity, hold)
+        if np.isnan(f_b).any():
+            return None
+        directions = -f_b / np.linalg.norm(f_b, axis=1, keepdims=True)
+        ideal = session(simulated.model, p, directions, simulated.gravity, hold)
+        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(stream,)))
+        size = max(1, POSITIONS // n)
+        for first in track(range(0, replicates, size), f"{simulation} simulation"):
+            numbers = np.arange(first, min(first + size, replicates))
+            drawn = ideal.draw(noise, len(numbers), rng).take(kept)
+            for calibration in (c for s, c in CASES if s == simulation):
+                table = _session_table(simulated, fits[calibration], drawn, hold)
+                if table is None:
+                    return None
+                known = {"simulation": simulation, "calibration": calibration}
+                tables.append(table.assign(**known, replicate=numbers)[COLUMNS])
+    loop = Loop(pd.concat(tables, ignore_index=True), measured)
+    return loop if all(len(loop.case(*case)) for case in CASES) else None
+
+
+def _comparable(variances: ArrayLike) -> NDArray[np.bool_]:
+    """Which variances of unit weight can be compared: a fit without residuals has none."""
+    values = np.asarray(variances, dtype=float)
+    return np.isfinite(values) & (values > 0)
+
+
+def _session_table(
+    simulated: Solution, estimated: Solution, observed: Observations, hold: HoldConditions
+) -> pd.DataFrame | None:
+    """Calibrate simulated sessions; None if readings that were corrected so have no tilt."""
+    result = _calibrated(estimated, observed)
+    errors = _tilt_errors(
+        simulated.model,
+        simulated.parameters[: simulated.model.n_parameters],
+        estimated.model,
+        result.parameters[result.converged, : estimated.model.n_parameters],
+        simulated.gravity,
+        hold,
+    )
+    if np.isnan(errors).any():
+        return None
+    tilt = np.full(len(result.converged), np.nan)
+    tilt[result.converged] = errors
+    return pd.DataFrame(
+        {
+            "sigma0_squared": result.variance_posteriori,
+            "tilt_error_rad": tilt,
+            "converged": result.converged,
+        }
+    )
+
+
+def _calibrated(fit: Solution, observed: Observations) -> Adjustment:
+    """Calibrate sessions with the model of a fit, from its estimates on."""
+    initial = fit.parameters[: fit.model.n_parameters]
+    return calibrate(fit.model, fit.approach, replace(observed, initial=initial))
+
+
+def _tilt_errors(
+    simulated: SensorModel,
+    truth: Array,
+    estimated: SensorModel,
+    estimates: Array,
+    g: float,
+    hold: HoldConditions,
+) -> Array:
+    """Rms of roll and pitch that each calibration leaves, in the holds of the campaign, rad."""
+    f_b, used = in_use(hold, g)
+    error = leveling_error(simulated, truth, estimated, estimates, f_b, g, used)
+    return np.sqrt(np.mean(error.per_replicate**2, axis=1))

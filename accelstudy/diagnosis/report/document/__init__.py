@@ -1,0 +1,1 @@
+"""The files for programs: JSON, YAML and the table of the positions."""

@@ -1,0 +1,167 @@
+"""What a credible set says in all: what is certain, one thing after the other, and what is open.
+
+Explanations of near rivals share the posterior, so that each has little of it. Together they may
+leave no doubt that a slow change in time is missing, say, and with it an even nonlinearity, while
+none of the four pairs that could be meant has 0.4.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations, product
+
+from accelstudy.diagnosis.decision.explanations import CREDIBLE, Explanation
+from accelstudy.diagnosis.report.words.families import family_of
+from accelstudy.diagnosis.space.examined import ExaminedFit
+from accelstudy.diagnosis.space.hypotheses import cosines
+
+Names = tuple[str, ...]
+
+DIGITS = 9
+"""To which sums of the same probabilities agree."""
+
+
+@dataclass(frozen=True)
+class Name:
+    """A name that something missing may have.
+
+    Attributes
+    ----------
+    name : str
+    members : tuple of str, the names that mean the same in this campaign, itself included
+    posterior : float, that what is missing is this
+    """
+
+    name: str
+    members: Names
+    posterior: float
+
+
+@dataclass(frozen=True)
+class Part:
+    """One thing that is missing for certain, by the names that it may have.
+
+    Attributes
+    ----------
+    family : str, what its names have in common in plain words; "" if they have nothing
+    names : tuple of Name, most probable first
+    posterior : float, that it is one of these
+    purity : float or None, the smallest canonical cosine of two of the names: whether they are
+        rivals, or what happened to be left over
+    """
+
+    family: str
+    names: tuple[Name, ...]
+    posterior: float
+    purity: float | None = None
+
+
+@dataclass(frozen=True)
+class Statement:
+    """What is known of that which is missing.
+
+    Attributes
+    ----------
+    certain : tuple of Part, most probable first
+    open : tuple of Explanation, what may be missing beside them, most probable first; one without
+        names stands for nothing. Empty if nothing is beside them
+    """
+
+    certain: tuple[Part, ...]
+    open: tuple[Explanation, ...]
+
+
+def statement(
+    credible_set: Iterable[Explanation],
+    family: Callable[..., str] = family_of,
+    cosine: Callable[[str, str], float] | None = None,
+    probability: float = CREDIBLE,
+) -> Statement:
+    """Say what a credible set leaves no doubt of, and what it leaves open.
+
+    A name is certain if the explanations that have it hold enough together, and so is a family if
+    those that have one of its effects do. A set does not hold all explanations, so that these
+    probabilities are lower bounds.
+
+    Parameters
+    ----------
+    credible_set : explanations that exclude each other
+    family : what names that mean the same in this campaign have in common, "" if nothing
+    cosine : largest canonical cosine of two effects in this campaign, optional
+    probability : float, that is enough to be certain
+    """
+    left, certain = list(credible_set), []
+    while (part := _certain(left, family, cosine, probability)) is not None:
+        certain.append(part)
+        left = [_without(one, [name.name for name in part.names]) for one in left]
+    rest: dict[Names, Explanation] = {}
+    for one in left:
+        known = rest.get(one.names)
+        p = one.posterior + (0.0 if known is None else known.posterior)
+        rest[one.names] = replace(one, posterior=p)
+    beside = sorted(rest.values(), key=lambda one: -one.posterior)
+    return Statement(tuple(certain), tuple(beside) if any(rest) else ())
+
+
+def _certain(
+    explanations: Sequence[Explanation],
+    family: Callable[..., str],
+    cosine: Callable[[str, str], float] | None,
+    probability: float,
+) -> Part | None:
+    """The most specific thing that is certain: a name or, if none is, a family."""
+    members: dict[str, Names] = {}
+    names: dict[str, float] = defaultdict(float)
+    families: dict[str, float] = defaultdict(float)
+    for one in explanations:
+        members.update(zip(one.names, one.classes, strict=True))
+        for name in dict.fromkeys(one.names):
+            names[name] += one.posterior
+        for common in dict.fromkeys(family(*alike) for alike in one.classes):
+            families[common] += one.posterior
+    families.pop("", None)
+    if (surest := _surest(names, probability)) is not None:
+        found, p = [surest], names[surest]
+    elif (kind := _surest(families, probability)) is not None:
+        found = [name for name, alike in members.items() if family(*alike) == kind]
+        found, p = sorted(found, key=lambda name: -names[name]), families[kind]
+    else:
+        return None
+    pairs = combinations(found, 2)
+    return Part(
+        family=family(*members[found[0]]),
+        names=tuple(Name(name, members[name], names[name]) for name in found),
+        posterior=p,
+        purity=None if cosine is None else min((cosine(*pair) for pair in pairs), default=None),
+    )
+
+
+def _surest(posteriors: Mapping[str, float], probability: float) -> str | None:
+    """Most probable key, if it is certain; of equal ones the first."""
+    if not posteriors:
+        return None
+    most = max(posteriors, key=lambda key: round(posteriors[key], DIGITS))
+    return most if round(posteriors[most], DIGITS) >= round(probability, DIGITS) else None
+
+
+def _without(explanation: Explanation, names: Sequence[str]) -> Explanation:
+    """Take the first of some names out of an explanation."""
+    first = next((name for name in names if name in explanation.names), None)
+    kept = [i for i, name in enumerate(explanation.names) if name != first]
+    return replace(
+        explanation,
+        names=tuple(explanation.names[i] for i in kept),
+        classes=tuple(explanation.classes[i] for i in kept),
+    )
+
+
+def cosine_in(examined: ExaminedFit) -> Callable[[str, str], float]:
+    """Return what tells the largest canonical cosine of two effects; 0 of what is no effect."""
+
+    def cosine(one: str, other: str) -> float:
+        shapes = [examined.candidates.get(name, ()) for name in (one, other)]
+        return max((float(cosines(a.ideal, b.ideal)[0]) for a, b in product(*shapes)), default=0.0)
+
+    return cosine

@@ -1,0 +1,273 @@
+"""A diagnosis in plain words."""
+
+from __future__ import annotations
+
+import math
+
+from accelstudy.basics.units import display_unit, to_display, unit_label
+from accelstudy.basics.wording import comma_list, number, p_value, words
+from accelstudy.diagnosis.report.words.missing import (
+    explanation_words,
+    missing,
+    most_probable,
+    not_told_apart,
+    without_a_name,
+)
+from accelstudy.diagnosis.result import Diagnosis, Named
+from accelstudy.effects import effect_names, get_effect
+
+GROUPS = {
+    "direction": "with the direction of gravity",
+    "robot_angles": "with the angles of the robot",
+    "repeat": "between repeats of the same attitude",
+    "slow_time": "slowly with time",
+    "temperature": "with temperature",
+    "previous_position": "with the position before",
+    "single_position": "in one single position",
+}
+"""How a residual of each group of regressors varies."""
+
+HEADLINES = {
+    "no_effect": "Nothing that these data can show is missing from the model.",
+    "named": "The model lacks {names}.",
+    "narrowed": "The model lacks {names}.",
+    "noise_model": "The sensor model is adequate, its noise is not: {names}.",
+    "gross_error": "The data are not what they say: {names}.",
+}
+
+
+def amount(value: float, unit: str) -> str:
+    """Show an SI value in the unit that people use, without the unit."""
+    return number(float(to_display(value, unit)))
+
+
+def estimate(value: float, sigma: float, unit: str) -> list[str]:
+    """Show an estimate and its sigma in the unit that people use, to two digits of the sigma."""
+    shown, spread = float(to_display(value, unit)), float(to_display(sigma, unit))
+    digits = max(0, 1 - math.floor(math.log10(spread))) if spread > 0 else 6
+    return [f"{x:.{digits}f}".replace("-", "−") for x in (shown, spread)]
+
+
+def shown_unit(unit: str) -> str:
+    """Return the unit that people use for an SI unit, as it is printed."""
+    return unit_label(display_unit(unit))
+
+
+def too_few(diagnosis: Diagnosis) -> bool:
+    """Whether nothing was found since nothing could be tested."""
+    return diagnosis.verdict == "no_effect" and not diagnosis.screening.p_family
+
+
+def headline(diagnosis: Diagnosis) -> str:
+    """Say the verdict in one sentence."""
+    if too_few(diagnosis):
+        return "Too few positions to show whether anything is missing from the model."
+    found = diagnosis.found
+    if diagnosis.verdict == "narrowed":
+        return HEADLINES["narrowed"].format(names=missing(diagnosis.credible_set))
+    if diagnosis.verdict == "unknown":
+        return without_a_name(diagnosis.credible_set)
+    if diagnosis.verdict == "gross_error":
+        found = tuple(f for f in found if not _is_effect(f))
+    names = {named.name for named in found}
+    return HEADLINES[diagnosis.verdict].format(names=comma_list([_title(f, names) for f in found]))
+
+
+def _title(named: Named, known: set[str]) -> str:
+    """Name what was found, with all that would be the same, or with its position."""
+    if named.position is not None:
+        return f"{words(named.name)} {named.position}"
+    same = [name for name in named.equivalence_class if name not in known]
+    return " or ".join(words(name) for name in (named.name, *same))
+
+
+def verdict_lines(diagnosis: Diagnosis) -> list[str]:
+    """Say in a few sentences what was found; the first is the verdict."""
+    d = diagnosis
+    lines = [headline(d), *_narrowed(d)]
+    if d.reason:
+        lines.append(sentence(d.reason))
+    if d.recognised is not None:
+        lines.append("All else is said of the data as they would be without this error.")
+    if d.verdict == "no_effect":
+        lines.append(_agreement(d))
+    else:
+        lines += _refuted(d)
+    lines += _weights(d)
+    lines += _suspects(d)
+    if d.verdict == "unknown":
+        lines += [line for line in (most_probable(d.credible_set), _where(d)) if line]
+    for named in filter(_is_effect, d.found):
+        lines.append(_effect_line(named))
+    if d.verdict == "gross_error" and any(f.position is not None for f in d.found):
+        lines.append(
+            "A position that disagrees with all others was moved, or the sensor had not settled. "
+            f"The final parameters are those {changed(d)}."
+        )
+    if d.leveling is not None:
+        before, after = (amount(value, "rad") for value in d.leveling)
+        unit = display_unit("rad")
+        lines.append(
+            f"Tilt error of the calibrated sensor: {before} {unit} as it is, {after} {unit} "
+            f"{changed(d)}."
+        )
+    if judged(d):
+        lines.append(confirmation(d))
+    if d.examined.invisible:
+        lines.append(
+            f"This campaign cannot see {comma_list([words(n) for n in d.examined.invisible])}, "
+            "however large."
+        )
+    return lines
+
+
+def advice(diagnosis: Diagnosis) -> list[str]:
+    """Say what, beside further positions, would show more."""
+    d = diagnosis
+    hidden = [words(name) for name in d.examined.invisible if name != "gravity_error"]
+    lines = []
+    if hidden and not d.approach.uses_angles:
+        lines.append(f"The angles of a robot in each position could show {comma_list(hidden)}.")
+    if "gravity_error" in d.examined.invisible:
+        lines.append("No position shows an error of g; it takes another measurement of gravity.")
+    if "repeat" not in d.location and (d.verdict == "noise_model" or not d.sigma_known):
+        lines.append("Repeated attitudes would show the noise from hold to hold without any model.")
+    return lines
+
+
+def judged(diagnosis: Diagnosis) -> bool:
+    """Whether effects were added that held-out positions are asked about."""
+    return diagnosis.gap.held_out is not None or bool(diagnosis.gap.reason)
+
+
+def confirmation(diagnosis: Diagnosis) -> str:
+    """Say which statement about the added effects held on positions that were not used."""
+    gap = diagnosis.gap
+    if gap.held_out is None:
+        return f"Not confirmed on data that were not used: {gap.reason}."
+    tested = (
+        f"on {len(gap.held_out.held)} held-out positions (z = {number(gap.held_out.z)}, "
+        f"{number(gap.held_out.needed)} needed)"
+    )
+    if not gap.confirmed:
+        return f"Not confirmed {tested}" + (f": {gap.reason}." if gap.reason else ".")
+    names = comma_list([words(named.name) for named in diagnosis.found if _is_effect(named)])
+    if gap.statement == "name":
+        return f"Confirmed {tested}: that it is {names}."
+    return (
+        f"Confirmed {tested}: that such an effect is missing; not that it is {names} rather than a "
+        "rival."
+    )
+
+
+def changed(diagnosis: Diagnosis) -> str:
+    """Say what the final fit does otherwise: with what was added, without what was left out."""
+    added = [words(named.name) for named in diagnosis.found if _is_effect(named)]
+    out = [str(named.position) for named in diagnosis.found if named.position is not None]
+    said = [f"with {comma_list(added)}"] if added else []
+    return comma_list([*said, *([f"without position {comma_list(out)}"] if out else [])])
+
+
+def _is_effect(named: Named) -> bool:
+    return bool(named.parameters)
+
+
+def _effect_line(named: Named) -> str:
+    equation = get_effect(named.spec).equation
+    values = ", ".join(
+        f"{name} = {' ± '.join(estimate(value, sigma or 0.0, unit))} {shown_unit(unit)}".rstrip()
+        for name, value, sigma, unit in named.parameters
+    )
+    same = [words(name) for name in named.equivalence_class if name != named.name]
+    alike = f" In these positions {comma_list(same)} would be the same." if same else ""
+    return f"{words(named.name).capitalize()}, {equation}: {values}.{alike}"
+
+
+def _agreement(d: Diagnosis) -> str:
+    test = d.global_test
+    if d.screening.p_family:
+        pattern = f"no pattern ({p_value(d.screening.p_value)})"
+    else:
+        pattern = f"too little redundancy ({d.base.redundancy}) to show a pattern"
+    if test is None:
+        return (
+            "The campaign does not give its noise, so that only patterns in the residuals could be "
+            f"tested, not their size; they have {pattern}."
+        )
+    if not test.accepted:  # the campaign is its own model
+        return f"The residuals are far smaller than the stated noise, and have {pattern}."
+    return (
+        f"The residuals are as large as the noise says ({p_value(test.p_value)}), and have "
+        f"{pattern}."
+    )
+
+
+def _narrowed(d: Diagnosis) -> list[str]:
+    """Say what cannot be told apart, what could tell it, and what the rest is said of."""
+    if d.verdict != "narrowed":
+        return []
+    said = not_told_apart(d.credible_set)
+    further = "; further positions would, and the report says which" if d.next_positions else ""
+    taken = explanation_words(d.credible_set[0])
+    return [f"{said}{further}.", f"All else is said of the most probable explanation: {taken}."]
+
+
+def _refuted(d: Diagnosis) -> list[str]:
+    """Say by how much the stated noise is refuted, as the calibration does."""
+    test = d.global_test
+    if test is None or test.accepted or d.reason.startswith("the residuals are "):
+        return []
+    ratio = math.sqrt(test.statistic / test.dof)
+    much = f"{ratio:.1f} times as large as" if ratio > 1 else f"only {ratio:.2g} times"
+    return [
+        f"With the base model the residuals are {much} the stated noise ({p_value(test.p_value)})."
+    ]
+
+
+def _weights(d: Diagnosis) -> list[str]:
+    """Say how unequal axes are weighted."""
+    variances = d.examined.frame.solution.variances[0, :3]
+    if d.examined.frame.solution is d.base:
+        return []
+    parts = comma_list([number(float(v)) for v in variances / variances.mean()])
+    return [f"The axes are weighted by their noise: x, y and z have {parts} of the mean variance."]
+
+
+def _suspects(d: Diagnosis) -> list[str]:
+    """Say which positions a calibration marks, where the verdict is not about them."""
+    found = {named.position for named in d.found}
+    labels = [
+        str(label) for label in sorted(label for label, _ in d.suspects) if label not in found
+    ]
+    if not labels:
+        return []
+    what = f"position{'' if len(labels) == 1 else 's'} {comma_list(labels)}"
+    said = f"A calibration with the base model marks {what} as in conflict with the others"
+    if d.verdict in ("no_effect", "noise_model"):
+        smallest = min(p for label, p in d.suspects if label not in found)
+        return [f"{said} ({p_value(smallest)}); among all that is tested here it is no finding."]
+    return [f"{said}."]
+
+
+def _where(d: Diagnosis) -> str:
+    ranked = sorted(d.location.items(), key=lambda item: -item[1])[:3]
+    shares = [
+        f"{100 * share:.0f} % {GROUPS.get(name, words(name))}"
+        for name, share in ranked
+        if share > 0
+    ]
+    if not shares:
+        return "Beside the noise level that is taken, nothing says where it lives."
+    return f"Of what the residuals have too much, {comma_list(shares)} (shares overlap)."
+
+
+def sentence(text: str) -> str:
+    """Make a sentence of a reason, with names of the catalogue as words."""
+    return f"{text[0].upper()}{words(text[1:])}" + ("" if text.endswith(".") else ".")
+
+
+def described(name: str) -> str:
+    """Return the first line of what the catalogue says of an effect; nothing for other names."""
+    if name not in effect_names():
+        return ""
+    return get_effect(name).summary

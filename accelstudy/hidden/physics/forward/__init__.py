@@ -1,0 +1,1 @@
+"""Forward physics: sessions, rigs, sensors, effects and noise."""

@@ -1,0 +1,1 @@
+"""The score: answers beside truths, shares, limits and targets."""

@@ -1,0 +1,1 @@
+"""The campaigns of the study, and the jobs that have them diagnosed."""

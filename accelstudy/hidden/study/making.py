@@ -1,0 +1,80 @@
+"""The campaigns of the study, made with the row of their truth."""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections.abc import Callable
+from typing import Any
+
+import pandas as pd
+
+from accelstudy.basics.errors import InputError
+from accelstudy.campaign import Campaign
+from accelstudy.hidden.physics import Truth, generate
+from accelstudy.hidden.study.cells import Cell
+from accelstudy.hidden.study.tables import SCHEMA
+
+Row = dict[str, Any]
+
+
+def rows_table(name: str, rows: list[Row]) -> pd.DataFrame:
+    """Table of the study, with its columns and their types, of rows."""
+    return pd.DataFrame(rows, columns=[*SCHEMA[name]]).astype(SCHEMA[name])
+
+
+def made(cell: Cell, k: int, seed: int) -> tuple[Campaign | None, Row]:
+    """Make a campaign and the row of its truth; None if it could not be made."""
+    campaign_and_truth, error = tried(
+        lambda own: generate(cell.case, own), cell.seed(seed, k), f"{cell.name} {k}: not made"
+    )
+    campaign, truth = campaign_and_truth or (None, None)
+    return campaign, _truth(cell, truth, error)
+
+
+def tried(work: Callable[[Any], Any], given: Any, what: str) -> tuple[Any, str]:
+    """Return what comes of what is given, and the error if nothing does; None comes of None."""
+    if given is None:
+        return None, ""
+    try:
+        return work(given), ""
+    except InputError as error:
+        logging.info("%s: %s", what, error)
+        return None, f"refused: {error}"
+    except OSError:  # a full disk, say, which is no matter of this campaign
+        raise
+    except Exception as error:
+        logging.exception("%s", what)
+        return None, f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
+
+
+def _truth(cell: Cell, truth: Truth | None, error: str) -> Row:
+    """Row of the table of truths; of a campaign that could not be made what was wanted."""
+    case = cell.case
+    known = {} if truth is None else truth.to_dict()
+    oracle = known.get("oracle") or {}
+    gross = known.get("gross") or {}
+    # What a session cannot show, or is not in the catalogue, is nothing that can be named rightly.
+    classes = [] if case.set in ("invisible", "outside") else known.get("classes", [])
+    left = [[name for name in one if name not in cell.removed] for one in classes]
+    return {
+        "set": case.set,
+        "what": cell.what,
+        "size": cell.size,
+        "design": case.design,
+        "approach": case.approach,
+        "sigma": "given" if case.sigma_known else "not given",
+        "classes": json.dumps([one for one in left if one]),
+        "effects": json.dumps(known.get("effects", [])),
+        "noise": json.dumps(known.get("noise")),
+        "gross": json.dumps(gross),
+        "gross_name": gross.get("name", ""),
+        "oracle_detected": oracle.get("detected"),
+        "oracle_best": json.dumps(oracle.get("best", [])),
+        "oracle_told": json.dumps(oracle.get("told", [])),
+        "oracle_alternatives": oracle.get("alternatives"),
+        "left": json.dumps(known.get("left", [])),
+        "sensor": json.dumps(known.get("sensor")),
+        "seed": json.dumps(known.get("seed")),
+        "failed": error,
+    }
