@@ -7,7 +7,7 @@ from accelstudy.campaign.batch.config import BatchConfig
 from accelstudy.design.proposal.config import DesignsConfig
 from accelstudy.diagnosis.round_trip import RoundTrip
 from accelstudy.field.config import FieldConfig
-from accelstudy.hidden.config import HiddenConfig
+from accelstudy.hidden.study.config import HiddenConfig
 from accelstudy.plan.config import PlanConfig
 from accelstudy.plan.example import Example
 from accelstudy.pole.config import PoleConfig
