@@ -152,7 +152,10 @@ def test_correlations(judged):
 
 def test_slips(judged):
     slips = judged[0][judged[0]["verdict"] == SLIP]
-    assert sorted(slips.index) == ["degree-of-freedom", "equation-10", "roll-accuracy-falls-with"]
+    assert [*slips.index] == ["roll-accuracy-falls-with", "degree-of-freedom", "equation-10"]
+    assert [*judged[0].index[-3:]] == [*slips.index]
+    assert judged[0]["section"][:-3].is_monotonic_increasing
+    assert judged[0].index.is_unique
     freedom = slips.loc["degree-of-freedom"]
     assert (freedom["paper"], freedom["ours"]) == (15, 63)
     assert slips.loc["equation-10", "ours"] == pytest.approx(-100)
@@ -351,6 +354,6 @@ def test_a_figure_as_the_workflow_draws_it(tables, folder, tmp_path):
     assert set(figure_tables("figure-7")) == {"summary", "quantiles"}
     paths = {name: folder / f"{name}.parquet" for name in figure_tables("figure-7")}
     svg, png = tmp_path / "figure-7.svg", tmp_path / "figure-7.png"
-    draw_figures(make_study(**KEYS), ["figure-7"], paths, tmp_path)
+    draw_figures(make_study(**KEYS), {"figure-7": "Errors."}, paths, tmp_path)
     assert "<svg" in svg.read_text(encoding="utf-8")
     assert png.read_bytes().startswith(b"\x89PNG")

@@ -4,12 +4,13 @@ The paper shows one simulation, with standard deviations a posteriori. So a numb
 counts as reproduced if ours agrees with it within the rounding in which it is given, or if it lies
 within the central 95 % of what single simulations of the same set-up show. Nothing is tuned to meet
 a number; where one is not met, the verdict says by how much.
+
+To add a claim, write a module next to this file with a function under `register`.
 """
 
 from __future__ import annotations
 
-import pandas as pd
-
+from accelstudy.basics.registry import import_modules
 from accelstudy.study.claims.base import (
     NOT_REPRODUCED,
     REPRODUCED,
@@ -17,12 +18,10 @@ from accelstudy.study.claims.base import (
     Claim,
     Evidence,
     SchemeClaim,
+    judge,
+    register,
 )
-from accelstudy.study.claims.calibration import calibration_claims, claims_by_scheme
 from accelstudy.study.claims.evidence import evidence_from
-from accelstudy.study.claims.leveling import leveling_claims
-from accelstudy.study.claims.sensitivity import sensitivity_claims
-from accelstudy.study.claims.slips import slips
 
 __all__ = [
     "NOT_REPRODUCED",
@@ -33,22 +32,8 @@ __all__ = [
     "SchemeClaim",
     "evidence_from",
     "judge",
+    "register",
 ]
 
-
-def judge(evidence: Evidence) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Judge all claims.
-
-    Returns
-    -------
-    claims : DataFrame, one row per `Claim`
-    by_scheme : DataFrame, one row per `SchemeClaim`
-    """
-    by_scheme = claims_by_scheme(evidence)
-    claims = [
-        *leveling_claims(evidence),
-        *sensitivity_claims(evidence),
-        *calibration_claims(evidence, by_scheme),
-        *slips(evidence),
-    ]
-    return pd.DataFrame(claims), pd.DataFrame(by_scheme)
+# A module registers its claims when it is imported.
+import_modules(__name__, __path__)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -95,6 +96,31 @@ class Evidence:
     def schemes(self) -> list[str]:
         """Schemes in which both approaches were simulated."""
         return schemes_with_both(self.statistics)
+
+
+Judge: TypeAlias = "Callable[[Evidence], Iterable[Claim | SchemeClaim]]"
+_JUDGES: list[Judge] = []
+
+
+def register(judge: Judge) -> Judge:
+    """Register a function that judges claims, and says how they stand in each scheme."""
+    _JUDGES.append(judge)
+    return judge
+
+
+def judge(evidence: Evidence) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Judge all claims.
+
+    Returns
+    -------
+    claims : DataFrame, one row per `Claim`, by section, slips last
+    by_scheme : DataFrame, one row per `SchemeClaim`
+    """
+    found = [row for its in _JUDGES for row in its(evidence)]
+    claims = [row for row in found if isinstance(row, Claim)]
+    claims.sort(key=lambda claim: (claim.verdict == SLIP, claim.section))
+    by_scheme = [row for row in found if isinstance(row, SchemeClaim)]
+    return pd.DataFrame(claims), pd.DataFrame(by_scheme)
 
 
 def schemes_with_both(known: Iterable[tuple[str, str]]) -> list[str]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from accelstudy.basics.units import recorded_unit, to_recorded
 from accelstudy.effects import get_effect
-from accelstudy.study.claims.base import Array, Claim, Evidence, SchemeClaim, verdict
+from accelstudy.study.claims.base import Array, Claim, Evidence, SchemeClaim, register, verdict
 from accelstudy.study.monte_carlo.followed import EFFECT, POSTERIORI
 
 EFFECTS = {"bias": "bias", "scale": "scale", "nonorthogonality": "misalignment"}
@@ -18,13 +18,11 @@ PAPER_REDUCTIONS = {"bias": 50.0, "scale": 30.0, "nonorthogonality": 70.0}
 PAPER_CORRELATION = 0.2
 
 
-def claims_by_scheme(evidence: Evidence) -> list[SchemeClaim]:
-    """Distribution of single simulations in every scheme."""
-    return [*_reductions_by_scheme(evidence), *_correlations_by_scheme(evidence)]
-
-
-def calibration_claims(evidence: Evidence, by_scheme: list[SchemeClaim]) -> Iterable[Claim]:
-    """Judge the claims of section 4, given their distributions by scheme."""
+@register
+def calibration_claims(evidence: Evidence) -> Iterable[Claim | SchemeClaim]:
+    """Judge the claims of section 4, and give their distributions in every scheme."""
+    by_scheme = [*_reductions_by_scheme(evidence), *_correlations_by_scheme(evidence)]
+    yield from by_scheme
     for effect, paper in PAPER_REDUCTIONS.items():
         yield _reduction_claim(evidence, by_scheme, effect, paper)
     yield from _correlation_claims(evidence, by_scheme)

@@ -9,11 +9,12 @@ from scipy import stats
 
 from accelstudy.basics.units import GON, MGON
 from accelstudy.leveling.angles import roll_pitch, specific_force
-from accelstudy.study.claims.base import Array, Claim, Evidence, verdict
+from accelstudy.study.claims.base import Array, Claim, Evidence, register, verdict
 
 DRAWS = 200_000
 
 
+@register
 def leveling_claims(evidence: Evidence) -> Iterable[Claim]:
     """Judge the claims of section 3.1."""
     level = simulated_tilts(evidence, 0, 0)

@@ -9,12 +9,13 @@ import pandas as pd
 
 from accelstudy.leveling.sensitivity import leveling_sensitivity
 from accelstudy.leveling.shares import overtaken
-from accelstudy.study.claims.base import Claim, Evidence, verdict
+from accelstudy.study.claims.base import Claim, Evidence, register, verdict
 
 TILT = 50.0
 """Largest roll and pitch, in gon, of the attitudes over which the claims are judged."""
 
 
+@register
 def sensitivity_claims(evidence: Evidence) -> Iterable[Claim]:
     """Judge the claims of section 3.2."""
     table = leveling_sensitivity(

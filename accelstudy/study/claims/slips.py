@@ -8,10 +8,11 @@ import numpy as np
 
 from accelstudy.basics.units import GON
 from accelstudy.leveling.angles import specific_force
-from accelstudy.study.claims.base import SLIP, Claim, Evidence
+from accelstudy.study.claims.base import SLIP, Claim, Evidence, register
 from accelstudy.study.claims.leveling import sd_with_interval, simulated_tilts
 
 
+@register
 def slips(evidence: Evidence) -> Iterable[Claim]:
     """Show each slip with the number that should stand there."""
     pitched, low, high = sd_with_interval(simulated_tilts(evidence, 0, 50)[:, 0])
