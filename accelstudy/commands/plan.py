@@ -212,10 +212,7 @@ def plan_command(
             + (", not both" if sensor else "")
         )
     from accelstudy.data_sheets import of_sigma
-    from accelstudy.plan.answer import answer
-    from accelstudy.plan.question import Equipment, Question
-    from accelstudy.plan.sensors import get_sensor
-    from accelstudy.plan.wording import (
+    from accelstudy.plan.report.wording import (
         answer_lines,
         assumption_lines,
         how_to,
@@ -223,6 +220,9 @@ def plan_command(
         table_lines,
         unreachable,
     )
+    from accelstudy.plan.search.answer import answer
+    from accelstudy.plan.search.question import Equipment, Question
+    from accelstudy.plan.search.sensors import get_sensor
 
     by_hand = Equipment("gravity", moving_time, 0.0)
     robot = Equipment("robot", robot_moving_time, robot_setup_time)
@@ -249,7 +249,7 @@ def plan_command(
     for line in ("", *assumption_lines(question)):
         say(line)
     if out is not None:
-        from accelstudy.plan.output import write_plan
+        from accelstudy.plan.report.output import write_plan
 
         inputs = [Path(sensor)] if sensor is not None and Path(sensor).exists() else []
         write_plan(found, out, {"config_hash": None, "seed": seed}, inputs, force)

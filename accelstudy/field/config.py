@@ -15,8 +15,8 @@ from accelstudy.field.shares import Use, field_shares
 from accelstudy.files.tables import write_table
 from accelstudy.files.types import Angle, Number, OneOrMore, PathName
 from accelstudy.files.validation import Block
-from accelstudy.pole.case import SensorCase
-from accelstudy.pole.setup import quantities
+from accelstudy.pole.instrument.case import SensorCase
+from accelstudy.pole.instrument.setup import quantities
 
 USUAL = quantities()
 

@@ -16,7 +16,7 @@ from accelstudy.basics.units import MGON, display_unit, to_display
 from accelstudy.data_sheets import DataSheet
 from accelstudy.drawing.style import FULL, INK, STYLE, legend_columns, log_ticks, new_figure
 from accelstudy.field.shares import RESTART, Use, parts_of_variance
-from accelstudy.pole.sources import sources
+from accelstudy.pole.errors.sources import sources
 
 Array = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ from accelstudy.design.proposal.config import DesignsConfig
 from accelstudy.diagnosis.round_trip import RoundTrip
 from accelstudy.field.config import FieldConfig
 from accelstudy.hidden.study.config import HiddenConfig
-from accelstudy.plan.config import PlanConfig
-from accelstudy.plan.example import Example
-from accelstudy.pole.config import PoleConfig
+from accelstudy.plan.batch.config import PlanConfig
+from accelstudy.plan.batch.example import Example
+from accelstudy.pole.report.config import PoleConfig
 from accelstudy.sequential.config import SequentialConfig
 from accelstudy.study.config import config_schema
 

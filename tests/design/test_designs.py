@@ -18,7 +18,7 @@ from accelstudy.design.proposal.figure import efficiency_figure
 from accelstudy.design.proposal.order import _drift_shown, field_order
 from accelstudy.design.proposal.request import Request
 from accelstudy.leveling.error import cap_forces, tilt_error
-from accelstudy.plan.example import parse_example, parse_section
+from accelstudy.plan.batch.example import parse_example, parse_section
 from accelstudy.schemes import files, get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.study.cells.cell import Cell, study_cells

@@ -10,17 +10,17 @@ from scipy.stats import ncx2
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
 from accelstudy.data_sheets import DataSheet
 from accelstudy.leveling.angles import roll_pitch
-from accelstudy.pole import closed_forms
-from accelstudy.pole.bending import flexibility
-from accelstudy.pole.budget import TOTAL, budget, contribution, situation_at
-from accelstudy.pole.geometry import INPUTS, foot, jacobian, leaning
-from accelstudy.pole.radius import radius
-from accelstudy.pole.sensor import CalibratedSensor, from_linear_theory, from_tilt_sigma
-from accelstudy.pole.setup import Setup, setup_of
-from accelstudy.pole.simulation import draw, simulate
-from accelstudy.pole.situation import Situation
-from accelstudy.pole.sources import sources
-from accelstudy.pole.statement import agreement, remarks, sentences
+from accelstudy.pole.errors import closed_forms
+from accelstudy.pole.errors.budget import TOTAL, budget, contribution, situation_at
+from accelstudy.pole.errors.radius import radius
+from accelstudy.pole.errors.simulation import draw, simulate
+from accelstudy.pole.errors.sources import sources
+from accelstudy.pole.instrument.bending import flexibility
+from accelstudy.pole.instrument.geometry import INPUTS, foot, jacobian, leaning
+from accelstudy.pole.instrument.sensor import CalibratedSensor, from_linear_theory, from_tilt_sigma
+from accelstudy.pole.instrument.setup import Setup, setup_of
+from accelstudy.pole.instrument.situation import Situation
+from accelstudy.pole.report.statement import agreement, remarks, sentences
 from accelstudy.sensors.frames import parse_frame
 from accelstudy.sensors.models import get_model
 

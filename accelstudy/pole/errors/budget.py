@@ -10,11 +10,11 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from accelstudy.basics.units import GON
-from accelstudy.pole.radius import radius
-from accelstudy.pole.sensor import CalibratedSensor
-from accelstudy.pole.setup import Setup
-from accelstudy.pole.situation import Situation
-from accelstudy.pole.sources import Source, sources
+from accelstudy.pole.errors.radius import radius
+from accelstudy.pole.errors.sources import Source, sources
+from accelstudy.pole.instrument.sensor import CalibratedSensor
+from accelstudy.pole.instrument.setup import Setup
+from accelstudy.pole.instrument.situation import Situation
 
 Array = NDArray[np.float64]
 

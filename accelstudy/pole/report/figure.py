@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 
 from accelstudy.basics.units import GON, attitude_unit, to_attitude
 from accelstudy.drawing.style import FULL, INK, STYLE, legend_columns, log_ticks, new_figure
-from accelstudy.pole.budget import TOTAL, Budget
-from accelstudy.pole.sources import sources
+from accelstudy.pole.errors.budget import TOTAL, Budget
+from accelstudy.pole.errors.sources import sources
 
 WIDEST = 1e4
 """Largest ratio of the largest error to the smallest that is shown."""

@@ -16,9 +16,9 @@ from accelstudy.drawing.style import (
     log_ticks,
     new_figure,
 )
-from accelstudy.plan.answer import Answer, by_time
-from accelstudy.plan.candidates import Candidate
-from accelstudy.plan.simulated import Simulated
+from accelstudy.plan.search.answer import Answer, by_time
+from accelstudy.plan.search.candidates import Candidate
+from accelstudy.plan.search.simulated import Simulated
 
 LABELS = {"gravity": "by hand, gravity alone", "robot": "with a robot"}
 

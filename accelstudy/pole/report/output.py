@@ -16,12 +16,12 @@ from accelstudy.drawing.saving import save
 from accelstudy.drawing.style import DPI
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.tables import write_table
-from accelstudy.pole.budget import Budget, budget
-from accelstudy.pole.figure import budget_figure
-from accelstudy.pole.sensor import CalibratedSensor
-from accelstudy.pole.setup import Setup
-from accelstudy.pole.simulation import simulate
-from accelstudy.pole.statement import agreement, remarks, sentences, shown_tilts
+from accelstudy.pole.errors.budget import Budget, budget
+from accelstudy.pole.errors.simulation import simulate
+from accelstudy.pole.instrument.sensor import CalibratedSensor
+from accelstudy.pole.instrument.setup import Setup
+from accelstudy.pole.report.figure import budget_figure
+from accelstudy.pole.report.statement import agreement, remarks, sentences, shown_tilts
 
 STEPS = 50
 """Steps of the tilt in the figure and in the table."""

@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from accelstudy.basics.progress import track
-from accelstudy.plan.candidates import Candidate, candidates, with_optimal
-from accelstudy.plan.question import ROBOT, Question
-from accelstudy.plan.simulated import Simulated, simulate, study_of
+from accelstudy.plan.search.candidates import Candidate, candidates, with_optimal
+from accelstudy.plan.search.question import ROBOT, Question
+from accelstudy.plan.search.simulated import Simulated, simulate, study_of
 
 SHOWN = 8
 """Candidates in the table."""

@@ -8,7 +8,7 @@ the part of the weight across the pole bends it, which grows with the sine of th
 from __future__ import annotations
 
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.pole.setup import Setup
+from accelstudy.pole.instrument.setup import Setup
 
 
 def flexibility(setup: Setup, g: float = STANDARD_GRAVITY) -> float:

@@ -12,8 +12,8 @@ from accelstudy.basics.units import GON, MGON, parse_quantity
 from accelstudy.data_sheets import data_sheet_names, of_sigma
 from accelstudy.files.types import OneOrMore, PathName, Replicates
 from accelstudy.files.validation import Block
-from accelstudy.plan.question import BY_HAND, ROBOT, Question
-from accelstudy.plan.sensors import get_sensor
+from accelstudy.plan.search.question import BY_HAND, ROBOT, Question
+from accelstudy.plan.search.sensors import get_sensor
 
 
 class PlanCase(Block):

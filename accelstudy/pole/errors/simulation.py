@@ -7,11 +7,11 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from accelstudy.basics.units import GON, MGON
-from accelstudy.pole.budget import Budget, budget, situation_at
-from accelstudy.pole.sensor import CalibratedSensor
-from accelstudy.pole.setup import Setup
-from accelstudy.pole.situation import Situation
-from accelstudy.pole.sources import sources
+from accelstudy.pole.errors.budget import Budget, budget, situation_at
+from accelstudy.pole.errors.sources import sources
+from accelstudy.pole.instrument.sensor import CalibratedSensor
+from accelstudy.pole.instrument.setup import Setup
+from accelstudy.pole.instrument.situation import Situation
 
 Array = NDArray[np.float64]
 

@@ -11,10 +11,10 @@ from pydantic import Field
 from accelstudy.data_sheets import get_data_sheet
 from accelstudy.files.types import PathName, Replicates
 from accelstudy.files.validation import Block
-from accelstudy.pole.case import SensorCase
-from accelstudy.pole.output import PoleResult, write_pole
-from accelstudy.pole.sensor import CalibratedSensor, from_tilt_sigma
-from accelstudy.pole.setup import TILT_RANGE, TILT_SIGMA, setup_of
+from accelstudy.pole.instrument.case import SensorCase
+from accelstudy.pole.instrument.sensor import CalibratedSensor, from_tilt_sigma
+from accelstudy.pole.instrument.setup import TILT_RANGE, TILT_SIGMA, setup_of
+from accelstudy.pole.report.output import PoleResult, write_pole
 from accelstudy.sensors.frames import FRD, Frame, parse_frame
 
 

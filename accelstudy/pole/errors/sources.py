@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.registry import Registry
-from accelstudy.pole.bending import flexibility
-from accelstudy.pole.situation import FORCE, PARAMETERS, Situation
+from accelstudy.pole.instrument.bending import flexibility
+from accelstudy.pole.instrument.situation import FORCE, PARAMETERS, Situation
 
 Array = NDArray[np.float64]
 

@@ -14,8 +14,8 @@ from accelstudy.adjustment.block import joined
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY, recorded_unit, to_recorded
 from accelstudy.effects import get_effect
 from accelstudy.leveling.error import ATTITUDES
-from accelstudy.plan.candidates import Candidate
-from accelstudy.plan.question import Question
+from accelstudy.plan.search.candidates import Candidate
+from accelstudy.plan.search.question import Question
 from accelstudy.study.cells.cell import Cell, study_cells
 from accelstudy.study.config import parse_study
 from accelstudy.study.monte_carlo.followed import cell_tilt_error

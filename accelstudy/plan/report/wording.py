@@ -12,10 +12,19 @@ from accelstudy.basics.units import angle_note, display_unit, quantity_text, to_
 from accelstudy.basics.wording import comma_list, number, words
 from accelstudy.data_sheets import ASSUMED
 from accelstudy.effects import get_effect
-from accelstudy.plan.advice import PLAIN, InUse, Need, Spoiler, in_use, limits, needs, spoilers
-from accelstudy.plan.answer import OTHER_CONFIDENCE, Answer, Ranked
-from accelstudy.plan.candidates import Candidate, shortest
-from accelstudy.plan.question import Equipment, Question
+from accelstudy.plan.report.advice import (
+    PLAIN,
+    InUse,
+    Need,
+    Spoiler,
+    in_use,
+    limits,
+    needs,
+    spoilers,
+)
+from accelstudy.plan.search.answer import OTHER_CONFIDENCE, Answer, Ranked
+from accelstudy.plan.search.candidates import Candidate, shortest
+from accelstudy.plan.search.question import Equipment, Question
 from accelstudy.sensors.sensor import SensorModel
 
 VERDICTS = {

@@ -12,8 +12,8 @@ from accelstudy.basics.errors import InputError
 from accelstudy.data_sheets import data_sheet_names, get_data_sheet
 from accelstudy.design.config_names import ModelName
 from accelstudy.files.validation import Block
-from accelstudy.pole.sensor import CalibratedSensor, from_calibration, from_linear_theory
-from accelstudy.pole.setup import HOLD, ROBOT_SIGMA, check_one_kind
+from accelstudy.pole.instrument.sensor import CalibratedSensor, from_calibration, from_linear_theory
+from accelstudy.pole.instrument.setup import HOLD, ROBOT_SIGMA, check_one_kind
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.frames import FRD, Frame
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import jacobian as leveling_jacobian
 from accelstudy.leveling.angles import roll_pitch
-from accelstudy.pole.geometry import INPUTS, foot, jacobian, leaning
-from accelstudy.pole.sensor import CalibratedSensor
-from accelstudy.pole.setup import Setup
+from accelstudy.pole.instrument.geometry import INPUTS, foot, jacobian, leaning
+from accelstudy.pole.instrument.sensor import CalibratedSensor
+from accelstudy.pole.instrument.setup import Setup
 
 Array = NDArray[np.float64]
 

@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 
 from accelstudy.basics.units import GON, MGON, display_unit, to_display
 from accelstudy.drawing.style import FULL, approach_colour, log_ticks, new_figure
-from accelstudy.plan.answer import by_time
-from accelstudy.plan.candidates import candidates
-from accelstudy.plan.question import Question
-from accelstudy.plan.sensors import get_sensor
-from accelstudy.plan.wording import model_words
+from accelstudy.plan.report.wording import model_words
+from accelstudy.plan.search.answer import by_time
+from accelstudy.plan.search.candidates import candidates
+from accelstudy.plan.search.question import Question
+from accelstudy.plan.search.sensors import get_sensor
 
 TILT_RANGE = 30 * GON
 HOLDS = (1.0, 10.0, 60.0)

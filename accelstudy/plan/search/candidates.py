@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.progress import stage, track
-from accelstudy.plan.question import Equipment, Question
-from accelstudy.plan.theory import Expected, Theory, theory_of
+from accelstudy.plan.search.question import Equipment, Question
+from accelstudy.plan.search.theory import Expected, Theory, theory_of
 from accelstudy.schemes import Scheme, get_scheme, scheme_names
 from accelstudy.sensors.models import MODELS, get_model
 from accelstudy.sensors.sensor import SensorModel

@@ -12,11 +12,11 @@ from accelstudy.basics.errors import InputError
 from accelstudy.drawing.saving import save
 from accelstudy.drawing.style import DPI, STYLE
 from accelstudy.files.tables import write_table
-from accelstudy.plan.answer import answer
-from accelstudy.plan.comparison import front_figure, front_table
-from accelstudy.plan.config import PlanCase
-from accelstudy.plan.output import plan_files
-from accelstudy.plan.wording import unreachable
+from accelstudy.plan.batch.comparison import front_figure, front_table
+from accelstudy.plan.batch.config import PlanCase
+from accelstudy.plan.report.output import plan_files
+from accelstudy.plan.report.wording import unreachable
+from accelstudy.plan.search.answer import answer
 
 
 def make_plan(

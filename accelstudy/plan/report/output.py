@@ -13,16 +13,16 @@ import yaml
 
 from accelstudy.basics.units import MGON
 from accelstudy.files.outputs import PLAN, result_folder
-from accelstudy.plan.advice import limits
-from accelstudy.plan.answer import Answer
-from accelstudy.plan.candidates import Candidate
-from accelstudy.plan.wording import (
+from accelstudy.plan.report.advice import limits
+from accelstudy.plan.report.wording import (
     answer_lines,
     assumption_lines,
     how_to,
     reason_lines,
     table_lines,
 )
+from accelstudy.plan.search.answer import Answer
+from accelstudy.plan.search.candidates import Candidate
 
 STUDY_HEAD = """\
 # The simulated candidates of a plan as a study, made by `accelstudy plan`. It makes their numbers
@@ -69,7 +69,7 @@ def plan_files(
     from accelstudy.drawing.saving import save
     from accelstudy.drawing.style import DPI, STYLE
     from accelstudy.files.tables import write_table
-    from accelstudy.plan.figure import plan_figure
+    from accelstudy.plan.report.figure import plan_figure
 
     write_table(folder / "plan.parquet", plan_table(answer), provenance)
     head = STUDY_HEAD.format(path=shown / "study.yaml")

@@ -7,9 +7,9 @@ import pandas as pd
 
 from accelstudy.basics.units import GON, attitude_unit, quantity_text, to_attitude
 from accelstudy.basics.wording import comma_list, words
-from accelstudy.pole.budget import Budget
-from accelstudy.pole.sensor import COEFFICIENTS
-from accelstudy.pole.sources import sources
+from accelstudy.pole.errors.budget import Budget
+from accelstudy.pole.errors.sources import sources
+from accelstudy.pole.instrument.sensor import COEFFICIENTS
 
 BEYOND_CHANCE = 4.0
 """Standard errors of the Monte Carlo beyond which linear theory is said to be wrong."""

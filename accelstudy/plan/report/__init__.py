@@ -1,0 +1,1 @@
+"""A plan for its reader: the answer in words, its reasons, table, figure and files."""

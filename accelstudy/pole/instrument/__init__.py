@@ -1,0 +1,1 @@
+"""The pole and the calibrated sensor on it: quantities, geometry, bending, attitudes."""
