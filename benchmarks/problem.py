@@ -5,11 +5,9 @@ import numpy as np
 from accelstudy.basics.units import MGON
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
-from accelstudy.simulation.sessions import Noise, session
+from accelstudy.simulation.sessions import BLOCK, Noise, session
 
 APPROACHES = ("gravity", "robot")
-BLOCK = 500
-"""Sessions that are drawn together, as in a study."""
 
 MODEL = get_model("bias-scale-nonorthogonality")
 SCHEME = "mclaren-24"

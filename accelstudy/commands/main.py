@@ -163,12 +163,12 @@ def scheme(name: str) -> None:
     import pandas as pd
 
     from accelstudy.basics.units import attitude_unit, to_attitude
-    from accelstudy.leveling.angles import roll_pitch
+    from accelstudy.leveling.angles import angles_of
     from accelstudy.schemes import get_scheme
 
     chosen = get_scheme(name)
     click.echo(f"# {chosen.title} ({chosen.status}): {chosen.source}")
-    attitudes = to_attitude(np.transpose(roll_pitch(tuple(-chosen.directions.T))))
+    attitudes = to_attitude(angles_of(-chosen.directions))
     columns = ["x", "y", "z", *(f"{angle}_{attitude_unit()}" for angle in ("roll", "pitch"))]
     click.echo(
         pd.DataFrame(np.hstack([chosen.directions, attitudes]), columns=columns).to_csv(

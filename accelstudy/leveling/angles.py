@@ -11,7 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from accelstudy.effects import HoldConditions
 from accelstudy.effects.base import Number, Vector
+from accelstudy.sensors.sensor import SensorModel
+
+Array = NDArray[np.float64]
 
 
 def roll_pitch(f: Vector, xp: Any = np) -> tuple[Number, Number]:
@@ -21,6 +25,12 @@ def roll_pitch(f: Vector, xp: Any = np) -> tuple[Number, Number]:
     """
     x, y, z = f
     return xp.arctan2(-y, -z), xp.arctan2(x, xp.sqrt(y * y + z * z))
+
+
+def angles_of(forces: ArrayLike) -> Array:
+    """Roll and pitch, (..., 2) in rad, of specific forces (..., 3)."""
+    forces = np.asarray(forces, dtype=float)
+    return np.stack(roll_pitch(tuple(np.moveaxis(forces, -1, 0))), axis=-1)
 
 
 def specific_force(roll: Number, pitch: Number, g: Number, xp: Any = np) -> Vector:
@@ -39,7 +49,7 @@ def _jacobian_function() -> Any:
     return jacobian_of(roll_pitch, 3)
 
 
-def jacobian(f: ArrayLike) -> NDArray[np.float64]:
+def jacobian(f: ArrayLike) -> Array:
     """Partial derivatives of roll and pitch with respect to the specific force (eq. 7).
 
     Parameters
@@ -54,7 +64,33 @@ def jacobian(f: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(_jacobian_function()(f))
 
 
-def sigma_roll_pitch(f: ArrayLike, cov: ArrayLike) -> NDArray[np.float64]:
+def tilt_slope(
+    model: SensorModel,
+    parameters: Array,
+    f_s: Array,
+    f_b: Array,
+    g: float,
+    hold: HoldConditions | None = None,
+) -> Array:
+    """Partial derivatives of roll and pitch with respect to the parameters of a calibration.
+
+    Parameters
+    ----------
+    model, parameters : sensor model and its (u,) parameters, SI
+    f_s : (k, 3) array, m/s², output of the sensor
+    f_b : (k, 3) array, m/s², the specific force that the model makes of it
+    g : float, m/s²
+    hold : HoldConditions, optional
+        What else is known of the attitudes, where effects depend on it.
+
+    Returns
+    -------
+    (k, 2, u) array
+    """
+    return np.asarray(jacobian(f_b) @ model.correction_jacobian(f_s, parameters, g, hold))
+
+
+def sigma_roll_pitch(f: ArrayLike, cov: ArrayLike) -> Array:
     """Propagate the covariance matrix of a specific force to roll and pitch (section 3.1).
 
     Parameters

@@ -7,15 +7,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.basics.angles import wrapped
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import HoldConditions
-from accelstudy.leveling.angles import jacobian, roll_pitch
+from accelstudy.leveling.angles import angles_of, roll_pitch, tilt_slope
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
 ATTITUDES = 200
-"""Over which a tilt error is averaged, where nobody says how many."""
+"""Number of attitudes over which a tilt error is averaged, unless another is given."""
+MAX_TILT_GON = 50.0
+"""Tilt up to which they lie, unless another is given."""
 
 
 def cap_forces(max_tilt: float, attitudes: int, g: float = STANDARD_GRAVITY) -> Array:
@@ -104,9 +107,8 @@ def tilt_error(
     reference = np.where(estimated.stays, reference, 0.0)
     output = simulated.sense(f_b, np.where(simulated.stays, truth, 0.0), g, hold)
     corrected = estimated.correct(output, reference, g, hold)
-    offset = np.stack(roll_pitch(tuple(corrected.T)), -1) - np.stack(roll_pitch(tuple(f_b.T)), -1)
-    offset = (offset + np.pi) % (2 * np.pi) - np.pi
-    slope = jacobian(corrected) @ estimated.correction_jacobian(output, reference, g, hold)
+    offset = wrapped(angles_of(corrected) - angles_of(f_b))
+    slope = tilt_slope(estimated, reference, output, corrected, g, hold)
     slope = np.where(estimated.stays, slope, 0.0)
     return TiltError(
         reference,

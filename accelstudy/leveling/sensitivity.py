@@ -19,18 +19,17 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from scipy import special
 
+from accelstudy.basics.angles import wrapped
+from accelstudy.basics.shares import Z95
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
-from accelstudy.leveling.angles import roll_pitch, specific_force
+from accelstudy.leveling.angles import angles_of, specific_force
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
 FORCES = ("f_x", "f_y", "f_z")
 OUTPUTS = ("roll", "pitch")
-
-Z95 = float(special.ndtri(0.975))
 
 NEGLIGIBLE_VARIANCE = 1e-24
 """Variance in rad² below which an output does not vary: rounding, not an effect."""
@@ -142,8 +141,7 @@ def leveled(
         force = inputs[:, :3]
         if model is not None:
             force = model.correct(force[:, None, :], inputs[:, 3:], g)[:, 0]
-        angles = np.stack(roll_pitch(tuple(force.T)), axis=-1) - attitude
-        return (angles + np.pi) % (2 * np.pi) - np.pi
+        return wrapped(angles_of(force) - attitude)
 
     return offset
 

@@ -22,7 +22,8 @@ from math import factorial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse.csgraph import connected_components
-from scipy.special import ndtri
+
+from accelstudy.basics.shares import Z95
 
 Array = NDArray[np.float64]
 
@@ -142,7 +143,7 @@ def sampled_shapley(
     variance = gained.sum(axis=1).mean(axis=0)
     shares = gained.mean(axis=0) / np.where(variance > 0, variance, np.nan)
     apart = gained - shares * gained.sum(axis=1, keepdims=True)
-    ci95 = ndtri(0.975) * apart.std(axis=0, ddof=1) / np.sqrt(orders) / variance
+    ci95 = Z95 * apart.std(axis=0, ddof=1) / np.sqrt(orders) / variance
     return shares.T, ci95.T, variance
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
 from accelstudy.effects import HoldConditions
-from accelstudy.leveling.angles import jacobian, specific_force
+from accelstudy.leveling.angles import jacobian, specific_force, tilt_slope
 from accelstudy.leveling.sensitivity import (
     FORCES,
     NEGLIGIBLE_VARIANCE,
@@ -55,11 +55,10 @@ def leveling_slope(
     hold : HoldConditions, optional
         What else is known of the attitudes, where effects depend on it.
     """
-    by_inputs = [
-        model.output_jacobian(f_s, parameters, g, hold),
-        model.correction_jacobian(f_s, parameters, g, hold),
-    ]
-    return jacobian(model.correct(f_s, parameters, g, hold)) @ np.concatenate(by_inputs, axis=-1)
+    f_b = model.correct(f_s, parameters, g, hold)
+    by_output = jacobian(f_b) @ model.output_jacobian(f_s, parameters, g, hold)
+    by_parameters = tilt_slope(model, parameters, f_s, f_b, g, hold)
+    return np.concatenate([by_output, by_parameters], axis=-1)
 
 
 def leveling_shares(

@@ -10,7 +10,7 @@ from accelstudy.approaches import Approach
 from accelstudy.campaign.files.format import Campaign
 from accelstudy.effects import HoldConditions
 from accelstudy.effects.base import REFERENCE_TEMPERATURE
-from accelstudy.leveling.angles import roll_pitch
+from accelstudy.leveling.angles import angles_of, roll_pitch
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise
 
@@ -60,7 +60,7 @@ def next_rows(
     observed = Observations(
         forces=f_b[None],  # of an ideal sensor, all of whose effects are zero
         sigma_force=noise.sigma_force,
-        angles=np.stack(roll_pitch(tuple(f_b.T)), axis=-1)[None],
+        angles=angles_of(f_b)[None],
         sigma_angle=noise.sigma_angle,
         gravity=campaign.gravity,
         sigma_gravity=noise.sigma_gravity,

@@ -14,10 +14,11 @@ from scipy import special
 from accelstudy.adjustment import Observations
 from accelstudy.approaches import Approach, get_approach
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.shares import Z95
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
 from accelstudy.design.estimability import estimability
 from accelstudy.design.optimal.information import position_rows
-from accelstudy.leveling.angles import roll_pitch
+from accelstudy.leveling.angles import angles_of
 from accelstudy.leveling.error import TiltError, tilt_error
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
@@ -36,7 +37,6 @@ TOLERANCE = 1e-3
 """Standard deviations by which estimates may be off: nothing beside what is counted here."""
 AT_ONCE = 500
 """Sessions that are simulated together; more would only take memory."""
-CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
@@ -203,7 +203,7 @@ def _measure(
     """Readings of one position each, forces (R, 1, 3) and the robot's angles (R, 1, 2)."""
     f_b = -STANDARD_GRAVITY * directions[:, None]
     force = set_up.model.sense(f_b, truth) + set_up.noise.sigma_force * noise[:, None]
-    angles = np.stack(roll_pitch(tuple(np.moveaxis(f_b, -1, 0))), axis=-1)
+    angles = angles_of(f_b)
     angles = angles + set_up.model.reading_errors(angles, truth)
     return force, angles + set_up.noise.sigma_angle * angle_noise[:, None]
 
@@ -221,10 +221,10 @@ def _outcome(set_up: SetUp, recursion: Recursion, truth: Array) -> pd.DataFrame:
     r = recursion.redundancy
     # Intervals as people make them: by the noise that is known, or by Student's t.
     if set_up.rule == "known":
-        width = np.full(len(truth), special.ndtri((1 + CONFIDENCE) / 2))
+        width = np.full(len(truth), Z95)
     else:
         sigma0 = np.sqrt(recursion.omega / r) if r > 0 else np.full(len(truth), np.nan)
-        width = special.stdtrit(max(r, 1), (1 + CONFIDENCE) / 2) * sigma0
+        width = special.stdtrit(max(r, 1), 0.975) * sigma0
     sigma = np.sqrt(np.diagonal(cofactors, axis1=1, axis2=2))
     inside = np.abs(delta) <= width[:, None] * sigma
     angles = np.stack([each.rms(delta) for each in set_up.attitudes], axis=1)

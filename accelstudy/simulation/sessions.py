@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,11 +12,14 @@ from numpy.typing import NDArray
 from accelstudy.adjustment import Observations
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY
 from accelstudy.effects import HoldConditions
-from accelstudy.leveling.angles import roll_pitch
+from accelstudy.leveling.angles import angles_of
 from accelstudy.noise_effects import get_noise_effect
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
+
+BLOCK = 500
+"""Sessions that are drawn and adjusted together; few enough for the processor's cache."""
 
 
 @dataclass(frozen=True)
@@ -105,6 +109,32 @@ class Session:
             forces = effect.read(forces)
         return replace(self.observations(noise), forces=forces, angles=read, gravity=gravity)
 
+    def draw_blocks(
+        self,
+        noise: Noise,
+        replicates: int,
+        blocks: Iterable[int],
+        rng_of: Callable[[int], np.random.Generator],
+        size: int,
+        angles: bool = True,
+    ) -> Iterator[Observations]:
+        """Draw sessions block by block, so that memory does not grow with their number.
+
+        Each block has its own random numbers and is drawn in full. So a larger number of replicates
+        extends a smaller one, and no block depends on which others are drawn.
+
+        Parameters
+        ----------
+        noise, angles : as in `draw`
+        replicates : int, of all blocks together; the last block may have fewer than `size`
+        blocks : iterable of int, numbers of the blocks to draw, the first is 0
+        rng_of : takes the number of a block, returns the generator of its random numbers
+        size : int, sessions of a block
+        """
+        for block in blocks:
+            drawn = self.draw(noise, size, rng_of(block), angles)
+            yield drawn.first(replicates - block * size)
+
 
 def session(
     model: SensorModel,
@@ -125,9 +155,9 @@ def session(
         Columns that the simulation cannot derive from the directions (temperature, time, …).
     """
     f_b = -gravity * np.asarray(directions, dtype=float)
-    roll, pitch = roll_pitch(tuple(f_b.T))
+    angles = angles_of(f_b)
+    roll, pitch = angles.T
     known = replace(hold or HoldConditions(), roll=roll, pitch=pitch).with_steps(f_b)
-    angles = np.stack([roll, pitch], axis=-1)
     return Session(
         f_b=f_b,
         forces=model.sense(f_b, parameters, gravity, known),

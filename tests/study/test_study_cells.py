@@ -10,9 +10,9 @@ from study_helpers import NINE, PAPER_TRUTH, grid, make_cells, make_study, run_s
 
 from accelstudy.basics.units import MGON
 from accelstudy.sensors.models import MODELS, PRESETS
-from accelstudy.simulation.sessions import Noise
+from accelstudy.simulation.sessions import BLOCK, Noise
 from accelstudy.study.cells.batches import batches
-from accelstudy.study.cells.cell import BLOCK, study_cells
+from accelstudy.study.cells.cell import study_cells
 from accelstudy.study.monte_carlo.simulate import blocks
 
 GRAVITY, ROBOT = f"{NINE}/mclaren-24/gravity", f"{NINE}/mclaren-24/robot"

@@ -11,7 +11,8 @@ from accelstudy.adjustment.calibration import CalibrationProblem, Observations
 from accelstudy.adjustment.gauss_helmert import ConditionEquations, Linearisation, adjust
 from accelstudy.adjustment.quality.solution import Solution, solve
 from accelstudy.approaches import Approach
-from accelstudy.leveling.angles import roll_pitch
+from accelstudy.basics.angles import wrapped
+from accelstudy.leveling.angles import angles_of
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -149,7 +150,6 @@ class _WithoutOne:
 
 def _attitude_error(f: Array, angles: Array) -> Array:
     """Roll and pitch of `f` less the given ones, (n, 2), roll wrapped into ±π."""
-    roll, pitch = roll_pitch(tuple(f.T))
-    roll = (roll - angles[:, 0] + np.pi) % (2 * np.pi) - np.pi
-    roll = np.where(np.cos(angles[:, 1]) < NEAR_POLE, np.nan, roll)
-    return np.stack([roll, pitch - angles[:, 1]], axis=-1)
+    roll, pitch = (angles_of(f) - angles).T
+    roll = np.where(np.cos(angles[:, 1]) < NEAR_POLE, np.nan, wrapped(roll))
+    return np.stack([roll, pitch], axis=-1)

@@ -12,8 +12,8 @@ from accelstudy.adjustment.quality.solution import Solution
 from accelstudy.basics.units import GON
 from accelstudy.effects import HoldConditions
 from accelstudy.effects.base import REFERENCE_TEMPERATURE
-from accelstudy.leveling.angles import jacobian, roll_pitch
-from accelstudy.leveling.error import cap_forces
+from accelstudy.leveling.angles import roll_pitch, tilt_slope
+from accelstudy.leveling.error import MAX_TILT_GON, cap_forces
 
 Array = NDArray[np.float64]
 
@@ -75,7 +75,7 @@ def reliability(
     solution: Solution,
     alpha: float = 0.001,
     power: float = 0.8,
-    max_tilt: float = 50 * GON,
+    max_tilt: float = MAX_TILT_GON * GON,
     attitudes: int = 64,
 ) -> Reliability:
     """Minimal detectable errors and their effects (Baarda 1968; Teunissen 2006).
@@ -125,5 +125,4 @@ def _leveling_slope(solution: Solution, max_tilt: float, attitudes: int) -> Arra
     at_rest = dict.fromkeys(HoldConditions.columns(), np.zeros(attitudes))
     reference = np.full(attitudes, REFERENCE_TEMPERATURE)
     hold = HoldConditions(**{**at_rest, "roll": roll, "pitch": pitch, "temperature": reference})
-    slope = model.correction_jacobian(model.sense(f_b, p, g, hold), p, g, hold)
-    return jacobian(f_b) @ slope * model.stays
+    return tilt_slope(model, p, model.sense(f_b, p, g, hold), f_b, g, hold) * model.stays

@@ -15,13 +15,10 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.calibration.fit import CampaignFit, campaign_noise
 from accelstudy.campaign.gross_errors.recognition import Recognised, recognise
-from accelstudy.leveling.angles import jacobian
-from accelstudy.leveling.error import ATTITUDES, cap_forces, holds_in_use
+from accelstudy.leveling.angles import jacobian, tilt_slope
+from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON, cap_forces, holds_in_use
 
 Array = NDArray[np.float64]
-
-MAX_TILT_GON = 50.0
-"""Range of tilts for which the accuracy of leveling is stated."""
 
 SUSPECT = 0.05
 """Family-wise level of the tests of single positions."""
@@ -113,7 +110,7 @@ def tilt_shares(fit: CampaignFit) -> dict[str, Array]:
     hold = holds_in_use(campaign.hold, campaign.n_positions, f_b)
     p = np.where(model.stays, fit.parameters, 0.0)
     output = model.sense(f_b, p, g, hold)
-    slope = jacobian(f_b) @ model.correction_jacobian(output, p, g, hold) * model.stays
+    slope = tilt_slope(model, p, output, f_b, g, hold) * model.stays
     covariance = fit.covariance
 
     def rms(columns: slice) -> Array:

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from accelstudy.basics.units import MGON, recorded_unit, to_recorded
-from accelstudy.campaign.calibration.assessment import MAX_TILT_GON, Assessment
+from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.fit import CampaignFit
 from accelstudy.campaign.calibration.gauges import GAUGES, affine_form, in_gauge
 from accelstudy.campaign.calibration.ranges import ranges_of
 from accelstudy.campaign.calibration.verdict import state, verdict_lines, warnings
 from accelstudy.campaign.files.session import Campaign
+from accelstudy.leveling.error import MAX_TILT_GON
 
 
 def calibration_document(fit: CampaignFit) -> dict[str, Any]:

@@ -13,12 +13,10 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import track
 from accelstudy.basics.units import display_unit, to_display
 from accelstudy.campaign.calibration.fit import CampaignFit, campaign_noise
-from accelstudy.simulation.sessions import session
+from accelstudy.simulation.sessions import BLOCK, session
 
-BLOCK = 500
-"""Sessions that are simulated at once."""
 AT_ONCE = 500_000
-"""Positions of all of them together, at most."""
+"""Positions of all sessions of a block together, at most."""
 
 
 def check_sigmas(fit: CampaignFit, replicates: int = 2000, seed: int = 1) -> pd.DataFrame:
@@ -53,11 +51,15 @@ def check_sigmas(fit: CampaignFit, replicates: int = 2000, seed: int = 1) -> pd.
     ideal = session(model, fit.parameters, directions, fit.gravity, fit.campaign.hold)
     estimates = []
     size = max(1, min(BLOCK, AT_ONCE // fit.campaign.n_positions))
-    blocks = range(0, replicates, size)
-    for block, first in enumerate(track(blocks, "simulated campaigns")):
-        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(block,)))
-        drawn = ideal.draw(noise, size, rng).first(replicates - first)
-        result = calibrate(model, approach, replace(drawn, initial=fit.parameters))
+    drawn = ideal.draw_blocks(
+        noise,
+        replicates,
+        track(range(-(-replicates // size)), "simulated campaigns"),
+        lambda block: np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(block,))),
+        size,
+    )
+    for observed in drawn:
+        result = calibrate(model, approach, replace(observed, initial=fit.parameters))
         estimates.append(result.parameters[result.converged, : model.n_parameters])
     errors = np.concatenate(estimates) - fit.parameters
     n = len(errors)

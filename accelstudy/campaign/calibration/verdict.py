@@ -9,8 +9,9 @@ import numpy as np
 from accelstudy.basics import suggested
 from accelstudy.basics.units import GON, attitude_unit, display_unit, to_attitude, to_display
 from accelstudy.basics.wording import comma_list, p_value, words
-from accelstudy.campaign.calibration.assessment import MAX_TILT_GON, Assessment
+from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.fit import CampaignFit
+from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.sensors.plausibility import implausible_parameters, implausible_tilt
 
 ACCEPTED, REJECTED = "accepted", "rejected"

@@ -20,7 +20,7 @@ from accelstudy.campaign.files.layout import LogLayout
 from accelstudy.effects import HoldConditions
 from accelstudy.files.types import Finite, NotNegative, Number, Positive
 from accelstudy.files.validation import checked
-from accelstudy.leveling.angles import jacobian, roll_pitch
+from accelstudy.leveling.angles import angles_of, jacobian, tilt_slope
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
 
@@ -102,15 +102,13 @@ class Calibration:
         """
         forces, share = self._as_continued(np.asarray(forces, dtype=float), hold)
         corrected = self.model.correct(forces, self.parameters, self.gravity, hold)
-        slope = jacobian(corrected)
-        # A reading's noise reaches the corrected force by ∂f_b/∂f_s, which is close to I.
-        by_parameters = slope @ self.model.correction_jacobian(
-            forces, self.parameters, self.gravity, hold
+        slope = share * tilt_slope(
+            self.model, self.parameters, forces, corrected, self.gravity, hold
         )
-        by_parameters *= share
-        variance = np.sum((by_parameters @ self.covariance) * by_parameters, axis=-1)
-        variance += np.square(sigma_force) * np.sum(slope**2, axis=-1)
-        return np.stack(roll_pitch(tuple(corrected.T)), axis=-1), np.sqrt(variance)
+        variance = np.sum((slope @ self.covariance) * slope, axis=-1)
+        # A reading's noise reaches the corrected force by ∂f_b/∂f_s, which is close to I.
+        variance += np.square(sigma_force) * np.sum(jacobian(corrected) ** 2, axis=-1)
+        return angles_of(corrected), np.sqrt(variance)
 
     def _as_continued(self, forces: Array, hold: HoldConditions | None) -> tuple[Array, Array]:
         """Readings as they would be if drifts had continued, for the model that has it so.

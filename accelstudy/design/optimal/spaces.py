@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import ANGLE_UNITS, to_si
-from accelstudy.leveling.angles import roll_pitch, specific_force
+from accelstudy.leveling.angles import angles_of, specific_force
 from accelstudy.schemes import get_scheme
 from accelstudy.schemes.polyhedra import corners, edges, faces
 
@@ -186,7 +186,7 @@ def listed_in(path: Path) -> Listed:
 
 def attitudes(directions: Array) -> Array:
     """Roll and pitch, rad, (n, 2), of directions of gravity."""
-    return np.stack(roll_pitch(tuple(-np.asarray(directions).T)), axis=-1)
+    return angles_of(-np.asarray(directions))
 
 
 def _unit(points: Array) -> Array:

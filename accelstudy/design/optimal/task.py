@@ -14,7 +14,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, STANDARD_GRAVITY
 from accelstudy.design.estimability import estimability
 from accelstudy.design.optimal.information import information, position_rows
-from accelstudy.leveling.error import ATTITUDES, TiltError, cap_forces, tilt_error
+from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON, TiltError, cap_forces, tilt_error
 from accelstudy.schemes import Scheme, get_scheme
 from accelstudy.sensors.models import compose, composition_name
 from accelstudy.sensors.sensor import SensorModel
@@ -57,7 +57,7 @@ class Task:
     approach: Approach
     noise: Noise = field(default_factory=Noise)
     gravity: float = STANDARD_GRAVITY
-    tilt_range: float = 50 * GON
+    tilt_range: float = MAX_TILT_GON * GON
     prior_sigmas: Mapping[str, float] = field(default_factory=dict)
     measured: Array | None = None
     neglected: Mapping[str, float] = field(default_factory=dict)

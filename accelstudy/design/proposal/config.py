@@ -13,6 +13,7 @@ from accelstudy.design.config_names import ModelName, SchemeName
 from accelstudy.design.optimal.task import Task
 from accelstudy.files.types import OneOrMore, SigmaAngle, SigmaForce, Tilt
 from accelstudy.files.validation import Block
+from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.schemes import get_scheme, scheme_names
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise
@@ -27,7 +28,9 @@ class DesignsConfig(Block):
     positions: list[int] = Field(
         default=[12, 24], description="numbers of positions of the I-optimal designs beside them"
     )
-    tilt_range_gon: Tilt = Field(50.0, description="up to which the calibrated sensor is used")
+    tilt_range_gon: Tilt = Field(
+        MAX_TILT_GON, description="tilt up to which the calibrated sensor is used"
+    )
     sensor_sigma_mps2: SigmaForce = Field(0.002, description="noise of a position's mean")
     robot_sigma_mgon: SigmaAngle = Field(3.2, description="noise of the robot's angles")
 

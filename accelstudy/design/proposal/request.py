@@ -25,6 +25,7 @@ from accelstudy.design.optimal.search import STARTS, Design, optimal_design
 from accelstudy.design.optimal.spaces import Mountings, Space, Sphere, by_eye, cube, listed_in
 from accelstudy.design.optimal.task import Task
 from accelstudy.effects import get_effect
+from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise
@@ -64,7 +65,7 @@ class Request:
     model: str = "bias-scale-nonorthogonality"
     approach: str = "robot"
     criterion: str = "I"
-    tilt_range: float = 50 * GON
+    tilt_range: float = MAX_TILT_GON * GON
     noise: Noise = field(default_factory=Noise)
     gravity: float = STANDARD_GRAVITY
     attitudes: str = "all"

@@ -17,7 +17,7 @@ from accelstudy.diagnosis.space.signatures import Moments, Signature, signatures
 from accelstudy.diagnosis.space.slopes import Slopes
 from accelstudy.diagnosis.space.spaces import VISIBLE, spans
 from accelstudy.effects import Effect, HoldConditions, effect_names, get_effect
-from accelstudy.leveling.angles import roll_pitch
+from accelstudy.leveling.angles import angles_of
 
 Array = NDArray[np.float64]
 
@@ -61,7 +61,7 @@ class Frame:
         if observed.angles is not None and solution.approach.uses_angles:
             angles = np.asarray(observed.angles[0])
         else:
-            angles = np.column_stack(roll_pitch(tuple(forces.T)))
+            angles = angles_of(forces)
         t = model.axes_matrix(solution.parameters[: model.n_parameters])
         frame = cls(
             solution=solution,

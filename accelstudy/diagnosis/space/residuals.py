@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from accelstudy.adjustment.calibration import CalibrationProblem
 from accelstudy.adjustment.quality import Solution, column_basis, diagonal_blocks, whitening_of
 from accelstudy.diagnosis.space.signatures import Signature
-from accelstudy.leveling.angles import roll_pitch, specific_force
+from accelstudy.leveling.angles import angles_of, specific_force
 
 Array = NDArray[np.float64]
 
@@ -215,7 +215,7 @@ def ideal_residuals(solution: Solution) -> tuple[Residuals, Array]:
         p = solution.parameters[: model.n_parameters]
         forces = model.correct(observed.forces[0], p, g, observed.hold)
         forces = g * forces / np.linalg.norm(forces, axis=1, keepdims=True)
-        angles = np.column_stack(roll_pitch(tuple(forces.T)))
+        angles = angles_of(forces)
     problem = CalibrationProblem.of(model, approach, observed)
     x = np.zeros(problem.initial.shape[1])
     if problem.weights.any():

@@ -6,14 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import Solution
+from accelstudy.basics.angles import wrapped
 from accelstudy.basics.units import GON
 from accelstudy.effects import HoldConditions
-from accelstudy.leveling.angles import jacobian, roll_pitch
-from accelstudy.leveling.error import ATTITUDES, cap_forces, holds_in_use
+from accelstudy.leveling.angles import angles_of, tilt_slope
+from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON, cap_forces, holds_in_use
 
 Array = NDArray[np.float64]
-
-MAX_TILT = 50 * GON
 
 
 def in_use(hold: HoldConditions, g: float) -> tuple[Array, HoldConditions]:
@@ -24,7 +23,7 @@ def in_use(hold: HoldConditions, g: float) -> tuple[Array, HoldConditions]:
     hold : HoldConditions, of the campaign, with the attitudes
     g : float, m/s²
     """
-    f_b = cap_forces(MAX_TILT, ATTITUDES, g)
+    f_b = cap_forces(MAX_TILT_GON * GON, ATTITUDES, g)
     return f_b, holds_in_use(hold, len(hold.column("roll")), f_b)
 
 
@@ -58,10 +57,8 @@ def leveling_rms(
         kept = model.stays
         p = np.where(kept, solution.parameters[: len(kept)], 0.0)
         corrected = model.correct(output, p, g, used)
-        offset = np.column_stack(roll_pitch(tuple(corrected.T))) - angles
-        offset = (offset + np.pi) % (2 * np.pi) - np.pi
-        slope = jacobian(corrected) @ model.correction_jacobian(output, p, g, used)
-        slope = slope[..., kept]
+        offset = wrapped(angles_of(corrected) - angles)
+        slope = tilt_slope(model, p, output, corrected, g, used)[..., kept]
         cofactors = solution.cofactors[: len(p), : len(p)][np.ix_(kept, kept)]
         formal = variance * np.einsum("kau,uv,kav->ka", slope, cofactors, slope)
         squares.append(float(np.mean(offset**2 + formal)))

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-from accelstudy.study.cells.cell import BLOCK, CHUNK, Cell
+from accelstudy.simulation.sessions import BLOCK
+from accelstudy.study.cells.cell import CHUNK, Cell
 
 LEAST_PER_JOB = 400_000
 """Calibrations in one job: some seconds of compiled code, as starting Python takes some too."""

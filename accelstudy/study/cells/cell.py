@@ -20,14 +20,12 @@ from accelstudy.schemes.files import held
 from accelstudy.sensors.models import compose, get_model
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.hold_plan import HoldPlan
-from accelstudy.simulation.sessions import Noise
+from accelstudy.simulation.sessions import BLOCK, Noise
 from accelstudy.study.cells.compiling import with_compiled
 
 if TYPE_CHECKING:
     from accelstudy.study.config import Grid, StudyConfig
 
-BLOCK = 500
-"""Replicates that are drawn and adjusted together, from one seed; small enough for the cache."""
 CHUNK = 20
 """Blocks that are held, summed up and written together: memory follows it, not the count."""
 
@@ -122,7 +120,8 @@ class Cell:
             list(self.simulated_effects),
             self.scheme,
             self.approach,
-            # What a set-up does without is not part of it, so that new things leave old seeds be.
+            # Noise effects count only where there are some. So the seeds of cells without them did
+            # not change when noise effects were added.
             {key: value for key, value in asdict(self.noise).items() if value != ()},
         ]
         holds = replace(self.holds, seed=HoldPlan().seed)

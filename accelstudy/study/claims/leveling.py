@@ -8,7 +8,7 @@ import numpy as np
 from scipy import stats
 
 from accelstudy.basics.units import GON, MGON
-from accelstudy.leveling.angles import roll_pitch, specific_force
+from accelstudy.leveling.angles import angles_of, specific_force
 from accelstudy.study.claims.base import Array, Claim, Evidence, register, verdict
 
 DRAWS = 200_000
@@ -67,7 +67,7 @@ def simulated_tilts(evidence: Evidence, roll: float, pitch: float, factor: float
     rng = np.random.default_rng(np.random.SeedSequence([evidence.seed, 31]))
     force = np.array(specific_force(roll * GON, pitch * GON, cell.gravity))
     noise = factor * cell.noise.sigma_force * rng.standard_normal((DRAWS, 3))
-    angles = np.stack(roll_pitch(tuple((force + noise).T)), axis=-1)
+    angles = angles_of(force + noise)
     return (angles - [roll * GON, pitch * GON]) / MGON
 
 

@@ -44,6 +44,7 @@ from accelstudy.files.types import (
     Vibration,
 )
 from accelstudy.files.validation import Block
+from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON
 from accelstudy.noise_effects import get_noise_effect
 from accelstudy.schemes import get_scheme, scheme_names
 from accelstudy.schemes.files import held, remember
@@ -169,8 +170,10 @@ class Presets(Block):
 class LevelingConfig(Block):
     """Where the tilt error that a calibration leaves is evaluated."""
 
-    max_tilt_gon: Tilt = Field(50.0, description="largest tilt of the z axis from the vertical")
-    attitudes: Attitudes = Field(200, description="attitudes, spread evenly over that cap")
+    max_tilt_gon: Tilt = Field(
+        MAX_TILT_GON, description="largest tilt of the z axis from the vertical"
+    )
+    attitudes: Attitudes = Field(ATTITUDES, description="attitudes, spread evenly over that cap")
 
 
 class SensitivityConfig(Block):

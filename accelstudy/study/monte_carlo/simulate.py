@@ -17,9 +17,9 @@ from accelstudy.adjustment.block import Block, joined
 from accelstudy.design.estimability import estimability
 from accelstudy.files.tables import parquet_writer
 from accelstudy.leveling.error import TiltError
-from accelstudy.simulation.sessions import session
+from accelstudy.simulation.sessions import BLOCK, session
 from accelstudy.study.cells.batches import Share
-from accelstudy.study.cells.cell import BLOCK, CHUNK, Cell
+from accelstudy.study.cells.cell import CHUNK, Cell
 from accelstudy.study.cells.compiling import calibrator
 from accelstudy.study.monte_carlo.followed import CellSketches, Followed, cell_tilt_error
 from accelstudy.study.monte_carlo.moments import MOMENTS, Node, Tree, moments_table
@@ -32,9 +32,6 @@ log = logging.getLogger(__name__)
 
 def blocks(cell: Cell, seed: int, first: int, count: int) -> Iterator[Block]:
     """Simulate and calibrate blocks of an estimable cell, one after another.
-
-    Each block is drawn from its own seed, and in full, so that a larger number of replicates
-    extends the smaller one, and no block depends on which others are asked for.
 
     Parameters
     ----------
@@ -52,10 +49,16 @@ def blocks(cell: Cell, seed: int, first: int, count: int) -> Iterator[Block]:
         cell.gravity,
         cell.hold,
     )
-    for block in range(first, min(first + count, cell.n_blocks)):
-        rng = np.random.default_rng(cell.seed(seed, block))
-        drawn = ideal.draw(cell.noise, BLOCK, rng, angles=cell.conditions.uses_angles)
-        yield calibrate(estimated, cell.conditions, drawn.first(cell.replicates - block * BLOCK))
+    drawn = ideal.draw_blocks(
+        cell.noise,
+        cell.replicates,
+        range(first, min(first + count, cell.n_blocks)),
+        lambda block: np.random.default_rng(cell.seed(seed, block)),
+        BLOCK,
+        angles=cell.conditions.uses_angles,
+    )
+    for observed in drawn:
+        yield calibrate(estimated, cell.conditions, observed)
 
 
 _NAME = pa.dictionary(pa.int32(), pa.string())
