@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import Solution
-from accelstudy.adjustment.quality.whole_model import REFUTED
 from accelstudy.approaches import Approach, get_approach
 from accelstudy.basics.progress import stage
 from accelstudy.campaign.files.format import Campaign
@@ -111,7 +110,7 @@ class _Run:
             found = (*gross, *found)
         final, variance = finding.examined, self.noise.unit_variance(finding.examined)
         known = self.fit.sigma_known
-        trusted = known and self.noise.level(search.examined).p_value >= REFUTED
+        trusted = self.noise.sigma_holds(search.examined)
         with stage("held-out positions"):
             gap = self.gap(finding, variance)
         return Diagnosis(
@@ -126,7 +125,7 @@ class _Run:
             examined=search.examined,
             final=final,
             sigma_known=known,
-            sigma_source=self.noise.sigma_source(final),
+            sigma_holds=self.noise.sigma_holds(final),
             unit_variance=variance,
             noise_tests=tests,
             screening=search.detection,
@@ -187,12 +186,14 @@ class _Run:
         found = []
         for choice in finding.chosen:
             best, p = choice.best, search.detection.p_family[choice.best.name]
-            if best.shown is None:
+            if best.place is not None:
                 label = int(self.campaign.positions[best.place])
                 found.append(
                     Named(OUTLIER, OUTLIER, (OUTLIER,), p, choice.probability, position=label)
                 )
                 continue
+            assert best.effect is not None
+            assert best.shown is not None
             parameters = tuple(
                 (
                     q.name,
@@ -205,7 +206,7 @@ class _Run:
             found.append(
                 Named(
                     name=best.name,
-                    spec=best.spec,
+                    spec=best.effect.spec,
                     equivalence_class=choice.members,
                     p_value=p,
                     posterior=choice.probability,

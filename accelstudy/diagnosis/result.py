@@ -93,7 +93,7 @@ class Diagnosis:
     examined : ExaminedFit, of the base fit, with unequal axes weighted
     final : ExaminedFit, of the extended fit, or the same
     sigma_known : bool
-    sigma_source : str
+    sigma_holds : bool, whether sigma is given, and the final fit does not refute it
     unit_variance : float, variance of unit weight that is taken for the noise
     noise_tests : tuple of NoiseTest
     screening : Detection, of all candidates
@@ -116,7 +116,7 @@ class Diagnosis:
     examined: ExaminedFit
     final: ExaminedFit
     sigma_known: bool
-    sigma_source: str
+    sigma_holds: bool
     unit_variance: float
     noise_tests: tuple[NoiseTest, ...]
     screening: Detection

@@ -78,9 +78,8 @@ class NoiseJudge:
             t
             for t in tests
             # A sigma that the residuals confirm knows of what varies from hold to hold.
-            if not (t.remark.startswith("white noise within") and self.search.level.known
-                    and level is not None and level.p_value >= REFUTED)
-        ]  # fmt: skip
+            if not (t.by_holds and level is not None and level.p_value >= REFUTED)
+        ]
         others = LEVEL_NOISE / max(len(counted) - (level is not None), 1)
         found = [t for t in counted if t.p_value < (REFUTED if t is level else others)]
         order = [kinds.STEPS, kinds.COLOUR, kinds.AXES, kinds.TAILS, kinds.LEVEL]
@@ -96,28 +95,32 @@ class NoiseJudge:
             )
             return Finding("unknown", examined, reason, posterior=posterior)
         if worst.name != kinds.LEVEL or worst.estimate[0] < 1:
-            return Finding("noise_model", examined, worst.remark, posterior=posterior)
+            return self._by_test(worst)
         # Larger residuals may be an effect that the test for a pattern could not see.
         noise = posterior.of_noise
         if noise >= priors.MORE_PROBABLE:
-            return Finding("noise_model", examined, worst.remark, posterior=posterior)
+            return self._by_test(worst)
         name = next(n for e in posterior.explanations for n in e.names if n not in kinds.NOISES)
         reason = (
             f"{worst.remark}; it may be the noise (probability {noise:.2f}), but "
             f"{'something' if name == 'unknown' else 'an effect such as ' + name} is not excluded"
         )
-        return Finding("unknown", examined, reason, posterior=posterior)
+        return Finding("unknown", examined, reason, posterior=posterior, says_the_level=True)
+
+    def _by_test(self, worst: NoiseTest) -> Finding:
+        """Blame the noise, as a test of it says."""
+        return Finding(
+            "noise_model",
+            self.search.examined,
+            worst.remark,
+            posterior=self.search.posterior,
+            says_the_level=worst.name == kinds.LEVEL,
+        )
+
+    def sigma_holds(self, final: ExaminedFit) -> bool:
+        """Whether sigma is given, and the residuals of a fit do not refute it."""
+        return self.search.level.known and self.level(final).p_value >= REFUTED
 
     def unit_variance(self, final: ExaminedFit) -> float:
-        """Variance of unit weight: 1 if sigma is known and not refuted, else a posteriori."""
-        if self.search.level.known and self.level(final).p_value >= REFUTED:
-            return 1.0
-        return final.frame.residuals.positions.variance
-
-    def sigma_source(self, final: ExaminedFit) -> str:
-        """Where the noise level comes from."""
-        return (
-            "a-priori"
-            if self.search.level.known and self.unit_variance(final) == 1
-            else "residuals"
-        )
+        """Variance of unit weight: 1 where the given sigma holds, else a posteriori."""
+        return 1.0 if self.sigma_holds(final) else final.frame.residuals.positions.variance

@@ -59,7 +59,7 @@ class Refits:
         # From an ideal sensor the iterations may not reach a large effect.
         start = dict(zip(base.model.parameter_names, base.parameters, strict=False))
         observed = replace(base.observed, initial=model.vector(start))
-        bumped = [h.place for h in chosen if h.effect is None]
+        bumped = [h.place for h in chosen if h.place is not None]
         if bumped:
             observed = observed.take(np.setdiff1d(np.arange(len(base.misclosures)), bumped))
         try:

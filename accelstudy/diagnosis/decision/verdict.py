@@ -16,7 +16,7 @@ from accelstudy.diagnosis.decision.explanations import Explanation
 from accelstudy.diagnosis.decision.posterior import Posterior, Weighed, of_effects
 from accelstudy.diagnosis.decision.search import Search
 from accelstudy.diagnosis.evidence.field import UNKNOWN
-from accelstudy.diagnosis.evidence.noise.kinds import NOISES
+from accelstudy.diagnosis.evidence.noise.kinds import LEVEL, NOISES
 from accelstudy.diagnosis.space.examined import ExaminedFit, examine
 from accelstudy.diagnosis.space.groups import LACK_OF_FIT
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
@@ -55,6 +55,7 @@ class Finding:
     reason : str
     chosen : tuple of Choice
     posterior : Posterior or None, where something is missing
+    says_the_level : bool, whether the reason says how large the residuals are
     """
 
     verdict: str
@@ -62,6 +63,7 @@ class Finding:
     reason: str = ""
     chosen: tuple[Choice, ...] = ()
     posterior: Posterior | None = None
+    says_the_level: bool = False
 
     @property
     def credible_set(self) -> tuple[Explanation, ...]:
@@ -121,8 +123,13 @@ def _without_a_fit(search: Search, posterior: Posterior) -> Finding:
     """Judge where no effect or set of effects is probable enough."""
     first = posterior.explanations[0]
     if first.names[0] in NOISES and first.posterior >= priors.SURE:
-        reason = NOISES[first.names[0]]
-        return Finding("noise_model", search.examined, reason, posterior=posterior)
+        return Finding(
+            "noise_model",
+            search.examined,
+            NOISES[first.names[0]],
+            posterior=posterior,
+            says_the_level=first.names[0] == LEVEL,
+        )
     if UNKNOWN in first.names:
         reason = "no effect or pair of effects of the catalogue explains it"
     else:

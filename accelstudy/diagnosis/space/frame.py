@@ -138,7 +138,6 @@ class Frame:
         return [
             Hypothesis(
                 name=effect.name,
-                spec=effect.spec,
                 effect=effect,
                 directions=directions[i, :, : rank[i]],
                 basis=basis[i, :, : rank[i]],

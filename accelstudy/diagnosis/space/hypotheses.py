@@ -28,19 +28,19 @@ class Hypothesis:
     Attributes
     ----------
     name : str, canonical name
-    spec : str, name with settings; of an outlier the index of its position
     effect : Effect; None for what is no effect of the sensor or the rig
     directions : (k, l) array, combinations of the parameters that the positions show
     basis : (m, l) array, orthonormal, of the space of its signature in the residuals
     ideal : (m, l) array, likewise for an ideal sensor, where what is equal is exactly so
+    place : int, index of the position that was bumped; None for an effect
     """
 
     name: str
-    spec: str
     effect: Effect | None
     directions: Array
     basis: Array
     ideal: Array
+    place: int | None = None
 
     @property
     def dim(self) -> int:
@@ -72,12 +72,6 @@ class Hypothesis:
         values = self.effect.settings
         smooth = (s.name for s in self.effect.takes if s.smooth and values[s.name] != s.none)
         return next(smooth, None)
-
-    @property
-    def place(self) -> int:
-        """Index of the position that a hypothesis of a bumped position is about."""
-        assert self.effect is None
-        return int(self.spec[len(OUTLIER) + 1 : -1])
 
     @property
     def value(self) -> float:
@@ -172,7 +166,7 @@ class BumpedPositions(Sequence[Hypothesis]):
         rows = np.zeros((len(self.residuals.design), directions.shape[1]))
         rows[where] = directions
         basis = self.residuals.project(rows)
-        return Hypothesis(OUTLIER, f"{OUTLIER}({place})", None, directions, basis, basis)
+        return Hypothesis(OUTLIER, None, directions, basis, basis, place)
 
     def drawn(self, places: NDArray[np.int_], amounts: Array) -> Array:
         """Sums of the columns of some bases by amounts (Σ l,) of each, (b, m), but for R."""

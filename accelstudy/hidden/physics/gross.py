@@ -21,7 +21,9 @@ LEAST = 100.0
 """Noncentrality of a bumped hold, at least."""
 FAR = 0.3 * GRAVITY
 """m/s², by which the forces of exchanged rows differ, or nobody could notice."""
-PER_AXIS = ("forces", "sd", "slope", "sd_slope")
+SIGNED, UNSIGNED = ("forces", "slope"), ("sd", "sd_slope")
+PER_AXIS = (*SIGNED, *UNSIGNED)
+"""Columns with a value for each axis, those with a sign first."""
 
 # What a number in the file would be for one in its header's unit.
 FORCE_UNITS = (1 / STANDARD_GRAVITY, 1e3 / STANDARD_GRAVITY, STANDARD_GRAVITY)
@@ -42,7 +44,7 @@ def _axis_error(
     for name in PER_AXIS:
         values = getattr(campaign, name)
         if values is not None:
-            turned = 1.0 if name.startswith("sd") else np.array(signs)
+            turned = np.array(signs) if name in SIGNED else 1.0
             changed[name] = turned * values[:, order]
     shown = [sign * (axis + 1) for axis, sign in zip(order, signs, strict=True)]
     return replace(campaign, **changed), dict(zip("xyz", shown, strict=True))

@@ -28,6 +28,7 @@ class NoiseTest:
     estimate : tuple of float, what the data say of it: variance factor, variance factors of the
         axes, correlation of successive holds, kurtosis, resolution in m/s²
     remark : str
+    by_holds : bool, whether it is measured by the noise within the holds
     """
 
     name: str
@@ -35,3 +36,4 @@ class NoiseTest:
     p_value: float
     estimate: tuple[float, ...]
     remark: str
+    by_holds: bool = False

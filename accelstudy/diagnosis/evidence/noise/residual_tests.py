@@ -150,6 +150,7 @@ def within_hold_test(
         (float(np.sqrt(white)),),
         f"white noise within the holds explains {1e3 * np.sqrt(white):.2f} of "
         f"{1e3 * np.sqrt(scatter):.2f} mm/s² of a position mean",
+        by_holds=True,
     )
 
 

@@ -30,7 +30,7 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
         },
         "noise": {
             "sigma_mps2": json_number(d.sigma_position),
-            "sigma_source": d.sigma_source,
+            "sigma_source": "a-priori" if d.sigma_holds else "residuals",
             "tests": [
                 {
                     "name": test.name,

@@ -61,9 +61,8 @@ def positions_table(diagnosis: Diagnosis) -> pd.DataFrame:
         ("after", solution, kept),
     ):
         tests = position_tests(fitted)
-        known = d.unit_variance == 1
         table[f"test_{when}"] = _placed(tests.w / np.sqrt(d.unit_variance), rows)
-        table[f"p_{when}"] = _placed(tests.p_known if known else tests.p_unknown, rows)
+        table[f"p_{when}"] = _placed(tests.p_known if d.sigma_holds else tests.p_unknown, rows)
     missed = ((), ()) if d.gap.held_out is None else d.gap.held_out.misses
     for when, values in zip(("before", "after"), missed, strict=True):
         table[f"predicted_{when}_mps2"] = _placed(np.array(values), held)

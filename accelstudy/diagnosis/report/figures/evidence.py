@@ -20,9 +20,7 @@ SMALLEST_P = 1e-12
 
 def evidence_figure(diagnosis: Diagnosis) -> Figure:
     """Family-wise p-value and posterior probability of each candidate."""
-    p_values = {
-        name: p for name, p in diagnosis.screening.p_family.items() if not name.startswith("group:")
-    }
+    p_values = diagnosis.screening.p_family
     # A class of equal effects has its probability under one name, the rest has none.
     probabilities = diagnosis.probabilities
 

@@ -28,7 +28,8 @@ ABREAST = 0.03
 
 def residual_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
     """Residuals before and after against direction, time and temperature."""
-    panels = _panels(diagnosis, positions)
+    names = [name for name in AXES if f"residual_{name}_before_mps2" in positions]
+    panels = _panels(diagnosis, positions, len(names))
     refitted = diagnosis.final is not diagnosis.examined
     explained = diagnosis.extended is not diagnosis.model
     rows = ("before", "after") if refitted else ("before",)
@@ -42,13 +43,12 @@ def residual_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
     gap = diagnosis.gap
     posteriori = gap.before if gap.after is None else gap.after
     sigma = 1e3 * condition_sigma(diagnosis.base, 1.0 if diagnosis.sigma_known else posteriori)
-    names = [name for name in AXES if f"residual_{name}_before_mps2" in positions]
     for when, line in zip(rows, grid, strict=True):
         for (label, abscissa), ax in zip(panels.items(), line, strict=True):
             ax.axhspan(-2 * sigma, 2 * sigma, color=NOISE)
             ax.axhline(0, color=INK, linewidth=0.6)
-            for name in names:
-                _draw_component(ax, positions, name, when, abscissa(name), explained)
+            for i, name in enumerate(names):
+                _draw_component(ax, positions, name, when, abscissa(i), explained)
             ax.margins(y=0.08)
             ax.xaxis.set_major_locator(MaxNLocator(ticks, steps=[1, 2, 5, 10]))
             if when == rows[-1]:
@@ -62,32 +62,32 @@ def residual_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
 
 
 def _panels(
-    diagnosis: Diagnosis, positions: pd.DataFrame
-) -> dict[str, Callable[[str], NDArray[np.float64]]]:
-    """Abscissas of the panels by their labels, each a function of the component."""
+    diagnosis: Diagnosis, positions: pd.DataFrame, count: int
+) -> dict[str, Callable[[int], Array]]:
+    """Abscissas of the panels by their labels, each a function of the component, of so many."""
     frame = diagnosis.examined.frame
     unit = frame.forces / frame.solution.gravity
-    panels: dict[str, Callable[[str], Array]] = {}
-    if "residual_norm_before_mps2" in positions:
-        for i, axis in enumerate("xyz"):
-            panels[f"$f_{axis}/g$"] = lambda _, i=i: unit[:, i]  # type: ignore[misc]
+    panels: dict[str, Callable[[int], Array]] = {}
+    if count == 1:
+        for k, axis in enumerate("xyz"):
+            panels[f"$f_{axis}/g$"] = lambda _, k=k: unit[:, k]  # type: ignore[misc]
     else:
-        panels["$f/g$ of the same axis"] = lambda axis: unit[:, "xyz".index(axis)]
+        panels["$f/g$ of the same axis"] = lambda i: unit[:, i]
     for column, label, scale in (
         ("time_s", "time / min", 60),
         ("temperature_degC", "temperature / °C", 1),
     ):
         values = positions[column].to_numpy() / scale
         if np.isfinite(values).all() and np.ptp(values) > 0:
-            panels[label] = lambda name, values=values: _abreast(values, name)  # type: ignore[misc]
+            panels[label] = lambda i, v=values: _abreast(v, i, count)  # type: ignore[misc]
     return panels
 
 
-def _abreast(values: Array, name: str) -> Array:
-    """Move the components apart where there are so few values that they would hide each other."""
-    if len(np.unique(values)) > FEW or name == "norm":
+def _abreast(values: Array, i: int, count: int) -> Array:
+    """Move component i of so many aside where so few values would let them hide each other."""
+    if len(np.unique(values)) > FEW:
         return values
-    return values + ABREAST * np.ptp(values) * ("xyz".index(name) - 1)
+    return values + ABREAST * np.ptp(values) * (i - (count - 1) / 2)
 
 
 def _draw_component(

@@ -215,7 +215,8 @@ def _narrowed(d: Diagnosis) -> list[str]:
 def _refuted(d: Diagnosis) -> list[str]:
     """Say by how much the stated noise is refuted, as the calibration does."""
     test = d.global_test
-    if test is None or test.accepted or d.reason.startswith("the residuals are "):
+    said = d.recognised is None and d.beside.finding.says_the_level
+    if test is None or test.accepted or said:
         return []
     ratio = math.sqrt(test.statistic / test.dof)
     much = f"{ratio:.1f} times as large as" if ratio > 1 else f"only {ratio:.2g} times"
