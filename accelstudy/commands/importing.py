@@ -1,4 +1,4 @@
-"""The commands that make a campaign of a raw log, or of public data."""
+"""The command that makes a campaign of a raw log."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import say, warn
 from accelstudy.commands.options import (
     PATH,
@@ -97,47 +96,11 @@ def import_command(
     for name, (_, report) in imported.items():
         if name:
             say(f"sensor {name}")
-        _show(report, folders[name], figure)
+        show_report(report, folders[name], figure)
 
 
-@click.command(
-    "public", epilog=example("accelstudy public", "accelstudy public xsens-mti --out xsens")
-)
-@click.argument("name", required=False)
-@click.option("--out", type=PATH, help="Folder of the campaign.")
-@click.option(
-    "--folder",
-    type=PATH,
-    default="resources/public",
-    show_default=True,
-    help="Where the file is, in any subfolder, or is downloaded to.",
-)
-@force_option
-@angle_unit_option
-@quiet_option
-def public_command(name: str | None, out: Path | None, folder: Path, force: bool) -> None:
-    """Make a campaign of public data, or list what there is.
-
-    NAME is that of the data; without it they are listed. A download is checked by its sha256, and
-    goes on where an earlier one broke off.
-    """
-    from accelstudy.campaign.importing.conversion import import_to
-    from accelstudy.campaign.importing.public import import_settings, public_data, public_file
-    from accelstudy.files.outputs import CAMPAIGN, result_folder
-
-    if name is None:
-        for known, entry in public_data().items():
-            click.echo(f"{known}: {entry.description}\n    {entry.licence}, {entry.url}")
-        return
-    settings = import_settings(name)
-    if out is None:
-        raise InputError("--out: give the folder of the campaign")
-    with result_folder(out, CAMPAIGN, [folder], force) as campaign:
-        _, report = import_to(campaign, public_file(name, folder), settings)
-    _show(report, out)
-
-
-def _show(report: ImportReport, out: Path, figure: bool = True) -> None:
+def show_report(report: ImportReport, out: Path, figure: bool = True) -> None:
+    """Tell what was imported, with its warnings, and where to."""
     for line in report.lines():
         say(line)
     for warning in report.warnings:

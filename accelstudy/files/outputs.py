@@ -84,6 +84,12 @@ POLE = Kind(
     ("budget.parquet", "monte-carlo.parquet", "budget.svg", "budget.png"),
 )
 PLAN = Kind("plan", "plan.parquet", ("plan.md", "study.yaml", "plan.svg", "plan.png"))
+STUDY = Kind(
+    "study",
+    "Snakefile",
+    ("README.md", "config/config.yaml", "profiles/default/config.yaml"),
+    replaced=False,
+)
 _KINDS = (BATCH_JOB, DIAGNOSIS, CALIBRATION, CAMPAIGN, POLE, PLAN)
 
 

@@ -12,10 +12,8 @@ def commands():
     """All commands, in the order of `accelstudy --help`."""
     top = click.Context(main, info_name="accelstudy")
     lists = []
-    for title, names in SECTIONS.items():
-        rows = [
-            (f"[`{name}`](#{name})", main.commands[name].get_short_help_str(200)) for name in names
-        ]
+    for title, its in SECTIONS.items():
+        rows = [(f"[`{c.name}`](#{c.name})", c.get_short_help_str(200)) for c in its]
         lists += [f"**{title}**", table(("command", "what it does"), rows)]
     return page(
         "# Commands",
@@ -25,7 +23,7 @@ def commands():
         "Each command ends its `--help` with an example, and overwrites nothing of yours without "
         "`--force`. Bad input ends with one line and the exit status 2.",
         *lists,
-        *(_command(main.commands[name], top) for names in SECTIONS.values() for name in names),
+        *(_command(command, top) for its in SECTIONS.values() for command in its),
     )
 
 

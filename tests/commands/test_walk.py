@@ -47,12 +47,25 @@ def log_csv(path):
 
 
 @pytest.fixture(scope="module")
-def steps(site, tmp_path_factory):
+def walked(tmp_path_factory):
+    return tmp_path_factory.mktemp("walk")
+
+
+def environment_of(site):
+    known = ("PATH", "HOME", "LANG", "OPENBLAS_NUM_THREADS")
+    environment = {name: os.environ[name] for name in known if name in os.environ}
+    environment |= {"PYTHONPATH": str(site), "MPLBACKEND": "agg"}
+    environment["PATH"] = f"{site / 'bin'}:{environment['PATH']}"
+    return environment
+
+
+@pytest.fixture(scope="module")
+def steps(site, walked):
     """What came of all commands, in a folder that holds what a reader has.
 
     That is a log of a sensor and, for studies, the configurations and the verdicts of one.
     """
-    folder = tmp_path_factory.mktemp("walk")
+    folder = walked
     log_csv(folder / "log.csv")
     shutil.copytree(ROOT / "config", folder / "config")
     claim = {
@@ -64,13 +77,9 @@ def steps(site, tmp_path_factory):
     path.parent.mkdir(parents=True)
     write_table(path, pd.DataFrame([claim]), PROVENANCE)
 
-    known = ("PATH", "HOME", "LANG", "OPENBLAS_NUM_THREADS")
-    environment = {name: os.environ[name] for name in known if name in os.environ}
-    environment |= {"PYTHONPATH": str(site), "MPLBACKEND": "agg"}
-    environment["PATH"] = f"{site / 'bin'}:{environment['PATH']}"
     done = subprocess.run(
         [sys.executable, ROOT / "tests/helpers/walk.py", README, "steps.json"],
-        cwd=folder, env=environment, capture_output=True, text=True,
+        cwd=folder, env=environment_of(site), capture_output=True, text=True,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     content = json.loads((folder / "steps.json").read_text(encoding="utf-8"))
@@ -79,9 +88,22 @@ def steps(site, tmp_path_factory):
 
 
 def test_the_package_has_all_its_files(site):
-    for path in (ROOT / "accelstudy").rglob("*.*"):
-        if path.suffix != ".pyc":
-            assert (site / path.relative_to(ROOT)).exists(), path
+    for folder in ("accelstudy", "config", "profiles", "workflow"):
+        within = site if folder == "accelstudy" else site / "accelstudy" / "shipped"
+        for path in (ROOT / folder).rglob("*"):
+            if path.is_file() and "__pycache__" not in path.parts:
+                assert (within / path.relative_to(ROOT)).read_bytes() == path.read_bytes(), path
+    assert (site / "accelstudy" / "py.typed").is_file()
+
+
+def test_a_new_study_runs_the_installed_workflow(site, steps, walked):
+    """`accelstudy init` is among the examples of the help."""
+    planned = subprocess.run(
+        [sys.executable, "-m", "snakemake", "--dry-run", "--cores", "1"],
+        cwd=walked / "my-study", env=environment_of(site), capture_output=True, text=True,
+    )  # fmt: skip
+    assert planned.returncode == 0, planned.stderr
+    assert "results/my-study/figures/sweep-positions.png" in planned.stdout
 
 
 @pytest.mark.parametrize("source", ["README", "help"])

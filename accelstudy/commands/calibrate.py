@@ -1,0 +1,57 @@
+"""The command that calibrates a campaign."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from accelstudy.basics.progress import say, stage, warn
+from accelstudy.commands.options import (
+    PATH,
+    angle_unit_option,
+    approach_option,
+    example,
+    force_option,
+    model_option,
+    quiet_option,
+)
+
+
+@click.command("calibrate", epilog=example("accelstudy calibrate my-campaign --out calibrated"))
+@click.argument("campaign", type=PATH)
+@click.option("--out", type=PATH, required=True, help="Folder to write to.")
+@model_option
+@approach_option("gravity")
+@force_option
+@angle_unit_option
+@quiet_option
+def calibrate_command(campaign: Path, model: str, approach: str, out: Path, force: bool) -> None:
+    """Calibrate a CAMPAIGN (a folder) and report on it."""
+    from accelstudy.approaches import get_approach
+    from accelstudy.basics.units import display_unit, to_display
+    from accelstudy.campaign.calibration.fit import fit_campaign
+    from accelstudy.campaign.calibration.output import write_calibration
+    from accelstudy.campaign.calibration.verdict import next_steps
+    from accelstudy.campaign.files.format import read_campaign
+    from accelstudy.files.outputs import CALIBRATION, result_folder
+    from accelstudy.sensors.models import get_model
+
+    chosen = get_model(model), get_approach(approach)
+    with result_folder(out, CALIBRATION, [campaign], force) as folder, stage("calibration"):
+        measured = read_campaign(campaign)
+        fit = fit_campaign(measured, *chosen)
+        content = write_calibration(fit, folder, campaign)
+    for warning in measured.warnings:
+        warn(warning)
+    for entry in content["parameters"]:
+        unit = entry["unit"]
+        known = entry["sigma"] is not None
+        sigma = f"{to_display(entry['sigma'], unit):.4f}" if known else "unknown"
+        value = f"{to_display(entry['value'], unit):12.4f}"
+        say(f"{entry['name']:>9} = {value} ± {sigma} {display_unit(unit)}")
+    quality = content["quality"]
+    say(f"{quality['state'].upper()}: {quality['verdict']}")
+    what, command = next_steps(fit, quality["state"], campaign, out / "calibration.json")[0]
+    say(f"{what}: {command}")
+    say(f"report: {out / 'report.html'}")

@@ -1,0 +1,36 @@
+"""The command that lists the cells of a study."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from accelstudy.commands.options import PATH, example
+
+
+@click.command(
+    "cells", epilog=example("accelstudy cells config/config.yaml config/sweeps/positions.yaml")
+)
+@click.argument("configs", nargs=-1, required=True, type=PATH)
+def cells_command(configs: tuple[Path, ...]) -> None:
+    """List the cells of a study and what it will take.
+
+    Cells that cannot be estimated are listed with the reason. CONFIGS are YAML files; later ones
+    overlay earlier ones, as with --configfile.
+    """
+    from accelstudy.design.estimability import estimability
+    from accelstudy.study.cells.cell import study_cells
+    from accelstudy.study.cells.effort import study_effort
+    from accelstudy.study.config import read_study
+
+    study = read_study(*configs)
+    chosen = study_cells(study)
+    effort = study_effort(study, chosen)
+    for cell in chosen:
+        found = estimability(
+            cell.positions, cell.estimated_model, cell.conditions, cell.noise, hold=cell.hold
+        )
+        state = found.reason or f"r = {found.redundancy}, {cell.replicates} replicates"
+        click.echo(f"{cell.name}: {state}")
+    click.echo(f"\n{effort}")

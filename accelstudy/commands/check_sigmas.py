@@ -1,0 +1,53 @@
+"""The command that checks the sigmas of a calibration by simulation."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from accelstudy.basics.progress import say
+from accelstudy.commands.options import (
+    PATH,
+    angle_unit_option,
+    approach_option,
+    example,
+    model_option,
+    quiet_option,
+    seed_option,
+)
+
+
+@click.command(
+    "check-sigmas", epilog=example("accelstudy check-sigmas my-campaign --replicates 500")
+)
+@click.argument("campaign", type=PATH)
+@model_option
+@approach_option("gravity")
+@click.option(
+    "--replicates",
+    default=2000,
+    show_default=True,
+    type=click.IntRange(min=2),
+    help="Simulated campaigns.",
+)
+@seed_option
+@angle_unit_option
+@quiet_option
+def check_sigmas_command(
+    campaign: Path, model: str, approach: str, replicates: int, seed: int
+) -> None:
+    """Check the sigmas of a calibration by simulation.
+
+    CAMPAIGN is the folder of the campaign that is calibrated.
+    """
+    from accelstudy.approaches import get_approach
+    from accelstudy.campaign.calibration.fit import fit_campaign
+    from accelstudy.campaign.calibration.sigma_check import check_sigmas
+    from accelstudy.campaign.files.format import read_campaign
+    from accelstudy.sensors.models import get_model
+
+    fit = fit_campaign(read_campaign(campaign), get_model(model), get_approach(approach))
+    table = check_sigmas(fit, replicates, seed)
+    click.echo(table.to_string(index=False, float_format=lambda value: f"{value:.4g}"))
+    say("sigma: as the adjustment claims it; ratio: sigma / sd_empirical.")
