@@ -27,7 +27,7 @@ from accelstudy.commands.options import (
 )
 
 if TYPE_CHECKING:
-    from accelstudy.design.proposal.proposal import Proposal
+    from accelstudy.proposal.proposal import Proposal
 
 SECTIONS = {
     "The calibration": ("model", "approach", "positions", "sigma", "robot_sigma", "gravity_sigma"),
@@ -173,10 +173,10 @@ def design_command(
     first.
     """
     from accelstudy.basics import bounds
-    from accelstudy.design.proposal.design_file import write_design
-    from accelstudy.design.proposal.proposal import Proposal
-    from accelstudy.design.proposal.request import Request
     from accelstudy.files.outputs import new_file
+    from accelstudy.proposal.design_file import write_design
+    from accelstudy.proposal.proposal import Proposal
+    from accelstudy.proposal.request import Request
     from accelstudy.schemes import is_scheme_file
     from accelstudy.simulation.sessions import Noise
 
@@ -251,7 +251,7 @@ def summary(proposal: Proposal) -> list[str]:
         to_display,
     )
     from accelstudy.basics.wording import number
-    from accelstudy.design.proposal.proposal import REFERENCE
+    from accelstudy.proposal.proposal import REFERENCE
     from accelstudy.schemes import get_scheme
 
     request, unit = proposal.request, display_unit("rad")

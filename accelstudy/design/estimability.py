@@ -11,7 +11,8 @@ from accelstudy.adjustment import whitened_jacobian
 from accelstudy.approaches import Approach
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import HoldConditions
-from accelstudy.schemes import Scheme, get_scheme
+from accelstudy.positions.scheme import Scheme
+from accelstudy.positions.sphere import evenly_spread
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.hold_plan import HoldPlan
 from accelstudy.simulation.sessions import Noise, session
@@ -23,6 +24,8 @@ SINGULAR = 1e-7
 ROUNDING = 1e-14
 """Columns of the design matrix shorter than this fraction of the longest count as zero."""
 
+MANY = 60
+"""Positions that determine whatever an approach can determine at all."""
 EVERYTHING_VARIES = HoldPlan(60.0, (0.0, 40.0), "random", (0.0, 1.0), "random")
 
 
@@ -92,7 +95,7 @@ def estimability(
     noise = noise or Noise()
     ideal = np.zeros(model.n_parameters)
     names = (*model.parameter_names, "g") if noise.sigma_gravity > 0 else model.parameter_names
-    a = _design(scheme, model, approach, noise, ideal, gravity, hold)
+    a = _design(scheme.directions, model, approach, noise, ideal, gravity, hold)
     rank, condition, free = rank_of(a)
     not_estimable = tuple(name for name, is_free in zip(names, free, strict=True) if is_free)
     reason = ""
@@ -108,7 +111,7 @@ def estimability(
     else:
         if parameters is not None:
             at = np.asarray(parameters, dtype=float)
-            a = _design(scheme, model, approach, noise, at, gravity, hold)
+            a = _design(scheme.directions, model, approach, noise, at, gravity, hold)
         scale = np.linalg.norm(a, axis=0)
         cofactors = np.linalg.inv((a / scale).T @ (a / scale)) / np.outer(scale, scale)
     return Estimability(
@@ -125,7 +128,7 @@ def estimability(
 
 
 def _design(
-    scheme: Scheme,
+    directions: Array,
     model: SensorModel,
     approach: Approach,
     noise: Noise,
@@ -134,16 +137,15 @@ def _design(
     hold: HoldConditions | None,
 ) -> Array:
     """Design matrix (conditions, u) with unit weights."""
-    ideal = session(model, parameters, scheme.directions, gravity, hold)
+    ideal = session(model, parameters, directions, gravity, hold)
     return whitened_jacobian(model, approach, ideal.observations(noise), parameters)
 
 
 def is_blind(model: SensorModel, approach: Approach, noise: Noise, gravity: float) -> bool:
-    """Whether an approach cannot determine a model even with 60 positions in varied conditions."""
+    """Whether an approach cannot determine a model in any scheme, whatever the conditions are."""
     ideal = np.zeros(model.n_parameters)
-    scheme = get_scheme("fibonacci-60")
-    hold = EVERYTHING_VARIES.hold(scheme.n_positions)
-    a = _design(scheme, model, approach, noise, ideal, gravity, hold)
+    hold = EVERYTHING_VARIES.hold(MANY)
+    a = _design(evenly_spread(MANY), model, approach, noise, ideal, gravity, hold)
     return rank_of(a)[0] < a.shape[1]
 
 

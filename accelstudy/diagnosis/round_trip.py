@@ -17,7 +17,7 @@ from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.names import check_path_name
 from accelstudy.campaign.files.format import write_campaign
 from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign, write_truth
-from accelstudy.design.config_names import ModelName
+from accelstudy.config_names import ModelName
 from accelstudy.files.types import Seed, Sessions
 from accelstudy.files.validation import Block, checked
 from accelstudy.sensors.models import get_model

@@ -4,10 +4,9 @@ To add one, write a module next to this file with a function under `register`.
 """
 
 from accelstudy.basics.registry import import_modules
+from accelstudy.positions.scheme import Scheme, Status
 from accelstudy.schemes.files import is_scheme_file
 from accelstudy.schemes.registry import (
-    Scheme,
-    Status,
     UnknownSchemeError,
     get_scheme,
     register,

@@ -17,7 +17,8 @@ import numpy as np
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.names import check_path_name
-from accelstudy.schemes.registry import Scheme
+from accelstudy.files.layers import read_layer
+from accelstudy.positions.scheme import Scheme
 
 KEYS = ("scheme", "title", "source", "directions", "positions", "design")
 """Of a file; only `directions` must be there, and the last two are for people."""
@@ -38,8 +39,6 @@ def scheme_of_file(path: str | Path) -> Scheme:
     InputError
         One line that names the file, the key, what is wrong and what would be right.
     """
-    from accelstudy.files.layers import read_layer  # its package needs all schemes
-
     content = read_layer(path)
     try:
         return remember(content, Path(path).stem)

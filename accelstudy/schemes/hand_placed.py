@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from accelstudy.schemes.registry import Array, register
+from accelstudy.positions.scheme import Array
+from accelstudy.schemes.registry import register
 
 PLACEMENT_SD = np.radians(2.0)
 

@@ -4,8 +4,9 @@ from itertools import permutations, product
 
 import numpy as np
 
+from accelstudy.positions.scheme import Array
 from accelstudy.schemes.polyhedra import generic
-from accelstudy.schemes.registry import Array, register
+from accelstudy.schemes.registry import register
 
 
 @register(

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from accelstudy.schemes.registry import Array, register
+from accelstudy.positions.scheme import Array
+from accelstudy.schemes.registry import register
 
 MODEL = "bias-scale-nonorthogonality"
 
@@ -47,7 +48,7 @@ def i_optimal(n: int) -> Array:
 
 
 def _optimal(n: int, criterion: str) -> Array:
-    # Only these schemes need models and their adjustment, which need schemes themselves.
+    # Slow to import, and only these schemes need them.
     from accelstudy.approaches import get_approach
     from accelstudy.design.optimal.criteria import get_criterion
     from accelstudy.design.optimal.search import optimal_design

@@ -1,10 +1,10 @@
 """Faces, edges and corners of the cube, and vertices of other polyhedra."""
 
-from itertools import product
-
 import numpy as np
 
-from accelstudy.schemes.registry import Array, register
+from accelstudy.positions.cube import corners, cyclic_permutations, edges, faces
+from accelstudy.positions.scheme import Array
+from accelstudy.schemes.registry import register
 
 GOLDEN_RATIO = (1 + np.sqrt(5)) / 2
 # Euler angles xyz of (15°, 25°, 35°) in numbers. Every job lists the schemes; to import
@@ -18,19 +18,6 @@ _GENERIC = np.array(
 )
 
 
-def cyclic_permutations(x: float, y: float, z: float) -> Array:
-    """All distinct points (±x, ±y, ±z), (±z, ±x, ±y) and (±y, ±z, ±x), shape (n, 3).
-
-    A point and its antipode follow each other.
-    """
-    points: dict[tuple[float, ...], None] = {}  # a set that keeps the order
-    for order in ((x, y, z), (z, x, y), (y, z, x)):
-        for signs in product((1, -1), repeat=3):
-            point = np.multiply(order, signs)
-            points[tuple(point)] = points[tuple(-point)] = None
-    return np.array(list(points))
-
-
 def generic(directions: Array) -> Array:
     """Turn directions by Euler angles xyz of (15°, 25°, 35°), which no symmetry of theirs knows.
 
@@ -40,25 +27,12 @@ def generic(directions: Array) -> Array:
     return directions @ _GENERIC.T
 
 
-@register(
+register(
     "faces-6",
     title="faces",
     status="standard",
     source="Lötters et al. (1998), Sensors and Actuators A 68, 221-228",
-)
-def faces() -> Array:
-    """The sensor on each side of a cube, +z (level) first."""
-    return cyclic_permutations(0, 0, 1)
-
-
-def edges() -> Array:
-    """The sensor on each edge of a cube: two axes share gravity."""
-    return cyclic_permutations(0, 1, 1)
-
-
-def corners() -> Array:
-    """The sensor on each corner of a cube: three axes share gravity."""
-    return cyclic_permutations(1, 1, 1)
+)(faces)
 
 
 @register(

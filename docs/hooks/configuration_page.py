@@ -4,13 +4,13 @@ from markdown_text import page
 from schemas import blocks
 
 from accelstudy.campaign.batch.config import BatchConfig
-from accelstudy.design.proposal.config import DesignsConfig
 from accelstudy.diagnosis.round_trip import RoundTrip
 from accelstudy.field.config import FieldConfig
 from accelstudy.hidden.study.config import HiddenConfig
 from accelstudy.plan.batch.config import PlanConfig
 from accelstudy.plan.batch.example import Example
 from accelstudy.pole.report.config import PoleConfig
+from accelstudy.proposal.config import DesignsConfig
 from accelstudy.sequential.config import SequentialConfig
 from accelstudy.study.config import config_schema
 

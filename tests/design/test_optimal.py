@@ -32,8 +32,8 @@ from accelstudy.design.optimal.spaces import (
     listed_in,
 )
 from accelstudy.design.optimal.task import Task
-from accelstudy.design.proposal.separation import Explained, Separation
 from accelstudy.leveling.error import cap_forces, tilt_error
+from accelstudy.proposal.separation import Explained, Separation
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise, session

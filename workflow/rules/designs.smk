@@ -1,4 +1,4 @@
-from accelstudy.design.proposal.config import DesignsConfig
+from accelstudy.proposal.config import DesignsConfig
 
 DESIGNS = section("designs", DesignsConfig)
 DESIGNS_FILES = {kind: f"{RESULTS}/designs/efficiency.{kind}" for kind in ("parquet", "svg", "png")}

@@ -1,10 +1,10 @@
-from accelstudy.design.proposal.config import DesignsConfig
-from accelstudy.design.proposal.efficiency import efficiency_table
-from accelstudy.design.proposal.figure import efficiency_figure
 from accelstudy.drawing.saving import save
 from accelstudy.drawing.style import DPI
 from accelstudy.files.tables import write_table
 from accelstudy.jobs.job import logged
+from accelstudy.proposal.config import DesignsConfig
+from accelstudy.proposal.efficiency import efficiency_table
+from accelstudy.proposal.figure import efficiency_figure
 from accelstudy.schemes import get_scheme
 
 with logged(snakemake):

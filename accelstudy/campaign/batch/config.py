@@ -20,7 +20,7 @@ from accelstudy.basics.names import check_path_name
 from accelstudy.campaign.files.header import HEADER, TABLES
 from accelstudy.campaign.importing.public import import_settings
 from accelstudy.campaign.importing.settings import GravitySettings, ImportSettings
-from accelstudy.design.config_names import ModelName
+from accelstudy.config_names import ModelName
 from accelstudy.files.layers import overlay, read_layer
 from accelstudy.files.types import PathName
 from accelstudy.files.validation import Block, checked

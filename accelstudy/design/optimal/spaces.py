@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import ANGLE_UNITS, to_si
 from accelstudy.leveling.angles import angles_of, specific_force
-from accelstudy.schemes import get_scheme
-from accelstudy.schemes.polyhedra import corners, edges, faces
+from accelstudy.positions.cube import corners, edges, faces
+from accelstudy.positions.sphere import evenly_spread
 
 Array = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ class Sphere(Space):
 
     def directions(self, count: int) -> Array:
         """Points of the Fibonacci lattice."""
-        return get_scheme(f"fibonacci-{count}").directions
+        return evenly_spread(count)
 
     def tangents(self, directions: Array) -> Array:
         """Return two directions across gravity."""

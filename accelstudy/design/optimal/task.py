@@ -15,7 +15,8 @@ from accelstudy.basics.units import GON, STANDARD_GRAVITY
 from accelstudy.design.estimability import estimability
 from accelstudy.design.optimal.information import information, position_rows
 from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON, TiltError, cap_forces, tilt_error
-from accelstudy.schemes import Scheme, get_scheme
+from accelstudy.positions.scheme import Scheme
+from accelstudy.positions.sphere import evenly_spread
 from accelstudy.sensors.models import compose, composition_name
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.hold_plan import HoldPlan, check_needs_no_plan
@@ -23,7 +24,8 @@ from accelstudy.simulation.sessions import Noise
 
 Array = NDArray[np.float64]
 
-SPHERE = "fibonacci-300"
+SPHERE = 300
+"""Attitudes that stand for the whole sphere."""
 LOOKING_BACK = ("step_x", "step_y", "step_z", "order")
 
 
@@ -99,7 +101,7 @@ class Task:
     @cached_property
     def scale(self) -> Array:
         """Root of the information of one position on each parameter, mean over the sphere, (u,)."""
-        rows = self._rows(get_scheme(SPHERE).directions)
+        rows = self._rows(evenly_spread(SPHERE))
         size = np.sqrt(np.mean(np.sum(rows**2, axis=1), axis=0))
         return np.where(size > 1e-12 * size.max(), size, 1.0)
 

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.design.proposal.separation import Explained, Separation
 from accelstudy.diagnosis.space.frame import Frame
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.diagnosis.space.signatures import signature
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import roll_pitch
+from accelstudy.proposal.separation import Explained, Separation
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import compose
 
@@ -61,7 +61,7 @@ def next_positions(frame: Frame, first: Explanation, second: Explanation) -> lis
     Both are fitted to all positions, each together with the parameters of the model. Of a grid of
     attitudes, at the lowest, middle and highest temperature so far and right after the session or
     later, those are chosen one after the other that add most to the separation, in which the
-    explanation that is wrong may be fitted to them, too (`accelstudy.design.proposal.separation`).
+    explanation that is wrong may be fitted to them, too (`accelstudy.proposal.separation`).
     Temperature and time vary only where one of the effects depends on them. Where the attitude
     hardly matters, those from the start of the session are to be repeated, so that readings can be
     compared without any model.

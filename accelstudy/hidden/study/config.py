@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, UnknownNameError
-from accelstudy.design.config_names import ModelName
+from accelstudy.config_names import ModelName
 from accelstudy.effects import effect_names
 from accelstudy.files.types import OneOrMore, PathName, Positive, Replicates, Seed
 from accelstudy.files.validation import Block, checked

@@ -9,8 +9,8 @@ from pydantic import Field, model_validator
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
+from accelstudy.config_names import ModelName
 from accelstudy.data_sheets import data_sheet_names, get_data_sheet
-from accelstudy.design.config_names import ModelName
 from accelstudy.files.validation import Block
 from accelstudy.pole.instrument.sensor import CalibratedSensor, from_calibration, from_linear_theory
 from accelstudy.pole.instrument.setup import HOLD, ROBOT_SIGMA, check_one_kind

@@ -17,7 +17,7 @@ from accelstudy.basics import bounds
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.names import LONGEST
 from accelstudy.basics.units import STANDARD_GRAVITY, to_si
-from accelstudy.design.config_names import ModelName, SchemeName
+from accelstudy.config_names import ModelName, SchemeName
 from accelstudy.design.estimability import estimability
 from accelstudy.effects import Effect, get_effect
 from accelstudy.files.provenance import config_hash

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from accelstudy.approaches import approach_names, get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON
-from accelstudy.design.config_names import ModelName, SchemeName
+from accelstudy.config_names import ModelName, SchemeName
 from accelstudy.design.optimal.task import Task
 from accelstudy.files.types import OneOrMore, SigmaAngle, SigmaForce, Tilt
 from accelstudy.files.validation import Block

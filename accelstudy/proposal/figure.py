@@ -20,7 +20,7 @@ def efficiency_figure(table: pd.DataFrame) -> Figure:
 
     Parameters
     ----------
-    table : DataFrame of `accelstudy.design.proposal.efficiency.efficiency_table`
+    table : DataFrame of `accelstudy.proposal.efficiency.efficiency_table`
     """
     with mpl.rc_context(STYLE):  # type: ignore[arg-type]
         approaches = list(dict.fromkeys(table["approach"]))

@@ -15,9 +15,9 @@ from accelstudy.basics.units import GON, MGON, angles_in
 from accelstudy.design.optimal.criteria import Rivals
 from accelstudy.design.optimal.search import Design
 from accelstudy.design.optimal.spaces import Mountings
-from accelstudy.design.proposal.design_file import rounded
-from accelstudy.design.proposal.order import field_order
-from accelstudy.design.proposal.request import Request
+from accelstudy.proposal.design_file import rounded
+from accelstudy.proposal.order import field_order
+from accelstudy.proposal.request import Request
 from accelstudy.schemes import get_scheme
 
 Array = NDArray[np.float64]
