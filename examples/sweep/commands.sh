@@ -1,0 +1,13 @@
+# A sweep of one's own, in a clone of the project, beside its folder config/.
+
+# --8<-- [start:cells]
+accelstudy cells config/config.yaml quadratic.yaml
+# --8<-- [end:cells]
+
+# --8<-- [start:run]
+snakemake --cores 2 --configfile quadratic.yaml
+# --8<-- [end:run]
+
+# --8<-- [start:read]
+python read.py
+# --8<-- [end:read]

@@ -1,0 +1,116 @@
+"""The examples run, print what the tutorials show of it, and what they say of it is so."""
+
+import re
+
+import numpy as np
+import pytest
+import yaml
+from example_helpers import EXAMPLES, FIGURES, SHOWN, run_example
+from places import ROOT
+
+from accelstudy.files.tables import read_table
+
+NAMES = sorted(path.parent.name for path in EXAMPLES.glob("*/commands.sh"))
+NUMBER = re.compile(r"(?<![\w.])[-−]?\d+\.?\d*(?:e[-+]?\d+)?")
+TOLERANCE = {"rel": 2e-3, "abs": 0.011}
+"""Of a printed number: other processors may round another way."""
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """Output of all examples by section, and the folder of each."""
+    folders = {name: tmp_path_factory.mktemp(name) for name in NAMES}
+    return {name: (run_example(name, folder), folder) for name, folder in folders.items()}
+
+
+def numbers(text):
+    return [float(number.replace("−", "-")) for number in NUMBER.findall(text)]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_tutorial_shows_what_the_example_prints(run, name):
+    outputs, folder = run[name]
+    shown = {path.stem: path.read_text("utf-8") for path in (SHOWN / name).glob("*.txt")}
+    assert shown.keys() == {section for section, output in outputs.items() if output}
+    for section, text in shown.items():
+        printed = outputs[section]
+        assert NUMBER.sub("#", printed) == NUMBER.sub("#", text), section
+        assert numbers(printed) == pytest.approx(numbers(text), **TOLERANCE), section
+    assert all((folder / figure).stat().st_size > 5000 for figure in FIGURES.get(name, ()))
+
+
+def of_lines(text):
+    """First word of each line, and its numbers."""
+    return {line.split()[0].rstrip(":"): numbers(line) for line in text.splitlines() if line}
+
+
+def test_a_robot_halves_the_tilt_error_of_the_paper(run):
+    lines = of_lines(run["paper"][0]["paper"])
+    for name, better in {"b_x": 0.41, "s_x": 0.28, "alpha_zx": 0.54, "roll": 0.5}.items():
+        gravity, robot = lines[name][:2]
+        assert 1 - robot / gravity == pytest.approx(better, abs=0.03)
+    assert [lines[name][0] for name in ("gravity", "robot")] == [15, 63]
+
+
+def test_the_log_levels_to_what_its_calibration_promised(run):
+    outputs, _ = run["log"]
+    raw, calibrated = (numbers(line) for line in outputs["apply"].splitlines()[1:])
+    promised = numbers(re.search("tilt error of .*? in pitch", outputs["calibrate"])[0])
+    assert min(raw) > 250
+    assert max(calibrated) < 1.5 * max(promised) < 4
+    assert "ACCEPTED" in outputs["calibrate"]
+
+
+def test_the_hidden_effect_is_found_and_explains_the_misfit(run):
+    outputs, folder = run["hidden"]
+    assert "REJECTED" in outputs["calibrate"]
+    assert "ACCEPTED" in outputs["extend"]
+    assert "it is thermal bias" in outputs["diagnose"]
+    truth = yaml.safe_load((folder / "truth.yaml").read_text())["effects"][0]["parameters"]
+    found = of_lines(outputs["extend"])
+    for parameter in truth:
+        value, sigma = found[parameter["name"]][:2]
+        assert abs(value - 1e3 * parameter["value"]) < 3 * sigma
+
+
+def test_to_estimate_the_quadratic_term_pays_from_fifty_positions_on(run):
+    table = read_table(run["sweep"][1] / "results/quadratic/leveling.parquet")
+    n = table["scheme"].str.extract(r"(\d+)")[0].astype(int)
+    worse = np.maximum(table["roll_rms_mgon"], table["pitch_rms_mgon"])
+    estimated = table["model"].str.endswith("quadratic")
+
+    def pays(approach, positions):
+        row = (table["approach"] == approach) & (n == positions)
+        return float(worse[row & estimated].iloc[0]) < float(worse[row & ~estimated].iloc[0])
+
+    assert [pays("gravity", k) for k in (14, 18, 24, 36, 50, 72)] == 4 * [False] + 2 * [True]
+    assert all(pays("robot", k) for k in (14, 18, 24, 36, 50, 72))
+
+
+def test_the_diagnosis_finds_an_effect_of_the_readers_own(run):
+    text = run["effect"][0]["find"]
+    assert "The model lacks ripple" in text
+    assert float(re.search(r"ripple\(period=([\d.]+)\)$", text)[1]) == pytest.approx(5, abs=0.1)
+
+
+def test_the_sides_of_the_box_tell_the_scales_apart(run):
+    text = run["scheme"][0]["compare"]
+    assert re.search("wedge-8 +gravity +rank 8 of 9: s_x, s_y, s_z", text)
+    assert "rank" not in re.search("wedge-sides-8 +gravity.*", text)[0]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_each_section_of_an_example_stands_in_its_tutorial(name):
+    page = next((ROOT / "docs" / "tutorials").glob(f"{name}.md")).read_text("utf-8")
+    for path in sorted((EXAMPLES / name).glob("*.*")):
+        marks = re.findall(r"\[start:(\w+)\]", path.read_text("utf-8"))
+        wanted = [f"examples/{name}/{path.name}:{mark}" for mark in marks]
+        assert all(f'"{one}"' in page for one in wanted or [f"examples/{name}/{path.name}"])
+
+
+def test_no_example_leaves_anything_registered(run):
+    from accelstudy.effects import effect_names
+    from accelstudy.schemes import scheme_families
+
+    assert "ripple" not in effect_names()
+    assert "wedge-N" not in scheme_families()
