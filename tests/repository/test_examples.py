@@ -1,4 +1,4 @@
-"""The examples run, print what the tutorials show of it, and what they say of it is so."""
+"""Examples print what the tutorials show; what pages for beginners say of accuracies is so."""
 
 import re
 
@@ -8,19 +8,37 @@ import yaml
 from example_helpers import EXAMPLES, FIGURES, SHOWN, run_example
 from places import ROOT
 
+from accelstudy.approaches import get_approach
+from accelstudy.basics.units import GON, MGON
+from accelstudy.design.estimability import estimability
 from accelstudy.files.tables import read_table
+from accelstudy.leveling.error import cap_forces, tilt_error
+from accelstudy.schemes import get_scheme
+from accelstudy.sensors.models import get_model
+from accelstudy.simulation.sessions import Noise
 
+NINE = get_model("bias-scale-nonorthogonality")
 NAMES = sorted(path.parent.name for path in EXAMPLES.glob("*/commands.sh"))
 NUMBER = re.compile(r"(?<![\w.])[-−]?\d+\.?\d*(?:e[-+]?\d+)?")
 TOLERANCE = {"rel": 2e-3, "abs": 0.011}
 """Of a printed number: other processors may round another way."""
 
 
+class Runs(dict):
+    """Output of an example by section, and its folder; each runs when it is asked for."""
+
+    def __init__(self, folder_of):
+        self.folder_of = folder_of
+
+    def __missing__(self, name):
+        folder = self.folder_of(name)
+        self[name] = run_example(name, folder), folder
+        return self[name]
+
+
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    """Output of all examples by section, and the folder of each."""
-    folders = {name: tmp_path_factory.mktemp(name) for name in NAMES}
-    return {name: (run_example(name, folder), folder) for name, folder in folders.items()}
+    return Runs(tmp_path_factory.mktemp)
 
 
 def numbers(text):
@@ -109,8 +127,42 @@ def test_each_section_of_an_example_stands_in_its_tutorial(name):
 
 
 def test_no_example_leaves_anything_registered(run):
+    assert run["effect"]
+    assert run["scheme"]
     from accelstudy.effects import effect_names
     from accelstudy.schemes import scheme_families
 
     assert "ripple" not in effect_names()
     assert "wedge-N" not in scheme_families()
+
+
+def linear_theory(scheme, approach="gravity", **noise):
+    """Rms tilt error of the worse angle up to 30 gon, mgon."""
+    ideal = np.zeros(NINE.n_parameters)
+    error = tilt_error(NINE, ideal, NINE, ideal, cap_forces(30 * GON, 200))
+    theory = estimability(get_scheme(scheme), NINE, get_approach(approach), Noise(**noise))
+    return float(error.rms_of_all(theory.cofactors).max()) / MGON
+
+
+def test_positions_by_hand_leave_what_a_geodesist_reads():
+    text = (ROOT / "docs/start/geodesist.md").read_text("utf-8")
+    rows = re.findall(r"\| `(\S+)` \| ([\d.]+) mgon \| ([\d.]+) mgon", text)
+    assert len(rows) == 6
+    for scheme, *told in rows:
+        left = [linear_theory(scheme, sigma_force=sigma) for sigma in (0.001, 0.002)]
+        assert [float(value) for value in told] == pytest.approx(left, abs=0.06), scheme
+
+
+def test_a_robot_is_worth_what_a_robotics_engineer_reads():
+    text = (ROOT / "docs/start/robotics.md").read_text("utf-8")
+    assert "robot of 1 mgon | 3.2 mgon | 10 mgon | 32 mgon | 100 mgon" in text
+    rows = re.findall(r"^\| ([\d.]+) mm/s² ((?:\| [\d.]+ ){6})\|", text, re.MULTILINE)
+    assert len(rows) == 2
+    for sigma, told in rows:
+        noise = {"sigma_force": 1e-3 * float(sigma)}
+        left = [linear_theory("mclaren-24", **noise)]
+        left += [
+            linear_theory("mclaren-24", "robot", sigma_angle=angle * MGON, **noise)
+            for angle in (1, 3.2, 10, 32, 100)
+        ]
+        assert numbers(told) == pytest.approx(left, abs=0.06)
