@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, ClassVar, TypeVar
 
 from accelstudy.basics.registry import Registry
-from accelstudy.effects.base import Number, Vector
+from accelstudy.effects.components import Number, Vector
 
 
 class Approach:

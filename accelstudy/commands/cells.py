@@ -21,8 +21,8 @@ def cells_command(configs: tuple[Path, ...]) -> None:
     """
     from accelstudy.design.estimability import estimability
     from accelstudy.study.cells.cell import study_cells
-    from accelstudy.study.cells.effort import study_effort
     from accelstudy.study.config import read_study
+    from accelstudy.study.monte_carlo.effort import study_effort
 
     study = read_study(*configs)
     chosen = study_cells(study)

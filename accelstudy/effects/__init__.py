@@ -8,13 +8,13 @@ definition. To add one, write a module next to this file with a class under `reg
 from accelstudy.basics.registry import Setting, import_modules
 from accelstudy.effects.base import (
     Effect,
-    HoldConditions,
     Parameter,
     effect_names,
     effects_without,
     get_effect,
     register,
 )
+from accelstudy.effects.hold_conditions import HoldConditions
 from accelstudy.effects.lag import Course
 
 __all__ = [

@@ -1,6 +1,7 @@
 """Cross-coupling: the output of an axis depends on products with the other two."""
 
-from accelstudy.effects.base import AXES, Effect, Parameter, register
+from accelstudy.effects.base import Effect, Parameter, register
+from accelstudy.effects.components import AXES
 
 
 @register

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import re
 from itertools import product
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
 
 from accelstudy.basics.tracing import symbolic, symbols
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.effects.base import AXES, Effect, HoldConditions, Matrix
+from accelstudy.effects.components import AXES, Matrix
+from accelstudy.effects.hold_conditions import HoldConditions
 from accelstudy.effects.hold_symbols import HoldSymbols
+
+if TYPE_CHECKING:
+    from accelstudy.effects.base import Effect
 
 USUAL = (1e-4, 1e-3)
 """Parts of g by which an effect of usual size changes a reading."""

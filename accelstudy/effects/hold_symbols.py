@@ -7,7 +7,7 @@ from typing import Any
 import sympy as sp
 
 from accelstudy.basics.tracing import symbols
-from accelstudy.effects.base import HoldConditions
+from accelstudy.effects.hold_conditions import HoldConditions
 
 
 class HoldSymbols:

@@ -3,7 +3,8 @@
 import numpy as np
 
 from accelstudy.basics.registry import Setting
-from accelstudy.effects.base import REFERENCE_TEMPERATURE, Effect, per_axis, register
+from accelstudy.effects.base import Effect, per_axis, register
+from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
 
 LAGS = (0.04, 0.1, 0.25)
 """Time constants of a lag that are tried, in parts of the session."""

@@ -1,6 +1,7 @@
 """Thermal curve: the zero offset is no linear function of temperature."""
 
-from accelstudy.effects.base import REFERENCE_TEMPERATURE, Effect, per_axis, register
+from accelstudy.effects.base import Effect, per_axis, register
+from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
 
 
 @register

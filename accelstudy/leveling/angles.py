@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.effects import HoldConditions
-from accelstudy.effects.base import Number, Vector
+from accelstudy.effects.components import Number, Vector
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ from accelstudy.adjustment import Observations, whitened_jacobian
 from accelstudy.approaches import Approach
 from accelstudy.campaign.files.format import Campaign
 from accelstudy.effects import HoldConditions
-from accelstudy.effects.base import REFERENCE_TEMPERATURE
+from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
 from accelstudy.leveling.angles import angles_of, roll_pitch
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise

@@ -16,7 +16,7 @@ from accelstudy.design.estimability import estimability
 from accelstudy.diagnosis.report.words.families import family_of
 from accelstudy.diagnosis.report.words.summary import GROUPS
 from accelstudy.effects import Course, HoldConditions, effect_names, get_effect
-from accelstudy.effects.base import STILL
+from accelstudy.effects.hold_conditions import STILL
 from accelstudy.leveling.angles import roll_pitch, specific_force
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.sensor import SensorModel

@@ -388,7 +388,7 @@ def test_a_figure_that_cannot_be_drawn_is_named(tables, paper, tmp_path):
 
 IMPORTED = """\
 import sys
-import accelstudy.study.figures, accelstudy.study.cells.effort
+import accelstudy.study.figures, accelstudy.study.monte_carlo.effort
 import accelstudy.jobs.earlier, accelstudy.jobs.job
 print([name for name in ("matplotlib", "pandas", "scipy.stats") if name in sys.modules])
 """

@@ -15,7 +15,7 @@ from accelstudy.study.cells.batches import batches
 from accelstudy.study.cells.cell import study_cells
 from accelstudy.study.config import parse_study
 from accelstudy.files.layers import read_layer
-from accelstudy.study.cells.effort import study_effort
+from accelstudy.study.monte_carlo.effort import study_effort
 from accelstudy.jobs.job import setup_digest
 from accelstudy.files.provenance import check_writable
 from accelstudy.jobs.code import code_hash

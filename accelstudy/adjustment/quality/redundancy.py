@@ -11,7 +11,7 @@ from scipy import special
 from accelstudy.adjustment.quality.solution import Solution
 from accelstudy.basics.units import GON
 from accelstudy.effects import HoldConditions
-from accelstudy.effects.base import REFERENCE_TEMPERATURE
+from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
 from accelstudy.leveling.angles import roll_pitch, tilt_slope
 from accelstudy.leveling.error import MAX_TILT_GON, cap_forces
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.effects.base import Number, Vector
+from accelstudy.effects.components import Number, Vector
 
 Array = NDArray[np.float64]
 

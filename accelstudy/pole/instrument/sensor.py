@@ -16,7 +16,7 @@ from accelstudy.campaign.use.applying import read_calibration
 from accelstudy.data_sheets import DataSheet
 from accelstudy.design.estimability import estimability
 from accelstudy.effects import HoldConditions
-from accelstudy.effects.base import REFERENCE_TEMPERATURE
+from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
 from accelstudy.effects.lag import Course
 from accelstudy.leveling.angles import roll_pitch
 from accelstudy.schemes import get_scheme

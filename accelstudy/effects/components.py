@@ -1,0 +1,15 @@
+"""The components on which the formulas of effects work: numbers, arrays or symbols."""
+
+from __future__ import annotations
+
+from typing import Any
+
+AXES = ("x", "y", "z")
+
+# Numbers, arrays or symbols, whatever the namespace `xp` works on.
+Number = Any
+Vector = tuple[Number, Number, Number]
+Matrix = tuple[Vector, Vector, Vector]
+
+ZERO_VECTOR: Vector = (0, 0, 0)
+ZERO_MATRIX: Matrix = (ZERO_VECTOR, ZERO_VECTOR, ZERO_VECTOR)
