@@ -37,7 +37,15 @@ UNITS: dict[str, dict[str, float]] = {
     },
     "1": {"ppm": 1e-6, "%": 1e-2, "1": 1.0},
     "m": {"mm": 1e-3, "cm": 1e-2, "m": 1.0},
-    "s": {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0},
+    "s": {
+        "s": 1.0,
+        "ms": 1e-3,
+        "us": 1e-6,
+        "ns": 1e-9,
+        "min": 60.0,
+        "h": 3600.0,
+        "d": 86400.0,
+    },
     "kg": {"kg": 1.0, "g": 1e-3},
     "m/s^2": {
         "mm/s^2": 1e-3,
@@ -85,6 +93,13 @@ UNITS: dict[str, dict[str, float]] = {
     "K": {"K": 1.0, "degC": 1.0},
 }
 """SI unit -> {unit that people use: its size in the SI unit}; the first is the one we record."""
+
+SENSOR_UNITS = ("m/s^2", "g", "mg")
+"""Units in which sensors give specific forces."""
+ROBOT_UNITS = {"gon": "gon", "deg": "degrees", "rad": "radians"}
+"""Units in which robots give angles, and their names in a sentence."""
+CLOCK_UNITS = ("s", "ms", "us", "ns")
+"""Units in which logs give the time."""
 
 ANGLE_UNITS = {"gon": "mgon", "deg": "mdeg"}
 """Units in which angles can be shown: that of an attitude -> that of a small angle."""

@@ -22,7 +22,7 @@ from accelstudy.commands.options import (
 )
 
 if TYPE_CHECKING:
-    from accelstudy.campaign.files.format import Campaign
+    from accelstudy.campaign.files.session import Campaign
     from accelstudy.sequential.prior import Prior
 
 POLL = 1.0

@@ -19,7 +19,7 @@ from accelstudy.commands.options import (
 )
 
 if TYPE_CHECKING:
-    from accelstudy.campaign.importing.conversion import ImportReport
+    from accelstudy.campaign.importing.logs import ImportReport
 
 
 _SECTIONS = {
@@ -79,7 +79,7 @@ def import_command(
     pattern are one position each. Without --threshold the noise of the log itself says what is at
     rest; segmentation.png in the folder shows the outcome, with the numbers of the holds.
     """
-    from accelstudy.campaign.importing.conversion import import_each
+    from accelstudy.campaign.importing.logs import import_each
     from accelstudy.commands.import_options import files_of, settings_of
     from accelstudy.files.outputs import CAMPAIGN, result_folder
 

@@ -32,7 +32,7 @@ def public_command(name: str | None, out: Path | None, folder: Path, force: bool
     NAME is that of the data; without it they are listed. A download is checked by its sha256, and
     goes on where an earlier one broke off.
     """
-    from accelstudy.campaign.importing.conversion import import_to
+    from accelstudy.campaign.importing.logs import import_to
     from accelstudy.campaign.importing.public import import_settings, public_data, public_file
     from accelstudy.files.outputs import CAMPAIGN, result_folder
 

@@ -10,10 +10,9 @@ from accelstudy.data_sheets.reading import (
     parse_data_sheet,
     read_data_sheet,
 )
-from accelstudy.data_sheets.sheet import ASSUMED, QUANTITIES, DataSheet, of_sigma
+from accelstudy.data_sheets.sheet import QUANTITIES, DataSheet, of_sigma
 
 __all__ = [
-    "ASSUMED",
     "QUANTITIES",
     "DataSheet",
     "data_sheet_names",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yaml
@@ -13,7 +14,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import recorded_unit, to_recorded
 from accelstudy.campaign.files.format import read_campaign
 from accelstudy.campaign.holds.allan import RELIABLE, AllanDeviation
-from accelstudy.campaign.importing.conversion import import_log
+from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.data_sheets.flicker import FLICKER
 from accelstudy.data_sheets.sheet import QUANTITIES, DataSheet
@@ -57,7 +58,7 @@ def sheet_of_allan(curve: AllanDeviation, name: str, source: str) -> DataSheet:
     found, _ = nnls(kinds * weight[:, None], variance * weight)
     seen = np.max(kinds * found / variance[:, None], axis=0) > SEEN
     longest = f"Allan deviation of {source} up to {tau[-1]:.3g} s"
-    values = {
+    values: dict[str, Any] = {
         "velocity_random_walk": math.sqrt(found[0]),
         "bias_instability": math.sqrt(found[1]) / FLICKER if seen[1] else None,
         "acceleration_random_walk": math.sqrt(3 * found[2]) if seen[2] else None,

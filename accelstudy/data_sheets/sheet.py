@@ -39,6 +39,7 @@ class DataSheet:
     ----------
     name, title, source : str
     sources : mapping of quantity to where its value comes from
+    assumed : frozenset of quantities whose value is taken for granted
     """
 
     name: str
@@ -58,6 +59,7 @@ class DataSheet:
     nonlinearity: float | None = None
     full_scale: float | None = None
     sources: Mapping[str, str] = field(default_factory=dict)
+    assumed: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         if self.velocity_random_walk is None and self.position_sigma is None:
@@ -142,10 +144,6 @@ class DataSheet:
         return 4 * self.nonlinearity * (STANDARD_GRAVITY / self.full_scale) ** 2
 
 
-ASSUMED = "assumed"
-"""Source of a value that is taken for granted."""
-
-
 def of_sigma(sigma: float) -> DataSheet:
     """Sensor of which only the noise of a position's mean is known, m/s².
 
@@ -157,5 +155,5 @@ def of_sigma(sigma: float) -> DataSheet:
         position_sigma=sigma,
         nonlinearity=0.0,
         full_scale=STANDARD_GRAVITY,
-        sources={"nonlinearity": ASSUMED, "full_scale": ASSUMED},
+        assumed=frozenset({"nonlinearity", "full_scale"}),
     )

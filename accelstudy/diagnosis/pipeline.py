@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from accelstudy.adjustment.quality import Solution
 from accelstudy.approaches import Approach, get_approach
 from accelstudy.basics.progress import stage
-from accelstudy.campaign.files.format import Campaign
+from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.gross_errors.recognition import Recognised, recognise
 from accelstudy.diagnosis.base_fit import BaseFit
 from accelstudy.diagnosis.beside import Beside

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from accelstudy.adjustment.quality import GlobalTest, Solution, global_test
 from accelstudy.adjustment.quality.whole_model import REFUTED
 from accelstudy.approaches import Approach
-from accelstudy.campaign.files.format import Campaign
+from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.gross_errors.recognition import Recognised
 from accelstudy.diagnosis.beside import Beside
 from accelstudy.diagnosis.decision.explanations import Explanation

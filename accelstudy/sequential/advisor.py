@@ -15,7 +15,7 @@ from accelstudy.campaign.calibration.fit import (
     check_campaign,
     initial_values,
 )
-from accelstudy.campaign.files.format import Campaign
+from accelstudy.campaign.files.session import Campaign
 from accelstudy.design.estimability import is_blind
 from accelstudy.leveling.error import TiltError
 from accelstudy.sensors.sensor import SensorModel

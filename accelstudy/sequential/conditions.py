@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment import Observations, whitened_jacobian
 from accelstudy.approaches import Approach
-from accelstudy.campaign.files.format import Campaign
+from accelstudy.campaign.files.session import Campaign
 from accelstudy.effects import HoldConditions
 from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
 from accelstudy.leveling.angles import angles_of, roll_pitch

@@ -9,7 +9,6 @@ import numpy as np
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.files.format import (
-    Campaign,
     campaign_of,
     parse_table,
     read_campaign,
@@ -18,6 +17,7 @@ from accelstudy.campaign.files.format import (
 )
 from accelstudy.campaign.files.header import HEADER, Header
 from accelstudy.campaign.files.position_files import columns_of, ignored_in
+from accelstudy.campaign.files.session import Campaign
 
 
 @dataclass(frozen=True)

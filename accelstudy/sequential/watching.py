@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.files.format import Campaign
 from accelstudy.campaign.files.header import COLUMNS
+from accelstudy.campaign.files.session import Campaign
 from accelstudy.sequential.running import read_running
 
 SETTLED = 3

@@ -14,10 +14,10 @@ from scipy.io import savemat
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON
-from accelstudy.campaign import Campaign
 from accelstudy.campaign.calibration.document import calibration_document
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.files.layout import LogLayout
+from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.use.applying import read_calibration
 from accelstudy.campaign.use.leveling import level_log
 from accelstudy.effects import HoldConditions

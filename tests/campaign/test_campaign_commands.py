@@ -11,8 +11,9 @@ from campaign_helpers import NINE, simulated_campaign
 from click.testing import CliRunner
 from page_helpers import assert_sound, text_of
 
-from accelstudy.campaign import Campaign, write_campaign
+from accelstudy.campaign.files.format import write_campaign
 from accelstudy.campaign.files.layout import LogLayout
+from accelstudy.campaign.files.session import Campaign
 from accelstudy.commands.main import main
 from accelstudy.simulation.sessions import Noise
 

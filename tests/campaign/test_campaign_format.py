@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
-from accelstudy.campaign.files.format import Campaign, read_campaign, write_campaign
+from accelstudy.campaign.files.format import read_campaign, write_campaign
 from accelstudy.campaign.files.layout import LogLayout
+from accelstudy.campaign.files.session import Campaign
 from accelstudy.leveling.angles import specific_force
 
 ROLL = np.array([0.0, 50.0, 100.0, 150.0, 200.0, -50.0, -100.0, 0.0])

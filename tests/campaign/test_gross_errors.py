@@ -278,7 +278,7 @@ def test_several_gross_errors_are_undone_together(designs):
     assert found.reasons["unit_error"] == "the forces are in g"
     assert found.reason.count(";") == len(found.reasons) - 1
     np.testing.assert_allclose(found.mended.forces, np.delete(right.forces, 20, axis=0), atol=0.06)
-    mended = np.delete(wrong.forces, 20, axis=0) @ found.conversion.T
+    mended = np.delete(wrong.forces, 20, axis=0) @ found.matrix.T
     np.testing.assert_allclose(np.sort(mended, axis=0), np.sort(found.mended.forces, axis=0))
 
 

@@ -14,7 +14,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY, angles_in
 from accelstudy.campaign.files.format import read_campaign
 from accelstudy.campaign.importing import segmentation_figure
-from accelstudy.campaign.importing.conversion import (
+from accelstudy.campaign.importing.logs import (
     ImportSettings,
     import_log,
     import_means,

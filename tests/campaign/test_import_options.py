@@ -14,7 +14,7 @@ from accelstudy.campaign.holds.allan import allan_moments
 from accelstudy.campaign.holds.segments import Moments, Segment
 from accelstudy.campaign.holds.slopes import slope_sigmas
 from accelstudy.campaign.importing import segmentation_figure
-from accelstudy.campaign.importing.conversion import (
+from accelstudy.campaign.importing.logs import (
     ImportSettings,
     import_log,
     import_means,

@@ -26,14 +26,17 @@ class GlobalTest:
     dof : int, r
     p_value : float
     accepted : bool, at the level asked for
-    remark : str, empty unless the test has no power
     """
 
     statistic: float
     dof: int
     p_value: float
     accepted: bool
-    remark: str
+
+    @property
+    def powerless(self) -> bool:
+        """Whether the redundancy is so small that the test hardly ever refuses anything."""
+        return self.dof <= NO_POWER
 
 
 def global_test(
@@ -51,11 +54,9 @@ def global_test(
         return None
     statistic = omega / variance
     below, above = special.chdtr(redundancy, statistic), special.chdtrc(redundancy, statistic)
-    remark = f"redundancy {redundancy}: the test has next to no power"
     return GlobalTest(
         statistic=float(statistic),
         dof=redundancy,
         p_value=float(2 * min(below, above)),
         accepted=bool(2 * min(below, above) >= alpha),
-        remark=remark if redundancy <= NO_POWER else "",
     )

@@ -96,7 +96,9 @@ def quality_document(assessment: Assessment) -> dict[str, Any]:
             "dof": test.dof,
             "p_value": test.p_value,
             "accepted": test.accepted,
-            "remark": test.remark,
+            "remark": f"redundancy {test.dof}: the test has next to no power"
+            if test.powerless
+            else "",
         },
         "suspects": [
             {"position": int(positions[s.position]), "p_value": json_number(s.p_value)}

@@ -15,8 +15,8 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
 from accelstudy.basics.wording import words
 from accelstudy.campaign.calibration.gauges import not_affine
-from accelstudy.campaign.files.format import Campaign
 from accelstudy.campaign.files.header import COLUMNS
+from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.gross_errors.recognition import recognise
 from accelstudy.campaign.holds.sphere import fit_sphere
 from accelstudy.design.estimability import Estimability, estimability
@@ -39,6 +39,20 @@ UNIT_SIGMA = 1e-3
 
 
 @dataclass(frozen=True)
+class JudgedNoise:
+    """What somebody made of the noise of a campaign.
+
+    Attributes
+    ----------
+    trusted : bool, whether the campaign states its noise, and nothing refutes it
+    variance : float, variance of unit weight to quote; 1 where the stated noise is trusted
+    """
+
+    trusted: bool
+    variance: float
+
+
+@dataclass(frozen=True)
 class CampaignFit:
     """A calibrated campaign.
 
@@ -48,8 +62,8 @@ class CampaignFit:
     observed : Observations, R = 1
     adjustment : Adjustment, R = 1
     estimability : Estimability, of the campaign's own positions
-    unit_variance : float, variance of unit weight to quote, where somebody has judged the noise by
-        more than this fit; by default its global test does
+    judged : JudgedNoise, where the noise was judged by more than this fit; by default the global
+        test of the fit judges it
     """
 
     campaign: Campaign
@@ -58,7 +72,7 @@ class CampaignFit:
     observed: Observations
     adjustment: Adjustment
     estimability: Estimability
-    unit_variance: float | None = None
+    judged: JudgedNoise | None = None
 
     @property
     def sigma_known(self) -> bool:
@@ -80,16 +94,16 @@ class CampaignFit:
     @property
     def trusts_sigma(self) -> bool:
         """Whether the a-priori noise is quoted: it is given, and the residuals do not refute it."""
-        if self.unit_variance is not None:
-            return self.sigma_known and self.unit_variance == 1
+        if self.judged is not None:
+            return self.judged.trusted
         test = self.global_test
         return self.sigma_known and (test is None or test.accepted)
 
     @property
     def variance_factor(self) -> float:
         """Variance of unit weight to quote: 1 if a-priori noise is trusted, else a posteriori."""
-        if self.unit_variance is not None:
-            return self.unit_variance
+        if self.judged is not None:
+            return self.judged.variance
         return 1.0 if self.trusts_sigma else float(self.adjustment.variance_posteriori[0])
 
     @property

@@ -36,7 +36,7 @@ def state(assessment: Assessment) -> str:
         return IMPLAUSIBLE
     if test is not None and not test.accepted:
         return REJECTED
-    return UNCHECKED if test is None or test.remark else ACCEPTED
+    return UNCHECKED if test is None or test.powerless else ACCEPTED
 
 
 def warnings(assessment: Assessment) -> list[str]:
@@ -155,7 +155,7 @@ def _consistency(fit: CampaignFit) -> list[str]:
             "The noise of a position is not stated, so nothing says whether the model is complete.",
             f"From the residuals it is {1e3 * fit.sigma_position:.2f} mm/s² with r = {r}.",
         ]
-    if test.accepted and test.remark:
+    if test.accepted and test.powerless:
         return [f"With r = {r} the test of the model has next to no power."]
     ratio = float(np.sqrt(test.statistic / test.dof))
     p = p_value(test.p_value)

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.basics.units import ROBOT_UNITS, STANDARD_GRAVITY, UNITS
 from accelstudy.campaign.files.header import ANY, COLUMNS, COUNTING, HEADER, MOST, RANGES, Header
-from accelstudy.campaign.gross_errors.unit_error import ANGLES, FORCES, WORDS
 from accelstudy.leveling.angles import specific_force
 
 Array = NDArray[np.float64]
@@ -104,7 +103,8 @@ def likely_fault(given: float, norm: float, unit: str, gravity: float) -> str | 
         return None
     if near(norm, STANDARD_GRAVITY):
         return "gravity"
-    better = [u for u in ("m/s^2", "g") if u != unit and near(given * FORCES[u], gravity)]
+    sizes = UNITS["m/s^2"]
+    better = [u for u in ("m/s^2", "g") if u != unit and near(given * sizes[u], gravity)]
     if not better and unit != "counts" and given > 100:
         better = ["counts"]
     return better[0] if better else "unknown"
@@ -162,10 +162,12 @@ def check_angles(angles: Array, forces: Array, gravity: float, path: Path) -> No
     """Check that no other reading of the robot's angles fits the forces clearly better than gon."""
 
     def misfit(unit: str, sign: int = 1) -> float:
-        return misfit_of_angles(angles * ANGLES[unit], sign * forces, gravity)
+        return misfit_of_angles(angles * UNITS["rad"][unit], sign * forces, gravity)
 
     readings = {
-        f"the angles look like {word}, not gon": misfit(unit) for unit, word in WORDS.items()
+        f"the angles look like {word}, not gon": misfit(unit)
+        for unit, word in ROBOT_UNITS.items()
+        if unit != "gon"
     }
     opposite = "the forces have the opposite sign; at level specific force is (0, 0, -g)"
     readings[opposite] = misfit("gon", -1)

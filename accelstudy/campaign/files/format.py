@@ -33,8 +33,6 @@ from accelstudy.files.outputs import whole_file
 from accelstudy.files.parquet import write_parquet
 from accelstudy.files.validation import checked
 
-__all__ = ["Campaign", "read_campaign", "write_campaign"]
-
 Array = NDArray[np.float64]
 
 
@@ -166,8 +164,7 @@ def parse_table(columns: Columns, header: Header, path: Path, plausible: bool = 
     values: dict[str, Any] = {}
     with np.errstate(all="ignore"):  # what overflows is nowhere near gravity, and found so
         for attribute, array in given.items():
-            scale, offset = header.to_si(attribute)
-            values[attribute] = (array - offset) * scale
+            values[attribute] = header.conversion(attribute).to_si(array)
         check = check_norm if plausible else check_size
         check(given["forces"], values["forces"], header, path)
         if plausible:
@@ -271,7 +268,6 @@ def _columns_of(campaign: Campaign, header: Header) -> dict[str, list[Any]]:
         if np.shape(values) != shape:
             raise InputError(f"{campaign.name}: {attribute}: shape {np.shape(values)}, not {shape}")
         if attribute not in COUNTING:
-            scale, offset = header.to_si(attribute)
-            values = np.asarray(values, dtype=float) / scale + offset
+            values = header.conversion(attribute).from_si(np.asarray(values, dtype=float))
         columns.update(zip(names, np.reshape(values, (-1, len(names))).T.tolist(), strict=True))
     return columns

@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
-from accelstudy.basics.units import GON, to_si
+from accelstudy.basics.units import GON
 from accelstudy.campaign.files.layout import LogLayout
 from accelstudy.files.types import (
     Finite,
@@ -22,6 +22,7 @@ from accelstudy.files.types import (
     SigmaGravity,
 )
 from accelstudy.files.validation import Block
+from accelstudy.sensors.conversion import Conversion, conversion_of
 
 Array = NDArray[np.float64]
 
@@ -120,16 +121,18 @@ class Header(Block):
             raise ValueError(f"nominal: goes with unit: counts, not with unit: {self.unit}")
         return self
 
-    def to_si(self, attribute: str) -> tuple[Array, Array]:
-        """Scale and offset of columns: SI = (value in the file − offset) · scale."""
-        zero, one = np.zeros(1), np.ones(1)
+    def conversion(self, attribute: str) -> Conversion:
+        """Conversion of the columns of an attribute to SI."""
         if attribute in ("angles", "yaw"):
-            return GON * one, zero
+            return Conversion(np.array([GON]), np.zeros(1))
         if attribute not in ("forces", "sd", "slope", "sd_slope"):
-            return one, zero
+            return Conversion(np.ones(1), np.zeros(1))
         if self.nominal is None:
-            return to_si(one, self.unit, "m/s^2"), zero
-        scale, offset = np.array(self.nominal.scale), np.array(self.nominal.offset)
+            forces = conversion_of(self.unit)
+        else:
+            forces = Conversion(np.array(self.nominal.scale), np.array(self.nominal.offset))
         if attribute == "forces":
-            return scale, offset
-        return (scale if attribute == "slope" else np.abs(scale)), zero
+            return forces
+        # Differences have no offset, and sds no sign.
+        scale = forces.scale if attribute == "slope" else np.abs(forces.scale)
+        return Conversion(scale, np.zeros(3))

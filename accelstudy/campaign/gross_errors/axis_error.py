@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from itertools import permutations, product
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.registry import Setting
+from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.gross_errors.base import (
     EVERYWHERE,
     Array,
@@ -19,10 +20,7 @@ from accelstudy.campaign.gross_errors.base import (
     register,
     with_readings,
 )
-
-if TYPE_CHECKING:
-    from accelstudy.campaign.files.session import Campaign
-    from accelstudy.campaign.gross_errors.real_sensor import RealSensor
+from accelstudy.campaign.gross_errors.real_sensor import RealSensor
 
 SIGNED_PERMUTATIONS = tuple(
     tuple(sign * axis for sign, axis in zip(signs, axes, strict=True))

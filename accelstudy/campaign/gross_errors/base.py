@@ -9,17 +9,15 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.registry import RegistryWithSettings, WithSettings
-
-if TYPE_CHECKING:  # the reader of campaigns takes the units of `unit_error`
-    from accelstudy.campaign.files.session import Campaign
-    from accelstudy.campaign.gross_errors.real_sensor import RealSensor
+from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.gross_errors.real_sensor import RealSensor
 
 Array = NDArray[np.float64]
 
@@ -39,14 +37,14 @@ class Mending:
     ----------
     reason : str, what is wrong, in words
     campaign : Campaign, as it would have been right
-    conversion : (3, 3) array, turns forces as they were read into mended ones, where it is not I
+    matrix : (3, 3) array, turns forces as they were read into mended ones, where it is not I
     changed : (n,) bool array, which positions would be others, where it is not all of them
     left_out : tuple of int, positions that cannot be mended
     """
 
     reason: str
     campaign: Campaign
-    conversion: Array | None = None
+    matrix: Array | None = None
     changed: NDArray[np.bool_] | None = None
     left_out: tuple[int, ...] = ()
 

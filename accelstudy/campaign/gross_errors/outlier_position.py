@@ -5,18 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 
 from accelstudy.basics.registry import Setting
 from accelstudy.basics.wording import comma_list
+from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.gross_errors.base import SINGLE, GrossError, Mending, register
-from accelstudy.campaign.gross_errors.real_sensor import LOST
-
-if TYPE_CHECKING:
-    from accelstudy.campaign.files.session import Campaign
-    from accelstudy.campaign.gross_errors.real_sensor import RealSensor
+from accelstudy.campaign.gross_errors.real_sensor import LOST, RealSensor
 
 SIZE = 0.1
 """m/s², of an error that is drawn."""

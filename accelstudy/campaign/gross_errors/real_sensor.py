@@ -8,15 +8,12 @@ far off have no weight in it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.campaign.files.session import Campaign
 from accelstudy.leveling.angles import specific_force
-
-if TYPE_CHECKING:
-    from accelstudy.campaign.files.session import Campaign
 
 Array = NDArray[np.float64]
 

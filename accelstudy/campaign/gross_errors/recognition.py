@@ -81,9 +81,9 @@ class Recognised:
         return self.errors[-1][1].campaign
 
     @property
-    def conversion(self) -> Array | None:
+    def matrix(self) -> Array | None:
         """Matrix (3, 3) that turns forces as they were read into mended ones; None if it is I."""
-        steps = [m.conversion for _, m in self.errors if m.conversion is not None]
+        steps = [m.matrix for _, m in self.errors if m.matrix is not None]
         return np.linalg.multi_dot([*steps[::-1], np.eye(3)]) if steps else None
 
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.registry import Setting
+from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.gross_errors.base import (
     SINGLE,
     Array,
@@ -20,11 +21,7 @@ from accelstudy.campaign.gross_errors.base import (
     register,
     with_readings,
 )
-from accelstudy.campaign.gross_errors.real_sensor import CLEARLY, LOST
-
-if TYPE_CHECKING:
-    from accelstudy.campaign.files.session import Campaign
-    from accelstudy.campaign.gross_errors.real_sensor import RealSensor
+from accelstudy.campaign.gross_errors.real_sensor import CLEARLY, LOST, RealSensor
 
 APART = 1.0
 """m/s², by which the forces of positions differ that are drawn to be exchanged."""

@@ -3,34 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Self
+from typing import Any, Self
 
 import numpy as np
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.registry import Setting
-from accelstudy.basics.units import UNITS
+from accelstudy.basics.units import ROBOT_UNITS, SENSOR_UNITS, UNITS
+from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.gross_errors.base import (
     EVERYWHERE,
-    Array,
     GrossError,
     Mending,
     register,
     with_readings,
 )
+from accelstudy.campaign.gross_errors.real_sensor import RealSensor
 
-if TYPE_CHECKING:
-    from accelstudy.campaign.files.session import Campaign
-    from accelstudy.campaign.gross_errors.real_sensor import RealSensor
-
-FORCES = {unit: UNITS["m/s^2"][unit] for unit in ("m/s^2", "g", "mg")}
-"""Units in which sensors give forces, and their sizes in m/s²."""
-ANGLES = {unit: UNITS["rad"][unit] for unit in ("gon", "deg", "rad")}
-"""Units in which robots give angles, and their sizes in rad."""
-WORDS = {"deg": "degrees", "rad": "radians"}
-"""What people call them."""
 NEAR = 0.8
 """Share of gravity to which a sensor comes, at worst, in the right unit."""
 
@@ -52,44 +43,49 @@ class UnitError(GrossError):
         """Draw one of the usual mistakes."""
         if not self.is_open("force", "angle"):
             return self
-        possible = [{"force": 1 / FORCES["g"]}]
+        possible = [{"force": 1 / UNITS["m/s^2"]["g"]}]
         if campaign.angles is not None:
-            possible += [{"angle": 1 / size} for size in other_units(ANGLES, "gon").values()]
+            possible += [{"angle": 1 / factor} for factor in _other_angles().values()]
         return type(self)(**possible[rng.integers(len(possible))])
 
     def act(self, campaign: Campaign) -> Campaign:
-        """Multiply by the factors; one that is not given is 1."""
-        force, angle = np.nan_to_num(
-            [self.settings["force"], self.settings["angle"]], nan=1.0
-        ).tolist()
-        if angle != 1 and campaign.angles is None:
-            raise InputError(f"gross error {self.name!r}: angle: {campaign.name} has no angles")
-        return _multiplied(campaign, force, angle)
+        """Multiply by the factors that are given."""
+        if not self.is_open("angle"):
+            if campaign.angles is None:
+                raise InputError(f"gross error {self.name!r}: angle: {campaign.name} has no angles")
+            campaign = _angles_times(campaign, self.settings["angle"])
+        if not self.is_open("force"):
+            campaign = _forces_times(campaign, self.settings["force"])
+        return campaign
 
     def mendings(self, campaign: Campaign, sensor: RealSensor) -> Iterator[Mending]:
         """Take the forces, or the angles, for numbers in another unit."""
         norm = float(np.median(np.linalg.norm(campaign.forces, axis=1))) / campaign.gravity
         for said in ("g", "m/s^2") if campaign.unit == "g" else ("m/s^2", "g"):
-            for unit, factor in other_units(FORCES, said).items():
+            for unit, factor in _other_units("m/s^2", SENSOR_UNITS, said).items():
                 if NEAR < factor * norm < 1 / NEAR:
                     reason = f"the forces are in {unit}" + (", not in g" if said == "g" else "")
-                    mended = _multiplied(campaign, factor, 1.0)
-                    yield Mending(reason, mended, factor * np.eye(3))
+                    yield Mending(reason, _forces_times(campaign, factor), factor * np.eye(3))
         if sensor.expected is not None:
-            for unit, factor in other_units(ANGLES, "gon").items():
-                reason = f"the robot's angles are in {WORDS[unit]}"
-                yield Mending(reason, _multiplied(campaign, 1.0, factor))
+            for unit, factor in _other_angles().items():
+                reason = f"the robot's angles are in {ROBOT_UNITS[unit]}"
+                yield Mending(reason, _angles_times(campaign, factor))
 
 
-def other_units(units: Mapping[str, float], said: str) -> dict[str, float]:
-    """Return the units that could be meant, and what numbers in `said` are to be multiplied by."""
-    return {unit: size / units[said] for unit, size in units.items() if unit != said}
+def _other_units(quantity: str, units: Iterable[str], said: str) -> dict[str, float]:
+    """Units that could be meant, each with the factor that mends numbers said to be in `said`."""
+    sizes = UNITS[quantity]
+    return {unit: sizes[unit] / sizes[said] for unit in units if unit != said}
 
 
-def _multiplied(campaign: Campaign, force: float, angle: float) -> Campaign:
-    def times(values: Array | None) -> Array | None:
-        return None if values is None else angle * values
+def _other_angles() -> dict[str, float]:
+    return _other_units("rad", ROBOT_UNITS, "gon")
 
-    if force != 1:
-        campaign = with_readings(campaign, lambda values: force * values)
-    return replace(campaign, angles=times(campaign.angles), yaw=times(campaign.yaw))
+
+def _forces_times(campaign: Campaign, factor: float) -> Campaign:
+    return with_readings(campaign, lambda values: factor * values)
+
+
+def _angles_times(campaign: Campaign, factor: float) -> Campaign:
+    columns: dict[str, Any] = {"angles": campaign.angles, "yaw": campaign.yaw}
+    return replace(campaign, **{key: factor * v for key, v in columns.items() if v is not None})

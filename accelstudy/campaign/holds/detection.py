@@ -33,7 +33,8 @@ from accelstudy.campaign.holds.threshold import (
     survey_log,
 )
 from accelstudy.campaign.holds.windows import samples_in
-from accelstudy.campaign.logs.recording import AXES, Recording
+from accelstudy.campaign.logs.columns import AXES
+from accelstudy.campaign.logs.recording import Recording
 
 Array = NDArray[np.float64]
 

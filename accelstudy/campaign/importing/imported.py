@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import UNITS
 from accelstudy.campaign.files.checks import likely_fault
 from accelstudy.campaign.files.layout import LogLayout, Place
 from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.importing.settings import ImportSettings
-from accelstudy.campaign.logs.recording import conversion
 from accelstudy.campaign.logs.sources import Source
+from accelstudy.sensors.conversion import conversion_of
 
 Array = NDArray[np.float64]
 
@@ -31,14 +30,13 @@ def imported_campaign(
     InputError
         If the forces are nowhere near gravity; says which options would make them so.
     """
+    conversion = conversion_of(settings.unit, settings.scale, settings.offset)
+    frame = settings.axes
+    raw = conversion.from_si(frame.from_frd(forces))
     scale, offset = None, None
     if settings.unit == "counts":
-        factor, shift = conversion("counts", settings.scale, settings.offset)
-        frame = settings.axes
-        scale, offset = frame.rearranged(factor) * frame.signs, frame.rearranged(shift)
-        raw = frame.from_frd(forces) / factor + shift
-    else:
-        raw = forces / UNITS["m/s^2"][settings.unit]
+        scale = frame.rearranged(conversion.scale) * frame.signs
+        offset = frame.rearranged(conversion.offset)
     _check_size(paths[0], settings, raw, forces)
     return Campaign(
         **{
@@ -80,13 +78,11 @@ def _check_size(path: str | Path, settings: ImportSettings, raw: Array, forces: 
 
 def layout_of(settings: LogLayout, source: Source, places: Mapping[str, int]) -> LogLayout:
     """How a log was read, with all its columns: by their names if it has names."""
-    names = source.names
-    named = names != [str(i) for i in range(len(names))]
 
     def column(key: str) -> Place:
         place = places[key]
-        name = names[place]
-        return name if named and name and names.count(name) == 1 else place
+        name = source.names[place]
+        return name if source.named and name and source.names.count(name) == 1 else place
 
     layout = settings.model_dump(include=set(LogLayout.model_fields))
     time = column("time") if "time" in places else None

@@ -9,17 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
-from accelstudy.basics.units import MGON, UNITS
+from accelstudy.basics.units import MGON, ROBOT_UNITS, UNITS
 from accelstudy.campaign.files.checks import clearly_worse, misfit_of_angles
 from accelstudy.campaign.files.layout import LogLayout
 from accelstudy.campaign.files.session import Campaign
-from accelstudy.campaign.gross_errors import unit_error
 from accelstudy.campaign.importing.imported import imported_campaign
 from accelstudy.campaign.importing.report import ImportReport
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.campaign.logs.columns import AXES, locate, read_columns
-from accelstudy.campaign.logs.recording import TIME_UNITS, conversion
 from accelstudy.campaign.logs.sources import Source, open_source
+from accelstudy.sensors.conversion import conversion_of
 
 Array = NDArray[np.float64]
 
@@ -57,7 +56,7 @@ def import_means(
         If the table cannot be read.
     """
     settings = settings or ImportSettings()
-    factor, shift = conversion(settings.unit, settings.scale, settings.offset)
+    conversion = conversion_of(settings.unit, settings.scale, settings.offset)
     source = open_source(path, settings.variable)
     values, warnings = _columns(source, settings)
     frame = settings.axes
@@ -69,14 +68,14 @@ def import_means(
             raise InputError(f"{path}: column n_samples: must be positive")
     sd = None
     if all(key in values for key in SDS):
-        sd = frame.rearranged(np.column_stack([values[key] for key in SDS]) * np.abs(factor))
+        sd = frame.rearranged(np.column_stack([values[key] for key in SDS]) * abs(conversion.scale))
         if np.any(sd < 0):
             raise InputError(f"{path}: columns sd_fx, sd_fy, sd_fz: must not be negative")
     sigma: float | None = None
     if sd is not None and n_samples is not None and np.any(sd > 0):
         sigma = float(np.sqrt(np.mean(sd**2 / n_samples[:, None])))
         warnings.append("sigma of a mean is that of white noise; coloured noise makes it larger")
-    forces = frame.to_frd((np.column_stack([values[axis] for axis in AXES]) - shift) * factor)
+    forces = frame.to_frd(conversion.to_si(np.column_stack([values[axis] for axis in AXES])))
     campaign = imported_campaign(
         [path],
         settings,
@@ -147,7 +146,7 @@ def _columns(source: Source, settings: ImportSettings) -> tuple[dict[str, Array]
     rows = read_columns(source, places, places.get("time"))
     values = dict(zip(places, rows.T, strict=True))
     if "time" in places:
-        factor = TIME_UNITS[settings.time_unit]
+        factor = UNITS["s"][settings.time_unit]
         first = float(next(source.read([places["time"]], 1))[0, 0]) * factor
         values["time"] = values["time"] * factor + (first if abs(first) < _YEARS else 0.0)
     return values, warnings
@@ -157,11 +156,10 @@ def _check_angles(path: str | Path, angles: Array, unit: str, campaign: Campaign
     """Check that the robot's angles (n, 2) fit the forces in this unit and frame, if in any."""
 
     def misfit(unit: str, sign: int = 1) -> float:
-        given = angles * unit_error.ANGLES[unit]
+        given = angles * UNITS["rad"][unit]
         return misfit_of_angles(given, sign * campaign.forces, campaign.gravity)
 
-    units = unit_error.ANGLES
-    others = {f"--robot-unit {name}": misfit(name) for name in units if name != unit}
+    others = {f"--robot-unit {name}": misfit(name) for name in ROBOT_UNITS if name != unit}
     others["another --frame"] = misfit(unit, -1)
     best = min(others, key=lambda option: others[option])
     if clearly_worse(misfit(unit), others[best]):

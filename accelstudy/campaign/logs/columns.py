@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.wording import short_list
 from accelstudy.campaign.logs.sources import CHUNK, Source
+from accelstudy.sensors.conversion import LARGEST
 
 Array = NDArray[np.float64]
 Column = str | int
 """A column by its name in the header, or by its place, counted from 0."""
 
 AXES = ("fx", "fy", "fz")
-LARGEST = 1e15
-"""Beyond it nothing is an acceleration or a time, and squares overflow."""
 
 _KNOWN_NAMES = {
     "fx": r"f_?x|a_?x|acc?_?x|acc?el_?x|accelerationx|acceleration_x|x",
@@ -75,14 +74,17 @@ def locate(
 
 
 def _place(source: Source, key: str, column: Column) -> int:
-    names = list(source.names)
-    if column in names:
-        if names.count(str(column)) > 1:
+    """Place of a column; digits that a person wrote are a place, unless they are a name."""
+    names = source.names
+    if source.named and isinstance(column, str) and column in names:
+        if names.count(column) > 1:
             raise InputError(f"{source.path}: {key}: there are several columns {column!r}")
-        return names.index(str(column))
-    if isinstance(column, int) or re.fullmatch(r"[0-9]{1,9}", column):
-        if 0 <= int(column) < len(names):
-            return int(column)
+        return names.index(column)
+    if isinstance(column, str) and re.fullmatch(r"[0-9]{1,9}", column):
+        column = int(column)
+    if isinstance(column, int):
+        if 0 <= column < len(names):
+            return column
         raise InputError(
             f"{source.path}: {key}: no column {column}; there are {len(names)}, counted from 0"
         )

@@ -17,16 +17,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
-from accelstudy.basics.units import UNITS
-from accelstudy.campaign.logs.columns import AXES, LARGEST, Column, check_numbers, locate
+from accelstudy.basics.units import CLOCK_UNITS, UNITS
+from accelstudy.campaign.logs.columns import AXES, Column, check_numbers, locate
 from accelstudy.campaign.logs.sources import CHUNK, Source, open_source
+from accelstudy.sensors.conversion import Conversion, conversion_of
 from accelstudy.sensors.frames import FRD, Frame
-
-__all__ = ["AXES", "TIME_UNITS", "Log", "Recording", "conversion", "locate", "open_log"]
 
 Array = NDArray[np.float64]
 
-TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 CONDITIONS = ("temperature", "vibration")
 """Columns of a log besides time and forces."""
 GAP = 5.0
@@ -114,9 +112,9 @@ def open_log(
     InputError
         If the file cannot be read or lacks a column.
     """
-    factor, shift = conversion(unit, scale, offset)
-    if time_unit not in TIME_UNITS:
-        raise UnknownNameError("unit of time", time_unit, TIME_UNITS)
+    conversion = conversion_of(unit, scale, offset)
+    if time_unit not in CLOCK_UNITS:
+        raise UnknownNameError("unit of time", time_unit, CLOCK_UNITS)
     if rate is not None and time is not None:
         raise InputError(f"{path}: give the rate or the column of time, not both")
     if rate is not None and not (np.isfinite(rate) and rate > 0):
@@ -149,9 +147,8 @@ def open_log(
         source=source,
         places=places,
         rate=rate,
-        time_factor=TIME_UNITS[time_unit],
-        scale=factor,
-        offset=shift,
+        time_factor=UNITS["s"][time_unit],
+        conversion=conversion,
         frame=frame,
         chunk_size=chunk_size,
     )
@@ -168,7 +165,7 @@ class Log:
     places : mapping of "fx", "fy", "fz" and perhaps "time" and `CONDITIONS` to columns
     rate : float, 1/s; None with a column of time
     time_factor : float, s per unit of that column
-    scale, offset : (3,), f = (raw − offset) · scale, in the axes of the log
+    conversion : Conversion, of forces to m/s², in the axes of the log
     frame : Frame, the axes of the log
     chunk_size : int, rows held in memory at a time
     lively : bool, whether each channel must change; in one position that of a coarse sensor may not
@@ -179,8 +176,7 @@ class Log:
     places: Mapping[str, int]
     rate: float | None
     time_factor: float
-    scale: Array
-    offset: Array
+    conversion: Conversion
     frame: Frame
     chunk_size: int
     lively: bool = True
@@ -217,9 +213,9 @@ class Log:
         if self.rate is not None:
             return ""
         step = self.step / self.time_factor
-        rates = {unit: 1 / (step * factor) for unit, factor in TIME_UNITS.items()}
+        rates = {unit: 1 / (step * UNITS["s"][unit]) for unit in CLOCK_UNITS}
         unit = min(rates, key=lambda unit: abs(np.log(rates[unit] / _USUAL_RATE)))
-        if TIME_UNITS[unit] == self.time_factor:
+        if UNITS["s"][unit] == self.time_factor:
             return ""
         return (
             f"; if its times are in {unit}, there are {rates[unit]:.4g} samples per second: give "
@@ -245,7 +241,7 @@ class Log:
             if clock is not None:
                 raw[:, keys.index("time")] *= self.time_factor
             check_numbers(self.source, self.places, raw, row, self.conditions)
-            forces = self.frame.to_frd((raw[:, axes] - self.offset) * self.scale)
+            forces = self.frame.to_frd(self.conversion.to_si(raw[:, axes]))
             if clock is not None:
                 time = raw[:, keys.index("time")]
                 self._check_order(time, last, row)
@@ -284,30 +280,3 @@ def usual_step(steps: Array) -> float:
         if len(without) == len(kept):
             return mean
         kept = without
-
-
-def conversion(unit: str, scale: ArrayLike | None, offset: ArrayLike | None) -> tuple[Array, Array]:
-    """Scale and offset, (3,) each, that turn numbers in `unit` into m/s²."""
-    if unit == "counts":
-        if scale is None:
-            raise InputError("unit counts needs a nominal scale, in m/s² per count")
-        factor = _triple(scale, "scale")
-        if not np.all((np.abs(factor) > 0) & (np.abs(factor) <= LARGEST)):
-            raise InputError("scale: must not be 0, and must be finite")
-        shift = _triple(0.0 if offset is None else offset, "offset")
-        if not np.all(np.abs(shift) <= LARGEST):
-            raise InputError("offset: must be finite")
-        return factor, shift
-    if scale is not None or offset is not None:
-        raise InputError(f"a nominal scale or offset goes with unit counts, not {unit}")
-    known = {name: UNITS["m/s^2"][name] for name in ("m/s^2", "g")}
-    if unit not in known:
-        raise UnknownNameError("unit of a log", unit, (*known, "counts"))
-    return np.full(3, known[unit]), np.zeros(3)
-
-
-def _triple(value: ArrayLike, name: str) -> Array:
-    given = np.atleast_1d(np.asarray(value, dtype=float))
-    if given.shape not in ((1,), (3,)):
-        raise InputError(f"{name}: one number or three, not {given.size}")
-    return np.array(np.broadcast_to(given, 3))

@@ -29,10 +29,18 @@ _IS_NUMBER = re.compile("double|single|u?int[0-9]+")  # classes of MATLAB arrays
 
 
 class Source(Protocol):
-    """A file of numbers in columns."""
+    """A file of numbers in columns.
+
+    Attributes
+    ----------
+    path : Path
+    names : list of str, of the columns; their places, counted from 0, where the file has no names
+    named : bool, whether the file has names
+    """
 
     path: Path
     names: list[str]
+    named: bool
 
     def read(
         self, places: Sequence[int], chunk_size: int, clock: int | None = None
@@ -106,6 +114,7 @@ class MatlabSource:
         except Exception as error:  # SciPy's reader fails in many ways on a damaged file
             raise InputError(f"{path}: not a whole MATLAB file ({one_line(error)})") from None
         self.names = [str(i) for i in range(self.values.shape[1])]
+        self.named = False
 
     def read(
         self, places: Sequence[int], chunk_size: int, clock: int | None = None
@@ -139,6 +148,7 @@ class ParquetSource:
             raise InputError(f"{path}: not a whole Parquet file ({one_line(error)})") from None
         self._columns, self._types = schema.names, schema.types
         self.names = [" ".join(name.split()) for name in schema.names]
+        self.named = True
 
     def read(
         self, places: Sequence[int], chunk_size: int, clock: int | None = None

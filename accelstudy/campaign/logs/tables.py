@@ -69,12 +69,12 @@ def read_chunks(source: Source, chunk_size: int = CHUNK, typed: bool = False) ->
 
 def column_names(source: Source) -> list[str]:
     """Names of the columns, all different: `column_0` … of a log without names."""
-    bare = source.names == [str(i) for i in range(len(source.names))]
+    if not source.named:
+        return [f"column_{place}" for place in range(len(source.names))]
     names: list[str] = []
     for name in source.names:
-        name = f"column_{name}" if bare else name
-        same = sum(other == name for other in source.names[: len(names)])
-        names.append(f"{name}.{same}" if same and not bare else name)
+        same = source.names[: len(names)].count(name)
+        names.append(f"{name}.{same}" if same else name)
     return names
 
 

@@ -37,6 +37,7 @@ class TextSource:
     ----------
     path : Path
     names : list of str, from the header, or the places of the columns
+    named : bool, whether there is a header
     delimiter : str, None for blanks
     decimal : str, mark between units and tenths
     comment : str, with which lines begin that are no data
@@ -82,7 +83,9 @@ class TextSource:
         self.first, self.width = first, usual
         self.quoted = any('"' in line for line in lines[first:])
         self.comment = next((c for c in _COMMENTS for line in lines if line.lstrip()[:1] == c), "#")
-        self.names = self._header(lines[:first]) or [str(i) for i in range(usual)]
+        header = self._header(lines[:first])
+        self.named = header is not None
+        self.names = header or [str(i) for i in range(usual)]
 
     def read(
         self, places: Sequence[int], chunk_size: int, clock: int | None = None

@@ -17,7 +17,7 @@ from accelstudy.basics import bounds
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.registry import WithSettings
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY
-from accelstudy.campaign.files.format import Campaign
+from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.gross_errors import GrossError, get_gross_error
 from accelstudy.effects import Effect, get_effect
 from accelstudy.files.outputs import whole_file

@@ -34,7 +34,7 @@ def clipped(calibration: Calibration, forces: Array) -> NDArray[np.bool_]:
 
 
 class Account:
-    """Takes in a log chunk by chunk.
+    """What was learned of a log so far; chunks are added one after the other.
 
     Attributes
     ----------
@@ -50,8 +50,8 @@ class Account:
         self._first_empty: tuple[int, str | None] = (0, None)
         self.rows = self.empty = 0
 
-    def take(self, table: pa.Table, forces: Array, corrected: Array, hold: HoldConditions) -> None:
-        """Take in rows, their readings and calibrated forces (k, 3), m/s² in frd, and conditions.
+    def add(self, table: pa.Table, forces: Array, corrected: Array, hold: HoldConditions) -> None:
+        """Add rows, their readings and calibrated forces (k, 3), m/s² in frd, and conditions.
 
         Raises
         ------
@@ -157,7 +157,7 @@ class Account:
     def _wrong_unit(self) -> InputError:
         readings, gravity = self._readings, self._calibration.gravity
         norm = float(np.median(self._norms))
-        given = norm / abs(float(readings.scale[0]))
+        given = norm / abs(float(readings.conversion.scale[0]))
         fault = likely_fault(given, norm, readings.unit, gravity)
         looks = f"these look like {fault}; give --unit {fault}"
         return InputError(

@@ -11,12 +11,11 @@ import yaml
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
-from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.basics.wording import comma_list
 from accelstudy.campaign.calibration.gauges import not_affine
-from accelstudy.campaign.logs.recording import conversion
 from accelstudy.effects import Effect
 from accelstudy.effects.defaults import formulas
+from accelstudy.sensors.conversion import Conversion, conversion_of
 from accelstudy.sensors.frames import FRD, Frame, parse_frame
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
@@ -70,18 +69,19 @@ def device_matrix(calibration: Mapping[str, Any]) -> Array:
     if affine is None:
         raise InputError(f"the model {calibration['model']!r} with these parameters has no inverse")
     k, bias = np.array(affine["matrix"]), np.array(affine["bias_mps2"])
-    scale, offset, frame = _readings(calibration)
-    linear = frame.matrix.T @ k @ mending(calibration) @ frame.matrix * scale
-    return np.column_stack([linear, -linear @ offset - frame.matrix.T @ k @ bias])
+    raw, frame = _readings(calibration)
+    linear = frame.matrix.T @ k @ mending(calibration) @ frame.matrix * raw.scale
+    return np.column_stack([linear, -linear @ raw.offset - frame.matrix.T @ k @ bias])
 
 
-def raw_conversion(calibration: Mapping[str, Any]) -> tuple[Array, Array]:
-    """Scale and offset (3,) with f = (raw − offset) · scale in m/s², for the campaign's unit."""
-    if calibration["unit"] == "counts":
-        nominal = calibration["nominal"]
-        return np.array(nominal["scale"], dtype=float), np.array(nominal["offset"], dtype=float)
-    factor = STANDARD_GRAVITY if calibration["unit"] == "g" else 1.0
-    return np.full(3, factor), np.zeros(3)
+def campaign_conversion(calibration: Mapping[str, Any]) -> Conversion:
+    """Conversion to m/s² of readings in the unit of the campaign, in frd."""
+    if calibration["unit"] != "counts":
+        return conversion_of(calibration["unit"])
+    scale, offset = (
+        np.array(calibration["nominal"][key], dtype=float) for key in ("scale", "offset")
+    )
+    return Conversion(scale, offset)
 
 
 def mending(calibration: Mapping[str, Any]) -> Array:
@@ -114,19 +114,19 @@ def _model(calibration: Mapping[str, Any]) -> SensorModel:
     return compose(calibration["model"], tuple(calibration["effects"]))
 
 
-def _readings(calibration: Mapping[str, Any]) -> tuple[Array, Array, Frame]:
-    """Scale and offset (3,) of raw readings, and their axes: those of the log, if there was one."""
+def _readings(calibration: Mapping[str, Any]) -> tuple[Conversion, Frame]:
+    """Conversion of raw readings, and their axes: those of the log, if there was one."""
     log = calibration.get("log")
     if log is None:
-        return *raw_conversion(calibration), FRD
-    scale, offset = conversion(log["unit"], log.get("scale"), log.get("offset"))
-    return scale, offset, parse_frame(log["frame"])
+        return campaign_conversion(calibration), FRD
+    raw = conversion_of(log["unit"], log.get("scale"), log.get("offset"))
+    return raw, parse_frame(log["frame"])
 
 
 def _whole(calibration: Mapping[str, Any]) -> dict[str, Any]:
     """All that a stranger needs to implement a calibration."""
     model = _model(calibration)
-    scale, offset, frame = _readings(calibration)
+    raw, frame = _readings(calibration)
     values = iter(calibration["parameters"])
     effects = [
         _effect(effect, [next(values) for _ in effect.parameters]) for effect in model.effects
@@ -142,8 +142,8 @@ def _whole(calibration: Mapping[str, Any]) -> dict[str, Any]:
         "gravity_mps2": calibration["gravity_mps2"],
         "readings": {
             "frame": frame.name,
-            "scale": scale.tolist(),
-            "offset": offset.tolist(),
+            "scale": raw.scale.tolist(),
+            "offset": raw.offset.tolist(),
             "to_frd": frame.matrix.tolist(),
             "mending": mending(calibration).tolist(),
         },
@@ -185,7 +185,7 @@ def _row(values: ArrayLike, separator: str) -> str:
 
 def _c_header(calibration: Mapping[str, Any]) -> str:
     rows = ",\n".join(f"    {{{_row(row, ', ')}}}" for row in device_matrix(calibration))
-    frame = _readings(calibration)[2]
+    _, frame = _readings(calibration)
     ways = ", ".join(f"{i} {WAYS[letter]}" for i, letter in zip("xyz", frame.name, strict=True))
     lines = [
         f"Accelerometer calibration of {calibration['campaign']}.",

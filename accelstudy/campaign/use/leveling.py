@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from accelstudy.basics import bounds
 from accelstudy.basics.progress import track
 from accelstudy.basics.units import attitude_unit, display_unit, to_attitude, to_display
-from accelstudy.campaign.logs.recording import AXES
+from accelstudy.campaign.logs.columns import AXES
 from accelstudy.campaign.logs.sources import CHUNK
 from accelstudy.campaign.logs.tables import chunk_writer, is_parquet
 from accelstudy.campaign.use.account import Account, clipped
@@ -85,7 +85,7 @@ def level_log(
         chunks = readings.chunks(chunk_size, typed=is_parquet(out))
         for table, forces, hold in track(chunks, "leveling"):
             corrected, added = _leveled(calibration, readings.frame, forces, hold, noise)
-            account.take(table, forces, corrected, hold)
+            account.add(table, forces, corrected, hold)
             write(_with(table, added))
         account.close()
     assumed = account.assumptions() if start is None else ()

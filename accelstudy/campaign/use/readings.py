@@ -12,14 +12,16 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import UNITS
 from accelstudy.campaign.files.layout import LogLayout
-from accelstudy.campaign.logs.recording import AXES, TIME_UNITS, conversion, locate
+from accelstudy.campaign.logs.columns import AXES, locate
 from accelstudy.campaign.logs.sources import CHUNK, Source, open_source
 from accelstudy.campaign.logs.tables import column_names, numbers, read_chunks
 from accelstudy.campaign.use.applying import Calibration
-from accelstudy.campaign.use.export import mending, raw_conversion
+from accelstudy.campaign.use.export import campaign_conversion, mending
 from accelstudy.effects import Course, HoldConditions
 from accelstudy.files.validation import checked
+from accelstudy.sensors.conversion import Conversion, conversion_of
 from accelstudy.sensors.frames import Frame
 
 Array = NDArray[np.float64]
@@ -44,7 +46,7 @@ class Readings:
     time_factor : float, s per unit of the column of time
     start : float, s, from the start of the calibration session to the first row
     unit : str, of the forces
-    scale, offset : (3,), f = (raw − offset) · scale, in the axes of the log
+    conversion : Conversion, of forces to m/s², in the axes of the log
     frame : Frame, the axes of the log
     mending : (3, 3), turns forces in frd as they are read into mended ones
     """
@@ -55,8 +57,7 @@ class Readings:
     time_factor: float
     start: float
     unit: str
-    scale: Array
-    offset: Array
+    conversion: Conversion
     frame: Frame
     mending: Array
 
@@ -94,7 +95,7 @@ class Readings:
                 step_z=still,
                 course=course if len(course.time) else None,
             )
-            read = self.frame.to_frd((forces - self.offset) * self.scale)
+            read = self.frame.to_frd(self.conversion.to_si(forces))
             yield table, read @ self.mending.T, hold
             row += len(table)
 
@@ -157,8 +158,6 @@ def readings_of(
     unit = layout.unit
     if calibration.log is None and "unit" not in given:
         unit = calibration.content["unit"]
-    scale, offset = _conversion(calibration, layout, unit)
-    factor = TIME_UNITS[layout.time_unit]
     # What is told of the log is right, whatever was wrong in the campaign.
     told = {"unit_error": "unit", "axis_error": "frame"}
     mended = calibration.content.get("mended")
@@ -167,11 +166,10 @@ def readings_of(
         source,
         places,
         layout.rate_hz,
-        factor,
+        UNITS["s"][layout.time_unit],
         start,
         unit,
-        scale,
-        offset,
+        _conversion(calibration, layout, unit),
         layout.axes,
         mending(calibration.content) if mends else np.eye(3),
     )
@@ -211,12 +209,12 @@ def _places(
     return places
 
 
-def _conversion(calibration: Calibration, layout: LogLayout, unit: str) -> tuple[Array, Array]:
-    """Scale and offset (3,) of readings in a unit, in the axes of the log."""
+def _conversion(calibration: Calibration, layout: LogLayout, unit: str) -> Conversion:
+    """Conversion of readings in a unit, in the axes of the log."""
     if calibration.log is None and unit == calibration.content["unit"]:
-        return raw_conversion(calibration.content)
+        return campaign_conversion(calibration.content)
     if unit != "counts":
-        return conversion(unit, None, None)
+        return conversion_of(unit)
     if layout.scale is None:
         raise InputError("--unit counts: the calibration has no nominal scale of counts")
-    return conversion("counts", layout.scale, layout.offset)
+    return conversion_of("counts", layout.scale, layout.offset)

@@ -17,8 +17,8 @@ from scipy import stats
 from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign import Campaign
 from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.files.session import Campaign
 from accelstudy.diagnosis.space.examined import examine
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis
 from accelstudy.sensors.sensor import SensorModel

@@ -10,7 +10,6 @@ import numpy as np
 
 from accelstudy.basics.units import angle_note, display_unit, quantity_text, to_display
 from accelstudy.basics.wording import comma_list, number, words
-from accelstudy.data_sheets import ASSUMED
 from accelstudy.effects import get_effect
 from accelstudy.plan.report.advice import (
     PLAIN,
@@ -73,7 +72,7 @@ def answer_lines(answer: Answer) -> list[str]:
             leaves = _angle(best.accuracy(question.confidence))
             lines.append(f"By hand the best leaves {leaves}: {effort(best)}.")
     use = in_use(question)
-    if any(size.source == ASSUMED for size in question.sizes.values()):
+    if any(size.source == "assumed" for size in question.sizes.values()):
         lines += _linear(question, candidate)
     more = [f"{_angle(use.reading)} of noise in each reading {_like(question, use)}"]
     if not math.isnan(use.drift):
@@ -276,7 +275,7 @@ def assumption_lines(question: Question) -> list[str]:
     assumed = [PLAIN[e] for e, size in question.sizes.items() if size.source == "typical"]
     if assumed:
         lines.append(f"Of a usual size, as nothing is known of it: {comma_list(assumed)}.")
-    if any(size.source == ASSUMED for size in question.sizes.values()):
+    if any(size.source == "assumed" for size in question.sizes.values()):
         lines.append("Taken to be linear, as only its noise is known.")
     if question.sheet.position_sigma is not None:
         sigma = quantity_text(question.sheet.position_sigma, "m/s^2")

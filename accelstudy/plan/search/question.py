@@ -6,9 +6,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 from accelstudy.basics.units import MGON
-from accelstudy.data_sheets import ASSUMED, DataSheet
+from accelstudy.data_sheets import DataSheet
 from accelstudy.effects import get_effect
 from accelstudy.schemes import Scheme, get_scheme, is_scheme_file
 
@@ -53,7 +54,7 @@ class Size:
     """
 
     value: float
-    source: str
+    source: Literal["data sheet", "assumed", "typical"]
 
 
 @dataclass(frozen=True)
@@ -117,15 +118,14 @@ def sizes_of(sheet: DataSheet) -> dict[str, Size]:
         "quadratic_scale": _times(sheet.quadratic_scale, shared),
         "cubic_scale": _times(sheet.cubic_scale, shared),
     }
-    kinds = {"nonorthogonality": "nonorthogonality"}
     sizes = {}
     for effect, value in stated.items():
         if value is None:
             low, high = get_effect(effect).typical
             sizes[effect] = Size(math.sqrt(low * high), "typical")
             continue
-        told = sheet.sources.get(kinds.get(effect, "nonlinearity"), "")
-        sizes[effect] = Size(value, "assumed" if told == ASSUMED else "data sheet")
+        quantity = "nonorthogonality" if effect == "nonorthogonality" else "nonlinearity"
+        sizes[effect] = Size(value, "assumed" if quantity in sheet.assumed else "data sheet")
     return sizes
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from accelstudy.adjustment import calibrate
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.document import calibration_document, quality_document
-from accelstudy.campaign.calibration.fit import CampaignFit, campaign_estimability
+from accelstudy.campaign.calibration.fit import CampaignFit, JudgedNoise, campaign_estimability
 from accelstudy.diagnosis.report.words.missing import explanation_words, missing
 from accelstudy.diagnosis.result import Diagnosis
 
@@ -34,7 +34,7 @@ def diagnosed_fit(diagnosis: Diagnosis) -> CampaignFit:
         observed=observed,
         adjustment=calibrate(d.extended, d.approach, observed),
         estimability=campaign_estimability(campaign, d.extended, d.approach),
-        unit_variance=d.unit_variance,
+        judged=JudgedNoise(d.sigma_holds, d.unit_variance),
     )
 
 
@@ -69,12 +69,12 @@ def diagnosed_calibration(diagnosis: Diagnosis) -> dict[str, Any]:
         )
     if (found := diagnosis.recognised) is not None:
         warning = f"The calibration is of mended data: {found.reason}."
-        if found.conversion is not None:
+        if found.matrix is not None:
             warning += " Readings need the same mending; `accelstudy apply` and `export` do it."
         warnings.append(warning)
         content["mended"] = {
             "error": found.name,
             "reason": found.reason,
-            "matrix": None if found.conversion is None else found.conversion.tolist(),
+            "matrix": None if found.matrix is None else found.matrix.tolist(),
         }
     return {**content, "warnings": warnings}

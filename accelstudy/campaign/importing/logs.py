@@ -1,4 +1,4 @@
-"""From a raw log, or a table of means, to a campaign."""
+"""From raw logs to campaigns."""
 
 from __future__ import annotations
 
@@ -24,8 +24,10 @@ from accelstudy.campaign.importing.settings import (
     parse_settings,
     read_settings,
 )
-from accelstudy.campaign.logs.recording import AXES, Log, Recording, conversion, open_log
+from accelstudy.campaign.logs.columns import AXES
+from accelstudy.campaign.logs.recording import Log, Recording, open_log
 from accelstudy.campaign.logs.series import LogSeries
+from accelstudy.sensors.conversion import conversion_of
 
 __all__ = [
     "GravitySettings",
@@ -285,13 +287,13 @@ def _with_offset(
     radius = float(np.median(np.linalg.norm(holds.mean - holds.center, axis=1)))
     if not (holds.directed and np.linalg.norm(holds.center) > radius / 2):
         return settings, holds.mean, []
-    factor, _ = conversion("counts", settings.scale, None)
-    offset = np.round(frame.from_frd(holds.center) / factor)
+    scale = conversion_of("counts", settings.scale).scale
+    offset = np.round(frame.from_frd(holds.center) / scale)
     note = (
         f"offset: {', '.join(f'{x:.0f}' for x in offset)} counts, from the positions, as none was "
         "given"
     )
-    forces = holds.mean - frame.to_frd(offset * factor)
+    forces = holds.mean - frame.to_frd(offset * scale)
     return settings.model_copy(update={"offset": offset.tolist()}), forces, [note]
 
 

@@ -1,0 +1,79 @@
+"""From the numbers that a sensor gives to SI, and back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.units import UNITS
+
+Array = NDArray[np.float64]
+
+LARGEST = 1e15
+"""Beyond it nothing is an acceleration or a time, and squares overflow."""
+
+
+@dataclass(frozen=True)
+class Conversion:
+    """Scale and offset of raw numbers: SI = (raw − offset) · scale.
+
+    Attributes
+    ----------
+    scale : (3,) array, one for each axis, or (1,), SI per unit of the raw numbers; not zero
+    offset : array of the same shape, raw number that means zero
+    """
+
+    scale: Array
+    offset: Array
+
+    def to_si(self, raw: Array) -> Array:
+        """Convert raw numbers, (..., axes), to SI."""
+        return (raw - self.offset) * self.scale
+
+    def from_si(self, values: Array) -> Array:
+        """Convert SI, (..., axes), to raw numbers."""
+        return values / self.scale + self.offset
+
+
+def conversion_of(
+    unit: str, scale: ArrayLike | None = None, offset: ArrayLike | None = None
+) -> Conversion:
+    """Conversion of specific forces to m/s².
+
+    Parameters
+    ----------
+    unit : "m/s^2", "g" or "counts"
+    scale : number or (3,), m/s² per count; only with counts, which need it
+    offset : number or (3,), counts at 0 m/s²; only with counts, 0 if omitted
+
+    Raises
+    ------
+    InputError
+        If the unit is unknown, or scale and offset do not fit it.
+    """
+    if unit == "counts":
+        if scale is None:
+            raise InputError("unit counts needs a nominal scale, in m/s² per count")
+        factor = _triple(scale, "scale")
+        if not np.all((np.abs(factor) > 0) & (np.abs(factor) <= LARGEST)):
+            raise InputError("scale: must not be 0, and must be finite")
+        zero = _triple(0.0 if offset is None else offset, "offset")
+        if not np.all(np.abs(zero) <= LARGEST):
+            raise InputError("offset: must be finite")
+        return Conversion(factor, zero)
+    if scale is not None or offset is not None:
+        raise InputError(f"a nominal scale or offset goes with unit counts, not {unit}")
+    known = {name: UNITS["m/s^2"][name] for name in ("m/s^2", "g")}
+    if unit not in known:
+        raise UnknownNameError("unit of a log", unit, (*known, "counts"))
+    return Conversion(np.full(3, known[unit]), np.zeros(3))
+
+
+def _triple(value: ArrayLike, name: str) -> Array:
+    given = np.atleast_1d(np.asarray(value, dtype=float))
+    if given.shape not in ((1,), (3,)):
+        raise InputError(f"{name}: one number or three, not {given.size}")
+    return np.array(np.broadcast_to(given, 3))
