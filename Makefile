@@ -84,7 +84,7 @@ benchmarks: $(READY) ## measure the speed, and take tables and figure into docs
 	python benchmarks/run.py docs/guides/speed.md docs/figures/speed.png
 
 docs: $(READY) ## build the documentation in site/, offline; open site/index.html
-	NO_MKDOCS_2_WARNING=1 mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 mkdocs build --strict
 
 # Snakemake's own check of the workflows is a test, as starting it takes longer.
 lint: $(READY) ## check style and types

@@ -34,10 +34,8 @@ class HoldConditions:
     step_x, step_y, step_z : (n,) arrays, m/s², specific force less that of the hold before; 0 in
         the first hold
     order : (n,) array, the time or, where there is none, the number of the hold, from 1 on
-
-    Of the whole session:
-
-    course : Course, of the temperature, with what of it is left out; by default of these holds
+    course : Course, of the temperature in the whole session, that of holds left out included; by
+        default that of these holds
     full_range : float, m/s², the sensor measures ± this
     """
 

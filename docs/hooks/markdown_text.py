@@ -4,9 +4,13 @@ from collections.abc import Iterable, Sequence
 
 
 def plain(text: str) -> str:
-    """Text of a docstring or a help: no tags, and code in single backticks."""
+    """Text of a docstring or a help: no tags or links, and code in single backticks."""
     parts = text.replace("``", "`").split("`")
-    return "`".join(p.replace("<", "&lt;") if i % 2 == 0 else p for i, p in enumerate(parts))
+    return "`".join(_literal(p) if i % 2 == 0 else p for i, p in enumerate(parts))
+
+
+def _literal(text: str) -> str:
+    return text.replace("<", "&lt;").replace("[", "&#91;")
 
 
 def code(value: object) -> str:

@@ -3,6 +3,7 @@
 import catalogue
 import command_pages
 import configuration_page
+import file_formats
 from markdown_text import page, table
 from mkdocs.structure.files import File
 
@@ -27,6 +28,8 @@ PAGES = {
     "reference/data-sheets.md": catalogue.data_sheets,
     "reference/commands.md": command_pages.commands,
     "reference/configuration.md": configuration_page.configuration,
+    "reference/file-formats.md": file_formats.formats,
+    "reference/tables.md": file_formats.tables,
     "reference/terms.md": terms,
 }
 

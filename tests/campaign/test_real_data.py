@@ -18,7 +18,7 @@ from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.effects import get_effect
 from accelstudy.sensors.models import get_model
 
-PAGE = (ROOT / "docs" / "real-data.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs/guides/real-data.md").read_text(encoding="utf-8")
 FLAT = " ".join(PAGE.split())
 NINE = get_model("bias-scale-nonorthogonality")
 

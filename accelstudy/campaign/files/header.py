@@ -74,41 +74,55 @@ PerAxis = Field(min_length=3, max_length=3)
 class Nominal(Block):
     """Nominal conversion of counts: f = (raw − offset) · scale, m/s², per axis."""
 
-    scale: list[Annotated[Finite, AfterValidator(_not_zero)]] = PerAxis
-    offset: list[Finite] = PerAxis
+    scale: Annotated[list[Annotated[Finite, AfterValidator(_not_zero)]], PerAxis] = Field(
+        description="m/s² per count, of x, y and z"
+    )
+    offset: Annotated[list[Finite], PerAxis] = Field(description="reading at 0 m/s², of x, y and z")
 
 
 class _Gravity(Block):
-    value_mps2: Gravity
-    sigma_mps2: SigmaGravity = 0.0
+    """Gravity where the sensor was."""
+
+    value_mps2: Gravity = Field(description="local gravity")
+    sigma_mps2: SigmaGravity = Field(
+        0.0, description="its standard deviation; 0 holds it fixed in the adjustment"
+    )
 
 
 class _SensorNoise(Block):
-    sigma_mps2: SigmaForce
+    """A-priori noise of the sensor; without it, the residuals tell it."""
+
+    sigma_mps2: SigmaForce = Field(description="standard deviation of a position mean, per axis")
 
 
 class _Robot(Block):
-    angle_sigma_mgon: SigmaAngle
+    """The robot; exactly when the table has its angles."""
+
+    angle_sigma_mgon: SigmaAngle = Field(description="standard deviation of roll and of pitch")
 
 
 class Exclusion(Block):
     """A hold that is left out of every fit."""
 
-    position: Annotated[int, Field(ge=1), Number]
-    reason: Annotated[str, Field(min_length=1)]
+    position: Annotated[int, Field(ge=1), Number] = Field(description="number of the hold")
+    reason: Annotated[str, Field(min_length=1)] = Field(description="why it is left out")
 
 
 class Header(Block):
     """What stands in `campaign.yaml`."""
 
-    schema_version: Annotated[Literal[1], Number]
-    name: Annotated[str, Field(min_length=1)]
-    sensor: str | None = None
-    unit: Literal["m/s^2", "g", "counts"]
+    schema_version: Annotated[Literal[1], Number] = Field(description="of this format")
+    name: Annotated[str, Field(min_length=1)] = Field(description="of the campaign, any text")
+    sensor: str | None = Field(None, description="what was calibrated, any text")
+    unit: Literal["m/s^2", "g", "counts"] = Field(
+        description="of the forces in the table; g is 9.80665 m/s²"
+    )
     nominal: Nominal | None = None
     gravity: _Gravity
     sensor_noise: _SensorNoise | None = None
-    range_mps2: Annotated[Positive, Field(le=MOST)] | None = None
+    range_mps2: Annotated[Positive, Field(le=MOST)] | None = Field(
+        None, description="the sensor measures ± this; where it can saturate"
+    )
     excluded: Annotated[list[Exclusion], Field(min_length=1)] | None = None
     robot: _Robot | None = None
     log: LogLayout | None = None

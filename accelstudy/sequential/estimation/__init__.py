@@ -1,1 +1,0 @@
-"""What the positions so far tell: estimates that take one position at a time."""

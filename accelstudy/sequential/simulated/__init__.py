@@ -1,1 +1,0 @@
-"""Simulated sessions that follow the advice, and what came of them."""

@@ -1,0 +1,220 @@
+"""The page of the rooms: what each holds, and which imports which, drawn from the imports."""
+
+import ast
+from collections import defaultdict
+from itertools import pairwise
+from pathlib import Path
+
+from markdown_text import plain, table
+
+import accelstudy
+
+ROOT = Path(accelstudy.__file__).parent
+BOX, HEIGHT = 112, 28
+"""Size of a box in the drawing."""
+GAP, ROW, PASSAGE = 14, 70, 22
+"""Space between two boxes, height of a row, and width that a passing arrow has."""
+
+
+def rooms():
+    """Names of the rooms and what each says of itself, in one sentence."""
+    found = {}
+    for init in sorted(ROOT.glob("*/__init__.py")):
+        text = ast.get_docstring(ast.parse(init.read_text(encoding="utf-8"))) or ""
+        found[init.parent.name] = " ".join(text.partition("\n\n")[0].split())
+    return found
+
+
+def imports(known):
+    """Rooms that each room imports, and of these what only its functions import, against the way.
+
+    A function may import what is slow to load. Where that leads up, it is no part of the order.
+
+    Returns
+    -------
+    graph : {room: rooms}
+    exceptions : list of (room, room)
+    """
+    loaded, later = ({room: set() for room in known} for _ in range(2))
+    for path in ROOT.glob("*/**/*.py"):
+        room = path.relative_to(ROOT).parts[0]
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        for node in tree.body:
+            if not (isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"):
+                found = loaded if isinstance(node, ast.ImportFrom) else later
+                found[room] |= {target for target in _targets(node) if target in known}
+    graph = {room: targets - {room} for room, targets in loaded.items()}
+    exceptions = []
+    for room in sorted(known):
+        for target in sorted(later[room] - {room} - graph[room]):
+            if room in _below(graph, target):
+                exceptions.append((room, target))
+            else:
+                graph[room].add(target)
+    return graph, exceptions
+
+
+def _targets(tree):
+    """Rooms that are named by the imports of a piece of code."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("accelstudy."):
+            yield node.module.split(".")[1]
+
+
+def _below(graph, room):
+    """All rooms that a room needs, by whatever way."""
+    return graph[room].union(*(_below(graph, each) for each in graph[room]))
+
+
+def levels(graph):
+    """Rooms by their level: one above the highest that they import.
+
+    Raises
+    ------
+    ValueError
+        If rooms import each other in a circle.
+    """
+    level = {}
+
+    def of(room, above=()):
+        if room in above:
+            raise ValueError(f"rooms import each other: {' → '.join((*above, room))}")
+        if room not in level:
+            level[room] = 1 + max((of(each, (*above, room)) for each in graph[room]), default=-1)
+        return level[room]
+
+    rows = defaultdict(list)
+    for room in sorted(graph):
+        rows[of(room)].append(room)
+    return [rows[number] for number in sorted(rows)]
+
+
+def needed(graph):
+    """Imports without those that follow from others, so that the drawing stays clear."""
+
+    return {
+        room: {
+            each for each in targets if not any(each in _below(graph, other) for other in targets)
+        }
+        for room, targets in graph.items()
+    }
+
+
+def routed(rows, arrows):
+    """Rows with a place for each arrow that passes them, and the ways of the arrows.
+
+    Returns
+    -------
+    rows : list of lists of rooms and of passing arrows, (room, target, number of the row)
+    ways : list of lists of such, from a room to one that it imports
+    """
+    level = {room: number for number, row in enumerate(rows) for room in row}
+    rows, ways = [list(row) for row in rows], []
+    for room, targets in arrows.items():
+        for target in sorted(targets):
+            passing = range(level[room] - 1, level[target], -1)
+            for number in passing:
+                rows[number].append((room, target, number))
+            ways.append([room, *((room, target, number) for number in passing), target])
+    return rows, ways
+
+
+def arranged(rows, ways):
+    """Horizontal middle of each item; those of a row stand near what they are joined to."""
+    beside = defaultdict(set)
+    for one, other in (pair for way in ways for pair in pairwise(way)):
+        beside[one].add(other)
+        beside[other].add(one)
+    x = {}
+    for step in range(30):
+        for row in rows if step % 2 else reversed(rows):
+            known = {item: [x[b] for b in beside[item] if b in x] for item in row}
+            wanted = {item: sum(k) / len(k) if k else 0.0 for item, k in known.items()}
+            row.sort(key=lambda item: (wanted[item], str(item)))
+            x |= _apart(row, wanted)
+    return x
+
+
+def _apart(row, wanted):
+    """Places near the wanted ones, in order, that do not overlap: groups that would are joined."""
+    groups = []
+    for item in row:
+        width = BOX + GAP if isinstance(item, str) else PASSAGE
+        groups.append(([(item, width)], width, wanted[item]))
+        while len(groups) > 1 and _end(groups[-2]) > _start(groups[-1]):
+            (one, w1, x1), (other, w2, x2) = groups[-2:]
+            middle = (x1 * len(one) + x2 * len(other)) / (len(one) + len(other))
+            groups[-2:] = [(one + other, w1 + w2, middle)]
+    places = {}
+    for group in groups:
+        at = _start(group)
+        for item, width in group[0]:
+            places[item] = at + width / 2
+            at += width
+    return places
+
+
+def _start(group):
+    return group[2] - group[1] / 2
+
+
+def _end(group):
+    return group[2] + group[1] / 2
+
+
+def drawing(graph):
+    """The rooms as SVG; each box leads to its line in the table."""
+    rows, ways = routed(levels(graph), needed(graph))
+    x = arranged(rows, ways)
+    left = min(x.values()) - BOX / 2 - 4
+    width = max(x.values()) + BOX / 2 + 4 - left
+    x = {item: round(value - left) for item, value in x.items()}
+    y = {item: (len(rows) - 1 - i) * ROW + 4 for i, row in enumerate(rows) for item in row}
+    parts = []
+    for way in ways:
+        path = f"M{x[way[0]]} {y[way[0]] + HEIGHT}"
+        for one, other in pairwise(way):
+            bend = (ROW - HEIGHT) // 2
+            end = y[other] - (4 if other == way[-1] else 0)
+            path += f"C{x[one]} {y[one] + HEIGHT + bend} {x[other]} {end - bend} {x[other]} {end}"
+            if other != way[-1]:
+                path += f"v{HEIGHT}"
+        parts.append(f'<path class="arrow" marker-end="url(#tip)" d="{path}"/>')
+    for room in graph:
+        parts.append(
+            f'<a href="#{room}"><rect x="{x[room] - BOX // 2}" y="{y[room]}" width="{BOX}" '
+            f'height="{HEIGHT}" rx="4"/><text x="{x[room]}" y="{y[room] + 20}">{room}</text></a>'
+        )
+    tip = (
+        '<defs><marker id="tip" viewBox="0 0 8 8" refX="6" refY="4" markerWidth="7" '
+        'markerHeight="7" orient="auto"><path d="M0 0L8 4L0 8z"/></marker></defs>'
+    )
+    return (
+        f'<div class="rooms"><svg role="img" aria-label="Rooms and their imports" '
+        f'viewBox="0 0 {width:.0f} {len(rows) * ROW - ROW + HEIGHT + 8}">{tip}{"".join(parts)}'
+        "</svg></div>"
+    )
+
+
+def on_page_markdown(markdown, page, **_):
+    """Put drawing and table where the page of the rooms has them."""
+    if page.file.src_uri != "contribute/architecture.md":
+        return markdown
+    known = rooms()
+    graph, exceptions = imports(known)
+    order = [room for row in reversed(levels(graph)) for room in sorted(row)]
+    lines = [
+        (
+            f'<span id="{room}"></span>`{room}/`',
+            plain(known[room]),
+            len([*(ROOT / room).rglob("*.py")]),
+            ", ".join(f"[{each}](#{each})" for each in sorted(graph[room])),
+        )
+        for room in order
+    ]
+    heads = ("room", "what it holds", "files", "imports")
+    above = "; ".join(f"`{room}` imports `{target}`" for room, target in exceptions)
+    note = f"\n\nAgainst the way, and only within a function: {above}." if above else ""
+    return markdown.replace("<!-- drawing of the rooms -->", drawing(graph) + note).replace(
+        "<!-- table of the rooms -->", table(heads, lines)
+    )

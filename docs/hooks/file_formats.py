@@ -1,0 +1,120 @@
+"""Pages of the files: campaigns, calibrations, diagnoses, and the tables of studies."""
+
+from pathlib import Path
+
+import yaml
+from markdown_text import code, page, table
+from schemas import blocks
+
+from accelstudy.campaign.files.header import COLUMNS, COUNTING, HEADER, RANGES, Header
+
+HERE = Path(__file__).parent
+UNITS = {
+    "forces": "unit",
+    "sd": "unit",
+    "slope": "unit/s",
+    "sd_slope": "unit/s",
+    "time": "s",
+    "temperature": "°C",
+    "angles": "gon",
+    "yaw": "gon",
+    "vibration": "m/s²",
+}
+"""Of the columns of a campaign; `unit` is that of the header."""
+MEANINGS = {
+    "positions": "number of the hold, from 1 on, in the order of acquisition",
+    "time": "middle of the hold since the start of the session",
+    "forces": "mean specific force of the hold, in sensor axes",
+    "n_samples": "samples in the hold",
+    "sd": "standard deviations of the samples within the hold",
+    "slope": "slopes of the samples within the hold",
+    "sd_slope": "standard deviations of the slopes",
+    "temperature": "mean temperature",
+    "angles": "attitude that the robot tells",
+    "yaw": "yaw that the robot tells; 0 if absent",
+    "vibration": "rms of the vibration",
+}
+REQUIRED = ("positions", "forces")
+
+
+def study_tables():
+    """Tables of a study and their columns: {table: (row, {column: (unit, meaning)})}."""
+    content = yaml.safe_load((HERE / "tables.yaml").read_text(encoding="utf-8"))
+    shared = {"cell": content["cells"]["columns"], "attitude": content["sensitivity"]["columns"]}
+    return {
+        name: (
+            each["row"],
+            {
+                **{
+                    k: v
+                    for key, columns in shared.items()
+                    if key in each
+                    for k, v in columns.items()
+                },
+                **each.get("columns", {}),
+                **each.get("more", {}),
+            },
+        )
+        for name, each in content.items()
+    }
+
+
+def tables():
+    """The page of the tables of a study."""
+    parts = []
+    for name, (row, columns) in study_tables().items():
+        rows = [(code(column), unit, meaning) for column, (unit, meaning) in columns.items()]
+        file = "estimates/*.parquet" if name == "estimates" else f"{name}.parquet"
+        parts += [
+            f"## `{file}`",
+            f"A row per {row}.",
+            table(("column", "unit", "meaning"), rows),
+        ]
+    return page(
+        "# Tables of a study",
+        "A study writes these tables to `results/<study>/`, as Parquet. Each file says where it "
+        "comes from: hash of the configuration, seed, version, commit and the libraries' versions "
+        "(`accelstudy.files.tables.read_origin`). Where the unit is *unit*, the column of that "
+        "name has it. What is not known is null.",
+        *parts,
+    )
+
+
+def formats():
+    """The page of all other files."""
+    rows = []
+    for attribute, names in COLUMNS.items():
+        if attribute not in MEANINGS:
+            raise ValueError(f"column {attribute}: its meaning is missing in {__name__}")
+        unit = UNITS.get(attribute, "")
+        within = RANGES.get(attribute)
+        kind = "whole number" if attribute in COUNTING else "number"
+        rows.append(
+            (
+                ", ".join(map(code, names)),
+                kind,
+                f"*{unit}*" if unit.startswith("unit") else unit,
+                "" if within is None else f"{within.least:g} … {within.most:g}",
+                "*required*" if attribute in REQUIRED else "",
+                MEANINGS[attribute],
+            )
+        )
+    schema = HERE.parent / "reference" / "diagnosis.schema.yaml"
+    return page(
+        "# File formats",
+        "What the guides say of the files in words: [campaigns](../guides/campaign-format.md), "
+        "[diagnosis](../guides/diagnosis.md#files). The tables of a study are "
+        "[a page of their own](tables.md).",
+        blocks(Header.model_json_schema(), f"Campaign: `{HEADER}`", "header: "),
+        "## Campaign: `positions.csv` or `positions.parquet`",
+        "Columns that belong together are all there or all absent. *unit* is the unit of the "
+        "header.",
+        table(("columns", "type", "unit", "range", "", "meaning"), rows),
+        blocks(
+            yaml.safe_load(schema.read_text(encoding="utf-8")),
+            "Diagnosis: `diagnosis.json`",
+            "diagnosis: ",
+        ),
+        "The JSON Schema itself, with what each verdict requires: "
+        "[diagnosis.schema.yaml](diagnosis.schema.yaml).",
+    )

@@ -1,0 +1,32 @@
+"""Docstrings of the Python pages: apart what a parameter is and what it means."""
+
+import re
+
+import griffe
+
+SECTIONS = ("Parameters", "Attributes")
+ITEM = re.compile(r"(\S.*?) : ((?:[^,;()\[\]{}]|\([^()]*\)|\[[^\[\]]*\]|\{[^{}]*\})*)[,;]\s*(.*)")
+"""Name, type, and what follows it on the line."""
+
+
+def apart(text):
+    """Docstring whose lines `name : type, meaning` have the meaning on a line of its own."""
+    lines, section = [], ""
+    for line in text.splitlines():
+        if lines and line and set(line) == {"-"}:
+            section = lines[-1]
+        item = ITEM.fullmatch(line) if section in SECTIONS else None
+        if item and item[3] != "optional":
+            lines += [f"{item[1]} : {item[2]}", f"    {item[3]}"]
+        else:
+            lines.append(line)
+    return "\n".join(lines)
+
+
+class Meanings(griffe.Extension):
+    """Rewrites docstrings before they are parsed."""
+
+    def on_object(self, *, obj, **_):
+        """Rewrite one."""
+        if obj.docstring:
+            obj.docstring.value = apart(obj.docstring.value)
