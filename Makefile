@@ -24,7 +24,7 @@ export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: help env test test-cluster test-faults smoke reproduce anew unlock report campaigns diagnose-example plan-example hidden-effects hidden-docs benchmarks docs lint lock clean
+.PHONY: help env test test-cluster test-faults smoke reproduce anew unlock report campaigns diagnose-example plan-example hidden-effects hidden-docs benchmarks docs wheel lint lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-18s%s\n", $$1, $$2 }' Makefile
@@ -86,12 +86,15 @@ benchmarks: $(READY) ## measure the speed, and take tables and figure into docs
 docs: $(READY) ## build the documentation in site/, offline; open site/index.html
 	NO_MKDOCS_2_WARNING=1 mkdocs build --strict
 
+wheel: $(READY) ## build the package in dist/, with the workflow in it
+	python -m hatchling build --target wheel
+
 # Snakemake's own check of the workflows is a test, as starting it takes longer.
 lint: $(READY) ## check style and types
 	ruff check
 	ruff format --check
 	mypy
-	snakefmt --check Snakefile workflow
+	snakefmt --check Snakefile workflow accelstudy/study/template
 
 lock: $(READY) ## lock the newest versions that pyproject.toml allows
 	uv lock --upgrade --default-index https://pypi.org/simple

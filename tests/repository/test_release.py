@@ -1,0 +1,56 @@
+"""A release: version, changelog, citation and tag agree, and hooks check what `make lint` checks."""
+
+import re
+import subprocess
+import tomllib
+
+import yaml
+from packaging.version import Version
+from places import ROOT
+
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+RELEASES = re.findall(
+    r"^## \[(\d+\.\d+\.\d+)\] - (\d{4}-\d\d-\d\d)$", (ROOT / "CHANGELOG.md").read_text(), re.M
+)
+
+
+def test_version_changelog_citation_and_lock_agree():
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    locked = tomllib.loads((ROOT / "uv.lock").read_text())["package"]
+    version, date = RELEASES[0]
+    assert PROJECT["version"] == version == citation["version"]
+    assert citation["date-released"].isoformat() == date
+    assert version in {p["version"] for p in locked if p["name"] == "accelstudy"}
+    assert citation["license"] == PROJECT["license"]
+
+
+def test_releases_are_in_order():
+    versions = [Version(version) for version, _ in RELEASES]
+    assert versions == sorted({*versions}, reverse=True)
+    dates = [date for _, date in RELEASES]
+    assert dates == sorted(dates, reverse=True)
+
+
+def test_a_tag_of_this_commit_is_that_of_its_version():
+    tags = subprocess.run(
+        ["git", "tag", "--points-at", "HEAD"], cwd=ROOT, capture_output=True, text=True
+    ).stdout.split()
+    assert {tag for tag in tags if tag.startswith("v")} <= {f"v{PROJECT['version']}"}
+
+
+def test_python_versions_are_the_same_everywhere():
+    named = {c.rpartition(" ")[2] for c in PROJECT["classifiers"] if "Python :: 3." in c}
+    tested = yaml.safe_load((ROOT / ".github" / "workflows" / "ci.yml").read_text())
+    assert named == {*tested["jobs"]["test"]["strategy"]["matrix"]["python"]}
+    assert (
+        PROJECT["requires-python"]
+        == f">={min(named)},<3.{max(map(int, (n[2:] for n in named))) + 1}"
+    )
+
+
+def test_hooks_run_what_make_lint_runs():
+    recipe = re.search(r"^lint:.*\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text(), re.M)[1]
+    (local,) = yaml.safe_load((ROOT / ".pre-commit-config.yaml").read_text())["repos"]
+    assert local["repo"] == "local"  # needs no network
+    commands = [line.strip() for line in recipe.splitlines()]
+    assert [hook["entry"] for hook in local["hooks"]] == [f".venv/bin/{c}" for c in commands]
