@@ -33,6 +33,11 @@ def angles_of(forces: ArrayLike) -> Array:
     return np.stack(roll_pitch(tuple(np.moveaxis(forces, -1, 0))), axis=-1)
 
 
+def wrapped(angle: ArrayLike) -> Array:
+    """Return the angles in [−π, π) that point the same way, in rad; arrays of any shape."""
+    return np.asarray((np.asarray(angle, dtype=float) + np.pi) % (2 * np.pi) - np.pi)
+
+
 def specific_force(roll: Number, pitch: Number, g: Number, xp: Any = np) -> Vector:
     """Components of the specific force at rest in an attitude; the inverse of `roll_pitch`."""
     return (

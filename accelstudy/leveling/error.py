@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.basics.angles import wrapped
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import HoldConditions
-from accelstudy.leveling.angles import angles_of, roll_pitch, tilt_slope
+from accelstudy.leveling.angles import angles_of, roll_pitch, tilt_slope, wrapped
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]

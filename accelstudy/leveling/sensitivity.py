@@ -20,10 +20,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from accelstudy.basics.angles import wrapped
 from accelstudy.basics.shares import Z95
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
-from accelstudy.leveling.angles import angles_of, specific_force
+from accelstudy.leveling.angles import angles_of, specific_force, wrapped
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]

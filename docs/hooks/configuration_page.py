@@ -11,7 +11,7 @@ from accelstudy.plan.batch.config import PlanConfig
 from accelstudy.plan.batch.example import Example
 from accelstudy.pole.report.config import PoleConfig
 from accelstudy.proposal.config import DesignsConfig
-from accelstudy.sequential.config import SequentialConfig
+from accelstudy.sequential.simulated.config import SequentialConfig
 from accelstudy.study.config import config_schema
 
 SECTIONS = {

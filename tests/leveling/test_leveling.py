@@ -6,7 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
-from accelstudy.leveling.angles import jacobian, roll_pitch, sigma_roll_pitch, specific_force
+from accelstudy.leveling.angles import (
+    jacobian,
+    roll_pitch,
+    sigma_roll_pitch,
+    specific_force,
+    wrapped,
+)
 
 G = STANDARD_GRAVITY
 SIGMA = 0.002
@@ -104,3 +110,11 @@ def test_sigma_of_correlated_noise_by_simulation():
     draws = np.random.default_rng(7).multivariate_normal(f, cov, size=40_000)
     spread = np.std(roll_pitch(tuple(draws.T)), axis=1)
     np.testing.assert_allclose(sigma_roll_pitch(f, cov), spread, rtol=4.5 / np.sqrt(2 * 40_000))
+
+
+def test_angles_wrap_to_half_a_turn_either_way():
+    angles = np.array([[0.0, 0.5], [np.pi - 1e-9, -np.pi], [3.5 * np.pi, -4.2]])
+    found = wrapped(angles)
+    np.testing.assert_allclose(np.exp(1j * found), np.exp(1j * angles), atol=1e-14)
+    assert np.all((found >= -np.pi) & (found < np.pi))
+    assert wrapped(np.pi) == -np.pi

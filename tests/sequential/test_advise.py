@@ -20,11 +20,11 @@ from accelstudy.commands.main import main
 from accelstudy.leveling.angles import specific_force
 from accelstudy.sensors.frames import parse_frame
 from accelstudy.sensors.models import get_model
-from accelstudy.sequential.advisor import Advisor
-from accelstudy.sequential.attitudes import candidates
-from accelstudy.sequential.promise import Promise
-from accelstudy.sequential.running import read_running
-from accelstudy.sequential.wording import attitude
+from accelstudy.sequential.advising.advisor import Advisor
+from accelstudy.sequential.advising.running import read_running
+from accelstudy.sequential.advising.wording import attitude
+from accelstudy.sequential.choice.attitudes import candidates
+from accelstudy.sequential.choice.promise import Promise
 
 MODEL = "bias-scale-nonorthogonality"
 WANTED = ("--tilt-accuracy", "10mgon", "--tilt-range", "30gon")

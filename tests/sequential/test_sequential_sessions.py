@@ -13,14 +13,19 @@ from accelstudy.design.optimal.information import position_rows
 from accelstudy.plan.batch.example import parse_example, parse_section
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
-from accelstudy.sequential.attitudes import apart_from, candidates
-from accelstudy.sequential.choosing import best, gain_of_leveling, gain_of_parameters, typical_sizes
-from accelstudy.sequential.config import SequentialConfig
-from accelstudy.sequential.figure import sequential_figure
-from accelstudy.sequential.promise import Promise, rms_of
-from accelstudy.sequential.simulated import SetUp, simulate
-from accelstudy.sequential.stopping import LEAST_REDUNDANCY, LEVEL, bound, get_rule, plain
-from accelstudy.sequential.tables import sessions_table, summary_table
+from accelstudy.sequential.choice.attitudes import apart_from, candidates
+from accelstudy.sequential.choice.choosing import (
+    best,
+    gain_of_leveling,
+    gain_of_parameters,
+    typical_sizes,
+)
+from accelstudy.sequential.choice.promise import Promise, rms_of
+from accelstudy.sequential.choice.stopping import LEAST_REDUNDANCY, LEVEL, bound, get_rule, plain
+from accelstudy.sequential.simulated.config import SequentialConfig
+from accelstudy.sequential.simulated.figure import sequential_figure
+from accelstudy.sequential.simulated.sessions import SetUp, simulate
+from accelstudy.sequential.simulated.tables import sessions_table, summary_table
 from accelstudy.simulation.sessions import Noise
 
 NINE = get_model("bias-scale-nonorthogonality")

@@ -11,8 +11,7 @@ from accelstudy.adjustment.calibration import CalibrationProblem, Observations
 from accelstudy.adjustment.gauss_helmert import ConditionEquations, Linearisation, adjust
 from accelstudy.adjustment.quality.solution import Solution, solve
 from accelstudy.approaches import Approach
-from accelstudy.basics.angles import wrapped
-from accelstudy.leveling.angles import angles_of
+from accelstudy.leveling.angles import angles_of, wrapped
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]

@@ -6,10 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import Solution
-from accelstudy.basics.angles import wrapped
 from accelstudy.basics.units import GON
 from accelstudy.effects import HoldConditions
-from accelstudy.leveling.angles import angles_of, tilt_slope
+from accelstudy.leveling.angles import angles_of, tilt_slope, wrapped
 from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON, cap_forces, holds_in_use
 
 Array = NDArray[np.float64]

@@ -10,10 +10,10 @@ from accelstudy.adjustment.quality import global_test, suspects
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
 from accelstudy.sensors.sensor import SensorModel
-from accelstudy.sequential.advice import Agreement, LastPosition
-from accelstudy.sequential.attitudes import apart_from
-from accelstudy.sequential.prior import NOTHING_KNOWN, Prior
-from accelstudy.sequential.recursion import Recursion
+from accelstudy.sequential.advising.advice import Agreement, LastPosition
+from accelstudy.sequential.choice.attitudes import apart_from
+from accelstudy.sequential.estimation.prior import NOTHING_KNOWN, Prior
+from accelstudy.sequential.estimation.recursion import Recursion
 
 Array = NDArray[np.float64]
 

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.leveling.error import TiltError
-from accelstudy.sequential.attitudes import apart_from
-from accelstudy.sequential.choosing import best, gain_of_leveling, gain_of_parameters
-from accelstudy.sequential.promise import Promise, rms_of
-from accelstudy.sequential.stopping import get_rule
+from accelstudy.sequential.choice.attitudes import apart_from
+from accelstudy.sequential.choice.choosing import best, gain_of_leveling, gain_of_parameters
+from accelstudy.sequential.choice.promise import Promise, rms_of
+from accelstudy.sequential.choice.stopping import get_rule
 
 Array = NDArray[np.float64]
 

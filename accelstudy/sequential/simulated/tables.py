@@ -5,9 +5,9 @@ from __future__ import annotations
 import pandas as pd
 
 from accelstudy.basics.progress import track
-from accelstudy.sequential.config import SequentialConfig
-from accelstudy.sequential.simulated import SetUp, simulate
-from accelstudy.sequential.summary import identity, summarise
+from accelstudy.sequential.simulated.config import SequentialConfig
+from accelstudy.sequential.simulated.sessions import SetUp, simulate
+from accelstudy.sequential.simulated.summary import identity, summarise
 
 
 def set_ups(config: SequentialConfig, approach: str) -> list[SetUp]:

@@ -17,9 +17,9 @@ from accelstudy.leveling.angles import roll_pitch
 from accelstudy.sensors.frames import FRD, Frame
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
-from accelstudy.sequential.advice import Advice, Agreement
-from accelstudy.sequential.promise import Promise
-from accelstudy.sequential.stopping import LEAST_REDUNDANCY
+from accelstudy.sequential.advising.advice import Advice, Agreement
+from accelstudy.sequential.choice.promise import Promise
+from accelstudy.sequential.choice.stopping import LEAST_REDUNDANCY
 
 Array = NDArray[np.float64]
 

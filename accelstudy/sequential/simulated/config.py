@@ -12,7 +12,7 @@ from accelstudy.files.types import OneOrMore, Positive
 from accelstudy.files.validation import Block
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
-from accelstudy.sequential.stopping import get_rule
+from accelstudy.sequential.choice.stopping import get_rule
 from accelstudy.simulation.hold_plan import check_needs_no_plan
 
 

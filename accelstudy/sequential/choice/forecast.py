@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.design.estimability import rank_of
-from accelstudy.sequential.chooser import Chooser
+from accelstudy.sequential.choice.chooser import Chooser
 
 Array = NDArray[np.float64]
 

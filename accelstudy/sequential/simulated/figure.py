@@ -29,7 +29,7 @@ def sequential_figure(summary: pd.DataFrame, fixed: str) -> Figure:
 
     Parameters
     ----------
-    summary : DataFrame, of `accelstudy.sequential.summary`
+    summary : DataFrame, of `accelstudy.sequential.simulated.summary`
     fixed : str, name of the fixed scheme
     """
     with mpl.rc_context(STYLE):  # type: ignore[arg-type]

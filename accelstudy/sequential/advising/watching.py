@@ -11,7 +11,7 @@ import numpy as np
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.files.header import COLUMNS
 from accelstudy.campaign.files.session import Campaign
-from accelstudy.sequential.running import read_running
+from accelstudy.sequential.advising.running import read_running
 
 SETTLED = 3
 """Looks after which a last line without an end is taken as it is: editors leave the end out."""

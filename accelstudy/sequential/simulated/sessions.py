@@ -23,12 +23,12 @@ from accelstudy.leveling.error import TiltError, tilt_error
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
-from accelstudy.sequential.attitudes import DEFAULTS, candidates
-from accelstudy.sequential.chooser import Chooser
-from accelstudy.sequential.choosing import typical_sizes
-from accelstudy.sequential.config import SequentialConfig
-from accelstudy.sequential.promise import Promise, rms_of
-from accelstudy.sequential.recursion import Recursion
+from accelstudy.sequential.choice.attitudes import DEFAULTS, candidates
+from accelstudy.sequential.choice.chooser import Chooser
+from accelstudy.sequential.choice.choosing import typical_sizes
+from accelstudy.sequential.choice.promise import Promise, rms_of
+from accelstudy.sequential.estimation.recursion import Recursion
+from accelstudy.sequential.simulated.config import SequentialConfig
 from accelstudy.simulation.sessions import Noise
 
 Array = NDArray[np.float64]

@@ -22,7 +22,7 @@ from accelstudy.adjustment.gauss_helmert import MAX_ITERATIONS, ROUNDING, Whiten
 from accelstudy.approaches import Approach
 from accelstudy.design.estimability import rank_of
 from accelstudy.sensors.sensor import SensorModel
-from accelstudy.sequential.linearised import (
+from accelstudy.sequential.estimation.linearised import (
     no_conditions,
     of_sessions,
     put,
@@ -30,9 +30,9 @@ from accelstudy.sequential.linearised import (
     seen_from,
     with_next,
 )
-from accelstudy.sequential.prediction import Prediction
-from accelstudy.sequential.prior import NOTHING_KNOWN, Prior
-from accelstudy.sequential.triangle import (
+from accelstudy.sequential.estimation.prediction import Prediction
+from accelstudy.sequential.estimation.prior import NOTHING_KNOWN, Prior
+from accelstudy.sequential.estimation.triangle import (
     absorb,
     inverse_root,
     length,

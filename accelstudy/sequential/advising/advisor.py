@@ -19,15 +19,15 @@ from accelstudy.campaign.files.session import Campaign
 from accelstudy.design.estimability import is_blind
 from accelstudy.leveling.error import TiltError
 from accelstudy.sensors.sensor import SensorModel
-from accelstudy.sequential.advice import Advice, Agreement, NextPosition, NoiseTaken
-from accelstudy.sequential.chooser import Chooser
-from accelstudy.sequential.choosing import typical_sizes
-from accelstudy.sequential.conditions import next_holds, next_rows
-from accelstudy.sequential.forecast import positions_to_go
-from accelstudy.sequential.prior import NOTHING_KNOWN, Prior
-from accelstudy.sequential.promise import Promise
-from accelstudy.sequential.screening import Screening
-from accelstudy.sequential.stopping import LEAST_REDUNDANCY, get_rule
+from accelstudy.sequential.advising.advice import Advice, Agreement, NextPosition, NoiseTaken
+from accelstudy.sequential.advising.conditions import next_holds, next_rows
+from accelstudy.sequential.advising.screening import Screening
+from accelstudy.sequential.choice.chooser import Chooser
+from accelstudy.sequential.choice.choosing import typical_sizes
+from accelstudy.sequential.choice.forecast import positions_to_go
+from accelstudy.sequential.choice.promise import Promise
+from accelstudy.sequential.choice.stopping import LEAST_REDUNDANCY, get_rule
+from accelstudy.sequential.estimation.prior import NOTHING_KNOWN, Prior
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ import pandas as pd
 
 from accelstudy.basics.shares import clopper_pearson
 from accelstudy.schemes import get_scheme
-from accelstudy.sequential.simulated import SetUp
+from accelstudy.sequential.simulated.sessions import SetUp
 
 ROUNDING = 1e-9
 CENTRAL = (0.05, 0.5, 0.95)

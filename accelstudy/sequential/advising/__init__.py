@@ -1,0 +1,1 @@
+"""Advice while a campaign is being measured."""

@@ -1,0 +1,1 @@
+"""Which position comes next, and when the accuracy is reached."""

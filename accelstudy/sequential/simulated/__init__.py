@@ -1,0 +1,1 @@
+"""Simulated sessions that follow the advice, and what came of them."""
