@@ -1,4 +1,4 @@
-"""A release: version, changelog, citation and tag agree, and hooks check what `make lint` checks."""
+"""A release: version, changelog, citation and tag agree; hooks check what `make lint` checks."""
 
 import re
 import subprocess
