@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import hashlib
-import os
-import tempfile
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import llvmlite
 import llvmlite.binding as llvm
 
-_DIGEST = hashlib.sha256().digest_size
+from accelstudy.files.kept import keep, kept
+
+KIND = "kernels"
+"""Under which compiled functions are kept."""
 
 
 class Compiled:
@@ -31,10 +30,10 @@ class Compiled:
         machine = _machine()
         described = (text, machine.triple, *_processor(), llvmlite.__version__)
         key = hashlib.sha256("\n".join(described).encode()).hexdigest()
-        compiled = _kept(key)
+        compiled = kept(KIND, key)
         if compiled is None:
             compiled = _compiled(text, machine)
-            _keep(key, compiled)
+            keep(KIND, key, compiled)
         self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
         self._engine.add_object_file(llvm.ObjectFileRef.from_data(compiled))
         self._engine.finalize_object()
@@ -75,37 +74,3 @@ def _compiled(text: str, machine: Any) -> bytes:
     builder = llvm.create_pass_builder(machine, options)
     builder.getModulePassManager().run(module, builder)
     return bytes(machine.emit_object(module))
-
-
-def folder() -> Path:
-    """Where compiled functions are kept: `accelstudy` in the user's folder of caches."""
-    caches = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(caches) / "accelstudy" / "kernels"
-
-
-def _kept(key: str) -> bytes | None:
-    """Return what was compiled before, if it is there and whole."""
-    try:
-        content = (folder() / key).read_bytes()
-    except (OSError, RuntimeError):  # there is no home folder
-        return None
-    digest, compiled = content[:_DIGEST], content[_DIGEST:]
-    return compiled if hashlib.sha256(compiled).digest() == digest else None
-
-
-def _keep(key: str, compiled: bytes) -> None:
-    """Keep it for the next process, where that can be written.
-
-    It appears whole or not at all: processes that start together each write their own file and
-    give it the name.
-    """
-    with contextlib.suppress(OSError, RuntimeError):
-        folder().mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=folder())
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(hashlib.sha256(compiled).digest() + compiled)
-            os.replace(name, folder() / key)
-        except OSError:
-            os.unlink(name)
-            raise
