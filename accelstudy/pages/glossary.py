@@ -60,7 +60,7 @@ _WORD = re.compile(
     rf"(?<!\w)({'|'.join(map(re.escape, sorted(_KNOWN, key=len, reverse=True)))})(?!\w)",
     re.IGNORECASE,
 )
-_APART = re.compile(r"(<(svg|style|title|pre|code|a)\b.*?</\2>|<[^>]*>)", re.DOTALL)
+_APART = re.compile(r"(<(svg|style|script|select|title|pre|code|a)\b.*?</\2>|<[^>]*>)", re.DOTALL)
 
 
 def explained(page: str) -> str:

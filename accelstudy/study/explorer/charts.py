@@ -1,0 +1,179 @@
+"""The charts of an explorer, as Vega-Lite; the page gives them their data and their width.
+
+Rows of a chart are categories, so that names can be read on a narrow screen, too. Nothing is
+filtered within a chart, or its rows would lose their order: what is missing is null in the data.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import altair as alt
+
+from accelstudy.drawing.style import INK, STYLE, approach_colour, approach_marker
+
+DATA = "data"
+"""Name of the data of each chart."""
+SHAPES = {"o": "circle", "s": "square", "D": "diamond"}
+"""Markers of the figures, as Vega has them."""
+FAILED = {"not estimable": "M-1,-1L1,1M-1,1L1,-1", "none converged": "M-1,0L1,0M0,-1L0,1"}
+"""What can fail, and how it is marked: × and +, as in the figures."""
+DASHES = [4, 3]
+BAR = 0.4
+"""Opacity of a bar, as in the figures."""
+ROW = 30
+"""Height of a row, pixels."""
+BLUES = ("#F7FBFF", "#6BAED6", "#08306B")
+"""Of correlations from none to 1, as in the figures."""
+
+
+def tilt_chart(angle: str, unit: str, approaches: Sequence[str]) -> dict[str, Any]:
+    """Tilt error of one angle, a point and a range for each set-up.
+
+    Its data: `row`, `approach`, `value`, `low`, `high`, `q95`, `failed`, `chosen`, `strength`,
+    `name` and `i`; and `wanted`, the error that is allowed. The page sets the ends of its axis,
+    `least` and `most`, so that those of both angles are alike.
+    """
+    rows = alt.Chart(alt.NamedData(DATA)).encode(
+        y=_rows("row"),
+        yOffset=_offset(approaches),
+        color=_colour(approaches),
+        opacity=_plain("strength"),
+        tooltip="name:N",
+    )
+    ends = {"domainMin": alt.ExprRef("least"), "domainMax": alt.ExprRef("most")}
+    x = alt.X("value:Q", title=f"{angle} / {unit}", axis=alt.Axis(format="~r", tickCount=6))
+    x = x.scale(type="log", nice=False, **ends)
+    ranges = rows.mark_rule(size=2).encode(x=alt.X("low:Q"), x2="high:Q")
+    ticks = rows.mark_tick(thickness=2, size=10).encode(x="q95:Q")
+    points = rows.mark_point(filled=True, size=55).encode(x=x, shape=_shape(approaches))
+    chosen = rows.mark_point(size=230, strokeWidth=2).encode(
+        x="value:Q", color=alt.value(INK), opacity=_plain("chosen")
+    )
+    marks = alt.Scale(domain=list(FAILED), range=list(FAILED.values()))
+    failed = rows.mark_point(size=45, strokeWidth=2).encode(
+        x=alt.value(alt.ExprRef("width - 8")),
+        shape=alt.Shape("failed:N", scale=marks, legend=None),
+        opacity=_plain("cross"),
+    )
+    wanted = alt.Chart(alt.NamedData("wanted")).encode(x="value:Q")
+    wanted = wanted.mark_rule(color=INK, strokeDash=DASHES)
+    layers = alt.layer(wanted, ranges, ticks, chosen, points, failed)
+    layers = layers.resolve_scale(shape="independent")
+    layers = layers.add_params(alt.param(name="least", value=1), alt.param(name="most", value=10))
+    return _finished(layers, f"Tilt error in {angle}, of the set-ups that are shown")
+
+
+def sds_chart(unit: str, approaches: Sequence[str]) -> dict[str, Any]:
+    """Standard deviations of the parameters of one unit: a posteriori, empirical, linear theory."""
+    rows = _parameters(approaches)
+    x = alt.X("posteriori:Q", title=f"sd / {unit}", axis=alt.Axis(format="~r", tickCount=5))
+    bars = rows.mark_bar(opacity=BAR).encode(x=x)
+    ranges = rows.mark_rule(size=2).encode(x="posteriori_low:Q", x2="posteriori_high:Q")
+    theory = rows.mark_tick(thickness=2, size=14).encode(x="linear:Q", color=alt.value(INK))
+    points = rows.mark_point(filled=True, size=45).encode(x="empirical:Q", shape=_shape(approaches))
+    layers = alt.layer(bars, ranges, theory, points)
+    return _finished(layers, f"Standard deviations of the parameters in {unit}")
+
+
+def interval_chart(
+    quantity: str, right: float, title: str, description: str, approaches: Sequence[str]
+) -> dict[str, Any]:
+    """A quantity of each parameter with its 95 % interval, beside the value that is right."""
+    rows = _parameters(approaches)
+    axis = alt.Axis(format="~r", tickCount=5)
+    x = alt.X(f"{quantity}:Q", title=title, scale=alt.Scale(zero=False), axis=axis)
+    line = (
+        alt.Chart(alt.InlineData([{"value": right}]))
+        .mark_rule(color=INK, strokeDash=DASHES)
+        .encode(x="value:Q")
+    )
+    ranges = rows.mark_rule(size=2).encode(x=f"{quantity}_low:Q", x2=f"{quantity}_high:Q")
+    points = rows.mark_point(filled=True, size=45).encode(x=x, shape=_shape(approaches))
+    return _finished(alt.layer(line, ranges, points), description)
+
+
+def correlation_chart(approach: str) -> dict[str, Any]:
+    """Matrix of correlations; its data: `first`, `second`, `value`, `size` and `label`."""
+    size = alt.ExprRef("min(12, width / 2.7 / domain('x').length)")
+    axis = alt.Axis(
+        title=None,
+        labelAngle=0,
+        labelFontSize=size,
+        labelOverlap=False,
+        ticks=False,
+        domain=False,
+        grid=False,
+    )
+    fields = alt.Chart(alt.NamedData(DATA)).encode(
+        x=alt.X("second:N", sort=None, axis=axis, scale=alt.Scale(paddingInner=0.04)),
+        y=alt.Y("first:N", sort=None, axis=axis, scale=alt.Scale(paddingInner=0.04)),
+        tooltip="name:N",
+    )
+    scale = alt.Scale(domain=[0, 1], range=list(BLUES), type="pow", exponent=0.6)
+    colour = alt.Color("size:Q", scale=scale, legend=None)
+    white = alt.condition("datum.size > 0.45", alt.value("white"), alt.value(INK))
+    layers = alt.layer(
+        fields.mark_rect().encode(color=colour),
+        fields.mark_text(fontSize=size).encode(text="label:N", color=white),
+    )
+    return _finished(layers.properties(height="container"), f"Correlations, {approach}")
+
+
+def _parameters(approaches: Sequence[str]) -> alt.Chart:
+    return alt.Chart(alt.NamedData(DATA)).encode(
+        y=_rows("parameter"),
+        yOffset=_offset(approaches),
+        color=_colour(approaches),
+        tooltip="name:N",
+    )
+
+
+def _rows(field: str) -> alt.Y:
+    axis = alt.Axis(title=None, ticks=False, domain=False, grid=True, labelLimit=170)
+    return alt.Y(f"{field}:N", sort=None, axis=axis)
+
+
+def _plain(field: str) -> alt.Opacity:
+    """Opacity that the data say."""
+    return alt.Opacity(f"{field}:Q", scale=None)
+
+
+def _offset(approaches: Sequence[str]) -> alt.YOffset:
+    return alt.YOffset("approach:N", scale=alt.Scale(domain=list(approaches)))
+
+
+def _colour(approaches: Sequence[str]) -> alt.Color:
+    colours = [approach_colour(name) for name in approaches]
+    return alt.Color(
+        "approach:N", scale=alt.Scale(domain=list(approaches), range=colours), legend=None
+    )
+
+
+def _shape(approaches: Sequence[str]) -> alt.Shape:
+    shapes = [SHAPES[approach_marker(name)] for name in approaches]
+    return alt.Shape(
+        "approach:N", scale=alt.Scale(domain=list(approaches), range=shapes), legend=None
+    )
+
+
+def _finished(chart: alt.LayerChart | alt.FacetChart, description: str) -> dict[str, Any]:
+    """Give a chart the width of its place on the page, and the look of the figures."""
+    whole = chart.properties(width="container", description=description)
+    if whole.height is alt.Undefined:
+        whole = whole.properties(height=alt.Step(ROW, **{"for": "position"}))
+    return (
+        whole.configure(font="system-ui, sans-serif", background="white")
+        .configure_axis(
+            labelColor=INK,
+            titleColor=INK,
+            labelFontSize=12,
+            titleFontSize=12,
+            titleFontWeight="normal",
+            gridColor=STYLE["grid.color"],
+            domainColor=INK,
+        )
+        .configure_view(stroke=None)
+        .to_dict()
+    )
