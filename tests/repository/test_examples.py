@@ -11,6 +11,9 @@ from places import ROOT
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import GON, MGON
 from accelstudy.design.estimability import estimability
+from accelstudy.diagnosis.decision import priors
+from accelstudy.diagnosis.decision.explanations import CREDIBLE
+from accelstudy.diagnosis.evidence.size import DOUBT
 from accelstudy.files.tables import read_table
 from accelstudy.leveling.error import cap_forces, tilt_error
 from accelstudy.schemes import get_scheme
@@ -166,3 +169,15 @@ def test_a_robot_is_worth_what_a_robotics_engineer_reads():
             for angle in (1, 3.2, 10, 32, 100)
         ]
         assert numbers(told) == pytest.approx(left, abs=0.06)
+
+
+def test_the_theory_of_evidence_has_the_priors_of_the_code():
+    text = (ROOT / "docs/theory/evidence.md").read_text("utf-8")
+    told = dict(re.findall(r"^\| ([a-z ]+) \| ([\d.]+) \|", text, re.MULTILINE))
+    code = {"two effects": priors.TWO, "something unknown": priors.UNKNOWN}
+    code |= {"coloured noise": priors.COLOUR, "unequal axes": priors.AXES}
+    code["heavy tails"] = priors.TAILS
+    assert {name: float(value) for name, value in told.items()} == code
+    assert f"from **{priors.SURE:g}** on" in text
+    assert f"hold **{CREDIBLE:g}** together" in text
+    assert f"with a probability of {1 - DOUBT:g}" in text
