@@ -20,7 +20,6 @@ from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.adjustment.gauss_helmert import (
@@ -31,6 +30,7 @@ from accelstudy.adjustment.gauss_helmert import (
     whitened_design,
 )
 from accelstudy.approaches import Approach
+from accelstudy.basics.algebra import sp
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.tracing import TracedFunction, derivative, inverse, symbolic, symbols
 from accelstudy.basics.units import STANDARD_GRAVITY

@@ -11,27 +11,33 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
-symbolic = SimpleNamespace(
-    sqrt=sp.sqrt,
-    sin=sp.sin,
-    cos=sp.cos,
-    tan=sp.tan,
-    arctan2=sp.atan2,
-    exp=sp.exp,
-    abs=sp.Abs,
-    sign=sp.sign,
-    maximum=sp.Max,
-    minimum=sp.Min,
-    pi=sp.pi,
-)
-"""The namespace `xp` for tracing: SymPy's functions under NumPy's names."""
+from accelstudy.basics.algebra import sp
+
+
+class _Symbolic:
+    """SymPy's functions under NumPy's names."""
+
+    _names: ClassVar = {
+        "arctan2": "atan2",
+        "abs": "Abs",
+        "maximum": "Max",
+        "minimum": "Min",
+        **{name: name for name in ("sqrt", "sin", "cos", "tan", "exp", "sign", "pi")},
+    }
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in self._names:
+            raise AttributeError(name)
+        return getattr(sp, self._names[name])
+
+
+symbolic = _Symbolic()
+"""The namespace `xp` for tracing."""
 
 
 def symbols(*names: str) -> tuple[sp.Symbol, ...]:

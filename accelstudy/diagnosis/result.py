@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import GlobalTest, Solution, global_test
-from accelstudy.adjustment.quality.whole_model import REFUTED
 from accelstudy.approaches import Approach
+from accelstudy.basics.levels import REFUTED
 from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.gross_errors.recognition import Recognised
 from accelstudy.diagnosis.beside import Beside

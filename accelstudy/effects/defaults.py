@@ -7,8 +7,8 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import sympy as sp
 
+from accelstudy.basics.algebra import sp
 from accelstudy.basics.tracing import symbolic, symbols
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects.components import AXES, Matrix

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import sympy as sp
-
+from accelstudy.basics.algebra import sp
 from accelstudy.basics.tracing import symbols
 from accelstudy.effects.hold_conditions import HoldConditions
 

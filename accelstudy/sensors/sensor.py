@@ -15,9 +15,9 @@ from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
+from accelstudy.basics.algebra import sp
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.tracing import TracedFunction, derivative, inverse, symbolic, symbols
 from accelstudy.basics.units import STANDARD_GRAVITY

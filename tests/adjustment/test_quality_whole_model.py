@@ -9,7 +9,7 @@ from scipy.stats import chi2, kstest
 
 from accelstudy.adjustment import calibrate
 from accelstudy.adjustment.quality import global_test
-from accelstudy.adjustment.quality.whole_model import REFUTED
+from accelstudy.basics.levels import REFUTED
 
 
 @BOTH

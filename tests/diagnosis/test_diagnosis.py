@@ -15,7 +15,8 @@ from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.calibration.verdict import ACCEPTED, REJECTED, state
+from accelstudy.campaign.calibration.states import ACCEPTED, REJECTED
+from accelstudy.campaign.calibration.verdict import state
 from accelstudy.campaign.files.format import read_campaign, write_campaign
 from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
 from accelstudy.commands.main import main

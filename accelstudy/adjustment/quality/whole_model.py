@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from accelstudy.basics.levels import REFUTED
+
 Array = NDArray[np.float64]
 
-REFUTED = 0.01
-"""Level at which residuals refute a stated sigma, in every command and on every page."""
 NO_POWER = 2
 """Up to this redundancy the global test finds next to nothing."""
 

@@ -10,19 +10,18 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from accelstudy.adjustment.quality.whole_model import REFUTED
 from accelstudy.basics import suggested
+from accelstudy.basics.levels import REFUTED
 from accelstudy.basics.units import MGON, UNITS, display_unit
 from accelstudy.basics.wording import number
-from accelstudy.campaign.batch.run import STATUS
-from accelstudy.campaign.calibration.verdict import (
+from accelstudy.campaign.calibration.states import (
     ACCEPTED,
     BLIND,
     IMPLAUSIBLE,
     REJECTED,
     UNCHECKED,
 )
-from accelstudy.files.outputs import whole_file
+from accelstudy.files.outputs import BATCH_JOB, whole_file
 from accelstudy.files.tables import write_table
 from accelstudy.pages import render
 
@@ -94,7 +93,7 @@ def summarise_campaigns(
     paths = [Path(folder) for folder in folders]
     rows, values = [], []
     for folder in paths:
-        status = _read(folder / STATUS)
+        status = _read(folder / BATCH_JOB.marker)
         content = _read(folder / "calibration.json") if status["status"] == "ok" else None
         rows.append(_row(status, content))
         for entry in content["parameters"] if content else ():

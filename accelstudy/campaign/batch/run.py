@@ -21,8 +21,6 @@ from accelstudy.campaign.importing.public import read_record
 from accelstudy.files.outputs import BATCH_JOB, result_folder
 from accelstudy.sensors.models import get_model
 
-STATUS = BATCH_JOB.marker
-
 
 def run_task(
     task: Task,
@@ -60,7 +58,7 @@ def run_task(
             "error": error,
         }
         text = json.dumps(status, indent=2, ensure_ascii=False) + "\n"
-        (new / STATUS).write_text(text, encoding="utf-8")
+        (new / BATCH_JOB.marker).write_text(text, encoding="utf-8")
     return error
 
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
+from accelstudy.basics.algebra import sp
 from accelstudy.basics.tracing import derivative
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import Effect

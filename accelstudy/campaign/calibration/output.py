@@ -7,7 +7,7 @@ from typing import Any
 
 import pandas as pd
 
-from accelstudy.adjustment.quality.whole_model import REFUTED
+from accelstudy.basics.levels import REFUTED
 from accelstudy.basics.units import display_unit, to_display, unit_label
 from accelstudy.basics.wording import number
 from accelstudy.campaign.calibration.assessment import assess, assessed_positions

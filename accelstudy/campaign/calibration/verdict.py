@@ -11,17 +11,15 @@ from accelstudy.basics.units import GON, attitude_unit, display_unit, to_attitud
 from accelstudy.basics.wording import comma_list, p_value, words
 from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.fit import CampaignFit
+from accelstudy.campaign.calibration.states import (
+    ACCEPTED,
+    BLIND,
+    IMPLAUSIBLE,
+    REJECTED,
+    UNCHECKED,
+)
 from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.sensors.plausibility import implausible_parameters, implausible_tilt
-
-ACCEPTED, REJECTED = "accepted", "rejected"
-UNCHECKED, IMPLAUSIBLE = "cannot tell", "implausible"
-
-BLIND = (
-    "Gravity alone cannot see a rotation of the sensor in its housing: tilts are relative to the "
-    "sensor's own axes."
-)
-"""What holds for every calibration without a robot."""
 
 
 def state(assessment: Assessment) -> str:

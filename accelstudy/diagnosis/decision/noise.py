@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from accelstudy.adjustment.quality.whole_model import REFUTED
+from accelstudy.basics.levels import REFUTED
 from accelstudy.campaign.files.session import Campaign
 from accelstudy.diagnosis.decision import priors
 from accelstudy.diagnosis.decision.search import Search

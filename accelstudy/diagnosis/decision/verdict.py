@@ -9,7 +9,7 @@ import numpy as np
 from scipy import special
 
 from accelstudy.adjustment.quality import Solution
-from accelstudy.adjustment.quality.whole_model import REFUTED
+from accelstudy.basics.levels import REFUTED
 from accelstudy.basics.wording import comma_list, words
 from accelstudy.diagnosis.decision import priors
 from accelstudy.diagnosis.decision.explanations import Explanation

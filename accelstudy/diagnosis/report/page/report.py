@@ -7,7 +7,7 @@ from typing import Any
 
 import pandas as pd
 
-from accelstudy.adjustment.quality.whole_model import REFUTED
+from accelstudy.basics.levels import REFUTED
 from accelstudy.diagnosis.decision.explanations import CREDIBLE
 from accelstudy.diagnosis.decision.noise import LEVEL_NOISE
 from accelstudy.diagnosis.decision.priors import SURE
