@@ -1,1 +1,1 @@
-"""The ground floor: units, errors, words, names and numbers, which every room stands on."""
+"""Units, errors, words, names and numbers: what every other room uses."""

@@ -1,4 +1,4 @@
-"""What a quantity can be at all: more than is ever measured, but never beyond computing."""
+"""The widest ranges that are accepted: wider than any measurement, and safe to compute with."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Range:
     ----------
     least, most : float, both allowed
     unit : str, for messages; empty for a count
-    zero : bool, whether 0 is allowed too, where it means "none"
+    zero : bool, whether 0 is allowed as well; it means "none"
     """
 
     least: float
@@ -47,8 +47,8 @@ def _plain(value: float) -> str:
 
 GRAVITY = Range(1e-3, 1e3, "m/s²")
 GRAVITY_ERROR = Range(-1e2, 1e2, "m/s²")
-# Forces are always observed, and an observation without noise has no finite weight; the best
-# gravimeters resolve 1e-9 m/s².
+# Forces are always observed, and an observation without noise would have an infinite weight. The
+# best gravimeters resolve 1e-9 m/s².
 SIGMA_FORCE = Range(1e-9, 1e3, "m/s²")
 SIGMA_READING = Range(1e-9, 1e3, "m/s²", zero=True)
 SIGMA_GRAVITY = Range(1e-9, 1e3, "m/s²", zero=True)

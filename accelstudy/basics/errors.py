@@ -1,4 +1,4 @@
-"""Errors that are the user's to mend: one clear line, exit status 2, never a traceback."""
+"""Errors that the user can correct: one clear line, exit status 2, never a traceback."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collections.abc import Iterable
 class InputError(ValueError):
     """Input that cannot be used; the message says where, what is wrong and what would be right.
 
-    What a file says may stand in the message. So nothing in it steers a terminal.
+    The message may quote a file. So characters that control a terminal are spelled out in it.
     """
 
     def __init__(self, message: str) -> None:
@@ -18,7 +18,7 @@ class InputError(ValueError):
 
 
 def printable(text: str) -> str:
-    """Text in which characters that nobody sees, but that a terminal obeys, are spelled out."""
+    """Spell out the invisible characters of a text that would control a terminal."""
     if text.isprintable():
         return text
     return "".join(
@@ -31,7 +31,7 @@ _BRIEF.maxlevel, _BRIEF.maxstring, _BRIEF.maxother, _BRIEF.maxlong = 3, 60, 60, 
 
 
 def shown(value: object) -> str:
-    """Show a value in a message as Python writes it, but briefly, however much it holds."""
+    """Show a value in a message as Python writes it, cut short if it is long."""
     try:
         text = _BRIEF.repr(value)
     except ValueError:  # Python writes no integer of more than 4300 digits
@@ -40,7 +40,7 @@ def shown(value: object) -> str:
 
 
 class UnknownNameError(InputError):
-    """A name that stands in no registry; the message lists the names that do."""
+    """A name that no registry has; the message lists those that there are."""
 
     def __init__(self, kind: str, name: object, known: Iterable[str]) -> None:
         known = tuple(known)

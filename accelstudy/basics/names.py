@@ -7,11 +7,11 @@ import re
 from accelstudy.basics.errors import InputError, shown
 
 LONGEST = 100
-"""Bytes; with what is added to it, the name of a file must stay below 255."""
+"""Bytes. Endings are added to a name, and the name of a file must stay below 255 bytes."""
 
 
 def check_path_name(name: str) -> str:
-    """Return a name that can be that of a folder on any disk and in any pattern of the workflow.
+    """Return the name if it can name a folder on any disk and in any pattern of the workflow.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What a command tells while it works: bars on a terminal for what takes long, and lines.
+"""What a command reports while it works: lines and, for long work, bars on a terminal.
 
 A function reports by `track` and `stage`, wherever it stands. Nothing is shown unless a command
 asks for it by `feedback`, so that the package is silent when it is used from Python.
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
 DELAY = 2.0
-"""Seconds that work takes before it gets a bar."""
+"""Seconds after which work gets a bar."""
 
 Item = TypeVar("Item")
 _quiet: ContextVar[bool] = ContextVar("quiet", default=False)
@@ -91,7 +91,7 @@ def track(items: Iterable[Item], what: str, total: float | None = None) -> Itera
 
 @contextmanager
 def _drawn() -> Iterator[Progress]:
-    """Bars that appear after a while and vanish at the end, on standard error."""
+    """Bars on standard error that appear after a while and vanish at the end."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 

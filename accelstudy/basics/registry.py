@@ -53,7 +53,7 @@ class Registry(Generic[Item]):
 
     @contextmanager
     def without(self, names: Collection[str]) -> Iterator[None]:
-        """Leave items out of `names` for a while; who knows of one can still get it."""
+        """Leave items out of `names` within a ``with`` block; `get` still returns them."""
         before = self._unlisted
         self._unlisted = before | set(names)
         try:
@@ -121,12 +121,12 @@ class WithSettings:
 
     @property
     def summary(self) -> str:
-        """First line of what the class says of itself; empty if it says nothing."""
+        """First line of the docstring of the class; empty if it has none."""
         return next(iter((type(self).__doc__ or "").strip().splitlines()), "")
 
     @property
     def spec(self) -> str:
-        """Name with its settings, those left open or at `none` excepted: ``warm_up(tau=300)``."""
+        """Name with its settings, ``warm_up(tau=300)``, except those that are open or `none`."""
         fixed = [
             f"{setting.name}={value:.12g}"
             for setting in self.takes

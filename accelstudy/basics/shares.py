@@ -1,6 +1,6 @@
-"""Intervals of shares that were counted.
+"""Confidence intervals of shares: so many of n were counted.
 
-`scipy.stats` has them too, but takes a second to import, in every job.
+`scipy.stats` has them too, but every job would take a second longer to import it.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ from scipy import special
 Array = NDArray[np.float64]
 
 Z95 = float(special.ndtri(0.975))
+"""Standard deviations on either side that hold 95 % of a normal distribution."""
 
 
 def clopper_pearson(count: ArrayLike, n: ArrayLike, level: float = 0.95) -> tuple[Array, Array]:
     """Exact interval of shares, low (...) and high (...), of counts (...) in n (...).
 
-    Where n is 0 nothing is known: from 0 to 1.
+    Where n is 0 nothing is known, and the interval is from 0 to 1.
     """
     count, n = np.asarray(count, dtype=float), np.asarray(n, dtype=float)
     tail = (1 - level) / 2

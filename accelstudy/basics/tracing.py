@@ -46,7 +46,7 @@ def symbols(*names: str) -> tuple[sp.Symbol, ...]:
 
 
 def derivative(expressions: Sequence[Any], variables: Sequence[sp.Symbol]) -> sp.Matrix:
-    """Jacobian matrix; steps contribute nothing to it, as almost everywhere."""
+    """Jacobian matrix; the derivative of a step is zero, as it is almost everywhere."""
     matrix = sp.Matrix(list(expressions)).jacobian(list(variables))
     return matrix.replace(sp.DiracDelta, lambda *_: sp.S.Zero)
 
@@ -54,9 +54,9 @@ def derivative(expressions: Sequence[Any], variables: Sequence[sp.Symbol]) -> sp
 def inverse(matrix: sp.Matrix) -> sp.Matrix:
     """Inverse of a 3 × 3 matrix.
 
-    It is formed of placeholders, since SymPy would expand the products of the entries: seconds for
-    a full matrix, and nothing that the elimination of common subexpressions would not find. That
-    they have a determinant needs no proof, for which `inv` takes longer than for all else.
+    The inverse is formed of placeholders. With the entries themselves SymPy would expand their
+    products, which takes seconds for a full matrix and saves nothing in the generated code. `inv`
+    would also prove that the determinant is not zero, which takes longer than all else.
     """
     if matrix.is_diagonal():
         return sp.diag(*(1 / matrix[i, i] for i in range(3)))
@@ -72,7 +72,7 @@ class TracedFunction:
     Parameters
     ----------
     arguments : tuple of Symbol
-    expressions : matrix of expressions; its shape leads the shape of what a call returns
+    expressions : matrix of expressions; a call returns an array whose shape begins with theirs
     """
 
     arguments: tuple[sp.Symbol, ...]

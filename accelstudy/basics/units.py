@@ -92,7 +92,7 @@ UNITS: dict[str, dict[str, float]] = {
     },
     "K": {"K": 1.0, "degC": 1.0},
 }
-"""SI unit -> {unit that people use: its size in the SI unit}; the first is the one we record."""
+"""SI unit -> {unit that people use: its size in the SI unit}; files have the first one."""
 
 SENSOR_UNITS = ("m/s^2", "g", "mg")
 """Units in which sensors give specific forces."""
@@ -104,13 +104,13 @@ CLOCK_UNITS = ("s", "ms", "us", "ns")
 ANGLE_UNITS = {"gon": "mgon", "deg": "mdeg"}
 """Units in which angles can be shown: that of an attitude -> that of a small angle."""
 ANGLE_UNIT_VARIABLE = "ACCELSTUDY_ANGLE_UNIT"
-"""Environment variable with the user's choice of them, which commands and workflows heed."""
+"""Environment variable by which a user chooses one for commands and workflows."""
 _angle_unit: ContextVar[str] = ContextVar("angle_unit", default="gon")
 
 
 @contextmanager
 def angles_in(unit: str | None) -> Iterator[None]:
-    """Show angles in gon or deg within a ``with`` block; None leaves what holds outside it.
+    """Show angles in gon or deg within a ``with`` block; None changes nothing.
 
     Only what people look at changes: files keep their units.
 
@@ -129,7 +129,7 @@ def angles_in(unit: str | None) -> Iterator[None]:
 
 
 def attitude_unit() -> str:
-    """Unit in which attitudes are shown, gon or deg; small ones have that of `display_unit`."""
+    """Unit in which attitudes are shown, gon or deg; small angles have that of `display_unit`."""
     return _angle_unit.get()
 
 
@@ -139,14 +139,14 @@ def to_attitude(angle: ArrayLike) -> NDArray[np.float64]:
 
 
 def angle_note() -> str:
-    """Explain the unit of angles, where it is first used."""
+    """Explain the unit of angles, for the place where it is first used."""
     if attitude_unit() == "gon":
         return "100 gon = 90°, 1 mgon = 0.0009°"
     return "90° = 100 gon, 1 mdeg = 0.001°"
 
 
 def recorded_unit(unit: str) -> str:
-    """Unit in which files hold a quantity of the SI `unit`; that itself if none is better."""
+    """Unit in which files hold a quantity of the SI `unit`; the SI unit if there is no other."""
     return next(iter(UNITS.get(unit, {unit: 1.0})))
 
 
@@ -156,7 +156,7 @@ def to_recorded(value: ArrayLike, unit: str) -> NDArray[np.float64]:
 
 
 def display_unit(unit: str) -> str:
-    """Unit in which people see a quantity of the SI `unit`: that of files, angles as chosen."""
+    """Unit in which people see a quantity of the SI `unit`: that of files, but angles as chosen."""
     return ANGLE_UNITS[attitude_unit()] if unit == "rad" else recorded_unit(unit)
 
 

@@ -1,4 +1,4 @@
-"""Words and numbers as all messages and pages have them."""
+"""How all messages and pages write words and numbers."""
 
 from __future__ import annotations
 

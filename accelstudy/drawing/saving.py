@@ -20,16 +20,16 @@ from accelstudy.drawing.style import STYLE
 from accelstudy.files.outputs import whole_file
 
 PAGE_DPI = 150
-"""Of the figures of a page, which shows them as SVG."""
+"""Dots per inch of the figures of a page, which shows them as SVG."""
 MANY = 1000
-"""Points or lines of one artist from which on it is drawn as an image inside of the SVG."""
+"""An artist with more points or lines is drawn as an image inside of the SVG."""
 
 
 def save(figure: Figure, svg_path: str | Path, png_path: str | Path, title: str, dpi: int) -> str:
     """Write a figure as SVG and PNG, each whole or not at all.
 
-    The same figure gives the same bytes. The canvases are called themselves, since
-    `Figure.savefig` would draw each twice.
+    The same figure gives the same bytes. The canvases are called directly, because
+    `Figure.savefig` would draw each of them twice.
 
     Parameters
     ----------
@@ -61,8 +61,8 @@ def save(figure: Figure, svg_path: str | Path, png_path: str | Path, title: str,
 def save_all(figures: Mapping[str, Callable[[], Figure]], folder: Path) -> dict[str, str]:
     """Draw the figures of a page and write them under their names; returns elements for the page.
 
-    A figure that fails takes nothing else with it: a line on the page and a warning on stderr say
-    so, with the error.
+    If a figure fails, the others are drawn all the same. A line on the page and a warning on stderr
+    name the error.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def save_all(figures: Mapping[str, Callable[[], Figure]], folder: Path) -> dict[
             _simplify(figure)
             svg, png = folder / f"{name}.svg", folder / f"{name}.png"
             elements[name] = save(figure, svg, png, name, PAGE_DPI)
-        except OSError:  # a full disk, say, which is no matter of the figure
+        except OSError:  # such as a full disk, which is no failure of the figure
             raise
         except Exception as error:
             said = failure(f"The figure {name!r} could not be drawn", error)

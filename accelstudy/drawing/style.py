@@ -88,8 +88,8 @@ GROUPS = {
 }
 """Group of parameters (an effect, or what else varies): its label and its colour."""
 
-# One cannot tell two dozen colours apart, so effects beyond the registered models share the colour
-# of their cause. These keep apart from all others with normal and with red-green blind eyes.
+# Nobody can tell two dozen colours apart, so effects beyond the registered models share the colour
+# of their cause. These differ from all others for normal and for red-green blind eyes.
 CAUSES = {
     "rig": "#332288",
     "environment": "#5C0A1E",
@@ -122,7 +122,7 @@ def group_colour(group: str) -> str:
 
 @cache
 def cause(effect: str) -> str:
-    """Cause of an effect: what has it, or on what it depends beside the force."""
+    """Cause of an effect: the part that has it, or what it depends on besides the force."""
     if get_effect(effect).part == "rig":
         return "rig"
     columns = set(compose(effect, (effect,)).hold_columns)
@@ -168,7 +168,7 @@ def in_order(groups: Iterable[str]) -> list[str]:
 
 
 def model_title(model: str) -> str:
-    """Short title of a model; one that extends a known one is named by what it adds."""
+    """Short title of a model; an extension of a registered model is named by what it adds."""
     if model in TITLES:
         return TITLES[model]
     known = max(
@@ -211,7 +211,7 @@ def log_ticks(axis: Axis, low: float, high: float) -> None:
 
 
 def spread(places: NDArray[np.float64], apart: float) -> list[int]:
-    """Indices of those places, from the first on, that lie at least `apart` from the last."""
+    """Indices of places, from the first on, each at least `apart` from the one chosen before."""
     chosen: list[int] = []
     for i, place in enumerate(places):
         if not chosen or place - places[chosen[-1]] >= apart:
@@ -220,7 +220,7 @@ def spread(places: NDArray[np.float64], apart: float) -> list[int]:
 
 
 def legend_columns(labels: Iterable[str], width_mm: float = 170.0) -> int:
-    """Columns of a legend that fit a figure's width, for the longest of its labels."""
+    """Number of columns in which the longest label of a legend fits the width of a figure."""
     from matplotlib.textpath import TextPath
 
     size = STYLE["legend.fontsize"]
@@ -230,7 +230,7 @@ def legend_columns(labels: Iterable[str], width_mm: float = 170.0) -> int:
 
 
 def say_empty(ax: Axes, text: str = "no estimable cell") -> None:
-    """Write into axes why nothing is drawn there."""
+    """Write into axes why they are empty."""
     ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", color="#777777",
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 2})  # fmt: skip
 

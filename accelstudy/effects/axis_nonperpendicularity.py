@@ -7,8 +7,8 @@ from accelstudy.effects.base import Effect, Parameter, register
 class AxisNonPerpendicularity(Effect):
     """Roll error k tan θ of axes that are not perpendicular (the tilting-axis error).
 
-    Written as what it does to the force, which is regular where the roll axis is vertical and
-    tan θ is not.
+    It is written as a change of the force, which stays finite where the roll axis is vertical and
+    tan θ does not.
     """
 
     name = "axis_nonperpendicularity"

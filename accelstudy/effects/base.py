@@ -60,16 +60,16 @@ class Effect(WithSettings):
     Attributes
     ----------
     name : str, canonical
-    family : str, what it has in common with effects that are easily taken for it, in plain words
-    group : str, in which `location` of a diagnosis counts it; empty where in none
+    family : str, what it has in common with effects that are easily mistaken for it
+    group : str, of effects that a diagnosis compares to say where a cause lies; may be empty
     parameters : tuple of Parameter
     takes : tuple of Setting, the settings that it takes
-    equation : str, what is added, for people; by default as the methods have it
+    equation : str, what is added, for people; by default written from the methods
     typical : (float, float), usual size of a parameter from good to cheap equipment, SI; by default
-        what changes a reading by 0.1 to 1 thousandth of g
-    part : what has the effect, the "sensor" or the "rig" that turns it
+        a size that changes a reading by 0.1 to 1 thousandth of g
+    part : what causes the effect, the "sensor" or the "rig" that turns it
     partial : bool, whether some of its parameters are left out
-    drifts : bool, whether it grows in proportion to time, and is known in its session only
+    drifts : bool, whether it grows in proportion to time, and is known within its session only
     """
 
     kind = "effect"
@@ -91,18 +91,18 @@ class Effect(WithSettings):
 
     @property
     def spec(self) -> str:
-        """Name with its settings and, if it has not all of its parameters, with those it has."""
+        """Name with its settings and, if some parameters are left out, with those that it has."""
         kept = f"[{', '.join(p.name for p in self.parameters)}]" if self.partial else ""
         return super().spec + kept
 
     def candidates(
         self, hold: HoldConditions, f: NDArray[np.float64], g: float
     ) -> Sequence[Effect]:
-        """Shapes of the effect that are worth a search in given holds with forces f (n, 3)."""
+        """Shapes of the effect, that is, settings to try, for given holds with forces f (n, 3)."""
         return (self,)
 
     def between(self, other: Effect, hold: HoldConditions) -> Sequence[Effect]:
-        """Shapes between two candidates that were passed over, as there are so many positions."""
+        """Shapes between two candidates, which were skipped because there are many positions."""
         return ()
 
     def only(self, kept: tuple[int, ...]) -> Effect:

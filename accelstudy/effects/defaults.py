@@ -1,4 +1,4 @@
-"""What is said of an effect that does not say it itself: its formula and how large it may be."""
+"""Defaults for an effect that states neither its equation nor its typical sizes."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from accelstudy.effects.base import Effect
 
 USUAL = (1e-4, 1e-3)
-"""Parts of g by which an effect of usual size changes a reading."""
+"""Parts of g by which an effect of typical size changes a reading."""
 
 Texts = list[str]
 
 
 def formulas(effect: Effect) -> dict[str, Texts | list[Texts]]:
-    """Write what an effect adds, with its settings as numbers, as text that a program can evaluate.
+    """Write what an effect adds as text that a program can evaluate, its settings as numbers.
 
     Returns
     -------
@@ -77,7 +77,7 @@ def typical_of(effect: Effect) -> tuple[float, float]:
 
 
 def _expressions(effect: Effect) -> tuple[tuple[Any, ...], Matrix, tuple[Any, Any]]:
-    """Evaluate an effect with symbols, but with its settings as the numbers they are."""
+    """Evaluate an effect with symbols for all but its settings, which stay numbers."""
     numbered = type(effect)()
     numbered.settings = {
         name: sp.Integer(int(value)) if float(value).is_integer() else sp.Float(value)

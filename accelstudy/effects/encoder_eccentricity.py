@@ -8,7 +8,7 @@ from accelstudy.effects.base import Effect, Parameter, register
 class EncoderEccentricity(Effect):
     """Harmonic A sin mφ + B cos mφ of each encoder, m = 1 for a disk off its axis.
 
-    The order m is searched: a tilted disk or two reading heads leave the second.
+    The order m is searched for: a tilted disk or two reading heads leave the second harmonic.
     """
 
     name = "encoder_eccentricity"

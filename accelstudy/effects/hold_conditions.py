@@ -22,8 +22,8 @@ OF_ALL = ("course", "full_range")
 class HoldConditions:
     """What is known of the static holds (positions) besides the forces, in order of acquisition.
 
-    Every column is optional and holds one value per position; an effect that needs a column that
-    is absent cannot be simulated or estimated, and says so.
+    Every column is optional and holds one value per position. An effect that needs a missing column
+    cannot be simulated or estimated; the error names the column.
 
     Parameters
     ----------
@@ -34,8 +34,8 @@ class HoldConditions:
     step_x, step_y, step_z : (n,) arrays, m/s², specific force less that of the hold before; 0 in
         the first hold
     order : (n,) array, the time or, where there is none, the number of the hold, from 1 on
-    course : Course, of the temperature in the whole session, that of holds left out included; by
-        default that of these holds
+    course : Course, of the temperature of the whole session, with the holds that were left out; by
+        default of these holds alone
     full_range : float, m/s², the sensor measures ± this
     """
 
@@ -53,7 +53,7 @@ class HoldConditions:
     full_range: float | None = None
 
     def take(self, positions: NDArray[np.int_]) -> HoldConditions:
-        """Return some of the holds, which keep what came before them: steps and temperatures."""
+        """Return some of the holds; steps and lagged temperatures still depend on all."""
         columns = {name: getattr(self, name) for name in self.columns()}
         return HoldConditions(
             **{k: None if v is None else np.asarray(v)[positions] for k, v in columns.items()},
@@ -62,7 +62,7 @@ class HoldConditions:
         )
 
     def with_steps(self, forces: NDArray[np.float64]) -> HoldConditions:
-        """Return all holds, in order of acquisition, with what follows from it.
+        """Return the holds, which are in order of acquisition, with columns that follow from it.
 
         These are the steps of forces (n, 3), m/s², and `order` unless it is known.
         """
@@ -86,7 +86,7 @@ class HoldConditions:
         return np.asarray(values, dtype=float)
 
     def lagged(self, tau: float) -> NDArray[np.float64]:
-        """Temperature of what follows the thermometer with a first-order lag of `tau` s, °C, (n,).
+        """Temperature of a body that follows the thermometer with a lag of `tau` s, °C, (n,).
 
         Raises
         ------

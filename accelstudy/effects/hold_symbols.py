@@ -31,7 +31,7 @@ class HoldSymbols:
             raise AttributeError(name) from None
 
     def lagged(self, tau: Any) -> sp.Symbol:
-        """Temperature behind a lag; of none, the temperature."""
+        """Temperature behind a lag; with a lag of 0 the temperature itself."""
         if tau == 0:
             return self.columns["temperature"]
         number = "" if not self.lagged_by else f"_{len(self.lagged_by) + 1}"

@@ -8,8 +8,8 @@ class JointCompliance(Effect):
     """Deflection of the joints by gravity, which the encoders do not see.
 
     Gravity turns each joint by a torque like sin 2φ cos θ, or sin 2θ cos φ, so that the flange is
-    at φ + c_φ sin 2φ cos θ and θ + c_θ sin 2θ cos φ where the encoders read φ and θ. What the
-    reading has too much is the opposite.
+    at φ + c_φ sin 2φ cos θ and θ + c_θ sin 2θ cos φ where the encoders read φ and θ. The
+    error of the reading is the opposite.
     """
 
     name = "joint_compliance"

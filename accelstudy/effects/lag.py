@@ -1,4 +1,4 @@
-"""What follows a temperature with a lag."""
+"""The temperature of a body that follows a thermometer with a lag."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Course:
     temperature: Array
 
     def then(self, time: Array, temperature: Array) -> Course:
-        """Go on with readings (n,) of a thermometer, of which one in each second is kept."""
+        """Continue the course with readings (n,) of a thermometer; one per second is kept."""
         last = np.floor(self.time[-1]) if len(self.time) else -np.inf
         known = np.isfinite(temperature) & np.isfinite(time) & (np.floor(time) > last)
         time, temperature = time[known], temperature[known]
@@ -35,7 +35,7 @@ class Course:
         )
 
     def behind(self, time: ArrayLike, tau: float) -> Array:
-        """By how much a body is warmer than the course, K, that follows it with a first-order lag.
+        """Temperature of a body that follows the course with a first-order lag, less the course, K.
 
         The body has T_τ with τ dT_τ/dt = T − T_τ, and T_τ = T until the first time that is known.
         Where T grows by s per second, T_τ − T goes to −s τ by exp(−Δt/τ), which is exact.
@@ -46,7 +46,7 @@ class Course:
         tau : float, s, above 0
         """
         known, first = np.unique(self.time, return_index=True)
-        # The last temperature is kept.
+        # After the last time the temperature stays as it is.
         rise = np.append(np.diff(self.temperature[first]) / np.diff(known), 0.0) * tau
         behind = [0.0]
         decay = np.exp(-np.diff(known) / tau)

@@ -5,7 +5,7 @@ from accelstudy.effects.base import Effect, per_axis, register
 
 @register
 class MountingRotation(Effect):
-    """Small rotation ε × f of the sensor against the flange, whose tilt it is to tell."""
+    """Small rotation ε × f of the sensor against the flange whose tilt it measures."""
 
     name = "mounting_rotation"
     family = "alignment of the axes"

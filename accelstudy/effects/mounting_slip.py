@@ -1,4 +1,4 @@
-"""Mounting slip: the mounting of the sensor gives way once."""
+"""Mounting slip: the sensor turns once on its mounting."""
 
 from accelstudy.basics.registry import Setting
 from accelstudy.effects.base import Effect, after, per_axis, register
@@ -12,7 +12,7 @@ LEAST = 3
 class MountingSlip(Effect):
     """Small rotation ε × f of the sensor on the flange for t > t_c.
 
-    The time t_c is searched between the holds. Where they have no time it counts them, from 1 on.
+    The time t_c is searched for between the holds; without times it is counted in holds from 1 on.
     """
 
     name = "mounting_slip"

@@ -7,14 +7,14 @@ from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects.base import Effect, per_axis, register
 
 FIRST = 0.25
-"""Part of a stated range up to which a sensor does not saturate: who states one knows it so far."""
+"""Part of a stated range up to which a sensor certainly does not saturate."""
 
 
 @register
 class Saturation(Effect):
     """Loss of gain beyond a knee, −k_i sign(f_i) max(0, |f_i| − c); k = 1 is hard clipping.
 
-    The knee c, in m/s², is searched. If the range of the sensor is stated it is within that.
+    The knee c, in m/s², is searched for, within the range of the sensor if that is stated.
     """
 
     name = "saturation"

@@ -1,4 +1,4 @@
-"""When something can have happened once, between two holds."""
+"""Times between two holds at which something may have happened once."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,27 +6,27 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 ALL = 100
-"""Times up to which all are searched."""
+"""Number of times up to which all are tried."""
 SOME = 50
-"""Of more, times that are searched at first; what lies between is looked at where it matters."""
+"""Of more times, number of those tried at first; times between them follow where it matters."""
 STEPS = 7
-"""Times between two of them that are looked at next."""
+"""Number of times that are tried next between two of them."""
 
 
 def step_times(when: Array, least: int) -> Array:
-    """Times (k,) between holds that are searched at first.
+    """Times (k,) between holds that are tried at first.
 
     Parameters
     ----------
     when : (n,) array, of the holds
-    least : int, holds on either side; fewer that deviate are so many bumped holds by another name
+    least : int, holds on either side; a step with fewer cannot be told from bumped holds
     """
     middles = _middles(when, least)
     return middles[_spread(len(middles))]
 
 
 def times_between(low: float, high: float, when: Array) -> Array:
-    """Return some (k,) of those that were passed over between two times, in either order."""
+    """Return some (k,) of the times that were skipped between two times, in either order."""
     middles = _middles(when, 1)
     left = middles[(middles > min(low, high)) & (middles < max(low, high))]
     if not len(left):
@@ -35,14 +35,14 @@ def times_between(low: float, high: float, when: Array) -> Array:
 
 
 def _middles(when: Array, least: int) -> Array:
-    """Middles between successive holds, with so many on either side, as they are written, (k,)."""
+    """Middles (k,) between successive holds with at least so many on either side, rounded."""
     times = np.unique(when)
     middles = (times[:-1] + times[1:]) / 2
     return np.array([float(f"{t:.9g}") for t in middles[least - 1 : len(times) - least]])
 
 
 def _spread(count: int) -> NDArray[np.int_]:
-    """Indices of all middles or, of very many, of some: the nearer to an end the closer."""
+    """Indices of all middles or, of very many, of some, which lie closer together near the ends."""
     if count <= ALL:
         return np.arange(count)
     part = np.geomspace(1, (count + 1) / 2, SOME // 2) - 1

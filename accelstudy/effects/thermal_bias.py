@@ -7,15 +7,15 @@ from accelstudy.effects.base import Effect, per_axis, register
 from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
 
 LAGS = (0.04, 0.1, 0.25)
-"""Time constants of a lag that are tried, in parts of the session."""
+"""Time constants of a lag that are tried, as parts of the session."""
 
 
 @register
 class ThermalBias(Effect):
     """Bias temperature sensitivity b_T (T − T0), T0 = 20 °C (IEEE Std 1293).
 
-    The sensor may follow the thermometer with a first-order lag: T is T_τ then, with
-    τ dT_τ/dt = T − T_τ, and T_τ = T when the session begins. By default τ is 0, which is none.
+    The sensor may follow the thermometer with a first-order lag. Then T_τ replaces T, with
+    τ dT_τ/dt = T − T_τ, and T_τ = T when the session begins. By default τ is 0: no lag.
     """
 
     name = "thermal_bias"

@@ -1,1 +1,1 @@
-"""What the jobs of all workflows share: their log, their origin, and what earlier runs left."""
+"""What the jobs of all workflows share: logs, provenance, and checks of earlier results."""

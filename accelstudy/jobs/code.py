@@ -1,4 +1,4 @@
-"""The code that a job depends on, as its imports have it."""
+"""The code on which a job depends, found from its imports."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ _DATA = (".j2", ".yaml")
 def code_hash(script: str | Path) -> str:
     """Hash of the package's files on which a script of the workflow depends.
 
-    Snakemake sees that a script has changed, but not that a package has; as a parameter of a rule
-    this shows it. What an import needs at the beginning of a module, or within a function, is found
-    by reading; imports for type checkers do not count. A registry depends on all modules of its
-    folder, and a module on the templates and data beside it.
+    Snakemake notices that a script has changed, but not that a package has. With this hash as a
+    parameter of a rule it does. Imports are found by reading the files, those within functions
+    included and those for type checkers excluded. A registry depends on all modules of its folder,
+    and a module on the templates and data next to it.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def _imported(root: Path, path: Path) -> Iterator[Path]:
 def _read(path: Path, modified: int) -> tuple[str, tuple[str, ...], bool]:
     """Hash of a file, modules that it names, and whether it imports all modules beside it.
 
-    The time at which it was modified is there so that a file is read again when it has changed.
+    With the time of its last change as an argument, a changed file is read again.
     """
     content = path.read_text(encoding="utf-8")
     digest = hashlib.sha256(content.encode()).hexdigest()

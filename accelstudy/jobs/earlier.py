@@ -1,7 +1,7 @@
-"""What an earlier run left in the folder of its results, looked at before a new one starts.
+"""Checks of the results of an earlier run, before a new one starts.
 
-Snakemake goes by time stamps and by its own records. It sees no file that was damaged and kept its
-time, and where its records are gone, no other configuration either.
+Snakemake goes by time stamps and by its own records. It does not notice a damaged file that kept
+its time stamp. Without its records it does not notice a changed configuration either.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from accelstudy.files.parquet import read_row_groups
 from accelstudy.files.tables import LIBRARIES, REMEDY, origin, read_origin
 
 READ_AT_START = 1_000_000_000
-"""Bytes of estimates up to which all of them are read at the start, in seconds; of more, the ends
-are, and the rest is checked when it is used."""
+"""Up to so many bytes of estimates are read in full at the start, in seconds. Of more, only the
+ends are read, and the rest is checked when it is used."""
 LISTED = 10
-"""Files that a line names."""
+"""Number of files that a line names."""
 LOCKS = Path(".snakemake/locks")
 
 _ENDS = {".png": b"IEND\xaeB`\x82", ".svg": b"</svg>", ".html": b"</html>"}
@@ -38,7 +38,7 @@ def earlier_run(
     seed: int | None,
     folders: Mapping[str, Kind] = MappingProxyType({}),
 ) -> Iterator[str]:
-    """Give lines on what a person should know of an earlier run before the next one starts.
+    """Return lines that tell a person what to know of an earlier run before the next one starts.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def earlier_run(
     there = [path for path in outputs if Path(path).is_file()]
     origins = _origins(there, setups, {f: k for f, k in folders.items() if Path(f).is_dir()})
     for path in sorted(map(str, Path(results, "estimates").glob("*.parquet"))):
-        with suppress(InputError):  # what has no origin is a user's
+        with suppress(InputError):  # a file without provenance belongs to the user
             origins.setdefault(path, read_origin(path))
     kept = (
         "What this run does not make anew stays; --forceall, which for a study is `make anew`, "
@@ -95,7 +95,7 @@ def _of_setup(made: Mapping[str, Any], digest: str | None) -> bool:
 
 
 def _other_software(origins: Iterable[Mapping[str, Any]]) -> list[str]:
-    """Return names and versions that are not those of now."""
+    """Return names and versions that differ from the present ones."""
     now = origin({})
     changed = []
     for key, name in _SOFTWARE.items():
@@ -114,7 +114,7 @@ def _brief(value: object) -> str:
 def _origins(
     paths: Sequence[str], estimates: Container[str], folders: Mapping[str, Kind]
 ) -> dict[str, dict[str, Any]]:
-    """Check that all is as it was written; where the tables among the files come from."""
+    """Check that files are as they were written; return the provenance of the tables."""
     size = sum(Path(path).stat().st_size for path in paths if path in estimates)
     origins = {}
     damaged = {}
@@ -143,7 +143,7 @@ def _named(paths: Sequence[str]) -> str:
 
 
 def _check_folder(folder: Path, kind: Kind) -> None:
-    """Check what a job wrote together; Snakemake does not miss a single file of it."""
+    """Check that files of one job are all there; Snakemake does not miss a single one."""
     for name in sorted(kind.of_earlier_run(folder)):
         try:
             _check_file(folder / name)
@@ -176,11 +176,11 @@ def _check_file(path: Path) -> None:
 def remove_foreign(
     folder: str | Path, setups: Mapping[str, str], to_make: Container[str]
 ) -> str | None:
-    """Remove estimates that are not of the study as it is configured; a line if there were any.
+    """Remove estimates that do not belong to the configured study; a line if there were any.
 
-    Who reads the whole folder would get them too. What has no origin is not ours and stays. So does
-    a file of this study that is not in `to_make`, what the run makes: the job that reads it says
-    what to do.
+    Readers of the whole folder would get them too. Files without provenance stay: they belong to
+    the user. Files of this study stay too unless they are in `to_make`, the outputs of the run: the
+    job that reads them says what to do.
     """
     removed = 0
     for path in Path(folder).glob("*.parquet"):

@@ -23,7 +23,7 @@ _NOT_OURS = {
     **dict.fromkeys((errno.EACCES, errno.EPERM, errno.EROFS), "make it writable"),
     errno.EIO: "look after the disk",
 }
-"""Errors of the system that are no defect of the program, and what a person must do."""
+"""Errors of the operating system, and what a person can do about them."""
 
 
 def quote_python() -> None:
@@ -35,12 +35,12 @@ def quote_python() -> None:
 
 
 def setup_digest(spec: Any) -> str:
-    """Digest of all on which the numbers of a batch depend, given as plain data."""
+    """Digest of everything that determines the numbers of a batch, given as plain data."""
     return hashlib.sha256(json.dumps(spec, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def killed_notice(logs: Iterable[str]) -> str | None:
-    """Return a line on what to do where Snakemake's logs say that a job was killed; else None."""
+    """Return what to do if Snakemake's logs say that a job was killed; else None."""
     text = "".join(Path(log).read_text(encoding="utf-8", errors="replace") for log in logs)
     if "<Signals.SIGKILL: 9>" not in text and "exit status 137" not in text:
         return None
@@ -61,13 +61,13 @@ def lists(named: Any) -> dict[str, list[str]]:
 def job(snakemake: Any) -> Iterator[Mapping[str, Any]]:
     """Run the body of a rule's script.
 
-    Gives the provenance of what the job writes: `config_hash` and `seed` of the configuration,
-    which was checked when the workflow started, and where the rule has the parameter `spec`, its
-    digest as `setup`.
+    Yields the provenance of the outputs: `config_hash` and `seed` of the configuration, which was
+    checked when the workflow started, and, where the rule has the parameter `spec`, its digest as
+    `setup`.
 
-    A table that comes in must have the same seed and, if it has a set-up and the rule the parameter
-    `setups`, one of these. Only who replaced it while the study ran, such as a job that outlived
-    the run that started it, leaves another one.
+    Input tables must have the same seed and, where the rule has the parameter `setups`, one of
+    these. They differ only if someone replaced a table while the study ran, such as a job that
+    outlived the run that started it.
     """
     with logged(snakemake):
         seed = snakemake.config["seed"]
@@ -91,7 +91,7 @@ def _check_origin(path: str, seed: int, setups: Container[str] | None) -> None:
 @contextmanager
 def logged(snakemake: Any) -> Iterator[None]:
     """Run the body of a script of any workflow."""
-    # On a full disk the log ends early; what the job itself could not write is said all the same.
+    # On a full disk the log ends early, but the error of the job is still reported.
     logging.raiseExceptions = False
     try:
         logging.basicConfig(

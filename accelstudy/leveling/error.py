@@ -49,8 +49,8 @@ class TiltError:
     """Errors of roll and pitch as a function of the estimates, about a reference calibration.
 
     The mean over attitudes of the squared error of an estimate x is, with δ = x − reference,
-    constant + 2 linear δ + δᵀ quadratic δ: the reference is propagated exactly, and what is left
-    linearly.
+    constant + 2 linear δ + δᵀ quadratic δ: the reference is propagated exactly, and the difference
+    from it linearly.
 
     Attributes
     ----------
@@ -95,9 +95,9 @@ def tilt_error(
 
     Parameters
     ----------
-    simulated, estimated : SensorModel, what the sensor is and what is estimated of it
+    simulated, estimated : SensorModel, of the simulated sensor and of the calibration
     truth : (u',) array, SI, of the simulated model
-    reference : (u,) array, SI, of the estimated model, near the estimates: their mean, say
+    reference : (u,) array, SI, of the estimated model, near the estimates, such as their mean
     f_b : (k, 3) array, m/s², attitudes
     g : float, m/s²
     hold : HoldConditions, optional
@@ -143,7 +143,7 @@ def leveling_error(
     g: float = STANDARD_GRAVITY,
     hold: HoldConditions | None = None,
 ) -> LevelingError:
-    """Propagate the errors of R calibrations about their mean; the rest is as in `tilt_error`.
+    """Propagate the errors of R calibrations about their mean; else as `tilt_error`.
 
     Parameters
     ----------

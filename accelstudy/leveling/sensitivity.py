@@ -100,15 +100,15 @@ def _standard_normal(d: int, base_samples: int, seed: int) -> Array:
 def _total_effects(values: Array, resampled: NDArray[np.int64]) -> tuple[Array, Array]:
     """Total effects by Jansen's estimator, with the half widths of their 95 % intervals.
 
-    What SALib's `sobol.analyze` gives, in a thirtieth of its time: it makes first-order effects
-    too, and resamples the outputs anew for each input.
+    The numbers are those of SALib's `sobol.analyze`, which takes thirty times as long: it computes
+    first-order effects as well, and resamples the outputs anew for each input.
 
     Parameters
     ----------
     values : (N (d + 2),) array, the output at each of `_standard_normal`, of mean 0 and sd 1
     resampled : (N, b) array, which base samples each bootstrap resample has
     """
-    values = (values - values.mean()) / values.std()  # once more, as SALib does: the last bits
+    values = (values - values.mean()) / values.std()  # once more, as SALib does, for the same bits
     base, *mixed, other = values.reshape(len(resampled), -1).T
     variance = np.var(np.concatenate([base, other]))
     variances = np.var(np.concatenate([base[resampled], other[resampled]]), axis=0)
@@ -121,7 +121,7 @@ def _total_effects(values: Array, resampled: NDArray[np.int64]) -> tuple[Array, 
 def leveled(
     attitude: Array, model: SensorModel | None, g: float = STANDARD_GRAVITY
 ) -> Callable[[Array], Array]:
-    """Return the function of which leveling is the evaluation near an attitude.
+    """Return leveling near an attitude as a function of its uncertain inputs.
 
     Parameters
     ----------

@@ -1,17 +1,17 @@
-"""Shapley effects: how the variance of an output is shared out to inputs that are correlated.
+"""Shapley effects: how correlated inputs share the variance of an output.
 
-An input that is correlated with others has no variance of its own that could be its share. Owen
-(2014) lets all inputs divide the variance as players of a game divide their gain (Shapley 1953).
+Where inputs are correlated, no part of the variance belongs to one of them alone. Owen (2014)
+divides the variance among the inputs as a game divides its gain among the players (Shapley 1953).
 The value of a set of inputs is the variance that it explains, v(u) = Var E(Y | X_u), and an input
 gets what it adds to v on average over all orders in which the inputs could become known. So the
 shares are not negative and sum to 1, whatever the correlations; of independent inputs of a linear
 function they are the classic Sobol indices.
 
 A linear function of normal inputs has them in closed form, since v(u) = g_uᵀ Σ_uu⁻¹ g_u with
-g = Cov(X, Y) (Owen & Prieur 2017; Iooss & Prieur 2019). Inputs that are independent of the others
-then are games of their own (Broto et al. 2019), so that what counts is not the number
-of all inputs but that of the largest group of correlated ones. A function that is not linear is
-sampled in random orders (Song, Nelson & Staum 2016).
+g = Cov(X, Y) (Owen & Prieur 2017; Iooss & Prieur 2019). Groups of inputs
+that are independent of each other can be treated one by one (Broto et al. 2019), so the effort
+depends on the largest group of correlated inputs. A function that is not linear is sampled in
+random orders (Song, Nelson & Staum 2016).
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from accelstudy.basics.shares import Z95
 Array = NDArray[np.float64]
 
 CHUNK = 1024
-"""Sets of inputs, or random orders, that are worked on at once."""
+"""Sets of inputs, or random orders, that are computed at once."""
 SINGULAR = 1e-12
-"""Share of the largest eigenvalue of a correlation matrix below which one is zero."""
+"""Eigenvalues of a correlation matrix below this share of the largest one count as zero."""
 
 
 def linear_shapley(slope: ArrayLike, covariance: ArrayLike) -> tuple[Array, Array]:
@@ -66,9 +66,9 @@ def _groups(covariance: Array) -> list[NDArray[np.int64]]:
 
 
 def _divided(covariance: Array, with_output: Array) -> Array:
-    """What each of p inputs gets of the variance, (k, p), of its covariances with k outputs."""
+    """Variance that each of p inputs gets, (k, p), from the covariances with k outputs."""
     p = len(covariance)
-    # Correlations, so that units do not matter to how well the inverses can be computed.
+    # Correlations instead of covariances, so that the inverses do not suffer from the units.
     sd = np.sqrt(np.diagonal(covariance))
     correlation, g = covariance / np.outer(sd, sd), (with_output / sd).T
     gained = np.zeros_like(g)
@@ -106,11 +106,11 @@ def sampled_shapley(
 ) -> tuple[Array, Array, Array]:
     """Shapley effects of normal inputs on the outputs of any function, by Monte Carlo.
 
-    In each random order the inputs become known one after another, and what is not known yet is
-    drawn again: half the mean square of what the output then changes by is the variance that is
-    left. The Cholesky factor of the inputs in that order does it, as their first j depend on the
-    first j of its normal numbers only. The same numbers through the linear function, of which the
-    shares are known exactly, take out what the two have in common.
+    In each random order the inputs become known one after another, and those not yet known are
+    drawn again. Half the mean square of the change of the output is the variance that is left. With
+    the Cholesky factor of the inputs in that order, the first j inputs depend on the first j normal
+    numbers only. The linear function, whose shares are known exactly, is evaluated with the same
+    numbers as a control variate.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What roll and pitch owe to each input, with the correlations of the calibration's parameters.
+"""How much of the variance of roll and pitch each input causes, correlations included.
 
 Shapley effects over a grid of attitudes, beside the total effects that
 `accelstudy.leveling.sensitivity` has for inputs taken as independent (figures 5 and 6 of
@@ -30,15 +30,15 @@ from accelstudy.sensors.sensor import SensorModel
 Array = NDArray[np.float64]
 
 LINEAR_UP_TO = 0.01
-"""Sd of roll and pitch in rad up to which linear theory is right to 3e-4 of their variance."""
+"""Sd of roll and pitch, rad, up to which linear theory gives their variance to 3e-4 of it."""
 ORDERS = 8192
-"""Random orders of the Monte Carlo where it is not."""
+"""Random orders of the Monte Carlo beyond that."""
 NOTABLE = 0.01
 """Share below which it does not matter which of two inputs is the larger."""
 TIED = 0.02
 """Relative difference of two shares up to which they count as equal.
 
-Sds of 100 000 calibrations leave 0.6 % of it.
+With the sds of 100 000 calibrations the shares are uncertain by 0.6 %.
 """
 
 
@@ -74,8 +74,8 @@ def leveling_shares(
 ) -> pd.DataFrame:
     """Shapley effects on roll and pitch over a grid of attitudes.
 
-    They are exact as long as leveling is linear within the errors; at attitudes so near to the roll
-    pole that it is not they are sampled.
+    They are exact where leveling is linear within the errors. Near the roll pole it is not, and
+    they are sampled.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Ways in which noise is not white, Gaussian and of the sigma that it is said to have.
+"""Ways in which noise is not white, not Gaussian, or not of the stated sigma.
 
 To add one, write a module next to this file with a class under `register`.
 """

@@ -11,10 +11,10 @@ from accelstudy.noise_effects.base import Array, NoiseEffect, register
 
 @register
 class AxisNoise(NoiseEffect):
-    """The noise of axis i has κ_i times the variance that it is said to have.
+    """The noise of axis i has κ_i times the stated variance.
 
     By default z has 1.5 times the sd of the others: the axis out of the plane of a MEMS chip is
-    the noisier one.
+    usually noisier.
     """
 
     name = "axis_noise"
@@ -34,5 +34,5 @@ class AxisNoise(NoiseEffect):
 
     @property
     def within_hold(self) -> Array:
-        """The samples have it too: √κ_i."""
+        """The samples have the factor √κ_i as well."""
         return np.sqrt([self.settings[f"kappa_{i}"] for i in "xyz"])

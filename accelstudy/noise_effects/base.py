@@ -1,8 +1,8 @@
 """What a noise effect is, and the registry of noise effects.
 
-The noise of the position means is white, Gaussian and of one sigma on all axes. A noise effect is a
-way in which it is not: it turns the noise drawn so into another, or the readings into coarser ones.
-Several work one after the other. Everything is in m/s², of R sessions of n holds with three axes.
+Without noise effects, the noise of the position means is white, Gaussian and of one sigma on all
+axes. A noise effect changes that noise, or makes the readings coarser. Several act one after the
+other. Everything is in m/s², of R sessions of n holds with three axes.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class NoiseEffect(WithSettings):
 
     Attributes
     ----------
-    equation : str, what becomes of the noise v or of the readings f, for people
+    equation : str, the changed noise v or readings f, for people
     typical : (float, float), usual range of the first setting, SI
     """
 
@@ -36,24 +36,24 @@ class NoiseEffect(WithSettings):
     def disturb(
         self, noise: Array, sigma: float, hold: HoldConditions, rng: np.random.Generator
     ) -> Array:
-        """Return what becomes of the noise.
+        """Return the changed noise.
 
         Parameters
         ----------
         noise : (R, n, 3) array, m/s²
         sigma : float, m/s², nominal sd of a position mean
         hold : HoldConditions
-        rng : Generator, of what the effect draws beyond the noise
+        rng : Generator, for what the effect itself draws
         """
         return noise
 
     def read(self, forces: Array) -> Array:
-        """Return the readings that are recorded of forces (R, n, 3) with noise."""
+        """Return the readings that are recorded for forces (R, n, 3) with noise."""
         return forces
 
     @property
     def within_hold(self) -> Array:
-        """Factors of the sd of the samples within a hold, (3,); what one sees of it there."""
+        """Factors on the sd of the samples within a hold, (3,)."""
         return np.ones(3)
 
 

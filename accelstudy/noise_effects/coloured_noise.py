@@ -13,28 +13,25 @@ from accelstudy.noise_effects.base import Array, NoiseEffect, register
 
 
 def memory(lag: ArrayLike, tau: float) -> Array:
-    """Share φ = exp(−Δt/τ) of the process that lasts over lags: its autocorrelation.
-
-    It does not end where τ is infinite: the process is a random walk then.
-    """
+    """Autocorrelation φ = exp(−Δt/τ) of the process over lags; 1 where τ is infinite."""
     return np.asarray(np.exp(-np.asarray(lag, dtype=float) / tau))
 
 
 def renewed(phi: Array) -> Array:
-    """Variance that comes anew where a share φ lasts, so that the process stays stationary."""
+    """Variance of the new part that keeps a process of autocorrelation φ stationary."""
     return np.asarray(1 - phi**2)
 
 
 @register
 class ColouredNoise(NoiseEffect):
-    """A first-order Gauss–Markov process beside the white noise (IEEE Std 952, annex C).
+    """A first-order Gauss–Markov process in addition to white noise (IEEE Std 952, annex C).
 
     Each axis has a stationary process m of its own with the autocorrelation exp(−|Δt|/τ). `share`
     is its share of the variance of a position mean: white noise keeps σ², so that the sum has
     σ² / (1 − share). Samples within a hold do not show it.
 
-    A τ far below the time between holds makes it a random offset from hold to hold; a τ far above
-    the session makes it a constant, which the biases take up, and a random walk. Where the holds
+    With a τ far below the time between holds it is a random offset from hold to hold. With a τ far
+    above the session it is a random walk about a constant, which the biases absorb. Where the holds
     have no time, τ counts holds.
     """
 

@@ -13,8 +13,8 @@ from accelstudy.noise_effects.base import Array, NoiseEffect, register
 class HeavyTails(NoiseEffect):
     """Student's t distribution with ν degrees of freedom, scaled so that the variance stays σ².
 
-    A t variable is a normal one divided by √(χ²_ν/ν); its variance is ν/(ν − 2), which is divided
-    out. Every component of every hold has its own divisor.
+    A t variable is a normal one divided by √(χ²_ν/ν). Its variance ν/(ν − 2) is divided out. Every
+    component of every hold has its own divisor.
     """
 
     name = "heavy_tails"

@@ -13,7 +13,7 @@ from accelstudy.noise_effects.base import Array, NoiseEffect, register
 
 @register
 class NoiseLevel(NoiseEffect):
-    """All noise has κ times the variance that it is said to have."""
+    """All noise has κ times the stated variance."""
 
     name = "noise_level"
     takes = (Setting("kappa", "1", 2.25, above=0),)
@@ -28,5 +28,5 @@ class NoiseLevel(NoiseEffect):
 
     @property
     def within_hold(self) -> Array:
-        """The samples have it too: √κ."""
+        """The samples have the factor √κ as well."""
         return np.full(3, math.sqrt(self.settings["kappa"]))

@@ -13,8 +13,8 @@ from accelstudy.noise_effects.base import Array, NoiseEffect, register
 class Quantisation(NoiseEffect):
     """The position means are rounded to multiples of the LSB, after all noise.
 
-    So it is where means are recorded in counts, or where the noise of the samples is far below the
-    LSB; with more noise than that, averaging removes the rounding of the samples.
+    This happens where means are recorded in counts, or where the noise of the samples is far below
+    the LSB. With more noise, averaging removes the rounding of the samples.
     """
 
     name = "quantisation"

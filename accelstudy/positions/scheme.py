@@ -45,7 +45,7 @@ class Scheme:
         the rows is the order of acquisition: effects with a history (drift, hysteresis) see it.
     status : {"exact", "standard", "stand-in", "generated"}
         The positions of the source; the usual set of that kind; a substitute, because the source
-        does not publish its own; or positions that come from a rule and no one's campaign.
+        does not publish its own; or positions made by a rule that nobody has measured.
     source : str
         The citation.
 

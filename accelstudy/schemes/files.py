@@ -1,7 +1,7 @@
 """Schemes in YAML files, such as `accelstudy design` writes.
 
-A scheme of a file has the name that stands in it, with a digest of its directions: what is computed
-with it depends on what the file holds, and not on where it lies.
+A scheme of a file has the name that the file gives, with a digest of its directions. So results
+depend on the content of the file, and not on its path.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from accelstudy.files.layers import read_layer
 from accelstudy.positions.scheme import Scheme
 
 KEYS = ("scheme", "title", "source", "directions", "positions", "design")
-"""Of a file; only `directions` must be there, and the last two are for people."""
+"""Keys of a file. Only `directions` is required; the last two are for people and not read."""
 
 _read: dict[str, tuple[Scheme, dict[str, Any]]] = {}
 
@@ -32,7 +32,7 @@ def is_scheme_file(text: str) -> bool:
 
 
 def scheme_of_file(path: str | Path) -> Scheme:
-    """Read a scheme; from then on `known_scheme` knows it by its name.
+    """Read a scheme; from then on `known_scheme` finds it by its name.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def scheme_of_file(path: str | Path) -> Scheme:
 
 
 def remember(content: Mapping[str, Any], name: str) -> Scheme:
-    """Make a scheme of what a file holds, and know it from then on; see `parse_scheme`."""
+    """Make a scheme of the content of a file, and keep it for `known_scheme`."""
     scheme = parse_scheme(content, name)
     held = {key: content[key] for key in KEYS[1:4] if content.get(key) is not None}
     plain = {"scheme": scheme.name.partition("@")[0], **held}
@@ -60,17 +60,17 @@ def known_scheme(name: str) -> Scheme | None:
 
 
 def held(name: str) -> dict[str, Any] | None:
-    """What the file of such a scheme holds, as plain data from which `remember` makes it again."""
+    """Content of the file of such a scheme, as plain data for `remember`."""
     return _read[name][1] if name in _read else None
 
 
 def parse_scheme(content: Mapping[str, Any], name: str) -> Scheme:
-    """Make a scheme of what a file holds.
+    """Make a scheme of the content of a file.
 
     Parameters
     ----------
     content : mapping
-    name : str, of a scheme that does not say its own
+    name : str, of the scheme if the content gives none
     """
     for key in content:
         if key not in KEYS:

@@ -21,8 +21,8 @@ def hand_placed(n: int, seed: int = 0) -> Array:
     Every other position, the first one included, is on a face of the block, off by a random tilt
     of 2° (standard deviation per axis); the six faces come in turn, each time in a new order. The
     positions between them are free, uniform over the sphere. The real log behind `xsens-38` is
-    like that: 21 of its 38 holds are within 5° of a face, the others anywhere, and attitudes
-    come again.
+    like that: 21 of its 38 holds are within 5° of a face, the others anywhere, and some
+    attitudes are repeated.
 
     Parameters
     ----------

@@ -16,11 +16,11 @@ MODEL = "bias-scale-nonorthogonality"
     "107-125, for the 9 positions of Zhang et al. (2010), Meas. Sci. Technol. 21, 015107",
 )
 def d_optimal_9() -> Array:
-    """As many positions as parameters, of the largest determinant there is; redundancy 0.
+    """Nine positions for nine parameters, with the largest possible determinant; redundancy 0.
 
     They are a triangular prism with a cap on each side. With triangles of radius r and caps of
     radius 1 the determinant is proportional to (1-r)^5 (1+r)^9 r^8, which 11 r² - 2 r - 4 = 0
-    maximises. A rotation leaves it alone: the prism stands along x, 44° off the roll pole.
+    maximises. A rotation does not change it: here the prism stands along x, 44° off the roll pole.
     """
     r = (1 + 3 * np.sqrt(5)) / 11
     x = np.sqrt(1 - r**2)
@@ -33,7 +33,7 @@ def d_optimal_9() -> Array:
 def d_optimal(n: int) -> Array:
     """The n positions of the largest determinant for a calibration by the norm of gravity.
 
-    From 16 positions on they are many, all as good as the sphere.
+    From 16 positions on there are many such sets, all as good as the whole sphere.
     """
     return _optimal(n, "D")
 

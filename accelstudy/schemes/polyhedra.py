@@ -7,8 +7,8 @@ from accelstudy.positions.scheme import Array
 from accelstudy.schemes.registry import register
 
 GOLDEN_RATIO = (1 + np.sqrt(5)) / 2
-# Euler angles xyz of (15°, 25°, 35°) in numbers. Every job lists the schemes; to import
-# scipy.spatial's Rotation for them would take most of the time of that.
+# Rotation by Euler angles xyz of (15°, 25°, 35°). It is written out because every job lists the
+# schemes, and scipy.spatial would take longer to import than all else here.
 _GENERIC = np.array(
     [
         [0.742403876506104, -0.46443208696509053, 0.4828450276703281],
@@ -19,10 +19,10 @@ _GENERIC = np.array(
 
 
 def generic(directions: Array) -> Array:
-    """Turn directions by Euler angles xyz of (15°, 25°, 35°), which no symmetry of theirs knows.
+    """Turn directions by Euler angles xyz of (15°, 25°, 35°), away from all their symmetries.
 
-    Aligned with the axes, orbits of the octahedral and icosahedral groups leave cubic terms
-    singular under the gravity norm; and a vertex on the x axis has no roll.
+    Polyhedra that are aligned with the axes cannot determine cubic terms from the norm of gravity,
+    and roll is undefined for a vertex on the x axis.
     """
     return directions @ _GENERIC.T
 
@@ -67,8 +67,8 @@ def faces_edges_corners() -> Array:
 def rhombicuboctahedron() -> Array:
     """The 24 vertices, aligned with the axes and yet 30° off the roll pole.
 
-    A rotation would change their fourth moment and cure what the alignment costs: cubic terms
-    are singular under the gravity norm.
+    Because they are aligned, they cannot determine cubic terms from the norm of gravity. A rotation
+    would cure that, and change their fourth moment.
     """
     return cyclic_permutations(1, 1, 1 + np.sqrt(2))
 
@@ -82,8 +82,8 @@ def rhombicuboctahedron() -> Array:
 def icosahedron() -> Array:
     """The 12 vertices in a generic orientation.
 
-    No fewer positions match the sphere's moments through degree 4, on which the cofactors of the
-    nine parameters depend. They are six axes only, too few for terms beyond.
+    No smaller set has the sphere's moments up to degree 4, on which the cofactors of the nine
+    parameters depend. They lie on only six axes, too few for further parameters.
     """
     return generic(cyclic_permutations(0, 1, GOLDEN_RATIO))
 

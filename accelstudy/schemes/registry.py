@@ -101,7 +101,7 @@ def get_scheme(name: str) -> Scheme:
     ----------
     name : str
         One of `scheme_names()`, a member of a family such as "fibonacci-60", the path of a YAML
-        file with a scheme, or the name that such a scheme has got when it was read.
+        file with a scheme, or the name that such a scheme got when it was read.
 
     Returns
     -------
@@ -121,7 +121,7 @@ def get_scheme(name: str) -> Scheme:
 
 @lru_cache
 def _registered(name: str) -> Scheme:
-    # A scheme registered under its very name goes before a family that the name fits.
+    # A scheme that has exactly this name goes before a family that it fits.
     for entry in sorted(_entries.values(), key=lambda entry: _is_family(entry.template)):
         if scheme := entry.scheme(name):
             return scheme
@@ -152,7 +152,7 @@ def _pattern(template: str) -> str:
 
 def _unknown(name: str) -> str:
     names, families = scheme_names(), scheme_families()
-    meant = [*_members(re.findall("[0-9]+", name)), *names]  # the numbers are the user's
+    meant = [*_members(re.findall("[0-9]+", name)), *names]  # with the numbers that the user wrote
     close = difflib.get_close_matches(name.lower(), meant, n=1)
     hint = f" Did you mean {close[0]!r}?" if close else ""
     return (

@@ -56,6 +56,6 @@ def xsens() -> tuple[tuple[float, float, float], ...]:
     Directions of g in the log's own axes: its z axis points up, so that g is along -z when the
     sensor is level, as in the first hold. They are the negative of the specific force of the
     holds' mean counts, calibrated by a least-squares fit of the nine parameters to the norm of
-    gravity, and good to 1e-3 rad. Attitudes come again in the log; some faces up to seven times.
+    gravity, and good to 1e-3 rad. Attitudes are repeated in the log, some faces up to seven times.
     """
     return DIRECTIONS

@@ -1,1 +1,1 @@
-"""Sensors: models composed of effects, frames, and what no real sensor can have."""
+"""Sensors: models composed of effects, frames, units, and bounds of what is plausible."""

@@ -1,4 +1,4 @@
-"""From the numbers that a sensor gives to SI, and back."""
+"""Conversion of a sensor's raw numbers to SI, and back."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from accelstudy.basics.units import UNITS
 Array = NDArray[np.float64]
 
 LARGEST = 1e15
-"""Beyond it nothing is an acceleration or a time, and squares overflow."""
+"""No acceleration or time is larger, and squares of larger numbers overflow."""
 
 
 @dataclass(frozen=True)

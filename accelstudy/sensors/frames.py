@@ -1,7 +1,7 @@
 """The axes of a sensor by three letters, and the angles that people measure in them.
 
 The letters say where x, y and z point: f or b forward or back, r or l right or left, d or u down
-or up. ``frd`` (forward, right, down) is the convention of everything inside; ``flu`` is that of
+or up. The package computes in ``frd`` (forward, right, down); ``flu`` is that of
 ROS (REP 103), ``rfu`` that of phones.
 """
 
@@ -69,7 +69,7 @@ class Frame:
         return values[..., np.argsort(self.order)]
 
     def rearranged(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Put what belongs to the axes, as their sds, (..., 3), in the order of frd."""
+        """Put values of the axes, such as their sds, (..., 3), in the order of frd."""
         return values[..., self.order]
 
 

@@ -1,7 +1,7 @@
-"""Sensor models by what people write for one, and Table 1 as presets of a model and a scheme.
+"""Sensor models by their names, and Table 1 of the paper as presets of a model and a scheme.
 
-A model is written as the name of a registered one; as a composition, whose parts, joined by +, are
-registered models and effects (``bias-scale-nonorthogonality+warm_up(tau=300)``); or as the path of
+A person writes a model in one of three ways: by the name of a registered model; as registered
+models and effects joined by + (``bias-scale-nonorthogonality+warm_up(tau=300)``); or as the path of
 a YAML file with a model, such as the `model.yaml` of a diagnosis.
 """
 
@@ -16,10 +16,11 @@ from typing import Any
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.effects import Effect, effect_names, get_effect
+from accelstudy.files.layers import read_layer
 from accelstudy.sensors.sensor import SensorModel
 
 MODEL_FILE = "model.yaml"
-"""What a diagnosis calls its file with a model."""
+"""Name of the file in which a diagnosis writes a model."""
 
 _NINE = ("bias", "scale", "nonorthogonality")
 
@@ -125,12 +126,9 @@ def _composed(specs: Sequence[str], source: str) -> SensorModel:
 def _model_of_file(path: str, name: str | None) -> SensorModel:
     """Model of a YAML file: the one under `models`, or the one of these that is asked for.
 
-    A file without `models` that simulates a sensor of certain effects has the model of that sensor:
-    so a diagnosis that added nothing writes its base model.
+    A file without `models` has the model of its `simulated_effects`. A diagnosis that added nothing
+    writes its base model in this way.
     """
-    # The package of the configuration needs the models of this module.
-    from accelstudy.files.layers import read_layer
-
     content = read_layer(path)
     models: Any = content.get("models") or {}
     if not isinstance(models, Mapping):

@@ -1,6 +1,6 @@
-"""What a sensor can have, and what can only be a gross error: bounds of parameters and of tilt.
+"""Bounds of parameters and of tilt errors, beyond which there must be a gross error.
 
-A fit knows no bounds: an axis with the wrong sign is fitted perfectly by a scale of −2.
+A fit has no bounds: a scale of −2 fits an axis with the wrong sign perfectly.
 """
 
 from __future__ import annotations
@@ -17,33 +17,33 @@ from accelstudy.effects import Effect, get_effect
 Array = NDArray[np.float64]
 
 FACTOR = 20.0
-"""Times the typical size of cheap equipment, beyond which a parameter is not believed."""
+"""A parameter is implausible beyond so many times the typical size of cheap equipment."""
 CLEARLY = 3.0
 """Standard deviations by which an estimate must be beyond its bound."""
 LARGEST = {"scale": 0.5, "base_tilt": 0.1, "encoder_offset": 0.1}
-"""Effects with a bound of their own, SI. Beyond a half, a scale is a unit, a range or a sign; how a
-rig stands and where its circles begin is up to who set it up, not to its quality."""
+"""Effects with a bound of their own, SI. A scale error beyond a half comes from a wrong unit, range
+or sign. The tilt of a rig and the zeros of its circles depend on its set-up, not on its quality."""
 
 
 def largest(effect: Effect) -> float:
-    """Largest size of a parameter of an effect that is believed, SI; infinite if nothing is known.
+    """Largest plausible size of a parameter of an effect, SI; infinite if nothing is known.
 
     It is `FACTOR` times the size that the catalogue calls typical of cheap equipment.
     """
     if effect.name in LARGEST:
         return LARGEST[effect.name]
-    if isinstance(type(effect).typical, property):  # not stated, but by default
+    if isinstance(type(effect).typical, property):  # not stated: a default
         return np.inf
     return FACTOR * float(effect.typical[1])
 
 
 def largest_tilt() -> float:
-    """Tilt error, rad, from which on a calibration is useless: a cheap sensor has it without."""
+    """Tilt error, rad, that a cheap sensor has without any calibration."""
     return float(get_effect("bias").typical[1]) / STANDARD_GRAVITY
 
 
 def implausible_parameters(effects: Sequence[Effect], parameters: Array, sigma: Array) -> list[str]:
-    """Say of each parameter that no sensor has how large it is, and what would be believed.
+    """Describe each parameter that no sensor can have: its size, and what would be plausible.
 
     A large estimate that the positions hardly determine says nothing of the sensor, so it counts
     only if it is beyond the bound by `CLEARLY` of its standard deviations.
@@ -51,8 +51,8 @@ def implausible_parameters(effects: Sequence[Effect], parameters: Array, sigma: 
     Parameters
     ----------
     effects : sequence of Effect, of the model
-    parameters, sigma : (u,) arrays, SI, in the order of the effects; a sigma that is unknown (NaN)
-        excuses nothing
+    parameters, sigma : (u,) arrays, SI, in the order of the effects; an unknown sigma (NaN)
+        counts as 0
     """
     doubt = CLEARLY * np.nan_to_num(np.asarray(sigma, dtype=float), posinf=0.0)
     values = iter(zip(np.asarray(parameters, dtype=float), doubt, strict=True))
@@ -69,7 +69,7 @@ def implausible_parameters(effects: Sequence[Effect], parameters: Array, sigma: 
 
 
 def implausible_tilt(roll: float, pitch: float) -> list[str]:
-    """Say that a tilt error is useless, rad; nothing of one that is not, or is not known."""
+    """Describe a tilt error, rad, that makes a calibration useless; empty for any other."""
     if not np.fmax(roll, pitch) > largest_tilt():
         return []
     worst, most = to_display([np.fmax(roll, pitch), largest_tilt()], "rad")

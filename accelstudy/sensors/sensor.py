@@ -69,16 +69,16 @@ class SensorModel:
 
     @property
     def stays(self) -> NDArray[np.bool_]:
-        """Which parameters, (u,), the sensor takes along when it leaves the rig."""
+        """Which parameters, (u,), belong to the sensor and not to the rig."""
         return np.array([e.part == "sensor" for e in self.effects for _ in e.parameters], bool)
 
     def vector(self, values: Mapping[str, float]) -> NDArray[np.float64]:
-        """Parameter vector (u,) in SI from a mapping; what it does not name is zero."""
+        """Parameter vector (u,) in SI from a mapping; parameters that it does not name are zero."""
         return np.array([values.get(name, 0.0) for name in self.parameter_names], dtype=float)
 
     @cached_property
     def settings(self) -> NDArray[np.float64]:
-        """Numbers that shape the effects, (s,), effect after effect."""
+        """Settings of all effects, (s,), effect after effect."""
         return np.array(
             [v for effect in self.effects for v in effect.settings.values()], dtype=float
         )
@@ -217,7 +217,7 @@ class SensorModel:
         """
         angles = np.asarray(angles, dtype=float)
         errors = np.zeros_like(angles)
-        for _ in range(10):  # each gains as many digits as the relative errors are small
+        for _ in range(10):  # each iteration gains as many digits as a relative error has zeros
             before, errors = errors, self.errors_of_reading(angles + errors, parameters, hold)
             if np.array_equal(before, errors):
                 break
@@ -257,7 +257,7 @@ class SensorTrace:
     Attributes
     ----------
     force, output, p, settings, g : the symbols of a force, of the output, of the parameters, of the
-        numbers that shape the effects and of gravity
+        settings of the effects and of gravity
     t_matrix : Matrix (3, 3), T
     h : list of 3 expressions, f_s as a function of f_a
     """

@@ -1,1 +1,1 @@
-"""Simulated sessions: noise, observations, and when and how warm each hold is."""
+"""Simulated sessions: noise, observations, and the conditions of each hold."""

@@ -1,4 +1,4 @@
-"""Under what conditions the holds of a simulated session are made."""
+"""The conditions of the holds of a simulated session: time, temperature, vibration, yaw."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ Array = NDArray[np.float64]
 CHOICES = {"temperature_order": ("linear", "ABBA", "random"), "yaw": ("none", "random")}
 RANGES = {"temperature": bounds.TEMPERATURE, "vibration": bounds.VIBRATION}
 PROVIDES = {"time": "interval", "temperature": "temperature", "vibration": "vibration"}
-"""Columns of the holds that are there only if the plan says so, and what of it does."""
+"""Column of the holds -> part of the plan without which the holds lack it."""
 
 _STREAM = 1000
-"""Sets what is drawn here apart from all else that is drawn from the same seed."""
+"""Number of a stream of its own, so that nothing else draws the same numbers from a seed."""
 
 
 @dataclass(frozen=True)
@@ -34,9 +34,9 @@ class HoldPlan:
     interval : float, s between holds; None leaves out the time
     temperature : (float, float), °C, from and to, optional
     temperature_order : "linear", "ABBA" (in quarters of the session) or "random"
-    vibration : (float, float), m/s² rms, between which it is drawn for each hold, optional
+    vibration : (float, float), m/s² rms, range from which that of each hold is drawn, optional
     yaw : "none" (zero) or "random"
-    seed : int, of what is drawn
+    seed : int, of the random numbers
     """
 
     interval: float | None = None
@@ -57,14 +57,14 @@ class HoldPlan:
                 allowed.check_key(key, value)
 
     def missing(self, effect: Effect) -> str | None:
-        """Column that an effect needs and the plan does not provide; None if there is all."""
+        """Column that an effect needs and the plan does not provide; None if it provides all."""
         needed = compose(effect.spec, (effect.spec,)).hold_columns
         return next(
             (c for c, key in PROVIDES.items() if c in needed and getattr(self, key) is None), None
         )
 
     def hold(self, n: int) -> HoldConditions:
-        """Return the holds of a session of n positions, without what follows from attitudes."""
+        """Return the conditions of n holds, without columns that follow from their attitudes."""
         course = {
             "linear": np.linspace(0, 1, n),
             "ABBA": np.array([0.0, 1.0, 1.0, 0.0])[4 * np.arange(n) // n],
@@ -78,9 +78,9 @@ class HoldPlan:
         )
 
     def moved(self, hold: HoldConditions, dt: float) -> HoldConditions:
-        """Return conditions a moment later within each hold of a session, s.
+        """Return the conditions `dt` seconds later, within the same holds.
 
-        A temperature that rises steadily does so within the holds, too; one that is set is kept.
+        A temperature that rises linearly rises within the holds too; any other stays as it is.
         """
         assert hold.time is not None
         temperature = hold.temperature
@@ -91,7 +91,7 @@ class HoldPlan:
         return replace(same, time=hold.time + dt, temperature=temperature)
 
     def use(self, forces: Array, n: int) -> HoldConditions:
-        """Return conditions in which a sensor is used that was calibrated in n positions.
+        """Return the conditions in which a sensor is used after a calibration in n positions.
 
         Parameters
         ----------
@@ -101,7 +101,7 @@ class HoldPlan:
         Returns
         -------
         HoldConditions
-            The ranges of conditions are those of the calibration, and the attitudes are taken in
+            Conditions vary as widely as during the calibration, and the attitudes are taken in
             random order.
         """
         rng = self._rng(3)
@@ -131,7 +131,7 @@ class HoldPlan:
 
 
 def check_needs_no_plan(model: SensorModel) -> None:
-    """Raise `InputError` if positions alone, those of a scheme, do not feed a model."""
+    """Raise `InputError` if a model needs more of its positions than a scheme tells."""
     for effect in model.effects:
         if column := HoldPlan().missing(effect):
             raise InputError(

@@ -31,8 +31,8 @@ class Noise:
     sigma_force : float, m/s², of the mean of one position, per axis
     sigma_angle : float, rad, of the robot's roll and of its pitch
     sigma_gravity : float, m/s², of the value of gravity; 0 holds it fixed in the adjustment
-    gravity_error : float, m/s², by which the value of gravity is wrong, besides its noise
-    effects : tuple of str, noise effects of the forces in the order in which they work
+    gravity_error : float, m/s², error of the value of gravity, in addition to its noise
+    effects : tuple of str, noise effects of the forces, in the order in which they act
     """
 
     sigma_force: float = 0.002
@@ -90,9 +90,9 @@ class Session:
     ) -> Observations:
         """Draw the observations of `replicates` sessions.
 
-        The draws are made in a fixed order (forces, angles, gravity, then what noise effects draw)
-        whatever is used of them; without `angles`, the readings of the robot are not drawn where
-        nothing follows them. The adjustment knows nothing of the noise effects.
+        The order of the draws is fixed: forces, angles, gravity, then the noise effects. Angles
+        that are not used are drawn all the same where other draws follow them. The adjustment does
+        not know of the noise effects.
         """
         n = len(self.forces)
         error = noise.sigma_force * rng.standard_normal((replicates, n, 3))

@@ -152,8 +152,6 @@ def _seconds_of_sensitivity(study: StudyConfig) -> float:
 
 
 def _size(size: float) -> str:
-    return next(
-        f"{size / unit:.2g} {name}" if size < 100 * unit else f"{size / unit:.0f} {name}"
-        for unit, name in ((1e12, "TB"), (1e9, "GB"), (1e6, "MB"), (1.0, "bytes"))
-        if size >= unit or unit == 1.0
-    )
+    units = ((1e12, "TB"), (1e9, "GB"), (1e6, "MB"))
+    unit, name = next((pair for pair in units if size >= pair[0]), (1.0, "bytes"))
+    return f"{size / unit:.{'2g' if size < 100 * unit else '0f'}} {name}"
