@@ -12,15 +12,11 @@ from accelstudy.diagnosis.decision.explanations import Explanation, credible_set
 from accelstudy.diagnosis.decision.posterior import Posterior, Weighed
 from accelstudy.diagnosis.decision.search import Search
 from accelstudy.diagnosis.decision.verdict import _misfit
-from accelstudy.diagnosis.evidence.chance import Chance
-from accelstudy.diagnosis.evidence.detection import detect
 from accelstudy.diagnosis.evidence.field import Field
 from accelstudy.diagnosis.evidence.noise.axes import UnequalAxes
 from accelstudy.diagnosis.evidence.noise.kinds import NOISES
 from accelstudy.diagnosis.evidence.noise.residual_tests import most_evidence
-from accelstudy.diagnosis.evidence.pairs import all_pairs
 from accelstudy.diagnosis.evidence.size import SIZE_WEIGHTS, SIZES, Evidence, Level
-from accelstudy.diagnosis.space.groups import groups
 from accelstudy.schemes import get_scheme
 from accelstudy.simulation.sessions import Noise, session
 
@@ -61,27 +57,6 @@ def examined(request):
     return design(shuffled("fibonacci-30"), request.param, seed=7)
 
 
-def test_the_level_of_the_test_is_what_it_says(examined):
-    """The value exceeded with 5 % and 1 %, found by importance sampling, in noise drawn apart."""
-    residuals = examined.frame.residuals
-    field = Field.of(examined.candidates, groups(examined))
-    evidence = Evidence(Level.given(), residuals.redundancy)
-    chance = Chance(np.random.SeedSequence(1), len(residuals.design))
-    by_chance = detect(field, evidence, residuals, chance).by_chance
-    assert np.mean(by_chance.weights) == pytest.approx(1.0, abs=0.1)
-    n = 4000
-    errors = np.random.default_rng(2).standard_normal((n, len(residuals.design)))
-    z = residuals.project(errors.T).T
-    logs = field.densities(evidence, z)
-    nothing = np.logaddexp.reduce(evidence.of_noise(np.sum(z**2, axis=1)), axis=-1)
-    odds = np.logaddexp.reduce(logs, axis=1) - np.log(len(field.names)) - nothing
-    for level, error in ((0.05, 0.012), (0.01, 0.005)):
-        assert np.mean(odds > by_chance.beyond(level)) == pytest.approx(level, abs=error)
-    # The bound that is used beyond what was simulated: the odds have the mean 1.
-    for value in (0.0, 1.0, 2.0):
-        assert np.mean(odds > value) <= np.exp(-value)
-
-
 def test_noise_is_not_noise_with_an_effect(examined):
     """What is drawn with an effect is found, and its weight takes it out again."""
     residuals, rng = examined.frame.residuals, np.random.default_rng(3)
@@ -94,20 +69,6 @@ def test_noise_is_not_noise_with_an_effect(examined):
     r = residuals.redundancy
     assert np.mean(squares) > r + 10
     assert np.sum(weights * squares) / np.sum(weights) == pytest.approx(r, rel=0.25)
-
-
-def test_a_pair_is_worth_the_space_of_both(examined):
-    """Of two candidates with one shape each the density is that of their joint space."""
-    residuals = examined.frame.residuals
-    evidence = Evidence(Level.unknown(), residuals.redundancy)
-    names = [n for n, s in examined.candidates.items() if len(s) == 1][:3]
-    found = all_pairs({n: examined.candidates[n] for n in names}, residuals, evidence)
-    assert found
-    for pair in found:
-        joint = np.linalg.qr(np.concatenate([h.basis for h in pair.best], axis=1))[0]
-        part = np.array([np.sum((residuals.z @ joint) ** 2)])
-        (expected,) = evidence.of_spaces(part, [joint.shape[1]], residuals.z @ residuals.z)
-        assert pair.log_density == pytest.approx(expected, abs=1e-6)
 
 
 @pytest.mark.parametrize("approach", [ROBOT, GRAVITY], ids=lambda approach: approach.name)

@@ -17,7 +17,6 @@ from jsonschema import Draft202012Validator
 from page_helpers import assert_sound, text_of
 from places import ROOT
 
-from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON, angles_in
@@ -38,8 +37,6 @@ from accelstudy.diagnosis.report.output import diagnose_folder, write_diagnosis
 from accelstudy.diagnosis.report.words.summary import headline
 from accelstudy.diagnosis.result import Gap
 from accelstudy.diagnosis.round_trip import parse_round_trip
-from accelstudy.diagnosis.space.examined import examine
-from accelstudy.diagnosis.worth.next_positions import next_positions
 from accelstudy.drawing.style import STYLE
 from accelstudy.sensors.models import get_model
 from accelstudy.study.config import read_study
@@ -239,29 +236,6 @@ def test_the_schema_asks_what_a_verdict_requires(written, change, path):
     _, content, _ = written("named")
     changed = {**content, **change, "gap": {**content["gap"], **change.get("gap", {})}}
     assert path in [error.json_path for error in SCHEMA.iter_errors(changed)]
-
-
-def test_effects_of_time_are_told_apart_by_repeats_later():
-    campaign, _ = simulate_campaign(
-        CampaignSettings(
-            scheme="fibonacci-30", interval=60.0, effects=("bias_drift: 1e-5, 1e-5, 1e-5",)
-        )
-    )
-    fit = fit_campaign(campaign, NINE, get_approach("robot"))
-    examined = examine(solve(fit.model, fit.approach, fit.observed))
-    drift, warm = (examined.candidates[name][0] for name in ("bias_drift", "warm_up"))
-    found = next_positions(examined.frame, (drift,), (warm,))
-    assert all(position.anywhere and position.temperature is None for position in found)
-    assert [position.later for position in found] == pytest.approx([30 * 60.0] * 3)
-    assert [found[0].roll, found[0].pitch] == pytest.approx(campaign.angles[0], abs=0.01)
-    assert found[0].separates == (("bias_drift",), ("warm_up",))
-
-    quadratic = examined.candidates["quadratic_scale"][0]
-    both = next_positions(examined.frame, (drift, quadratic), (warm, quadratic))
-    assert both[0].separates == (("bias_drift",), ("warm_up",))
-    one = next_positions(examined.frame, (quadratic,), (examined.candidates["scale_asymmetry"][0],))
-    assert not one[0].anywhere
-    assert one[0].later is None
 
 
 def test_the_headline_names_all_that_would_be_the_same():
