@@ -4,6 +4,7 @@ import catalogue
 import command_pages
 import configuration_page
 import file_formats
+import gallery
 from markdown_text import page, table
 from mkdocs.structure.files import File
 
@@ -31,6 +32,7 @@ PAGES = {
     "reference/file-formats.md": file_formats.formats,
     "reference/tables.md": file_formats.tables,
     "reference/terms.md": terms,
+    "gallery/study.md": gallery.study_figures,
 }
 
 

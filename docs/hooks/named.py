@@ -1,0 +1,47 @@
+"""Check what a page names: files of the repository, commands and their options, make targets."""
+
+import logging
+import re
+import shlex
+from pathlib import Path
+
+import click
+
+from accelstudy.commands.main import main
+
+ROOT = Path(__file__).parents[2]
+CODE = re.compile(r"^```.*?^```|(?:^ {4}.*\n)+|`[^`]+`", re.MULTILINE | re.DOTALL)
+FILE = re.compile(r"`((?:accelstudy|benchmarks|config|docs|examples|profiles|workflow)/[\w/.-]*)`")
+COMMAND = re.compile(r"(?:^ *|`)accelstudy ([^`\n]*(?:\\\n[^`\n]*)*)", re.MULTILINE)
+TARGET = re.compile(r"(?:^ *|`)make ([a-z][a-z-]*)", re.MULTILINE)
+
+log = logging.getLogger("mkdocs.hooks.named")
+
+
+def on_page_markdown(markdown, page, **_):
+    """Warn of what there is not; a strict build then fails."""
+    code = "\n".join(found[0] for found in CODE.finditer(markdown))
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    missing = [name for name in FILE.findall(code) if not (ROOT / name).exists()]
+    missing += [f"make {t}" for t in TARGET.findall(code) if f"\n{t}:" not in makefile]
+    missing += filter(None, map(_unknown, COMMAND.findall(code)))
+    for name in dict.fromkeys(missing):
+        log.warning("%s names %s, which there is not", page.file.src_uri, name)
+
+
+def _unknown(text):
+    """What is no command, or no option of it; None where all is."""
+    lexer = shlex.shlex(text.replace("\\\n", " "), posix=True, punctuation_chars=True)
+    lexer.whitespace_split = True
+    try:
+        words = list(lexer)
+    except ValueError:  # a quote that is not closed: prose
+        return None
+    name = next((word for word in words if not word.startswith("-")), "")
+    if name not in main.commands:
+        return f"accelstudy {name}" if re.fullmatch(r"[a-z-]+", name) else None
+    context = click.Context(main.commands[name])
+    known = {option for p in main.commands[name].get_params(context) for option in p.opts}
+    known |= {option for p in main.params for option in p.opts} | {"--help"}
+    given = [word.partition("=")[0] for word in words if word.startswith("--")]
+    return next((f"accelstudy {name} {each}" for each in given if each not in known), None)
