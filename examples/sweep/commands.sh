@@ -1,4 +1,10 @@
-# A sweep of one's own, in a clone of the project, beside its folder config/.
+# A sweep of one's own.
+
+# --8<-- [start:init]
+accelstudy init my-study
+cp quadratic.yaml read.py my-study
+cd my-study
+# --8<-- [end:init]
 
 # --8<-- [start:cells]
 accelstudy cells config/config.yaml quadratic.yaml

@@ -56,8 +56,7 @@ def run_example(example, folder):
     {section: output}, warnings included
     """
     shutil.copytree(EXAMPLES / example, folder, dirs_exist_ok=True)
-    shutil.copytree(ROOT / "config", folder / "config")
-    with contextlib.chdir(folder), only_here():
+    with contextlib.chdir(folder), only_in(str(folder)):
         return {
             name: "".join(output_of(command) for command in commands)
             for name, commands in sections(example).items()
@@ -67,6 +66,9 @@ def run_example(example, folder):
 def output_of(command):
     """Run a command that a reader types; what it prints."""
     program, *arguments = shlex.split(command)
+    if program == "cd":
+        os.chdir(arguments[0])
+        return ""
     if program == "accelstudy":
         result = CliRunner().invoke(main, arguments)
         if result.exit_code:
@@ -87,22 +89,22 @@ def output_of(command):
 
 
 @contextlib.contextmanager
-def only_here():
+def only_in(folder):
     """Let a script import its neighbours, and forget with it what they registered."""
     import matplotlib.pyplot as plt
 
     known = effects._registry._items, schemes._entries
     before = [dict(items) for items in known], set(sys.modules)
-    sys.path.insert(0, os.getcwd())
+    sys.path.insert(0, folder)
     try:
         yield
     finally:
-        sys.path.remove(os.getcwd())
+        sys.path.remove(folder)
         for items, kept in zip(known, before[0], strict=True):
             items.clear()
             items.update(kept)
         for name in set(sys.modules) - before[1]:
-            if (getattr(sys.modules[name], "__file__", None) or "").startswith(os.getcwd()):
+            if (getattr(sys.modules[name], "__file__", None) or "").startswith(folder):
                 del sys.modules[name]
         plt.close("all")
 

@@ -95,7 +95,7 @@ def test_the_hidden_effect_is_found_and_explains_the_misfit(run):
 
 
 def test_to_estimate_the_quadratic_term_pays_from_fifty_positions_on(run):
-    table = read_table(run["sweep"][1] / "results/quadratic/leveling.parquet")
+    table = read_table(run["sweep"][1] / "my-study/results/quadratic/leveling.parquet")
     n = table["scheme"].str.extract(r"(\d+)")[0].astype(int)
     worse = np.maximum(table["roll_rms_mgon"], table["pitch_rms_mgon"])
     estimated = table["model"].str.endswith("quadratic")
