@@ -11,7 +11,7 @@ from pydantic import AfterValidator
 def _model_name(text: str) -> str:
     from accelstudy.sensors.models import get_model  # slow to import, and most keys need no model
 
-    # A plain name may be that of a model of the study's own, which is known later.
+    # A plain name may be that of a model that the configuration itself defines.
     return text if re.fullmatch(r"[\w-]+", text) else get_model(text).name
 
 
@@ -22,6 +22,6 @@ def _scheme_name(text: str) -> str:
 
 
 ModelName = Annotated[str, AfterValidator(_model_name)]
-"""A model by its name; a composition and a file have the name that their effects give them."""
+"""The name of a model; a composition and a file get the name that follows from their effects."""
 SchemeName = Annotated[str, AfterValidator(_scheme_name)]
-"""A scheme by its name; that of a file has a name that tells of its content."""
+"""The name of a scheme; that of a file contains a digest of its directions."""

@@ -1,4 +1,4 @@
-"""Results of many replicates that are calibrated together, as a study writes them."""
+"""Results of many replicates that are calibrated together, as far as a study needs them."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Block:
 
     @classmethod
     def of(cls, result: Adjustment) -> Block:
-        """Take what a study writes of an adjustment."""
+        """Take from an adjustment what a study needs."""
         q = result.cofactors[result.converged]
         sigma = np.sqrt(np.diagonal(q, axis1=1, axis2=2))
         return cls(

@@ -1,16 +1,17 @@
 """The calibration of an accelerometer as a Gauss–Helmert adjustment.
 
-The condition equations are made from the definitions of the effects and of the approach alone. With
-f_s = h(f_a, x) and f_b = T(x) f_a, an approach that says something of f_b has the conditions
-ψ(f_b) = 0 for the f_b that belongs to the adjusted output, and
+The condition equations follow from the definitions of the effects and of the approach alone. With
+f_s = h(f_a, x) and f_b = T(x) f_a, an approach gives conditions ψ(f_b) = 0 for the f_b that belongs
+to the adjusted output, and
 
     ∂f_a/∂f_s = H⁻¹,  ∂f_a/∂x = −H⁻¹ ∂h/∂x,   H = ∂h/∂f_a,
 
 and the chain rule give A and B. The force f_a is carried through the iterations (the `latent`
 quantity of the adjustment) and improved by one Newton step in each; it is exact when they end.
 
-An approach that tells the force has f_a = T⁻¹ f_b(φ, θ, g) and the same conditions in the output of
-the sensor, ψ = f_s − h(f_a, x). That needs no inverse of h, which a saturated sensor has not.
+An approach that knows the force from the angles has f_a = T⁻¹ f_b(φ, θ, g), and conditions in the
+output of the sensor, ψ = f_s − h(f_a, x). They need no inverse of h, which a saturated sensor does
+not have.
 """
 
 from __future__ import annotations
@@ -55,7 +56,7 @@ class Observations:
     sigma_angle : float or (n, 2) array, rad
     gravity : float or (R,) array, m/s²; one number where it is held fixed
     sigma_gravity : float, m/s²; 0 holds gravity fixed
-    hold : HoldConditions, what else is known of the positions
+    hold : HoldConditions, of the positions
     initial : (u,) array, SI, initial values of the model's parameters; an ideal sensor if None
     slope, sd_slope : (n, 3) arrays, m/s²/s, of the output within each position, and its standard
         deviation, R = 1; the adjustment does not use them
@@ -125,19 +126,19 @@ class CalibrationEquations:
 
     @cached_property
     def attitude(self) -> tuple[Any, ...]:
-        """Roll and pitch without what the effects add to the robot's reading."""
+        """Roll and pitch without the errors of the robot's reading."""
         errors = self.trace.reading_errors(self.angles) if self.angles else ()
         return tuple(a - e for a, e in zip(self.angles, errors, strict=True))
 
     @cached_property
     def told(self) -> sp.Matrix | None:
-        """Force in the body frame that the approach tells, as a function of the readings."""
+        """Force in the body frame by the approach, as a function of readings; None if unknown."""
         force = self.approach.force(self.attitude, self.trace.g, symbolic) if self.angles else None
         return None if force is None else sp.Matrix(force)
 
     @cached_property
     def sensitive(self) -> TracedFunction:
-        """f_a of the force that the approach tells, generated."""
+        """f_a of the force that the approach knows, generated."""
         assert self.told is not None
         f_a = inverse(self.trace.t_matrix) * self.told
         return TracedFunction((*self.trace.arguments, *self.angles), f_a)
@@ -178,7 +179,7 @@ class CalibrationEquations:
 
 @dataclass(frozen=True)
 class CalibrationConditions:
-    """`CalibrationEquations` with all that is known, as the adjustment takes them."""
+    """`CalibrationEquations` with all known quantities, as the adjustment takes them."""
 
     equations: CalibrationEquations
     settings: Array
@@ -206,7 +207,7 @@ class CalibrationConditions:
 def equations_of(
     trace: SensorTrace, approach: Approach, estimates_gravity: bool
 ) -> CalibrationEquations:
-    """Return the condition equations; to generate them takes a fraction of a second, so once."""
+    """Return the condition equations, generated once, as that takes a fraction of a second."""
     return CalibrationEquations(trace, approach, estimates_gravity)
 
 
@@ -229,8 +230,8 @@ def calibrate(model: SensorModel, approach: Approach, observed: Observations) ->
     Raises
     ------
     InputError
-        If the approach needs angles that were not observed, a column that is absent, or there are
-        fewer conditions than unknowns.
+        If angles or a column are missing that the approach or the model needs, or there are fewer
+        conditions than unknowns.
     """
     count, n = observed.forces.shape[:2]
     size = max(1, AT_ONCE // n)

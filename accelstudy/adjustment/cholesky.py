@@ -1,8 +1,8 @@
 """Cholesky factorisation of many small matrices at once.
 
-The matrix axes come first, so that each operation runs over all members of the batch, and a member
-that is not positive definite becomes NaN instead of raising for all of them (as LAPACK's batched
-routines in NumPy do).
+The matrix axes come first, so each operation runs over all members of the batch. A member that is
+not positive definite becomes NaN, whereas NumPy's batched routines raise an error for the whole
+batch.
 """
 
 from __future__ import annotations

@@ -6,8 +6,8 @@ at the *adjusted* observations (Pope 1972; Lenzmann & Lenzmann 2004; Neitzel 201
 
     A dx + B v + w = 0,   w = ψ(l + v₀, x₀) − B v₀,
 
-not at the raw ones. All replicates of a batch are solved together; each stops at its own
-convergence, so its result does not depend on what else is in the batch.
+not at the raw ones. All replicates of a batch are solved together. Each stops at its own
+convergence, so its result does not depend on the others.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ MAX_ITERATIONS = 30
 STEP_TOLERANCE = 1e-6
 """Convergence: the last step is below this fraction of a standard deviation."""
 ROUNDING = 64
-"""The last step is not asked to be below so many roundings of the largest observation."""
+"""The last step need not be below so many roundings of the largest observation."""
 PIVOT_TOLERANCE = 1e-12
 """A normal matrix, scaled to unit diagonal, is singular when a Cholesky pivot is below this."""
 
-# glibc hands blocks above a threshold back to the system as soon as they are freed, and to fetch
-# them again page by page in each iteration costs a quarter of the time. Freeing one large block,
-# never touched, raises the threshold (mallopt(3), M_MMAP_THRESHOLD). Elsewhere it does nothing.
+# glibc returns freed blocks above a threshold to the system. To fetch them again page by page in
+# each iteration takes a quarter of the time. One large block that is freed untouched raises the
+# threshold (mallopt(3), M_MMAP_THRESHOLD). On other systems it has no effect.
 np.empty(31 << 20, dtype=np.uint8)
 
 
@@ -169,7 +169,7 @@ def adjust(
         Direct observations of parameters (gravity with σ_g, say) and their weights; a weight of
         zero means that the parameter is not observed.
     latent : (k, R, n) array, optional
-        First value of what the equations carry along.
+        Initial value of the quantity that the equations carry along.
     max_iterations : int
 
     Returns
@@ -275,7 +275,7 @@ def _step(at: Linearisation, v: Array, q: Array, weights: Array, prior_misclosur
     omega = np.einsum("crn,crn->r", misclosure, misclosure)
     omega += (weights[:, None] * (prior_misclosure - dx) ** 2).sum(axis=0)
 
-    # The three that must vanish: the step in x and in v, and ψ at the adjusted observations.
+    # All three must vanish: the step in x, the step in v, and ψ at the adjusted observations.
     size_x = np.sqrt((half**2).sum(axis=0))
     size_v = (np.abs(v_new - v) / _sigma(q)[:, None]).max(axis=(0, 2))
     size_psi = np.abs(cholesky.forward(white.factor, at.psi)).max(axis=(0, 2))
@@ -301,7 +301,7 @@ class Whitened:
     bq: Array
 
     def solved(self, dx: Array) -> tuple[Array, Array]:
-        """What a step (u, R) leaves: errors of unit weight (c, R, n) and residuals v (o, R, n)."""
+        """Errors of unit weight (c, R, n) and residuals v (o, R, n) after a step (u, R)."""
         errors = self.misclosures + np.einsum("curn,ur->crn", self.design, dx)
         v = np.einsum("crn,corn->orn", -cholesky.backward(self.factor, errors), self.bq)
         return errors, v
@@ -331,7 +331,7 @@ def _whiten(at: Linearisation, bq: Array) -> tuple[Array, Array]:
     """Scale conditions to unit weight: M = B Q Bᵀ = L Lᵀ; L (c, c, R, n), L⁻¹A (c, u, R, n)."""
     b = at.jac_observations
     m = np.empty((len(b), len(b), *b.shape[2:]))
-    for i in range(len(b)):  # the lower triangle is all that the factorisation reads
+    for i in range(len(b)):  # the factorisation reads the lower triangle only
         m[i:, i] = np.einsum("corn,orn->crn", bq[i:], b[i])
     lower = cholesky.factor(m)
     return lower, cholesky.forward(lower, at.jac_parameters)
@@ -375,6 +375,6 @@ def _sigma(q: Array) -> Array:
 
 
 def _tolerance(observed: Array, q: Array) -> Array:
-    """Step at which each replicate stops, in standard deviations: never finer than rounding."""
+    """Step at which each replicate stops, in standard deviations; never below rounding."""
     largest = np.max(np.abs(observed) / _sigma(q)[:, None], axis=(0, 2), initial=0.0)
     return np.asarray(np.maximum(STEP_TOLERANCE, ROUNDING * np.finfo(float).eps * largest))

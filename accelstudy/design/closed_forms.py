@@ -1,4 +1,4 @@
-"""Closed forms of linear theory, against which the Monte Carlo is held.
+"""Closed forms of linear theory, with which the Monte Carlo is compared.
 
 They are valid for the models of bias, scale and non-orthogonality in schemes with octahedral
 moments: over the n directions ⟨x⟩ = ⟨xy⟩ = 0 and all third moments vanish, ⟨x⁴⟩ is the same for

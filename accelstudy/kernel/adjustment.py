@@ -2,8 +2,8 @@
 
 It follows `accelstudy.adjustment.gauss_helmert`, which explains it, step by step and name by name.
 The conditions come from the traced expressions of `CalibrationEquations`. A group of replicates
-goes through its iterations together; a lane that has ended keeps what it ended with, and what is
-computed in it from then on goes nowhere.
+iterates together. A lane that has ended keeps its results, and what is computed in it afterwards is
+ignored.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ POINTERS = (
 class KernelCode:
     """The code that calibrates the replicates of one kind of sensor model with one approach.
 
-    The function takes, of n positions and R replicates, with u parameters (gravity is the last one
-    if it is estimated), o observations per position and k known numbers:
+    The function has these arguments, for n positions, R replicates, u parameters (gravity is the
+    last if it is estimated), o observations per position and k known numbers:
 
         known         (n, 2 o + k)  variances of the observations, their 1/σ (0 where σ = 0),
                                     and the numbers of `known`
@@ -90,7 +90,7 @@ class KernelCode:
 
     @cached_property
     def _sensitive(self) -> Formulas:
-        """f_a of what was told, or of that of the iteration before."""
+        """f_a from the known force, or from that of the iteration before."""
         eq, trace = self.equations, self.equations.trace
         if not self._latent:
             return Formulas(list(eq.sensitive.expressions), self._same)
@@ -105,7 +105,7 @@ class KernelCode:
 
     @cached_property
     def known(self) -> TracedFunction:
-        """What is known of the positions, (k, 1)."""
+        """Known numbers of a position, (k, 1)."""
         expressions = [*self._sensitive.known.values(), *self._linear.known.values()]
         return TracedFunction(
             self.equations.trace.arguments, sp.Matrix(len(expressions), 1, expressions)
@@ -316,13 +316,13 @@ class _Writer:
             for row, misclosure, cofactors in zip(a_white, w_white, bq_white, strict=True)
         ]
         for number, value in enumerate(value for row in self.stored for value in row):
-            if isinstance(value, Lanes):  # a constant needs no place
+            if isinstance(value, Lanes):  # a constant is not stored
                 self.write(i, 2 * o + len(self.of._latent) + number, [value])
 
     def evaluate(
         self, formulas: Formulas, table: dict[Any, Term], i: str, column: int
     ) -> list[Term]:
-        """Write formulas at a position; what is known begins at a column."""
+        """Write formulas at a position, whose known numbers begin at a column."""
         known = {symbol: self.known(i, column + k) for k, symbol in enumerate(formulas.known)}
         return formulas.write(self.code, {**table, **known})
 
@@ -353,7 +353,7 @@ class _Writer:
         self.write(i, o, v_new)
 
     def results(self, first: str, kept: _Kept, valid: Mask) -> None:
-        """Write what a group ended with."""
+        """Write the results of a group."""
         code, u = self.code, self.u
         lower: Rows = [[variable.get() for variable in row] for row in kept.lower]
         pivots: list[Term] = [variable.get() for variable in kept.pivots]
@@ -397,7 +397,7 @@ class _Step:
 
 @dataclass(frozen=True)
 class _Kept:
-    """What the lanes ended with."""
+    """Results of the lanes."""
 
     x: list[Variable]
     lower: list[list[Variable]]

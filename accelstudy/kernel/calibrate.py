@@ -40,7 +40,7 @@ class Kernel:
         padded = -(-count // LANES) * LANES
         results = np.empty((2 * u + 3, padded))
         correlations = np.zeros((u * (u - 1) // 2, LANES))
-        # The last of the observations stands for the angles where there are none.
+        # Without angles, the forces take their place and are not read.
         forces, angles = (np.ascontiguousarray(problem.observed[k]) for k in (0, -1))
         arrays = [
             self._known(problem),
@@ -85,7 +85,7 @@ class Kernel:
 
 @cache
 def kernel_of(equations: CalibrationEquations) -> Kernel:
-    """Return the compiled code for some equations; it takes seconds the first time, so once."""
+    """Return the compiled code for some equations, made once, as that may take seconds."""
     return Kernel(equations)
 
 
@@ -96,6 +96,6 @@ def calibrate(model: SensorModel, approach: Approach, observed: Observations) ->
 
 
 def _aligned(count: int) -> Array:
-    """Memory for numbers that begins where a vector may begin."""
+    """Memory for numbers, aligned for vectors."""
     memory = np.empty(count + LANES)
     return memory[-(memory.ctypes.data // 8) % LANES :][:count]

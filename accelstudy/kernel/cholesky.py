@@ -1,6 +1,6 @@
 """Cholesky factorisation of a small symmetric matrix in each lane.
 
-Matrices are rows of numbers, lower triangles as far as the diagonal or without it.
+Matrices are lists of rows: lower triangles, with or without the diagonal.
 """
 
 from __future__ import annotations

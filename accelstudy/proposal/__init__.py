@@ -1,1 +1,1 @@
-"""A proposed design: from the request to ordered positions, a file and a figure."""
+"""A proposed design: from a request to ordered positions, a file and a figure."""

@@ -20,7 +20,7 @@ from accelstudy.simulation.sessions import Noise
 
 
 class DesignsConfig(Block):
-    """Which schemes are compared with the best there can be, and with what designs."""
+    """Schemes and designs whose efficiency is compared."""
 
     model: ModelName = Field("bias-scale-nonorthogonality", description="what is calibrated")
     schemes: OneOrMore[SchemeName] = Field(default=["all"], description="schemes, or all")

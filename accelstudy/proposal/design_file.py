@@ -1,4 +1,4 @@
-"""A design as a YAML file, with how it was made; any configuration takes it as a scheme."""
+"""A design as a YAML file that records how it was made; a configuration takes it as a scheme."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ def write_design(
     path : Path
     name, title, source : str, of the scheme
     directions : (n, 3) array of unit vectors
-    made : mapping, plain data: how it was made, and what it is worth
-    columns : mapping of name to n values, optional, what else is to be known of each position
+    made : mapping, plain data: how it was made, and how good it is
+    columns : mapping of name to n values, optional, further columns of the positions
     """
     roll, pitch = (to_recorded(attitudes(directions), "rad") / 1000).T
     positions = [

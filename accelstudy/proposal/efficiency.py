@@ -1,4 +1,4 @@
-"""How good schemes are, against the best that as many positions can be."""
+"""The efficiency of schemes, compared with the best possible set of as many positions."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def efficiency_table(
 
     Parameters
     ----------
-    tasks : calibrations that all of them are judged for
+    tasks : calibrations for which all of them are judged
     schemes : Schemes
     positions : numbers of positions of the designs
     seed : int, of the search for the designs
@@ -35,8 +35,8 @@ def efficiency_table(
     DataFrame
         For each task, scheme and criterion: approach, model, scheme, title, status, n, criterion,
         efficiency (0 where the scheme does not determine the model; `reason` says why), rms_roll
-        and rms_pitch (rad, NaN likewise), and least_rms, that of roll and pitch together that no n
-        positions are below (I only).
+        and rms_pitch (rad, NaN likewise), and least_rms, the lower bound for any n positions
+        of the rms of roll and pitch together (I only).
     """
     schemes = list(schemes)
     tables = [_of_task(task, schemes, positions, seed) for task in tasks]
@@ -47,7 +47,7 @@ def _of_task(
     task: Task, schemes: list[Scheme], positions: Iterable[int], seed: int
 ) -> pd.DataFrame:
     criteria = {name: get_criterion(name, task) for name in CRITERIA}
-    # Of one position's worth of shares; n positions have n times the information.
+    # For shares that sum to one position; n positions have n times the information.
     bounds = {
         name: continuous_optimum(task, criterion, Sphere(), Constraints(), 1).bound
         for name, criterion in criteria.items()

@@ -1,4 +1,4 @@
-"""Figure of the efficiency of schemes, and of what they come to in roll and pitch."""
+"""Figure of the efficiency of schemes, and of the rms of roll and pitch that they reach."""
 
 from __future__ import annotations
 

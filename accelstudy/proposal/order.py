@@ -1,4 +1,4 @@
-"""The order in which to take positions: short ways, and a drift that no parameter can imitate."""
+"""The order of positions: short ways, and a drift that no parameter can imitate."""
 
 from __future__ import annotations
 
@@ -18,16 +18,17 @@ Order = NDArray[np.int_]
 
 TOURS = 12
 LONGER = 1.15
-"""How much longer than the shortest tour found another may be that keeps a drift apart better."""
+"""Length, relative to the shortest tour found, up to which a tour that separates drifts better is
+taken."""
 
 
 def field_order(task: Task, directions: Array, groups: Order | None = None) -> Order:
     """Order positions (n, 3) for the field.
 
-    They are a round trip of small turns: the last position is near the first, so that what changes
-    steadily with time is not taken for what depends on the attitude. Of several round trips, and of
-    their beginnings, the one is taken in which a linear drift of the biases shows best beside the
-    parameters of the model.
+    The order is a round trip of small turns. The last position is near the first, so a steady
+    change with time is not mistaken for an effect of the attitude. Several round trips are tried,
+    each with several first positions. The one is taken in which a linear drift of the biases can be
+    told best from the parameters of the model.
 
     Parameters
     ----------
@@ -59,7 +60,7 @@ def _length(angles: Array, tour: Order) -> float:
 
 
 def _round_trip(angles: Array, tour: Order) -> Order:
-    """Shorten a round trip by turning parts of it around, until no turn shortens it (2-opt)."""
+    """Shorten a round trip by reversing parts of it until no reversal shortens it (2-opt)."""
     n, shorter = len(tour), True
     while shorter and n > 3:
         shorter = False
@@ -81,7 +82,7 @@ def _round_trip(angles: Array, tour: Order) -> Order:
 
 
 def _drift_shown(task: Task, directions: Array) -> float:
-    """Smallest share of a drift of the biases that the parameters of the model cannot imitate."""
+    """Share of a drift of the biases that the parameters cannot imitate; the smallest axis."""
     effects = [effect.spec for effect in task.model.effects]
     model = compose("drifting", (*effects, "bias_drift"))
     n, u = len(directions), task.model.n_parameters

@@ -1,4 +1,4 @@
-"""A design in the order in which to take it, and what it brings."""
+"""A design in the order of measurement, and the accuracy that it gives."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ Array = NDArray[np.float64]
 
 REFERENCE = "mclaren-24"
 PLACEMENT = np.radians(5.0)
-"""rad, sd by which a block that is held by hand misses its attitude, about each of two axes."""
+"""rad, sd about each of two axes by which a block held by hand misses its attitude."""
 PLACED = 200
-"""Sets of misplaced positions."""
+"""Number of simulated sets of misplaced positions."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class Proposal:
     ----------
     request : Request
     design : Design
-    directions : (n, 3) array of unit vectors, in the order of the field, as the file holds them
+    directions : (n, 3) array of unit vectors, in the order of measurement, as in the file
     """
 
     request: Request
@@ -94,7 +94,7 @@ class Proposal:
         return np.sqrt(np.mean(squares, axis=0))
 
     def nameable(self, directions: Array) -> dict[str, tuple[float, str]]:
-        """Size at which each parameter of two rivals can be told from the other effect, SI."""
+        """Size from which each parameter of two rivals can be told from the other effect, SI."""
         criterion, task = self.request.chosen, self.request.task
         if not isinstance(criterion, Rivals):
             return {}
@@ -107,7 +107,7 @@ class Proposal:
         }
 
     def made(self) -> Mapping[str, Any]:
-        """How it was made and what it is worth, as plain data in the units of files."""
+        """How it was made and how good it is, as plain data in the units of files."""
         request, noise = self.request, self.request.noise
         with angles_in("gon"):
             constraints = request.constraints.texts

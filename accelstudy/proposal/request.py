@@ -1,4 +1,4 @@
-"""What a person asks of a design, in words and numbers, and what that means."""
+"""A request for a design, in words and numbers, and its meaning."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from accelstudy.simulation.sessions import Noise
 CRITERIA = ("I", "D", "A")
 ATTITUDES = ("all", "cube", "hand")
 HAND_STEP = np.pi / 6
-"""rad, in which steps a person judges roll and pitch by eye."""
+"""rad, step in which a person judges roll and pitch by eye."""
 MOUNTINGS = Range(1, 9)
 MOST_POSITIONS = Range(1, 300)
 
@@ -54,8 +54,8 @@ class Request:
     mountings : int, optional, how often the sensor may be mounted; each is turned about one axis
     roll, pitch : (least, most), rad, optional
     pole_distance, least_angle : float, rad, optional
-    prior : tuple of str, what is known before, as "bias=20mg" or "s_x=500ppm"
-    after : str, scheme that is measured already, optional
+    prior : tuple of str, parameters known before, as "bias=20mg" or "s_x=500ppm"
+    after : str, scheme that was measured before, optional
     neglect : tuple of str, effects that the model leaves out, as "quadratic_scale=50ug/g^2"
     discriminate : (effect, effect), optional
     seed, starts : int
@@ -164,7 +164,7 @@ class Request:
 
     @cached_property
     def constraints(self) -> Constraints:
-        """What the positions must keep to."""
+        """The constraints on the positions."""
         single: list[Constraint] = []
         for name, ends, kind in (("roll", self.roll, RollRange), ("pitch", self.pitch, PitchRange)):
             if ends is not None:
@@ -182,7 +182,7 @@ class Request:
         Raises
         ------
         InputError
-            If what is asked for cannot be.
+            If the request cannot be met.
         """
         return optimal_design(
             self.task,

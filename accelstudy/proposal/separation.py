@@ -1,15 +1,15 @@
 """What further positions add to the separation of two fitted explanations.
 
-Two explanations of the same positions predict new ones differently, by d. If one of them is right,
-the other is fitted to the new positions, too, and misses them by less than d. What its sum of
-squares grows by is
+The predictions of two explanations for a new position differ by d. If one of them is right, the
+other is fitted to the new position as well, and then misses it by less than d. Its sum of squares
+grows by
 
     dᵀ (I + G C Gᵀ)⁻¹ d,
 
-with the predictions in units of their noise, their derivatives G by the parameters of the
-explanation that is wrong, and its cofactors C so far. It is by this that the noncentrality of the
-test of one against the other grows, so the size at which they can be told apart (MIB) falls. Either
-may be the right one; so the mean of both counts.
+with the predictions in units of their noise, their derivatives G by the parameters of the wrong
+explanation, and its cofactors C so far. The noncentrality of the test of one against the other
+grows by the same amount, so the size from which they can be told apart (MIB) falls. Either may be
+the right one, so the mean of both counts.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Columns = tuple[Array, Array]
 
 @dataclass(frozen=True, eq=False)
 class Explained:
-    """An explanation as it is fitted so far.
+    """An explanation, fitted to the positions so far.
 
     Attributes
     ----------
@@ -55,12 +55,12 @@ class Explained:
 
 @dataclass(frozen=True, eq=False)
 class Separation:
-    """Two explanations, each as the right one, and each as the wrong one that is fitted on.
+    """Two explanations, each in the role of the right one and of the wrong one.
 
     Attributes
     ----------
-    right : (p,) arrays, what either predicts by
-    wrong : Explained, either, after the positions that were taken
+    right : (p,) arrays, parameters by which either predicts
+    wrong : Explained, either one, fitted to the positions taken so far
     """
 
     right: tuple[Array, Array]

@@ -6,9 +6,9 @@ With M = M₀ + Σ θ_i M_i the variance of the misclosures w, M_i = B Q_i Bᵀ,
 
 the factors θ on the a-priori variances obey S θ = q − S₀, iterated (Helmert; Koch 1999, chapter 3).
 θ_i q_i is the share of group i in Ω, and θ_i tr(W M_i) its share r_i in the redundancy. Where
-Helmert's step would leave the positive numbers, Förstner's (1979, Ein Verfahren zur Schätzung von
-Varianz- und Kovarianzkomponenten), θ_i ← θ_i · (θ_i q_i / r_i), is taken: it has the same fixed
-point and cannot. A component that is not there runs to zero, never below.
+Helmert's step would give a negative factor, Förstner's step is taken instead, θ_i ← θ_i · (θ_i q_i
+/ r_i) (1979, Ein Verfahren zur Schätzung von Varianz- und Kovarianzkomponenten). It has the same
+fixed point and stays positive. The factor of an absent component goes to zero.
 """
 
 from __future__ import annotations
@@ -56,10 +56,10 @@ def variance_components(
 ) -> VarianceComponents | None:
     """Estimate the variance components of one session; None if there are no two to estimate.
 
-    Forces alone (no robot), a group that is free of noise, and positions that cannot separate the
-    two leave nothing to estimate. The factors are unbiased only as long as they stay clear of zero:
-    where one of them has a standard deviation of its own size it is often cut off there, and its
-    mean is too large.
+    There is nothing to estimate without a robot, with a group that is free of noise, or with
+    positions that cannot separate the two groups. The factors are unbiased only if they are clearly
+    above zero: one with a standard deviation of its own size is often cut off at zero, so its mean
+    is too large.
 
     Parameters
     ----------
@@ -100,13 +100,13 @@ def variance_components(
 def _estimate(solution: Solution, groups: Array, factors: Array) -> VarianceComponents | None:
     """Estimate the factors with the derivatives of one solution; None if S is singular.
 
-    All matrices of conditions by conditions have blocks of one position each but for what A adds,
-    so that traces of products are sums over positions and products of (u, u) matrices:
-    with G = (Aᵀ M⁻¹ A)⁻¹ and T_i = Aᵀ M⁻¹ M_i M⁻¹ A,
+    Apart from the part of A, all matrices of conditions by conditions have one block per position.
+    So traces of products are sums over positions and products of (u, u) matrices: with
+    G = (Aᵀ M⁻¹ A)⁻¹ and T_i = Aᵀ M⁻¹ M_i M⁻¹ A,
 
         tr(W M_i W M_j) = tr(M⁻¹ M_i M⁻¹ M_j) − 2 tr(G Aᵀ M⁻¹ M_i M⁻¹ M_j M⁻¹ A) + tr(G T_i G T_j).
 
-    Observed gravity is a row of weight 1 in A, w and M, which keeps its weight.
+    Observed gravity is a row of weight 1 in A, w and M; its weight stays as it is.
     """
     b = solution.jac_observations
     rows, errors = solution.prior
@@ -121,7 +121,7 @@ def _estimate(solution: Solution, groups: Array, factors: Array) -> VarianceComp
         inverse = np.linalg.inv(np.tensordot(factors, m, 1))
         weighted = inverse @ a
         g = np.linalg.inv(_normal(a, weighted) + known)
-        # W w, by position; what is left at observed gravity has no part in the components.
+        # W w, by position; the row of observed gravity does not count in the components.
         x = g @ (np.einsum("ncu,nc->u", weighted, w) + rows.T @ errors)
         pw = np.einsum("ncd,nd->nc", inverse, w) - weighted @ x
 

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class PositionTests:
-    """Is there a gross error in a position? One test for each of n positions.
+    """Tests for a gross error, one for each of n positions.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class PositionTests:
 
 
 def holm(p_values: Array) -> Array:
-    """Adjust p-values by Holm's step-down method; NaN stays NaN and counts for nothing."""
+    """Adjust p-values by Holm's step-down method; NaN stays NaN and does not count."""
     adjusted = np.full(np.shape(p_values), np.nan)
     order = np.argsort(p_values)[: np.count_nonzero(~np.isnan(p_values))]
     steps = np.arange(len(order), 0, -1) * p_values[order]

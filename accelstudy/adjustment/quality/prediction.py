@@ -1,4 +1,4 @@
-"""How well positions are predicted that were not used."""
+"""How well a calibration predicts positions that it did not use."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ Array = NDArray[np.float64]
 NEAR_POLE = 0.1
 """Cosine of pitch below which an error of roll says nothing of the tilt."""
 REFITTED = 200
-"""Positions up to which each is left out by an adjustment of its own. Among more, one changes the
-parameters so little that the derivatives at the solution of all tell by how much."""
+"""Number of positions up to which each is left out in an adjustment of its own. Among more, one
+position changes the parameters so little that the derivatives at the common solution suffice."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ def held_out(model: SensorModel, approach: Approach, observed: Observations) -> 
     if observed.angles is not None and approach.uses_angles:
         p = x[:, : model.n_parameters]
         g = x[:, -1] if problem.weights.any() else np.full(n, problem.conditions.gravity)
-        # Each position with parameters of its own: sessions of one position.
+        # Each position has parameters of its own, so they are sessions of one position.
         hold = None if observed.hold is None else observed.hold.take(np.arange(n)[:, None])
         f_b = model.correct(observed.forces[0][:, None], p, g, hold)[:, 0]
         readings = observed.angles[0]
@@ -107,7 +107,7 @@ def _refitted(problem: CalibrationProblem, c: int) -> tuple[Array, Array, Array]
 
 
 def _derived(solution: Solution) -> tuple[Array, Array, Array]:
-    """Likewise, by the derivatives at the solution of all positions: dx = Q_xx Ãᵀ R_ii⁻¹ e_i."""
+    """The same by the derivatives at the common solution: dx = Q_xx Ãᵀ R_ii⁻¹ e_i."""
     n, c = solution.misclosures.shape
     root, rank = solution.root
     root = np.where((rank == c)[:, None, None], root, np.nan)
@@ -126,9 +126,9 @@ def _derived(solution: Solution) -> tuple[Array, Array, Array]:
 class _WithoutOne:
     """Condition equations in which replicate i does without position i, all of equal shape.
 
-    Instead of being removed, the conditions of the position get an unknown shift each, the last c
-    parameters. It takes up all that the position says, and ends as minus what the others predict
-    for its misclosure. Which position that is, the last row of `latent` marks.
+    The conditions of the position are not removed. Each gets an unknown shift, the last c
+    parameters, which absorbs all information of the position. At the end it is minus the misclosure
+    that the others predict. The last row of `latent` marks the position.
     """
 
     conditions: ConditionEquations

@@ -1,4 +1,4 @@
-"""Redundancy numbers, and what the tests of positions do not find."""
+"""Redundancy numbers, and the errors that the tests of positions do not find."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Redundancy:
-    """Shares of the observations in the redundancy; with that of gravity they sum up to r.
+    """Shares of the observations in the redundancy; with the share of gravity they sum up to r.
 
     Attributes
     ----------
-    observations : (n, o) array, diagonal of Q_vv Q⁻¹; 0 shows nothing of an error, 1 all of it
+    observations : (n, o) array, diagonal of Q_vv Q⁻¹: share of an error that shows in v, 0 to 1
     positions : (n,) array, their sums, which are the traces of R
     gravity : float, of the observed gravity; None where it is fixed
     """
@@ -48,7 +48,7 @@ def redundancy_numbers(solution: Solution) -> Redundancy:
 
 @dataclass(frozen=True)
 class Reliability:
-    """What the tests of positions do not find; infinite where a position is not controlled.
+    """Largest errors that the tests may miss; infinite where a position is not controlled.
 
     Attributes
     ----------

@@ -1,14 +1,14 @@
 """How good one calibration is: tests, redundancy, reliability and held-out errors.
 
-All of it follows from the adjustment linearised at its solution, A dx + B v + w = 0. Scaled to unit
+It all follows from the adjustment linearised at its solution, A dx + B v + w = 0. Scaled to unit
 weight with B Q Bᵀ = L Lᵀ, the misclosures are e = L⁻¹ w = R ε with the projector
 
     R = I − Ã (Ãᵀ Ã)⁻¹ Ãᵀ = I − U Uᵀ,   Ã = L⁻¹ A,   ε ~ N(0, σ0² I),
 
-with an orthonormal basis U of the columns of Ã, so that eᵀe = Ω and tr R = r. R is never formed:
-what is needed of it are its blocks on the diagonal. A gross error shifts the conditions of its
+with an orthonormal basis U of the columns of Ã, so that eᵀe = Ω and tr R = r. R is never formed,
+as only its diagonal blocks are needed. A gross error shifts the conditions of its
 position by ∇ and e by R L⁻¹ ∇. In the gravity-based approach one condition covers the three forces
-of a position, which no test can tell apart: here positions are tested, not single observations.
+of a position, which no test can tell apart. So positions are tested, not single observations.
 
 Sources: Baarda (1968), A testing procedure for use in geodetic networks; Pope (1976), The
 statistics of residuals and the detection of outliers; Koch (1999), Parameter estimation and
@@ -32,7 +32,7 @@ from accelstudy.sensors.sensor import SensorModel
 Array = NDArray[np.float64]
 
 CONTROLLED = 1e-6
-"""A direction of a position whose redundancy is below this is checked by no other position."""
+"""A direction of a position with a smaller redundancy is not checked by the other positions."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Solution:
     variances : (n, o) array, diagonal of Q, (m/s²)² and rad²
     jac_parameters : (n, c, u) array, A
     jac_observations : (n, c, o) array, B
-    misclosures : (n, c) array, w = ψ(l + v, x) − B v, m/s²; what the raw readings lack of ψ = 0
+    misclosures : (n, c) array, w = ψ(l + v, x) − B v, m/s²; of the raw readings
     prior : (k, u) array and (k,) array, rows of unit weight of Ã and of e for observed gravity;
         k is 0 or 1
     omega : float, Ω

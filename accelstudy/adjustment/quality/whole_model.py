@@ -13,7 +13,7 @@ from accelstudy.basics.levels import REFUTED
 Array = NDArray[np.float64]
 
 NO_POWER = 2
-"""Up to this redundancy the global test finds next to nothing."""
+"""With this redundancy or less the global test finds next to nothing."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class GlobalTest:
 
     @property
     def powerless(self) -> bool:
-        """Whether the redundancy is so small that the test hardly ever refuses anything."""
+        """Whether the redundancy is so small that the test hardly ever rejects."""
         return self.dof <= NO_POWER
 
 

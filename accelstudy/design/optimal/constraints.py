@@ -1,7 +1,7 @@
-"""What the attitudes of a design must keep to, one by one and in pairs.
+"""Constraints on the attitudes of a design, singly and in pairs.
 
-A constraint has margins that are not negative where it is kept: with them a grid of attitudes is
-filtered, and positions are moved without leaving what is allowed.
+A constraint has margins, which are not negative where it is met. They filter a grid of attitudes,
+and keep positions within the constraints while they are moved.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from accelstudy.design.optimal.spaces import attitudes
 Array = NDArray[np.float64]
 
 TOLERANCE = 1e-7
-"""rad, by which a position may break a constraint: rounding."""
+"""rad, by which rounding may break a constraint."""
 
 
 class Constraint(ABC):
@@ -34,7 +34,7 @@ class Constraint(ABC):
 
     @abstractmethod
     def margins(self, directions: Array) -> Array:
-        """How far directions (n, 3) are from breaking it, (n, m), rad."""
+        """Distances of directions (n, 3) from breaking it, (n, m), rad; negative where they do."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class PitchRange(Constraint):
 
 @dataclass(frozen=True)
 class OffPole(Constraint):
-    """At least an angle, rad, from the x axis being vertical, where roll is undefined."""
+    """Least angle, rad, between the x axis and the vertical, where roll is undefined."""
 
     angle: float
 
@@ -92,7 +92,7 @@ class OffPole(Constraint):
 
 @dataclass(frozen=True)
 class LeastAngle:
-    """At least an angle, rad, between any two positions."""
+    """Least angle, rad, between any two positions."""
 
     angle: float
 
@@ -108,7 +108,7 @@ class LeastAngle:
 
 @dataclass(frozen=True)
 class Constraints:
-    """Constraints that hold together.
+    """Constraints that must all be met.
 
     Attributes
     ----------
@@ -134,7 +134,7 @@ class Constraints:
         return directions[np.all(self.margins(directions) >= -TOLERANCE, axis=1)]
 
     def kept(self, directions: Array) -> bool:
-        """Whether a set of positions keeps all constraints."""
+        """Whether a set of positions meets all constraints."""
         if np.any(self.margins(directions) < -TOLERANCE):
             return False
         if self.pair is None or len(directions) < 2:

@@ -1,8 +1,8 @@
-"""The best there can be: shares of all positions instead of whole ones, and a bound from them.
+"""A lower bound of a criterion, from designs with shares instead of whole positions.
 
-A convex criterion is a convex function of shares w, too, so from its derivatives at any w
-follows a bound that no shares, and no whole positions, are below (the general equivalence theorem
-of Kiefer & Wolfowitz 1960 and Whittle 1973 is the case in which the bound is reached):
+A convex criterion is also a convex function of the shares w. So its derivatives at any w give a
+lower bound for all shares, and for all sets of whole positions. The general equivalence theorem of
+Kiefer & Wolfowitz (1960) and Whittle (1973) is the case in which the bound is reached:
 
     φ(w*) ≥ φ(w) + n (min gⱼ − Σ wᵢ gᵢ),  gⱼ = tr(∂φ/∂N · Iⱼ).
 """
@@ -22,22 +22,22 @@ from accelstudy.design.optimal.task import Task
 Array = NDArray[np.float64]
 
 COARSE, FINE = 600, 6000
-"""Attitudes that have shares, and attitudes on which the bound is taken."""
+"""Number of attitudes that have shares, and of those on which the bound is evaluated."""
 ROUNDS = 8
 ENOUGH = 1e-4
-"""Gap between the criterion and its bound, relative, at which to stop."""
+"""Relative gap between the criterion and its bound at which the search stops."""
 
 
 @dataclass(frozen=True)
 class Continuous:
-    """The optimum of shares.
+    """The optimal shares.
 
     Attributes
     ----------
     directions : (k, 3) array, attitudes with a share
     shares : (k,) array, of sum 1
-    value : float, criterion of n positions so shared out
-    bound : float, below which no n positions are
+    value : float, criterion of n positions with these shares
+    bound : float, lower bound of the criterion for any n positions
     """
 
     directions: Array
@@ -49,15 +49,15 @@ class Continuous:
 def continuous_optimum(
     task: Task, criterion: Criterion, space: Space, constraints: Constraints, n: int
 ) -> Continuous:
-    """Share out n positions best, in the attitudes that are allowed one by one.
+    """Find the best shares for n positions among the attitudes that are allowed singly.
 
     Parameters
     ----------
     task : Task
     criterion : Criterion, convex
     space : Space
-    constraints : Constraints; least angles and a number of mountings are left out, so that the
-        bound holds with them, too
+    constraints : Constraints; least angles and a number of mountings are ignored, so the bound
+        holds with and without them
     n : int
     """
     fine = allowed(space, constraints, FINE)
@@ -88,7 +88,7 @@ def continuous_optimum(
 
 
 def allowed(space: Space, constraints: Constraints, count: int) -> Array:
-    """About `count` attitudes that are allowed, evenly spread; all of a finite set."""
+    """About `count` allowed attitudes, evenly spread; all of a finite set."""
     found = constraints.keep(space.directions(count))
     if 0 < len(found) < count / 2 and space.tangents(found[:1]).shape[2]:
         found = constraints.keep(space.directions(min(9999, count * count // len(found))))
@@ -100,7 +100,7 @@ def _flat(task: Task, directions: Array) -> Array:
 
 
 def _share(prior: Array, criterion: Criterion, flat: Array, start: Array, n: int) -> Array:
-    """Best shares of given attitudes; squares of free numbers, so that none is negative."""
+    """Best shares of given attitudes. They are squares of free numbers, so none is negative."""
     from scipy.optimize import minimize  # slow to import
 
     u = len(prior)
@@ -131,7 +131,7 @@ def _lowest(
     fine: Array,
     slopes: Array,
 ) -> tuple[Array, float]:
-    """Attitudes of the smallest derivatives, between those of the grid too, and the smallest."""
+    """Attitudes with the smallest derivatives, also between those of the grid; and the smallest."""
     points = fine[np.argsort(slopes, kind="stable")[:60]]
     step = np.sqrt(4 * np.pi / FINE)
     for _ in range(12):

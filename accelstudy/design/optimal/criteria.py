@@ -1,10 +1,9 @@
-"""What makes one choice of positions better than another.
+"""Criteria by which one choice of positions is better than another.
 
 A criterion is the logarithm of a variance, or of a determinant of variances, as a function of the
-scaled normal matrix; so its differences are relative, and it is to be made small. It has a
-derivative by that matrix, with which positions are ranked and moved. All but that of a neglected
-effect are convex, so that no choice of positions can be better than a bound (`continuous`); that
-one has its bound from another.
+scaled normal matrix. It is to be minimised, and its differences are relative. Its derivative by
+that matrix serves to rank and to move positions. All criteria but the one with neglected effects
+are convex, so they have a lower bound (`continuous`); that one takes its bound from another.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from accelstudy.design.optimal.task import Task
 Array = NDArray[np.float64]
 
 RIDGE = 1e-12
-"""Added to scaled normal matrices, so that a singular one has a huge variance instead of none."""
+"""Added to scaled normal matrices, so that a singular one gives a huge variance, not an error."""
 INVISIBLE = 1e-8
 """Scaled information below which an effect does not show."""
 
@@ -50,7 +49,7 @@ class Criterion(ABC):
         """Derivative by a symmetric normal matrix (u, u), symmetric."""
 
     def efficiency(self, value: float, best: float) -> float:
-        """How much of the number of positions would suffice if the best were reached."""
+        """Share of the positions that would suffice if the bound were reached."""
         return float(np.exp(best - value))
 
     @property
@@ -60,15 +59,15 @@ class Criterion(ABC):
 
     @property
     def convex(self) -> Criterion:
-        """A convex criterion that is nowhere above this one."""
+        """A convex criterion that is never above this one."""
         return self
 
     def bound(self, convex: float) -> float:
-        """What this criterion is not below, given what `convex` is not below."""
+        """Lower bound of this criterion, given that of `convex`."""
         return convex
 
     def blind(self, normal: Array) -> str:
-        """What else a normal matrix leaves undetermined; empty if nothing."""
+        """What a normal matrix leaves undetermined beyond its rank; empty if nothing."""
         return ""
 
 
@@ -180,7 +179,7 @@ class NeglectedEffect(Criterion):
         return Leveling(self.estimated, self.weight)
 
     def bound(self, convex: float) -> float:
-        """Add what no shift of the estimates can make up for: W₂₂ − W₂₁ W₁₁⁻¹ W₁₂."""
+        """Add the part that no shift of the estimates can compensate: W₂₂ − W₂₁ W₁₁⁻¹ W₁₂."""
         kept, left = np.flatnonzero(self.estimated), np.flatnonzero(~self.estimated)
         w, w12 = self.weight[np.ix_(kept, kept)], self.weight[np.ix_(kept, left)]
         imitated = np.sum(w12 * (np.linalg.pinv(w, rcond=1e-9, hermitian=True) @ w12), axis=0)
@@ -188,7 +187,7 @@ class NeglectedEffect(Criterion):
         return float(np.log(np.exp(convex) + np.sum(remains * self.variance)))
 
     def gradient(self, normal: Array) -> Array:
-        """By the blocks N₁₁ and N₁₂; what is neglected tells nothing by N₂₂."""
+        """Derivative by the blocks N₁₁ and N₁₂; the criterion does not depend on N₂₂."""
         kept, left = np.flatnonzero(self.estimated), np.flatnonzero(~self.estimated)
         cofactors = np.linalg.inv(_kept(normal, self.estimated))
         shift = cofactors @ normal[np.ix_(kept, left)]
@@ -204,10 +203,10 @@ class NeglectedEffect(Criterion):
 
 @dataclass(frozen=True)
 class Rivals(Criterion):
-    """How large two effects must be to be told from each other: their mean squared MIB.
+    """Size from which two effects can be told apart: their mean squared MIB.
 
-    Of the signature of one parameter only what neither the model nor the rival can imitate counts,
-    the Schur complement l of the normal matrix; the MIB is in proportion to 1/√l.
+    Only the part of a signature counts that neither the model nor the rival can imitate: the Schur
+    complement l of the normal matrix. The MIB is proportional to 1/√l.
 
     Attributes
     ----------
@@ -223,7 +222,7 @@ class Rivals(Criterion):
     text = "mean square of the sizes at which the two effects can be told from each other"
 
     def left(self, normal: Array) -> Array:
-        """What cannot be imitated of each parameter of the first, then of the second, (..., q)."""
+        """Part l of each parameter of the first effect, then of the second, (..., q)."""
         found = []
         for own, rest in self._parts():
             cross = normal[..., rest[:, None], own]
@@ -251,12 +250,12 @@ class Rivals(Criterion):
 
     @property
     def unknowns(self) -> int:
-        """The model's, those of the larger rival, and one of the other."""
+        """Parameters of the model and of the larger rival, and one of the other rival."""
         rival = max(np.count_nonzero(self.first), np.count_nonzero(self.second))
         return int(np.count_nonzero(self.estimated) + rival + 1)
 
     def blind(self, normal: Array) -> str:
-        """Whether a parameter of one effect is the other, or nothing."""
+        """Whether a parameter of one effect looks like the other, or like nothing."""
         left = self.left(normal)
         return "they do not tell the two effects apart" if left.min() < INVISIBLE else ""
 

@@ -1,8 +1,8 @@
 """Exchange of positions for better ones, from a list of candidates (Fedorov 1972).
 
-Each position in turn is taken out, and the candidate put in with which the criterion is best. They
-are ranked by the derivative of the criterion first, and only the best of them are tried out, as in
-the KL exchange of Atkinson & Donev (1989).
+Each position in turn is replaced by the candidate with which the criterion is best. The derivative
+of the criterion ranks the candidates, and only the first of them are tried, as in the KL exchange
+of Atkinson & Donev (1989).
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from accelstudy.design.optimal.criteria import Criterion
 Array = NDArray[np.float64]
 
 TRIED = 24
-"""Candidates that are tried out for each position, of those that rank first."""
+"""Number of candidates that are tried for each position, in the order of their rank."""
 GAIN = 1e-9
 """Relative improvement below which a position stays."""
 SWEEPS = 100
 DRAWS = 200
-"""Random sets that are drawn to find one that keeps its distances."""
+"""Number of random sets that are drawn to find one that keeps its distances."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +35,8 @@ class Candidates:
     ----------
     directions : (k, 3) array
     informations : (k, u, u) array, scaled
-    prior : (u, u) array, information that there is before
-    constraints : Constraints, of which those of single attitudes are kept by all candidates
+    prior : (u, u) array, information before the first position
+    constraints : Constraints; all candidates meet those on single attitudes
     """
 
     directions: Array
@@ -111,7 +111,7 @@ def exchange(candidates: Candidates, chosen: list[int], criterion: Criterion) ->
             if values[best] < value - GAIN:
                 chosen[i], value = int(tried[best]), float(values[best])
                 normal = rest + candidates.informations[chosen[i]]
-        normal = candidates.normal(chosen)  # without the rounding of many exchanges
+        normal = candidates.normal(chosen)  # computed anew, without the rounding of many exchanges
         if not value < before - GAIN:
             break
     return chosen

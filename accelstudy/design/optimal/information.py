@@ -1,4 +1,4 @@
-"""What each position tells of the parameters: the rows of the design, and their normal matrices."""
+"""The information of each position: its rows of the design matrix, and their normal matrix."""
 
 from __future__ import annotations
 
@@ -24,19 +24,18 @@ def position_rows(
     gravity: float = STANDARD_GRAVITY,
     hold: HoldConditions | None = None,
 ) -> Array:
-    """Rows of the design that each position contributes, at unit weight.
+    """Rows of the design matrix that each position contributes, at unit weight.
 
-    The normal matrix of any choice of positions is the sum of RᵀR over their rows R. Positions of a
-    model whose effects look back (on the step from the position before, say) are seen in the order
-    in which they stand here.
+    The normal matrix of any choice of positions is the sum of RᵀR over their rows R. Where
+    effects depend on the position before, the order of the directions is that of the session.
 
     Parameters
     ----------
     model : SensorModel
     approach : Approach
     noise : Noise
-        With `sigma_gravity` > 0 gravity is the last parameter. That it is observed is no matter of
-        a position: its weight, 1/σ², is not in the rows.
+        With `sigma_gravity` > 0 gravity is the last parameter. Its observation belongs to no
+        position, so its weight 1/σ² is not in the rows.
     directions : (k, 3) array of unit vectors, gravity in the body frame
     parameters : (u,) array, SI, optional; the ideal sensor by default
     gravity : float, m/s²

@@ -15,10 +15,10 @@ Array = NDArray[np.float64]
 STEP = 1e-4
 """rad, of the difference quotients; their error is of the order of its square."""
 ROUNDS = 6
-"""Each starts from new tangents at the positions."""
+"""Number of rounds; each starts from new tangents at the positions."""
 ITERATIONS = 60
 NEAR = 0.35
-"""rad, beyond the least angle, up to which pairs of positions may come too near in one round."""
+"""rad, of which a position moves at most half along each tangent in one round."""
 
 
 def refine(
@@ -31,12 +31,12 @@ def refine(
     task : Task
     criterion : Criterion
     space : Space, which says how positions can move
-    constraints : Constraints, which `start` keeps
+    constraints : Constraints, which `start` meets
     start : (n, 3) array of unit vectors
 
     Returns
     -------
-    (n, 3) array of unit vectors that keeps all constraints, no worse than `start`
+    (n, 3) array of unit vectors that meets all constraints, no worse than `start`
     """
     best, smallest = start, float(criterion.value(task.normal(start)))
     if not space.tangents(start).shape[2]:
@@ -64,7 +64,7 @@ class _Chart:
         return np.asarray(moved / np.linalg.norm(moved, axis=1, keepdims=True))
 
     def around(self, t: Array) -> Array:
-        """Positions a step before and behind in each coordinate, (2, d, n, 3)."""
+        """Positions one step forward and one back in each coordinate, (2, d, n, 3)."""
         d = self.shape[1]
         steps = STEP * np.eye(d)[None, :, None, :] * np.array([-1.0, 1.0])[:, None, None, None]
         return np.array(

@@ -1,4 +1,4 @@
-"""One attitude, repeated, in place of several that hardly differ: it is easier to take."""
+"""Repeat one attitude instead of taking several that hardly differ: that is easier to measure."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from accelstudy.design.optimal.task import Task
 Array = NDArray[np.float64]
 
 NEAR = 1 * GON
-"""Angle up to which two positions may be one."""
+"""Angle up to which two positions may be joined."""
 COST = 1e-4
-"""What the criterion, a logarithm, may lose by it."""
+"""Largest loss of the criterion, a logarithm, by joining."""
 
 
 def with_repeats(
     task: Task, criterion: Criterion, constraints: Constraints, directions: Array
 ) -> Array:
-    """Let positions that lie next to each other be one of them, repeated.
+    """Replace positions that lie close together by one of them, repeated.
 
-    A search ends with such positions where repeats are best, since nothing draws them together in
-    the end.
+    Where repeats are best, a search ends with such positions: near the optimum nothing draws them
+    together completely.
 
     Parameters
     ----------
     task : Task
     criterion : Criterion
-    constraints : Constraints, which `directions` keep; where they ask for a least angle, no
+    constraints : Constraints, which `directions` meet; where they ask for a least angle, no
         positions are joined
     directions : (n, 3) array of unit vectors
 

@@ -22,9 +22,9 @@ Array = NDArray[np.float64]
 CANDIDATES = 600
 STARTS = 8
 REFINED = 3
-"""Of the starts, how many are refined: those that are best after the exchange, which is cheap."""
+"""Number of starts that are refined: the best ones after the exchange, which is cheap."""
 PARTS = 10
-"""Parts of a space that are searched in full."""
+"""Number of parts of a space that are searched in full."""
 TIED = 1e-6
 """Relative difference below which two designs are equally good, and the first one is taken."""
 
@@ -37,7 +37,7 @@ class Design:
     ----------
     directions : (n, 3) array of unit vectors, gravity in the body frame
     value : float, of the criterion
-    bound : float, below which no positions are; NaN if it is not wanted
+    bound : float, lower bound of the criterion; NaN if it is not wanted
     efficiency : float, against the bound; NaN likewise
     """
 
@@ -83,7 +83,7 @@ def optimal_design(
         raise InputError(f"no attitude is left of {space.text} with {_shown(constraints)}")
     _check_determined(task, criterion, everything, n)
     parts = space.parts(np.random.default_rng(np.random.SeedSequence([seed, 0])))
-    if len(parts) > PARTS:  # those that are best as they come out of one exchange
+    if len(parts) > PARTS:  # the best ones after a single exchange
         tried = [_best(task, criterion, p, constraints, n, seed, 1, moved=False) for p in parts]
         order = np.argsort([value for _, value in tried], kind="stable")
         parts = [parts[i] for i in order[:PARTS]]
@@ -132,7 +132,7 @@ def _best(
 
 
 def _first_best(found: list[tuple[Array, float]]) -> tuple[Array, float]:
-    """Where designs tie, rounding must not choose between them."""
+    """First of the designs that are equally good, so that rounding does not choose."""
     smallest = min(value for _, value in found)
     return next(pair for pair in found if pair[1] <= smallest + TIED)
 

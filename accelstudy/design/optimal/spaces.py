@@ -1,4 +1,4 @@
-"""The attitudes that there are to choose from: where they lie, and in which ways they can move."""
+"""The attitudes to choose from: where they lie, and in which directions they can move."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from accelstudy.positions.sphere import evenly_spread
 Array = NDArray[np.float64]
 
 MOST_MOUNTINGS = 150
-"""Choices of mountings that are tried; of more, a random part."""
+"""Number of choices of mountings that are tried; of more, a random part."""
 
 
 class Space(ABC):
@@ -35,14 +35,14 @@ class Space(ABC):
 
     @abstractmethod
     def directions(self, count: int) -> Array:
-        """Attitudes of the set, (k, 3): all of a finite one, else about `count`, evenly spread."""
+        """Attitudes of the set, (k, 3): all of a finite set, else about `count`, evenly spread."""
 
     def tangents(self, directions: Array) -> Array:
         """Unit vectors along which positions (n, 3) can move, (n, 3, d); d = 0 of a finite set."""
         return np.zeros((len(directions), 3, 0))
 
     def parts(self, rng: np.random.Generator) -> list[Space]:
-        """Parts of the set of which one is to be chosen; itself if it is one."""
+        """Parts of the set, of which one is to be chosen; often only the set itself."""
         return [self]
 
 
@@ -105,7 +105,7 @@ class Mountings(Space):
     Attributes
     ----------
     count : int, mountings
-    axes : tuple of axes in the sensor, to choose from; by default x, y, z and what halves them
+    axes : tuple of axes in the sensor to choose from; by default x, y, z and their bisectors
     """
 
     count: int

@@ -33,9 +33,9 @@ LOOKING_BACK = ("step_x", "step_y", "step_z", "order")
 class Task:
     """A calibration whose positions are to be chosen.
 
-    All matrices are of scaled parameters: the unit of each is the standard deviation that one
-    position gives it, on average over all attitudes, were all others known. So no number depends on
-    a choice of units, and all criteria weigh alike what one position tells alike.
+    All matrices are of scaled parameters. The unit of a parameter is the standard deviation that
+    one position gives it, on average over all attitudes, if all others are known. So no number
+    depends on a choice of units, and a criterion weighs all parameters by what positions can tell.
 
     Attributes
     ----------
@@ -44,15 +44,15 @@ class Task:
     noise : Noise
     gravity : float, m/s²
     tilt_range : float, rad, up to which the calibrated sensor is used
-    prior_sigmas : mapping of parameter to the sd of what is known of it, SI (a factory calibration)
-    measured : (k, 3) array of unit vectors, directions of positions that are measured already
+    prior_sigmas : mapping of parameter to the sd of its known value, SI (a factory calibration)
+    measured : (k, 3) array of unit vectors, directions of positions measured before
     neglected : mapping of effect to the sd of its parameters, SI; effects that the sensor has and
-        the model lacks, for criteria that reckon with them
+        the model lacks, for criteria that take them into account
 
     Raises
     ------
     InputError
-        If positions alone do not tell what the model needs, or a prior sigma is of no parameter.
+        If the model needs more than positions, or a prior sigma belongs to no parameter.
     """
 
     model: SensorModel
@@ -80,7 +80,7 @@ class Task:
 
     @cached_property
     def extended(self) -> SensorModel:
-        """The model with what it neglects."""
+        """The model with the neglected effects."""
         if not self.neglected:
             return self.model
         specs = tuple(effect.spec for effect in self.model.effects)
@@ -118,7 +118,7 @@ class Task:
 
     @cached_property
     def prior(self) -> Array:
-        """Scaled information that there is before the first position, (u, u)."""
+        """Scaled information before the first position, (u, u)."""
         weights = np.zeros(len(self.names))
         for name, sigma in self.prior_sigmas.items():
             weights[self.names.index(name)] = sigma**-2
@@ -168,7 +168,7 @@ class Task:
     def rms_tilt(self, directions: ArrayLike) -> Array:
         """Expected rms of roll and of pitch, rad, (2,), without the noise of the leveled reading.
 
-        What is neglected is in it, as a scatter of the size that it has.
+        Neglected effects contribute as a scatter of their given size.
         """
         kept, left = self.estimated, ~self.estimated
         normal = self.normal(directions)

@@ -1,4 +1,4 @@
-"""What is told after each position of a running session, in SI."""
+"""The advice after each position of a running session, in SI."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ class LastPosition:
     ----------
     index : int, in the session
     agreement : Agreement
-    p_value : float, that noise alone would make it disagree so much; NaN where it is untested
-    repeats : bool, whether it repeats one that was in conflict, and is in conflict as well
+    p_value : float, probability that noise alone makes it disagree so much; NaN if untested
+    repeats : bool, whether it repeats a position in conflict and is in conflict as well
     """
 
     index: int
@@ -45,7 +45,7 @@ class NoiseTaken:
     ----------
     stated : float or None, by the campaign
     seen : float or None, from the residuals; None without redundancy
-    taken : float or None, as which it is taken; None as long as nothing tells it
+    taken : float or None, the one that is used; None as long as it is unknown
     refuted : bool, whether the residuals are larger than the stated noise allows
     redundancy : int
     """
@@ -59,7 +59,7 @@ class NoiseTaken:
 
 @dataclass(frozen=True)
 class NextPosition:
-    """Where to go next.
+    """The position to take next.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class NextPosition:
 
 @dataclass(frozen=True)
 class Advice:
-    """All that is told.
+    """The whole advice.
 
     Attributes
     ----------
@@ -81,12 +81,12 @@ class Advice:
     last : LastPosition or None
     set_aside : tuple of int, numbers of positions that disagree with the others and are not used
     undetermined : tuple of str, parameters that the positions do not determine yet
-    vague : tuple of str, parameters that they tell less of than is known of any cheap sensor
+    vague : tuple of str, parameters known less well than the typical size in a cheap sensor
     noise : NoiseTaken
     rms : (2,) array, rad, of roll and of pitch; None as long as it is not known
     next : NextPosition
-    to_go : int or None, positions; None where it cannot be told, or where they are too many
-    foreseeable : bool, whether it can be told
+    to_go : int or None, positions still needed; None if unknown or too many
+    foreseeable : bool, whether `to_go` can be known
     enough : bool, whether the promise is kept
     """
 

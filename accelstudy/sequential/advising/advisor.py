@@ -32,14 +32,14 @@ from accelstudy.sequential.estimation.prior import NOTHING_KNOWN, Prior
 Array = NDArray[np.float64]
 
 TOLD = 0.5
-"""Sigma over usual size of a parameter, up to which positions without a solution tell something."""
+"""Ratio of sigma to the typical size of a parameter, up to which it counts as known at all."""
 CONDITIONS = {"time", "temperature", "vibration"}
 """Columns of the holds that change by themselves from position to position."""
 
 
 @dataclass
 class Advisor:
-    """Follows a session.
+    """Advice for a session that is being measured.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class Advisor:
         self._screening: Screening | None = None
 
     def restart(self) -> None:
-        """Forget all positions: they are not what they were."""
+        """Forget all positions, because they have changed."""
         self._screening = None
 
     def check(self, campaign: Campaign) -> None:
@@ -81,12 +81,12 @@ class Advisor:
             )
 
     def advise(self, campaign: Campaign) -> Advice:
-        """Take what is new in a session, and advise.
+        """Take the new positions of a session, and give advice.
 
         Parameters
         ----------
         campaign : Campaign
-            The session as far as it goes; positions that were taken before are as they were.
+            The session so far; positions that were taken before are unchanged.
         """
         observed = campaign_observations(campaign)
         if self._screening is None or not self._screening.recursion.solved[0]:
@@ -126,7 +126,7 @@ class Advisor:
         latest = screening.last
         if latest is not None and latest.agreement is Agreement.CONFLICT and not latest.repeats:
             repeats = int(campaign.positions[latest.index])
-        # Nobody knows the conditions of the positions to come.
+        # The conditions of later positions are unknown.
         to_go, varying = None, bool(CONDITIONS & {*self.model.hold_columns})
         told_noise = trusted or recursion.redundancy >= LEAST_REDUNDANCY
         if not enough and told_noise and not varying:
@@ -158,7 +158,7 @@ class Advisor:
         return self.promise.tilt_error(self.model, own, campaign.gravity, hold)
 
     def _undetermined(self, root: Array, solved: bool) -> tuple[str, ...]:
-        """Parameters of which positions without a solution tell little beyond their usual size."""
+        """Parameters that the positions do not determine better than their typical size."""
         if solved:
             return ()
         names, sizes = self.model.parameter_names, typical_sizes(self.model, len(root))
@@ -175,7 +175,7 @@ class Advisor:
 
 
 def _noise_taken(screening: Screening, stated: float | None, unit: float) -> NoiseTaken:
-    """By which noise of a position the accuracy is judged."""
+    """Noise of a position by which the accuracy is judged."""
     recursion, refuted = screening.recursion, screening.refuted
     r, seen, taken = recursion.redundancy, None, stated
     if recursion.solved[0] and r > 0:

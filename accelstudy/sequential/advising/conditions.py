@@ -1,4 +1,4 @@
-"""What holds at a position not measured yet, where effects depend on more than the force."""
+"""Conditions of the next position, for effects that depend on more than the force."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from accelstudy.simulation.sessions import Noise
 Array = NDArray[np.float64]
 
 INTERVAL = 60.0
-"""s between two holds, as long as the session does not tell."""
+"""s between two holds, until the session has two."""
 
 
 def next_holds(campaign: Campaign, directions: Array) -> HoldConditions:
-    """Conditions of each of k attitudes if it came next: as in the last position, a hold later."""
+    """Conditions of each of k attitudes as the next position: those of the last, one hold later."""
     k, n = len(directions), campaign.n_positions
     last = campaign.hold.take(np.array([n - 1])) if n else HoldConditions()
 
@@ -55,7 +55,7 @@ def next_holds(campaign: Campaign, directions: Array) -> HoldConditions:
 def next_rows(
     campaign: Campaign, model: SensorModel, approach: Approach, noise: Noise, directions: Array
 ) -> Array:
-    """What each of k attitudes would tell as the next position, (k, c, u'), at unit weight."""
+    """Rows of the design matrix of each of k attitudes as the next position, (k, c, u')."""
     f_b, hold = -campaign.gravity * directions, next_holds(campaign, directions)
     observed = Observations(
         forces=f_b[None],  # of an ideal sensor, all of whose effects are zero

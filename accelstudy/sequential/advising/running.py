@@ -22,11 +22,11 @@ from accelstudy.campaign.files.session import Campaign
 
 @dataclass(frozen=True)
 class Running:
-    """What there is of a session.
+    """A session so far.
 
     Attributes
     ----------
-    campaign : Campaign, with the positions that are whole
+    campaign : Campaign, with its complete positions
     unfinished : str, a last line that is still being written; empty if there is none
     """
 
@@ -35,13 +35,13 @@ class Running:
 
 
 def read_running(folder: str | Path, settled: str = "") -> Running:
-    """Read what there is of a session.
+    """Read a session so far.
 
     Parameters
     ----------
     folder : path
     settled : str
-        A last line without an end that is taken nevertheless, as it has not changed for a while.
+        A last line without an end that is taken all the same, because it has not changed lately.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def read_running(folder: str | Path, settled: str = "") -> Running:
         text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}") from None
-    except UnicodeDecodeError as error:  # half a character, perhaps
+    except UnicodeDecodeError as error:  # the last character may be incomplete
         raise InputError(f"{path}: not a CSV file in UTF-8 ({error.reason})") from None
     whole, unfinished = _split(text)
     if unfinished and unfinished == settled:
@@ -80,7 +80,7 @@ def read_running(folder: str | Path, settled: str = "") -> Running:
 
 
 def read_as_it_is(folder: str | Path) -> Running:
-    """Read a session that nobody follows: a last line without an end counts if it has all cells.
+    """Read a session once, as it is: a last line without an end counts if it has all cells.
 
     Errors are those of `read_running`.
     """
@@ -96,7 +96,7 @@ def read_as_it_is(folder: str | Path) -> Running:
 
 
 def _split(text: str) -> tuple[str, str]:
-    """Whole lines, and what stands after them."""
+    """Complete lines, and the text after them."""
     end = max(text.rfind("\n"), text.rfind("\r")) + 1
     return text[:end], text[end:]
 

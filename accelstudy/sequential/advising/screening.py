@@ -1,4 +1,4 @@
-"""Positions as they come in: each tested by those before it, and used unless it is in conflict."""
+"""Test each new position against those before it, and use it unless it is in conflict."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ CONFLICT = 1e-3
 ALL_ALIKE = 0.01
 """Family-wise level of the tests of all positions by all others."""
 MANY = 0.2
-"""Share of positions in conflict above which it is not the positions that are wrong."""
+"""Share of positions in conflict above which the noise or the model must be wrong."""
 
 
 class Screening:
     """One session, its positions sorted into those that agree and those in conflict.
 
-    One that is in conflict is set aside, and is to be repeated. The fault may be with those before,
-    which nothing checked when they came in. So with each further position all are tested by all
-    others, and those are set aside that the others do not bear. If these are too many, the noise or
-    the model is wrong and not the positions: then all are used.
+    A position in conflict is set aside and should be repeated. The fault may also lie with earlier
+    positions, which could not be checked when they came in. So with each further position all are
+    tested against all others, and those in conflict with the others are set aside. If these are too
+    many, the noise or the model is wrong and not the positions; then all are used.
 
     Parameters
     ----------
     model : SensorModel
     approach : Approach
-    observed : Observations, R = 1, as far as the session goes; of no positions, perhaps
+    observed : Observations, R = 1, of the session so far; it may have no positions yet
     sigma_known : bool, whether the noise is stated
     prior : Prior, optional
     initial : (u,) array, SI, optional, where to start, as in `Recursion`
@@ -76,7 +76,7 @@ class Screening:
         return test is not None and not test.accepted and omega > r
 
     def add(self, observed: Observations) -> None:
-        """Take what is new in the session, with the positions that were taken before."""
+        """Take the session with new positions; those taken before must be in it."""
         for i in range(len(self.used) + len(self.aside), observed.forces.shape[1]):
             self._take(i, observed)
 
@@ -108,7 +108,7 @@ class Screening:
         self.recursion.add(observed.take(np.array(self.used)))
 
     def _p_value(self, i: int, observed: Observations) -> float:
-        """P-value of position i by those that are used; NaN where they say nothing of it."""
+        """P-value of position i, tested by those in use; NaN where they cannot test it."""
         recursion = self.recursion
         if not recursion.solved[0]:
             return np.nan
@@ -118,9 +118,9 @@ class Screening:
         return float(prediction.p_value(omega, recursion.redundancy)[0])
 
     def _sort_anew(self, observed: Observations, i: int) -> bool:
-        """Test all positions up to i by all others; whether that could be done.
+        """Test all positions up to i against all others; return whether that was possible.
 
-        Afterwards all are sorted but for i, if it is in no conflict.
+        Afterwards all are sorted except i, if it is in no conflict.
         """
         whole, most = observed.take(np.arange(i + 1)), int(MANY * (i + 1))
         try:

@@ -14,18 +14,18 @@ from accelstudy.campaign.files.session import Campaign
 from accelstudy.sequential.advising.running import read_running
 
 SETTLED = 3
-"""Looks after which a last line without an end is taken as it is: editors leave the end out."""
+"""Number of looks after which a last line without an end is taken, as editors may leave it out."""
 
 
 @dataclass(frozen=True)
 class News:
-    """What is new in a session.
+    """News of a session.
 
     Attributes
     ----------
-    campaign : Campaign, as far as it goes
-    remark : str, what else happened to the table; empty if positions were added and no more
-    again : bool, whether positions that were there before are gone or are not what they were
+    campaign : Campaign, so far
+    remark : str, what else happened to the table; empty if positions were only added
+    again : bool, whether earlier positions are gone or have changed
     """
 
     campaign: Campaign
@@ -53,8 +53,8 @@ class Watch:
         Raises
         ------
         InputError
-            At the first look, if the campaign cannot be read. Later on a table that cannot be read
-            is one that is just being written: what is wrong is told once, as a remark.
+            At the first look, if the campaign cannot be read. A table that cannot be read later
+            is probably just being written: the error is reported once, as a remark.
         """
         try:
             running = read_running(self.folder, self._settled)
@@ -87,7 +87,7 @@ class Watch:
 
 
 def _first(campaign: Campaign, n: int) -> Campaign:
-    """Return the campaign when it had n positions."""
+    """Return the campaign as it was with n positions."""
     if n == campaign.n_positions:
         return campaign
     later = {int(p): "later" for p in campaign.positions[n:]}
@@ -97,7 +97,7 @@ def _first(campaign: Campaign, n: int) -> Campaign:
 
 
 def _changes(before: Campaign, now: Campaign) -> str:
-    """What of the positions before is not as it was; empty if all is."""
+    """How earlier positions have changed; empty if they have not."""
     if before.reasons != now.reasons:
         return "campaign.yaml leaves out other positions"
     gone = [str(p) for p in before.positions if p not in now.positions]

@@ -29,11 +29,11 @@ down."""
 
 
 CHANGING = {"time": "times", "temperature": "temperatures", "vibration": "vibration"}
-"""What else than the attitude effects depend on."""
+"""Conditions other than the attitude on which effects depend."""
 
 
 def lines(advice: Advice, campaign: Campaign, model: SensorModel, promise: Promise) -> list[str]:
-    """Say it, most important last."""
+    """Write the advice, most important last."""
     said = [*_last(advice), *_aside(advice), *_undetermined(advice, model), *_noise(advice)]
     said.append(_accuracy(advice, promise))
     frame = FRD if campaign.log is None else campaign.log.axes
@@ -43,7 +43,7 @@ def lines(advice: Advice, campaign: Campaign, model: SensorModel, promise: Promi
 
 
 def heading(advice: Advice, campaign: Campaign, model: SensorModel, approach: str) -> str:
-    """What the block is about."""
+    """Heading of the advice."""
     how = "by gravity alone" if approach == "gravity" else f"with the {approach}"
     return (
         f"{campaign.name}: {counted(len(advice.positions), 'position')} so far; "
@@ -52,7 +52,7 @@ def heading(advice: Advice, campaign: Campaign, model: SensorModel, approach: st
 
 
 def attitude(direction: Array, frame: Frame = FRD) -> str:
-    """Say an attitude by roll and pitch, and by where its axes point.
+    """Describe an attitude by roll and pitch, and by the directions of its axes.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def attitude(direction: Array, frame: Frame = FRD) -> str:
     frame : Frame, of the axes that a person knows
     """
     roll, pitch = frame.signs[:2] * np.array(roll_pitch(tuple(-direction)))
-    if roll < -np.pi + LEVEL:  # half a turn is half a turn, either way
+    if roll < -np.pi + LEVEL:  # −π and π are the same roll: show the positive one
         roll += 2 * np.pi
     upright = np.hypot(direction[1], direction[2]) < np.sin(LEVEL)
     angles = [] if upright else [f"roll {_angle(roll)}"]
@@ -129,7 +129,7 @@ def _undetermined(advice: Advice, model: SensorModel) -> list[str]:
 
 
 def _by_effect(names: Sequence[str], model: SensorModel) -> str:
-    """Parameters by what they are of: bias (b_x, b_y), scale."""
+    """Group parameters by their effects: bias (b_x, b_y), scale."""
     parts = []
     for effect in model.effects:
         own = [parameter.name for parameter in effect.parameters]
@@ -177,7 +177,7 @@ def _accuracy(advice: Advice, promise: Promise) -> str:
 
 
 def _about(value: float, unit: str) -> str:
-    """Write a quantity that is known to some per cent at best."""
+    """Write a quantity that is known to a few per cent at best."""
     number, shown = quantity_text(value, unit).split(" ")
     return f"{float(number):.3g} {shown}"
 
@@ -203,5 +203,5 @@ def _to_go(advice: Advice, campaign: Campaign) -> str:
 
 
 def finished(campaign: Path, model: str, approach: str) -> str:
-    """Say what to do when it is enough."""
+    """Say what to do when the accuracy is reached."""
     return f"calibrate: {calibrate(campaign, model, approach, 'calibrated')}"

@@ -1,4 +1,4 @@
-"""Attitudes from which the next position is chosen."""
+"""The attitudes from which the next position is chosen."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from accelstudy.design.optimal.spaces import by_eye, cube, listed_in
 Array = NDArray[np.float64]
 
 STEP = 25 * GON
-"""Of roll and pitch in the grid."""
+"""Step of roll and pitch in the grid."""
 SETS = {"cube": "faces, edges and corners of a cube", "grid": "roll and pitch in steps of 25 gon"}
 DEFAULTS = {"gravity": "cube", "robot": "grid"}
-"""Attitudes by approach: of a block on a table, of a robot."""
+"""Default set of attitudes of an approach: a block on a table, a grid for a robot."""
 SAME = 5 * GON
-"""A position within this of the last one is the same once more."""
+"""A position within this angle of another counts as the same attitude."""
 
 
 def candidates(
@@ -67,14 +67,14 @@ def candidates(
     left = Constraints(tuple(limits)).keep(directions)
     if not len(left):
         raise InputError(f"attitudes: none of {name} is within the limits that are given")
-    # Simple ones first: axes that are vertical, then such that are horizontal.
+    # Simple attitudes first: with vertical axes, then with horizontal ones.
     axes = np.count_nonzero(np.abs(left) > 1e-9, axis=1)
     return left[np.argsort(axes, kind="stable")]
 
 
 def apart_from(directions: Array, last: Array) -> NDArray[np.bool_]:
-    """Which of directions (k, 3) are others than the last ones (R, 3), (R, k).
+    """Which of directions (k, 3) differ from the last ones (R, 3), (R, k).
 
-    The same attitude at once again shows the same errors of it again.
+    To repeat an attitude at once would repeat its errors too.
     """
     return np.asarray(last @ directions.T < np.cos(SAME))

@@ -1,4 +1,4 @@
-"""The choice of the next position, for all that is set up beforehand."""
+"""The choice of the next position for a given set-up."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Chooser:
     Attributes
     ----------
     directions : (k, 3) array, attitudes to choose from
-    rows : (k, c, u') array, what each tells, at unit weight
+    rows : (k, c, u') array, their rows of the design matrix, at unit weight
     error : TiltError
     promise : Promise
     rule : str, what the variance of unit weight is taken for
@@ -54,7 +54,7 @@ class Chooser:
         ----------
         root_information : (R, u', u') array
         solved : (R,) bool array, whether all parameters are determined
-        rms : (R, 2) array, so far; of no meaning where they are not
+        rms : (R, 2) array, so far; ignored where they are not
         last : (R, 3) array, directions of the last positions; None before the first
         """
         gains = np.empty((len(solved), len(self.directions)))

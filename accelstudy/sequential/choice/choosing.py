@@ -1,14 +1,14 @@
-"""Which position tells most: for leveling, or for the parameters as long as some are unknown.
+"""The gain of each candidate: for leveling or, while some are unknown, for the parameters.
 
 A position with the whitened rows A turns the covariance Q of the parameters into
 Q − Q Aᵀ (I + A Q Aᵀ)⁻¹ A Q. So the mean variance of roll and pitch, tr(W Q), falls by
 
     tr[(I + A Q Aᵀ)⁻¹ A Q W Q Aᵀ],
 
-which is what is chosen by (I criterion; W is the quadratic form of `TiltError`). As long as the
-parameters are not all determined there is no Q. Then the log-determinant of the information counts
-(D criterion), to which each parameter brings what is known of any cheap sensor: its typical size.
-It grows by log det (I + A Q₀ Aᵀ), with the Q₀ that the positions so far and these sizes leave.
+the I criterion (W is the quadratic form of `TiltError`). As long as some parameters are not
+determined there is no Q. Then the log-determinant of the information counts (D criterion), with the
+typical size in a cheap sensor as prior information of each parameter. It grows by
+log det (I + A Q₀ Aᵀ), where Q₀ follows from the positions so far and these sizes.
 
 Both are sequential designs of one step at a time: Fedorov (1972), Theory of optimal experiments,
 chapter 4.
@@ -24,8 +24,8 @@ from accelstudy.sensors.sensor import SensorModel
 Array = NDArray[np.float64]
 
 ALIKE = 0.99
-"""A candidate whose gain is above this fraction of the largest is as good as the best. The first of
-them is chosen, so neither rounding nor noise decides, and simple attitudes can come first."""
+"""Candidates whose gain is above this fraction of the largest are equally good, and the first is
+taken. So neither rounding nor noise decides, and simple attitudes can come first."""
 
 
 def typical_sizes(model: SensorModel, unknowns: int) -> Array:
@@ -39,7 +39,7 @@ def gain_of_parameters(root_information: Array, sizes: Array, rows: Array) -> Ar
 
     Parameters
     ----------
-    root_information : (R, u, u) array, R with Q⁻¹ = RᵀR; singular, perhaps
+    root_information : (R, u, u) array, R with Q⁻¹ = RᵀR; it may be singular
     sizes : (u,) array, of the parameters in a cheap sensor
     rows : (k, c, u) array, of k candidates
 
@@ -59,7 +59,7 @@ def gain_of_leveling(root_information: Array, weight: Array, rows: Array) -> Arr
     Parameters
     ----------
     root_information : (R, u', u') array, R with Q⁻¹ = RᵀR, of full rank
-    weight : (R, u, u) array, W; gravity, where it is estimated beside, has no part in it
+    weight : (R, u, u) array, W; without gravity, even where that is estimated
     rows : (k, c, u) array, of k candidates
 
     Returns

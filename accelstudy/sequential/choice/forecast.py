@@ -1,4 +1,4 @@
-"""How many positions more it takes, as far as that can be told."""
+"""How many more positions it takes, as far as that can be known."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from accelstudy.sequential.choice.chooser import Chooser
 Array = NDArray[np.float64]
 
 MOST = 500
-"""Positions more, beyond which nobody wants to know."""
+"""Largest number of further positions that is forecast."""
 
 
 def positions_to_go(
@@ -28,7 +28,7 @@ def positions_to_go(
     ----------
     chooser : Chooser
     root_information : (u', u') array, of the positions so far
-    variance : float, of unit weight, as which it is taken to go on
+    variance : float, of unit weight, assumed to stay as it is
     redundancy : int, so far
     rms : (2,) array, so far, rad
     last : (3,) array, direction of the last position; None before the first

@@ -1,4 +1,4 @@
-"""The tilt accuracy that is promised, and the one that there is."""
+"""The tilt accuracy that is promised, and the one reached so far."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Promise:
-    """Rms of roll and of pitch, each, that a calibration shall leave.
+    """Rms of roll and of pitch, each, that a calibration may leave.
 
-    Over all tilts up to `tilt_range`, and over all calibrations that could have come out; without
-    the noise of the leveled reading.
+    The rms is over all tilts up to `tilt_range` and over all possible outcomes of the calibration,
+    without the noise of the leveled reading.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Promise:
         parameters : (u,) array, SI; those of an ideal sensor by default
         gravity : float, m/s²
         hold : HoldConditions, optional
-            Conditions of the positions, where effects depend on them; those in use are like them.
+            Conditions of the positions, where effects depend on them; use is in like conditions.
         """
         at = np.zeros(model.n_parameters) if parameters is None else parameters
         f_b = cap_forces(self.tilt_range, ATTITUDES, gravity)
@@ -55,11 +55,11 @@ class Promise:
         return tilt_error(model, at, model, at, f_b, gravity, hold)
 
     def reached(self, rms: Array) -> NDArray[np.bool_]:
-        """Whether rms of roll and of pitch, (..., 2), are both as promised."""
+        """Whether the rms of roll and of pitch, (..., 2), both keep the promise."""
         return np.asarray(np.all(rms <= self.accuracy, axis=-1))
 
     def weight(self, error: TiltError, rms: Array) -> Array:
-        """W of the next choice, (R, u, u): mean variance of the angles not yet as promised.
+        """W of the next choice, (R, u, u): mean variance of the angles that miss the promise.
 
         rms : (R, 2) array, of roll and pitch so far
         """
@@ -71,7 +71,7 @@ class Promise:
 def rms_of(error: TiltError, cofactors: Array, variance: Array | float = 1.0) -> Array:
     """Rms of roll and of pitch, (R, 2), rad, by cofactors (R, u', u') and variances of unit weight.
 
-    Gravity, where it is estimated, has no part in it.
+    Gravity, where it is estimated, does not count.
     """
     u = len(error.reference)
     covariance = cofactors[:, :u, :u] * np.reshape(variance, (-1, 1, 1))

@@ -1,16 +1,15 @@
 """When to stop: what the variance of unit weight is taken for when the accuracy is judged.
 
 The positions are chosen by the design, which hardly depends on the readings. So with a **known**
-noise the time of stopping is no matter of chance, and the accuracy then is what the covariance
-says.
+noise the time of stopping is not random, and the accuracy is the one that the covariance states.
 
-With an **unknown** noise it is one. The recursive residuals, by whose squares Ω grows from
-position to position, are independent N(0, σ0²), and independent of the estimate (Brown, Durbin &
-Evans 1975, J. R. Stat. Soc. B 37, 149-192). So stopping by them does not bias the estimate, but
-it does bias Ω/r: who looks after each position and stops when the accuracy seems good stops when
-Ω/r happens to be small. What is used here is an upper confidence bound of the variance, from some
-redundancy on. As it is looked at again and again, its level is higher than that of the promise.
-By simulation the promise then holds in about 95 % of the sessions or more, whatever is promised
+With an **unknown** noise the time of stopping is random. Ω grows from position to position by the
+squares of the recursive residuals. These are independent N(0, σ0²), and independent of the estimate
+(Brown, Durbin & Evans 1975, J. R. Stat. Soc. B 37, 149-192). So stopping by them does not bias the
+estimate, but it does bias Ω/r: a person who stops when the accuracy seems good stops when Ω/r
+happens to be small. Here an upper confidence bound of the variance is used, from a least redundancy
+on. It is looked at again and again, so its level is higher than that of the promise. In simulations
+the promise then holds in about 95 % of the sessions or more, whatever is promised
 (docs/guides/sequential.md).
 """
 
@@ -27,9 +26,9 @@ from accelstudy.basics.errors import UnknownNameError
 Array = NDArray[np.float64]
 
 LEVEL = 0.975
-"""Of the upper confidence bound of the variance at each look; so that 0.95 holds for all looks."""
+"""Level of the upper confidence bound of the variance at each look, for 0.95 over all looks."""
 LEAST_REDUNDANCY = 5
-"""From which on residuals are believed to tell the noise at all."""
+"""Least redundancy with which the residuals may state the noise."""
 
 
 def known(omega: ArrayLike, redundancy: int) -> Array:
@@ -45,7 +44,7 @@ def bound(omega: ArrayLike, redundancy: int) -> Array:
 
 
 def plain(omega: ArrayLike, redundancy: int) -> Array:
-    """Ω/r, with which nobody should stop: here to show what comes of it."""
+    """Ω/r. Nobody should stop by it; it is here to show the consequences."""
     if redundancy < 1:
         return np.full(np.shape(omega), np.inf)
     return np.asarray(omega) / redundancy

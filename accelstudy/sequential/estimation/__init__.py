@@ -1,1 +1,1 @@
-"""What the positions so far tell: estimates that take one position at a time."""
+"""Estimates from the positions so far, updated with one position at a time."""

@@ -1,8 +1,8 @@
 """The linearised conditions of all positions so far, session by session.
 
-They are kept so that residuals can be told at any time, and so that some sessions can be linearised
-anew while others stay as they are. All of a session are seen from one place x₀: at unit weight they
-are Ã (x − x₀) + w̃.
+They are kept so that residuals are known at any time, and so that some sessions can be linearised
+anew while others stay as they are. All conditions of a session refer to one point x₀: at unit
+weight they are Ã (x − x₀) + w̃.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ Array = NDArray[np.float64]
 
 _ARRAYS = tuple(field.name for field in fields(Whitened))
 _SESSIONS = -2
-"""Axis of the sessions in all of them; the last one is that of the positions."""
+"""Axis of the sessions in all arrays; the last axis is that of the positions."""
 
 
 def seen_from(part: Whitened, step: Array) -> Whitened:
-    """Conditions as seen from a place that is `step` (u, R) away from their own."""
+    """Conditions referred to a point that is `step` (u, R) away from their own."""
     return replace(part, misclosures=part.solved(step)[0])
 
 
@@ -34,7 +34,7 @@ def no_conditions(conditions: int, unknowns: int, observed: tuple[int, ...]) -> 
 
 
 def with_next(before: Whitened, new: Whitened) -> Whitened:
-    """Conditions of the positions before, and of further ones."""
+    """Join the conditions of earlier and of further positions."""
     pairs = {name: (getattr(before, name), getattr(new, name)) for name in _ARRAYS}
     return Whitened(**{name: np.concatenate(pair, axis=-1) for name, pair in pairs.items()})
 

@@ -1,4 +1,4 @@
-"""Does a new position agree with those before it? Asked before it is used."""
+"""Test whether a new position agrees with those before it, before it is used."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Prediction:
-    """What the positions so far say of the next one, R sessions.
+    """Prediction of the next position from those so far, R sessions.
 
     Attributes
     ----------
     misclosures : (R, c) array, of unit weight
-    covariance : (R, c, c) array, theirs a priori: of the next position and of the prediction
+    covariance : (R, c, c) array, a priori, of the next position and the prediction together
     """
 
     misclosures: Array
@@ -36,9 +36,9 @@ class Prediction:
         Parameters
         ----------
         omega : (R,) array, optional
-            Ω of the positions before, where only they say how large the noise is (an F test); by
+            Ω of the earlier positions, where the noise is estimated from them (an F test); by
             default the noise is known (a χ² test).
-        redundancy : int, theirs; with 0 the test says nothing and the p-value is NaN
+        redundancy : int, of the earlier positions; with 0 there is no test, and the p-value is NaN
         """
         c = self.misclosures.shape[-1]
         if omega is None:

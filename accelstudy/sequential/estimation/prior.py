@@ -1,4 +1,4 @@
-"""What is known of the parameters before the first position: a factory calibration, say."""
+"""Knowledge of the parameters before the first position, such as a factory calibration."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Prior:
-    """Parameters that are known beforehand, with what they are known to.
+    """Parameters that are known beforehand, with their accuracy.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class Prior:
 
     @classmethod
     def of_sigmas(cls, mean: ArrayLike, sigma: ArrayLike) -> Prior:
-        """Return what a data sheet says: values (u,) with sigmas (u,), infinite where unknown.
+        """Return the prior of a data sheet: values (u,) with sigmas (u,), infinite where unknown.
 
         Raises
         ------
@@ -43,7 +43,7 @@ class Prior:
 
     @classmethod
     def of_covariance(cls, mean: ArrayLike, covariance: ArrayLike) -> Prior:
-        """Return what an earlier calibration says: values (u,), covariance matrix (u, u).
+        """Return the prior of an earlier calibration: values (u,) and covariance matrix (u, u).
 
         Raises
         ------

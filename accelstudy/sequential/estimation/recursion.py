@@ -1,12 +1,12 @@
 """A recursive Gauss–Helmert adjustment that takes one position at a time.
 
 A new position costs an update of a triangle, whatever the number of positions so far. That is exact
-where the conditions are linear. Where the estimate moves, the positions before it are linearised at
-the wrong place. What that costs is known from the last time that all were linearised anew: a
-movement of so many standard deviations left an error of so many. As soon as the error is more than
-a tolerance, all are linearised anew. By default the tolerance is so small that the result is that
-of the adjustment of all positions together. A tolerance that is coarser, but still nothing beside a
-standard deviation, leaves most positions without any pass over the others.
+where the conditions are linear. Where the estimate moves, the earlier positions are linearised at
+the wrong point. The last time that all were linearised anew shows how much that matters: a movement
+of so many standard deviations left an error of so many. As soon as the predicted error exceeds a
+tolerance, all are linearised anew. By default the tolerance is so small that the result is that of
+the adjustment of all positions together. With a coarser tolerance, still far below a standard
+deviation, most positions need no pass over the others.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from accelstudy.sequential.estimation.triangle import (
 Array = NDArray[np.float64]
 
 EXACT = 1e-10
-"""Standard deviations that the solution may be off by; that of all positions is not nearer."""
+"""Default tolerance in standard deviations; the adjustment of all positions is no more exact."""
 
 
 class Recursion:
@@ -55,14 +55,14 @@ class Recursion:
     model : SensorModel
     approach : Approach
     observed : Observations
-        The sessions as far as they go; they may have no positions yet.
+        The sessions so far; they may have no positions yet.
     prior : Prior, optional
         What is known before the first position.
     initial : (u,) array, SI, optional
         Where to linearise as long as there is no solution; the mean of the prior by default.
     tolerance : float
-        Standard deviations by which the estimate is predicted to be off the solution of all
-        positions together, at most. By default it is not off at all.
+        Largest predicted difference, in standard deviations, from the solution of all positions
+        together. By default there is none.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class Recursion:
         problem = CalibrationProblem.of(model, approach, observed.take(np.arange(0)))
         sessions, u = problem.initial.shape
         own, known = prior.rows_of(model), prior.start(model)
-        # Gravity that is observed is known beforehand as well.
+        # Observed gravity is prior knowledge too.
         seen = np.flatnonzero(problem.weights)
         self._before = np.zeros((len(own) + len(seen), u))
         self._before[: len(own), : model.n_parameters] = own
@@ -111,18 +111,18 @@ class Recursion:
         self.add(observed)
 
     def add(self, observed: Observations) -> None:
-        """Take what is new in sessions, one position after the other.
+        """Take the new positions of sessions, one after the other.
 
         Parameters
         ----------
         observed : Observations
-            The sessions as far as they go, with the positions that were taken before.
+            The sessions so far, including the positions that were taken before.
         """
         for n in range(self.n_positions + 1, observed.forces.shape[1] + 1):
             self._take(observed.take(np.arange(n)))
 
     def only(self, chosen: NDArray[np.int_]) -> Recursion:
-        """Return some of the sessions, to go on with them alone."""
+        """Return some of the sessions, to continue with them alone."""
         part = copy(self)
         for name in ("solved", "passes", "_bent", "_rate", "_x", "_at", "_mean", "_start"):
             setattr(part, name, getattr(self, name)[chosen])
@@ -131,12 +131,12 @@ class Recursion:
         return part
 
     def predict(self, observed: Observations) -> Prediction:
-        """Predict the misclosures of the position after those that were taken.
+        """Predict the misclosures of the next position.
 
         Parameters
         ----------
         observed : Observations
-            The sessions with one position more than were taken; all of them are solved.
+            The sessions with one more position than were taken; all sessions must be solved.
         """
         new, _ = self._newest(observed)
         design = np.moveaxis(new.design[..., 0], -1, 0)
@@ -170,7 +170,7 @@ class Recursion:
 
     @property
     def redundancy(self) -> int:
-        """Conditions, with what is known beforehand, less unknowns; negative at first."""
+        """Conditions, prior knowledge included, less unknowns; negative at first."""
         return self._n_rows - self._x.shape[1]
 
     @property
@@ -180,7 +180,7 @@ class Recursion:
         return np.where(self.solved[:, None, None], np.moveaxis(v, 0, -1), np.nan)
 
     def _known(self, chosen: NDArray[np.int_]) -> Array:
-        """Rows of what is known beforehand, at the place of linearisation, (R, m, u' + 1)."""
+        """Rows of the prior knowledge, at the point of linearisation, (R, m, u' + 1)."""
         right = (self._mean - self._at)[chosen] @ self._before.T
         left = np.broadcast_to(self._before, (len(right), *self._before.shape))
         return np.concatenate([left, right[..., None]], axis=-1)
@@ -189,7 +189,7 @@ class Recursion:
         """Take the last position of sessions."""
         problem = CalibrationProblem.of(self.model, self.approach, observed)
         new, f_a = self._newest(observed)
-        # It is linearised at the estimate, the others where that was before it moved.
+        # It is linearised at the estimate; the others at an earlier one.
         new = seen_from(new, (self._at - self._x).T)
         self._white = with_next(self._white, new)
         self._latent = np.concatenate([self._latent, f_a], axis=-1)
@@ -225,7 +225,7 @@ class Recursion:
         return np.moveaxis(f_a, -1, 0)
 
     def _solve_first(self, problem: CalibrationProblem) -> None:
-        """Solve the sessions in which all parameters are determined now for the first time."""
+        """Solve the sessions in which all parameters are now determined for the first time."""
         u = self._x.shape[1]
         if self._n_rows < u:
             return
@@ -277,7 +277,7 @@ class Recursion:
             self._x[active] = x + step
             if at.latent is not None:
                 self._latent[:, active] = at.latent
-            if first:  # what a movement by a new position leaves wrong
+            if first:  # the error that a movement by a new position leaves
                 self._rate[active], first = rate, False
             self._bent[active] = 0.0
             self.passes[active] += 1

@@ -1,4 +1,4 @@
-"""Square-root information: what all positions so far tell, as one small triangle.
+"""Square-root information: all positions so far as one small triangle.
 
 The rows [Ã | −w̃] of linearised conditions at unit weight, Ã d = −w̃ + ε with ε ~ N(0, I), are kept
 as the triangle of their QR decomposition,
@@ -6,9 +6,9 @@ as the triangle of their QR decomposition,
     [R  z]
     [0  ρ],   d̂ = R⁻¹ z,   Q_xx = R⁻¹ R⁻ᵀ,   Ω = ρ².
 
-New rows are stacked below it and decomposed with it: as many rows as the triangle and they have,
-whatever the number of positions so far. No normal matrix is formed, so no digits are lost to the
-square of its condition. Source: Bierman (1977), Factorization methods for discrete sequential
+New rows are stacked below the triangle and decomposed with it, so the effort does not grow with the
+number of positions. No normal matrix is formed, so no digits are lost to the square of its
+condition. Source: Bierman (1977), Factorization methods for discrete sequential
 estimation, chapter IV.
 """
 

@@ -1,1 +1,1 @@
-"""Simulated sessions that follow the advice, and what came of them."""
+"""Simulated sessions that follow the advice, and their results."""

@@ -34,7 +34,7 @@ from accelstudy.simulation.sessions import Noise
 Array = NDArray[np.float64]
 
 TOLERANCE = 1e-3
-"""Standard deviations by which estimates may be off: nothing beside what is counted here."""
+"""Tolerance of the estimates in standard deviations, negligible for the results here."""
 AT_ONCE = 500
 """Sessions that are simulated together; more would only take memory."""
 
@@ -63,7 +63,7 @@ class SetUp:
 
     @cached_property
     def equipment(self) -> Approach:
-        """The approach itself."""
+        """The approach."""
         return get_approach(self.approach)
 
     @cached_property
@@ -95,7 +95,7 @@ class SetUp:
 
     @cached_property
     def chooser(self) -> Chooser:
-        """What positions are chosen by."""
+        """The chooser of the positions."""
         directions = candidates(DEFAULTS.get(self.approach, "grid"))
         return Chooser(
             directions,
@@ -108,7 +108,7 @@ class SetUp:
 
     @cached_property
     def attitudes(self) -> list[TiltError]:
-        """Attitudes in which intervals are checked: level, and leant by the tilt range."""
+        """Attitudes in which intervals are checked: level, and tilted by the tilt range."""
         sin, cos = np.sin(self.promise.tilt_range), np.cos(self.promise.tilt_range)
         down = [(0, 0, 1), (sin, 0, cos), (-sin, 0, cos), (0, sin, cos), (0, -sin, cos)]
         ideal = np.zeros(self.model.n_parameters)
@@ -118,7 +118,7 @@ class SetUp:
         ]
 
     def rng(self, seed: int, part: int) -> np.random.Generator:
-        """Random numbers of a part of the sessions; rules share them, so that they compare."""
+        """Random numbers of a part of the sessions; all rules share them, to be compared."""
         name = f"{self.config.model} {self.approach} {self.multiple}"
         digest = int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "big")
         return np.random.default_rng(np.random.SeedSequence([seed, digest], spawn_key=(part,)))
@@ -130,9 +130,9 @@ def simulate(set_up: SetUp, seed: int) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        A row for each session, angles in rad: how many positions it took; what it claims of roll
-        and pitch, what holds by the true noise, and the error that its calibration has; whether
-        intervals contain what they should; how often all positions were linearised anew.
+        A row for each session, angles in rad: the number of positions; the rms of roll and pitch
+        that it claims, the one by the true noise, and the actual error of its calibration; the
+        shares of intervals that contain the truth; how often all positions were linearised anew.
     """
     sizes = [AT_ONCE] * (set_up.config.sessions // AT_ONCE)
     sizes += [rest] if (rest := set_up.config.sessions % AT_ONCE) else []
@@ -153,7 +153,7 @@ def _simulate(set_up: SetUp, sessions: int, rng: np.random.Generator) -> pd.Data
     ended: list[pd.DataFrame] = []
     for n in range(1, set_up.config.most_positions + 1):
         chosen = chooser.choose(recursion.root_information, recursion.solved, rms, last)
-        # For all sessions, so that those that go on do not depend on those that have ended.
+        # Drawn for all sessions, so that none depends on which others have ended.
         off = set_up.config.placing_gon * GON * rng.standard_normal((sessions, 3))
         errors = rng.standard_normal((sessions, 3)), rng.standard_normal((sessions, 2))
         last = chooser.directions[chosen] + off[going]
@@ -214,12 +214,12 @@ def _observed(set_up: SetUp, forces: Array, angles: Array) -> Observations:
 
 
 def _outcome(set_up: SetUp, recursion: Recursion, truth: Array) -> pd.DataFrame:
-    """What came of sessions that have ended, one row each."""
+    """Results of sessions that have ended, one row each."""
     error, cofactors = set_up.chooser.error, recursion.cofactors
     delta = recursion.parameters - truth
     true_rms, actual = rms_of(error, cofactors), error.rms(delta)
     r = recursion.redundancy
-    # Intervals as people make them: by the noise that is known, or by Student's t.
+    # The usual intervals: normal with known noise, else Student's t.
     if set_up.rule == "known":
         width = np.full(len(truth), Z95)
     else:

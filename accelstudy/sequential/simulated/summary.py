@@ -1,4 +1,4 @@
-"""What came of simulated sessions, set-up by set-up."""
+"""Results of simulated sessions, set-up by set-up."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ CENTRAL = (0.05, 0.5, 0.95)
 
 
 def identity(set_up: SetUp) -> dict[str, Any]:
-    """Columns that say which set-up a row is of."""
+    """Columns that identify the set-up of a row."""
     return {
         "approach": set_up.approach,
         "rule": set_up.rule,
@@ -29,8 +29,9 @@ def identity(set_up: SetUp) -> dict[str, Any]:
 def summarise(set_up: SetUp, sessions: pd.DataFrame) -> dict[str, Any]:
     """One row of the table: angles in rad, times in s, intervals of 95 %.
 
-    `broken` is the share of sessions that stopped though, by the true noise, roll or pitch was not
-    yet as accurate as promised. `rms` is over all sessions and attitudes, over what was promised.
+    `broken` is the share of sessions that stopped although, by the true noise, roll or pitch was
+    not yet as accurate as promised. `rms` is over all sessions and attitudes, relative to the
+    promise.
     """
     n, promised = len(sessions), set_up.promise.accuracy
     positions = sessions["positions"].to_numpy(dtype=float)
@@ -38,7 +39,7 @@ def summarise(set_up: SetUp, sessions: pd.DataFrame) -> dict[str, Any]:
     broken = int(np.count_nonzero(sessions["kept"] & (true > promised * (1 + ROUNDING))))
     low, high = clopper_pearson(broken, n)
     actual = (sessions[["actual_roll", "actual_pitch"]].to_numpy() / promised) ** 2
-    # How often the whole fixed scheme must be measured to be as accurate.
+    # How often the fixed scheme must be measured in full for the same accuracy.
     rounds = int(np.ceil(round(set_up.multiple**-2, 9)))
     fixed = rounds * get_scheme(set_up.config.instead_of).n_positions
     row: dict[str, Any] = {

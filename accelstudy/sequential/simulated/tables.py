@@ -17,7 +17,7 @@ def set_ups(config: SequentialConfig, approach: str) -> list[SetUp]:
 
 
 def sessions_table(config: SequentialConfig, approach: str, seed: int) -> pd.DataFrame:
-    """All sessions of an approach, one row each, as `simulate` tells and which set-up it is of."""
+    """All sessions of an approach, one row each: the columns of `simulate` and its set-up."""
     parts = []
     for one in track(set_ups(config, approach), "sessions"):
         parts.append(simulate(one, seed).assign(**identity(one)))
@@ -25,7 +25,7 @@ def sessions_table(config: SequentialConfig, approach: str, seed: int) -> pd.Dat
 
 
 def summary_table(config: SequentialConfig, sessions: pd.DataFrame) -> pd.DataFrame:
-    """One row for each set-up, as `summarise` tells."""
+    """One row for each set-up, with the columns of `summarise`."""
     rows = []
     for approach in config.approaches:
         for one in set_ups(config, approach):

@@ -1,1 +1,1 @@
-"""Cells of a study: one model, scheme and approach each; how they are shared out to jobs."""
+"""Cells of a study: one model, scheme and approach each; and how jobs share them."""

@@ -1,4 +1,4 @@
-"""How the cells of a study are shared out to jobs; no number depends on it."""
+"""How the jobs of a study share its cells; no number depends on it."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from accelstudy.simulation.sessions import BLOCK
 from accelstudy.study.cells.cell import CHUNK, Cell
 
 LEAST_PER_JOB = 400_000
-"""Calibrations in one job: some seconds of compiled code, as starting Python takes some too."""
+"""Calibrations in one job: seconds of compiled code, as starting Python takes seconds too."""
 JOB_GROWTH = 100
 """A large study of N calibrations has jobs of 100 √N or somewhat more, and so about √N / 100 of
 them: some tens for 10⁸, some thousands for 10¹¹."""
 CELLS_PER_BATCH = 100
-"""Cells in one job, however few their replicates, so that small studies use all cores too."""
+"""Most cells in one job, even with few replicates, so that small studies use all cores."""
 
 
 @dataclass(frozen=True)
 class Share:
-    """What a job simulates of a cell: `count` chunks from the chunk `first` on."""
+    """Part of a cell that a job simulates: `count` chunks from the chunk `first` on."""
 
     cell: Cell
     first: int
@@ -46,8 +46,8 @@ class Batch:
     ----------
     cells : tuple of Cell
     jobs : tuple of tuples of Share
-        What each of the jobs simulates: one job all cells or, of a cell that is larger than a job,
-        each some of its chunks.
+        Shares of each job. One job has all cells; only a cell that is too large for one job is
+        shared by several.
     """
 
     cells: tuple[Cell, ...]
@@ -55,7 +55,7 @@ class Batch:
 
 
 def job_size(cells: Iterable[Cell]) -> int:
-    """Calibrations in one job: in powers of two, so that a few more cells leave the jobs alone."""
+    """Calibrations in one job: a power of two, so that a few more cells do not change all jobs."""
     wanted = JOB_GROWTH * math.isqrt(sum(cell.replicates for cell in cells))
     size = LEAST_PER_JOB
     while size < wanted:

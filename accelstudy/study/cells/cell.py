@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from accelstudy.study.config import Grid, StudyConfig
 
 CHUNK = 20
-"""Blocks that are held, summed up and written together: memory follows it, not the count."""
+"""Blocks that are held, summed up and written together; they limit the memory of a job."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class Cell:
 
     @property
     def hold(self) -> HoldConditions:
-        """What is known of the holds, without what follows from their attitudes."""
+        """Conditions of the holds, without columns that follow from their attitudes."""
         return self.holds.hold(self.positions.n_positions)
 
     @property
@@ -112,8 +112,8 @@ class Cell:
     def seed(self, seed: int, block: int) -> np.random.SeedSequence:
         """Seed of one block of replicates.
 
-        It depends on the study's seed, on what the cell is and on the block, so that no other cell
-        and no other block changes it.
+        It depends on the study's seed, the definition of the cell and the block only. So no other
+        cell or block changes it.
         """
         identity = [
             list(self.effects),
@@ -134,7 +134,7 @@ class Cell:
     def to_dict(self) -> dict[str, Any]:
         """Plain data, from which `from_dict` makes the cell again."""
         data = json.loads(json.dumps(asdict(self)))
-        # What few set-ups have is no part of the others, so that their results stay up to date.
+        # Rare settings are left out where they are not used, so that older results stay valid.
         return {key: value for key, value in data.items() if value is not None}
 
     @classmethod
@@ -164,8 +164,8 @@ def _rows(data: Any) -> tuple[tuple[float, ...], ...] | None:
 def study_cells(study: StudyConfig) -> list[Cell]:
     """All cells of a study, in the order of its configuration, without repetition.
 
-    A cell that occurs more than once (as a Table 1 row and in a grid, say) runs once, with the
-    largest number of replicates.
+    A cell that occurs more than once, such as in Table 1 and in a grid, runs once, with the largest
+    number of replicates.
     """
     cells: dict[str, Cell] = {}
     for grid in study.all_grids:

@@ -1,14 +1,14 @@
 """Which cells of a study are calibrated by compiled code, and which by NumPy.
 
-Both give the same numbers to rounding, 1e-10 of a standard deviation or less, but not the same
-bits. So that a study has the same bits however it is run, the choice is made once, when its cells
-are planned, and is a part of each cell: it depends on the configuration and on whether the compiler
-is installed, and never on batches, on cores or on what is compiled already. It goes into the
-parameters of the jobs, so Snakemake runs a cell again when it changes. A job that is to compile and
-has no compiler ends with an error.
+Both give the same numbers to 1e-10 of a standard deviation or better, but not the same bits. A
+study must have the same bits however it is run. So the choice is made once, when its cells are
+planned, and is a part of each cell. It depends on the configuration and on whether the compiler is
+installed, and never on batches, on cores or on what was compiled before. It is among the parameters
+of the jobs, so Snakemake runs a cell again when it changes. A job that should compile and has no
+compiler ends with an error.
 
-A cell is compiled where the calibrations of all cells that share its code take NumPy longer than
-the compiler takes, were it to start from nothing.
+A cell is compiled if NumPy would take longer for the calibrations of all cells with the same code
+than the compiler takes for that code.
 """
 
 from __future__ import annotations
@@ -29,20 +29,20 @@ if TYPE_CHECKING:
     from accelstudy.study.cells.cell import Cell
 
 POSITIONS_PER_PARAMETER = 50_000
-"""Positions, of all calibrations together, per parameter that pay for compilation.
+"""Positions of all calibrations together, per parameter, from which on compilation saves time.
 
-Measured on one core of a virtual x86-64 server of 2026: to compile takes 0.5 s for 9 parameters and
-1.3 s for 15, and a position takes NumPy 0.8 µs and 2.3 µs by gravity, 1.9 µs and 3 µs with a robot.
+Measured on one core of a virtual x86-64 server of 2026: compilation takes 0.5 s for 9 parameters
+and 1.3 s for 15; NumPy takes 0.8 µs and 2.3 µs a position by gravity, 1.9 µs and 3 µs with a robot.
 """
 
 
 def installed() -> bool:
-    """Whether the compiler is there: the extra `kernel` of the package."""
+    """Whether the compiler, the extra `kernel` of the package, is installed."""
     return find_spec("llvmlite") is not None
 
 
 def with_compiled(cells: Sequence[Cell]) -> list[Cell]:
-    """Say of the cells of a study which are compiled."""
+    """Decide which cells of a study are compiled."""
     if not installed():
         return list(cells)
     positions: Counter[Hashable] = Counter()
@@ -55,7 +55,7 @@ def with_compiled(cells: Sequence[Cell]) -> list[Cell]:
 
 
 def calibrator(cell: Cell) -> Callable[[SensorModel, Approach, Observations], Block]:
-    """Return what calibrates the replicates of a cell.
+    """Return the function that calibrates the replicates of a cell.
 
     Raises
     ------
@@ -79,6 +79,6 @@ def _unknowns(cell: Cell) -> int:
 
 
 def _code(cell: Cell) -> Hashable:
-    """What the code depends on: settings of effects, for one, are arguments."""
+    """What the code depends on. Settings of effects are not part of it, but arguments."""
     kinds = tuple(type(effect) for effect in cell.estimated_model.effects)
     return kinds, cell.approach, cell.noise.sigma_gravity > 0

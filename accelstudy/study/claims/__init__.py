@@ -1,9 +1,9 @@
-"""The claims of Thalmann & Neuner (2018), each held against the Monte Carlo.
+"""The claims of Thalmann & Neuner (2018), each compared with the Monte Carlo.
 
 The paper shows one simulation, with standard deviations a posteriori. So a number of the paper
 counts as reproduced if ours agrees with it within the rounding in which it is given, or if it lies
 within the central 95 % of what single simulations of the same set-up show. Nothing is tuned to meet
-a number; where one is not met, the verdict says by how much.
+a number. Where one is not met, the verdict says by how much.
 
 To add a claim, write a module next to this file with a function under `register`.
 """

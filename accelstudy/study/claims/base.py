@@ -1,4 +1,4 @@
-"""What a claim is, what it is judged on, and how."""
+"""What a claim is, the evidence for it, and how it is judged."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SLIP = "slip in the paper"
 
 @dataclass(frozen=True)
 class Claim:
-    """One claim and what became of it; numbers in `unit`, NaN where they do not apply.
+    """One claim and its verdict; numbers in `unit`, NaN where they do not apply.
 
     `paper` is the paper's number, `ours` ours with its 95 % confidence interval; `single_low` and
     `single_high` bound the central 95 % of single simulations, and `percentile` is where the
@@ -61,7 +61,7 @@ class SchemeClaim:
 
 @dataclass(frozen=True)
 class Evidence:
-    """What the claims are judged on.
+    """The evidence by which the claims are judged.
 
     Attributes
     ----------
@@ -130,5 +130,5 @@ def schemes_with_both(known: Iterable[tuple[str, str]]) -> list[str]:
 
 
 def verdict(holds: bool) -> str:
-    """Verdict on a claim of which it is known whether it holds."""
+    """Verdict on a claim that holds or does not."""
     return REPRODUCED if holds else NOT_REPRODUCED

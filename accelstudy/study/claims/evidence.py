@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 class RatioOfSketches:
-    """Ratio of two independent quantities, of which there are sketches; within 0.2 %."""
+    """Ratio of two independent quantities that have sketches; within 0.2 %."""
 
     def __init__(self, above: Sketch, below: Sketch) -> None:
         self.above = above
@@ -76,9 +76,9 @@ def evidence_from(
 def _ratios(
     pair: Sequence[tuple[Cell, Statistics]], parts: Mapping[str, Sequence[str | Path]]
 ) -> dict[str, Distribution]:
-    """By effect: robot-aided over gravity-based. The two are sessions of their own.
+    """Ratios by effect, robot-aided over gravity-based, of independent sessions.
 
-    Kept calibrations are paired by their number; of sketches, each goes with each.
+    Kept calibrations are paired by their number; with sketches, each is paired with each.
     """
     keys = [(EFFECT, effect) for effect in pair[0][1].followed.effects]
     if parts.get("estimates") and all(its.converged <= EXACT for _, its in pair):

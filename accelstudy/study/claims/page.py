@@ -9,7 +9,7 @@ import pandas as pd
 from accelstudy.basics.wording import interval, number
 
 SWEEP = "config/sweeps/positions.yaml"
-"""A study for who has read the claims and wants one of their own."""
+"""A study for readers of the claims who want one of their own."""
 
 
 def claims_page(claims: pd.DataFrame, by_scheme: pd.DataFrame) -> str:

@@ -75,7 +75,7 @@ def sensitivity_claims(evidence: Evidence) -> Iterable[Claim]:
     def largest(
         output: str, prefix: tuple[str, ...], up_to: float = np.inf
     ) -> tuple[float, float, float]:
-        """Find the largest share of the inputs named so, within a range of roll and pitch."""
+        """Find the largest share of the named inputs within a range of roll and pitch."""
         within = (grid["roll_gon"].abs() <= up_to) & (grid["pitch_gon"] <= up_to)
         named = grid["input"].str.startswith(prefix)
         return _largest_effect(grid[(grid["output"] == output) & within & named])

@@ -1,4 +1,4 @@
-"""The configuration of a study: its schema, how it is read, and what is said of errors in it."""
+"""The configuration of a study: its schema, and how it is read and checked."""
 
 from accelstudy.files.layers import overlay, read_layer
 from accelstudy.study.config.reading import config_schema, parse_study, read_study

@@ -1,4 +1,4 @@
-"""The configuration of a study: what may stand in `config/*.yaml`, checked before anything runs.
+"""The schema of the configuration of a study, `config/*.yaml`, checked before anything runs.
 
 The models below are the schema; `workflow/schemas/config.schema.json` is generated from them.
 """
@@ -54,7 +54,7 @@ from accelstudy.simulation.hold_plan import HoldPlan
 from accelstudy.simulation.sessions import Noise, sigma_of_mean
 
 CLAIMED_EFFECTS = ("bias", "scale", "nonorthogonality")
-"""Effects that the model of the paper's claims and figures has."""
+"""Effects that the model of the paper's claims and figures must have."""
 
 
 Temperatures = tuple[Temperature, Temperature]
@@ -89,7 +89,7 @@ class GravityNoise(Block):
 
 
 class NoiseConfig(Block):
-    """The stochastic model of all cells that do not say otherwise."""
+    """The stochastic model of all cells, except where a grid gives other values."""
 
     sensor: SensorNoise = SensorNoise()
     robot: RobotNoise = RobotNoise()
@@ -241,7 +241,7 @@ class StudyConfig(Block):
     @field_validator("schemes")
     @classmethod
     def _schemes_of_files(cls, given: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
-        """Know them before the grids name them."""
+        """Remember these schemes before the grids name them."""
         for name, content in given.items():
             if (found := remember(content, name).name) != name:
                 raise InputError(f"{name}: is the name of other positions; these are {found}")
@@ -305,7 +305,7 @@ class StudyConfig(Block):
         return self
 
     def _check_gravity(self) -> None:
-        """Check that every wrong value of gravity is one that gravity can have."""
+        """Check that the values of gravity, errors included, are within the bounds of gravity."""
         errors = {"noise.gravity.error_mps2": [self.noise.gravity.error_mps2]}
         for index, grid in enumerate(self.grids):
             errors[f"grids.{index}.gravity_error_mps2"] = grid.gravity_error_mps2 or []
@@ -315,7 +315,7 @@ class StudyConfig(Block):
                     bounds.GRAVITY.check(self.gravity_mps2 + error)
 
     def _check_sensitivity(self, settings: SensitivityConfig) -> None:
-        """Check that the cells exist whose standard deviations later stages need."""
+        """Check that the cells exist whose standard deviations the sensitivity analysis needs."""
         with _at("sensitivity.model"):
             model = get_model(settings.model, self.models)
             missing = set(CLAIMED_EFFECTS) - {effect.name for effect in model.effects}
@@ -349,7 +349,7 @@ class StudyConfig(Block):
                 raise ValueError(f"sensitivity: {cell} has no redundancy, which paper: true needs")
 
     def _n_cells(self, grid: Grid) -> int:
-        """Number of combinations in a grid, which is not spelled out for it."""
+        """Number of combinations in a grid, counted without making them."""
         lists: list[Sequence[object]] = [
             self.model_names(grid.models),
             _known_schemes(grid.schemes),
@@ -426,7 +426,7 @@ class StudyConfig(Block):
         return self.position_sigma(self.noise.sensor.sigma_mps2)
 
     def position_sigma(self, sigma_mps2: float) -> float:
-        """Noise of a position's mean, m/s², for a noise as configured (per position or sample)."""
+        """Noise of a position's mean, m/s², from the configured noise (per position or sample)."""
         sensor = self.noise.sensor
         if sensor.per == "position":
             return sigma_mps2
@@ -439,7 +439,7 @@ class StudyConfig(Block):
         for effect in map(get_effect, effects):
             key = effect.spec if effect.spec in given else effect.name
             quantity = given.get(key)
-            # A value may be that of the whole effect, of which the model has a part.
+            # The value may be that of the whole effect although the model has a part of it.
             known = [parameter.name for parameter in get_effect(key).parameters]
             for name, unit in ((p.name, p.unit) for p in effect.parameters):
                 values[name] = (
@@ -451,7 +451,7 @@ class StudyConfig(Block):
 
     @property
     def fingerprint(self) -> str:
-        """Hash of all that numbers depend on, defaults included."""
+        """Hash of everything that the numbers depend on, defaults included."""
         return config_hash(self.model_dump(mode="json"))
 
 

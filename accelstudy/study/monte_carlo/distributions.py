@@ -1,4 +1,4 @@
-"""How the calibrations of a cell spread: exactly where they are kept, else from sketches."""
+"""Distributions over the calibrations of a cell: exact where they are kept, else from sketches."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from accelstudy.study.monte_carlo.statistics import Statistics
 Array = NDArray[np.float64]
 
 EXACT = 1_000_000
-"""Kept calibrations of a cell up to which quantiles are exact. Those of more are taken from
-sketches: what these add to the error of the simulation itself does not show."""
+"""Kept calibrations of a cell up to which quantiles are exact. Beyond, they come from sketches. The
+error of these is negligible against that of the simulation itself."""
 
 
 class Distribution(Protocol):
-    """Something of which there are quantiles."""
+    """A distribution, with quantiles."""
 
     def quantile(self, probabilities: ArrayLike) -> Array:
         """Quantiles, as `numpy.quantile` defines them."""
@@ -52,7 +52,7 @@ class Sample:
 def cell_distributions(
     cell: Cell, parts: Mapping[str, Sequence[str | Path]], statistics: Statistics, tilt: TiltError
 ) -> Mapping[Key, Distribution]:
-    """Distributions of what is followed of a cell, and of the tilt error.
+    """Distributions of the quantities of a cell, and of the tilt error.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
-"""What a study will take, estimated before it starts: calibrations, time, memory and disk.
+"""Estimate of what a study takes, before it starts: calibrations, time, memory and disk.
 
 The rates were measured on one core of a virtual x86-64 server of 2026 (NumPy with one thread), by
 `simulate_batch`, `summarise_batch` and `leveling_sensitivity`: 6 to 15 parameters, 18 to 1000
-positions. There the estimates are right within a factor of two; elsewhere they are as good as the
-machine is alike.
+positions. There the estimates are right within a factor of two; on another machine they scale with
+its speed.
 """
 
 from __future__ import annotations
@@ -20,26 +20,26 @@ from accelstudy.study.config import StudyConfig
 from accelstudy.study.monte_carlo.distributions import EXACT
 
 SECONDS_TO_KEEP, SECONDS_TO_SUM = 9e-6, 4e-6
-"""To write a calibration and to summarise it, or only that; to this comes the adjustment, per
-position and parameter, by gravity and with the robot, and by compiled code:"""
+"""To write and summarise a calibration, or only to summarise it. The adjustment adds to this, per
+position and parameter, by gravity, with the robot, and by compiled code:"""
 SECONDS_BY_GRAVITY, SECONDS_WITH_ROBOT, SECONDS_COMPILED = 0.11e-6, 0.26e-6, 0.03e-6
 SECONDS_PER_RESAMPLED_VALUE = 0.01e-6
 """Sensitivity: per base sample, input, bootstrap resample and attitude."""
 SECONDS_PER_JOB = 3.0
-"""To start Python, twice for each batch of cells, and once for each of the rest of the jobs."""
+"""To start Python, twice for each batch of cells and once for each of the other jobs."""
 OTHER_JOBS = 10
 
 BYTES_ON_DISK = 16
 """Per calibration and parameter that is kept."""
 BYTES_OF_SKETCHES = 1e6
-"""Of a cell in a job that keeps none."""
+"""Per cell in a job that keeps no replicates."""
 BYTES_IN_MEMORY = 350e6
-"""Of a job, however many calibrations it has: they go by in chunks. To this come the positions of a
-block that is drawn, and what is held of kept calibrations for exact quantiles:"""
+"""Of a job with any number of calibrations, as it holds one chunk at a time. The positions of
+a block add to it, and the values of kept calibrations for exact quantiles:"""
 BYTES_PER_POSITION, BYTES_PER_VALUE = 200, 8
 
 MOST_HOURS, MOST_DISK = 50_000, 10e12
-"""Six years on one core, bytes: what a well-equipped group could still have."""
+"""Six years on one core, and bytes: the most that a well-equipped group could have."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What a study follows of every calibration of a cell, and which of it it keeps."""
+"""The quantities of every calibration that a study sums up, and those of which it has quantiles."""
 
 from __future__ import annotations
 
@@ -80,14 +80,14 @@ class Followed:
     def moments(self, block: Block, values: Array) -> Moments:
         """Moments of a chunk, given its `values`."""
         t = special.stdtrit(max(block.redundancy, 1), 0.975)
-        half = t * values[:, self.columns(POSTERIORI)]  # NaN without redundancy: nothing is inside
+        half = t * values[:, self.columns(POSTERIORI)]  # NaN without redundancy: outside
         inside = np.count_nonzero(np.abs(values[:, self.columns(ERROR)]) <= half, axis=0)
         return moments_of(
             values, len(block.converged), block.redundancy, inside, block.correlation_sum
         )
 
     def sketched(self, redundancy: int) -> list[Key]:
-        """Quantities of which there are quantiles."""
+        """Quantities that have quantiles."""
         defined = (ERROR, POSTERIORI, EFFECT) if redundancy > 0 else (ERROR,)
         return [key for key in self.keys if key[0] in defined]
 

@@ -1,4 +1,4 @@
-"""Kept replicates and sketches, read cell by cell as they were written: a row group at a time."""
+"""Kept replicates and sketches, read cell by cell, one row group at a time."""
 
 from __future__ import annotations
 
@@ -68,4 +68,4 @@ def _cell_of(file: pq.ParquetFile, number: int) -> str:
     statistics = file.metadata.row_group(number).column(0).statistics
     if statistics is not None and statistics.has_min_max:
         return str(statistics.min)
-    return str(file.read_row_group(number, ["cell"])["cell"][0])  # too long a name for statistics
+    return str(file.read_row_group(number, ["cell"])["cell"][0])  # a name too long for statistics

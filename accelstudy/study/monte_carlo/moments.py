@@ -1,8 +1,8 @@
 """Counts, means and co-moments of calibrations, merged in one fixed order.
 
 A sum of floats depends on the order of its terms. So the chunks of a cell are merged as the leaves
-of one binary tree, whose nodes are fixed by the number of the chunk alone: what a cell comes to
-does not depend on which job made which chunks, to the last bit.
+of one binary tree, in which the number of a chunk alone fixes its place. The result is the same to
+the last bit, whichever job made which chunks.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Moments:
-    """What is known of the calibrations of some chunks of a cell.
+    """The calibrations of some chunks of a cell, summed up.
 
     The q quantities are those of `accelstudy.study.monte_carlo.followed.Followed`; u of them are
     errors.
@@ -99,7 +99,7 @@ class Node:
 
 
 class Tree:
-    """The nodes that cover the chunks added so far: as few as there can be."""
+    """The fewest nodes that cover the chunks added so far."""
 
     def __init__(self, nodes: Iterable[Node] = ()) -> None:
         self.nodes: list[Node] = []
@@ -107,7 +107,7 @@ class Tree:
             self.add(node)
 
     def add(self, node: Node) -> None:
-        """Add the node that comes next; siblings are merged into their parent.
+        """Add the next node; siblings are merged into their parent.
 
         Raises
         ------

@@ -78,15 +78,15 @@ ESTIMATES = pa.schema(
         "converged": pa.bool_(),
     }
 )
-"""One row per cell, replicate and parameter, SI. What follows in one step is not stored: the error
-is estimate − truth, σ̂0² = omega / redundancy, and sigma_posteriori = σ̂0 · sigma_priori
-(`read_estimates` adds them). Columns that repeat within a replicate cost next to nothing."""
+"""One row per cell, replicate and parameter, SI. Columns that follow from these are not stored: the
+error is estimate − truth, σ̂0² = omega / redundancy, and sigma_posteriori = σ̂0 · sigma_priori
+(`read_estimates` adds them). Columns that repeat within a replicate need next to no space."""
 
 
 def simulate_batch(
     spec: Mapping[str, Any], outputs: Mapping[str, str | Path], provenance: Mapping[str, Any]
 ) -> None:
-    """Simulate what a job has of the cells of a batch, chunk by chunk.
+    """Simulate a job's share of the cells of a batch, chunk by chunk.
 
     Cells that are not estimable leave no rows; the table of cells says why.
 
@@ -157,7 +157,7 @@ def _chunks(share: Share, seed: int) -> Iterator[tuple[int, Block]]:
 def _pilot_tilt(cell: Cell, seed: int, leveling: Mapping[str, Any]) -> TiltError | None:
     """Tilt error about the mean of the first block of a cell in which a calibration converged.
 
-    Whichever job asks, it is the same. Without one in the first chunk, there is none.
+    It is the same in all jobs. It is None if no calibration of the first chunk converged.
     """
     for block in blocks(cell, seed, 0, CHUNK):
         if block.converged.any():

@@ -1,9 +1,9 @@
-"""Quantiles of any number of values from counts in buckets: a sketch, whose size has a bound.
+"""Sketches: quantiles of any number of values from counts in buckets, with bounded memory.
 
-A bucket is the sign, the exponent and the first `BITS` bits of the mantissa of a number, so that it
-is as wide as a thousandth of what it holds. The counts are integers: they are the same in whatever
-order values are counted and sketches merged. The sketches of libraries are no choice here, as they
-are random or depend on that order (KLL, t-digest).
+A bucket is the sign, the exponent and the first `BITS` bits of the mantissa of a number. So its
+width is a thousandth of the values in it. The counts are integers: they do not depend on the order
+in which values are counted and sketches are merged. The sketches of libraries (KLL, t-digest) are
+random or depend on that order, so they cannot be used here.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ Counts = NDArray[np.int64]
 
 BITS = 10
 RELATIVE_ERROR = 2.0**-BITS
-"""Bound of the relative error of a quantile: 0.1 %. It is far smaller where values lie densely."""
+"""Bound of the relative error of a quantile: 0.1 %. Where values are dense, it is far smaller."""
 LEAST = 2.0**-60
-"""What is smaller counts as zero; any quantity of a study, in SI, is larger by orders."""
+"""Smaller values count as zero; the quantities of a study, in SI, are larger by orders."""
 
 _SHIFT = 52 - BITS
 _ORIGIN = int(np.float64(LEAST).view(np.int64)) >> _SHIFT
@@ -35,7 +35,7 @@ SKETCHES = pa.schema(
         "count": pa.int64(),
     }
 )
-"""One row per bucket that holds something; `Sketch.edges` says what a bucket holds."""
+"""One row per bucket that is not empty; `Sketch.edges` gives the edges of a bucket."""
 
 Key = tuple[str, str]
 """Quantity and name, as of `accelstudy.study.monte_carlo.followed`."""
@@ -47,7 +47,7 @@ class Sketch:
     Parameters
     ----------
     lowest : int, number of the first bucket; negative for negative values, 0 for zero
-    counts : (k,) int array, of it and of those that follow
+    counts : (k,) int array, of this bucket and those that follow
     """
 
     def __init__(self, lowest: int = 0, counts: Counts | None = None) -> None:
@@ -101,7 +101,7 @@ class Sketch:
         return low + (rank - below) * (high - low)
 
     def share_below(self, values: ArrayLike) -> Array:
-        """Share of what was counted that is below given values; even within each bucket."""
+        """Share of the values below given ones; values are taken as evenly spread in a bucket."""
         low, high = self.edges()
         upto = np.cumsum(self.counts) / self.total
         return np.interp(
@@ -109,7 +109,7 @@ class Sketch:
         )
 
     def _ordered(self, rank: Array) -> Array:
-        """Values by their number in ascending order; those of a bucket are taken as even in it."""
+        """Values by their rank; values are taken as evenly spread in a bucket."""
         upto = np.cumsum(self.counts)
         at = np.searchsorted(upto, rank, side="right")
         share = (rank - (upto[at] - self.counts[at]) + 0.5) / self.counts[at]
@@ -123,7 +123,7 @@ class Sketch:
         return np.where(number > 0, near, -far), np.where(number < 0, -near, far)
 
     def occupied(self) -> tuple[Array, Counts]:
-        """Middle and count of each bucket that holds something."""
+        """Middle and count of each bucket that is not empty."""
         held = np.flatnonzero(self.counts)
         low, high = self.edges()
         return (low[held] + high[held]) / 2, self.counts[held]
@@ -136,7 +136,7 @@ def _bucket(values: Array) -> Counts:
 
 
 def _edge(number: Counts) -> Array:
-    """Where the bucket of a positive number begins."""
+    """Lower edge of the bucket of a positive number."""
     return ((number - 1 + _ORIGIN) << _SHIFT).view(np.float64)
 
 

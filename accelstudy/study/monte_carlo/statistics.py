@@ -1,4 +1,4 @@
-"""What is known of the calibrations of a cell once all its chunks are merged."""
+"""Statistics of the calibrations of a cell, from all its chunks."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Statistics:
 
     @classmethod
     def of_none(cls, cell: Cell) -> Statistics:
-        """Return those of a cell that was not simulated."""
+        """Return the statistics of a cell that was not simulated."""
         followed = Followed.of(cell)
         q, u = len(followed.keys), len(followed.units)
         nothing = np.zeros(u, np.int64), np.zeros((u, u))
@@ -54,7 +54,7 @@ class Statistics:
         return self.moments.first[self.followed.columns(quantity)]
 
     def covariance(self, quantity: str) -> Array:
-        """Empirical covariances of a quantity; NaN of less than two calibrations."""
+        """Empirical covariances of a quantity; NaN for fewer than two calibrations."""
         columns = self.followed.columns(quantity)
         n = self.converged
         return self.moments.comoment[columns, columns] / (n - 1 if n > 1 else np.nan)

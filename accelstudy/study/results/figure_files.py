@@ -18,7 +18,7 @@ def draw_figures(
 ) -> None:
     """Draw figures, and write each into a folder under its name: as SVG, as PNG, and its caption.
 
-    The first figure that cannot be drawn ends it; the error names that figure.
+    It stops at the first figure that cannot be drawn; the error names that figure.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The claims of the paper judged by a study, from its tables to tables and a page."""
+"""The paper's claims, judged by the tables of a study: results as tables and a page."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The sensitivity of leveling in a study, from its tables to tables."""
+"""The sensitivity of leveling, from the tables of a study."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from accelstudy.sensors.sensor import SensorModel
 from accelstudy.study.config import StudyConfig
 
 APPROACHES = ("gravity", "robot")
-"""Those whose calibrations the sensitivity is analysed with."""
+"""The approaches with whose calibrations the sensitivity is analysed."""
 
 
 def analyse_sensitivity(
@@ -68,10 +68,10 @@ def analyse_shapley(
     output: str | Path,
     provenance: Mapping[str, Any],
 ) -> None:
-    """Share out the variance of roll and pitch to correlated parameters, and write the table.
+    """Divide the variance of roll and pitch among correlated parameters, and write the table.
 
-    The covariance matrix of a calibration has the sds that the total effects have, of the Monte
-    Carlo, and the mean correlations of the adjustment's Σ_xx.
+    The covariance matrix of a calibration has the sds of the Monte Carlo, as for the total effects,
+    and the mean correlations of the adjustment's Σ_xx.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def _sensor(study: StudyConfig) -> tuple[SensorModel, np.ndarray]:
 
 
 def _cell(study: StudyConfig, approach: str) -> str:
-    """Name of the cell whose calibrations count in the sensitivity analysis."""
+    """Name of the cell whose calibrations the sensitivity analysis uses."""
     settings = study.sensitivity
     assert settings is not None
     return "/".join([settings.model, settings.scheme, approach])

@@ -1,4 +1,4 @@
-"""From calibrations to tables: what a cell determines how well, and what tilt error it leaves."""
+"""From calibrations to tables: the accuracy of the parameters, and the tilt error that is left."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ Array = NDArray[np.float64]
 
 LOWER = (1e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.025, 0.05, 0.25)
 PROBABILITIES = np.array([*LOWER, 0.5, *(1 - p for p in reversed(LOWER))])
-"""Of the quantiles; those beyond the central 95 % only where a calibration can lie there."""
+"""Probabilities of the quantiles; the outermost only where there are enough calibrations."""
 
 
 def summarise_batch(
@@ -54,7 +54,7 @@ def summarise_batch(
     Parameters
     ----------
     spec : mapping with `cells` (plain data of `Cell`)
-    parts : what the jobs of the batch wrote, in order: `moments`, and `estimates` or `sketches`
+    parts : files of the jobs of the batch, in order: `moments`, and `estimates` or `sketches`
     leveling : mapping with max_tilt_gon and attitudes
     outputs : path of each of `TABLES`, and of `moments` and `sketches` of whole cells
     provenance : see `accelstudy.files.tables.origin`
@@ -281,7 +281,7 @@ def _quantile_rows(
 def _leveling_row(
     cell: Cell, statistics: Statistics, tilt: TiltError | None, found: Mapping[Key, Distribution]
 ) -> pd.DataFrame:
-    """Rms of the tilt error over all calibrations, and what 95 % of them stay below."""
+    """Rms of the tilt error over all calibrations, and its 95 % quantile."""
     rms = q95 = np.full(2, np.nan)
     n = statistics.converged
     if tilt is not None:
