@@ -6,7 +6,7 @@ filtered within a chart, or its rows would lose their order: what is missing is 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import altair as alt
@@ -28,22 +28,36 @@ BLUES = ("#F7FBFF", "#6BAED6", "#08306B")
 """Of correlations from none to 1, as in the figures."""
 
 
-def tilt_chart(angle: str, unit: str, approaches: Sequence[str]) -> dict[str, Any]:
-    """Tilt error of one angle, a point and a range for each set-up.
+def all_charts(approaches: Sequence[str]) -> dict[str, Any]:
+    """All charts by their kinds; the page has several of a kind, and their titles."""
+    return {
+        "tilt": tilt_chart(approaches),
+        "sds": sds_chart(approaches),
+        "ratio": interval_chart("ratio", 1, approaches),
+        "coverage": interval_chart("coverage", 95, approaches),
+        "correlations": correlation_chart(),
+    }
 
-    Its data: `row`, `approach`, `value`, `low`, `high`, `q95`, `failed`, `chosen`, `strength`,
-    `name` and `i`; and `wanted`, the error that is allowed. The page sets the ends of its axis,
-    `least` and `most`, so that those of both angles are alike.
+
+def tilt_chart(approaches: Sequence[str]) -> dict[str, Any]:
+    """Tilt error in one angle, a point and a range for each set-up.
+
+    Its data: `row`, `model`, `scheme`, `approach`, `value`, `low`, `high`, `q95`, `state`,
+    `failed`, `cross`, `chosen`, `strength` and `i`; and `wanted`, the error that is allowed. The
+    page sets the ends of its axis, `least` and `most`, so that those of both angles are alike.
     """
     rows = alt.Chart(alt.NamedData(DATA)).encode(
         y=_rows("row"),
         yOffset=_offset(approaches),
         color=_colour(approaches),
         opacity=_plain("strength"),
-        tooltip="name:N",
+        tooltip=[
+            *_words("model", "scheme", "approach", "state"),
+            *_numbers({"value": "rms", "low": "2.5 %", "q95": "95 %", "high": "97.5 %"}),
+        ],
     )
     ends = {"domainMin": alt.ExprRef("least"), "domainMax": alt.ExprRef("most")}
-    x = alt.X("value:Q", title=f"{angle} / {unit}", axis=alt.Axis(format="~r", tickCount=6))
+    x = alt.X("value:Q", title=None, axis=alt.Axis(format="~r", tickCount=6))
     x = x.scale(type="log", nice=False, **ends)
     ranges = rows.mark_rule(size=2).encode(x=alt.X("low:Q"), x2="high:Q")
     ticks = rows.mark_tick(thickness=2, size=10).encode(x="q95:Q")
@@ -62,39 +76,37 @@ def tilt_chart(angle: str, unit: str, approaches: Sequence[str]) -> dict[str, An
     layers = alt.layer(wanted, ranges, ticks, chosen, points, failed)
     layers = layers.resolve_scale(shape="independent")
     layers = layers.add_params(alt.param(name="least", value=1), alt.param(name="most", value=10))
-    return _finished(layers, f"Tilt error in {angle}, of the set-ups that are shown")
+    return _finished(layers, "Tilt error of the set-ups that are shown")
 
 
-def sds_chart(unit: str, approaches: Sequence[str]) -> dict[str, Any]:
+def sds_chart(approaches: Sequence[str]) -> dict[str, Any]:
     """Standard deviations of the parameters of one unit: a posteriori, empirical, linear theory."""
     rows = _parameters(approaches)
-    x = alt.X("posteriori:Q", title=f"sd / {unit}", axis=alt.Axis(format="~r", tickCount=5))
+    x = alt.X("posteriori:Q", title=None, axis=alt.Axis(format="~r", tickCount=5))
     bars = rows.mark_bar(opacity=BAR).encode(x=x)
     ranges = rows.mark_rule(size=2).encode(x="posteriori_low:Q", x2="posteriori_high:Q")
     theory = rows.mark_tick(thickness=2, size=14).encode(x="linear:Q", color=alt.value(INK))
-    points = rows.mark_point(filled=True, size=45).encode(x="empirical:Q", shape=_shape(approaches))
+    points = rows.mark_point(filled=True, size=60).encode(x="empirical:Q", shape=_shape(approaches))
     layers = alt.layer(bars, ranges, theory, points)
-    return _finished(layers, f"Standard deviations of the parameters in {unit}")
+    return _finished(layers, "Standard deviations of the parameters")
 
 
-def interval_chart(
-    quantity: str, right: float, title: str, description: str, approaches: Sequence[str]
-) -> dict[str, Any]:
+def interval_chart(quantity: str, right: float, approaches: Sequence[str]) -> dict[str, Any]:
     """A quantity of each parameter with its 95 % interval, beside the value that is right."""
     rows = _parameters(approaches)
     axis = alt.Axis(format="~r", tickCount=5)
-    x = alt.X(f"{quantity}:Q", title=title, scale=alt.Scale(zero=False), axis=axis)
+    x = alt.X(f"{quantity}:Q", title=None, scale=alt.Scale(zero=False), axis=axis)
     line = (
         alt.Chart(alt.InlineData([{"value": right}]))
         .mark_rule(color=INK, strokeDash=DASHES)
         .encode(x="value:Q")
     )
     ranges = rows.mark_rule(size=2).encode(x=f"{quantity}_low:Q", x2=f"{quantity}_high:Q")
-    points = rows.mark_point(filled=True, size=45).encode(x=x, shape=_shape(approaches))
-    return _finished(alt.layer(line, ranges, points), description)
+    points = rows.mark_point(filled=True, size=60).encode(x=x, shape=_shape(approaches))
+    return _finished(alt.layer(line, ranges, points), f"The {quantity} of each parameter")
 
 
-def correlation_chart(approach: str) -> dict[str, Any]:
+def correlation_chart() -> dict[str, Any]:
     """Matrix of correlations; its data: `first`, `second`, `value`, `size` and `label`."""
     size = alt.ExprRef("min(12, width / 2.7 / domain('x').length)")
     axis = alt.Axis(
@@ -109,7 +121,7 @@ def correlation_chart(approach: str) -> dict[str, Any]:
     fields = alt.Chart(alt.NamedData(DATA)).encode(
         x=alt.X("second:N", sort=None, axis=axis, scale=alt.Scale(paddingInner=0.04)),
         y=alt.Y("first:N", sort=None, axis=axis, scale=alt.Scale(paddingInner=0.04)),
-        tooltip="name:N",
+        tooltip=[*_words("first", "second"), *_numbers({"value": "correlation"})],
     )
     scale = alt.Scale(domain=[0, 1], range=list(BLUES), type="pow", exponent=0.6)
     colour = alt.Color("size:Q", scale=scale, legend=None)
@@ -118,7 +130,7 @@ def correlation_chart(approach: str) -> dict[str, Any]:
         fields.mark_rect().encode(color=colour),
         fields.mark_text(fontSize=size).encode(text="label:N", color=white),
     )
-    return _finished(layers.properties(height="container"), f"Correlations, {approach}")
+    return _finished(layers.properties(height="container"), "Correlations of the parameters")
 
 
 def _parameters(approaches: Sequence[str]) -> alt.Chart:
@@ -126,13 +138,27 @@ def _parameters(approaches: Sequence[str]) -> alt.Chart:
         y=_rows("parameter"),
         yOffset=_offset(approaches),
         color=_colour(approaches),
-        tooltip="name:N",
+        tooltip=[
+            *_words("parameter", "approach"),
+            *_numbers({"empirical": "empirical sd", "posteriori": "sd a posteriori"}),
+            *_words("unit"),
+            *_numbers({"ratio": "ratio", "coverage": "coverage / %"}),
+        ],
     )
 
 
 def _rows(field: str) -> alt.Y:
     axis = alt.Axis(title=None, ticks=False, domain=False, grid=True, labelLimit=170)
     return alt.Y(f"{field}:N", sort=None, axis=axis)
+
+
+def _words(*fields: str) -> list[alt.Tooltip]:
+    return [alt.Tooltip(f"{field}:N") for field in fields]
+
+
+def _numbers(titles: Mapping[str, str]) -> list[alt.Tooltip]:
+    """Numbers of a tooltip, with three digits, by their fields."""
+    return [alt.Tooltip(f"{field}:Q", title=its, format=".3~r") for field, its in titles.items()]
 
 
 def _plain(field: str) -> alt.Opacity:

@@ -25,7 +25,8 @@ def figures_of(study: StudyConfig, cells: Sequence[Mapping[Any, Any]]) -> list[l
     -------
     list of list of str, one for each cell
     """
-    tests = {name: test for name, test in _tests(study).items() if name in figure_names(study)}
+    names = figure_names(study)
+    tests = {name: test for name, test in _tests(study).items() if name in names}
     return [[name for name, test in tests.items() if test(cell)] for cell in cells]
 
 

@@ -109,7 +109,7 @@ def explorer_page(
         "noises": {factor.name: _unit(factor) for factor in factors},
         "start": _start(study, cells),
         "report": dict(in_report),
-        "charts": _charts(more["units"], heads["approaches"]),
+        "charts": charts.all_charts(heads["approaches"]),
     }
     shown = {
         "study": study.study,
@@ -157,7 +157,7 @@ def _left_out(cells: pd.DataFrame, rows: int, details: int) -> list[str]:
         blind = int((~missing["estimable"]).sum())
         return [
             f"{end}, so only the first {rows} of {len(cells)} set-ups are here, without their "
-            f"parameters and correlations. The others ({blind} of them not "
+            f"parameters and correlations. The other {len(missing)} ({blind} of them not "
             "estimable) are in the tables."
         ]
     if details < len(cells):
@@ -260,20 +260,3 @@ def _start(study: StudyConfig, cells: pd.DataFrame) -> int:
     if study.sensitivity is not None:
         return names.index(f"{study.sensitivity.model}/{study.sensitivity.scheme}/gravity")
     return int(cells["estimable"].to_numpy(bool).argmax())
-
-
-def _charts(units: Sequence[str], approaches: Sequence[str]) -> dict[str, Any]:
-    unit = display_unit("rad")
-    return {
-        **{angle: charts.tilt_chart(angle, unit, approaches) for angle in ANGLES},
-        **{f"sds-{i}": charts.sds_chart(unit, approaches) for i, unit in enumerate(units)},
-        "ratio": charts.interval_chart(
-            "ratio", 1, "sd a posteriori / empirical sd", "Ratio of the sds", approaches
-        ),
-        "coverage": charts.interval_chart(
-            "coverage", 95, "coverage / %", "Coverage of the 95 % intervals", approaches
-        ),
-        **{
-            f"correlations-{i}": charts.correlation_chart(name) for i, name in enumerate(approaches)
-        },
-    }

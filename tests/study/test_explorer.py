@@ -1,0 +1,401 @@
+"""The explorer shows what the tables hold; in a browser, what a person chooses of it."""
+
+import json
+import re
+import shutil
+from urllib.parse import unquote, urlsplit
+
+import numpy as np
+import pytest
+from page_helpers import assert_sound
+from playwright.sync_api import sync_playwright
+from study_helpers import NINE, grid, make_study, run_study
+
+from accelstudy.basics.units import angles_in
+from accelstudy.basics.wording import number
+from accelstudy.drawing.style import APPROACH_COLOURS, model_title
+from accelstudy.study.explorer import page as explorer
+from accelstudy.study.explorer.content import plain
+from accelstudy.study.explorer.links import figures_of
+from accelstudy.study.explorer.page import explorer_page, write_explorer
+from accelstudy.study.figures import figure_names
+from accelstudy.study.results.estimates import TABLES
+
+CROSS = f"{NINE}-crossaxis"
+KEYS = {
+    "grids": [
+        grid(
+            [NINE, CROSS],
+            ["mclaren-24", "icosahedron-12"],
+            replicates=40,
+            sensor_sigma_mps2=[0.001, 0.002],
+            robot_sigma_mgon=[0.32, 3.2],
+        )
+    ],
+    "leveling": {"attitudes": 10},
+}
+BLIND = 4
+"""Set-ups of the cross-axis model with gravity alone, which nothing can estimate."""
+DIGITS = 6e-4
+"""Relative error of four digits."""
+
+
+@pytest.fixture(scope="module")
+def study():
+    return make_study(**KEYS)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("study")
+
+
+@pytest.fixture(scope="module")
+def tables(folder):
+    return run_study(folder, **KEYS)
+
+
+@pytest.fixture(scope="module")
+def written(study, tables, folder):
+    """Path of the page, with the figures of the workflow beside it."""
+    (folder / "figures").mkdir()
+    for name in figure_names(study):
+        (folder / "figures" / f"{name}.svg").write_text("<svg></svg>", encoding="utf-8")
+    paths = {name: folder / f"{name}.parquet" for name in TABLES}
+    write_explorer(study, paths, folder / "explorer.html")
+    return folder / "explorer.html"
+
+
+@pytest.fixture(scope="module")
+def page(written):
+    return written.read_text(encoding="utf-8")
+
+
+def data_of(page):
+    found = re.search(r'<script type="application/json" id="study">(.*?)</script>', page, re.DOTALL)
+    return json.loads(found[1])
+
+
+def rows_of(data):
+    return [dict(zip(data["fields"], row, strict=True)) for row in data["rows"]]
+
+
+def same(found, expected):
+    """Compare numbers, none where there is none, with those of a table."""
+    found = np.array([np.nan if value is None else value for value in found], float)
+    np.testing.assert_allclose(found, np.asarray(expected, float), rtol=DIGITS)
+
+
+# --- the data ------------------------------------------------------------------------------------
+
+
+def test_set_ups_are_those_of_the_tables(page, tables):
+    data, cells = data_of(page), tables["cells"]
+    rows = rows_of(data)
+    assert [data["models"][row["model"]]["name"] for row in rows] == list(cells["model"])
+    assert [data["schemes"][row["scheme"]]["name"] for row in rows] == list(cells["scheme"])
+    assert [data["approaches"][row["approach"]] for row in rows] == list(cells["approach"])
+    assert [row["n"] for row in rows] == list(cells["n_positions"])
+    same([row["sensor-noise"] for row in rows], cells["sensor_sigma_mps2"] * 1e3)
+    robot = cells["robot_sigma_mgon"].where(cells["approach"] == "robot")
+    same([row["robot-noise"] for row in rows], robot)
+    leveling = tables["leveling"].set_index("cell").reindex(cells["cell"])
+    tilt = tables["quantiles"].query("quantity == 'tilt'").set_index(["cell", "name"])
+    for angle in ("roll", "pitch"):
+        same([row[f"{angle}_rms"] for row in rows], leveling[f"{angle}_rms_mgon"])
+        same([row[f"{angle}_q95"] for row in rows], leveling[f"{angle}_rms_q95_mgon"])
+        for end, probability in (("low", 0.025), ("high", 0.975)):
+            its = tilt[np.isclose(tilt["probability"].astype(float), probability)]["value"]
+            its = its.xs(angle, level="name").reindex(cells["cell"])
+            same([row[f"{angle}_{end}"] for row in rows], its)
+
+
+def test_parameters_are_those_of_the_summary(page, tables):
+    data, summary = data_of(page), tables["summary"]
+    quantities = ("truth", "bias_high", "empirical", "posteriori", "linear", "ratio", "ratio_low")
+    columns = ("truth", "bias_ci95_high", "sd_empirical", "sd_posteriori_mean", "sd_linear")
+    columns += ("sd_ratio", "sd_ratio_ci95_low")
+    for (_, its), (parameters, _) in zip(
+        summary.groupby("cell", sort=False), data["details"], strict=True
+    ):
+        number_of_list, estimable, *values = parameters
+        values = dict(zip(data["quantities"], values, strict=True))
+        listed = data["parameters"][number_of_list]
+        assert [name for name, _ in listed] == [plain(name) for name in its["parameter"]]
+        units = [data["units"][unit].replace("²", "^2") for _, unit in listed]
+        assert units == list(its["unit"])
+        assert estimable == list(its["estimable"])
+        for quantity, column in zip(quantities, columns, strict=True):
+            same(values[quantity], its[column])
+        same(values["coverage_low"], its["coverage_95_low"] * 100)
+        assert all(
+            low <= mean <= high
+            for low, mean, high in zip(
+                values["posteriori_low"],
+                values["posteriori"],
+                values["posteriori_high"],
+                strict=True,
+            )
+            if mean is not None
+        )
+
+
+def test_correlations_are_those_of_the_tables(page, tables):
+    data = data_of(page)
+    table = tables["correlations"]
+    for cell, (_, matrix) in zip(tables["cells"]["cell"], data["details"], strict=True):
+        its = table[table["cell"] == cell]
+        u = int(np.sqrt(len(its)))
+        assert len(matrix) == u * u
+        lower = np.tril(np.ones((u, u), bool)).ravel()
+        expected = np.where(lower, its["adjustment"], its["empirical"])
+        assert np.abs(np.array(matrix, float) / 1000 - expected).max(initial=0) <= 0.0005
+
+
+def test_failures_are_there(page, tables):
+    data = data_of(page)
+    blind = [row for row in rows_of(data) if not row["estimable"]]
+    assert len(blind) == BLIND
+    reasons = {data["reasons"][row["reason"]] for row in blind}
+    assert reasons == set(tables["cells"].query("not estimable")["reason"])
+    assert all(row["roll_rms"] is None and row["converged"] == 0 for row in blind)
+    assert f"{BLIND} cannot be estimated" in page
+
+
+def test_the_page_is_small_and_whole_and_the_same_again(page, study, tables):
+    assert len(page.encode()) <= explorer.LIMIT
+    assert_sound(re.sub(r"<script\b.*?</script>", "", page, flags=re.DOTALL))
+    assert not re.search(r'(?:src|href)="(?!figures/|#)', page)
+    assert "A page has at most" not in page
+    assert explorer_page(study, tables, {}) == page
+
+
+def test_angles_in_degrees(study, tables):
+    with angles_in("deg"):
+        page = explorer_page(study, tables, {})
+    data = data_of(page)
+    assert data["angle"] == "mdeg"
+    assert "mgon" not in data["units"]
+    same([rows_of(data)[0]["roll_rms"]], tables["leveling"]["roll_rms_mgon"][:1] * 0.9)
+
+
+def test_charts_have_the_colours_of_the_figures(page):
+    charts = json.dumps(data_of(page)["charts"])
+    for colour in APPROACH_COLOURS.values():
+        assert colour in charts
+        assert page.count(f'fill="{colour}"') == 1
+
+
+def test_what_has_no_room_is_said(page, study, tables, monkeypatch):
+    details = len(json.dumps(data_of(page)["details"], separators=(",", ":")))
+
+    def smaller_by(size):
+        limit = len(page.encode()) - size
+        monkeypatch.setattr(explorer, "LIMIT", limit)
+        small = explorer_page(study, tables, {})
+        assert len(small.encode()) <= limit
+        data = data_of(small)
+        (said,) = re.findall(r'<p class="failed">(A page[^<]*)', small)
+        return len(data["rows"]), len(data["details"]), said
+
+    rows, few, said = smaller_by(details // 2)
+    assert 0 < few < rows == 24
+    assert f"the parameters and correlations of only the first {few} of 24 set-ups" in said
+    few, none, said = smaller_by(details + 500)
+    assert none == 0 < few < 24
+    missing = 24 - few
+    blind = (~tables["cells"]["estimable"])[few:].sum()
+    assert f"only the first {few} of 24 set-ups are here" in said
+    assert f"The other {missing} ({blind} of them not estimable) are in the tables" in said
+
+
+def test_figures_that_show_a_set_up(study, tables):
+    cells = tables["cells"].to_dict("records")
+    found = dict(zip(tables["cells"]["cell"], figures_of(study, cells), strict=True))
+    assert {name for names in found.values() for name in names} <= set(figure_names(study))
+    usual = found[f"{NINE}/mclaren-24/robot"]
+    assert usual == ["sweep-sensor-noise", "sweep-robot-noise", "closed-forms"]
+    other = found[f"{NINE}/mclaren-24/robot/sensor_sigma_mps2=0.001/robot_sigma_mgon=0.32"]
+    assert other == ["closed-forms"]
+    assert "closed-forms" not in found[f"{CROSS}/mclaren-24/gravity"]
+
+
+# --- in a browser --------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def tab():
+    """A tab of a browser, and what it complained of or asked the network for."""
+    path = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("chrome")
+    if path is None:
+        pytest.skip("no chromium on this machine")
+    with sync_playwright() as playwright:
+        options = ["--headless", "--no-sandbox", "--disable-gpu"]
+        browser = playwright.chromium.launch(executable_path=path, args=options)
+        opened = browser.new_page(viewport={"width": 1280, "height": 900})
+        opened.set_default_timeout(20_000)
+        opened.amiss = []
+        opened.on("pageerror", lambda error: opened.amiss.append(str(error)))
+        opened.on(
+            "console", lambda said: opened.amiss.append(said.text) if said.type == "error" else None
+        )
+        opened.on(
+            "request",
+            lambda asked: (
+                None if asked.url.startswith(("file:", "data:")) else opened.amiss.append(asked.url)
+            ),
+        )
+        yield opened
+        browser.close()
+
+
+@pytest.fixture
+def shown(tab, written):
+    """The page as it is first seen; at the end nothing is amiss."""
+    load(tab, written.as_uri())
+    yield tab
+    assert tab.amiss == []
+
+
+def load(tab, address):
+    tab.goto("about:blank")
+    tab.goto(address)
+    tab.wait_for_selector("#parameters tbody tr")
+    tab.wait_for_selector("#chart-roll svg [aria-roledescription=point]")
+
+
+def column(tab, key, table="setups"):
+    """Texts of a column of a table."""
+    return tab.locator(f"#{table} tbody td.{key}").all_inner_texts()
+
+
+def as_number(text):
+    return float(text.replace("−", "-"))
+
+
+def points(tab, chart):
+    """Number of points of a chart that one can see."""
+    marks = f"#chart-{chart} [aria-roledescription=point]"
+    return tab.locator(f"{marks}:not([opacity='0'])").count()
+
+
+def test_the_first_sight(shown, tables):
+    cells = tables["cells"]
+    assert len(column(shown, "model")) == len(cells) == 24
+    assert shown.locator("#count").inner_text().startswith("24 of 24 set-ups shown, 4 of them not")
+    assert column(shown, "state").count("× not estimable") == BLIND
+    # A ring, a cross for each that cannot be estimated, a point for each of the others.
+    assert points(shown, "roll") == points(shown, "pitch") == 24 + 1
+    for name in shown.locator("select, input").all():
+        assert shown.locator(f"label[for={name.get_attribute('id')}]").count() == 1
+
+
+def test_a_choice_leaves_its_set_ups_and_shows_their_numbers(shown, tables):
+    shown.select_option("#model", label=model_title(CROSS))
+    shown.select_option("#scheme", label="12 icosahedron")
+    shown.select_option("#sensor-noise", label="1")
+    shown.select_option("#robot-noise", label="0.32")
+    chosen = tables["cells"].query(
+        "model == @CROSS and scheme == 'icosahedron-12' and sensor_sigma_mps2 == 0.001 and "
+        "(approach == 'gravity' or robot_sigma_mgon < 1)"
+    )
+    assert len(column(shown, "model")) == len(chosen) == 2
+    assert column(shown, "state") == ["× not estimable", "all converged"]
+    (robot,) = chosen.query("approach == 'robot'")["cell"]
+    tilt = tables["leveling"].set_index("cell").loc[robot]
+    facts = shown.locator("#facts p")
+    (reason,) = set(chosen.query("not estimable")["reason"])
+    assert facts.nth(0).inner_text() == f"gravity, sensor noise 1 mm/s²: not estimable; {reason}."
+    for angle in ("roll", "pitch"):
+        text = f"{angle} {number(tilt[f'{angle}_rms_mgon'])} mgon rms"
+        text += f" (95 % below {number(tilt[f'{angle}_rms_q95_mgon'])})"
+        assert text in facts.nth(1).inner_text()
+    its = tables["summary"][tables["summary"]["cell"] == robot]
+    for key, name in (("empirical", "sd_empirical"), ("linear", "sd_linear")):
+        assert column(shown, key, "parameters")[-len(its) :] == [number(x) for x in its[name]]
+    assert column(shown, "empirical", "parameters")[: len(its)] == ["–"] * len(its)
+    # The charts show the one that there is.
+    assert points(shown, "roll") == 1 + 2
+    assert points(shown, "coverage") == len(its)
+    assert not shown.locator("#correlations-0").is_visible()
+    fields = shown.locator("#chart-correlations-1 [aria-roledescription='rect mark']")
+    assert fields.count() == len(its) ** 2
+    # Choices that nothing would be left of cannot be made.
+    shown.select_option("#approach", label="gravity")
+    assert shown.locator("#state option").count() == 3
+    assert len(column(shown, "model")) == 1
+    shown.click("button[type=reset]")
+    shown.wait_for_function("document.querySelectorAll('#setups tbody tr').length === 24")
+
+
+def test_a_click_on_a_row_or_on_a_point_chooses_its_set_up(shown, tables):
+    shown.locator("#setups tbody tr", has_text="robot").first.locator("button").click()
+    assert shown.locator("#setups tr[aria-current=true]").count() == 1
+    assert "robot" in shown.locator("#setups tr[aria-current=true]").inner_text()
+    shown.select_option("#by", label="Scheme")
+    shown.select_option("#approach", label="gravity")
+    shown.select_option("#sensor-noise", label="2")
+    shown.select_option("#model", label=model_title(NINE))
+    assert "24 McLaren" in shown.locator("#name").inner_text()
+    mark = "#chart-pitch [aria-label*='12 icosahedron'][aria-roledescription=point]"
+    shown.locator(f"{mark}:not([opacity='0'])").click(force=True)
+    assert "12 icosahedron" in shown.locator("#name").inner_text()
+    its = tables["summary"]
+    its = its[its["cell"] == f"{NINE}/icosahedron-12/gravity"]
+    assert column(shown, "empirical", "parameters") == [number(x) for x in its["sd_empirical"]]
+
+
+def test_the_table_sorts_by_a_click_or_a_key(shown, tables):
+    expected = tables["leveling"]["roll_rms_mgon"].sort_values()
+    head = shown.locator("#setups th[data-key=roll_rms]")
+    head.locator("button").click()
+    assert head.get_attribute("aria-sort") == "ascending"
+    none = ["–"] * BLIND
+    assert column(shown, "roll_rms") == [number(x) for x in expected] + none
+    head.locator("button").press("Enter")
+    assert head.get_attribute("aria-sort") == "descending"
+    assert column(shown, "roll_rms") == [number(x) for x in expected[::-1]] + none
+    shown.locator("#parameters th[data-key=empirical] button").click()
+    values = [as_number(x) for x in column(shown, "empirical", "parameters")]
+    assert values == sorted(values)
+    # What is chosen, and how it is sorted, is a part of the address.
+    shown.fill("#need", "15")
+    kept = column(shown, "roll_rms")
+    load(shown, shown.url)
+    assert shown.input_value("#need") == "15"
+    assert column(shown, "roll_rms") == kept
+    assert head.get_attribute("aria-sort") == "descending"
+
+
+def test_filters_by_tilt_error_and_by_state(shown, tables):
+    most = tables["leveling"][["roll_rms_q95_mgon", "pitch_rms_q95_mgon"]].max(axis=1)
+    limit = float(f"{most.median():.3g}")
+    shown.fill("#need", str(limit))
+    left = (most <= limit).sum()
+    assert 0 < left < len(most)
+    assert len(column(shown, "model")) == left
+    assert shown.locator("#count").inner_text() == f"{left} of 24 set-ups shown."
+    shown.fill("#need", "")
+    shown.select_option("#state", "failed")
+    assert column(shown, "state") == ["× not estimable"] * BLIND
+    assert points(shown, "roll") == BLIND
+    assert shown.locator("#details").is_visible()
+    shown.select_option("#state", "sound")
+    assert len(column(shown, "model")) == 24 - BLIND
+
+
+def test_links_go_to_figures_that_exist(shown, written, study):
+    links = shown.locator("#links a")
+    assert links.count() > 0
+    shown.locator("#setups tbody button").last.click()
+    for link in [*links.all(), *shown.locator("[data-figure]").all()]:
+        path = unquote(urlsplit(link.evaluate("link => link.href")).path)
+        assert (written.parent / "figures" / path.rpartition("/")[2]).is_file()
+        assert path.startswith(str(written.parent))
+
+
+def test_a_narrow_screen(shown):
+    shown.set_viewport_size({"width": 390, "height": 800})
+    assert shown.evaluate("document.documentElement.scrollWidth") <= 390
+    assert shown.locator("#chart-roll svg").bounding_box()["width"] <= 390
+    shown.set_viewport_size({"width": 1280, "height": 900})
