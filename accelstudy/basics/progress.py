@@ -67,7 +67,7 @@ def stage(what: str, total: float | None = None) -> Iterator[Callable[[float], N
     what : str
         Such as "null simulation".
     total : float, optional
-        How much there is to do; the stage yields a function that is told each part done.
+        The whole amount of work; the stage yields a function to be called with each part done.
     """
     if not _wanted.get():
         yield lambda done: None

@@ -6,7 +6,7 @@ import shlex
 from pathlib import Path
 
 HERE = "calibration.json"
-"""A calibration beside the page that speaks of it."""
+"""Name of a calibration file, as pages mention it."""
 
 
 def apply(calibration: str | Path = HERE) -> str:

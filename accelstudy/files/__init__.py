@@ -1,1 +1,1 @@
-"""Files: written whole or not at all, tables with their origin, YAML whose errors name the key."""
+"""Files written whole or not at all, tables with provenance, YAML with errors that name the key."""

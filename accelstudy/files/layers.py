@@ -11,7 +11,7 @@ import yaml
 from accelstudy.basics.errors import InputError
 
 LARGEST = 100_000
-"""Values of a file once its aliases are written out; without aliases it may have more."""
+"""Most values of a file with its aliases expanded; a file without aliases may have more."""
 
 
 def read_layer(path: str | Path) -> dict[str, Any]:
@@ -20,8 +20,8 @@ def read_layer(path: str | Path) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If it cannot be read, is not valid YAML, names a key twice, is no mapping, or means much
-        more than it says by aliases of aliases.
+        If it cannot be read, is not valid YAML, names a key twice, is no mapping, or becomes
+        very large by aliases of aliases.
     """
     try:
         layer = _load(Path(path).read_text(encoding="utf-8"))
@@ -34,7 +34,7 @@ def read_layer(path: str | Path) -> dict[str, Any]:
     except (LookupError, TypeError, AttributeError):
         # PyYAML trips over explicit tags that do not fit their value, such as !!int "".
         raise InputError(f"{path}: not valid YAML: a tag does not fit its value") from None
-    except (yaml.YAMLError, ValueError) as error:  # an impossible date, say
+    except (yaml.YAMLError, ValueError) as error:  # such as an impossible date
         line = " ".join(str(error).split())
         raise InputError(f"{path}: not valid YAML: {line}") from None
     if not isinstance(layer, dict):
@@ -55,7 +55,7 @@ def _load(text: str) -> Any:
 
 
 def _check_size(root: yaml.Node) -> None:
-    """Refuse aliases that make a small file large (`LARGEST`), or a value a part of itself."""
+    """Refuse aliases that make a small file large (`LARGEST`) or put a value into itself."""
     sizes: dict[int, int | None] = {}
 
     def size(node: yaml.Node) -> int:
@@ -73,7 +73,7 @@ def _check_size(root: yaml.Node) -> None:
         sizes[id(node)] = total
         return total
 
-    # Without aliases it is as large as the file, which is no surprise.
+    # Without aliases the content is as large as the file.
     if size(root) > max(LARGEST, 2 * len(sizes)):
         raise yaml.YAMLError(f"with its aliases written out it has more than {LARGEST} values")
 
@@ -96,7 +96,7 @@ def _where(error: yaml.MarkedYAMLError) -> str:
 
 
 class _Loader(yaml.SafeLoader):
-    """A safe loader to which a key that stands twice is an error."""
+    """A safe loader that refuses a key given twice."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         seen: set[str] = set()

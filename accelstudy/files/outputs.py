@@ -1,4 +1,4 @@
-"""What commands and jobs write: whole or not at all, and over nothing that is a user's.
+"""Output of commands and jobs: written whole or not at all, and never over files of the user.
 
 Everything is written to a temporary folder on the same disk first, and moved when it is complete.
 """
@@ -22,12 +22,12 @@ from accelstudy.basics.errors import InputError
 fcntl: ModuleType | None
 try:
     import fcntl
-except ImportError:  # without locks, what a killed run leaves stays until somebody removes it
+except ImportError:  # without locks, the leftovers of a killed run stay until somebody removes them
     fcntl = None
 
 _PREFIX, _SUFFIX = ".accelstudy-", ".part"
 WAIT = 0.05
-"""Seconds in which a run that took a new folder for one of a killed run has removed it."""
+"""Seconds within which another run may take a new folder for a leftover, and remove it."""
 
 
 @dataclass(frozen=True)
@@ -38,9 +38,9 @@ class Kind:
     ----------
     name : str, for messages
     marker : str, the file by which such a folder is known; it is moved there last
-    files : tuple of str, other files that it may have
+    files : tuple of str, other files that it may contain
     folders : tuple of str, subfolders whose files are the command's own
-    replaced : bool, whether the same command may replace an earlier result unasked
+    replaced : bool, whether the command may replace its own earlier result without `force`
     """
 
     name: str
@@ -50,7 +50,7 @@ class Kind:
     replaced: bool = True
 
     def of_earlier_run(self, folder: Path) -> set[Path]:
-        """Files in a folder of this kind that are not a user's, relative to it."""
+        """Files in a folder of this kind that belong to the command, relative to it."""
         found = {Path(name) for name in (self.marker, *self.files) if (folder / name).is_file()}
         for name in self.folders:
             found |= {p.relative_to(folder) for p in (folder / name).rglob("*") if p.is_file()}
@@ -97,15 +97,15 @@ _KINDS = (BATCH_JOB, DIAGNOSIS, CALIBRATION, CAMPAIGN, POLE, PLAN)
 def result_folder(
     out: str | Path, kind: Kind, inputs: Iterable[str | Path] = (), force: bool = False
 ) -> Iterator[Path]:
-    """Give a new folder to write to, whose files go to `out` together if all went well.
+    """Yield a new folder to write to; its files are moved to `out` together if all went well.
 
-    Enter it before anything is computed: a folder that cannot be written is found at once.
+    Enter it before anything is computed, so that a folder that cannot be written is found at once.
 
     Parameters
     ----------
     out : path of the folder of results, made if it is not there
     kind : Kind of the results
-    inputs : files and folders that are read, which `out` must be apart from
+    inputs : files and folders that are read; `out` must be apart from them
     force : bool
         Whether to write into a folder with other files. Files that have the name of one that is
         written are replaced, the others stay.
@@ -114,7 +114,7 @@ def result_folder(
     ------
     InputError
         If `out` is, holds or lies in an input, holds what must not be overwritten, or cannot be
-        written. `out` is then as it was.
+        written. `out` is then unchanged.
     """
     out = Path(out)
     with _reported(out) as stages:
@@ -132,7 +132,7 @@ def result_folder(
 def new_file(
     path: str | Path, inputs: Iterable[str | Path] = (), force: bool = False
 ) -> Iterator[Path]:
-    """Give a temporary file, which is moved to `path` if all went well; see `result_folder`.
+    """Yield a temporary file, which is moved to `path` if all went well; see `result_folder`.
 
     Raises
     ------
@@ -154,7 +154,7 @@ def new_file(
 
 @contextmanager
 def whole_file(path: str | Path) -> Iterator[Path]:
-    """Give a temporary file of the same name, and move it to `path` only if all went well."""
+    """Yield a temporary file of the same name, and move it to `path` only if all went well."""
     path = Path(path)
     with _staging(path.parent) as stage:
         yield stage / path.name
@@ -163,7 +163,7 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 
 
 def cannot_write(error: OSError, out: Path) -> str:
-    """Say that `out` cannot be written and why, with the place that is meant if it is another."""
+    """Say that `out` cannot be written and why; name the place of the error if it is another."""
     where = Path(str(error.filename)) if error.filename is not None else out
     inside = where.is_relative_to(out) or is_temporary(where)
     place = "" if inside else f"{where}: "
@@ -172,16 +172,16 @@ def cannot_write(error: OSError, out: Path) -> str:
 
 
 def is_temporary(path: Path) -> bool:
-    """Whether a file belongs to a run that has not finished it."""
+    """Whether a file belongs to a run that has not finished."""
     return any(part.startswith(_PREFIX) for part in path.parts)
 
 
 @contextmanager
 def _staging(near: Path) -> Iterator[Path]:
-    """A private folder in `near` or, if that is not there, in the nearest folder above it.
+    """A private folder in `near` or, if that does not exist, in the nearest folder above it.
 
-    Nobody can foretell its name and plant a link there. It is locked while it is in use, so that
-    the next run can tell what a killed one left, and remove it.
+    Its name cannot be predicted, so nobody can place a link there. It is locked while it is in use,
+    so the next run recognises the leftovers of a killed run and removes them.
     """
     folder = next(path for path in (near, *near.absolute().parents) if path.exists())
     if not folder.is_dir():
@@ -206,7 +206,7 @@ def _staging(near: Path) -> Iterator[Path]:
 
 
 def _locked(folder: Path) -> int | None:
-    """Descriptor of a folder of ours, locked by it; None if it is in use, or cannot be locked."""
+    """Descriptor that locks a temporary folder; None if it is in use, or cannot be locked."""
     if fcntl is None:
         return None
     try:
@@ -247,7 +247,7 @@ def _check_apart(out: Path, inputs: Iterable[str | Path]) -> None:
     for given in inputs:
         source = Path(given)
         if not source.exists():
-            continue  # who reads it says so
+            continue  # the reader reports it
         above = _identities(source)
         if above[0] == above_out[0]:
             raise InputError(f"{out}: is the input; give another name for the results")
@@ -258,14 +258,14 @@ def _check_apart(out: Path, inputs: Iterable[str | Path]) -> None:
 
 
 def _identities(path: Path) -> list[tuple[int, int] | None]:
-    """What a path and the folders above it are on the disk; None for what is not there."""
+    """Identity of a path and of the folders above it on the disk; None where one does not exist."""
     resolved = path.resolve()
     found: list[tuple[int, int] | None] = []
     for each in (resolved, *resolved.parents):
         try:
             status = each.stat()
         except (FileNotFoundError, NotADirectoryError):
-            # Not there, and so the same as nothing; only the first place of the list counts.
+            # A path that does not exist equals no other; only the first place of the list counts.
             found.append(None)
         else:
             found.append((status.st_dev, status.st_ino))
@@ -273,7 +273,7 @@ def _identities(path: Path) -> list[tuple[int, int] | None]:
 
 
 def _check_folder(out: Path, kind: Kind, force: bool) -> bool:
-    """Check that a folder may be written to; whether it is an earlier result of this kind."""
+    """Check that a folder may be written to; tell whether it is an earlier result of this kind."""
     if not out.is_dir():
         if out.exists():
             raise InputError(f"{out}: is not a folder")
@@ -299,7 +299,7 @@ def _check_folder(out: Path, kind: Kind, force: bool) -> bool:
 
 
 def _publish(stage: Path, out: Path, kind: Kind, mine: bool) -> None:
-    """Move what is new to `out`, and what it replaces away; on an error, all of it back."""
+    """Move new files to `out` and the replaced ones away; on an error, move all of them back."""
     new, old = stage / "new", stage / "old"
     if not out.is_dir():
         with _parents(out):
@@ -311,7 +311,7 @@ def _publish(stage: Path, out: Path, kind: Kind, mine: bool) -> None:
     made = [folder for folder in folders if not (out / folder).exists()]
     stale = kind.of_earlier_run(out) if mine else set()
     moves = [(out / file, old / file) for file in stale | files if (out / file).is_file()]
-    # The marker leaves first and comes last: with it, the results are complete.
+    # The marker is removed first and put back last: with it, the results are complete.
     moves.sort(key=lambda move: move[0] != out / kind.marker)
     moves += [(new / f, out / f) for f in sorted(files, key=lambda f: f == Path(kind.marker))]
     done: list[tuple[Path, Path]] = []
@@ -330,7 +330,7 @@ def _publish(stage: Path, out: Path, kind: Kind, mine: bool) -> None:
 
 
 def _check_free(out: Path, files: Iterable[Path], folders: Iterable[Path]) -> None:
-    """Check that nothing of another sort, and no link, is where files and folders belong."""
+    """Check that the places of files and folders hold no links and nothing of another sort."""
     for paths, fits in ((files, Path.is_file), (folders, Path.is_dir)):
         for path in (out / path for path in paths):
             if path.is_symlink() or (path.exists() and not fits(path)):

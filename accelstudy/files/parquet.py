@@ -1,4 +1,4 @@
-"""Parquet files whose pages carry checksums, so that a damaged one is refused and not read."""
+"""Parquet files with checksums of their pages, so that damaged files are refused."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def whole_parquet(path: str | Path, remedy: str = "") -> Iterator[pq.ParquetFile
     ----------
     path : path
     remedy : str
-        What a person must do if the file is damaged; ends the message.
+        What a person must do if the file is damaged; the end of the message.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def whole_parquet(path: str | Path, remedy: str = "") -> Iterator[pq.ParquetFile
 
 @contextmanager
 def _whole(path: str | Path, remedy: str) -> Iterator[None]:
-    """Turn what Arrow raises on a file that is not whole into one line."""
+    """Turn Arrow's error on an incomplete file into one line."""
     try:
         yield
     except InputError:

@@ -1,4 +1,4 @@
-"""Where numbers come from: the code that made them, and a place where they can be written."""
+"""Where numbers come from, and where they can be written."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from accelstudy.basics.errors import InputError
 
 
 def config_hash(config: Mapping[str, Any]) -> str:
-    """Hash of all that the numbers of a study depend on.
+    """Hash of everything in a configuration that the numbers of a study depend on.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Files that come with the package and are no code: the workflow, configurations, profiles."""
+"""Files of the package that are not Python code: the workflow, configurations, profiles."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import accelstudy
 def shipped(path: str) -> Path:
     """Path of a file or folder that comes with the package.
 
-    In a clone it lies beside the package, once installed within it.
+    In a clone it lies beside the package; after installation it lies within it.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Parquet files with their origin in the metadata, written whole or not at all."""
+"""Parquet files with their provenance in the metadata, written whole or not at all."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from accelstudy.files.parquet import parquet_file, read_parquet, whole_parquet, 
 
 if (
     TYPE_CHECKING
-):  # else where it is needed: it is slow to import, and jobs that simulate do without
+):  # otherwise imported where it is needed: it is slow, and jobs that simulate do not need it
     import pandas as pd
 
 METADATA_KEY = b"accelstudy"
 
 REMEDY = "delete it and run again"
-"""What to do with a damaged file; Snakemake then makes it anew."""
+"""What to do with a damaged file. Snakemake then makes it anew."""
 
 LIBRARIES = ("numpy", "scipy", "llvmlite")
-"""Libraries on whose versions the last bits of the numbers depend."""
+"""Libraries whose versions may change the last bits of the numbers."""
 
 
 @cache
@@ -49,7 +49,7 @@ def git_commit() -> str:
 
 
 def origin(provenance: Mapping[str, Any]) -> dict[str, Any]:
-    """What is written into each file: where its numbers come from.
+    """Provenance that is written into each file.
 
     `provenance` holds `config_hash` and `seed`, and `setup` where the file is of a batch (see
     `accelstudy.jobs.job`). Commit and versions of what numbers depend on are added.
@@ -79,8 +79,8 @@ def parquet_writer(
 ) -> Iterator[Callable[[pa.Table], None]]:
     """Write tables of one schema into one file, a row group each.
 
-    `measured` names columns of floats that hardly repeat; they are packed byte by byte, which is
-    smaller and faster than looking for repetition.
+    `measured` names columns of floats that hardly repeat. They are packed byte by byte, which is
+    smaller and faster than a search for repetitions.
     """
     metadata = {METADATA_KEY: json.dumps(origin(provenance)).encode()}
     with (
@@ -128,7 +128,7 @@ def read_table(path: str | Path | Sequence[str | Path], **options: Any) -> pd.Da
 
 
 def _check_seeds(paths: Sequence[Path]) -> None:
-    """Check that files are of one study; a run that was stopped leaves some of an earlier one."""
+    """Check that files belong to one study: a stopped run leaves some of an earlier one."""
     seeds: dict[Any, Path] = {}
     for path in paths:
         seeds.setdefault(read_origin(path)["seed"], path)

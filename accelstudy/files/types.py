@@ -1,4 +1,4 @@
-"""The types of numbers and lists that stand in a configuration."""
+"""The types of numbers and lists in a configuration."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ Pitch = Annotated[float, Field(gt=-100, lt=100), Number]
 
 
 def _within(range_: Range) -> tuple[Any, ...]:
-    """What makes a number of a type one within a range, in the schema too."""
+    """Annotations that keep a number within a range, in the schema too."""
     ends = {"minimum": 0 if range_.zero else range_.least, "maximum": range_.most}
     finite = Field(json_schema_extra=dict(ends))
     return Number, AfterValidator(range_.check), finite

@@ -1,4 +1,4 @@
-"""From formulas to lanes: traced expressions, freed of what they have in common, as code."""
+"""From formulas to code in lanes, with common subexpressions computed once."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ Table = dict[sp.Symbol, Term]
 
 
 class Formulas:
-    """Expressions in what differs between replicates and in what does not.
+    """Expressions, split into parts that differ between replicates and parts that do not.
 
-    What depends on the position alone (temperatures, settings, functions of them) is the same in
-    all replicates and iterations. It gets symbols of its own, whose values `known` are computed
-    once.
+    Parts that depend on the position alone (temperatures, settings, functions of them) are the same
+    in all replicates and iterations. They get symbols of their own, whose values `known` are
+    computed once.
 
     Parameters
     ----------
     expressions : sequence of expressions
-    same : symbols of what is the same in all replicates
+    same : symbols of quantities that are the same in all replicates
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Formulas:
                 self.known[whole] = whole
                 return whole
             names = {value: symbol for symbol, value in self.known.items()}
-            # By number: a dummy's place in a sum would depend on what was traced before.
+            # By number: the place of a SymPy dummy in a sum depends on what was traced before.
             symbol = names.get(whole) or sp.Symbol(f"known_{len(self.known):03}", real=True)
             self.known[symbol] = whole
             return symbol
@@ -91,7 +91,7 @@ def _value(code: Code, e: Any, values: Table) -> Term:
 
 
 def _sum(code: Code, terms: Sequence[Any], values: Table) -> Term:
-    """Sum, with fused multiply-adds; what is no product comes first."""
+    """Sum, with fused multiply-adds; terms that are no products come first."""
     total: Term = 0.0
     for term in sorted(terms, key=lambda term: bool(term.is_Mul)):
         if term.is_Mul:
@@ -125,7 +125,7 @@ def _power(code: Code, base: Term, exponent: Any) -> Term:
 
 
 _HALF_PI = (math.pi / 2, 6.123233995736766e-17, -1.4973849048591833e-33)
-"""π/2 in parts, each of which goes on where the one before ends."""
+"""π/2 in parts, each with the digits that follow those of the part before."""
 _SINE = (
     *(1.58969099521155010221e-10, -2.50507602534068634195e-08, 2.75573137070700676789e-06),
     *(-1.98412698298579493134e-04, 8.33333333332248946124e-03, -1.66666666666666324348e-01),
@@ -140,7 +140,7 @@ _COSINE = (
 def _turned(code: Code, a: Term, quarters: int) -> Term:
     """sin(a + quarters π/2).
 
-    The C library's sine takes one number at a time, and takes longer than all the rest together.
+    The C library's sine takes one number at a time, and longer than all the rest together.
     """
     count = code.intrinsic("rint", a * (2 / math.pi))
     rest = a
@@ -199,4 +199,4 @@ _FUNCTIONS: dict[Any, Callable[..., Term]] = {
     sp.Max: _extreme("maximum"),
     sp.Min: _extreme("minimum"),
 }
-"""What `accelstudy.basics.tracing.symbolic` has, and what its derivatives bring."""
+"""Functions of `accelstudy.basics.tracing.symbolic` and of their derivatives."""

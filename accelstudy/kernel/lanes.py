@@ -1,10 +1,10 @@
 """Arithmetic on lanes: as many replicates side by side as a vector has places.
 
-The operations on `Lanes` write LLVM's text instead of computing, so that what is written with them
-in ordinary Python is compiled afterwards. A plain number stands for a constant in all lanes: what
-is zero or one by structure costs nothing. No lane sees another, and every operation is rounded as
-IEEE 754 says (fused multiply-adds are written where they are wanted, and no others are made), so a
-result depends neither on who shares the lanes nor on the processor.
+The operations on `Lanes` write LLVM's text instead of computing. So formulas in ordinary Python
+become text that is compiled afterwards. A plain number is a constant in all lanes; structural zeros
+and ones cost nothing. The lanes are independent, and every operation is rounded by IEEE 754 (no
+fused multiply-adds but those that are written). So a result depends neither on the other lanes nor
+on the processor.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class Mask:
         return Lanes(self.code, self.code.line(f"select {_MASK} {self.name}, {operands}"))
 
     def any(self) -> str:
-        """Whether it is so in any lane, as one bit."""
+        """Whether the mask is set in any lane, as one bit."""
         bits = self.code.line(f"bitcast {_MASK} {self.name} to i{LANES}")
         return self.code.line(f"icmp ne i{LANES} {bits}, 0")
 
@@ -90,7 +90,7 @@ Term: TypeAlias = Lanes | float
 
 
 class Variable:
-    """What changes in a loop."""
+    """A value that changes in a loop."""
 
     def __init__(self, code: Code, start: Term) -> None:
         self._code = code
@@ -209,7 +209,7 @@ class Code:
 
     @contextmanager
     def when(self, bit: str) -> Iterator[None]:
-        """Write what is done only if a bit is set."""
+        """Write instructions that are run only if a bit is set."""
         then, after = self._new("then"), self._new("after")
         self.do(f"br i1 {bit}, label %{then}, label %{after}")
         self._lines.append(f"{then}:")
@@ -229,11 +229,11 @@ class Code:
         return self.line(f"getelementptr inbounds double, ptr %{pointer}, i64 {offset}")
 
     def load(self, pointer: str, offset: str) -> Lanes:
-        """Load a number for each lane, side by side from an offset on."""
+        """Load a number for each lane from consecutive places."""
         return Lanes(self, self.line(f"load {_VECTOR}, ptr {self._at(pointer, offset)}, align 8"))
 
     def store(self, value: Term, pointer: str, offset: str) -> None:
-        """Store the numbers of all lanes side by side."""
+        """Store the numbers of all lanes in consecutive places."""
         self.do(f"store {_VECTOR} {text(value)}, ptr {self._at(pointer, offset)}, align 8")
 
     def load_same(self, pointer: str, offset: str) -> Lanes:
@@ -285,7 +285,7 @@ def fma(a: Term, b: Term, c: Term) -> Term:
 
 
 def sqrt(a: Term) -> Term:
-    """Square root; NaN of what is negative."""
+    """Square root; NaN of a negative number."""
     return a.code.intrinsic("sqrt", a) if isinstance(a, Lanes) else math.sqrt(a)
 
 
@@ -302,7 +302,7 @@ def larger(a: Term, b: Term) -> Term:
 
 
 def above(a: Term, least: float) -> Term:
-    """Return what is above a number, and NaN instead of what is not."""
+    """Return values above a number, and NaN instead of others."""
     if isinstance(a, Lanes):
         return (a > least).select(a, math.nan)
     return a if a > least else math.nan

@@ -69,7 +69,7 @@ class Task:
         if back := [c for c in self.extended.hold_columns if c in LOOKING_BACK]:
             raise InputError(
                 f"the model {self.extended.name!r} depends on the order of the positions "
-                f"({back[0]}), which a set of attitudes has not; leave that effect out"
+                f"({back[0]}), which a set of attitudes does not have; leave that effect out"
             )
         for name in self.prior_sigmas:
             if name not in self.model.parameter_names:
