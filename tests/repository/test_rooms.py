@@ -1,6 +1,7 @@
 """The rooms of the package: their imports go one way, and none is too full to look through."""
 
 import ast
+import re
 from collections import defaultdict
 from graphlib import CycleError, TopologicalSorter
 
@@ -79,6 +80,25 @@ def test_imports_between_rooms_go_one_way(arrows):
         except CycleError as error:
             cycles.append(" → ".join(reversed(error.args[1])))
     assert cycles == []
+
+
+def test_the_table_for_contributors_has_all_rooms_in_the_order_of_imports(arrows):
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    lines = re.findall(r"^\|[^|`]*\|([^|]*`\w+/`[^|]*)\|$", text, re.MULTILINE)
+    line_of = {
+        f"{PACKAGE}.{room}": number
+        for number, line in enumerate(lines)
+        for room in re.findall(r"`(\w+)/`", line)
+    }
+    folders = {path.parent.name for path in (ROOT / PACKAGE).glob("*/__init__.py")}
+    assert {name.removeprefix(f"{PACKAGE}.") for name in line_of} == folders
+    upwards = [
+        f"{room} imports {other}"
+        for room, others in among(arrows, PACKAGE).items()
+        for other in others
+        if room in line_of and line_of.get(other, 0) > line_of[room]
+    ]
+    assert upwards == []
 
 
 def test_no_room_is_too_full():
