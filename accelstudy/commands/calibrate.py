@@ -32,7 +32,7 @@ def calibrate_command(campaign: Path, model: str, approach: str, out: Path, forc
     from accelstudy.basics.units import display_unit, to_display
     from accelstudy.campaign.calibration.fit import fit_campaign
     from accelstudy.campaign.calibration.output import write_calibration
-    from accelstudy.campaign.calibration.verdict import next_steps
+    from accelstudy.campaign.calibration.wording import next_steps
     from accelstudy.campaign.files.format import read_campaign
     from accelstudy.files.outputs import CALIBRATION, result_folder
     from accelstudy.sensors.models import get_model

@@ -541,7 +541,7 @@ def test_what_the_calibration_did_not_see_is_counted(tmp_path):
     log.to_csv(tmp_path / "log.csv", index=False)
     warnings = level_log(calibration, tmp_path / "log.csv", tmp_path / "out.csv").warnings
     assert len(warnings) == 2
-    assert warnings[0].startswith("temperature beyond what the calibration saw in 1 of 4 rows")
+    assert warnings[0].startswith("temperature outside the range of the calibration in 1 of 4 rows")
     assert "up to 60 °C" in warnings[0]
     assert "force beyond what the calibration saw in 1 of 4 rows: up to 12.5 m/s² r" in warnings[1]
 

@@ -19,7 +19,7 @@ from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import fit_campaign, initial_values
 from accelstudy.campaign.calibration.gauges import GAUGES, affine_form, in_gauge
 from accelstudy.campaign.calibration.sigma_check import check_sigmas
-from accelstudy.campaign.calibration.verdict import verdict_lines
+from accelstudy.campaign.calibration.wording import verdict_lines
 from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
 from accelstudy.campaign.use.export import device_matrix, export
@@ -210,19 +210,19 @@ def test_positions_in_conflict_are_not_blamed_alone():
     one = replace(measured, forces=measured.forces.copy())
     one.forces[15] += [0.02, 0.02, -0.02]
     (said,) = _in_conflict(one)
-    assert re.match(r"In conflict with the others: position 16 \(p [=<].*, all positions", said)
+    assert re.match(r"In conflict with the others: position 16 \(p [=<].*, adjusted", said)
     several = replace(measured, forces=measured.forces.copy())
     several.forces[[3, 20, 11]] *= [[1.01], [0.994], [1.003]]
     (said,) = _in_conflict(several)
-    assert said.startswith("In conflict with the others: positions 4, 12 and 21 (each with p")
-    assert said.endswith("They may be bumped, or show what the model lacks.")
+    assert said.startswith("In conflict with the others: positions 4, 12 and 21 (the largest p")
+    assert said.endswith("The sensor may have been bumped there, or the model lacks an effect.")
     assert _in_conflict(measured) == []
 
 
 def _in_conflict(campaign):
     lines = verdict_lines(assess(fit_campaign(campaign, NINE, GRAVITY)))
     found = [line for line in lines if line.startswith("In conflict")]
-    advised = "What is wrong or missing, “accelstudy diagnose” may tell." in lines
+    advised = "“accelstudy diagnose” looks for what is wrong or missing." in lines
     assert advised == bool(found)
     return found
 

@@ -16,7 +16,6 @@ from accelstudy.approaches import get_approach
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.states import ACCEPTED, REJECTED
-from accelstudy.campaign.calibration.verdict import state
 from accelstudy.campaign.files.format import read_campaign, write_campaign
 from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
 from accelstudy.commands.main import main
@@ -57,7 +56,7 @@ def test_false_alarms_are_rare(approach):
         found = diagnose(measured, NINE)
         alarms += found.verdict != "no_effect"
         assessment = assess(fit_campaign(measured, NINE, get_approach(approach)))
-        judged = state(assessment)
+        judged = assessment.state
         assert judged in (ACCEPTED, REJECTED)
         assert not (judged == REJECTED and found.verdict == "no_effect")
         assert not (judged == ACCEPTED and "noise_level" in names(found))

@@ -1,1 +1,1 @@
-"""Many campaigns calibrated by one configuration, and their overview."""
+"""Batches: many campaigns calibrated by one configuration, and their overview."""

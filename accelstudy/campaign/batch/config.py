@@ -1,4 +1,4 @@
-"""The configuration of a batch of campaigns: what may stand in `config/campaigns.yaml`."""
+"""The configuration of a batch of campaigns: the keys of `config/campaigns.yaml`."""
 
 from __future__ import annotations
 
@@ -32,17 +32,21 @@ Kind = Literal["campaign", "log", "public"]
 
 
 class Entry(Block):
-    """What is calibrated, and with what where it is not that of the batch."""
+    """One or more campaigns to calibrate, and what differs from the rest of the batch."""
 
     campaign: str | None = Field(None, description="folder of a campaign, or a pattern of folders")
     log: str | None = Field(None, description="raw log or table of means, or a pattern of files")
     public: str | None = Field(None, description="name of public data, see `accelstudy public`")
-    name: PathName | None = Field(None, description="of the results; that of the source if absent")
-    model: ModelName | None = Field(None, description="model, if not that of the batch")
-    approach: str | None = Field(None, description="approach, if not that of the batch")
+    name: PathName | None = Field(
+        None, description="name of the results; by default that of the source"
+    )
+    model: ModelName | None = Field(None, description="model; by default that of the batch")
+    approach: str | None = Field(None, description="approach; by default that of the batch")
     gravity: GravitySettings | None = Field(None, description="instead of the campaign's own")
     settings: ImportSettings | None = Field(
-        None, alias="import", description="how a log is read; of public data, what to do otherwise"
+        None,
+        alias="import",
+        description="how a log is read; of public data, what differs from the registry",
     )
 
     @model_validator(mode="after")
@@ -76,7 +80,7 @@ class Task(Block):
     kind : "campaign", "log" or "public"
     source : str, path of the folder or file, or name of the public data
     model, approach : str
-    gravity : GravitySettings, instead of that of a campaign folder; None leaves it
+    gravity : GravitySettings, replaces that of a campaign folder; None keeps it
     settings : ImportSettings, of a log or public data
     """
 
@@ -89,7 +93,7 @@ class Task(Block):
     settings: ImportSettings | None = None
 
     def files(self) -> list[str]:
-        """Files that are there and on which the result depends; none for public data."""
+        """Existing files on which the result depends; none for public data."""
         source = Path(self.source)
         if self.kind == "campaign":
             return [str(path) for name in (HEADER, *TABLES) if (path := source / name).is_file()]
@@ -104,7 +108,7 @@ class BatchConfig(Block):
     approach: str = Field("gravity", description="approach of all campaigns")
     public_folder: str = Field(
         "resources/public",
-        description="where public files are, in any subfolder, or are downloaded to",
+        description="folder with public files, in any subfolder; missing ones are downloaded to it",
     )
     campaigns: list[Entry] = Field(min_length=1)
 
@@ -123,9 +127,9 @@ class BatchConfig(Block):
         return self
 
     def tasks(self) -> list[Task]:
-        """Campaigns in the order of the configuration; patterns are those of now.
+        """Campaigns in the order of the configuration; patterns match what is there now.
 
-        What an entry names itself is left out of patterns, so that it can differ from the rest.
+        A pattern leaves out what another entry names, so that this entry can differ from the rest.
 
         Raises
         ------
@@ -187,7 +191,7 @@ def _check_names(model: str | None, approach: str | None) -> None:
 
 
 def _path(entry: Entry) -> str:
-    """Path, or name of public data, spelled in one way."""
+    """Normalised path, or name of public data."""
     return entry.public or os.path.normpath(entry.campaign or entry.log or "")
 
 
@@ -207,7 +211,7 @@ def _name_of(kind: Kind, source: str) -> str:
 
 
 def _settings(entry: Entry, source: str) -> ImportSettings | None:
-    """How a file is imported: as the registry says, if it is public, the entry over it."""
+    """How a file is imported; for public data the entry overlays what the registry says."""
     if entry.kind == "campaign":
         return None
     content = import_settings(source).model_dump(exclude_unset=True) if entry.public else {}

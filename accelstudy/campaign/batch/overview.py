@@ -1,4 +1,4 @@
-"""All campaigns of a batch in two tables and on one page."""
+"""The overview of a batch: two tables and one page with all campaigns."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def summarise_campaigns(
 
 
 def counts(table: pd.DataFrame) -> str:
-    """How many campaigns of a table were calibrated, without those that no sensor can have."""
+    """Number of campaigns that were calibrated; implausible calibrations are counted apart."""
     implausible = int((table["state"] == IMPLAUSIBLE).sum())
     calibrated = int((table["status"] == "ok").sum()) - implausible
     doubt = f", {implausible} implausible" if implausible else ""
@@ -158,7 +158,7 @@ def _rad(mgon: float | None) -> float | None:
 
 
 def _links(folder: Path, start: Path) -> dict[str, str | None]:
-    """Pages and pictures of a campaign, relative to the folder of the overview."""
+    """Links to the pages and pictures of a campaign, relative to the folder of the overview."""
     places = {"report": "report.html", "holds": "campaign/segmentation.png"}
     links = {
         key: (folder / place).relative_to(start).as_posix() if (folder / place).exists() else None
@@ -168,7 +168,7 @@ def _links(folder: Path, start: Path) -> dict[str, str | None]:
 
 
 def _next_steps(rows: list[dict[str, Any]]) -> list[tuple[str, str]]:
-    """Say what to do with the first good and the first doubtful campaign, and the command."""
+    """Commands for the first good and for the first doubtful campaign, each with its purpose."""
     steps = []
     good = next((row for row in rows if row["state"] in (ACCEPTED, UNCHECKED)), None)
     if good is not None:

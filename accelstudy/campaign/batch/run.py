@@ -1,4 +1,4 @@
-"""Calibrate one campaign of a batch, so that a bad one is reported and stops no other."""
+"""Calibrate one campaign of a batch; a bad one is reported and does not stop the others."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def run_task(
     record: str | Path | None = None,
     log: str | Path | None = None,
 ) -> str | None:
-    """Import and calibrate a campaign, and write how it went to status.json.
+    """Import and calibrate a campaign, and write the outcome to status.json.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def run_task(
     record : path
         Of public data, written by `accelstudy.campaign.importing.public.record_public`.
     log : path
-        Where the traceback of an error stands that nobody has foreseen.
+        File with the traceback of an unexpected error.
 
     Returns
     -------
@@ -72,7 +72,7 @@ def _calibrate(
     except InputError as error:
         _remove_results(folder)
         return " ".join(str(error).split()).removeprefix(f"{task.name}: ")
-    except OSError:  # a full disk, say, which is no matter of this campaign
+    except OSError:  # such as a full disk, which is not the campaign's fault
         raise
     except Exception as error:
         # One campaign must not cost the others their overview.
@@ -84,7 +84,7 @@ def _calibrate(
 
 
 def _remove_results(folder: Path) -> None:
-    """Leave of a calibration that failed only the campaign that was imported."""
+    """Remove the files of a failed calibration, but keep the campaign that was imported."""
     for name in BATCH_JOB.files:
         (folder / name).unlink(missing_ok=True)
     shutil.rmtree(folder / "figures", ignore_errors=True)

@@ -1,4 +1,4 @@
-"""How far a calibration can be trusted, for a person and for a program."""
+"""How far a calibration can be trusted: tests, the tilt error that is left, and the state."""
 
 from __future__ import annotations
 
@@ -6,17 +6,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from accelstudy.adjustment import quality
 from accelstudy.adjustment.quality import VarianceComponents, variance_components
 from accelstudy.approaches import get_approach
-from accelstudy.basics.units import GON, MGON
+from accelstudy.basics.units import GON
 from accelstudy.campaign.calibration.fit import CampaignFit, campaign_noise
+from accelstudy.campaign.calibration.states import ACCEPTED, IMPLAUSIBLE, REJECTED, UNCHECKED
 from accelstudy.campaign.gross_errors.recognition import Recognised, recognise
 from accelstudy.leveling.angles import jacobian, tilt_slope
 from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON, cap_forces, holds_in_use
+from accelstudy.sensors.plausibility import implausible_parameters, implausible_tilt
 
 Array = NDArray[np.float64]
 
@@ -31,16 +32,19 @@ class Assessment:
     Attributes
     ----------
     fit : CampaignFit
-    solution : linearisation at the solution
+    solution : quality.Solution, linearised at the estimates
     redundancy, tests, reliability : of the positions
     suspects : positions in conflict with the others, removed one at a time
-    held_out : None where the others do not determine the model
+    held_out : prediction of each position from the others; None where those do not determine the
+        model
     components : variance components of accelerometer and robot; None without a robot
-    tilt_shares : group of parameters (effect) -> its tilt error (2,) alone, rms roll and pitch, rad
-    tilt_parameters : (2,) array, rad, tilt error that the uncertainty of all parameters leaves, rms
-    tilt_missing : (2,) array, rad, tilt error of a reading that is as wrong as the residuals say
-        beyond the stated noise, rms; 0 where they do not refute it
-    gross_error : Recognised or None, of what the campaign holds, the robot's angles included
+    tilt_shares : mapping of effect to the tilt error that the uncertainty of its parameters leaves,
+        (2,), rad, rms of roll and of pitch
+    tilt_parameters : (2,) array, rad, the same of all parameters together
+    tilt_missing : (2,) array, rad, rms tilt error of a reading that is wrong by as much as the
+        residuals exceed the stated noise; 0 where they do not refute it
+    implausible : tuple of str, parameters and tilt errors that no sensor has
+    gross_error : Recognised or None, in the campaign, its robot's angles included
     """
 
     fit: CampaignFit
@@ -54,20 +58,48 @@ class Assessment:
     tilt_shares: Mapping[str, Array]
     tilt_parameters: Array
     tilt_missing: Array
+    implausible: tuple[str, ...]
     gross_error: Recognised | None
 
     @property
     def tilt(self) -> Array:
-        """Tilt error that is left, rms, rad, (2,): of parameters, and of what the model lacks."""
+        """Rms tilt error that is left, (2,), rad: by parameters, and by what the model lacks."""
         return np.hypot(self.tilt_parameters, self.tilt_missing)
+
+    @property
+    def warnings(self) -> list[str]:
+        """What of the calibration can only come from a gross error; empty for a plausible one."""
+        gross = self.gross_error
+        return [*self.implausible, *([] if gross is None else [gross.reason])]
+
+    @property
+    def state(self) -> str:
+        """State of the calibration, the first that applies.
+
+        `IMPLAUSIBLE` if no sensor has such parameters or the data look grossly wrong, `REJECTED` if
+        the residuals refute the stated noise, `UNCHECKED` if nothing could have refuted it, else
+        `ACCEPTED`.
+        """
+        test = self.fit.global_test
+        if self.implausible or self.gross_error is not None:
+            return IMPLAUSIBLE
+        if test is not None and not test.accepted:
+            return REJECTED
+        return UNCHECKED if test is None or test.powerless else ACCEPTED
 
 
 def assess(fit: CampaignFit) -> Assessment:
     """Assess a calibrated campaign."""
     session = (fit.model, fit.approach, fit.observed)
     solution = quality.solve(*session, fit.adjustment)
-    shares = tilt_shares(fit)
-    sees = get_approach("gravity" if fit.campaign.angles is None else "robot")
+    shares, missing = tilt_shares(fit), tilt_missing(fit)
+    left = shares.pop("all")
+    implausible = (
+        *implausible_parameters(fit.model.effects, fit.parameters, fit.sigma),
+        *implausible_tilt(*np.hypot(left, missing)),
+    )
+    # A gross error of the angles shows even where the fit does not use them.
+    full = get_approach("gravity" if fit.campaign.angles is None else "robot")
     return Assessment(
         fit=fit,
         solution=solution,
@@ -78,18 +110,19 @@ def assess(fit: CampaignFit) -> Assessment:
         held_out=quality.held_out(*session),
         components=variance_components(*session) if fit.sigma_known else None,
         tilt_shares=shares,
-        tilt_parameters=shares.pop("all"),
-        tilt_missing=tilt_missing(fit),
-        gross_error=recognise(fit.campaign, sees),
+        tilt_parameters=left,
+        tilt_missing=missing,
+        implausible=implausible,
+        gross_error=recognise(fit.campaign, full),
     )
 
 
 def tilt_missing(fit: CampaignFit) -> Array:
     """Tilt error of a reading that is wrong by the excess of the residuals, (2,), rad.
 
-    Residuals beyond the stated noise are what the model does not describe. An effect of the sensor
-    is in each reading that is leveled, as it was in the positions; the uncertainty of the
-    parameters does not contain it.
+    The excess of the residuals over the stated noise is what the model does not describe. An effect
+    of the sensor is in each reading that is leveled, as it was in the positions, and the
+    uncertainty of the parameters does not contain it.
     """
     if not fit.sigma_known or fit.trusts_sigma:
         return np.zeros(2)
@@ -101,9 +134,9 @@ def tilt_missing(fit: CampaignFit) -> Array:
 def tilt_shares(fit: CampaignFit) -> dict[str, Array]:
     """Tilt error from the uncertainty of each effect's parameters, and of "all", (2,), rad.
 
-    Rms of roll and of pitch over tilts up to `MAX_TILT_GON`, at the temperatures and times of the
-    campaign where effects depend on them, without the noise of a reading. Effects of the rig, which
-    the sensor has left, have no share.
+    It is the rms of roll and of pitch over tilts up to `MAX_TILT_GON`, without the noise of a
+    reading. Effects that depend on temperature or time have those of the campaign. Effects of the
+    rig have no share: the sensor in use has left the rig.
     """
     model, campaign, g = fit.model, fit.campaign, fit.gravity
     f_b = cap_forces(MAX_TILT_GON * GON, ATTITUDES, g)
@@ -124,35 +157,3 @@ def tilt_shares(fit: CampaignFit) -> dict[str, Array]:
             shares[effect.name] = rms(slice(first, last))
         first = last
     return shares
-
-
-def assessed_positions(assessment: Assessment) -> pd.DataFrame:
-    """One row per position: residuals, tests and reliability, in the units that the names say."""
-    fit, tests, reliability = assessment.fit, assessment.tests, assessment.reliability
-    scale = np.sqrt(fit.variance_factor)  # reliability is in terms of the a-priori noise
-    table = pd.DataFrame(
-        {
-            "position": fit.campaign.positions,
-            "norm_residual_mps2": fit.norm_residuals,
-            "redundancy": assessment.redundancy.positions,
-            "statistic": tests.statistic,
-            "dof": tests.dof,
-            "p_value": tests.p_known if fit.trusts_sigma else tests.p_unknown,
-            "p_value_adjusted": tests.p_adjusted(fit.trusts_sigma),
-            "tau": tests.tau,
-            "mdb_mps2": scale * reliability.mdb[:, -1],
-            "external_roll_mgon": scale * reliability.leveling[:, 0] / MGON,
-            "external_pitch_mgon": scale * reliability.leveling[:, 1] / MGON,
-        }
-    )
-    residuals = assessment.solution.residuals
-    for i, name in enumerate(("fx", "fy", "fz")):
-        table[f"v_{name}_mps2"] = residuals[:, i]
-    if fit.approach.uses_angles:
-        for i, name in enumerate(("roll", "pitch")):
-            table[f"v_{name}_mgon"] = residuals[:, 3 + i] / MGON
-    if assessment.held_out is not None:
-        table["held_out_mps2"] = np.linalg.norm(assessment.held_out.misclosures, axis=1)
-    found = {s.position for s in assessment.suspects}
-    table["suspect"] = [i in found for i in range(len(table))]
-    return table

@@ -1,4 +1,4 @@
-"""The machine-readable result of a calibration: the content of `calibration.json`."""
+"""The result of a calibration for programs: `calibration.json` and `positions.parquet`."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ import json
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from accelstudy.basics.units import MGON, recorded_unit, to_recorded
 from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.fit import CampaignFit
 from accelstudy.campaign.calibration.gauges import GAUGES, affine_form, in_gauge
 from accelstudy.campaign.calibration.ranges import ranges_of
-from accelstudy.campaign.calibration.verdict import state, verdict_lines, warnings
+from accelstudy.campaign.calibration.wording import verdict_lines
 from accelstudy.campaign.files.session import Campaign
 from accelstudy.leveling.error import MAX_TILT_GON
 
@@ -84,9 +85,9 @@ def quality_document(assessment: Assessment) -> dict[str, Any]:
     angles = None if held is None else held.rms_angles
     positions = assessment.fit.campaign.positions
     return {
-        "state": state(assessment),
-        "plausible": not warnings(assessment),
-        "warnings": warnings(assessment),
+        "state": assessment.state,
+        "plausible": not assessment.warnings,
+        "warnings": assessment.warnings,
         "gross_error": None if gross is None else {"name": gross.name, "reason": gross.reason},
         "verdict": " ".join(verdict_lines(assessment)),
         "global_test": None
@@ -128,6 +129,38 @@ def quality_document(assessment: Assessment) -> dict[str, Any]:
             "max_tilt_gon": MAX_TILT_GON,
         },
     }
+
+
+def assessed_positions(assessment: Assessment) -> pd.DataFrame:
+    """One row per position: residuals, tests and reliability, in the units that the names say."""
+    fit, tests, reliability = assessment.fit, assessment.tests, assessment.reliability
+    scale = np.sqrt(fit.variance_factor)  # reliability is in terms of the a-priori noise
+    table = pd.DataFrame(
+        {
+            "position": fit.campaign.positions,
+            "norm_residual_mps2": fit.norm_residuals,
+            "redundancy": assessment.redundancy.positions,
+            "statistic": tests.statistic,
+            "dof": tests.dof,
+            "p_value": tests.p_known if fit.trusts_sigma else tests.p_unknown,
+            "p_value_adjusted": tests.p_adjusted(fit.trusts_sigma),
+            "tau": tests.tau,
+            "mdb_mps2": scale * reliability.mdb[:, -1],
+            "external_roll_mgon": scale * reliability.leveling[:, 0] / MGON,
+            "external_pitch_mgon": scale * reliability.leveling[:, 1] / MGON,
+        }
+    )
+    residuals = assessment.solution.residuals
+    for i, name in enumerate(("fx", "fy", "fz")):
+        table[f"v_{name}_mps2"] = residuals[:, i]
+    if fit.approach.uses_angles:
+        for i, name in enumerate(("roll", "pitch")):
+            table[f"v_{name}_mgon"] = residuals[:, 3 + i] / MGON
+    if assessment.held_out is not None:
+        table["held_out_mps2"] = np.linalg.norm(assessment.held_out.misclosures, axis=1)
+    found = {s.position for s in assessment.suspects}
+    table["suspect"] = [i in found for i in range(len(table))]
+    return table
 
 
 def _sigma_reading(campaign: Campaign) -> float | None:

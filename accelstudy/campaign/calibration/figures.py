@@ -13,9 +13,10 @@ SUSPECT = "#D55E00"
 
 
 def residual_figure(fit: CampaignFit, positions: pd.DataFrame) -> Figure:
-    """|f_b| − g of each position, with the range of the stated noise or, without it, of their own.
+    """|f_b| − g of each position, with a band of two standard deviations.
 
-    What is too large beside the noise that was stated has to look so.
+    The band shows the stated noise if there is one, so that residuals that are too large for it
+    look so. Otherwise it shows the noise that the residuals have themselves.
     """
     figure = new_figure(FULL, 62)
     ax = figure.add_subplot()

@@ -1,4 +1,4 @@
-"""The calibration of a measured campaign, by the same adjustment as the simulated ones."""
+"""The calibration of a measured campaign, by the same adjustment as that of simulated sessions."""
 
 from __future__ import annotations
 
@@ -28,23 +28,24 @@ from accelstudy.simulation.sessions import Noise
 Array = NDArray[np.float64]
 
 LEAST_RATIO = 1e-6
-"""Noise of the forces beside that of the robot's angles below which double precision ends."""
+"""Smallest ratio of the noise of a direction to that of the robot's angles that double precision
+can weigh."""
 
 HARDLY = 10.0
-"""Condition beyond which it is the positions that keep an adjustment from converging: where noise
-alone tells repeats of too few attitudes apart."""
+"""Condition of the design beyond which too few different attitudes explain why an adjustment does
+not converge."""
 
 UNIT_SIGMA = 1e-3
-"""m/s², stands for an unknown sigma; only sigmas a posteriori mean anything then."""
+"""m/s², stands in for an unknown sigma; only sigmas a posteriori have a meaning then."""
 
 
 @dataclass(frozen=True)
 class JudgedNoise:
-    """What somebody made of the noise of a campaign.
+    """A judgement of the noise of a campaign.
 
     Attributes
     ----------
-    trusted : bool, whether the campaign states its noise, and nothing refutes it
+    trusted : bool, whether the campaign states its noise and nothing refutes it
     variance : float, variance of unit weight to quote; 1 where the stated noise is trusted
     """
 
@@ -62,8 +63,7 @@ class CampaignFit:
     observed : Observations, R = 1
     adjustment : Adjustment, R = 1
     estimability : Estimability, of the campaign's own positions
-    judged : JudgedNoise, where the noise was judged by more than this fit; by default the global
-        test of the fit judges it
+    judged : JudgedNoise, from a diagnosis; by default the global test of this fit judges the noise
     """
 
     campaign: Campaign
@@ -101,14 +101,14 @@ class CampaignFit:
 
     @property
     def variance_factor(self) -> float:
-        """Variance of unit weight to quote: 1 if a-priori noise is trusted, else a posteriori."""
+        """Variance of unit weight to quote: 1 if the stated noise is trusted, else a posteriori."""
         if self.judged is not None:
             return self.judged.variance
         return 1.0 if self.trusts_sigma else float(self.adjustment.variance_posteriori[0])
 
     @property
     def sigma_position(self) -> float:
-        """Noise of a position mean, m/s², a priori or a posteriori likewise."""
+        """Noise of a position mean to quote, m/s²: as stated if trusted, else a posteriori."""
         return self._sigma_taken * float(np.sqrt(self.variance_factor))
 
     @property
@@ -124,13 +124,13 @@ class CampaignFit:
 
     @property
     def covariance(self) -> Array:
-        """Covariance matrix of the model's parameters to quote, (u, u), SI: likewise."""
+        """Covariance matrix of the model's parameters to quote, (u, u), SI."""
         u = self.model.n_parameters
         return self.variance_factor * self.adjustment.cofactors[0, :u, :u]
 
     @property
     def sigma(self) -> Array:
-        """Standard deviations of the parameters to quote, (u,), SI: likewise."""
+        """Standard deviations of the parameters to quote, (u,), SI."""
         return np.sqrt(np.diag(self.covariance))
 
     @property
@@ -167,7 +167,7 @@ def campaign_noise(campaign: Campaign) -> Noise:
 
 
 def least_sigma(campaign: Campaign, approach: Approach) -> float:
-    """Smallest noise of a force, m/s², whose weight is regular beside that of the angles."""
+    """Smallest noise of a force, m/s², that can be weighed against that of the angles."""
     return LEAST_RATIO * campaign.gravity * (campaign.sigma_angle or 0.0) * approach.uses_angles
 
 
@@ -182,7 +182,7 @@ def campaign_observations(campaign: Campaign) -> Observations:
         gravity=campaign.gravity,
         sigma_gravity=campaign.sigma_gravity,
         hold=campaign.hold,
-        # Beside means of unknown noise nobody knows what slopes weigh.
+        # If the noise of the means is unknown, slopes have no weight relative to them.
         slope=campaign.slope if known else None,
         sd_slope=campaign.sd_slope if known else None,
     )
@@ -244,7 +244,7 @@ def fit_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> 
     observed = replace(campaign_observations(campaign), initial=start_of(model))
     adjustment = calibrate(model, approach, observed)
     if not adjustment.converged[0] and (unfit := not_affine(model)):
-        # Of a model with large effects the affine part alone is a better start.
+        # If nonlinear effects are large, the affine part of the model gives a better start.
         rest = [effect.spec for effect in model.effects if effect.name not in unfit]
         part = compose("affine part", tuple(rest))
         first = calibrate(part, approach, replace(observed, initial=start_of(part)))
@@ -292,8 +292,7 @@ def _cause(campaign: Campaign, theory: Estimability) -> str:
 def initial_values(model: SensorModel, forces: Array, gravity: float) -> Array:
     """Biases and a common scale from the sphere that fits best, (u,), SI; the rest is zero.
 
-    Positions that do not
-    determine a sphere, and models without these parameters, start from an ideal sensor.
+    If the positions do not determine a sphere, or the model lacks these parameters, all are zero.
     """
     sphere = fit_sphere(forces)
     if sphere is None:

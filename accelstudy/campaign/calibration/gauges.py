@@ -42,7 +42,8 @@ def in_gauge(matrix: ArrayLike, gauge: Gauge) -> Array:
 def not_affine(model: SensorModel) -> tuple[str, ...]:
     """Names of the effects that no matrix can hold.
 
-    They are those of the sensor whose output is not linear in the force, or depends on more.
+    Their output is not linear in the force, or depends on more than the force. Effects of the rig
+    do not count.
     """
     return tuple(
         effect.name
@@ -62,7 +63,7 @@ def _is_affine(kind: type[Effect]) -> bool:
 def affine_form(model: SensorModel, parameters: ArrayLike) -> tuple[Array, Array] | None:
     """K (3, 3) and b (3,) of f_b = K (f_s − b), or None if the model is not affine.
 
-    What the rig has is left out: it is no part of the sensor.
+    Effects of the rig are left out: they are no part of the sensor.
 
     Parameters
     ----------

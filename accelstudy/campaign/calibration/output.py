@@ -10,15 +10,16 @@ import pandas as pd
 from accelstudy.basics.levels import REFUTED
 from accelstudy.basics.units import display_unit, to_display, unit_label
 from accelstudy.basics.wording import number
-from accelstudy.campaign.calibration.assessment import assess, assessed_positions
+from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.document import (
+    assessed_positions,
     calibration_document,
     json_text,
     quality_document,
 )
 from accelstudy.campaign.calibration.figures import correlation_figure, residual_figure
 from accelstudy.campaign.calibration.fit import CampaignFit
-from accelstudy.campaign.calibration.verdict import next_steps, verdict_lines
+from accelstudy.campaign.calibration.wording import next_steps, verdict_lines
 from accelstudy.drawing.saving import save_all
 from accelstudy.files.outputs import whole_file
 from accelstudy.pages import write_page
@@ -32,8 +33,8 @@ def write_calibration(
 ) -> dict[str, Any]:
     """Assess a fit and write calibration.json, positions.parquet, figures/ and report.html.
 
-    Each file is whole or not there; calibration.json comes last. A page that fails takes the
-    numbers not with it.
+    Each file is whole or not there; calibration.json comes last. If the page fails, the numbers are
+    written all the same.
 
     Parameters
     ----------
@@ -74,7 +75,7 @@ def write_calibration(
         unit=lambda unit: unit_label(display_unit(unit)),
         refuted=REFUTED,
         figures=drawn,
-        next_steps=next_steps(fit, quality["state"], source),
+        next_steps=next_steps(fit, assessment.state, source),
     )
     content = {**document, "quality": quality}
     with whole_file(folder / "calibration.json") as path:
@@ -83,11 +84,11 @@ def write_calibration(
 
 
 def _listed(positions: pd.DataFrame) -> pd.DataFrame:
-    """Return the positions that a page lists, in their order: all, or the least probable ones."""
+    """Positions that the page lists, in their order: all, or those that fit worst."""
     worst = positions.sort_values(["suspect", "p_value"], ascending=[False, True], kind="stable")
     return worst.head(LISTED).sort_index()
 
 
 def _shown(parameter: dict[str, Any], value: float | None) -> str:
-    """Show an SI value of a parameter in the unit of the table."""
+    """Show an SI value of a parameter in the unit of the page."""
     return "–" if value is None else number(to_display(value, parameter["unit"]).item())

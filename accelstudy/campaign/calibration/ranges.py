@@ -1,4 +1,4 @@
-"""The ranges that a calibration saw of forces and conditions, and what of a log lies beyond."""
+"""The ranges of forces and conditions in a calibration, and how far a log goes beyond them."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 MARGIN = 0.1
-"""Part of its width by which a range may be left without a word."""
+"""A log may leave a range by this part of its width without a warning."""
 FORCES = {"fx_mps2": "forward", "fy_mps2": "right", "fz_mps2": "down"}
 """Ranges of the calibrated forces, and where they point."""
 
 
 def ranges_of(fit: CampaignFit) -> dict[str, list[float]]:
-    """Smallest and largest value over the holds of a calibration, of whatever it had.
+    """Smallest and largest value over the holds of a calibration.
 
     Returns
     -------
     dict
-        `time_s` since the start of the session, `temperature_degC`, `vibration_mps2`, and the
-        calibrated forces.
+        Ranges of `time_s` since the start of the session, `temperature_degC`, `vibration_mps2` as
+        far as they are known, and of the calibrated forces.
     """
     campaign = fit.campaign
     columns = {
@@ -46,7 +46,7 @@ def ranges_of(fit: CampaignFit) -> dict[str, list[float]]:
 
 
 class Watch:
-    """Counts the rows of a log that lie beyond what a calibration saw.
+    """Counts the rows of a log that lie beyond the ranges of a calibration.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class Watch:
         self._worst: dict[str, tuple[float, str, float]] = {}
 
     def look_at(self, corrected: Array, hold: HoldConditions) -> None:
-        """Take in calibrated forces (n, 3), m/s², and their conditions."""
+        """Count calibrated forces (n, 3), m/s², and their conditions."""
         columns = {
             "temperature_degC": hold.temperature,
             "vibration_mps2": hold.vibration,
@@ -78,7 +78,7 @@ class Watch:
                 if values is None:
                     continue
                 low, high = self._ranges[name]
-                # In parts of the width, so that axes can be compared; NaN is not beyond.
+                # In parts of the width, so that axes can be compared; NaN does not count.
                 excess = np.fmax(low - values, values - high) / max(high - low, 1e-9)
                 beyond |= excess > MARGIN
                 if (excess > MARGIN).any():
@@ -88,13 +88,13 @@ class Watch:
             self._rows[what] += int(beyond.sum())
 
     def warnings(self, rows: int) -> Iterator[str]:
-        """Say what lay beyond, of a log of so many rows."""
+        """Say what lay beyond a range in a log of so many rows."""
         for what, unit, names in self._groups:
             if what in self._worst:
                 _, name, value = self._worst[what]
                 low, high = self._ranges[name]
                 yield (
-                    f"{what} beyond what the calibration saw in {self._rows[what]} of "
-                    f"{counted(rows, 'row')}: up to {value:.4g} {unit}{names[name]}, where it saw "
-                    f"{low:.4g} to {high:.4g}; the calibration is extrapolated there"
+                    f"{what} outside the range of the calibration in {self._rows[what]} of "
+                    f"{counted(rows, 'row')}: up to {value:.4g} {unit}{names[name]}, while the "
+                    f"calibration had {low:.4g} to {high:.4g}; it is extrapolated there"
                 )

@@ -1,4 +1,4 @@
-"""Whether the sigmas that an adjustment claims for a measured campaign hold, by simulation."""
+"""A check, by simulation, of the sigmas that an adjustment claims for a measured campaign."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ AT_ONCE = 500_000
 
 
 def check_sigmas(fit: CampaignFit, replicates: int = 2000, seed: int = 1) -> pd.DataFrame:
-    """Simulate the campaign's own positions, noise and parameters, and calibrate again.
+    """Simulate sessions with the positions, noise and parameters of a campaign, and calibrate them.
 
-    Where the campaign does not know its noise, the sigma a posteriori of its adjustment is taken.
+    If the campaign does not state its noise, the simulation takes the sigma a posteriori.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Checks of a campaign: each wrong value is named with what would be right."""
+"""Checks of a campaign: an error names the wrong value and says what would be right."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from accelstudy.leveling.angles import specific_force
 Array = NDArray[np.float64]
 
 FARTHEST = 1000
-"""Times gravity, beyond which a single mean is no measurement."""
+"""Times gravity; a mean beyond it is no measurement."""
 
 
 def check_names(names: Sequence[str], path: Path) -> None:
-    """Check that no column stands twice."""
+    """Check that no column occurs twice."""
     for name in names:
         if names.count(name) > 1:
             raise InputError(f"{path}: {name!r}: the column stands twice")
@@ -29,7 +29,7 @@ def check_names(names: Sequence[str], path: Path) -> None:
 def check_column(
     attribute: str, name: str, values: Array, labels: Sequence[str], path: Path
 ) -> None:
-    """Check what a column must be, whatever its unit."""
+    """Check what must hold for a column in any unit."""
 
     def complain_of(wrong: NDArray[np.bool_], text: str) -> None:
         if wrong.any():
@@ -69,7 +69,7 @@ def check_robot(given: Mapping[str, Array], header: Header, path: Path) -> None:
 
 
 def check_size(raw: Array, forces: Array, header: Header, path: Path) -> None:
-    """Check that forces in whatever unit are numbers that can be calculated with."""
+    """Check that forces are numbers that can be calculated with, in whatever unit they are."""
     norm, given = (float(np.median(np.linalg.norm(array, axis=1))) for array in (forces, raw))
     if not (norm > 1 / MOST and np.max(abs(forces)) < MOST):
         raise InputError(
@@ -79,9 +79,9 @@ def check_size(raw: Array, forces: Array, header: Header, path: Path) -> None:
 
 
 def likely_fault(given: float, norm: float, unit: str, gravity: float) -> str | None:
-    """What makes forces of the size `norm`, m/s², no specific forces of a sensor at rest.
+    """Say why forces of the size `norm`, m/s², are not those of a sensor at rest.
 
-    Real sensors are wrong by some tenths at worst, so a factor of two is not theirs.
+    Even bad sensors are wrong by some tenths only, so a factor of two has another cause.
 
     Parameters
     ----------
@@ -93,7 +93,8 @@ def likely_fault(given: float, norm: float, unit: str, gravity: float) -> str | 
     Returns
     -------
     str
-        "gravity", the unit that would be right, "unknown", or None where nothing is wrong.
+        "gravity" if its value is wrong, the unit that would be right, or "unknown"; None if nothing
+        is wrong.
     """
 
     def near(size: float, gravity: float) -> bool:
@@ -111,7 +112,7 @@ def likely_fault(given: float, norm: float, unit: str, gravity: float) -> str | 
 
 
 def check_norm(raw: Array, forces: Array, header: Header, path: Path) -> None:
-    """Check that forces are roughly as large as gravity, and say which unit would make them so."""
+    """Check that forces are roughly as large as gravity; the error names the unit that fits."""
     gravity, unit = header.gravity.value_mps2, header.unit
     norm, given = (float(np.median(np.linalg.norm(array, axis=1))) for array in (forces, raw))
     fault = likely_fault(given, norm, unit, gravity)
@@ -135,7 +136,7 @@ def check_norm(raw: Array, forces: Array, header: Header, path: Path) -> None:
 
 
 def check_outliers(forces: Array, labels: Sequence[str], gravity: float, path: Path) -> None:
-    """Check that no single mean is farther from gravity than any sensor or bump could take it."""
+    """Check that no mean is so far from gravity that neither sensor nor bump explains it."""
     for i in np.flatnonzero(np.linalg.norm(forces, axis=1) > FARTHEST * gravity)[:1]:
         raise InputError(
             f"{path}: fx, fy, fz: {labels[i]}: more than {FARTHEST} times gravity; correct the "
@@ -144,22 +145,22 @@ def check_outliers(forces: Array, labels: Sequence[str], gravity: float, path: P
 
 
 def misfit_of_angles(angles: Array, forces: Array, gravity: float) -> float:
-    """Rms of what forces (n, 3), m/s², differ from those at angles (n, 2), rad, over gravity."""
+    """Rms difference of forces (n, 3), m/s², from those at angles (n, 2), rad, over gravity."""
     roll, pitch = angles.T
     expected = np.column_stack(specific_force(roll, pitch, gravity))
     return float(np.sqrt(np.mean(np.sum((forces - expected) ** 2, axis=1))) / gravity)
 
 
 def clearly_worse(misfit: float, other: float) -> bool:
-    """Whether another reading of the angles fits so much better that it is no accident.
+    """Whether another reading of the angles fits so much better that this is no accident.
 
-    A sensor fits its robot within some hundredths of g.
+    A real sensor agrees with its robot within some hundredths of g.
     """
     return misfit > max(0.05, 4 * other)
 
 
 def check_angles(angles: Array, forces: Array, gravity: float, path: Path) -> None:
-    """Check that no other reading of the robot's angles fits the forces clearly better than gon."""
+    """Check that no other unit or sign fits the forces clearly better than angles in gon."""
 
     def misfit(unit: str, sign: int = 1) -> float:
         return misfit_of_angles(angles * UNITS["rad"][unit], sign * forces, gravity)

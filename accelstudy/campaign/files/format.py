@@ -41,14 +41,14 @@ def read_campaign(
 ) -> Campaign:
     """Read a campaign folder: `campaign.yaml` and `positions.csv` or `positions.parquet`.
 
-    With ``unit: g`` forces are multiples of standard gravity, 9.80665 m/s², whatever `gravity`
-    says: the unit is the same everywhere, `gravity` is what holds at the place. For data scaled so
-    that local gravity is 1, give 9.80665 as the value of gravity; the norm to be met is 1 then.
+    With ``unit: g`` forces are multiples of standard gravity, 9.80665 m/s². This unit is the same
+    everywhere, while `gravity` is the local value. If the data are scaled so that local gravity is
+    1, give 9.80665 as the value of gravity.
 
     With ``unit: counts`` forces are (raw − offset) · scale, and sds are sd · abs(scale).
 
-    Numbers in `position` grow, but some may be absent: holds that were removed. Where a robot gives
-    no yaw it is 0. Columns that the format does not know are left out and named in `warnings`.
+    Numbers in `position` increase, but some may be missing, as after the removal of a hold. A
+    missing yaw of the robot is 0. Unknown columns are left out and named in `warnings`.
 
     Parameters
     ----------
@@ -57,12 +57,12 @@ def read_campaign(
         Overlays the header key by key.
     plausible : bool
         Whether to refuse forces that are not as large as gravity, and angles that fit them better
-        in another unit. Who looks for such errors reads without.
+        in another unit. False is for callers that look for such errors themselves.
 
     Raises
     ------
     InputError
-        If a file is missing or not whole, or what it says cannot be right; one line says where.
+        If a file is missing or incomplete, or a value cannot be right; one line says where.
     """
     folder = Path(folder)
     if not folder.is_dir():
@@ -80,12 +80,12 @@ def read_campaign(
 
 
 def read_header(folder: Path, given: Mapping[str, Any] | None = None) -> Header:
-    """Header of a campaign folder, with `given` laid over it key by key; errors as above."""
+    """Header of a campaign folder, overlaid key by key with `given`; errors as `read_campaign`."""
     return _parse_header(overlay(read_layer(folder / HEADER), given or {}), folder / HEADER)
 
 
 def table_of(folder: Path) -> Path | None:
-    """Table of positions in a campaign folder; None if there is none yet, an error for two."""
+    """Table of positions in a campaign folder; None if there is none, an error if there are two."""
     found = [folder / name for name in TABLES if (folder / name).exists()]
     if len(found) > 1:
         raise InputError(
@@ -107,8 +107,8 @@ def write_campaign(
     campaign : Campaign
         Its `warnings` and `source` are not written.
     folder : path
-        Made if it is not there. A table of positions in it is replaced, whichever of the two kinds
-        it has; other files are left as they are.
+        Made if it does not exist. A table of positions in it is replaced, be it CSV or Parquet;
+        other files stay.
     table : "csv" or "parquet"
     plausible : bool
         As in `read_campaign`.
@@ -148,7 +148,7 @@ def _parse_header(content: dict[str, Any], path: Path) -> Header:
 
 
 def parse_table(columns: Columns, header: Header, path: Path, plausible: bool = True) -> Campaign:
-    """Check the columns of the table `path`, and turn them and the header into a campaign."""
+    """Check the columns of the table `path`, and make a campaign of them and the header."""
     given: dict[str, Array] = {}
     labels: list[str] = []
     for attribute, names in COLUMNS.items():
@@ -162,7 +162,7 @@ def parse_table(columns: Columns, header: Header, path: Path, plausible: bool = 
         given[attribute] = np.column_stack(parts) if len(parts) > 1 else parts[0]
     check_robot(given, header, path)
     values: dict[str, Any] = {}
-    with np.errstate(all="ignore"):  # what overflows is nowhere near gravity, and found so
+    with np.errstate(all="ignore"):  # the checks below find what overflows
         for attribute, array in given.items():
             values[attribute] = header.conversion(attribute).to_si(array)
         check = check_norm if plausible else check_size
@@ -185,7 +185,7 @@ def parse_table(columns: Columns, header: Header, path: Path, plausible: bool = 
 
 
 def campaign_of(header: Header, values: Mapping[str, Any]) -> Campaign:
-    """Campaign of a header and of columns in SI, by attribute."""
+    """Make a campaign of a header and of columns in SI, by attribute."""
     nominal, noise, robot = header.nominal, header.sensor_noise, header.robot
     return Campaign(
         name=header.name,
@@ -204,7 +204,7 @@ def campaign_of(header: Header, values: Mapping[str, Any]) -> Campaign:
 
 
 def _numbers(columns: Columns, name: str, labels: Sequence[str], path: Path) -> Array:
-    """Column of finite numbers; `labels` say what its rows are called."""
+    """Column of finite numbers; `labels` name its rows in errors."""
     if name not in columns:
         lower = {other.lower(): other for other in columns if other not in KNOWN}
         near = get_close_matches(name.lower(), lower, n=1)
@@ -233,7 +233,7 @@ def _numbers(columns: Columns, name: str, labels: Sequence[str], path: Path) -> 
 
 
 def _content_of(campaign: Campaign) -> dict[str, Any]:
-    """What `campaign.yaml` says of a campaign."""
+    """Content of `campaign.yaml`."""
     content = {
         "schema_version": 1,
         "name": campaign.name,

@@ -1,4 +1,4 @@
-"""What stands in a campaign's header, and what its columns are."""
+"""The header of a campaign, and the columns of its table."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ COLUMNS = {
 KNOWN = tuple(name for names in COLUMNS.values() for name in names)
 COUNTING = ("positions", "n_samples")
 MOST = 1e12
-"""Beyond anything that is measured, in any unit; squares and cubes of less stay finite."""
+"""Larger than any measured value in any unit; squares and cubes of smaller ones stay finite."""
 ANY = Range(-MOST, MOST)
 RANGES = {
     "positions": Range(1, 2**53),  # beyond which not every integer is a float
@@ -59,7 +59,7 @@ RANGES = {
     "angles": bounds.ANGLE,
     "yaw": bounds.ANGLE,
 }
-"""What columns can hold, in the unit of the file, where it is not `ANY`."""
+"""Ranges of the columns in the unit of the file; others have `ANY`."""
 
 
 def _not_zero(value: float) -> float:
@@ -109,7 +109,7 @@ class Exclusion(Block):
 
 
 class Header(Block):
-    """What stands in `campaign.yaml`."""
+    """The content of `campaign.yaml`."""
 
     schema_version: Annotated[Literal[1], Number] = Field(description="of this format")
     name: Annotated[str, Field(min_length=1)] = Field(description="of the campaign, any text")

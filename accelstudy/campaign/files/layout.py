@@ -1,4 +1,4 @@
-"""How a raw log is laid out: what `import` was told and found, and what `apply` needs again."""
+"""The layout of a raw log: what `import` was told or found out, and `apply` needs again."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Place = Annotated[StrictInt, Field(ge=0)] | StrictStr
 
 
 class LogLayout(BaseModel):
-    """How the numbers of a log are to be read; the block `log` of a campaign's header.
+    """How the numbers of a log are read; the block `log` of a campaign's header.
 
     Scale and offset are in the order of the log's own axes, whatever its frame.
     """

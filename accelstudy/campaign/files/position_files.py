@@ -1,4 +1,4 @@
-"""The table of positions as it stands in its file: columns by their names, not yet checked."""
+"""The table of positions as it is in its file: columns by name, not yet checked."""
 
 from __future__ import annotations
 
@@ -19,24 +19,29 @@ Columns = Mapping[str, Sequence[Any]]
 
 
 def read_positions(path: Path) -> tuple[Columns, list[str]]:
-    """Columns of a table, text of CSV and values of Parquet, and what is odd about the file.
+    """Read the columns of a table, as text from CSV and as values from Parquet.
+
+    Returns
+    -------
+    columns : mapping of name to values
+    warnings : list of str
 
     Raises
     ------
     InputError
-        If the file is missing or not whole, or a column stands twice.
+        If the file is missing or incomplete, or a column occurs twice.
     """
     columns, odd = (_read_csv if path.suffix == ".csv" else _read_parquet)(path)
     return columns, odd + ignored_in(columns, path)
 
 
 def ignored_in(columns: Columns, path: Path) -> list[str]:
-    """Warnings of the columns that the format does not know."""
+    """Warnings about columns that the format does not know."""
     return [_ignored(path, name) for name in columns if name not in KNOWN]
 
 
 def _read_csv(path: Path) -> tuple[Columns, list[str]]:
-    """Columns of text, and what is odd about the file."""
+    """Columns of text, and warnings."""
     try:
         text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
@@ -44,14 +49,14 @@ def _read_csv(path: Path) -> tuple[Columns, list[str]]:
     except UnicodeDecodeError as error:
         raise _not_whole(path, error) from None
     columns = columns_of(text, path)
-    # Half a number is a number too, so a cut in the last one shows only in the missing line end.
+    # Half a number is a number, too: if the file was cut there, only the line end is missing.
     whole = text.endswith(("\n", "\r"))
     odd = [] if whole else [f"{path}: the last line does not end; check that it is whole"]
     return columns, odd
 
 
 def columns_of(text: str, path: Path) -> Columns:
-    """Columns of the text of a CSV table; `path` is what messages call it."""
+    """Columns of the text of a CSV table; errors name `path`."""
     try:
         reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
         lines = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
@@ -77,7 +82,7 @@ def _not_whole(path: Path, error: Exception) -> InputError:
 
 
 def _read_parquet(path: Path) -> tuple[Columns, list[str]]:
-    """Columns of whatever Python makes of them; those that are not known are not looked at."""
+    """Columns of Python values, and no warnings; unknown columns are not read."""
     with whole_parquet(path) as file:
         names = [str(name) for name in file.schema_arrow.names]
         check_names(names, path)

@@ -22,8 +22,8 @@ Array = NDArray[np.float64]
 class Campaign:
     """One calibration session of one sensor, in SI; n static holds in order of acquisition.
 
-    Holds that are left out of every fit stand in `excluded` alone. So nothing takes them in by
-    mistake, and `hold` and `whole` still know of them.
+    Holds that are left out of every fit are in `excluded` only. So no calculation uses them by
+    mistake, while `hold` and `whole` still know them.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class Campaign:
     time, temperature, vibration, yaw : (n,) arrays in s, °C, m/s², rad, optional
     nominal_scale, nominal_offset : (3,) arrays with unit "counts", f = (raw − offset) · scale
     full_range : float, m/s², optional, the sensor measures ± this
-    log : LogLayout, optional, how the log was read that the campaign was made of
+    log : LogLayout, optional, layout of the log from which the campaign was made
     excluded : Campaign, optional, the holds that were left out, with the same columns
     reasons : mapping of int to str, why, by position
     warnings : tuple of str, what was ignored when the campaign was read
@@ -85,7 +85,7 @@ class Campaign:
     @property
     def hold(self) -> HoldConditions:
         """What is known of the holds besides the forces, as the effects take it."""
-        # What came before a hold came before it, whether it is used or not.
+        # The position before a hold acts on it, whether that position is used or not.
         whole, used = self._rows()
         session = HoldConditions(time=whole.get("time"), temperature=whole.get("temperature"))
         session = session.with_steps(whole["forces"]).take(np.flatnonzero(used))

@@ -29,7 +29,8 @@ SIGNED_PERMUTATIONS = tuple(
 )
 """What the channels x, y, z show: axis 1, 2 or 3 with a sign; the first is the right one."""
 NEAR = 2.0
-"""How many times as far from the ideal sensor as the best axes others may be, to be tried."""
+"""Axes are tried if their distance from the ideal sensor is at most this many times the smallest
+distance of any axes."""
 
 
 @register
@@ -64,10 +65,10 @@ class AxisError(GrossError):
         return _turned(campaign, _matrix(shown))
 
     def mendings(self, campaign: Campaign, sensor: RealSensor) -> Iterator[Mending]:
-        """Undo each of the 47 that could be meant; gravity alone sees none of them."""
+        """Undo each of the 47 that are likely; without a robot none of them shows."""
         if sensor.expected is None:
             return
-        # What the ideal sensor reads tells the axes well enough, and all 48 at once.
+        # An ideal sensor is near enough to compare all 48 quickly.
         misses = {}
         for axes in SIGNED_PERMUTATIONS:
             distance = np.linalg.norm(campaign.forces @ _matrix(axes) - sensor.expected, axis=1)
@@ -87,13 +88,13 @@ def _matrix(shown: Sequence[float]) -> Array:
 
 
 def _turned(campaign: Campaign, matrix: Array) -> Campaign:
-    """Return the campaign with f → P f; columns are taken, so that no digit changes."""
+    """Return the campaign with f → P f; columns are reordered, not summed, so no digit changes."""
     axes = np.argmax(np.abs(matrix), axis=1)
     return with_readings(campaign, lambda values: matrix[range(3), axes] * values[:, axes])
 
 
 def _changes(shown: Sequence[float]) -> tuple[int, int]:
-    """Number of channels that are wrong, those from another axis first."""
+    """Number of channels that show another axis, and of those with the wrong sign."""
     return (
         sum(abs(axis) != i for i, axis in enumerate(shown, 1)),
         sum(axis < 0 for axis in shown),
@@ -101,7 +102,7 @@ def _changes(shown: Sequence[float]) -> tuple[int, int]:
 
 
 def _reason(matrix: Array) -> str:
-    """Say how the axes are read, from the matrix that turns them right."""
+    """Say which axes are wrong, from the matrix that mends them."""
     axes, signs = np.argmax(np.abs(matrix), axis=1), matrix.sum(axis=1)
     words = ", ".join(
         f"{axis} is read as {'−' if sign < 0 else ''}{'xyz'[other]}"

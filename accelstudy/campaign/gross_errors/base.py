@@ -1,6 +1,6 @@
 """What a gross error is, and the registry of gross errors.
 
-A gross error is not an effect of the sensor or of the rig: the data is not what it says it is.
+A gross error is no effect of the sensor or of the rig: the data are not what the file says.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ Array = NDArray[np.float64]
 
 EVERYWHERE = 0
 SINGLE = (1, 2)
-"""Ranks of what is wrong in all positions alike, and of what is in single ones: rows that are not
-exchanged may be wrong by themselves."""
+"""Ranks of errors in all positions alike, and of errors in single positions. Exchanged rows are
+looked for first: a row that was not exchanged may still be wrong by itself."""
 READINGS = {"forces": False, "sd": True, "slope": False, "sd_slope": True}
-"""Columns with what the sensor reads, and whether they are sds, which have no sign."""
+"""Columns of what the sensor reads, and whether they are sds, which have no sign."""
 
 
 @dataclass(frozen=True)
@@ -36,9 +36,9 @@ class Mending:
     Attributes
     ----------
     reason : str, what is wrong, in words
-    campaign : Campaign, as it would have been right
-    matrix : (3, 3) array, turns forces as they were read into mended ones, where it is not I
-    changed : (n,) bool array, which positions would be others, where it is not all of them
+    campaign : Campaign, mended
+    matrix : (3, 3) array, turns forces as they were read into mended ones; None if it is I
+    changed : (n,) bool array, which positions change; None if all do
     left_out : tuple of int, positions that cannot be mended
     """
 
@@ -50,14 +50,14 @@ class Mending:
 
 
 class GrossError(WithSettings):
-    """One gross error; subclasses say what it does to a campaign, and draw what is left open.
+    """One gross error; subclasses say what it does to a campaign, and draw settings left open.
 
-    A setting whose default is NaN is open: it is drawn for the campaign at hand.
+    A setting whose default is NaN is open: if it is not given it is drawn for the campaign.
 
     Attributes
     ----------
     equation : str, what it does, for people
-    rank : int, when it is looked for: those of all positions alike first, together
+    rank : int, when it is looked for: errors in all positions alike come first, together
     """
 
     kind = "gross error"
@@ -66,27 +66,27 @@ class GrossError(WithSettings):
     rank: ClassVar[int]
 
     def drawn(self, campaign: Campaign, rng: np.random.Generator) -> Self:
-        """Return the same error with all that was open drawn for a campaign."""
+        """Return the same error with every open setting drawn for a campaign."""
         raise NotImplementedError
 
     def act(self, campaign: Campaign) -> Campaign:
-        """Return the campaign with the error; nothing is open any more."""
+        """Return the campaign with the error; no setting may be open."""
         raise NotImplementedError
 
     def mendings(self, campaign: Campaign, sensor: RealSensor) -> Iterator[Mending]:
-        """Ways to undo the error, the simplest first; `sensor` fits most of the campaign."""
+        """Ways to undo the error, the simplest first; `sensor` was fitted to most positions."""
         raise NotImplementedError
 
     def apply(self, campaign: Campaign, rng: np.random.Generator) -> Campaign:
-        """Draw what is open, and act."""
+        """Draw the open settings, and act."""
         return self.drawn(campaign, rng).act(campaign)
 
     def is_open(self, *names: str) -> bool:
-        """Whether none of the settings is given."""
+        """Whether none of these settings is given."""
         return all(math.isnan(self.settings[name]) for name in names)
 
     def row(self, campaign: Campaign, setting: str) -> int:
-        """Row of the position that a setting names."""
+        """Row of the position that a setting gives."""
         found = np.flatnonzero(campaign.positions == self.settings[setting])
         if not len(found):
             raise InputError(
@@ -115,7 +115,7 @@ def register(error: GrossErrorClass) -> GrossErrorClass:
 
 
 def with_readings(campaign: Campaign, change: Callable[[Array], Array]) -> Campaign:
-    """Change all that the sensor reads, (n, 3) columns, likewise."""
+    """Apply a change to all columns of what the sensor reads, (n, 3) each."""
     columns: dict[str, Any] = {
         name: np.abs(change(values)) if is_sd else change(values)
         for name, is_sd in READINGS.items()

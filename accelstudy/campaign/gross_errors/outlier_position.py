@@ -16,17 +16,17 @@ from accelstudy.campaign.gross_errors.base import SINGLE, GrossError, Mending, r
 from accelstudy.campaign.gross_errors.real_sensor import LOST, RealSensor
 
 SIZE = 0.1
-"""m/s², of an error that is drawn."""
+"""m/s², size of an error whose direction is drawn."""
 PART = 8
-"""One of so many positions may be bumped; of more, something else is wrong."""
+"""At most one of so many positions may be bumped; if more are off, something else is wrong."""
 
 
 @register
 class OutlierPosition(GrossError):
     """The mean of one position is wrong by a vector e.
 
-    The position is drawn if it is not given, and so is the direction of e, of `SIZE`, if none of
-    its components is; those that are missing beside others are zero.
+    The position is drawn if it is not given. If no component of e is given, its direction is drawn
+    and its size is `SIZE`; if some are given, the others are zero.
     """
 
     name = "outlier_position"
@@ -56,7 +56,7 @@ class OutlierPosition(GrossError):
         return replace(campaign, forces=forces)
 
     def mendings(self, campaign: Campaign, sensor: RealSensor) -> Iterator[Mending]:
-        """Leave out positions that are so wrong that a calibration would not bear them."""
+        """Leave out positions that are so wrong that they would spoil a calibration."""
         far = sensor.wrong & (sensor.distance > LOST * sensor.gravity)
         bumped = tuple(campaign.positions[far].tolist())
         if not sensor.tells or not 0 < len(bumped) <= campaign.n_positions // PART:

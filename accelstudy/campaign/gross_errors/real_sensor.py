@@ -1,8 +1,7 @@
 """How well a real sensor can fit a campaign: what gross errors are judged by.
 
-A real sensor is within some hundredths of an ideal one, before any calibration. So the fit starts
-at the ideal sensor and stays about it, however many positions there are, and positions that are
-far off have no weight in it.
+Even before calibration a real sensor differs from an ideal one by some hundredths of g only. So
+the fit starts at the ideal sensor and stays near it, and positions that are far off get no weight.
 """
 
 from __future__ import annotations
@@ -20,15 +19,16 @@ Array = NDArray[np.float64]
 USUAL = 0.3
 """Standard deviation of each parameter of an uncalibrated sensor, as a share of gravity."""
 CLEARLY = 4.0
-"""How many times better an explanation must fit; as many times the usual distance are too far."""
+"""How many times better an explanation must fit to be clear. A position that is farther off than so
+many times the usual distance is wrong."""
 LOST = 0.15
-"""Share of gravity beyond which no sensor of any use is off."""
+"""Share of gravity by which no usable sensor is wrong."""
 LEAST = 1e-6
-"""Distance, as a share of gravity, below which all are alike."""
+"""Distance, as a share of gravity, below which differences do not count."""
 SPARE = 3
-"""Positions beside the numbers that are fitted, with which a wrong one is noticed."""
+"""Positions beyond the number of fitted parameters that are needed to notice a wrong one."""
 STEPS = 40
-"""Iterations at most."""
+"""Largest number of iterations."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class RealSensor:
     expected : (n, 3) array, m/s², what it reads in each position; None where only the norm is known
     distance : (n,) array, m/s², of each reading from what it should be
     gravity : float, m/s²
-    tells : bool, whether there are enough positions to tell which of them are wrong
+    tells : bool, whether there are enough positions to say which of them are wrong
     """
 
     expected: Array | None
@@ -55,7 +55,7 @@ class RealSensor:
 
     @property
     def misfit(self) -> float:
-        """Mean distance, m/s²; beyond `LOST` a position is wrong, and how far does not matter."""
+        """Mean distance, m/s²; a position beyond `LOST` counts as `LOST`, however far off it is."""
         return float(np.mean(np.minimum(self.distance, LOST * self.gravity)))
 
     @property
@@ -71,7 +71,7 @@ class RealSensor:
         ----------
         campaign : Campaign
         attitude : bool, whether to compare with the robot's attitudes, or with gravity alone
-        mounted : bool, whether the sensor may be mounted in any way, and be wrong by anything
+        mounted : bool, whether the sensor may be mounted in any attitude, with errors of any size
         """
         g, conditions = campaign.gravity, _conditions(campaign)
         if not attitude:
@@ -104,7 +104,7 @@ def _tells(design: Array) -> bool:
 
 
 def _conditions(campaign: Campaign) -> list[Array]:
-    """Temperature and time from −1 to 1: of what drifts with them no position is to be blamed."""
+    """Temperature and time, scaled to −1 … 1: a drift with them is not the fault of a position."""
     found = []
     for values in (campaign.temperature, campaign.time):
         if values is not None and np.ptp(values) > 0:
@@ -113,11 +113,11 @@ def _conditions(campaign: Campaign) -> list[Array]:
 
 
 def _robust(design: Array, lacking: Array, share: float) -> Array:
-    """Fit X p ≈ y with weights that far positions lose; returns X p, (n, k).
+    """Fit X p ≈ y robustly and return X p, (n, k); positions that are far off lose their weight.
 
-    The parameters count like one more observation for each position: with `share` as their standard
-    deviation, where an observation has the usual distance. So they remain small as long as the
-    usual distance is not.
+    Each parameter is held near zero, as if it had been observed in each position with the standard
+    deviation `share`, where the standard deviation of an observation is the usual distance. So the
+    parameters become large only if the usual distance is large.
     """
     n, u = design.shape
     start: Array = np.zeros((u, lacking.shape[1]))

@@ -1,7 +1,7 @@
-"""Gross errors that make all else meaningless are recognised by trying what would mend them.
+"""Recognise gross errors that make all else meaningless, by trying what would mend them.
 
-A real sensor fits its robot, or gravity, within some hundredths of g before any calibration; a
-wrong unit, a swapped axis or exchanged rows do not.
+Even before calibration a real sensor agrees with its robot, or with gravity, within some hundredths
+of g. Data in a wrong unit, with swapped axes or exchanged rows do not.
 """
 
 from __future__ import annotations
@@ -29,13 +29,14 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 TOGETHER = 4
-"""Gross errors of a rank that one campaign may have."""
+"""Largest number of gross errors of one rank that are looked for in a campaign."""
 GROSS = 0.1
-"""Share of gravity that some position is off by, or no unit and no axis is wrong."""
+"""Share of gravity: if no position is farther off, no unit and no axis can be wrong."""
 SHOWS = 0.005
-"""Share of gravity by which single positions have to be wrong."""
+"""Share of gravity by which a single position must be off to be called wrong."""
 AS_GOOD = 1.25
-"""Ratio of distances up to which two explanations fit equally well; the simpler one is taken."""
+"""Two explanations whose distances differ by less than this factor fit equally well; the simpler
+one is taken."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ class Recognised:
 
     @property
     def named(self) -> tuple[tuple[str, int | None], ...]:
-        """What they are called, each once, and each bumped position with its number."""
+        """Names of the errors, each once, and the number of each bumped position."""
         found: dict[tuple[str, int | None], None] = {}
         for name, mending in self.errors:
             found |= dict.fromkeys((name, position) for position in mending.left_out or (None,))
@@ -59,12 +60,12 @@ class Recognised:
 
     @property
     def name(self) -> str:
-        """What the first is called."""
+        """Name of the first error."""
         return self.errors[0][0]
 
     @property
     def reasons(self) -> dict[str, str]:
-        """What is wrong, in words, by what it is called."""
+        """What is wrong, in words, by the names of the errors."""
         found: dict[str, list[str]] = {}
         for name, mending in self.errors:
             found.setdefault(name, []).append(mending.reason)
@@ -77,7 +78,7 @@ class Recognised:
 
     @property
     def mended(self) -> Campaign:
-        """The campaign as it would have been right."""
+        """The campaign with its errors undone."""
         return self.errors[-1][1].campaign
 
     @property
@@ -90,11 +91,12 @@ class Recognised:
 def recognise(campaign: Campaign, approach: Approach) -> Recognised | None:
     """Recognise wrong units, swapped axes, exchanged rows and bumped positions, if they are gross.
 
-    Without the angles of a robot axes and rows cannot be wrong: the norm of gravity is the same.
+    Without the angles of a robot, swapped axes and exchanged rows do not show: they leave the norm
+    of the force as it is.
 
     Returns
     -------
-    Recognised; None if all looks right
+    Recognised, or None if nothing looks wrong
 
     Raises
     ------
@@ -103,11 +105,11 @@ def recognise(campaign: Campaign, approach: Approach) -> Recognised | None:
     """
     errors: list[tuple[str, Mending]] = []
     mended = campaign
-    # The norm tells the unit of the forces, however wrong their axes are.
+    # The norm shows a wrong unit even if the axes are wrong, so gravity comes before the attitudes.
     for attitude in (False, True)[: 1 + (approach.uses_angles and campaign.angles is not None)]:
         errors += _errors(EVERYWHERE, mended, attitude)
         mended = errors[-1][1].campaign if errors else campaign
-    # A sensor that is mounted in its own way is no reason to reorder its positions.
+    # A sensor that is mounted askew is no reason to reorder its positions.
     mounted = _is_mounted(mended, attitude)
     for rank in SINGLE:
         errors += _errors(rank, mended, attitude, mounted)
@@ -119,7 +121,7 @@ def recognise(campaign: Campaign, approach: Approach) -> Recognised | None:
 def _errors(
     rank: int, campaign: Campaign, attitude: bool, mounted: bool = False
 ) -> list[tuple[str, Mending]]:
-    """Gross errors of a rank: the one whose mending helps most, until nothing helps clearly."""
+    """Gross errors of a rank: the one whose mending helps most first, until none helps clearly."""
     errors: list[tuple[str, Mending]] = []
     kind = [error for error in map(get_gross_error, gross_error_names()) if error.rank == rank]
     sensor = RealSensor.of(campaign, attitude, mounted)
@@ -150,7 +152,7 @@ def _is_mounted(campaign: Campaign, attitude: bool) -> bool:
 
 
 def _clear(mending: Mending, before: RealSensor, after: RealSensor) -> bool:
-    """Whether a mending makes clearly better what was clearly wrong."""
+    """Whether a mending clearly improves what was clearly wrong."""
     if mending.left_out:
         return True
     if mending.changed is None:
@@ -160,7 +162,7 @@ def _clear(mending: Mending, before: RealSensor, after: RealSensor) -> bool:
 
 
 def _check_norm(campaign: Campaign) -> None:
-    """Raise `InputError` if forces are not as large as gravity but for what a bad sensor does."""
+    """Raise `InputError` if the forces differ from gravity by more than even a bad sensor does."""
     norm = float(np.median(np.linalg.norm(campaign.forces, axis=1)))
     if not 0.5 < norm / campaign.gravity < 2:
         raise InputError(

@@ -24,18 +24,18 @@ from accelstudy.campaign.gross_errors.base import (
 from accelstudy.campaign.gross_errors.real_sensor import CLEARLY, LOST, RealSensor
 
 APART = 1.0
-"""m/s², by which the forces of positions differ that are drawn to be exchanged."""
+"""m/s², smallest difference between the forces of two positions that are drawn to be exchanged."""
 LEAST = 0.005
-"""Share of gravity by which an exchange of rows has to show."""
+"""Share of gravity by which an exchange of rows must improve the fit."""
 SHOWN = 20
-"""Positions that are told of those that are exchanged."""
+"""Largest number of exchanged positions that a message names."""
 EXCHANGED = 1000
-"""Rows that may belong elsewhere, at most; where more do not fit, it is not their order."""
+"""Largest number of rows that are reordered; if more do not fit, their order is not the cause."""
 
 
 @register
 class RowOrder(GrossError):
-    """The readings of the sensor in two positions are exchanged; all else stays where it was.
+    """The readings of the sensor in two positions are exchanged; all other columns stay.
 
     Both positions are drawn if neither is given.
     """
@@ -67,14 +67,14 @@ class RowOrder(GrossError):
         return _ordered(campaign, order)
 
     def mendings(self, campaign: Campaign, sensor: RealSensor) -> Iterator[Mending]:
-        """Give each row that does not fit to the position where it fits; any number of them."""
+        """Move each row that does not fit to the position where it fits; any number of rows."""
         if sensor.expected is None or not sensor.tells:
             return
         lost = sensor.usual > LOST * sensor.gravity
         wrong = np.flatnonzero(sensor.wrong | lost)
         if not 1 < len(wrong) <= EXCHANGED:
             return
-        # Repeated attitudes could be exchanged at will, so an exchange has to gain something.
+        # Rows in the same attitude could be exchanged at will, so an exchange must gain something.
         least = min(CLEARLY * sensor.usual, LEAST * sensor.gravity)
         cost = campaign.forces[wrong][:, None] - sensor.expected[wrong][None]
         order = np.arange(campaign.n_positions)
@@ -100,7 +100,7 @@ def _places(cost: Array, least: float) -> NDArray[np.int_]:
     Parameters
     ----------
     cost : (s, s) array, distance of each row (first index) from what each position should read
-    least : float, that an exchange has to gain
+    least : float, that an exchange must gain
     """
     stay = np.arange(len(cost))
     total = cost**2 + least**2 * (1 - np.eye(len(cost)))

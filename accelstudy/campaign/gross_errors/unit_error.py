@@ -23,7 +23,7 @@ from accelstudy.campaign.gross_errors.base import (
 from accelstudy.campaign.gross_errors.real_sensor import RealSensor
 
 NEAR = 0.8
-"""Share of gravity to which a sensor comes, at worst, in the right unit."""
+"""Share of gravity that even a bad sensor reads in the right unit."""
 
 
 @register
@@ -59,7 +59,7 @@ class UnitError(GrossError):
         return campaign
 
     def mendings(self, campaign: Campaign, sensor: RealSensor) -> Iterator[Mending]:
-        """Take the forces, or the angles, for numbers in another unit."""
+        """Convert the forces, or the angles, as if they were in another unit."""
         norm = float(np.median(np.linalg.norm(campaign.forces, axis=1))) / campaign.gravity
         for said in ("g", "m/s^2") if campaign.unit == "g" else ("m/s^2", "g"):
             for unit, factor in _other_units("m/s^2", SENSOR_UNITS, said).items():

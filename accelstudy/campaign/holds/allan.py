@@ -1,8 +1,8 @@
-"""The Allan deviation, and from it how well the mean of a hold is known.
+"""The Allan deviation, and how well it says the mean of a hold is known.
 
-Samples of a real sensor are not independent: the mean of n of them is less certain than their
-standard deviation over √n. The Allan deviation at an averaging time τ is that of means over τ,
-whatever the colour of the noise; for white noise the two agree.
+Samples of a real sensor are not independent, so the mean of n samples is less certain than their
+standard deviation over √n. The Allan deviation at an averaging time τ measures the scatter of means
+over τ for noise of any colour. For white noise both agree.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 RELIABLE = 10
-"""Independent differences of neighbouring means behind a value that is trusted (about 20 %)."""
+"""Independent differences of neighbouring means that a trusted value needs (it is right to about
+20 %)."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ class AllanDeviation:
 
 @dataclass(frozen=True)
 class AllanMoments:
-    """What one record contributes to the Allan variance, whatever the direction that is asked for.
+    """What one record contributes to the Allan variance, for any direction.
 
     Attributes
     ----------
@@ -65,7 +66,7 @@ class AllanMoments:
     independent: NDArray[np.int_]
 
     def up_to(self, factor: float) -> AllanMoments:
-        """Return what the shorter averages contribute; the shortest one stays."""
+        """Return the contributions of the shorter averages; the shortest one always stays."""
         k = max(1, int(np.searchsorted(self.factors, factor, side="right")))
         return AllanMoments(
             self.factors[:k], self.squares[:k], self.terms[:k], self.independent[:k]
@@ -92,7 +93,7 @@ def allan_moments(samples: ArrayLike) -> AllanMoments:
 
 
 class AllanSums:
-    """What the records of one sensor contribute to its Allan variance; records may be short."""
+    """Sums over the records of one sensor for its Allan variance; records may be short."""
 
     def __init__(self, channels: int = 3) -> None:
         self._squares: dict[int, Array] = {}
@@ -143,10 +144,10 @@ class MeanAccuracy:
     Attributes
     ----------
     duration : float, s, of the hold
-    white : float, what white noise would give: sd / √n
-    allan : float, from the Allan deviation at `duration`
+    white : float, standard deviation of the mean for white noise: sd / √n
+    allan : float, the same from the Allan deviation at `duration`
     tau : float, s, largest averaging time that the data determine
-    slope : float, d log σ / d log τ by which `allan` was carried on from `tau` to `duration`;
+    slope : float, d log σ / d log τ by which `allan` was extrapolated from `tau` to `duration`;
         None if that was not necessary
     """
 
@@ -158,7 +159,7 @@ class MeanAccuracy:
 
     @property
     def ratio(self) -> float:
-        """By how much white noise would have been too optimistic."""
+        """Factor by which the assumption of white noise is too optimistic."""
         return self.allan / self.white
 
 
@@ -166,8 +167,8 @@ def accuracy_of_mean(curve: AllanDeviation, duration: float, sd: float, n: int) 
     """Standard deviation of a mean over `duration`, averaged over the channels.
 
     Beyond the largest averaging time with at least `RELIABLE` independent differences the curve is
-    carried on with the slope of its last two octaves, though neither steeper than white noise
-    (−1/2) nor than a random walk (+1/2).
+    extrapolated with the slope of its last two octaves. The slope is kept between that of white
+    noise (−1/2) and that of a random walk (+1/2).
 
     Parameters
     ----------
@@ -189,7 +190,7 @@ def accuracy_of_mean(curve: AllanDeviation, duration: float, sd: float, n: int) 
     x, y, weight = log_tau[last], log_sigma[last], curve.differences[usable][last]
     slope = -0.5
     if len(x) > 1:
-        # The variance of log σ goes as one over the independent differences.
+        # The variance of log σ is proportional to one over the independent differences.
         slope = float(np.clip(np.polyfit(x, y, 1, w=np.sqrt(weight))[0], -0.5, 0.5))
     level = np.average(y - slope * x, weights=weight)
     return MeanAccuracy(

@@ -1,8 +1,8 @@
 """Static holds in a log: where a sliding window varies no more than the noise of the sensor.
 
-The detector is that of Tedaldi, Pretto and Menegatti (ICRA 2014): the norm of the variances of the
-three axes in a window, against a threshold. The threshold comes from the data. The log is read
-twice, first for the threshold, then for the holds, and only a piece of it is in memory at a time.
+The detector is that of Tedaldi, Pretto and Menegatti (ICRA 2014): it compares the norm of the
+variances of the three axes in a window with a threshold, which comes from the data. The log is read
+twice, first for the threshold, then for the holds, and only a chunk of it is in memory at a time.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class DetectedHolds:
 
     Attributes
     ----------
-    number : (n,) int array, by which a person names a hold
+    number : (n,) int array, numbers that figures and options use
     start, end : (n,) int arrays, first sample, and the one after the last
     t0, t1 : (n,) arrays, s, times of the first and of the last sample since the first of the log
     n_samples : (n,) int array
@@ -65,8 +65,8 @@ class DetectedHolds:
     allan : AllanDeviation, of all holds together; channels: along the mean specific force of a
         hold, and twice across
     noise : (3,) array, m/s², root mean square sd of the samples within holds in these channels
-    center : (3,) array, m/s², from which the specific forces count; zero if the holds tell none
-    directed : bool, whether the means are near enough to forces for "along" to mean anything
+    center : (3,) array, m/s², zero point of the specific forces; zero if the holds determine none
+    directed : bool, whether the means are close enough to forces for "along" to have a meaning
     warnings : tuple of str
     """
 
@@ -133,7 +133,8 @@ def find_joint_holds(
 ) -> list[DetectedHolds]:
     """Find the static holds of sensors that were turned together.
 
-    They rest where all of them do: they are on one body, and so a hold has the same number for all.
+    The sensors are on one body. So a hold is where all of them rest, and has the same number for
+    all.
 
     Parameters
     ----------
@@ -142,12 +143,12 @@ def find_joint_holds(
         the samples at rest
     threshold : float, m/s², standard deviation of a window up to which it is at rest; chosen from
         the data of each sensor if omitted
-    trim : float, s, cut from both ends of a hold besides
-    shortest : float, s, of what is left
+    trim : float, s, cut off in addition at both ends of a hold
+    shortest : float, s, least length of what is left
     full_range : float, m/s², the sensors measure ± this
     selection : Selection, holds that a person leaves out or joins
-    one_each : bool, whether the logs are of several recordings with one position each, which is
-        the longest hold there and has the number of the recording
+    one_each : bool, whether the logs have several recordings with one position each: the longest
+        hold, which gets the number of the recording
 
     Returns
     -------
@@ -204,7 +205,7 @@ def find_joint_holds(
         if wandering[i]:
             warnings.append(
                 f"{counted(wandering[i], 'hold')} left out: the force changes there by more than "
-                "its noise, as the sensor turns slowly"
+                "its noise, since the sensor turns slowly"
             )
         found = {n: part for n, (_, parts) in numbers.items() if (part := parts[i]) is not None}
         if not found:
@@ -224,8 +225,8 @@ def find_joint_holds(
         spread = float(np.sqrt(np.mean(holds.noise**2)))
         if threshold is None and moves(chosen[i], holds.allan, spread, step, radius):
             why = (
-                f"what looks like rest varies by {chosen[i].floor:.3g} m/s², slowly, as a hand "
-                "does and no sensor's noise"
+                f"what looks like rest varies by {chosen[i].floor:.3g} m/s², slowly like a hand, "
+                "not like the noise of a sensor"
             )
             raise never_still(log, surveys[i], window, why)
         result.append(holds)
@@ -235,7 +236,7 @@ def find_joint_holds(
 def _numbers(
     groups: Sequence[tuple[int, list[Segment | None]]], one_each: bool
 ) -> dict[int, tuple[int, list[Segment | None]]]:
-    """Holds by their numbers: as they come, or the longest of each recording by its number."""
+    """Number the holds: in order, or the longest of each recording by the recording's number."""
     if not one_each:
         return dict(enumerate(groups, 1))
     longest: dict[int, tuple[int, list[Segment | None]]] = {}
@@ -253,7 +254,7 @@ def _holds(
     width: int,
     warnings: Sequence[str],
 ) -> DetectedHolds:
-    """Put together what the segments of a sensor say."""
+    """Collect the segments of a sensor."""
     used = [segment for number, segment in segments.items() if number not in left_out]
     if not used:
         raise InputError(f"{log.path}: exclude: no hold is left")
@@ -300,10 +301,10 @@ def _conditions(segments: Sequence[Segment], names: Sequence[str]) -> dict[str, 
 
 
 def _center(means: Array) -> tuple[Array, bool]:
-    """Point from which the means of holds are alike in size, and whether they are.
+    """Point from which all means of holds are equally far, and whether there is one.
 
-    Of counts the offset may be unknown, and with a large one no mean points along gravity. The
-    sphere through the means tells it, whatever was assumed, if the attitudes are not much alike.
+    The offset of counts may be unknown; with a large one no mean points along gravity. If the
+    attitudes differ enough, the sphere through the means shows it.
     """
     centers = [np.zeros(3)]
     if len(means) > 5 and (sphere := fit_sphere(means)) is not None:
@@ -321,8 +322,8 @@ def _center(means: Array) -> tuple[Array, bool]:
 def _frame(force: Array) -> Array:
     """Orthonormal columns, the first of them along `force`.
 
-    A sensor that settles or is nudged turns a little; gravity then moves across the mean specific
-    force, and along it only in the second order. What is left along it is the sensor's own noise.
+    A sensor that settles or is nudged turns a little. That moves the force across its mean, and
+    along it in the second order only. So the scatter along the mean is the sensor's own noise.
     """
     size = float(np.linalg.norm(force))
     if size == 0:

@@ -1,4 +1,4 @@
-"""Runs of windows at rest, collected into holds while the log passes by."""
+"""Runs of windows at rest, collected into holds while the log is read."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from accelstudy.campaign.logs.recording import Recording
 Array = NDArray[np.float64]
 
 LONGEST_RECORD = 2**20
-"""Samples of a hold that are kept for the Allan deviation; what follows counts for the mean."""
+"""Samples of a hold that are used for the Allan deviation; later ones count for the mean only."""
 SATURATED = 0.05
-"""Share of the samples of a hold at the end of the scale that makes it useless."""
+"""A hold is useless if more than this share of its samples is at the end of the scale."""
 
 
 class GrowingHold:
     """A hold while it grows.
 
-    Its first `cut` samples are dropped as they come; its latest ones wait until later ones arrive,
-    as nobody knows yet which will be the last.
+    Its first `cut` samples are dropped. The latest `cut` samples wait until later ones arrive,
+    since they are dropped if the hold ends.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class GrowingHold:
         self._recorded = 0
 
     def grow(self, batch: Windows, chosen: slice) -> None:
-        """Take in the samples that follow, (k, 4 + c): time, forces, conditions."""
+        """Add the samples that follow, (k, 4 + c): time, forces, conditions."""
         rows = np.column_stack([batch.time, batch.forces, batch.conditions])[chosen]
         dropped = min(self._to_drop, len(rows))
         self._to_drop -= dropped
@@ -73,14 +73,14 @@ class GrowingHold:
         self.n += len(rows)
         forces = rows[:, 1:4]
         self._at_extremes += np.sum(forces == self._extremes[:, :, None, :], axis=2)
-        # What is converted from counts or g is rounded.
+        # Conversion from counts or g rounds.
         self._beyond += np.sum(np.abs(forces) >= self._range * (1 - 1e-9), axis=0)
         kept = rows[: max(0, LONGEST_RECORD - self._recorded), :4]
         self._record.append(kept.copy())
         self._recorded += len(kept)
 
     def finish(self) -> Segment:
-        """Sum the hold up; its samples are forgotten here, as those of all holds may not fit."""
+        """Reduce the hold to its sums; the samples of all holds may not fit into memory."""
         assert self._moments is not None
         record, self._record, self._waiting = np.concatenate(self._record), [], []
         time, forces = record[:, 0], record[:, 1:]
@@ -100,7 +100,8 @@ class GrowingHold:
     def saturated(self) -> bool:
         """Whether samples pile up at the end of the scale, or lie at the sensor's range.
 
-        A coarse but sound sensor reaches its largest value too, though less often than the next.
+        A coarse sensor that is not saturated reaches its largest value, too, but less often than
+        the next one.
         """
         end, beside = self._at_extremes[:, 0], self._at_extremes[:, 1]
         piled = (end > SATURATED * self.n) & (end > beside)
@@ -116,7 +117,7 @@ def runs_at_rest(
     full_range: float = np.inf,
     advance: Callable[[float], None] = lambda done: None,
 ) -> Iterator[list[GrowingHold]]:
-    """Runs of windows in which all sensors rest, cut at both ends; some have no samples left.
+    """Runs of windows in which all sensors rest, cut at both ends; a run may have no samples left.
 
     Parameters
     ----------
@@ -125,7 +126,7 @@ def runs_at_rest(
     largest : variance up to which a window of each sensor is at rest, (m/s²)²
     cut : int, samples cut off at both ends
     extremes, full_range : as of `GrowingHold`, `extremes` for each sensor
-    advance : callable, is told how many windows were looked at
+    advance : callable, gets the number of windows that were processed
     """
     holds: list[GrowingHold] | None = None
     piece = 0

@@ -1,4 +1,4 @@
-"""What is kept of the samples of one static hold: sums, so that its length does not matter."""
+"""The samples of one static hold, kept as sums, so that its length does not matter."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Moments:
-    """Number, mean and products of deviations from the mean, of rows of c numbers.
+    """Number, mean, and products of deviations from the mean of rows of c numbers.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class Segment:
     t0, t1 : float, s, times of the first and of the last sample
     moments : Moments, of time and forces, c = 4, s and m/s²
     conditions : (3, k) array, number, sum and sum of squares of what else was measured
-    noise, wobble : tuples of AllanMoments, of the forces, and of what they leave about a straight
+    noise, wobble : tuples of AllanMoments, of the forces, and of their residuals about a straight
         line in time; one for each uninterrupted part
     """
 
@@ -94,7 +94,7 @@ class Segment:
         return float(np.linalg.norm(np.diag(self.covariance)))
 
     def __add__(self, later: Segment) -> Segment:
-        """Both holds as one; what lies between them does not belong to it."""
+        """Both holds as one, without the samples between them."""
         return Segment(
             self.start,
             later.end,

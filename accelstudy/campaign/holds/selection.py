@@ -1,4 +1,4 @@
-"""Holds that a person leaves out or joins, by their numbers in the figure or by time."""
+"""Holds that the user leaves out or joins, by their numbers in the figure or by time."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _BY_TIME = re.compile(_SPAN.pattern + r":\s*(\S.*?)\s*")
 
 @dataclass(frozen=True)
 class Selection:
-    """What is left out, and what is joined; numbers are those of the holds as they are found.
+    """Holds to leave out and to join, by the numbers that the detector gave them.
 
     Attributes
     ----------
@@ -44,8 +44,8 @@ class Selection:
         Raises
         ------
         InputError
-            If there is no such hold, fewer than two in a span of time, others lie between, or they
-            have not one attitude.
+            If there is no such hold, a span of time has fewer than two, others lie between, or
+            their attitudes differ.
         """
         holds = dict(found)
         groups = list(self.joined)

@@ -1,4 +1,4 @@
-"""How well the slope of the samples within a hold is known, when they are not independent."""
+"""How well the slope of the samples within a hold is known if they are not independent."""
 
 from __future__ import annotations
 
@@ -13,18 +13,20 @@ from accelstudy.campaign.holds.segments import Segment
 Array = NDArray[np.float64]
 
 SHARE = 8.0
-"""A hold's length over the averaging times that are taken of what a line leaves of it."""
+"""Length of a hold over the longest averaging time that its residuals about a line are used for."""
 
 
 def slope_sigmas(segments: Sequence[Segment], step: float) -> Array:
     """Standard deviations of the slopes of the axes in holds, (n, 3), m/s²/s.
 
-    A slope over T is told by the difference of the two halves. For white noise the least-squares
-    slope has σ = √6 σ_A(T/2) / T with the Allan deviation σ_A; for flicker noise and a random walk
-    the same is right within some 10 %. σ_A is that of the samples about the line of their own hold,
-    so that slopes do not count as noise, over all holds together. The line takes the slowest noise
-    with it; so of each hold only averaging times up to an eighth of it are used. What is longer is
-    known from the long holds, or carried on: the noise of a sensor is slower in a long hold.
+    The slope over a time T depends on the difference between its two halves. For white noise the
+    least-squares slope has σ = √6 σ_A(T/2) / T with the Allan deviation σ_A; for flicker noise and
+    a random walk this is right within some 10 %.
+
+    σ_A is that of the residuals about the line of each hold, over all holds together, so that
+    slopes do not count as noise. Since the line also absorbs the slowest noise, a hold contributes
+    only averaging times up to an eighth of its length. Longer ones come from longer holds, or are
+    extrapolated.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The sphere on which the readings of a sensor at rest lie, but for its smaller errors."""
+"""The sphere on which the readings of a sensor at rest lie, apart from its smaller errors."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ Array = NDArray[np.float64]
 
 
 def fit_sphere(forces: Array) -> tuple[Array, float] | None:
-    """Centre (3,) and radius of the sphere that fits points (n, 3) best; None if they tell none.
+    """Centre (3,) and radius of the sphere that fits points (n, 3) best; None if there is none.
 
     |f − c|² = r² is linear in c and in r² − |c|².
     """
-    # From their middle on, so that a large offset costs no digits.
+    # Relative to their mean, so that a large offset costs no digits.
     middle = forces.mean(axis=0)
     points = forces - middle
     design = np.column_stack([2 * points, np.ones(len(points))])

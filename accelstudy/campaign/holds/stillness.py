@@ -1,4 +1,4 @@
-"""Whether a sensor was still at all: what tells a hold from a quiet moment of a motion."""
+"""Whether a sensor was still at all, or only moved quietly for a moment."""
 
 from __future__ import annotations
 
@@ -12,19 +12,20 @@ from accelstudy.campaign.holds.threshold import Survey, Threshold
 from accelstudy.campaign.logs.recording import Recording
 
 WANDERING = 2.0
-"""Standard deviation over a whole hold, over the threshold of its windows, that no hold has."""
+"""A hold whose standard deviation is more than this many thresholds of a window is none."""
 RESTLESS = 0.02
-"""Noise of windows over gravity from which on it is doubtful whether it is the sensor's."""
+"""Noise of windows, as a share of gravity, from which on it may be motion and not the sensor's."""
 SLOW = 2.0
-"""Allan deviation over that of white noise from which on a motion is slow, as that of a hand."""
+"""Allan deviation, as a multiple of that of white noise, from which on a motion is slow, such as
+that of a hand."""
 SHORTEST = 0.2
-"""Seconds; motions that are quicker are vibrations, of which a mean is none the worse."""
+"""Seconds; quicker motions are vibrations, which do not harm a mean."""
 
 
 def wanders(segment: Segment, threshold: Threshold) -> bool:
-    """Whether the force changes within a run of still windows by more than any of them tells.
+    """Whether the force changes over a run of still windows by more than within each of them.
 
-    A sensor that turns slowly is nearly still in each window, and yet has no attitude.
+    A sensor that turns slowly is nearly still in each window, yet has no constant attitude.
     """
     return segment.variance > (WANDERING * threshold.sd) ** 2
 
@@ -32,10 +33,10 @@ def wanders(segment: Segment, threshold: Threshold) -> bool:
 def moves(
     threshold: Threshold, curve: AllanDeviation, noise: float, step: float, radius: float
 ) -> bool:
-    """Whether what the windows "at rest" show is motion: large beside gravity, and slow.
+    """Whether the windows "at rest" show motion: large compared with gravity, and slow.
 
-    The noise of a sensor at rest is below a few hundredths of gravity; a machine's vibration may be
-    more, but is quick, so that means are as good as those of white noise. What a body does is slow.
+    The noise of a sensor at rest is below a few hundredths of gravity. The vibration of a machine
+    may be larger, but it is quick and averages out like white noise. A human body moves slowly.
 
     Parameters
     ----------
@@ -55,7 +56,7 @@ def moves(
 
 
 def never_still(log: Recording, survey: Survey, window: float, why: str) -> InputError:
-    """Error that says that a sensor was never still."""
+    """Make the error for a sensor that was never still."""
     return InputError(
         f"{log.path}: the sensor was never still: {why}; the quietest hundredth of its windows "
         f"of {window:g} s varies by {survey.quietest():.3g} m/s². Lay it down for some seconds in "

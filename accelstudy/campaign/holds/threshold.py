@@ -18,9 +18,9 @@ from accelstudy.campaign.logs.recording import Recording
 Array = NDArray[np.float64]
 
 FACTOR = 3.0
-"""Threshold over noise floor; a sensor's noise differs between attitudes."""
+"""Threshold over noise floor; it leaves room for noise that differs between attitudes."""
 QUIET_FACTOR, QUIET = 10.0, 0.003 * STANDARD_GRAVITY
-"""The same for a quiet sensor, though only up to this, m/s²."""
+"""The same for a quiet sensor, and the largest threshold that it may give, m/s²."""
 
 _BINS = np.linspace(-40.0, 40.0, 4001)  # decades of variance
 
@@ -43,7 +43,7 @@ class Threshold:
 
 
 class Survey:
-    """What the first reading of a log finds."""
+    """What the first pass over a log finds."""
 
     def __init__(self) -> None:
         self.counts = np.zeros(len(_BINS) - 1, dtype=int)
@@ -53,7 +53,7 @@ class Survey:
         self.extremes = np.array([[[np.inf] * 3] * 2, [[-np.inf] * 3] * 2])
 
     def add(self, batch: Windows) -> None:
-        """Take in some windows, which follow those before."""
+        """Add windows, in their order."""
         self.gaps = batch.piece - batch.recording
         if not len(batch.time):
             return
@@ -71,7 +71,7 @@ class Survey:
         return float(10.0 ** (_BINS[min(rank, len(_BINS) - 2) + 1] / 2))
 
     def warnings(self) -> Iterator[str]:
-        """What is odd about the log."""
+        """What the user should know about the log."""
         if self.gaps:
             yield f"{counted(self.gaps, 'gap')} in time; no hold spans one"
         if self.frozen:
@@ -106,13 +106,14 @@ def given_threshold(sd: float) -> Threshold:
 
 
 def choose_threshold(survey: Survey, log: Recording) -> Threshold:
-    """Take a multiple of the noise floor: of the variance that windows at rest usually have.
+    """Choose a multiple of the noise floor, which is the usual noise of windows at rest.
 
-    Otsu's valley of the logarithmic variances parts rest from motion, though not sharply; at rest
-    they crowd around one value, while in motion they spread over decades.
+    Otsu's method finds the valley between rest and motion in the histogram of the logarithmic
+    variances. At rest they crowd around one value, the noise floor; in motion they spread over
+    decades.
 
-    The multiple is 3, as noise differs between attitudes, and up to 10 as long as the threshold is
-    below 0.003 g: a quiet sensor feels steps and pumps that come and go, and what moves by less
+    The multiple is 3, since noise differs between attitudes. It is up to 10 as long as the
+    threshold is below 0.003 g: a quiet sensor feels footsteps and pumps, and whatever moves less
     than that in a second is not being turned.
     """
     counts = survey.counts
@@ -120,7 +121,7 @@ def choose_threshold(survey: Survey, log: Recording) -> Threshold:
         raise InputError(f"{log.path}: a channel does not change in any window; is it frozen?")
     middle = (_BINS[:-1] + _BINS[1:]) / 2
     quiet = np.where(middle <= _otsu(counts, middle), counts, 0)
-    # Smoothed over a tenth of a decade, so that the few windows of a short log have a crowd too.
+    # Smoothed over a tenth of a decade, so that a short log with few windows has a peak, too.
     mode = middle[np.argmax(np.convolve(quiet, np.ones(5), "same"))]
     crowd = np.where(np.abs(middle - mode) <= np.log10(2), counts, 0)
     floor = 10.0 ** middle[np.searchsorted(np.cumsum(crowd), crowd.sum() / 2)]
@@ -135,11 +136,11 @@ def choose_threshold(survey: Survey, log: Recording) -> Threshold:
 
 
 def _otsu(counts: NDArray[np.int_], middle: Array) -> float:
-    """Value that parts a histogram in two with the largest variance between them."""
+    """Value that divides a histogram into two classes with the largest variance between them."""
     below = np.cumsum(counts)[:-1].astype(float)
     above = counts.sum() - below
     moment = np.cumsum(counts * middle)
-    # Empty classes have no mean, and no weight either.
+    # An empty class has no mean, and no weight.
     low = moment[:-1] / np.maximum(below, 1)
     high = (moment[-1] - moment[:-1]) / np.maximum(above, 1)
     between = below * above * (high - low) ** 2

@@ -24,7 +24,7 @@ def samples_in(log: Recording, window: float) -> int:
     Raises
     ------
     InputError
-        If they are too few to tell a variance, or too many to be meant.
+        If they are too few for a variance, or so many that the rate must be wrong.
     """
     samples = window / log.step
     if not _SMALLEST <= samples <= _LARGEST:
@@ -40,8 +40,8 @@ def samples_in(log: Recording, window: float) -> int:
 class Windows:
     """Neighbouring windows, one centred at each of m samples.
 
-    `piece` counts the gaps so far, `recording` the recordings that ended; `index` is the place of
-    the first of these samples in the log.
+    `piece` is the number of gaps so far, `recording` the number of recordings that ended, and
+    `index` the place of the first of these samples in the log.
     """
 
     piece: int
@@ -91,11 +91,11 @@ def windows(log: Recording, width: int) -> Iterator[Windows]:
 
 def _spread(forces: Array, width: int) -> tuple[Array, NDArray[np.bool_]]:
     """Norm of the variances of the axes in each window, and whether an axis does not change."""
-    # Running sums lose digits far from zero.
+    # Running sums of large numbers lose digits.
     offsets = forces - forces.mean(axis=0)
     sums, squares = (_window_sums(values, width) / width for values in (offsets, offsets**2))
     variance = np.maximum(squares - sums**2, 0.0)
-    # Rounding hides a variance of zero; counting does not.
+    # Rounding may hide a variance of zero, so changes are counted.
     changes = _window_sums(np.diff(forces, axis=0) != 0, width - 1)
     return np.sqrt(np.sum(variance**2, axis=1)), np.any(changes == 0, axis=1)
 

@@ -37,7 +37,7 @@ class ImportReport:
 
     @property
     def ratio(self) -> float | None:
-        """By how much white noise would have been too optimistic."""
+        """Factor by which the assumption of white noise is too optimistic."""
         return None if self.accuracy is None else self.accuracy.ratio
 
     def lines(self) -> list[str]:

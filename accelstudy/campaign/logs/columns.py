@@ -1,4 +1,4 @@
-"""Which columns of a file are which: as given, or by what they are usually called."""
+"""Find the columns of a file: as given, or by their usual names."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _KNOWN_NAMES = {
 def locate(
     source: Source, given: Mapping[str, Column], wanted: Sequence[str], needed: bool = True
 ) -> dict[str, int]:
-    """Places of the wanted columns: as given, by usual names, or the only three there are.
+    """Places of the wanted columns: as given, by their usual names, or the only three columns.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def locate(
 
 
 def _place(source: Source, key: str, column: Column) -> int:
-    """Place of a column; digits that a person wrote are a place, unless they are a name."""
+    """Place of a column; digits are a place, unless a column has them as its name."""
     names = source.names
     if source.named and isinstance(column, str) and column in names:
         if names.count(column) > 1:
@@ -94,9 +94,15 @@ def _place(source: Source, key: str, column: Column) -> int:
 def check_numbers(
     source: Source, places: Mapping[str, int], raw: Array, row: int = 0, gaps: Sequence[str] = ()
 ) -> None:
-    """Raise `InputError` at the first value of the rows from `row` on that is no usable number.
+    """Raise `InputError` at the first value that is no usable number.
 
-    The columns `gaps` may have cells without a number.
+    Parameters
+    ----------
+    source : Source
+    places : mapping of key to column, in the order of the columns of `raw`
+    raw : (k, len(places)) array
+    row : int, number of rows before these
+    gaps : sequence of str, columns that may have cells without a number
     """
     bad = ~(np.abs(raw) <= LARGEST)
     bad &= ~(np.isnan(raw) & np.isin(list(places), gaps))

@@ -1,8 +1,8 @@
-"""Raw accelerometer logs, read piece by piece, so that their size does not matter.
+"""Raw accelerometer logs, read in chunks, so that their size does not matter.
 
 A log is text (comma, semicolon, tab or blanks between numbers, with or without header and comment
-lines), a MATLAB file or a Parquet file. It gives times in s from its first sample on, and specific
-forces in m/s²; whatever is wrong with it is said in one line with the place where it stands.
+lines), a MATLAB file or a Parquet file. It gives times in s since its first sample, and specific
+forces in m/s². An error is one line with its place in the file.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ Array = NDArray[np.float64]
 CONDITIONS = ("temperature", "vibration")
 """Columns of a log besides time and forces."""
 GAP = 5.0
-"""A step of time this many times the usual one is a gap."""
+"""A step of time that is this many times the usual one is a gap."""
 _USUAL_RATE = 100.0
-"""1/s; of several units of time the one is likely that comes nearest to it."""
+"""1/s; of several units of time the likely one gives the rate nearest to it."""
 
 
 class Rows(NamedTuple):
@@ -41,7 +41,7 @@ class Rows(NamedTuple):
     time : (k,) array, s
     forces : (k, 3) array, m/s², in forward, right, down
     conditions : (k, c) array, °C or m/s², NaN where nothing is known
-    anew : bool, whether another recording begins here, so that no hold goes on
+    anew : bool, whether another recording begins here, so that no hold continues
     """
 
     time: Array
@@ -55,7 +55,7 @@ class Recording(Protocol):
 
     @property
     def path(self) -> Path:
-        """What messages name."""
+        """The file that messages name."""
         ...
 
     @property
@@ -73,7 +73,7 @@ class Recording(Protocol):
         ...
 
     def likely_unit(self) -> str:
-        """What to say where the rate is odd."""
+        """Hint for a message about an odd rate; empty if there is none."""
         ...
 
 
@@ -95,7 +95,7 @@ def open_log(
 
     Parameters
     ----------
-    path : file; .parquet, .mat (binary or ASCII), anything else is text, perhaps packed by gzip
+    path : file; .parquet, .mat (binary or ASCII), anything else is text, perhaps gzipped
     columns : mapping of "fx", "fy", "fz", "temperature" and "vibration" to columns; by their names
         in the header if omitted, or the only three columns there are. The last two may be absent.
     time : column of time; by its name in the header if omitted
@@ -168,7 +168,8 @@ class Log:
     conversion : Conversion, of forces to m/s², in the axes of the log
     frame : Frame, the axes of the log
     chunk_size : int, rows held in memory at a time
-    lively : bool, whether each channel must change; in one position that of a coarse sensor may not
+    lively : bool, whether each channel must change; in a single position, one of a coarse sensor
+        may be constant
     """
 
     path: Path
@@ -188,10 +189,10 @@ class Log:
 
     @cached_property
     def step(self) -> float:
-        """Usual time between two samples, s: the mean one of the first chunk, without gaps.
+        """Usual time between two samples, s: the mean over the first chunk, without gaps.
 
-        Steps may jitter or come in multiples of a clock's tick. So the middle one may be far from
-        the mean, and only the mean belongs to the number of samples.
+        Steps may jitter or be multiples of a clock's tick. So the median may be far from the mean,
+        and only the mean fits the number of samples.
         """
         if self.rate is not None:
             return 1.0 / self.rate
@@ -202,14 +203,14 @@ class Log:
 
     @cached_property
     def start(self) -> float:
-        """Time of the first sample as the file has it, s; NaN without a column of time."""
+        """Time of the first sample as written in the file, s; NaN without a column of time."""
         if self.rate is not None:
             return np.nan
         first = next(self.source.read([self.places["time"]], 1), np.full((1, 1), np.nan))
         return float(first[0, 0]) * self.time_factor
 
     def likely_unit(self) -> str:
-        """Unit of time with which the log has a usual rate, as a hint; empty if it has one."""
+        """Hint at the unit of time that would give a usual rate; empty if the rate is usual."""
         if self.rate is not None:
             return ""
         step = self.step / self.time_factor
@@ -228,8 +229,8 @@ class Log:
         Raises
         ------
         InputError
-            At a value that is no finite number, where time does not increase, and at the end if
-            there is nothing in the log or a channel is constant.
+            At a value that is no finite number and where time does not increase; at the end if the
+            log is empty or a channel is constant.
         """
         keys = list(self.places)
         axes = [keys.index(axis) for axis in AXES]
@@ -272,7 +273,7 @@ class Log:
 
 
 def usual_step(steps: Array) -> float:
-    """Mean of steps of time without those that are gaps, `GAP` times the mean or more."""
+    """Mean step of time, without gaps: steps of `GAP` times the mean or more."""
     kept = steps
     while True:
         mean = float(np.mean(kept))

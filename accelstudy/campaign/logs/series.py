@@ -1,4 +1,4 @@
-"""Several logs of one sensor, as where each position has a file of its own."""
+"""Several logs of one sensor, for example one file for each position."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class LogSeries:
         return self.parts[0].likely_unit()
 
     def chunks(self) -> Iterator[Rows]:
-        """Samples of all parts; where their times do not tell, one begins as the last one ends."""
+        """Samples of all parts; if their times do not tell, each begins where the last one ends."""
         end = 0.0
         for part in self.parts:
             start = part.start - self.parts[0].start if self.timed else end

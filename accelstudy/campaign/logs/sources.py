@@ -45,15 +45,15 @@ class Source(Protocol):
     def read(
         self, places: Sequence[int], chunk_size: int, clock: int | None = None
     ) -> Iterator[Array]:
-        """Rows of the columns at `places`, (k, len(places)), k > 0; NaN where no number stands.
+        """Rows of the columns at `places`, (k, len(places)), k > 0; NaN where there is no number.
 
-        The column at the place `clock` counts from its first value: time since 1970 in ns has more
-        digits than a float.
+        The column at the place `clock` counts from its first value, since a time in ns since 1970
+        has more digits than a float.
         """
         ...
 
     def look_up(self, row: int, place: int) -> tuple[str, str]:
-        """Where a row stands in the file, and what stands in one of its columns."""
+        """Describe where a row is in the file, and what its cell in a column says."""
         ...
 
 
@@ -83,7 +83,7 @@ def open_source(path: str | Path, variable: str | None = None) -> Source:
 
 
 class MatlabSource:
-    """An array of a MATLAB file, which is read as a whole: the format allows 2 GB at most."""
+    """An array of a MATLAB file; it is read as a whole, since the format allows 2 GB at most."""
 
     def __init__(self, path: Path, variable: str | None = None) -> None:
         self.path = path
@@ -101,7 +101,7 @@ class MatlabSource:
             array = loadmat(path, variable_names=[name])[name]
             if np.iscomplexobj(array):
                 raise InputError(f"{path}: array {name} has complex numbers")
-            # Few rows and many columns are a table that lies on its side.
+            # An array with few rows and many columns has the samples in its columns.
             self.values = array.T if array.shape[0] < array.shape[1] else array
         except InputError:
             raise
@@ -133,7 +133,7 @@ class MatlabSource:
 
 
 def open_parquet(path: Path) -> pq.ParquetFile:
-    """Open a file to be read page by page, as a group of rows may be all of it."""
+    """Open a file to be read page by page, since one group of rows may be the whole file."""
     return pq.ParquetFile(path, pre_buffer=False, buffer_size=_BUFFER)
 
 
@@ -186,7 +186,7 @@ class ParquetSource:
 
 
 def _numbers(column: pa.Array) -> NDArray[Any]:
-    """Numbers of a column, NaN where there is none; whole ones as they are."""
+    """Numbers of a column, NaN where there is none; whole numbers stay integers."""
     if column.null_count or not pa.types.is_integer(column.type):
         column = column.cast(pa.float64(), safe=False)
     return column.to_numpy(zero_copy_only=False)

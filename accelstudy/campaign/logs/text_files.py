@@ -1,4 +1,4 @@
-"""Numbers in lines of text, in whatever layout, perhaps packed by gzip."""
+"""Numbers in lines of text of any layout, perhaps gzipped."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from accelstudy.basics.errors import InputError
 Array = NDArray[np.float64]
 
 GZIP = b"\x1f\x8b"
-"""How a file begins that gzip packed."""
+"""First bytes of a gzipped file."""
 
 _PREVIEW = 65536  # characters of a text from which its layout is told
 _COMMENTS = "#%"
@@ -63,10 +63,10 @@ class TextSource:
         layout = _LAYOUTS[int(np.argmax(scores))]
         self.delimiter: str | None = layout[0]
         self.decimal = layout[1]
-        # Most lines are data; what stands before the first line like them is the header.
+        # Most lines are data; everything before the first such line is the header.
         usual = _most_frequent(len(split_line(row, self.delimiter)) for row in rows)
         alike = [row for row in rows if len(split_line(row, self.delimiter)) == usual]
-        # Text beside the numbers of a line is no harm.
+        # A line may hold text beside its numbers.
         numbers = max(1, _most_frequent(_count_numbers(row, layout) for row in alike))
         first = next(
             (
@@ -114,7 +114,7 @@ class TextSource:
                 for chunk in _chunks(reader):
                     if not len(chunk):
                         continue
-                    # A cell too many lands in the column after the last.
+                    # A surplus cell ends up in the column after the last.
                     if chunk[self.width].notna().any():
                         raise InputError(f"{self.path}: {self._odd_line()}")
                     columns = [_numbers(chunk[place]) for place in places]
@@ -133,7 +133,7 @@ class TextSource:
             raise InputError(f"{self.path}: {self._odd_line()}") from None
 
     def look_up(self, row: int, place: int) -> tuple[str, str]:
-        """See `Source`; reads the file anew, as only an error asks for it."""
+        """See `Source`; reads the file again, which only errors need."""
         number, line = next(islice(self.rows(), row, None), (0, ""))
         if not number:
             return f"row {row + 1}", "unreadable"
@@ -150,7 +150,7 @@ class TextSource:
                     yield number, line.rstrip("\n")
 
     def _open(self, skipped: int = 0) -> TextIO:
-        """Open the file behind some of its lines; a quotation mark in a header means nothing."""
+        """Open the file and skip some lines; quotation marks in a header have no meaning."""
         with self.path.open("rb") as start:
             packed = start.read(len(GZIP)) == GZIP
         if packed:
@@ -189,7 +189,7 @@ class TextSource:
 def since(values: NDArray[Any], zero: Any) -> Array:
     """Numbers as floats, counted from `zero` unless that is None.
 
-    Whole numbers are subtracted as such: since 1970 there have been more ns than a float counts.
+    Whole numbers are subtracted as integers: a time in ns since 1970 has more digits than a float.
     """
     if zero is None:
         return values.astype(float)
@@ -199,7 +199,7 @@ def since(values: NDArray[Any], zero: Any) -> Array:
 
 
 def _chunks(reader: Iterator[pd.DataFrame]) -> Iterator[pd.DataFrame]:
-    """Yield tables of a reader; where pandas would warn that it loses cells, raise that warning."""
+    """Yield tables of a reader; raise the warning that pandas gives where it loses cells."""
     while True:
         with warnings.catch_warnings():
             warnings.simplefilter("error", pd.errors.ParserWarning)
@@ -210,7 +210,7 @@ def _chunks(reader: Iterator[pd.DataFrame]) -> Iterator[pd.DataFrame]:
 
 
 def split_line(line: str, delimiter: str | None) -> list[str]:
-    """Cells of a line, without blanks around them and quotation marks."""
+    """Cells of a line, without surrounding blanks and quotation marks."""
     if '"' in line and delimiter is not None:
         try:
             row = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
@@ -245,7 +245,7 @@ def _most_frequent(counts: Iterator[int]) -> int:
 
 
 def _numbers(column: pd.Series) -> NDArray[Any]:
-    """Numbers of a column, NaN where there is none; whole ones as they are."""
+    """Numbers of a column, NaN where there is none; whole numbers stay integers."""
     if pd.api.types.is_bool_dtype(column):
         return np.full(len(column), np.nan)
     numbers = pd.to_numeric(column, errors="coerce")

@@ -1,4 +1,4 @@
-"""What is said of a calibration: one of four states, in plain words, and what to do next."""
+"""A calibration in words: how good it is, what limits it, and what to do next."""
 
 from __future__ import annotations
 
@@ -11,52 +11,18 @@ from accelstudy.basics.units import GON, attitude_unit, display_unit, to_attitud
 from accelstudy.basics.wording import comma_list, p_value, words
 from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.fit import CampaignFit
-from accelstudy.campaign.calibration.states import (
-    ACCEPTED,
-    BLIND,
-    IMPLAUSIBLE,
-    REJECTED,
-    UNCHECKED,
-)
+from accelstudy.campaign.calibration.states import BLIND, IMPLAUSIBLE, REJECTED
 from accelstudy.leveling.error import MAX_TILT_GON
-from accelstudy.sensors.plausibility import implausible_parameters, implausible_tilt
-
-
-def state(assessment: Assessment) -> str:
-    """Say in a word what becomes of a calibration; the first that holds.
-
-    `IMPLAUSIBLE` if no sensor has such parameters or the data look grossly wrong, `REJECTED` if
-    the residuals refute the stated noise, `UNCHECKED` if nothing could have refuted it, else
-    `ACCEPTED`.
-    """
-    test = assessment.fit.global_test
-    if warnings(assessment):
-        return IMPLAUSIBLE
-    if test is not None and not test.accepted:
-        return REJECTED
-    return UNCHECKED if test is None or test.powerless else ACCEPTED
-
-
-def warnings(assessment: Assessment) -> list[str]:
-    """Say what of a calibration can only be a gross error; nothing of a plausible one."""
-    fit = assessment.fit
-    said = implausible_parameters(fit.model.effects, fit.parameters, fit.sigma)
-    said += implausible_tilt(*assessment.tilt)
-    if assessment.gross_error is not None:
-        said.append(assessment.gross_error.reason)
-    return said
 
 
 def verdict_lines(assessment: Assessment) -> list[str]:
-    """Say whether the calibration is good, for what, and what limits it; the first comes first."""
-    fit = assessment.fit
-    lines = [*_implausible(assessment), *_consistency(fit)]
-    lines += _conflict(assessment)
-    judged = state(assessment)
-    if judged != IMPLAUSIBLE and np.isfinite(assessment.tilt).all():
+    """Say how good the calibration is, for what, and what limits it; the verdict comes first."""
+    fit, state = assessment.fit, assessment.state
+    lines = [*_implausible(assessment), *_consistency(fit), *_conflict(assessment)]
+    if state != IMPLAUSIBLE and np.isfinite(assessment.tilt).all():
         lines.append(_tilt(assessment))
-    if judged in (REJECTED, IMPLAUSIBLE) or assessment.suspects:
-        lines.append("What is wrong or missing, “accelstudy diagnose” may tell.")
+    if state in (REJECTED, IMPLAUSIBLE) or assessment.suspects:
+        lines.append("“accelstudy diagnose” looks for what is wrong or missing.")
     if not fit.approach.uses_angles:
         lines.append(BLIND)
     return lines
@@ -64,21 +30,25 @@ def verdict_lines(assessment: Assessment) -> list[str]:
 
 def next_steps(
     fit: CampaignFit,
-    judged: str,
+    state: str,
     campaign: str | Path = "CAMPAIGN",
     result: str | Path = "calibration.json",
 ) -> list[tuple[str, str]]:
-    """Say what to do next, most urgent first: what for, and the command.
+    """Say what to do next, most urgent first.
 
     Parameters
     ----------
     fit : CampaignFit
-    judged : str, its state
+    state : str, of the calibration
     campaign : path of the campaign's folder
     result : path of calibration.json
+
+    Returns
+    -------
+    list of (purpose, command)
     """
     diagnose = suggested.diagnose(campaign, fit.model.name, fit.approach.name, fit.campaign.name)
-    if judged in (REJECTED, IMPLAUSIBLE):
+    if state in (REJECTED, IMPLAUSIBLE):
         return [("Find what is wrong or missing", diagnose)]
     return [
         ("Level a log with this calibration", suggested.apply(result)),
@@ -87,15 +57,11 @@ def next_steps(
 
 
 def _implausible(assessment: Assessment) -> list[str]:
-    said = warnings(assessment)
-    if not said:
-        return []
-    found, gross = said, assessment.gross_error
+    """Name the gross error and the parameters that no sensor has."""
     lines = []
+    gross, found = assessment.gross_error, assessment.implausible
     if gross is not None:
-        found = said[:-1]
-        what = words(gross.name)
-        lines.append(f"This looks like a gross error ({what}): {gross.reason}.")
+        lines.append(f"This looks like a gross error ({words(gross.name)}): {gross.reason}.")
     if found:
         cause = "" if gross is not None else " A wrong unit, sign, axis or row is the usual cause."
         lines.append(f"No sensor is like this: {comma_list(found)}.{cause}")
@@ -103,7 +69,7 @@ def _implausible(assessment: Assessment) -> list[str]:
 
 
 def _conflict(assessment: Assessment) -> list[str]:
-    """Name the positions that the others do not bear, which need not be the fault of the holds."""
+    """Name the positions that contradict the others; their holds need not be at fault."""
     found = sorted(assessment.suspects, key=lambda suspect: suspect.position)
     if not found:
         return []
@@ -111,21 +77,22 @@ def _conflict(assessment: Assessment) -> list[str]:
     p = p_value(max(suspect.p_value for suspect in found))
     if len(found) == 1:
         return [
-            f"In conflict with the others: position {labels[0]} ({p}, all positions counted). It "
-            "may be bumped, or show what the model lacks."
+            f"In conflict with the others: position {labels[0]} ({p}, adjusted for the number of "
+            "positions). The sensor may have been bumped there, or the model lacks an effect."
         ]
-    least = p if "<" in p else f"{p} or less"
     return [
-        f"In conflict with the others: positions {comma_list(labels)} (each with {least}, all "
-        "positions counted). They may be bumped, or show what the model lacks."
+        f"In conflict with the others: positions {comma_list(labels)} (the largest {p}, adjusted "
+        "for the number of positions). The sensor may have been bumped there, or the model lacks "
+        "an effect."
     ]
 
 
 def _tilt(assessment: Assessment) -> str:
+    """Say which tilt error is left, and what it comes from."""
     shares = assessment.tilt_shares
     limit = words(max(shares, key=lambda name: float(shares[name].max())))
     most, unit = to_attitude(MAX_TILT_GON * GON), display_unit("rad")
-    where = f"rms up to {most:.0f} {attitude_unit()} of tilt, noise of a reading apart"
+    where = f"rms over tilts up to {most:.0f} {attitude_unit()}, without the noise of a reading"
     alone, whole = (
         f"{roll:.1f} {unit} in roll and {pitch:.1f} {unit} in pitch"
         for roll, pitch in (
@@ -138,20 +105,21 @@ def _tilt(assessment: Assessment) -> str:
             f"of {limit}."
         )
     return (
-        f"The calibration leaves a tilt error of {whole} ({where}) if what the residuals have too "
-        "much is an effect that the model lacks, since readings in use have it as well. The "
-        f"uncertainty of the parameters alone would leave {alone}."
+        f"The calibration leaves a tilt error of {whole} ({where}) if an effect that the model "
+        "lacks makes the residuals so large: readings in use have that effect, too. The "
+        f"uncertainty of the parameters alone leaves {alone}."
     )
 
 
 def _consistency(fit: CampaignFit) -> list[str]:
+    """Say whether the residuals agree with the stated noise."""
     r, test = fit.adjustment.redundancy, fit.global_test
     if r == 0:
         return ["There is no redundancy: the positions determine the model and nothing checks it."]
     if test is None:
         return [
             "The noise of a position is not stated, so nothing says whether the model is complete.",
-            f"From the residuals it is {1e3 * fit.sigma_position:.2f} mm/s² with r = {r}.",
+            f"Estimated from the residuals it is {1e3 * fit.sigma_position:.2f} mm/s² (r = {r}).",
         ]
     if test.accepted and test.powerless:
         return [f"With r = {r} the test of the model has next to no power."]
@@ -161,11 +129,11 @@ def _consistency(fit: CampaignFit) -> list[str]:
         return [f"The residuals agree with the stated noise (σ̂0 = {ratio:.2f}, {p})."]
     if ratio > 1:
         return [
-            f"The residuals are {ratio:.1f} times as large as the stated noise allows "
-            f"({p}): it is understated, or an effect is missing.",
-            "Sigmas are those of the residuals.",
+            f"The residuals are {ratio:.1f} times as large as the stated noise allows ({p}): the "
+            "noise is understated, or an effect is missing.",
+            "The sigmas are taken from the residuals.",
         ]
     return [
         f"The residuals are only {ratio:.2g} times the stated noise ({p}): it is overstated.",
-        "Sigmas are those of the residuals.",
+        "The sigmas are taken from the residuals.",
     ]
