@@ -543,7 +543,10 @@ def test_what_the_calibration_did_not_see_is_counted(tmp_path):
     assert len(warnings) == 2
     assert warnings[0].startswith("temperature outside the range of the calibration in 1 of 4 rows")
     assert "up to 60 °C" in warnings[0]
-    assert "force beyond what the calibration saw in 1 of 4 rows: up to 12.5 m/s² r" in warnings[1]
+    assert (
+        "force outside the range of the calibration in 1 of 4 rows: up to 12.5 m/s² r"
+        in warnings[1]
+    )
 
 
 def test_a_reading_at_the_end_of_the_range_is_no_measurement(tmp_path):
