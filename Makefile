@@ -7,6 +7,7 @@ HIDDEN ?= config/hidden-effects.yaml
 SHELL := bash
 ENV := .venv
 READY := $(ENV)/.ready
+TEST = pytest --numprocesses $(CORES) --dist loadfile --no-loadscope-reorder
 INSTALL := pip install --quiet --no-build-isolation --require-hashes --requirement requirements.lock
 
 # The workflow's shell commands find the environment's python by the path alone.
@@ -24,7 +25,7 @@ export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: help env test test-cluster test-faults smoke reproduce anew unlock report campaigns diagnose-example plan-example hidden-effects hidden-docs benchmarks docs wheel lint lock clean
+.PHONY: help env test coverage test-cluster test-faults smoke reproduce anew unlock report campaigns diagnose-example plan-example hidden-effects hidden-docs benchmarks docs wheel lint lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-18s%s\n", $$1, $$2 }' Makefile
@@ -34,8 +35,12 @@ help: ## list the targets
 
 env: $(READY) ## make the environment, from locked versions, in .venv
 
-test: lint ## check and test the package, with coverage
-	pytest --cov --numprocesses $(CORES) --dist loadfile --no-loadscope-reorder
+test: lint ## check and test the package
+	$(TEST)
+
+# Apart from `make test`, as measuring takes as long as all tests.
+coverage: $(READY) ## test the package, and list the lines that no test runs
+	$(TEST) --cov
 
 test-cluster: $(READY) ## run the small configuration by a SLURM on this machine, and compare
 	python tests/helpers/cluster.py

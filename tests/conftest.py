@@ -12,12 +12,23 @@ settings.load_profile("repeatable")
 os.environ.pop("ACCELSTUDY_ANGLE_UNIT", None)
 
 
-LONGEST = ("test_workflow.py", "test_campaign_batch.py", "test_every_path.py", "test_diagnosis.py")
+LONGEST = (
+    "test_campaign_batch.py",
+    "test_workflow.py",
+    "test_every_path.py",
+    "test_diagnosis.py",
+    "test_walk.py",
+    "test_diagnosis_output.py",
+    "test_diagnosis_hidden.py",
+    "test_figures.py",
+)
+"""The longest first."""
 
 
 def pytest_collection_modifyitems(items):
     """Let the longest files come first, or one process would still be at them, and others wait."""
-    items.sort(key=lambda item: item.path.name not in LONGEST)
+    rank = {name: place for place, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: rank.get(item.path.name, len(rank)))
 
 
 @pytest.fixture

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import gc
 import hashlib
 import json
 import logging
@@ -17,6 +18,9 @@ from accelstudy.basics.errors import InputError
 from accelstudy.files.outputs import cannot_write
 from accelstudy.files.provenance import config_hash
 from accelstudy.files.tables import REMEDY, read_origin
+
+COLLECT_AFTER = 50_000
+"""New objects after which Python looks for cycles, instead of 700."""
 
 _NOT_OURS = {
     **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), "free some space"),
@@ -91,6 +95,9 @@ def _check_origin(path: str, seed: int, setups: Container[str] | None) -> None:
 @contextmanager
 def logged(snakemake: Any) -> Iterator[None]:
     """Run the body of a script of any workflow."""
+    # A job ends soon and makes few cycles. The collector would look at all modules again and again.
+    gc.freeze()
+    gc.set_threshold(COLLECT_AFTER)
     # On a full disk the log ends early, but the error of the job is still reported.
     logging.raiseExceptions = False
     try:

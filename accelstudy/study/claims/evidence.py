@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import optimize
 
 from accelstudy.study.cells.cell import Cell
 from accelstudy.study.claims.base import Evidence, schemes_with_both
@@ -41,6 +40,8 @@ class RatioOfSketches:
 
     def quantile(self, probabilities: ArrayLike) -> Array:
         """Quantiles."""
+        from scipy import optimize  # slow to import, and studies that keep replicates do without
+
         return np.array(
             [
                 optimize.brentq(lambda x, p=p: self.share_below(x) - p, *self.ends, rtol=1e-9)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from accelstudy.basics.units import GON, MGON
 from accelstudy.leveling.angles import angles_of, specific_force
@@ -75,5 +75,6 @@ def sd_with_interval(values: Array) -> tuple[float, float, float]:
     """Empirical standard deviation with its 95 % confidence interval."""
     n = len(values)
     sd = float(np.std(values, ddof=1))
-    low, high = stats.chi2.ppf([0.975, 0.025], n - 1)
+    # Quantiles of χ²; scipy.stats has them too, but is slow to import.
+    low, high = 2 * special.gammaincinv((n - 1) / 2, [0.975, 0.025])
     return sd, sd * np.sqrt((n - 1) / low), sd * np.sqrt((n - 1) / high)

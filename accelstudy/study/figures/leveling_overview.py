@@ -142,7 +142,14 @@ def _draw_matrix(ax: Axes, rms: Array, q95: Array, norm: LogNorm) -> AxesImage:
         colour = "white" if rms[i, j] > middle else INK
         for value, offset, size in ((rms[i, j], -0.2, 7), (q95[i, j], 0.24, 5.8)):
             ax.text(
-                j, i + offset, _short(value), ha="center", va="center", fontsize=size, color=colour
+                j,
+                i + offset,
+                _short(value),
+                ha="center",
+                va="center",
+                fontsize=size,
+                color=colour,
+                in_layout=False,
             )
     if not np.isfinite(rms).any():
         say_empty(ax)

@@ -159,6 +159,7 @@ def _mark(ax: Axes, value: float, y: float, approach: str, *, pale: bool) -> Non
             color=colour,
             va="center",
             fontsize=6.5,
+            in_layout=False,
         )
     else:
         ax.plot(
