@@ -31,12 +31,12 @@ from accelstudy.adjustment.gauss_helmert import (
     whitened_design,
 )
 from accelstudy.approaches import Approach
-from accelstudy.basics.algebra import sp
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.tracing import TracedFunction, derivative, inverse, symbolic, symbols
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import HoldConditions
 from accelstudy.sensors.sensor import SensorModel, SensorTrace
+from accelstudy.symbolic.algebra import sp
+from accelstudy.symbolic.tracing import TracedFunction, derivative, inverse, symbolic, symbols
 
 Array = NDArray[np.float64]
 

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from accelstudy.basics.algebra import sp
-from accelstudy.basics.tracing import symbolic, symbols
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects.components import AXES, Matrix
 from accelstudy.effects.hold_conditions import HoldConditions
 from accelstudy.effects.hold_symbols import HoldSymbols
+from accelstudy.symbolic.algebra import sp
+from accelstudy.symbolic.tracing import symbolic, symbols
 
 if TYPE_CHECKING:
     from accelstudy.effects.base import Effect

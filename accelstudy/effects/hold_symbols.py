@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from accelstudy.basics.algebra import sp
-from accelstudy.basics.tracing import symbols
 from accelstudy.effects.hold_conditions import HoldConditions
+from accelstudy.symbolic.algebra import sp
+from accelstudy.symbolic.tracing import symbols
 
 
 class HoldSymbols:

@@ -23,11 +23,11 @@ from accelstudy.adjustment.gauss_helmert import (
     ROUNDING,
     STEP_TOLERANCE,
 )
-from accelstudy.basics.tracing import TracedFunction, symbols
 from accelstudy.kernel.cholesky import Rows, backward, dot, factor, forward, inverse
 from accelstudy.kernel.formulas import Formulas
 from accelstudy.kernel.lanes import LANES, Code, Lanes, Mask, Term, Variable, absolute, fma, larger
 from accelstudy.kernel.lanes import sqrt as root
+from accelstudy.symbolic.tracing import TracedFunction, symbols
 
 NAME = "calibrate"
 INTEGERS = ("positions", "replicates")

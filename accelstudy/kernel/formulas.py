@@ -199,4 +199,4 @@ _FUNCTIONS: dict[Any, Callable[..., Term]] = {
     sp.Max: _extreme("maximum"),
     sp.Min: _extreme("minimum"),
 }
-"""Functions of `accelstudy.basics.tracing.symbolic` and of their derivatives."""
+"""Functions of `accelstudy.symbolic.tracing.symbolic` and of their derivatives."""

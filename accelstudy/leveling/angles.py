@@ -49,7 +49,7 @@ def specific_force(roll: Number, pitch: Number, g: Number, xp: Any = np) -> Vect
 
 @cache
 def _jacobian_function() -> Any:
-    from accelstudy.basics.tracing import jacobian_of
+    from accelstudy.symbolic.tracing import jacobian_of
 
     return jacobian_of(roll_pitch, 3)
 

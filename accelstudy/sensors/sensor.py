@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from accelstudy.basics.algebra import sp
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.tracing import TracedFunction, derivative, inverse, symbolic, symbols
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import Effect, HoldConditions, Parameter, get_effect
 from accelstudy.effects.hold_symbols import HoldSymbols
+from accelstudy.symbolic.algebra import sp
+from accelstudy.symbolic.tracing import TracedFunction, derivative, inverse, symbolic, symbols
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from accelstudy.basics.algebra import sp
-from accelstudy.basics.tracing import derivative
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import Effect
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel, trace_of
+from accelstudy.symbolic.algebra import sp
+from accelstudy.symbolic.tracing import derivative
 
 Array = NDArray[np.float64]
 Gauge = Literal["upper", "lower", "symmetric"]

@@ -68,7 +68,7 @@ def _about_down(v: Vector, angle: Number, xp: Any) -> Vector:
 
 @cache
 def _jacobian_function() -> Any:
-    from accelstudy.basics.tracing import jacobian_of
+    from accelstudy.symbolic.tracing import jacobian_of
 
     return jacobian_of(foot, len(INPUTS))
 

@@ -7,7 +7,7 @@ LOADED = """\
 import sys
 import accelstudy.campaign.batch.overview, accelstudy.campaign.batch.config, accelstudy.study.config
 print([name for name in ("sympy.core", "matplotlib", "scipy.stats") if name in sys.modules])
-from accelstudy.basics.tracing import symbolic, symbols
+from accelstudy.symbolic.tracing import symbolic, symbols
 import sympy
 (x,) = symbols("x")
 print(symbolic.maximum(x, 2 * x).diff(x).subs(x, 3), sympy.Symbol is type(x))

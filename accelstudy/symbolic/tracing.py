@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.basics.algebra import sp
+from accelstudy.symbolic.algebra import sp
 
 
 class _Symbolic:

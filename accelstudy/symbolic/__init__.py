@@ -1,0 +1,1 @@
+"""Formulas with symbols: traced once, differentiated exactly, and turned into array functions."""
