@@ -1,9 +1,9 @@
-"""Walk a README and the help as their reader would: run each command, in order, in this folder.
+"""Walk pages and the help as their reader would: run each command, in order, in this folder.
 
-    python walk.py README.md steps.json
+    python walk.py steps.json README.md [PAGE ...]
 
-First come the blocks of the README, then the example at the end of each command's help, if it is
-not among them. Runs with whatever package is installed; test_walk.py installs it and judges.
+First come the blocks of the pages, then the example at the end of each command's help. What was run
+before is left out. Runs with whatever package is installed; test_walk.py installs it and judges.
 """
 
 import json
@@ -30,14 +30,15 @@ WRITTEN = re.compile(r"^(?:campaign|figure|report): (\S+)", re.MULTILINE)
 """What a command says that it wrote."""
 
 
-def readme_commands(text):
-    """Commands in the indented blocks of a Markdown text, and its runnable Python blocks."""
+def page_commands(page):
+    """Commands in the indented blocks of a page; a page of Python is one command."""
+    text = page.read_text("utf-8")
+    if page.suffix == ".py":
+        yield text
+        return
     plain = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
     for block in re.findall(r"(?:^ {4}.*\n)+", plain, re.MULTILINE):
         yield from joined(block)
-    for block in re.findall(r"```python\n(.*?)```", text, re.DOTALL):
-        if block.startswith("import "):
-            yield block
 
 
 def help_commands():
@@ -83,15 +84,14 @@ def step(source, command):
 
 
 if __name__ == "__main__":
-    readme, out = map(Path, sys.argv[1:])
-    steps = [step("README", command) for command in readme_commands(readme.read_text("utf-8"))]
-    known = [words(made["command"]) for made in steps]
-    for command in help_commands():
-        again = words(command) in known
-        steps.append(
-            {"source": "help", "command": command, "skipped": "is in the README"}
-            if again
-            else step("help", command)
-        )
+    out, *pages = map(Path, sys.argv[1:])
+    wanted = [(page.name, command) for page in pages for command in page_commands(page)]
+    wanted += [("help", command) for command in help_commands()]
+    steps, known = [], []
+    for source, command in wanted:
+        given = words(command)
+        before = {"source": source, "command": command, "skipped": "was run before"}
+        steps.append(before if given in known else step(source, command))
+        known.append(given)
     content = {"package": accelstudy.__file__, "steps": steps}
     out.write_text(json.dumps(content, indent=2, ensure_ascii=False), encoding="utf-8")

@@ -167,7 +167,7 @@ def test_the_answer_is_the_cheapest_that_reaches_the_target(found):
     times = [r.candidate.seconds for r in found.ranked]
     assert times == sorted(times)
     assert len({r.candidate.kind[:2] for r in found.ranked}) == len(found.ranked)
-    assert found.stricter.scheme.n_positions >= 100  # as the README says: 100 for 95 %
+    assert found.stricter.scheme.n_positions >= 100  # docs/guides/paper.md: 100 for 95 %
 
 
 def test_simulation_agrees_with_linear_theory(found):
