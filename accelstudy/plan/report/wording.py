@@ -217,7 +217,7 @@ def reason_lines(answer: Answer) -> Iterator[str]:
         yield f"  {_spoiler(spoiler)}"
     if candidate.equipment.name == "gravity":
         yield "Gravity does not tell how the sensor sits in its housing: put it on a flat surface,"
-        yield "turn it there by 180°; it is off by half of the difference of the two tilts."
+        yield "read roll and pitch, turn it there by 180° and read again: the mean is how far it is off."
     yield "In use, to be added to what the calibration leaves (rms of the worse angle):"
     for line in use_lines(question, in_use(question)):
         yield f"  {line}"
