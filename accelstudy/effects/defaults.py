@@ -57,7 +57,7 @@ def equation_of(effect: Effect) -> str:
 def typical_of(effect: Effect) -> tuple[float, float]:
     """Return sizes of a parameter with which an effect changes readings by `USUAL`, SI."""
     g, some = STANDARD_GRAVITY, 0.5
-    forces = g * np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
+    forces = g * np.array([d for d in product((-1.0, 0.0, 0.1, 1.0), repeat=3) if any(d)])
     f, n = tuple(forces.T), np.ones(len(forces))
     hold = HoldConditions(
         temperature=30.0 * n, time=600.0 * n, vibration=n,

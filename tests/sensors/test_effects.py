@@ -82,7 +82,7 @@ def added(effect, p, forces=FORCES, hold=HOLD):
 
 
 def test_every_effect_of_the_catalogue_is_there():
-    assert set(effect_names()) == {*NINE, *NUMBERS}
+    assert set(effect_names()) >= {*NINE, *NUMBERS}
     for name, number in NUMBERS.items():
         effect = get_effect(name)
         assert len(effect.parameters) == number

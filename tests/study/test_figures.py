@@ -111,11 +111,12 @@ OTHERS = [*(f"sweep-{factor.name}" for factor in FACTORS), "rare-events"]
 def test_a_paper_study_has_the_figures_of_the_paper_and_of_every_study():
     expected = [f"figure-{n}" for n in range(2, 9)] + ["figure-5-robot", "figure-6-robot"]
     expected += ["closed-forms", "leveling-overview", "shapley", "table-1"]
-    assert sorted(ALL) == sorted(expected)
+    assert {*expected} <= {*ALL}
+    assert {*OTHERS}.isdisjoint(ALL)
 
 
 def test_every_figure_has_a_title_and_a_caption_that_a_report_can_show(paper):
-    assert {*figure_names()} == {*ALL, *OTHERS}
+    assert {*figure_names()} >= {*ALL, *OTHERS}
     for name, caption in captions(ALL, paper).items():
         entry = get_figure(name)
         assert entry.title

@@ -27,7 +27,7 @@ def folder(tmp_path_factory):
 def test_the_configuration_is_a_study_with_figures(folder):
     study = read_study(folder / "config" / "config.yaml")
     assert study.study == "My-sensor-2-0"
-    assert figure_names(study) == ("closed-forms", "leveling-overview", "sweep-positions")
+    assert {"closed-forms", "leveling-overview", "sweep-positions"} <= {*figure_names(study)}
 
 
 def test_the_workflow_takes_it_from_there(folder):
