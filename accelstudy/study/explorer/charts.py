@@ -22,10 +22,26 @@ FAILED = {"not estimable": "M-1,-1L1,1M-1,1L1,-1", "none converged": "M-1,0L1,0M
 DASHES = [4, 3]
 BAR = 0.4
 """Opacity of a bar, as in the figures."""
-ROW = 30
-"""Height of a row, pixels."""
+STEPS = {"step": 30, "for": "position"}
+"""Height of the rows, pixels."""
 BLUES = ("#F7FBFF", "#6BAED6", "#08306B")
 """Of correlations from none to 1, as in the figures."""
+
+
+def look() -> dict[str, Any]:
+    """Return what all charts have in common, as Vega-Lite's `config`: the look of the figures."""
+    return alt.Config(
+        font="system-ui, sans-serif",
+        background="white",
+        view=alt.ViewConfig(stroke=None),
+        axis=alt.Axis(
+            labelColor=INK,
+            titleColor=INK,
+            labelFontSize=12,
+            gridColor=STYLE["grid.color"],
+            domainColor=INK,
+        ),
+    ).to_dict()
 
 
 def all_charts(approaches: Sequence[str]) -> dict[str, Any]:
@@ -130,7 +146,7 @@ def correlation_chart() -> dict[str, Any]:
         fields.mark_rect().encode(color=colour),
         fields.mark_text(fontSize=size).encode(text="label:N", color=white),
     )
-    return _finished(layers.properties(height="container"), "Correlations of the parameters")
+    return _finished(layers, "Correlations of the parameters", "container")
 
 
 def _parameters(approaches: Sequence[str]) -> alt.Chart:
@@ -184,22 +200,9 @@ def _shape(approaches: Sequence[str]) -> alt.Shape:
     )
 
 
-def _finished(chart: alt.LayerChart | alt.FacetChart, description: str) -> dict[str, Any]:
-    """Give a chart the width of its place on the page, and the look of the figures."""
-    whole = chart.properties(width="container", description=description)
-    if whole.height is alt.Undefined:
-        whole = whole.properties(height=alt.Step(ROW, **{"for": "position"}))
-    return (
-        whole.configure(font="system-ui, sans-serif", background="white")
-        .configure_axis(
-            labelColor=INK,
-            titleColor=INK,
-            labelFontSize=12,
-            titleFontSize=12,
-            titleFontWeight="normal",
-            gridColor=STYLE["grid.color"],
-            domainColor=INK,
-        )
-        .configure_view(stroke=None)
-        .to_dict()
-    )
+def _finished(
+    chart: alt.LayerChart | alt.FacetChart, description: str, height: Any = STEPS
+) -> dict[str, Any]:
+    """Give a chart the size of its place on the page; as plain data, since Altair copies a lot."""
+    size = {"width": "container", "height": height}
+    return {**chart.to_dict(), **size, "description": description}

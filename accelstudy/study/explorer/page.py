@@ -109,6 +109,7 @@ def explorer_page(
         "noises": {factor.name: _unit(factor) for factor in factors},
         "start": _start(study, cells),
         "report": dict(in_report),
+        "look": charts.look(),
         "charts": charts.all_charts(heads["approaches"]),
     }
     shown = {
