@@ -1,4 +1,4 @@
-# Many campaigns, each calibrated by itself, and one overview of them:
+# Calibrate many campaigns, each by itself, and write one overview of all:
 # snakemake --cores 2 --snakefile workflow/campaigns.smk --configfile config/campaigns.yaml
 from pathlib import Path
 
@@ -19,7 +19,7 @@ min_version("9.10")
 quote_python()
 
 
-# The environment of the Makefile is what counts; this is for executors that want a container.
+# Jobs run in the environment of the Makefile. This is for executors that need a container.
 container: "docker://python:3.13-slim"
 
 
@@ -27,7 +27,7 @@ try:
     if not config:
         raise InputError("no campaigns; name them with --configfile config/campaigns.yaml")
     for path in workflow.configfiles:
-        read_layer(path)  # more strictly than Snakemake does
+        read_layer(path)  # Snakemake's own reading is less strict
     BATCH = parse_batch(config, ", ".join(map(str, workflow.configfiles)) or "config")
     RESULTS = f"results/{BATCH.batch}"
     check_writable(RESULTS)
@@ -44,7 +44,8 @@ RECORDS = [
     f"{RESULTS}/public/{task.source}.json" for task in TASKS.values() if task.kind == "public"
 ]
 
-# Before Snakemake decides what to make; jobs that read this file again leave it out.
+# Check earlier results before Snakemake decides what to make. On a cluster, jobs read this file
+# again; they skip the check.
 if workflow.is_main_process:
     try:
         of_tasks = {f"{RESULTS}/campaigns/{name}": BATCH_JOB for name in TASKS}
@@ -65,7 +66,7 @@ wildcard_constraints:
 
 
 def measured_files(wildcards):
-    """What a campaign is made of, as far as it is there; its absence is for the job to report."""
+    """Files of a campaign that exist. The job reports those that are missing."""
     task = TASKS[wildcards.campaign]
     if task.kind == "public":
         return {"record": f"{RESULTS}/public/{task.source}.json"}
@@ -73,7 +74,7 @@ def measured_files(wildcards):
 
 
 def braced_files(wildcards):
-    """Times of files with a brace in their names, which as inputs Snakemake would take for wildcards."""
+    """Times of files with a brace in their names. As inputs, Snakemake would see wildcards in them."""
     paths = TASKS[wildcards.campaign].files()
     return {path: Path(path).stat().st_mtime_ns for path in paths if "{" in path}
 
@@ -84,7 +85,7 @@ rule campaigns:
         OUTPUTS,
 
 
-# The file itself is no output, as Snakemake would delete it, whole or in part, before a second try.
+# The downloaded file is no output: Snakemake would delete it before a second try.
 rule public:
     output:
         f"{RESULTS}/public/{{public}}.json",
@@ -95,7 +96,7 @@ rule public:
         folder=BATCH.public_folder,
         attempt=lambda wildcards: next_attempt(f"{RESULTS}/public/{wildcards.public}.json"),
     message:
-        "Get the public data {wildcards.public}"
+        "Download the public data {wildcards.public}"
     script:
         "scripts/public.py"
 

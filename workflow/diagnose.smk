@@ -1,4 +1,4 @@
-# A campaign with hidden effects: simulated, diagnosed, and simulated with what was found:
+# Simulate a campaign with hidden effects, and diagnose it:
 # snakemake --cores 2 --snakefile workflow/diagnose.smk --configfile config/diagnose-example.yaml
 from dataclasses import asdict
 
@@ -19,7 +19,7 @@ min_version("9.10")
 quote_python()
 
 
-# The environment of the Makefile is what counts; this is for executors that want a container.
+# Jobs run in the environment of the Makefile. This is for executors that need a container.
 container: "docker://python:3.13-slim"
 
 
@@ -27,11 +27,12 @@ try:
     if not config:
         raise InputError("no campaign; give it with --configfile config/diagnose-example.yaml")
     for path in workflow.configfiles:
-        read_layer(path)  # more strictly than Snakemake does
+        read_layer(path)  # Snakemake's own reading is less strict
     TRIP = parse_round_trip(config, ", ".join(map(str, workflow.configfiles)) or "config")
     RESULTS = f"results/{TRIP.campaign.name}"
     check_writable(RESULTS)
-    # Before Snakemake decides what to make; jobs that read this file again leave it out.
+    # Check earlier results before Snakemake decides what to make. On a cluster, jobs read this
+    # file again; they skip the check.
     if workflow.is_main_process:
         made = {f"{RESULTS}/campaign": CAMPAIGN, f"{RESULTS}/diagnosis": DIAGNOSIS}
         for line in earlier_run(RESULTS, [], {}, None, made):

@@ -1,4 +1,4 @@
-# Campaigns with hidden effects, each diagnosed, and how well that went:
+# Simulate campaigns with hidden effects, diagnose each, and score the diagnoses:
 # snakemake --cores 2 --snakefile workflow/hidden.smk
 from snakemake.exceptions import WorkflowError
 from snakemake.utils import min_version
@@ -20,13 +20,13 @@ quote_python()
 configfile: "config/hidden-effects.yaml"
 
 
-# The environment of the Makefile is what counts; this is for executors that want a container.
+# Jobs run in the environment of the Makefile. This is for executors that need a container.
 container: "docker://python:3.13-slim"
 
 
 try:
     for path in workflow.configfiles:
-        read_layer(path)  # more strictly than Snakemake does
+        read_layer(path)  # Snakemake's own reading is less strict
     STUDY = parse_hidden(config, ", ".join(map(str, workflow.configfiles)) or "config")
     RESULTS = f"results/{STUDY.study}"
     check_writable(RESULTS)
@@ -48,7 +48,8 @@ OUTPUTS = [
     *expand(f"{RESULTS}/{{table}}.parquet", table=TABLES),
 ]
 
-# Before Snakemake decides what to make; jobs that read this file again leave it out.
+# Check earlier results before Snakemake decides what to make. On a cluster, jobs read this file
+# again; they skip the check.
 if workflow.is_main_process:
     try:
         of_this = dict.fromkeys(BY_CHUNK, STUDY.fingerprint)
@@ -91,7 +92,7 @@ rule plan:
         config=CONTENT,
         code=code_hash(workflow.source_path("scripts/hidden_plan.py")),
     message:
-        "Plan the campaigns"
+        "Choose the campaigns to simulate"
     script:
         "scripts/hidden_plan.py"
 
@@ -115,7 +116,7 @@ rule diagnose:
         provenance=ORIGIN,
         code=code_hash(workflow.source_path("scripts/hidden_diagnose.py")),
     message:
-        "Simulate and diagnose chunk {wildcards.chunk}"
+        "Simulate and diagnose the campaigns of chunk {wildcards.chunk}"
     script:
         "scripts/hidden_diagnose.py"
 
@@ -137,7 +138,7 @@ rule baselines:
         provenance=ORIGIN,
         code=code_hash(workflow.source_path("scripts/hidden_baselines.py")),
     message:
-        "Try simpler methods on chunk {wildcards.chunk}"
+        "Diagnose the campaigns of chunk {wildcards.chunk} by simpler methods"
     script:
         "scripts/hidden_baselines.py"
 
@@ -164,6 +165,6 @@ rule score:
         provenance=ORIGIN,
         code=code_hash(workflow.source_path("scripts/hidden_score.py")),
     message:
-        "Score all chunks"
+        "Score the diagnoses of all campaigns"
     script:
         "scripts/hidden_score.py"

@@ -1,4 +1,4 @@
-# What to measure, with what and how long, for a tilt accuracy that is asked for:
+# Plan calibrations for a required tilt accuracy: sensor, positions and time:
 # snakemake --cores 2 --snakefile workflow/plan.smk --configfile config/plan-example.yaml
 from snakemake.utils import min_version
 
@@ -8,7 +8,7 @@ min_version("9.10")
 quote_python()
 
 
-# The environment of the Makefile is what counts; this is for executors that want a container.
+# Jobs run in the environment of the Makefile. This is for executors that need a container.
 container: "docker://python:3.13-slim"
 
 

@@ -45,7 +45,7 @@ from functools import partial
 
 from accelstudy.study.cells import batches
 
-batches.batches = partial(batches.batches, size=190)
+batches.batches = partial(batches.batches, size=240)
 
 
 include: "{ROOT}/workflow/Snakefile"
@@ -56,7 +56,7 @@ rule study:
     input:
         rules.all.input,
 """
-"""The workflow with batches of three cells."""
+"""The workflow with two batches of four cells."""
 
 
 def words(folder, *arguments, snakefile=ROOT / "Snakefile", cores=2, config=TINY):
@@ -170,7 +170,7 @@ def test_killed_and_resumed(single, tmp_path, monkeypatch):
     one_line(locked.stdout, "results/tiny is locked", "`make unlock`")
     succeed(tmp_path, "--unlock", snakefile=snakefile)
     succeed(tmp_path, *TABLE_PATHS, snakefile=snakefile)
-    assert len(list(estimates.iterdir())) == 3
+    assert len(list(estimates.iterdir())) == 2
     assert_same(content(tmp_path), content(single))
     for path in TABLE_PATHS:
         assert pq.read_schema(tmp_path / path).equals(pq.read_schema(single / path))

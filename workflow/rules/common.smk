@@ -23,7 +23,7 @@ from accelstudy.study.results.estimates import TABLES
 
 try:
     for path in workflow.configfiles:
-        read_layer(path)  # more strictly than Snakemake does
+        read_layer(path)  # Snakemake's own reading is less strict
     STUDY = parse_study(config, ", ".join(map(str, workflow.configfiles)) or "config")
     RESULTS = f"results/{STUDY.study}"
     check_writable(RESULTS)
@@ -33,11 +33,11 @@ try:
 except InputError as error:
     raise WorkflowError(str(error)) from None
 
-# Checked and with all defaults, so that jobs take it as it is.
+# Jobs get the checked configuration, with all defaults.
 config.update(STUDY.model_dump(mode="json"))
 
-# Cells run in batches, so that starting Python does not dominate. A batch is a job or, where it is
-# one large cell, several, each of which simulates a part of it.
+# A job simulates a batch of cells, because starting Python takes longer than a small cell. One
+# large cell is a batch by itself; several jobs simulate a part of it each.
 BATCHES = {f"{i:04d}": batch for i, batch in enumerate(batches(CELLS))}
 PARTS_OF = {
     name: [name] if len(batch.jobs) == 1 else [f"{name}-{i:04d}" for i in range(len(batch.jobs))]
@@ -77,7 +77,7 @@ wildcard_constraints:
 
 @cache
 def part_spec(part):
-    """All on which the numbers of a part depend, as plain data."""
+    """Everything that the numbers of a part depend on, as plain data."""
     shares = [share.to_dict() for share in PARTS[part]]
     leveling = {} if KEPT else {"leveling": STUDY.leveling.model_dump()}
     return {"seed": STUDY.seed, "shares": shares, **leveling}
@@ -85,12 +85,12 @@ def part_spec(part):
 
 @cache
 def setup_of(part):
-    """What a part is made of, in brief."""
+    """Digest of what a part depends on."""
     return setup_digest(part_spec(part))
 
 
 def parts_of_batch(wildcards):
-    """What the jobs of a batch wrote, in order."""
+    """Files that the jobs of a batch write, in order."""
     return {
         kind: [path.format(part=part) for part in PARTS_OF[wildcards.batch]]
         for kind, path in WRITTEN.items()
@@ -98,7 +98,7 @@ def parts_of_batch(wildcards):
 
 
 def parts_of_claims():
-    """What the cells of the claims come to, and their estimates."""
+    """Moments and sketches of the cells that the claims use, and their estimates."""
     chosen = [
         name
         for name, batch in BATCHES.items()
@@ -127,7 +127,7 @@ def in_report(name):
 
 
 def files_of_figures(names):
-    """What is drawn of figures."""
+    """All files of figures."""
     others = [f"{RESULTS}/figures/{name}.{kind}" for name in names for kind in ("png", "rst")]
     return [*map(in_report, names), *others]
 

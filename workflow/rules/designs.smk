@@ -18,12 +18,12 @@ rule designs:
     resources:
         mem_mb=1000,
     params:
-        # As it is written, with paths of files, and as it is read, with what the files hold.
+        # As written, with the paths of files, and as read, with the content of the files.
         section=EXAMPLE.designs,
         read=DESIGNS.model_dump(),
         provenance=PROVENANCE,
         code=code_hash(workflow.source_path("../scripts/designs.py")),
     message:
-        "Compare schemes with the best there can be"
+        "Compare position schemes with optimal designs"
     script:
         "../scripts/designs.py"

@@ -22,6 +22,6 @@ rule field:
         provenance=PROVENANCE,
         code=code_hash(workflow.source_path("../scripts/field.py")),
     message:
-        "Share out the variance of roll and pitch in use: {wildcards.case}"
+        "Work out which errors the variance of roll and pitch comes from: {wildcards.case}"
     script:
         "../scripts/field.py"

@@ -1,5 +1,5 @@
-# Many figures in a job, since starting one takes as long as drawing two of them; and two jobs, since
-# those of sensitivity have to wait for it.
+# A job draws many figures, because starting it takes as long as drawing two of them. There are two
+# jobs, because the figures of sensitivity wait for its analysis.
 rule figures:
     input:
         **inputs_of_figures(CELL_FIGURES),
@@ -17,7 +17,7 @@ rule figures:
         captions=captions(CELL_FIGURES, STUDY),
         code=code_hash(workflow.source_path("../scripts/figures.py")),
     message:
-        "Draw the figures of the cells"
+        "Draw the figures of the calibrations"
     script:
         "../scripts/figures.py"
 
@@ -36,4 +36,4 @@ use rule figures as sensitivity_figures with:
         captions=captions(SENSITIVITY_FIGURES, STUDY),
         code=code_hash(workflow.source_path("../scripts/figures.py")),
     message:
-        "Draw the figures of sensitivity"
+        "Draw the figures of the sensitivity analysis"

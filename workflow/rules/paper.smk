@@ -17,7 +17,7 @@ rule sensitivity:
         sensor=STUDY.model_dump(include={"seed", "gravity_mps2", "noise", "sensor"}),
         code=code_hash(workflow.source_path("../scripts/sensitivity.py")),
     message:
-        "Analyse what roll and pitch depend on"
+        "Analyse the sensitivity of roll and pitch"
     script:
         "../scripts/sensitivity.py"
 
@@ -47,6 +47,6 @@ rule claims:
     params:
         code=code_hash(workflow.source_path("../scripts/claims.py")),
     message:
-        "Judge the paper's claims"
+        "Check the paper's claims against the Monte Carlo"
     script:
         "../scripts/claims.py"

@@ -25,7 +25,7 @@ rule plan:
         provenance=PROVENANCE,
         code=code_hash(workflow.source_path("../scripts/plan.py")),
     message:
-        "Plan {wildcards.plan}"
+        "Plan the calibration {wildcards.plan}"
     script:
         "../scripts/plan.py"
 

@@ -28,6 +28,6 @@ rule pole:
         provenance=PROVENANCE,
         code=code_hash(workflow.source_path("../scripts/pole.py")),
     message:
-        "Work out the pole {wildcards.pole}"
+        "Work out the error of the pole's foot: {wildcards.pole}"
     script:
         "../scripts/pole.py"

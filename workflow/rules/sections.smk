@@ -12,7 +12,7 @@ try:
     if not config:
         raise InputError("nothing to plan; name it with --configfile config/plan-example.yaml")
     for path in workflow.configfiles:
-        read_layer(path)  # more strictly than Snakemake does
+        read_layer(path)  # Snakemake's own reading is less strict
     EXAMPLE = parse_example(config, SOURCE)
     RESULTS = f"results/{EXAMPLE.study}"
     check_writable(RESULTS)

@@ -49,6 +49,6 @@ rule sequential:
         provenance=PROVENANCE,
         code=code_hash(workflow.source_path("../scripts/sequential_summary.py")),
     message:
-        "Sum up how many positions a promised accuracy takes, and whether it is kept"
+        "Summarise how many positions the promised accuracy takes, and how often it is reached"
     script:
         "../scripts/sequential_summary.py"

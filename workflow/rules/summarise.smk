@@ -18,7 +18,7 @@ rule summarise:
         leveling=STUDY.leveling.model_dump(),
         code=code_hash(workflow.source_path("../scripts/summarise.py")),
     message:
-        "Summarise batch {wildcards.batch}"
+        "Work out sds, correlations and tilt errors of batch {wildcards.batch}"
     script:
         "../scripts/summarise.py"
 
@@ -38,6 +38,6 @@ rule collect:
     params:
         code=code_hash(workflow.source_path("../scripts/collect.py")),
     message:
-        "Collect the tables of all batches"
+        "Join the tables of all batches"
     script:
         "../scripts/collect.py"
