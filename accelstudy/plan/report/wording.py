@@ -216,8 +216,8 @@ def reason_lines(answer: Answer) -> Iterator[str]:
     for spoiler in spoilers(question, candidate):
         yield f"  {_spoiler(spoiler)}"
     if candidate.equipment.name == "gravity":
-        yield "Gravity does not tell how the sensor sits in its housing: put it on a flat surface,"
-        yield "read roll and pitch, turn it there by 180° and read again: the mean is how far it is off."
+        yield "Gravity does not tell how the sensor sits in its housing. Put it on a flat surface,"
+        yield "read roll and pitch, turn it there by 180°, read again: the means are its errors."
     yield "In use, to be added to what the calibration leaves (rms of the worse angle):"
     for line in use_lines(question, in_use(question)):
         yield f"  {line}"
