@@ -4,12 +4,13 @@ import re
 
 import numpy as np
 
-from accelstudy.adjustment.calibration import equations_of
+from accelstudy.adjustment.equations import equations_of
 from accelstudy.approaches import get_approach
 from accelstudy.kernel import calibrate as kernel
-from accelstudy.kernel.adjustment import KernelCode
 from accelstudy.kernel.compiled import Compiled
+from accelstudy.kernel.function import KernelFunction
 from accelstudy.kernel.lanes import LANES, Code, Variable, fma
+from accelstudy.kernel.writing import text_of
 from problem import APPROACHES, BLOCK, MODEL, NOISE, drawn, ideal_session
 from timing import in_turns, table
 
@@ -60,7 +61,7 @@ def measure(name):
     approach, ideal = get_approach(name), ideal_session()
     observed = drawn(ideal, approach)
     block = kernel.calibrate(MODEL, approach, observed)
-    per = operations(KernelCode(equations_of(MODEL.trace, approach, False)).text)
+    per = operations(text_of(KernelFunction(equations_of(MODEL.trace, approach, False))))
     n, iterations = len(ideal.forces), block.iterations.mean()
     work = per["group"] + n * per["observe"]
     work += iterations * (per["iteration"] + n * per["position"])

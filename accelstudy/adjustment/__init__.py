@@ -1,11 +1,7 @@
 """Gauss–Helmert adjustment, in general and for the calibration of an accelerometer."""
 
-from accelstudy.adjustment.calibration import (
-    CalibrationEquations,
-    Observations,
-    calibrate,
-    whitened_jacobian,
-)
+from accelstudy.adjustment.calibration import calibrate, whitened_jacobian
+from accelstudy.adjustment.equations import CalibrationEquations
 from accelstudy.adjustment.gauss_helmert import (
     Adjustment,
     ConditionEquations,
@@ -13,6 +9,7 @@ from accelstudy.adjustment.gauss_helmert import (
     Linearisation,
     adjust,
 )
+from accelstudy.adjustment.observations import Observations
 
 __all__ = [
     "Adjustment",

@@ -8,12 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.block import Block
-from accelstudy.adjustment.calibration import CalibrationEquations, CalibrationProblem, Observations
+from accelstudy.adjustment.calibration import CalibrationProblem
+from accelstudy.adjustment.equations import CalibrationEquations
 from accelstudy.adjustment.gauss_helmert import redundancy_of
+from accelstudy.adjustment.observations import Observations
 from accelstudy.approaches import Approach
-from accelstudy.kernel.adjustment import INTEGERS, NAME, POINTERS, KernelCode
 from accelstudy.kernel.compiled import Compiled
+from accelstudy.kernel.function import INTEGERS, NAME, POINTERS, KernelFunction
 from accelstudy.kernel.lanes import LANES
+from accelstudy.kernel.writing import text_of
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -28,15 +31,15 @@ class Kernel:
     """
 
     def __init__(self, equations: CalibrationEquations) -> None:
-        self.code = KernelCode(equations)
-        self._function = Compiled(self.code.text, NAME, len(INTEGERS), len(POINTERS))
+        self.function = KernelFunction(equations)
+        self._compiled = Compiled(text_of(self.function), NAME, len(INTEGERS), len(POINTERS))
 
     def calibrate(self, problem: CalibrationProblem) -> Block:
         """Calibrate the sessions of a problem; result and errors as of `calibrate`."""
-        code = self.code
+        function = self.function
         count, n, _ = problem.observed[0].shape
-        u = code.unknowns
-        redundancy = redundancy_of(code.conditions * n, problem.weights)
+        u = function.unknowns
+        redundancy = redundancy_of(function.conditions * n, problem.weights)
         padded = -(-count // LANES) * LANES
         results = np.empty((2 * u + 3, padded))
         correlations = np.zeros((u * (u - 1) // 2, LANES))
@@ -48,11 +51,11 @@ class Kernel:
             angles,
             np.ascontiguousarray(problem.initial),
             problem.weights,
-            _aligned(n * code.work * LANES),
+            _aligned(n * function.work * LANES),
             results,
             correlations,
         ]
-        self._function.call(n, count, *(array.ctypes.data for array in arrays))
+        self._compiled.call(n, count, *(array.ctypes.data for array in arrays))
         correlation = np.diag(np.full(u, results[2 * u + 2, :count].sum()))
         below = np.tril_indices(u, -1)
         correlation[below] = correlation.T[below] = correlations.sum(axis=1)
@@ -68,7 +71,7 @@ class Kernel:
 
     def _known(self, problem: CalibrationProblem) -> Array:
         """Numbers of the positions that are the same in all replicates, (n, columns)."""
-        conditions, known = problem.conditions, self.code.known
+        conditions, known = problem.conditions, self.function.known
         trace, n = conditions.equations.trace, len(problem.cofactors)
         variances = problem.cofactors
         unit = np.sqrt(np.divide(1.0, variances, out=np.zeros_like(variances), where=variances > 0))

@@ -11,7 +11,8 @@ from importlib.util import find_spec
 import numpy as np
 import sympy as sp
 
-from accelstudy.adjustment.calibration import CalibrationProblem, equations_of
+from accelstudy.adjustment.calibration import CalibrationProblem
+from accelstudy.adjustment.equations import equations_of
 from accelstudy.adjustment.gauss_helmert import MAX_ITERATIONS, STEP_TOLERANCE
 from problem import MODEL
 from processes import scratch

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.adjustment.calibration import Observations
+from accelstudy.adjustment.observations import Observations
 from accelstudy.adjustment.quality.solution import Solution, solve
 from accelstudy.approaches import Approach
 from accelstudy.sensors.sensor import SensorModel

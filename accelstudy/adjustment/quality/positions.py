@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from accelstudy.adjustment.calibration import Observations
+from accelstudy.adjustment.observations import Observations
 from accelstudy.adjustment.quality.solution import Solution, solve
 from accelstudy.approaches import Approach
 from accelstudy.sensors.sensor import SensorModel

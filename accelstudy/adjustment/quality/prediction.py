@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.adjustment.calibration import CalibrationProblem, Observations
+from accelstudy.adjustment.calibration import CalibrationProblem
 from accelstudy.adjustment.gauss_helmert import ConditionEquations, Linearisation, adjust
+from accelstudy.adjustment.observations import Observations
 from accelstudy.adjustment.quality.solution import Solution, solve
 from accelstudy.approaches import Approach
 from accelstudy.leveling.angles import angles_of, wrapped

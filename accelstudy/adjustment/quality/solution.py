@@ -23,8 +23,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.adjustment.calibration import CalibrationProblem, Observations, calibrate
+from accelstudy.adjustment.calibration import CalibrationProblem, calibrate
 from accelstudy.adjustment.gauss_helmert import Adjustment
+from accelstudy.adjustment.observations import Observations
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
 from accelstudy.sensors.sensor import SensorModel

@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import Effect
 from accelstudy.sensors.models import compose
-from accelstudy.sensors.sensor import SensorModel, trace_of
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.sensors.trace import trace_of
 from accelstudy.symbolic.algebra import sp
 from accelstudy.symbolic.tracing import derivative
 

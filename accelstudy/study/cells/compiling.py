@@ -20,7 +20,8 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from accelstudy.adjustment.block import Block
-from accelstudy.adjustment.calibration import Observations, calibrate
+from accelstudy.adjustment.calibration import calibrate
+from accelstudy.adjustment.observations import Observations
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
 from accelstudy.sensors.sensor import SensorModel

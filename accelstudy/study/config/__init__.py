@@ -1,8 +1,9 @@
 """The configuration of a study: its schema, and how it is read and checked."""
 
 from accelstudy.files.layers import overlay, read_layer
+from accelstudy.study.config.blocks import Grid
 from accelstudy.study.config.reading import config_schema, parse_study, read_study
-from accelstudy.study.config.schema import Grid, StudyConfig
+from accelstudy.study.config.schema import StudyConfig
 
 __all__ = [
     "Grid",

@@ -17,34 +17,15 @@ from accelstudy.basics import bounds
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.names import LONGEST
 from accelstudy.basics.units import STANDARD_GRAVITY, to_si
-from accelstudy.config_names import ModelName, SchemeName
 from accelstudy.design.estimability import estimability
 from accelstudy.effects import Effect, get_effect
 from accelstudy.files.provenance import config_hash
 from accelstudy.files.types import (
-    Angle,
-    Attitudes,
-    BaseSamples,
-    Duration,
-    Finite,
     Gravity,
-    GravityError,
-    Interval,
     OneOrMore,
-    Pitch,
-    Rate,
-    Replicates,
-    Resamples,
     Seed,
-    SigmaAngle,
-    SigmaForce,
-    SigmaGravity,
-    Temperature,
-    Tilt,
-    Vibration,
 )
 from accelstudy.files.validation import Block
-from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON
 from accelstudy.noise_effects import get_noise_effect
 from accelstudy.schemes import get_scheme, scheme_names
 from accelstudy.schemes.files import held, remember
@@ -52,139 +33,19 @@ from accelstudy.sensors.models import MODELS, PRESETS, get_model
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.hold_plan import HoldPlan
 from accelstudy.simulation.sessions import Noise, sigma_of_mean
+from accelstudy.study.config.blocks import (
+    HOLD_KEYS,
+    Grid,
+    HoldPlanConfig,
+    LevelingConfig,
+    NoiseConfig,
+    Presets,
+    Quantity,
+    SensitivityConfig,
+)
 
 CLAIMED_EFFECTS = ("bias", "scale", "nonorthogonality")
 """Effects that the model of the paper's claims and figures must have."""
-
-
-Temperatures = tuple[Temperature, Temperature]
-Vibrations = tuple[Vibration, Vibration]
-"""Two numbers, from and to."""
-
-
-class SensorNoise(Block):
-    """White noise of the accelerometer."""
-
-    sigma_mps2: SigmaForce = Field(0.002, description="standard deviation per axis, m/s²")
-    per: Literal["position", "sample"] = Field(
-        "position", description="whether sigma_mps2 is that of a position's mean or of one sample"
-    )
-    rate_hz: Rate = Field(100.0, description="sampling rate; used with per: sample")
-    duration_s: Duration = Field(2.0, description="duration of a hold; used with per: sample")
-
-
-class RobotNoise(Block):
-    """Noise of the robot's angles."""
-
-    sigma_mgon: SigmaAngle = Field(3.2, description="standard deviation of roll and of pitch")
-
-
-class GravityNoise(Block):
-    """What is known of local gravity."""
-
-    sigma_mps2: SigmaGravity = Field(
-        0.0, description="standard deviation of the value used; 0 holds it fixed in the adjustment"
-    )
-    error_mps2: GravityError = Field(0.0, description="systematic error of the value used")
-
-
-class NoiseConfig(Block):
-    """The stochastic model of all cells, except where a grid gives other values."""
-
-    sensor: SensorNoise = SensorNoise()
-    robot: RobotNoise = RobotNoise()
-    gravity: GravityNoise = GravityNoise()
-    effects: list[str] = Field(
-        default_factory=list,
-        description="noise effects of the forces, e.g. heavy_tails(nu=3), in the order in which "
-        "they work; the calibration does not know of them",
-    )
-
-
-class HoldPlanConfig(Block):
-    """Conditions of the holds, on which some effects depend."""
-
-    interval_s: Interval | None = Field(None, description="time between holds")
-    temperature_degC: Temperatures | None = Field(None, description="temperatures from and to")
-    temperature_order: Literal["linear", "ABBA", "random"] = Field(
-        "linear", description="course of the temperature; ABBA: in quarters of the session"
-    )
-    vibration_mps2: Vibrations | None = Field(
-        None, description="rms of the vibration, drawn for each hold between these"
-    )
-    yaw: Literal["none", "random"] = Field("none", description="yaw of the robot: zero, or drawn")
-
-
-HOLD_KEYS = {
-    "time": "holds.interval_s",
-    "temperature": "holds.temperature_degC",
-    "vibration": "holds.vibration_mps2",
-}
-"""Columns of the holds and the keys that provide them."""
-
-
-class Quantity(Block):
-    """True values of the parameters of one effect."""
-
-    value: OneOrMore[Finite] = Field(description="one number per parameter of the effect")
-    unit: str = Field(description="unit of the values, e.g. mgon, ppm, m/s^2")
-
-
-class Grid(Block):
-    """Cells: every combination of what is listed. A single value may stand for a list of one."""
-
-    models: OneOrMore[ModelName] = Field(
-        description="models: names, compositions as bias-scale+warm_up(tau=300), YAML files with a "
-        "model; or all"
-    )
-    schemes: OneOrMore[SchemeName] = Field(
-        description="schemes: names, YAML files as `accelstudy design` writes them; or all"
-    )
-    approaches: OneOrMore[str] = Field(
-        default=["gravity", "robot"], description="names of approaches, or all"
-    )
-    replicates: Replicates = Field(description="simulated calibrations per cell")
-    sensor_sigma_mps2: OneOrMore[SigmaForce] | None = Field(
-        None, description="noise.sensor.sigma_mps2"
-    )
-    robot_sigma_mgon: OneOrMore[SigmaAngle] | None = Field(
-        None, description="noise.robot.sigma_mgon"
-    )
-    gravity_sigma_mps2: OneOrMore[SigmaGravity] | None = Field(
-        None, description="noise.gravity.sigma_mps2"
-    )
-    gravity_error_mps2: OneOrMore[GravityError] | None = Field(
-        None, description="noise.gravity.error_mps2"
-    )
-
-
-class Presets(Block):
-    """The rows of the paper's Table 1, each with its own model and scheme."""
-
-    replicates: Replicates = Field(description="simulated calibrations per row and approach")
-    approaches: OneOrMore[str] = Field(
-        default=["gravity", "robot"], description="names of approaches, or all"
-    )
-
-
-class LevelingConfig(Block):
-    """Where the tilt error that a calibration leaves is evaluated."""
-
-    max_tilt_gon: Tilt = Field(
-        MAX_TILT_GON, description="largest tilt of the z axis from the vertical"
-    )
-    attitudes: Attitudes = Field(ATTITUDES, description="attitudes, spread evenly over that cap")
-
-
-class SensitivityConfig(Block):
-    """Variance-based sensitivity analysis of leveling (figures 4 to 6)."""
-
-    base_samples: BaseSamples = Field(1024, description="Sobol base samples, a power of two")
-    resamples: Resamples = Field(100, description="bootstrap resamples for confidence intervals")
-    roll_gon: OneOrMore[Angle] = Field(description="rolls of the grid")
-    pitch_gon: OneOrMore[Pitch] = Field(description="pitches of the grid")
-    model: ModelName = Field("bias-scale-nonorthogonality", description="model of figures 5 and 6")
-    scheme: SchemeName = Field("mclaren-24", description="scheme whose calibration gives the sds")
 
 
 _NAME = "[A-Za-z0-9][A-Za-z0-9_-]*"

@@ -10,13 +10,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
-import sympy as sp
 
-from accelstudy.adjustment.calibration import CalibrationEquations
 from accelstudy.adjustment.gauss_helmert import (
     MAX_ITERATIONS,
     PIVOT_TOLERANCE,
@@ -25,113 +22,20 @@ from accelstudy.adjustment.gauss_helmert import (
 )
 from accelstudy.kernel.cholesky import Rows, backward, dot, factor, forward, inverse
 from accelstudy.kernel.formulas import Formulas
+from accelstudy.kernel.function import INTEGERS, NAME, POINTERS, KernelFunction
 from accelstudy.kernel.lanes import LANES, Code, Lanes, Mask, Term, Variable, absolute, fma, larger
 from accelstudy.kernel.lanes import sqrt as root
-from accelstudy.symbolic.tracing import TracedFunction, symbols
-
-NAME = "calibrate"
-INTEGERS = ("positions", "replicates")
-POINTERS = (
-    *("known", "forces", "angles", "initial", "weights"),
-    *("work", "results", "correlations"),
-)
-"""Arguments of the function, in order; `KernelCode` says what they hold."""
 
 
-@dataclass(frozen=True)
-class KernelCode:
-    """The code that calibrates the replicates of one kind of sensor model with one approach.
-
-    The function has these arguments, for n positions, R replicates, u parameters (gravity is the
-    last if it is estimated), o observations per position and k known numbers:
-
-        known         (n, 2 o + k)  variances of the observations, their 1/σ (0 where σ = 0),
-                                    and the numbers of `known`
-        forces        (R, n, 3)
-        angles        (R, n, 2)     if the approach uses them
-        initial       (R, u)        of the parameters; the last is observed if it is gravity
-        weights       (u,)          of the observations of parameters: of gravity, or none
-        work          (n, work, LANES)
-        results       (2 u + 3, R') estimates, sigmas, Ω, iterations, converged (1 or 0); R' is R
-                                    rounded up to a multiple of LANES
-        correlations  (u (u − 1)/2, LANES)  sums over the converged replicates, below the diagonal
-                                    row by row; added to what is there
-
-    Parameters
-    ----------
-    equations : CalibrationEquations
-    """
-
-    equations: CalibrationEquations
-
-    @property
-    def unknowns(self) -> int:
-        """Parameters u."""
-        return len(self.equations.parameters)
-
-    @property
-    def observed(self) -> int:
-        """Observations o per position."""
-        return len(self.equations.observations)
-
-    @property
-    def conditions(self) -> int:
-        """Conditions c per position."""
-        return int(self.equations.linear.expressions.shape[0])
-
-    @cached_property
-    def _latent(self) -> tuple[sp.Symbol, ...]:
-        return () if self.equations.told is not None else symbols("a_x", "a_y", "a_z")
-
-    @cached_property
-    def _same(self) -> frozenset[sp.Symbol]:
-        lanes = {*self.equations.parameters, *self.equations.observations, *self._latent}
-        return frozenset(self.equations.trace.arguments) - lanes - set(self.equations.trace.force)
-
-    @cached_property
-    def _sensitive(self) -> Formulas:
-        """f_a from the known force, or from that of the iteration before."""
-        eq, trace = self.equations, self.equations.trace
-        if not self._latent:
-            return Formulas(list(eq.sensitive.expressions), self._same)
-        before = dict(zip(trace.force, self._latent, strict=True))
-        step = trace.newton_step.expressions.xreplace(before)
-        return Formulas([a + s for a, s in zip(self._latent, step, strict=True)], self._same)
-
-    @cached_property
-    def _linear(self) -> Formulas:
-        """[ψ | A | B], row by row."""
-        return Formulas(list(self.equations.linear.expressions), self._same)
-
-    @cached_property
-    def known(self) -> TracedFunction:
-        """Known numbers of a position, (k, 1)."""
-        expressions = [*self._sensitive.known.values(), *self._linear.known.values()]
-        return TracedFunction(
-            self.equations.trace.arguments, sp.Matrix(len(expressions), 1, expressions)
-        )
-
-    @property
-    def columns(self) -> int:
-        """Numbers of `known` per position."""
-        return 2 * self.observed + len(self.known.expressions)
-
-    @cached_property
-    def text(self) -> str:
-        """The function, as LLVM's text."""
-        return str(_Writer(self).code)
-
-    @property
-    def work(self) -> int:
-        """Vectors of `work` per position."""
-        c, u, o = self.conditions, self.unknowns, self.observed
-        return 2 * o + len(self._latent) + c * (u + 1 + o)
+def text_of(function: KernelFunction) -> str:
+    """Write the function as LLVM's text."""
+    return str(_Writer(function).code)
 
 
 class _Writer:
     """Writes the function."""
 
-    def __init__(self, of: KernelCode) -> None:
+    def __init__(self, of: KernelFunction) -> None:
         self.of = of
         self.u, self.o = of.unknowns, of.observed
         self.c = of.conditions
@@ -218,7 +122,7 @@ class _Writer:
             largest.set(size)
             self.write(i, 0, values)
             self.write(i, o, [0.0] * o)
-            if self.of._latent:
+            if self.of.latent:
                 self.write(i, 2 * o, values[:3])
         return larger(largest.get() * (ROUNDING * np.finfo(float).eps), STEP_TOLERANCE)
 
@@ -269,11 +173,11 @@ class _Writer:
         l, v = self.read(i, 0, o), self.read(i, o, o)
         table: dict[Any, Term] = dict(zip(eq.parameters, x, strict=True))
         table |= zip(eq.observations, (a + b for a, b in zip(l, v, strict=True)), strict=True)
-        if self.of._latent:
-            table |= zip(self.of._latent, self.read(i, 2 * o, 3), strict=True)
-        sensitive, linear = self.of._sensitive, self.of._linear
+        if self.of.latent:
+            table |= zip(self.of.latent, self.read(i, 2 * o, 3), strict=True)
+        sensitive, linear = self.of.sensitive, self.of.linear
         f_a = self.evaluate(sensitive, table, i, 2 * o)
-        if self.of._latent:
+        if self.of.latent:
             self.write(i, 2 * o, f_a)
         table |= zip(eq.trace.force, f_a, strict=True)
         values = self.evaluate(linear, table, i, 2 * o + len(sensitive.known))
@@ -317,7 +221,7 @@ class _Writer:
         ]
         for number, value in enumerate(value for row in self.stored for value in row):
             if isinstance(value, Lanes):  # a constant is not stored
-                self.write(i, 2 * o + len(self.of._latent) + number, [value])
+                self.write(i, 2 * o + len(self.of.latent) + number, [value])
 
     def evaluate(
         self, formulas: Formulas, table: dict[Any, Term], i: str, column: int
@@ -329,7 +233,7 @@ class _Writer:
     def residuals(self, i: str, dx: list[Term], size_v: Variable, omega: Variable) -> None:
         """Residuals of a position after a step, v = −(B Q)ᵀ L⁻ᵀ (A dx + w)."""
         u, o = self.u, self.o
-        number = 2 * o + len(self.of._latent)
+        number = 2 * o + len(self.of.latent)
         v_new: list[Term] = [0.0] * o
         total: Term = omega.get()
         for stored in self.stored:

@@ -1,0 +1,74 @@
+"""What was observed in a calibration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.effects import HoldConditions
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Observations:
+    """What was observed in n positions, R times.
+
+    Parameters
+    ----------
+    forces : (R, n, 3) array, m/s², sensor output f_s
+    sigma_force : float or (n, 3) array, m/s²
+    angles : (R, n, 2) array, rad, roll and pitch of the robot; None without a robot
+    sigma_angle : float or (n, 2) array, rad
+    gravity : float or (R,) array, m/s²; one number where it is held fixed
+    sigma_gravity : float, m/s²; 0 holds gravity fixed
+    hold : HoldConditions, of the positions
+    initial : (u,) array, SI, initial values of the model's parameters; an ideal sensor if None
+    slope, sd_slope : (n, 3) arrays, m/s²/s, of the output within each position, and its standard
+        deviation, R = 1; the adjustment does not use them
+    """
+
+    forces: Array
+    sigma_force: ArrayLike
+    angles: Array | None = None
+    sigma_angle: ArrayLike = 0.0
+    gravity: ArrayLike = STANDARD_GRAVITY
+    sigma_gravity: float = 0.0
+    hold: HoldConditions | None = None
+    initial: Array | None = None
+    slope: Array | None = None
+    sd_slope: Array | None = None
+
+    def take(self, positions: NDArray[np.int_]) -> Observations:
+        """Return the sessions with some of their positions."""
+
+        def chosen(values: ArrayLike) -> ArrayLike:
+            return np.asarray(values)[positions] if np.ndim(values) == 2 else values
+
+        return replace(
+            self,
+            forces=self.forces[:, positions],
+            angles=None if self.angles is None else self.angles[:, positions],
+            sigma_force=chosen(self.sigma_force),
+            sigma_angle=chosen(self.sigma_angle),
+            hold=None if self.hold is None else self.hold.take(positions),
+            slope=None if self.slope is None else self.slope[positions],
+            sd_slope=None if self.sd_slope is None else self.sd_slope[positions],
+        )
+
+    def sessions(self, chosen: slice) -> Observations:
+        """Return some of the sessions."""
+        angles, gravity = self.angles, np.asarray(self.gravity)
+        return replace(
+            self,
+            forces=self.forces[chosen],
+            angles=None if angles is None else angles[chosen],
+            gravity=gravity[chosen] if gravity.ndim else gravity,
+        )
+
+    def first(self, replicates: int) -> Observations:
+        """Return the first `replicates` sessions; all if there are fewer."""
+        return self.sessions(slice(replicates))
