@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -51,20 +51,13 @@ class Block:
             correlation_sum=(q / (sigma[:, :, None] * sigma[:, None, :])).sum(axis=0),
         )
 
-
-def joined(parts: Iterable[Block]) -> Block:
-    """Join blocks that follow each other."""
-    parts = list(parts)
-
-    def together(name: str) -> Any:
-        return np.concatenate([getattr(part, name) for part in parts])
-
-    return Block(
-        estimates=together("estimates"),
-        sigma_priori=together("sigma_priori"),
-        omega=together("omega"),
-        redundancy=parts[0].redundancy,
-        iterations=together("iterations"),
-        converged=together("converged"),
-        correlation_sum=np.sum([part.correlation_sum for part in parts], axis=0),
-    )
+    @classmethod
+    def joined(cls, parts: Iterable[Block]) -> Block:
+        """Join blocks that follow each other."""
+        parts = list(parts)
+        whole: dict[str, Any] = {
+            name: np.concatenate([getattr(part, name) for part in parts])
+            for name in ("estimates", "sigma_priori", "omega", "iterations", "converged")
+        }
+        correlation_sum = np.sum([part.correlation_sum for part in parts], axis=0)
+        return replace(parts[0], **whole, correlation_sum=correlation_sum)

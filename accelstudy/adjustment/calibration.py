@@ -13,7 +13,6 @@ from accelstudy.adjustment.gauss_helmert import (
     Adjustment,
     Linearisation,
     adjust,
-    joined,
     whitened_design,
 )
 from accelstudy.adjustment.observations import Observations
@@ -57,7 +56,7 @@ def calibrate(model: SensorModel, approach: Approach, observed: Observations) ->
     for start in range(0, count, size):
         part = observed.sessions(slice(start, start + size))
         parts.append(_calibrated(CalibrationProblem.of(model, approach, part)))
-    return joined(parts)
+    return Adjustment.joined(parts)
 
 
 def _calibrated(problem: CalibrationProblem) -> Adjustment:

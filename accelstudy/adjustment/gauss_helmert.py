@@ -134,16 +134,15 @@ class Adjustment:
         """Standard deviations a posteriori, (R, u)."""
         return np.sqrt(np.diagonal(self.covariance_posteriori, axis1=1, axis2=2))
 
-
-def joined(parts: Sequence[Adjustment]) -> Adjustment:
-    """Join adjustments of replicates of one problem."""
-    names = [field.name for field in fields(Adjustment)]
-    arrays: dict[str, Any] = {
-        name: np.concatenate([getattr(part, name) for part in parts])
-        for name in names
-        if name not in ("redundancy", "variance_priori")
-    }
-    return replace(parts[0], **arrays)
+    @classmethod
+    def joined(cls, parts: Sequence[Adjustment]) -> Adjustment:
+        """Join adjustments of replicates of one problem."""
+        arrays: dict[str, Any] = {
+            field.name: np.concatenate([getattr(part, field.name) for part in parts])
+            for field in fields(cls)
+            if field.name not in ("redundancy", "variance_priori")
+        }
+        return replace(parts[0], **arrays)
 
 
 def adjust(

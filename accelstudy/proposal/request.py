@@ -31,7 +31,7 @@ from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise
 
 CRITERIA = ("I", "D", "A")
-ATTITUDES = ("all", "cube", "hand")
+SPACES = ("all", "cube", "hand")
 HAND_STEP = np.pi / 6
 """rad, step in which a person judges roll and pitch by eye."""
 MOUNTINGS = Range(1, 9)
@@ -50,7 +50,7 @@ class Request:
     tilt_range : float, rad
     noise : Noise
     gravity : float, m/s²
-    attitudes : str, of `ATTITUDES`, or the path of a CSV file with those that are allowed
+    attitudes : str, of `SPACES`, or the path of a CSV file with those that are allowed
     mountings : int, optional, how often the sensor may be mounted; each is turned about one axis
     roll, pitch : (least, most), rad, optional
     pole_distance, least_angle : float, rad, optional
@@ -160,7 +160,7 @@ class Request:
             return by_eye(HAND_STEP)
         if self.attitudes.endswith(".csv") or "/" in self.attitudes:
             return listed_in(Path(self.attitudes))
-        raise UnknownNameError("attitudes", self.attitudes, (*ATTITUDES, "a path ending in .csv"))
+        raise UnknownNameError("attitudes", self.attitudes, (*SPACES, "a path ending in .csv"))
 
     @cached_property
     def constraints(self) -> Constraints:

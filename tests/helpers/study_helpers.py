@@ -1,6 +1,6 @@
 """A small study without Snakemake: configured, simulated and summarised as the workflow does it."""
 
-from accelstudy.adjustment.block import joined
+from accelstudy.adjustment.block import Block
 from accelstudy.basics.units import MGON
 from accelstudy.files.tables import collect, read_table
 from accelstudy.study.cells.batches import Share, batches
@@ -44,7 +44,7 @@ def make_cells(*grids, **keys):
 
 def simulated(cell, seed=1):
     """All replicates of a cell in one block."""
-    return joined(blocks(cell, seed, 0, cell.n_blocks))
+    return Block.joined(blocks(cell, seed, 0, cell.n_blocks))
 
 
 def simulate(folder, shares, seed=1, leveling=None):

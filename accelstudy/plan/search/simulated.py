@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.adjustment.block import joined
+from accelstudy.adjustment.block import Block
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY, recorded_unit, to_recorded
 from accelstudy.effects import get_effect
 from accelstudy.leveling.error import ATTITUDES
@@ -115,7 +115,7 @@ def simulate(config: dict[str, Any]) -> list[Simulated]:
 
 
 def _simulated(cell: Cell, seed: int, leveling: dict[str, Any]) -> Simulated:
-    block = joined(blocks(cell, seed, 0, cell.n_blocks))
+    block = Block.joined(blocks(cell, seed, 0, cell.n_blocks))
     estimates = block.estimates[block.converged]
     tilt = cell_tilt_error(cell, estimates.mean(axis=0), leveling)
     per_calibration = tilt.rms(estimates)

@@ -13,7 +13,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from accelstudy.adjustment.block import Block, joined
+from accelstudy.adjustment.block import Block
 from accelstudy.design.estimability import estimability
 from accelstudy.files.tables import parquet_writer
 from accelstudy.leveling.error import TiltError
@@ -151,7 +151,7 @@ def _chunks(share: Share, seed: int) -> Iterator[tuple[int, Block]]:
     """Number and content of each chunk of a share."""
     drawn = blocks(share.cell, seed, share.first * CHUNK, share.count * CHUNK)
     for index in range(share.first, share.first + share.count):
-        yield index, joined(islice(drawn, CHUNK))
+        yield index, Block.joined(islice(drawn, CHUNK))
 
 
 def _pilot_tilt(cell: Cell, seed: int, leveling: Mapping[str, Any]) -> TiltError | None:
