@@ -210,7 +210,7 @@ def test_a_drift_stays_where_the_session_left_it(tmp_path):
     errors, sigmas = errors_of(tmp_path / "out.csv")
     assert np.abs(errors / sigmas).max() < 4.5
     (warning,) = leveled.warnings
-    assert "bias_drift: kept as it was at the end" in warning
+    assert "bias_drift: constant after the end of the calibration session" in warning
     assert "600 s, in 35 of 40 rows" in warning
     # A day later nothing else is known, and no more is claimed to be unknown.
     level_log(calibration, log, tmp_path / "day.csv", {"rate_hz": 1 / 150}, 0.0, start=86400)
@@ -440,7 +440,7 @@ def test_a_lost_sample_does_not_lose_the_log(tmp_path, chunk_size):
     assert "line 4, column fz (fz): nothing" in warning
     log.write_text("fx,fy,fz,note\n1,2,9,a\n1,2\n", encoding="utf-8")
     (warning,) = level_log(calibration, log, tmp_path / "out.csv").warnings
-    assert warning.endswith("line 3 has not the 4 columns of the others")
+    assert warning.endswith("line 3 does not have 4 columns like the others")
 
 
 @pytest.mark.parametrize("wanted", ["out.csv.gz", "out.pq"])

@@ -347,8 +347,8 @@ def test_apply_mends_readings_as_the_data_were(tmp_path):
     log, right = log_of(campaign.forces, tmp_path), read_calibration(path)
     expected = right.correct(campaign.forces * 9.80665)
     for options, words in (
-        ([], "the forces are in g; readings are mended likewise"),
-        (["--unit", "g"], "the forces are in g; readings are taken as the options say"),
+        ([], "the forces are in g; readings are mended in the same way"),
+        (["--unit", "g"], "the forces are in g; readings are converted by the options only"),
     ):
         arguments = ["apply", path, log, "--columns", "fx=0,fy=1,fz=2", *options]
         result = CliRunner().invoke(

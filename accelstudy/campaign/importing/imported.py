@@ -1,4 +1,4 @@
-"""What is common to campaigns made of logs and of tables of means."""
+"""What the import of logs and of tables of means have in common."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ Array = NDArray[np.float64]
 def imported_campaign(
     paths: Sequence[str | Path], settings: ImportSettings, forces: Array, **columns: Any
 ) -> Campaign:
-    """Campaign of forces (n, 3) in m/s², in forward, right, down, as the settings describe it.
+    """Make a campaign of forces (n, 3) in m/s², in forward, right, down, as the settings say.
 
     Raises
     ------
     InputError
-        If the forces are nowhere near gravity; says which options would make them so.
+        If the forces are nowhere near gravity; it names the options that would mend that.
     """
     conversion = conversion_of(settings.unit, settings.scale, settings.offset)
     frame = settings.axes
@@ -56,7 +56,7 @@ def imported_campaign(
 
 
 def _check_size(path: str | Path, settings: ImportSettings, raw: Array, forces: Array) -> None:
-    """Check that forces are roughly as large as gravity; names the options that would make them."""
+    """Check that forces are roughly as large as gravity; the error names the options to change."""
     gravity, unit = settings.gravity.value_mps2, settings.unit
     norm, given = (float(np.median(np.linalg.norm(array, axis=1))) for array in (forces, raw))
     fault = likely_fault(given, norm, unit, gravity)
@@ -77,7 +77,7 @@ def _check_size(path: str | Path, settings: ImportSettings, raw: Array, forces: 
 
 
 def layout_of(settings: LogLayout, source: Source, places: Mapping[str, int]) -> LogLayout:
-    """How a log was read, with all its columns: by their names if it has names."""
+    """How a log was read, with all its columns, by name if it has names."""
 
     def column(key: str) -> Place:
         place = places[key]
@@ -91,7 +91,7 @@ def layout_of(settings: LogLayout, source: Source, places: Mapping[str, int]) ->
 
 
 def default_name(paths: Sequence[str | Path]) -> str:
-    """Name of a campaign: that of its file without its endings, or of the folder of several."""
+    """Name of a campaign: the name of its file without endings, or of the folder of its files."""
     path = Path(paths[0])
     if len(paths) > 1:
         return path.absolute().parent.name or path.stem

@@ -47,11 +47,12 @@ __all__ = [
 Array = NDArray[np.float64]
 
 TURNING = 1.5
-"""Noise across over noise along gravity from which on the sensor is said to turn in its holds."""
+"""Noise across gravity, as a multiple of that along it, from which on a warning says that the
+sensor turns within its holds."""
 
 
 def log_of(path: str | Path, settings: ImportSettings) -> Log:
-    """Open a log as the settings say."""
+    """Open a log by the settings."""
     return open_log(
         path,
         columns=settings.columns,
@@ -81,17 +82,17 @@ def import_sensors(
 
     Parameters
     ----------
-    paths : files with raw logs, see `open_log`; of several each has one position, the longest hold
-        in it
+    paths : files with raw logs, see `open_log`; if there are several, the longest hold of each is
+        its one position
     settings : ImportSettings
 
     Returns
     -------
     dict
-        For each sensor, by its name ("" if the settings name none), the campaign and what was
-        found. The campaign has one position for each hold. Its `sigma_force` takes into account
-        that the samples are not independent: it is the Allan deviation over a typical hold, of the
-        specific force along gravity, as across it a sensor that settles looks like one that drifts.
+        For each sensor, by its name ("" if the settings name none), the campaign and a report. The
+        campaign has one position for each hold. Its `sigma_force` takes into account that samples
+        are not independent: it is the Allan deviation over a typical hold. It is taken along
+        gravity only, since a sensor that settles makes the force drift across it.
 
     Raises
     ------
@@ -143,7 +144,7 @@ def import_each(
 ) -> dict[str, tuple[Campaign, ImportReport]]:
     """Import logs, or a table of means, and write the campaigns to folders.
 
-    With `figure`, segmentation.svg and .png there show the log with its holds, if it is a log.
+    With `figure`, the folder of a log also gets segmentation.svg and .png, which show its holds.
 
     Parameters
     ----------
@@ -154,7 +155,7 @@ def import_each(
     Raises
     ------
     InputError
-        If something cannot be read, makes no campaign, or cannot be written.
+        If a file cannot be read or makes no campaign, or a folder cannot be written.
     """
     if settings.means:
         if len(paths) > 1 or settings.sensors:
@@ -169,14 +170,14 @@ def import_each(
 
             files = (folders[name] / f"segmentation.{kind}" for kind in ("svg", "png"))
             own = _settings_of_sensors(settings)[name]
-            if campaign.log is not None:  # it knows the offset that the positions showed
+            if campaign.log is not None:  # it has the offset that the positions determined
                 own = own.model_copy(update={"offset": campaign.log.offset})
             render_segmentation(_recording(paths, own), report.holds, *files)
     return campaigns
 
 
 def _settings_of_sensors(settings: ImportSettings) -> dict[str, ImportSettings]:
-    """Settings of each sensor, as if it were alone."""
+    """Settings of each sensor, as if it were the only one."""
     if settings.robot is not None:
         raise InputError("robot: its angles go with a table of means (--means)")
     if not settings.sensors:
@@ -251,7 +252,7 @@ def _campaign(
 
 
 def _accuracy(holds: DetectedHolds, gravity: float) -> tuple[MeanAccuracy, list[str]]:
-    """How well the mean over a typical hold is known, and what is odd about the holds."""
+    """How well the mean over a typical hold is known, and warnings about the holds."""
     typical = int(np.median(holds.n_samples[holds.used]))
 
     def accuracy_in(channels: slice) -> MeanAccuracy:
@@ -263,7 +264,7 @@ def _accuracy(holds: DetectedHolds, gravity: float) -> tuple[MeanAccuracy, list[
     if not holds.directed:
         warnings.append(
             "the norms of the means differ too much for specific forces (is an offset missing?); "
-            "sigma is that of all axes together"
+            "sigma is taken over all axes"
         )
     elif (across := accuracy_in(slice(1, 3)).allan) > TURNING * accuracy.allan:
         turned = f"{to_display(across / gravity, 'rad'):.0f} {display_unit('rad')}"
@@ -273,7 +274,7 @@ def _accuracy(holds: DetectedHolds, gravity: float) -> tuple[MeanAccuracy, list[
         )
     if accuracy.slope is not None:
         warnings.append(
-            f"the Allan deviation is known up to {accuracy.tau:.2g} s, and carried on from there "
+            f"the Allan deviation is known up to {accuracy.tau:.2g} s, and extrapolated from there "
             f"to the {accuracy.duration:.2g} s of a hold with slope {accuracy.slope:.2f}"
         )
     return accuracy, warnings
@@ -282,7 +283,7 @@ def _accuracy(holds: DetectedHolds, gravity: float) -> tuple[MeanAccuracy, list[
 def _with_offset(
     settings: ImportSettings, holds: DetectedHolds
 ) -> tuple[ImportSettings, Array, list[str]]:
-    """Offset of counts from the positions, unless zero is right but for a sensor's bias."""
+    """Offset of counts, from the positions, unless it is zero apart from the sensor's bias."""
     frame = settings.axes
     radius = float(np.median(np.linalg.norm(holds.mean - holds.center, axis=1)))
     if not (holds.directed and np.linalg.norm(holds.center) > radius / 2):
@@ -298,7 +299,7 @@ def _with_offset(
 
 
 def _full_range(settings: ImportSettings) -> float:
-    """Range of the sensor, infinite if unknown; counts without an offset reach no range."""
+    """Range of the sensor; infinite if it is unknown, or if the offset of counts is."""
     if settings.range_mps2 is None or (settings.unit == "counts" and settings.offset is None):
         return np.inf
     return settings.range_mps2

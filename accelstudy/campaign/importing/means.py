@@ -26,28 +26,28 @@ SDS = ("sd_fx", "sd_fy", "sd_fz")
 ANGLES = ("roll", "pitch")
 MEANS = (*AXES, "n_samples", *SDS, "temperature", "vibration", *ANGLES, "yaw")
 """Columns that a table of means may have, besides its time."""
-_YEARS = 1e8  # s; nobody calibrates for years, so times beyond count from 1970
+_YEARS = 1e8  # s; no session lasts for years, so later times count from 1970
 
 
 def import_means(
     path: str | Path, settings: ImportSettings | None = None
 ) -> tuple[Campaign, ImportReport]:
-    """Take a table of means, one row for each position.
+    """Make a campaign of a table of means, one row for each position.
 
     Parameters
     ----------
     path : file, of any kind that `open_log` reads; a MATLAB array may have a column for each
         position instead
     settings : ImportSettings, optional
-        Of `columns` those of `MEANS`; nothing is detected, so that windows do not matter. With
-        `robot` the columns roll, pitch and perhaps yaw are the robot's angles, in the convention of
-        the frame.
+        Its `columns` are those of `MEANS`. Settings of the detector do not matter. With `robot`
+        the columns roll, pitch and perhaps yaw are the robot's angles, in the convention of the
+        frame.
 
     Returns
     -------
     Campaign
-        With a `sigma_force` if the table has the number of samples and their standard deviations:
-        that of white noise, as a table of means does not tell more.
+        It has a `sigma_force` if the table has numbers of samples and their standard deviations:
+        that of white noise, since a table of means does not say more.
     ImportReport
 
     Raises
@@ -74,7 +74,7 @@ def import_means(
     sigma: float | None = None
     if sd is not None and n_samples is not None and np.any(sd > 0):
         sigma = float(np.sqrt(np.mean(sd**2 / n_samples[:, None])))
-        warnings.append("sigma of a mean is that of white noise; coloured noise makes it larger")
+        warnings.append("sigma of a mean assumes white noise; coloured noise makes it larger")
     forces = frame.to_frd(conversion.to_si(np.column_stack([values[axis] for axis in AXES])))
     campaign = imported_campaign(
         [path],
@@ -104,14 +104,14 @@ def import_means(
 
 
 def _layout(settings: ImportSettings) -> LogLayout:
-    """What a table of means tells of logs: their unit and axes, but not their columns."""
+    """Layout of logs of the same sensor: unit and axes of the table, but not its columns."""
     return LogLayout.model_validate(
         settings.model_dump(include={"unit", "scale", "offset", "frame"}, exclude_none=True)
     )
 
 
 def _columns(source: Source, settings: ImportSettings) -> tuple[dict[str, Array], list[str]]:
-    """Columns by their keys, and what was not taken."""
+    """Columns by their keys, and warnings about columns that are not used."""
     given = settings.columns
     for key in given:
         if key not in MEANS:
@@ -128,7 +128,7 @@ def _columns(source: Source, settings: ImportSettings) -> tuple[dict[str, Array]
         missing = [key for key in ANGLES if key not in angles]
         if missing:
             raise InputError(
-                f"{source.path}: which column is the robot's {missing[0]}? Say it with "
+                f"{source.path}: which column is the robot's {missing[0]}? Name it by "
                 f"--columns {missing[0]}=..."
             )
         places |= angles
@@ -153,7 +153,7 @@ def _columns(source: Source, settings: ImportSettings) -> tuple[dict[str, Array]
 
 
 def _check_angles(path: str | Path, angles: Array, unit: str, campaign: Campaign) -> None:
-    """Check that the robot's angles (n, 2) fit the forces in this unit and frame, if in any."""
+    """Check that no other unit or frame fits the forces clearly better, for angles (n, 2)."""
 
     def misfit(unit: str, sign: int = 1) -> float:
         given = angles * UNITS["rad"][unit]

@@ -1,4 +1,4 @@
-"""Public measurements: a registry of where they are, and a way to get them whole."""
+"""Public measurements: a registry of their sources, and checked downloads."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from accelstudy.files.validation import Block, checked
 
 REGISTRY = Path(__file__).with_name("public_data.yaml")
 TIMEOUT = 30.0
-"""s, that a server may be silent."""
+"""Longest time without data from a server, s."""
 BLOCK = 1 << 16
-"""Bytes that are taken from it at a time."""
+"""Bytes that are read at a time."""
 
 
 class PublicData(Block):
@@ -39,7 +39,7 @@ class PublicData(Block):
     url : str, of the file as it was at one commit
     sha256 : str, of its bytes
     licence : str, SPDX identifier
-    settings : ImportSettings, the key `import`; None where the file holds no forces
+    settings : ImportSettings, the key `import`; None if the file holds no forces
     """
 
     description: str
@@ -81,15 +81,15 @@ def import_settings(name: str) -> ImportSettings:
 
 
 def public_file(name: str, folder: str | Path) -> Path:
-    """Path of a public file, which is downloaded unless it is there already.
+    """Path of a public file; the file is downloaded if it is missing.
 
     Parameters
     ----------
     name : str
         Name in the registry, see `public_data`.
     folder : path
-        Searched with all its subfolders for a file of that name and checksum. A download goes to
-        `<folder>/<name>/`.
+        This folder and all its subfolders are searched for a file with that name and checksum. A
+        download goes to `<folder>/<name>/`.
 
     Raises
     ------
@@ -98,7 +98,7 @@ def public_file(name: str, folder: str | Path) -> Path:
     InputError
         If the file cannot be downloaded, or is not the one that the registry knows.
     """
-    folder = Path(folder).expanduser()  # no shell has seen what stands in a configuration
+    folder = Path(folder).expanduser()  # in a configuration no shell expands it
     return fetch(_known(name), folder, folder / name)
 
 
@@ -110,7 +110,7 @@ def _known(name: str) -> PublicData:
 
 
 def record_public(name: str, folder: str | Path, path: str | Path, attempt: int) -> None:
-    """Write to a JSON file where a public file is, or why it could not be had.
+    """Write to a JSON file where a public file is, or why it is missing.
 
     `attempt` is kept with it; see `next_attempt`.
     """
@@ -129,10 +129,10 @@ def read_record(path: str | Path) -> dict[str, Any]:
 
 
 def next_attempt(path: str | Path) -> int:
-    """Number of the attempt to get a file that its record calls for, from 1.
+    """Number of the attempt to get a file, from 1.
 
-    It is that of the record as long as its file is there. As a parameter of a rule it makes
-    Snakemake try again what failed, and nothing else.
+    It is the number in the record as long as the file is there, else the next one. As a parameter
+    of a rule it makes Snakemake repeat failed downloads, and only those.
     """
     if not Path(path).exists():
         return 1
@@ -144,14 +144,14 @@ def next_attempt(path: str | Path) -> int:
 def fetch(data: PublicData, searched: Path, target: Path) -> Path:
     """Find a file below the folder `searched`, or download it to the folder `target`.
 
-    A download that breaks off goes on as long as each try brings something. What is left of it in
-    the end, a `.part` file, is continued by the next call. Two calls at once do not meet: each
-    writes to a file of its own.
+    A download that breaks off is continued as long as each try brings some data. If it remains
+    incomplete, the next call continues its `.part` file. Two calls at the same time do not collide:
+    each writes to its own file.
 
     Raises
     ------
     InputError
-        If the file cannot be downloaded, or is not the one that is meant.
+        If the file cannot be downloaded, or is not the expected one.
     """
     try:
         for path in sorted(searched.rglob(data.file_name)):
@@ -178,7 +178,7 @@ def fetch(data: PublicData, searched: Path, target: Path) -> Path:
 
 
 def _download_after_earlier(url: str, path: Path, left: Path) -> None:
-    """Go on with what an earlier call has left, which nobody else can take then; leave it again."""
+    """Claim the part file of an earlier call, so that no other call uses it, and leave it again."""
     if left.is_symlink():  # no download of ours: it would be written to another place
         left.unlink()
     with suppress(FileNotFoundError):
@@ -202,7 +202,7 @@ def _download_with_retries(url: str, path: Path) -> None:
 
 
 def _download(url: str, path: Path, have: int) -> None:
-    """Download to `path`, after the `have` bytes that it holds already."""
+    """Download to `path`, which already holds the first `have` bytes."""
     request = Request(url, headers={"Range": f"bytes={have}-"} if have else {})
     try:
         with urlopen(request, timeout=TIMEOUT) as response:
@@ -210,7 +210,7 @@ def _download(url: str, path: Path, have: int) -> None:
             resumed = response.headers.get("Content-Range", "").startswith(f"bytes {have}-")
             with path.open("ab" if resumed else "wb") as file:
                 start = file.tell()
-                # Only a server that says how much there is can be held to it.
+                # Completeness can be checked only if the server states the size.
                 expected = response.headers.get("Content-Length", "").strip()
                 known = expected.isascii() and expected.isdigit()
                 total = int(expected[:18]) if known else None
@@ -218,7 +218,7 @@ def _download(url: str, path: Path, have: int) -> None:
                     while block := response.read(BLOCK):
                         advance(file.write(block))
                 came = file.tell() - start
-            # The end of a broken connection looks like the end of the file.
+            # A broken connection looks like the end of the file.
             if total is not None and came < total:
                 raise OSError(f"the connection broke after {came} of {expected} bytes")
     except HTTPError as error:

@@ -80,11 +80,11 @@ def render_segmentation(
 ) -> None:
     """Draw the segmentation and write it as SVG and PNG, each whole or not at all.
 
-    A figure that fails takes nothing with it: there is none, and a warning on stderr says why.
+    If the figure fails, the import goes on: a warning on stderr says why there is no figure.
     """
     try:
         save(draw_segmentation(log, holds), svg_path, png_path, "Static holds", DPI)
-    except (OSError, InputError):  # a full disk or a log that is gone is no matter of the figure
+    except (OSError, InputError):  # such as a full disk, which is not the figure's fault
         raise
     except Exception as error:
         for path in (svg_path, png_path):  # of an import before
@@ -128,6 +128,6 @@ def _envelope(log: Recording, holds: DetectedHolds) -> tuple[Array, Array, Array
 
 
 def _band(ax: Axes, x: Array, low: Array, high: Array, colour: str, label: str | None) -> None:
-    # A band without height would be invisible, so its middle is drawn too.
+    # A band without height would be invisible, so its middle is drawn, too.
     ax.fill_between(x, low, high, color=colour, alpha=0.5, linewidth=0)
     ax.plot(x, (low + high) / 2, color=colour, linewidth=0.8, label=label)

@@ -1,4 +1,4 @@
-"""What `accelstudy import` is told: the keys of a settings file."""
+"""The settings of `accelstudy import`: the keys of a settings file."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class RobotSettings(BaseModel):
 
 
 class ImportSettings(LogLayout):
-    """How a log is to be read, and what is to be made of it; the keys of a settings file."""
+    """How a log is read, and what the campaign gets from it; the keys of a settings file."""
 
     means: bool = Field(False, description="the file is a table of means already")
     name: str | None = Field(None, description="name of the campaign; that of the file if absent")
@@ -88,6 +88,6 @@ def parse_settings(content: Mapping[str, Any], source: str = "settings") -> Impo
 def read_settings(
     path: str | Path | None, given: Mapping[str, Any] | None = None
 ) -> ImportSettings:
-    """Settings from a YAML file, overlaid with what is given besides."""
+    """Settings from a YAML file, overlaid with `given`."""
     content = read_layer(path) if path is not None else {}
     return parse_settings(overlay(content, given or {}), str(path or "options"))

@@ -1,1 +1,1 @@
-"""Simulated campaigns, with hidden effects and gross errors whose truth is recorded."""
+"""Simulated campaigns with effects and gross errors of your choice, and their truth."""

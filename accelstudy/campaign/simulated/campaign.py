@@ -1,4 +1,4 @@
-"""Simulated campaigns: measured data as it might be, with effects of one's choice and the truth."""
+"""Simulated campaigns: data as they might be measured, with chosen effects and the truth."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from accelstudy.simulation.sessions import Noise, Session, session
 Array = NDArray[np.float64]
 
 STREAMS = ("sensor", "effects", "order", "noise", "sd", "gross", "slope")
-"""What is drawn, each from a stream of its own, so that none changes another (nor the holds)."""
+"""What is drawn. Each has its own stream of random numbers, so that none changes another."""
 
 ORDERS = ("scheme", "random")
 
@@ -49,7 +49,7 @@ _RANGES = {
 
 @dataclass(frozen=True)
 class CampaignSettings:
-    """What is simulated; SI but for temperatures.
+    """Settings of a simulated campaign, in SI apart from temperatures in °C.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class CampaignSettings:
     seed : int
     scheme : str
     repeats : int, how often the whole scheme is measured
-    repeat_first : int, how many of the first holds are measured again at the end
+    repeat_first : int, number of first holds that are measured again at the end
     order : "scheme" or "random", of the holds
     approach : str, whether there is a robot
     model : str, effects that every sensor has; their parameters are drawn, of `Effect.typical` size
@@ -67,7 +67,7 @@ class CampaignSettings:
         the larger typical size, with random signs
     noise_effects, gross_errors : tuple of str
     sigma : float, m/s², of a position mean
-    sigma_known : bool, whether the campaign tells it
+    sigma_known : bool, whether the campaign states it
     sigma_angle : float, rad, of the robot's roll and pitch
     gravity : float, m/s²
     interval, temperature, temperature_order, vibration, yaw : as in `HoldPlan`
@@ -139,8 +139,8 @@ def simulate_campaign(settings: CampaignSettings) -> tuple[Campaign, dict[str, A
     -------
     campaign : Campaign
     truth : dict
-        Plain data: the settings, and all that was drawn: the parameters of the sensor and of the
-        effects, the settings of the gross errors.
+        Plain data: the settings, and everything that was drawn, which are the parameters of the
+        sensor and of the effects, and the settings of the gross errors.
 
     Raises
     ------
@@ -228,7 +228,7 @@ def _hidden_effects(
 
 
 def _usual_parameters(effect: Effect, rng: np.random.Generator) -> Array:
-    """Parameters of either sign and, on a scale of logarithms, anywhere between typical sizes."""
+    """Parameters of random sign, with sizes that are log-uniform between the typical sizes."""
     n = len(effect.parameters)
     low, high = np.log(effect.typical)
     return np.asarray(np.exp(rng.uniform(low, high, n)) * rng.choice([-1.0, 1.0], n))
@@ -252,7 +252,7 @@ def _samples(
     n_positions: int,
     rng: np.random.Generator,
 ) -> dict[str, Any]:
-    """Numbers of samples, and their sds: σ√n with the scatter of the sd of a normal sample."""
+    """Numbers of samples, and their sds: σ√n with the scatter of the sd of normal samples."""
     n = settings.n_samples
     if n is None:
         return {}
@@ -269,10 +269,10 @@ def _slopes(
     noise_effects: Sequence[NoiseEffect],
     rng: np.random.Generator,
 ) -> dict[str, Any]:
-    """Slopes of the samples, and their sds: √12 σ over the time of a hold, as of white noise."""
+    """Slopes of the samples, and their sds: √12 σ over the duration of a hold, for white noise."""
     if settings.duration is None:
         return {}
-    # A line through samples has the slope between these two moments, up to the third order.
+    # Up to the third order a fitted line has the slope between these two moments.
     dt = np.sqrt(0.6) * settings.duration / 2
     later, earlier = (
         model.sense(ideal.f_b, parameters, settings.gravity, settings.holds.moved(ideal.hold, d))

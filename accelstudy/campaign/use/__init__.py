@@ -1,1 +1,1 @@
-"""The use of a calibration: logs leveled by it, and its export to devices."""
+"""The use of a calibration: leveling of logs, and export to devices."""

@@ -1,4 +1,4 @@
-"""What is learned of a log while it is leveled: what stays empty, lies far off or is assumed."""
+"""What the user should know about a log that is leveled: empty rows, outliers, assumptions."""
 
 from __future__ import annotations
 
@@ -21,10 +21,11 @@ from accelstudy.effects import HoldConditions
 Array = NDArray[np.float64]
 
 CLIPPED = 0.999
-"""Part of the sensor's range from which on a reading is none: a count less than all is the end."""
+"""A reading beyond this part of the sensor's range is saturated: the last count is often below the
+range."""
 
 RAGGED = "ragged"
-"""What is unusable of a line that has not as many cells as the others: all."""
+"""Key of an unusable line that has more or fewer cells than the others."""
 
 
 def clipped(calibration: Calibration, forces: Array) -> NDArray[np.bool_]:
@@ -34,12 +35,12 @@ def clipped(calibration: Calibration, forces: Array) -> NDArray[np.bool_]:
 
 
 class Account:
-    """What was learned of a log so far; chunks are added one after the other.
+    """Collects what the user should know about a log; chunks are added one after the other.
 
     Attributes
     ----------
     rows : int, so far
-    empty : int, rows of which no force could be made
+    empty : int, rows without a calibrated force
     """
 
     def __init__(self, calibration: Calibration, readings: Readings) -> None:
@@ -56,7 +57,7 @@ class Account:
         Raises
         ------
         InputError
-            If all of the first chunk is nowhere near gravity: the rest need not be read then.
+            If all readings of the first chunk are nowhere near gravity.
         """
         lost = np.isnan(corrected[:, 0])
         if lost.any() and not self.empty:
@@ -66,7 +67,7 @@ class Account:
         self.empty += int(lost.sum())
         norms = np.linalg.norm(forces, axis=1)
         norms = norms[np.isfinite(norms)]
-        # Sensors are wrong by some tenths at worst; one that moves has other forces for moments.
+        # Even bad sensors are wrong by some tenths only; larger differences come from motion.
         gravity = self._calibration.gravity
         self._far += int(np.sum((norms < gravity / 2) | (norms > gravity * 2)))
         if not self._usable and len(norms):
@@ -79,7 +80,7 @@ class Account:
         self._watch.look_at(corrected, hold)
 
     def close(self) -> None:
-        """Raise `InputError` if nothing of the log is of use, or most of it far from gravity."""
+        """Raise `InputError` if no row is usable, or most readings are far from gravity."""
         if not self._usable:
             path = self._readings.source.path
             raise InputError(f"{path}: no row has three numbers; the first: {self._reason()}")
@@ -87,34 +88,37 @@ class Account:
             raise self._wrong_unit()
 
     def assumptions(self) -> Iterator[str]:
-        """What is taken for granted as long as nobody says when the log was started."""
+        """Assumptions that are made if the user does not say when the log was started."""
         needs = self._calibration.needs
         warmed = {effect for effect, column in needs if column == "temperature"}
         timed = [e for e, column in needs if column == "time" and e not in warmed]
         lagging = [e for e, column in needs if column == "time" and e in warmed]
         if lagging:
-            yield f"{short_list(lagging)}: the sensor is taken to be as warm as the first row says"
+            yield f"{short_list(lagging)}: assumes that the sensor has the temperature of row 1"
         if timed:
             yield (
-                f"{short_list(timed)}: the first row is taken for the start of the calibration "
-                "session; if it is not, give the seconds between them by --start"
+                f"{short_list(timed)}: assumes that the first row is the start of the calibration "
+                "session; if not, give the seconds between them by --start"
             )
 
     def warnings(self) -> Iterator[str]:
-        """What a user should know of the log."""
+        """Warnings about the log."""
         of_all = f"of {counted(self.rows, 'row')}"
         if self.empty:
             first = self._reason()
-            yield f"{self.empty} {of_all} have no calibrated force, their cells are empty; {first}"
+            yield f"{self.empty} {of_all} have no calibrated force and get empty cells; {first}"
         if self._after:
             yield (
-                f"{short_list(self._calibration.drifts)}: kept as it was at the end of the "
-                f"calibration session, at {self._session_end:.0f} s, in {self._after} {of_all} "
-                "that come later"
+                f"{short_list(self._calibration.drifts)}: constant after the end of the "
+                f"calibration session at {self._session_end:.0f} s, which concerns {self._after} "
+                f"{of_all}"
             )
         moved = dict.fromkeys(e for e, c in self._calibration.needs if c.startswith("step_"))
         for name in moved:
-            yield f"{name} is not corrected ({self._sizes(name)}): a log has no position before"
+            yield (
+                f"{name} is not corrected ({self._sizes(name)}): it depends on the position "
+                "before, which a log does not have"
+            )
         yield from self._watch.warnings(self.rows)
 
     @property
@@ -131,7 +135,7 @@ class Account:
         )
 
     def _unusable(self, table: pa.Table, row: int) -> str | None:
-        """Which of the columns that are used has no number in a row of a chunk."""
+        """Key of the first used column that has no number in a row of a chunk."""
         names = column_names(self._readings.source)
         if all(not cell.is_valid for column in table.columns for cell in column.slice(row, 1)):
             return RAGGED
@@ -141,13 +145,13 @@ class Account:
         return None
 
     def _reason(self) -> str:
-        """Why the first empty row is, with the place where it stands."""
+        """Say why the first empty row is empty, and where it is."""
         source, places = self._readings.source, self._readings.places
         row, key = self._first_empty
-        # Looks for the line in the file anew, so once.
+        # This reads the file again to find the line.
         where, found = source.look_up(row, places.get(key or "", places["fx"]))
         if key == RAGGED:
-            return f"{where} has not the {len(source.names)} columns of the others"
+            return f"{where} does not have {len(source.names)} columns like the others"
         if key is not None:
             return f"{where}, column {source.names[places[key]]} ({key}): {found}"
         full = self._calibration.content.get("range_mps2")

@@ -32,7 +32,7 @@ NO_CALIBRATION = "not a calibration.json of accelstudy"
 
 @dataclass(frozen=True)
 class Calibration:
-    """A calibration as the sensor takes it along, without what belongs to the rig.
+    """A calibration as it stays with the sensor, without the effects of the rig.
 
     Attributes
     ----------
@@ -41,8 +41,8 @@ class Calibration:
     covariance : (u, u) array, SI
     gravity : float, m/s²
     content : mapping, what is used of the file
-    log : LogLayout, how the log was read that the campaign was made of; None if there was none
-    ranges : mapping, what the calibration saw, see `accelstudy.campaign.calibration.ranges`
+    log : LogLayout, layout of the log from which the campaign was made; None if there was none
+    ranges : mapping, of the calibration, see `accelstudy.campaign.calibration.ranges`
     """
 
     model: SensorModel
@@ -55,7 +55,7 @@ class Calibration:
 
     @cached_property
     def needs(self) -> tuple[tuple[str, str], ...]:
-        """Effects that need more than a force, each with one of the columns of `HoldConditions`."""
+        """Effects that need more than the force, each with a column of `HoldConditions`."""
         if not self.model.hold_columns:
             return ()
         return tuple(
@@ -66,7 +66,7 @@ class Calibration:
 
     @property
     def drifts(self) -> tuple[str, ...]:
-        """Effects that drift with the session, and are kept as they were at its end."""
+        """Effects that drift during the session; afterwards they keep their value at its end."""
         return tuple(effect.name for effect in self.model.effects if effect.drifts)
 
     def correct(self, forces: ArrayLike, hold: HoldConditions | None = None) -> Array:
@@ -75,11 +75,11 @@ class Calibration:
         Parameters
         ----------
         forces : (n, 3) array, m/s², readings
-        hold : HoldConditions, what else is known of them, as far as the effects need it
+        hold : HoldConditions, other columns of the readings that the effects need
 
         Returns
         -------
-        (n, 3) array, m/s²; NaN where no force makes such a reading
+        (n, 3) array, m/s²; NaN where no force explains the reading
         """
         forces, _ = self._as_continued(np.asarray(forces, dtype=float), hold)
         return self.model.correct(forces, self.parameters, self.gravity, hold)
@@ -97,7 +97,7 @@ class Calibration:
 
         Returns
         -------
-        angles, sigma : (n, 2) arrays, rad; sigma holds the noise of the reading and the
+        angles, sigma : (n, 2) arrays, rad; sigma combines the noise of the reading and the
         uncertainty of the calibration
         """
         forces, share = self._as_continued(np.asarray(forces, dtype=float), hold)
@@ -106,19 +106,19 @@ class Calibration:
             self.model, self.parameters, forces, corrected, self.gravity, hold
         )
         variance = np.sum((slope @ self.covariance) * slope, axis=-1)
-        # A reading's noise reaches the corrected force by ∂f_b/∂f_s, which is close to I.
+        # Noise of a reading propagates by ∂f_b/∂f_s, which is close to I.
         variance += np.square(sigma_force) * np.sum(jacobian(corrected) ** 2, axis=-1)
         return angles_of(corrected), np.sqrt(variance)
 
     def _as_continued(self, forces: Array, hold: HoldConditions | None) -> tuple[Array, Array]:
-        """Readings as they would be if drifts had continued, for the model that has it so.
+        """Change readings as if drifts had gone on, since the model lets them go on.
 
-        A drift is known in its session only. Beyond, the sensor keeps what it had at the end.
+        A drift is known within its session only. After it the sensor keeps the value at its end.
 
         Returns
         -------
         forces : (n, 3) array, m/s²
-        share : (n, 1, u) array, of the derivative by a parameter with a drift that continues
+        share : (n, 1, u) array, factors for derivatives by the parameters of such drifts
         """
         share = np.ones((len(forces), 1, self.model.n_parameters))
         if hold is None or "time_s" not in self.ranges or not self.drifts:
@@ -178,7 +178,7 @@ class _Quality(BaseModel):
 
 
 class _Document(BaseModel):
-    """What is read of `calibration.json`; the rest is for persons and other programs."""
+    """The part of `calibration.json` that is read; the rest is for people and other programs."""
 
     schema_version: Annotated[Literal[1], Number]
     campaign: str
@@ -216,7 +216,7 @@ def read_calibration(path: str | Path) -> Calibration:
     Raises
     ------
     InputError
-        If there is no such file or it is none.
+        If there is no such file, or it is not a calibration.
     """
     if Path(path).is_dir():
         raise InputError(f"{path}: a folder; give the calibration.json in it")
@@ -232,7 +232,7 @@ def read_calibration(path: str | Path) -> Calibration:
 
 def _calibration(document: _Document) -> Calibration:
     whole = compose(document.model, tuple(document.effects))
-    # What the rig had is estimated beside the sensor, and stays with the rig.
+    # Effects of the rig were estimated together with those of the sensor, but stay with the rig.
     own = [effect.spec for effect in whole.effects if effect.part == "sensor"]
     stays = np.flatnonzero(whole.stays)
     covariance = np.array(document.covariance, dtype=float)  # None becomes NaN

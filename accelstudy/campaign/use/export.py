@@ -1,4 +1,4 @@
-"""A calibration in the forms in which a device or another program takes it."""
+"""Export of a calibration in forms that devices and other programs can read."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ STEPS = (
     "f_b = (I + Σ axes) · f_a",
     "result = to_frdᵀ · f_b, m/s², in the axes of the readings",
 )
-"""How a reading is calibrated; sums are over the effects of the sensor."""
+"""Steps that calibrate a reading; sums are over the effects of the sensor."""
 SYMBOLS = {
     "f_x": "m/s², f_a along x; likewise f_y, f_z",
     "g": "m/s², gravity_mps2",
@@ -85,9 +85,9 @@ def campaign_conversion(calibration: Mapping[str, Any]) -> Conversion:
 
 
 def mending(calibration: Mapping[str, Any]) -> Array:
-    """C (3, 3) by which forces as they are read become those that were fitted, in frd.
+    """C (3, 3) that turns forces as they were read into those that were fitted, in frd.
 
-    It is not I where the calibration is of data with a gross error that a diagnosis mended.
+    It differs from I if the data had a gross error that a diagnosis mended.
     """
     mended = calibration.get("mended") or {}
     return np.eye(3) if mended.get("matrix") is None else np.array(mended["matrix"], dtype=float)
@@ -96,8 +96,8 @@ def mending(calibration: Mapping[str, Any]) -> Array:
 def export(calibration: Mapping[str, Any], form: str) -> str:
     """Text of a calibration in one of `FORMS`.
 
-    "json" and "yaml" hold all: parameters with sigmas, formulas of the effects and, where there is
-    one, the matrix; "c" is a header with the matrix, "matrix" the plain 3 × 4 numbers.
+    "json" and "yaml" hold everything: parameters with sigmas, formulas of the effects and, if there
+    is one, the matrix. "c" is a header file with the matrix, "matrix" its plain 3 × 4 numbers.
     """
     if form == "matrix":
         return "\n".join(_row(row, " ") for row in device_matrix(calibration)) + "\n"
@@ -124,7 +124,7 @@ def _readings(calibration: Mapping[str, Any]) -> tuple[Conversion, Frame]:
 
 
 def _whole(calibration: Mapping[str, Any]) -> dict[str, Any]:
-    """All that a stranger needs to implement a calibration."""
+    """Everything that is needed to implement a calibration elsewhere."""
     model = _model(calibration)
     raw, frame = _readings(calibration)
     values = iter(calibration["parameters"])
@@ -157,12 +157,12 @@ def _whole(calibration: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _effect(effect: Effect, parameters: list[Any]) -> dict[str, Any]:
-    """What an effect adds, with its parameters in SI."""
+    """Formulas of an effect, and its parameters in SI."""
     notes = []
     if effect.part == "rig":
-        notes.append("belongs to the rig: not for readings of the sensor away from it")
+        notes.append("belongs to the rig: do not apply it to readings away from the rig")
     if effect.drifts:
-        notes.append("known in its session only: keep time within ranges.time_s")
+        notes.append("known within the session only: limit time to ranges.time_s")
     return {
         "spec": effect.spec,
         "part": effect.part,

@@ -26,17 +26,17 @@ from accelstudy.sensors.frames import Frame
 Array = NDArray[np.float64]
 
 DECIMALS = 9
-"""Decimals of what is added, in its unit: far below any noise, and half as long as a double."""
+"""Decimals of the added columns: far below any noise, and half the digits of a double."""
 
 
 @dataclass(frozen=True)
 class Leveled:
-    """What became of a log.
+    """Summary of a leveled log.
 
     Attributes
     ----------
     rows : int
-    empty : int, rows of which no force could be made
+    empty : int, rows without a calibrated force
     warnings : tuple of str
     """
 
@@ -56,14 +56,14 @@ def level_log(
 ) -> Leveled:
     """Write a log with calibrated forces, roll and pitch and their standard deviations.
 
-    Forces and angles are in the axes of the log. A row of which no force can be made, as a reading
-    is missing or the calibration has no answer, gets empty cells.
+    Forces and angles are in the axes of the log. A row gets empty cells if a reading is missing, or
+    if no force explains it.
 
     Parameters
     ----------
     calibration : Calibration
     log : file with the raw log; see `readings_of`
-    out : CSV or Parquet file; whole or not there
+    out : CSV or Parquet file to write; if that fails, there is none
     given : mapping, optional
         How to read the log; see `readings_of`.
     sigma : float, m/s², noise of a reading; see `noise_of_reading` if omitted
@@ -73,8 +73,8 @@ def level_log(
     Raises
     ------
     InputError
-        If the log cannot be read, lacks what an effect of the calibration needs, or is so far from
-        gravity in most rows that it must be in another unit.
+        If the log cannot be read, lacks a column that an effect of the calibration needs, or is so
+        far from gravity in most rows that it must be in another unit.
     """
     readings = readings_of(log, calibration, given, start or 0.0)
     if sigma is not None:
@@ -95,7 +95,7 @@ def level_log(
 
 
 def _implausible(calibration: Calibration) -> tuple[str, ...]:
-    """Say that no sensor has such a calibration."""
+    """Warn that no sensor can have such a calibration."""
     quality = calibration.content["quality"]
     if quality["plausible"]:
         return ()
@@ -103,7 +103,7 @@ def _implausible(calibration: Calibration) -> tuple[str, ...]:
 
 
 def _mended(calibration: Calibration, readings: Readings) -> tuple[str, ...]:
-    """Say that the calibration is of mended data, and whether readings were mended likewise."""
+    """Say that the calibration is of mended data, and whether readings were mended, too."""
     mended = calibration.content.get("mended")
     if mended is None:
         return ()
@@ -111,14 +111,15 @@ def _mended(calibration: Calibration, readings: Readings) -> tuple[str, ...]:
     if mended["matrix"] is None:
         return (said,)
     if np.array_equal(readings.mending, np.eye(3)):
-        return (f"{said}; readings are taken as the options say, and are not mended",)
-    return (f"{said}; readings are mended likewise",)
+        return (f"{said}; readings are converted by the options only, and are not mended",)
+    return (f"{said}; readings are mended in the same way",)
 
 
 def noise_of_reading(calibration: Calibration) -> float:
-    """Noise of a reading, m/s²: that within the holds of the campaign.
+    """Noise of a reading, m/s²: the noise within the holds of the campaign.
 
-    Unless it is known it is that of the mean of a hold, which is smaller; 0 if neither is known.
+    If that is unknown it is the noise of the mean of a hold, which is smaller; 0 if neither is
+    known.
     """
     known = (calibration.content.get(f"sigma_{what}_mps2") for what in ("reading", "position"))
     return next((sigma for sigma in known if sigma is not None), 0.0)
@@ -127,8 +128,8 @@ def noise_of_reading(calibration: Calibration) -> float:
 def _leveled(
     calibration: Calibration, frame: Frame, forces: Array, hold: HoldConditions, noise: float
 ) -> tuple[Array, dict[str, Array]]:
-    """Calibrated forces in frd of readings (k, 3), m/s², and what is added to their rows."""
-    with np.errstate(all="ignore"):  # what is not finite is counted, or a sigma without a meaning
+    """Calibrated forces in frd of readings (k, 3), m/s², and the columns that are added."""
+    with np.errstate(all="ignore"):  # forces that are not finite are counted below
         corrected = calibration.correct(forces, hold)
         angles, sigmas = calibration.level(forces, noise, hold)
     lost = ~np.isfinite(corrected + angles[:, :1]).all(axis=1)
@@ -145,7 +146,7 @@ def _leveled(
 
 
 def _with(table: pa.Table, added: dict[str, Array]) -> pa.Table:
-    """Table with columns added; those that it had by these names are replaced."""
+    """Table with added columns; existing columns of the same name are replaced."""
     for name, values in added.items():
         column = pa.array(values, from_pandas=True)  # NaN becomes null
         if name in table.column_names:

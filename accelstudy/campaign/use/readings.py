@@ -1,4 +1,4 @@
-"""How a log is read that a calibration is applied to, and what its effects need of each row."""
+"""How to read a log to which a calibration is applied, with the conditions that effects need."""
 
 from __future__ import annotations
 
@@ -31,18 +31,18 @@ OPTIONS = {
     "temperature": "--columns temperature=NAME",
     "vibration": "--columns vibration=NAME",
 }
-"""Conditions that a log can tell, and the options that say where it does."""
+"""Conditions that a log can hold, and the options that name their columns."""
 
 
 @dataclass(frozen=True)
 class Readings:
-    """A log as a calibration takes it.
+    """A log, prepared for a calibration.
 
     Attributes
     ----------
     source : Source
     places : mapping of fx, fy, fz, time, temperature and vibration to columns, as far as known
-    rate : float, 1/s, if it tells the time
+    rate : float, 1/s, if the time comes from it
     time_factor : float, s per unit of the column of time
     start : float, s, from the start of the calibration session to the first row
     unit : str, of the forces
@@ -64,7 +64,7 @@ class Readings:
     def chunks(
         self, chunk_size: int = CHUNK, typed: bool = False
     ) -> Iterator[tuple[pa.Table, Array, HoldConditions]]:
-        """Rows as they stand, their forces (k, 3) in m/s² in frd, and their conditions.
+        """Rows as they are in the file, their forces (k, 3) in m/s² in frd, and their conditions.
 
         See `read_chunks` for `typed`.
         """
@@ -84,7 +84,7 @@ class Readings:
             temperature = values.get("temperature")
             if time is not None and temperature is not None:
                 course = course.then(time, temperature)
-            # A log does not tell the position before: effects that need it add nothing.
+            # A log has no position before: effects that depend on it add nothing.
             still = np.zeros(len(table))
             hold = HoldConditions(
                 time=time,
@@ -115,15 +115,16 @@ def readings_of(
     given: Mapping[str, Any] | None = None,
     start: float = 0.0,
 ) -> Readings:
-    """Open a log, read as the one that the campaign was made of unless it is told otherwise.
+    """Open a log; by default it is read like the log from which the campaign was made.
 
     Parameters
     ----------
     log : file, of any kind that `open_source` reads
     calibration : Calibration
     given : mapping, optional
-        Keys of `LogLayout`. Columns overlay those of the campaign's log; all three of the forces
-        replace them, as then the log is another. A column of time replaces a rate, and the reverse.
+        Keys of `LogLayout`. Columns overlay those of the campaign's log; if all three columns of
+        the forces are given, they replace all others, since then the log is another one. A column
+        of time replaces a rate, and vice versa.
     start : float, s, from the start of the calibration session to the first row
 
     Returns
@@ -133,7 +134,7 @@ def readings_of(
     Raises
     ------
     InputError
-        If the file cannot be read, lacks a column, or does not tell what an effect needs.
+        If the file cannot be read, or lacks a column, perhaps one that an effect needs.
     """
     given = dict(given or {})
     if {"time", "rate_hz"} <= set(given):
@@ -146,7 +147,7 @@ def readings_of(
         if calibration.log is None or "columns" in given:
             raise
         raise InputError(
-            f"{error}; looked for as in the log of the campaign, --columns and --time say otherwise"
+            f"{error}; this is the layout of the campaign's log: --columns and --time change it"
         ) from None
     for effect, condition in calibration.needs:
         known = condition in places or (condition == "time" and layout.rate_hz is not None)
@@ -158,7 +159,7 @@ def readings_of(
     unit = layout.unit
     if calibration.log is None and "unit" not in given:
         unit = calibration.content["unit"]
-    # What is told of the log is right, whatever was wrong in the campaign.
+    # What the user says of this log is right, whatever was wrong with the campaign.
     told = {"unit_error": "unit", "axis_error": "frame"}
     mended = calibration.content.get("mended")
     mends = mended is None or told.get(mended["error"]) not in given
@@ -176,7 +177,7 @@ def readings_of(
 
 
 def _layout(calibration: Calibration, given: Mapping[str, Any]) -> LogLayout:
-    """Layout of the campaign's log, overlaid with what is given."""
+    """Layout of the campaign's log, overlaid with `given`."""
     known = {} if calibration.log is None else calibration.log.model_dump(exclude_none=True)
     if given.keys() & {"time", "rate_hz"}:
         known = {key: value for key, value in known.items() if key not in ("time", "rate_hz")}
@@ -189,7 +190,7 @@ def _layout(calibration: Calibration, given: Mapping[str, Any]) -> LogLayout:
 def _places(
     source: Source, layout: LogLayout, calibration: Calibration, given: set[str]
 ) -> dict[str, int]:
-    """Columns of the log; one that no effect needs may be missing, unless it was asked for."""
+    """Columns of the log; a column that no effect needs may be missing, unless it was given."""
     columns = dict(layout.columns)
     if layout.time is not None:
         columns["time"] = layout.time
