@@ -1,1 +1,1 @@
-"""The cheapest calibration that reaches a tilt accuracy: what to measure, with what, how long."""
+"""The plan: the cheapest calibration that reaches a tilt accuracy."""

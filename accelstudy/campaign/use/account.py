@@ -109,9 +109,8 @@ class Account:
             yield f"{self.empty} {of_all} have no calibrated force and get empty cells; {first}"
         if self._after:
             yield (
-                f"{short_list(self._calibration.drifts)}: constant after the end of the "
-                f"calibration session at {self._session_end:.0f} s, which concerns {self._after} "
-                f"{of_all}"
+                f"{short_list(self._calibration.drifts)}: kept constant after the end of the "
+                f"calibration session ({self._session_end:.0f} s), in {self._after} {of_all}"
             )
         moved = dict.fromkeys(e for e, c in self._calibration.needs if c.startswith("step_"))
         for name in moved:

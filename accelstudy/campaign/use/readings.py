@@ -147,7 +147,8 @@ def readings_of(
         if calibration.log is None or "columns" in given:
             raise
         raise InputError(
-            f"{error}; this is the layout of the campaign's log: --columns and --time change it"
+            f"{error}; the columns are those of the log of the campaign, --columns and --time "
+            "change them"
         ) from None
     for effect, condition in calibration.needs:
         known = condition in places or (condition == "time" and layout.rate_hz is not None)

@@ -1,4 +1,4 @@
-"""What each of several sensors can reach, by hand and with a robot, in how much time."""
+"""A comparison of sensors: the accuracy that each reaches over time, by hand and with a robot."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ COLUMNS = 3
 
 
 def front_table(sensors: Sequence[str], tilt_range: float = TILT_RANGE) -> pd.DataFrame:
-    """Candidates that leave less than all that take less time, for each sensor and equipment.
+    """Candidates that leave less error than all quicker ones, for each sensor and equipment.
 
-    They are by linear theory; columns are in the units that they name.
+    They come from linear theory. Columns are in the units in their names.
     """
     rows = []
     for name in sensors:

@@ -19,11 +19,11 @@ from accelstudy.plan.search.sensors import get_sensor
 class PlanCase(Block):
     """One question, as `accelstudy plan` takes it."""
 
-    tilt_accuracy: str = Field(description="wanted of roll and of pitch, as 10mgon")
+    tilt_accuracy: str = Field(description="target for roll and for pitch, as 10mgon")
     tilt_range: str = Field("30gon", description="largest tilt at which the sensor is used")
     sensor: str | None = Field(None, description="data sheet: a name, or the path of a file")
     sigma: str | None = Field(None, description="noise of a position's mean, as 2mm/s2, instead")
-    equipment: Literal["gravity", "robot", "both"] = Field("both", description="what there is")
+    equipment: Literal["gravity", "robot", "both"] = Field("both", description="what is available")
     confidence: float | None = Field(
         None, ge=0.5, le=0.999, description="share of the calibrations that must reach it; or rms"
     )
@@ -31,7 +31,7 @@ class PlanCase(Block):
 
     @property
     def question(self) -> Question:
-        """What is asked."""
+        """The question in SI."""
         if (self.sensor is None) == (self.sigma is None):
             raise InputError("give sensor or sigma, one of them")
         sheet = (
@@ -61,7 +61,7 @@ class PlanCase(Block):
 
 
 class PlanConfig(Block):
-    """What is planned."""
+    """The plans, and the sensors that are compared."""
 
     cases: dict[PathName, PlanCase] = Field(default_factory=dict, description="name: question")
     sensors: OneOrMore[str] = Field(

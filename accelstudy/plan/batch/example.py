@@ -1,4 +1,4 @@
-"""The configuration of `workflow/plan.smk`: a section for each part, checked where that part is."""
+"""The configuration of `workflow/plan.smk`: a section for each part; each part checks its own."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Example(Block):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """What tables say of where they come from."""
+        """Provenance that tables record."""
         text = json.dumps(self.model_dump(mode="json"), sort_keys=True)
         return {
             "config_hash": hashlib.sha256(text.encode()).hexdigest()[:16],
@@ -37,7 +37,7 @@ class Example(Block):
 
 
 def parse_example(content: Mapping[str, Any], source: str = "config") -> Example:
-    """Check the configuration but for its sections.
+    """Check the configuration, except its sections.
 
     Raises
     ------
@@ -50,5 +50,5 @@ def parse_example(content: Mapping[str, Any], source: str = "config") -> Example
 def parse_section(
     example: Example, name: str, block: type[Section], source: str = "config"
 ) -> Section:
-    """Check one section by the class of its part; errors are as in `parse_example`."""
+    """Check one section against the class of its part; raises errors like `parse_example`."""
     return checked(block, getattr(example, name), source, name)

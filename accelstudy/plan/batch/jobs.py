@@ -1,4 +1,4 @@
-"""What the rules of `workflow/rules/plan.smk` do."""
+"""The jobs of `workflow/rules/plan.smk`."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def make_plan(
     Raises
     ------
     InputError
-        If no calibration reaches its target; it says what would be reachable.
+        If no calibration reaches the target; the message says what is reachable.
     """
     found = answer(PlanCase(**case).question, int(provenance["seed"]), replicates)
     if not found.ranked:

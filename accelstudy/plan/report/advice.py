@@ -1,4 +1,4 @@
-"""What a plan says beside its numbers: what the model needs, what spoils it, what use adds."""
+"""Reasons of a plan: what the model needs, what would spoil it, and what use adds."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ PLAIN = {
     "encoder_offset": "zero error of the robot's angles",
     "gravity_error": "wrong value of gravity",
 }
-"""Effects in words that a newcomer knows."""
+"""Effects in plain words."""
 
 
 @dataclass(frozen=True)
@@ -39,11 +39,11 @@ class Need:
     Attributes
     ----------
     effect : str
-    size : float, SI, and where it comes from
-    source : str
+    size : float, SI
+    source : str, where the size comes from
     in_model : bool
-    left : float, rad, rms that neglecting it adds; NaN if it cannot be told
-    cost : float, rad, rms that noise adds where it is estimated, too; NaN if it cannot be
+    left : float, rad, rms that neglecting the effect adds; NaN if the positions cannot show it
+    cost : float, rad, rms that noise adds if the effect is estimated; NaN if it cannot be
     verdict : "needed", "worth it", "of no use" or "not needed"
     """
 
@@ -65,7 +65,7 @@ class Spoiler:
     effect : str
     unit : str, SI
     size : float, SI; inf if no size of it matters
-    usual : (float, float), SI, of good and of cheap equipment
+    usual : (float, float), SI, sizes of good and of cheap equipment
     verdict : "spoils it", "may spoil it" or "no matter"
     """
 
@@ -78,17 +78,17 @@ class Spoiler:
 
 @dataclass(frozen=True)
 class InUse:
-    """What adds to a calibration's tilt error when the sensor is used; rad, roll or pitch.
+    """What adds to a calibration's tilt error when the sensor is used; sds of roll or pitch, rad.
 
     Attributes
     ----------
-    reading : float, of noise of one reading; NaN if its duration says nothing of it
+    reading : float, by the noise of one reading; NaN if that is not known
     seconds : float, s, duration of the reading
-    drift : float, of the bias since the calibration; NaN if nothing is known
-    hours : float, h
-    warmth : float, of the bias at another temperature; NaN if nothing is known
-    kelvin : float
-    restart : float, of the bias after switching off and on; NaN if nothing is known
+    drift : float, by the drift of the bias since the calibration; NaN if that is not known
+    hours : float, h, since the calibration
+    warmth : float, by the bias at another temperature; NaN if that is not known
+    kelvin : float, K, difference in temperature
+    restart : float, by the bias after switching off and on; NaN if that is not known
     """
 
     reading: float
@@ -124,7 +124,7 @@ def limits(question: Question, candidate: Candidate) -> str:
 
 
 def needs(question: Question, candidate: Candidate) -> list[Need]:
-    """Say of each effect of the sensor whether it must be in the model for the target."""
+    """Say for each effect of the sensor whether the model needs it to reach the target."""
     theory = theory_of(question.tilt_range)
     rows = _rows(question, theory, candidate)
     effects = [effect.name for effect in candidate.model.effects]
@@ -155,13 +155,13 @@ def needs(question: Question, candidate: Candidate) -> list[Need]:
 
 
 def spoilers(question: Question, candidate: Candidate) -> list[Spoiler]:
-    """Sizes of what is not in the model that would by themselves use up the target."""
+    """Sizes at which effects that are not in the model would by themselves use up the target."""
     theory = theory_of(question.tilt_range)
     rows = _rows(question, theory, candidate)
     inside = {effect.name for effect in candidate.model.effects}
     effects = [e for e in ("quadratic_scale", "cubic_scale") if e not in inside]
     if candidate.equipment.name == "robot":
-        # Gravity alone never sees how the sensor is mounted, and is not misled by it either.
+        # Without a robot the mounting of the sensor neither shows nor does harm.
         effects += [] if "cross_axis_misalignment" in inside else ["mounting_rotation"]
         effects += OF_RIG
     else:
@@ -170,7 +170,7 @@ def spoilers(question: Question, candidate: Candidate) -> list[Spoiler]:
     for name in effects:
         effect = get_effect(name)
         each = float(theory.neglecting(rows, candidate.model, name).max())
-        # What does nothing leaves rounding errors only.
+        # An effect without influence leaves rounding errors only.
         size = math.inf if each < 1e-6 else question.target / each
         low, high = effect.typical
         verdict = "no matter" if size > high else "may spoil it" if size > low else "spoils it"
@@ -182,7 +182,7 @@ def spoilers(question: Question, candidate: Candidate) -> list[Spoiler]:
 def in_use(
     question: Question, seconds: float = 1.0, hours: float = 8.0, kelvin: float = 10.0
 ) -> InUse:
-    """What adds to the calibration's part when the sensor is used."""
+    """Tilt errors in use that add to that of the calibration."""
     sheet = question.sheet
     theory = theory_of(question.tilt_range)
     columns = theory.columns["bias"]
@@ -206,7 +206,7 @@ def _rows(question: Question, theory: Theory, candidate: Candidate) -> Array:
 
 
 def _noise_square(question: Question, candidate: Candidate, sigma_angle: float) -> Array:
-    """Mean square that noise leaves, (2,), rad², with another robot."""
+    """Mean square error that noise leaves, (2,), rad², with another noise of the robot."""
     theory = theory_of(question.tilt_range)
     noise = Noise(candidate.sigma, sigma_angle)
     rows = theory.rows(candidate.scheme.directions, candidate.equipment.name, noise)

@@ -1,4 +1,4 @@
-"""The figure of a plan: tilt accuracy over effort, with the front of the best."""
+"""The figure of a plan: tilt accuracy over effort, with the front of the best candidates."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LABELS = {"gravity": "by hand, gravity alone", "robot": "with a robot"}
 
 
 def plan_figure(answer: Answer) -> Figure:
-    """Draw all candidates, the best for their time, and those of the table that were simulated."""
+    """Draw all candidates, the front of the best, and the simulated candidates of the table."""
     question = answer.question
     figure = new_figure(FULL, 95)
     ax = figure.subplots()

@@ -1,4 +1,4 @@
-"""A plan as files: its table, its words, its figure, and the study that makes its numbers again."""
+"""A plan as files: table, page, figure, and the study that reproduces its numbers."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from accelstudy.plan.search.answer import Answer
 from accelstudy.plan.search.candidates import Candidate
 
 STUDY_HEAD = """\
-# The simulated candidates of a plan as a study, made by `accelstudy plan`. It makes their numbers
-# again: snakemake --cores 2 --configfile {path}
+# The simulated candidates of a plan as a study, made by `accelstudy plan`. It reproduces their
+# numbers: snakemake --cores 2 --configfile {path}
 """
 ANGLES = ("roll", "pitch")
 
@@ -38,12 +38,12 @@ def write_plan(
     inputs: Iterable[str | Path] = (),
     force: bool = False,
 ) -> None:
-    """Write the files of a plan that reaches its target to a folder.
+    """Write the files of a plan that reaches its target into a folder.
 
     Raises
     ------
     InputError
-        If the folder cannot be written, or holds what must not be overwritten.
+        If the folder cannot be written, or holds files that must not be overwritten.
     """
     with result_folder(out, PLAN, inputs, force) as folder:
         plan_files(answer, folder, provenance, shown=Path(out))
@@ -56,15 +56,15 @@ def plan_files(
     shown: Path,
     study: str = "plan",
 ) -> None:
-    """Write the files of a plan into a folder that is there.
+    """Write the files of a plan into an existing folder.
 
     Parameters
     ----------
     answer : Answer, that reaches its target
     folder : Path
     provenance : see `accelstudy.files.tables.origin`
-    shown : Path, what the folder is called in what is written
-    study : str, name of the study that makes the numbers again
+    shown : Path, name of the folder in the files
+    study : str, name of the study that reproduces the numbers
     """
     from accelstudy.drawing.saving import save
     from accelstudy.drawing.style import DPI, STYLE
@@ -96,9 +96,9 @@ def plan_page(answer: Answer) -> str:
 
 
 def plan_table(answer: Answer) -> pd.DataFrame:
-    """All candidates that were compared, and of those in the table of the plan their rank.
+    """All candidates that were compared, and the rank of those in the table of the plan.
 
-    Angles are in mgon, whatever unit is shown.
+    Angles are in mgon, whatever unit the user chose.
     """
     ranks = {id(r.candidate): (i, r) for i, r in enumerate(answer.ranked, 1)}
     rows = []

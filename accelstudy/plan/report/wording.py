@@ -1,4 +1,4 @@
-"""A plan in words: the answer first, as everybody understands it, then its table and reasons."""
+"""A plan in words: first the answer in plain sentences, then its table and reasons."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ VERDICTS = {
 
 
 def answer_lines(answer: Answer) -> list[str]:
-    """What to do, in sentences."""
+    """Say what to do, in sentences."""
     if not answer.ranked:
         return [unreachable(answer)]
     question, first = answer.question, answer.first
@@ -79,22 +79,23 @@ def answer_lines(answer: Answer) -> list[str]:
         more.append(f"{_angle(use.drift)} after {number_of(use.hours)} h")
     if not math.isnan(use.warmth):
         more.append(f"{_angle(use.warmth)} where it is {number_of(use.kelvin)} K warmer or colder")
-    lines.append(f"In use comes on top: {comma_list(more)}.")
+    lines.append(f"In use this adds: {comma_list(more)}.")
     return lines
 
 
 def _linear(question: Question, candidate: Candidate) -> list[str]:
-    """Say for what nonlinearity the answer holds, if the sensor was taken to be linear."""
+    """Say which nonlinearity would matter, if the sensor was assumed to be linear."""
     found = [s for s in spoilers(question, candidate) if s.effect == "quadratic_scale"]
     return [
-        f"That is for a linear sensor; a quadratic nonlinearity of {quantity_text(s.size, s.unit)} "
-        "would by itself leave as much, unless the calibration estimates it, too."
+        "This assumes a linear sensor; a quadratic nonlinearity of "
+        f"{quantity_text(s.size, s.unit)} would by itself leave as much, unless the calibration "
+        "estimates it, too."
         for s in found
     ]
 
 
 def unreachable(answer: Answer) -> str:
-    """One line: that nothing reaches the target, and what would be reachable."""
+    """Say in one line that nothing reaches the target, and what is reachable."""
     question, best = answer.question, answer.best
     within = []
     if question.most_seconds < math.inf:
@@ -113,7 +114,7 @@ def unreachable(answer: Answer) -> str:
         f"No calibration tried here reaches {target} ({measure}) {limit}".rstrip()
         + f"; the best leaves {_angle(best.accuracy(question.confidence))}: {effort(best)}, "
         f"limited by the {limits(question, best)}"
-        + ("" if answer.instead is None else f". It takes a robot: {effort(answer.instead)}")
+        + ("" if answer.instead is None else f". A robot reaches it: {effort(answer.instead)}")
         + "."
     )
 
@@ -131,7 +132,7 @@ def effort(candidate: Candidate, imperative: bool = False) -> str:
 
 
 def minutes(seconds: float) -> str:
-    """A time in the field, for people."""
+    """Show a time in the field."""
     if seconds < 5400:
         return f"{math.ceil(seconds / 60)} minutes"
     return f"{number(seconds / 3600)} hours"
@@ -161,8 +162,8 @@ def table_lines(answer: Answer) -> list[str]:
     ]
     return [
         *lines,
-        "model: number of parameters, and what it has beside bias, scale and angles between axes;",
-        "roll, pitch: rms, and between what 95 of 100 calibrations lie, from "
+        "model: number of parameters, and effects besides bias, scale and angles between axes;",
+        "roll, pitch: rms, and interval with 95 of 100 calibrations, from "
         f"{answer.replicates} simulated ones each; ~ by linear theory",
     ]
 
@@ -188,14 +189,14 @@ def _row(answer: Answer, rank: int, ranked: Ranked) -> list[str]:
 
 
 def interval_of(ranked: Ranked) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Rms of roll and pitch between the ends of where 95 of 100 calibrations lie, (2,), rad."""
+    """Rms of roll and pitch, between the ends of the interval with 95 of 100 calibrations, rad."""
     expected, simulated = ranked.candidate.expected, ranked.simulated
     source = expected if simulated is None else simulated
     return source.quantile(0.025), source.rms, source.quantile(0.975)
 
 
 def model_words(model: SensorModel) -> str:
-    """A model by its number of parameters and what it has beside the usual nine."""
+    """A model by its number of parameters and its effects besides the usual nine parameters."""
     nine = {"bias", "scale", "nonorthogonality"}
     effects = [effect.name for effect in model.effects]
     more = [words(name.removesuffix("_scale")) for name in effects if name not in nine]
@@ -205,20 +206,20 @@ def model_words(model: SensorModel) -> str:
 
 
 def reason_lines(answer: Answer) -> Iterator[str]:
-    """What the model needs, what would spoil it, and what comes in use, of the first candidate."""
+    """What the model of the first candidate needs, what would spoil it, and what use adds."""
     question, candidate = answer.question, answer.first.candidate
     unit_note = f"({angle_note()})"
     yield f"The calibration's model: {candidate.model.name} {unit_note}"
     for need in needs(question, candidate):
         yield f"  {_need(need)}"
     target = quantity_text(question.target, "rad")
-    yield f"What is not in the model, and the size that by itself would leave {target}:"
+    yield f"Effects that are not in the model, and the size that by itself would leave {target}:"
     for spoiler in spoilers(question, candidate):
         yield f"  {_spoiler(spoiler)}"
     if candidate.equipment.name == "gravity":
-        yield "Gravity does not tell how the sensor sits in its housing. Put it on a flat surface,"
+        yield "Gravity does not show how the sensor sits in its housing. Put it on a flat surface,"
         yield "read roll and pitch, turn it there by 180°, read again: the means are its errors."
-    yield "In use, to be added to what the calibration leaves (rms of the worse angle):"
+    yield "In use, in addition to what the calibration leaves (rms of the worse angle):"
     for line in use_lines(question, in_use(question)):
         yield f"  {line}"
 
@@ -235,7 +236,7 @@ def _need(need: Need) -> str:
         costs = "costs" if need.in_model else "would cost"
         what.append(f"to estimate it {costs} {_angle(need.cost)}")
     elif not need.in_model:
-        what.append("these positions cannot tell it")
+        what.append("these positions do not determine it")
     return f"{effect} ({size}): {VERDICTS[need.verdict]}; {comma_list(what)}"
 
 
@@ -248,7 +249,7 @@ def _spoiler(spoiler: Spoiler) -> str:
 
 
 def use_lines(question: Question, use: InUse) -> list[str]:
-    """What adds to the calibration's part in use."""
+    """What use adds to the errors of the calibration."""
     like = _like(question, use)
 
     def told(value: float) -> str:
@@ -263,20 +264,20 @@ def use_lines(question: Question, use: InUse) -> list[str]:
 
 
 def _like(question: Question, use: InUse) -> str:
-    """How long the reading is of which the noise is told."""
+    """Duration of the reading whose noise is stated."""
     if question.sheet.position_sigma is not None:
         return "as long as a position"
     return f"of {number_of(use.seconds)} s"
 
 
 def assumption_lines(question: Question) -> list[str]:
-    """What was taken for granted."""
+    """Assumptions of the plan."""
     lines = [f"Sensor: {question.sheet.name}, {question.sheet.title}."]
     assumed = [PLAIN[e] for e, size in question.sizes.items() if size.source == "typical"]
     if assumed:
-        lines.append(f"Of a usual size, as nothing is known of it: {comma_list(assumed)}.")
+        lines.append(f"Assumed to have a usual size, since it is unknown: {comma_list(assumed)}.")
     if any(size.source == "assumed" for size in question.sizes.values()):
-        lines.append("Taken to be linear, as only its noise is known.")
+        lines.append("The sensor is assumed to be linear, since only its noise is known.")
     if question.sheet.position_sigma is not None:
         sigma = quantity_text(question.sheet.position_sigma, "m/s^2")
         lines.append(f"The mean of a position has a noise of {sigma}, however long it is held.")
@@ -292,7 +293,7 @@ def assumption_lines(question: Question) -> list[str]:
 
 
 def how_to(answer: Answer) -> list[str]:
-    """Where the positions are, and how numbers are made again."""
+    """Say how to get the positions, and how exactly to measure them."""
     candidate = answer.first.candidate
     scheme = shlex.quote(answer.question.written(candidate.scheme))
     lines = [f"The positions: accelstudy scheme {scheme}"]

@@ -1,4 +1,4 @@
-"""Which of the candidates to take: the cheapest that reach the target, checked by simulation."""
+"""The answer: the cheapest candidates that reach the target, checked by simulation."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from accelstudy.plan.search.simulated import Simulated, simulate, study_of
 SHOWN = 8
 """Candidates in the table."""
 SIMULATED = 5
-"""Of which are simulated."""
+"""Candidates that are simulated."""
 OTHER_CONFIDENCE = 0.95
-"""Share of the calibrations that the plan also speaks of where the rms is asked for."""
+"""Share of the calibrations that the plan also quotes if the user asked for the rms."""
 TRIES = 12
-"""Candidates of a kind that linear theory takes for good and simulation may refuse."""
+"""Candidates of one kind that are simulated until one reaches the target."""
 
 
 @dataclass(frozen=True)
 class Ranked:
-    """A candidate in the table, simulated if it stands at the top."""
+    """A candidate in the table; those at the top are simulated."""
 
     candidate: Candidate
     simulated: Simulated | None = None
@@ -30,18 +30,18 @@ class Ranked:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a plan found.
+    """The result of a plan.
 
     Attributes
     ----------
     question : Question
-    compared : list of Candidate, all of them
-    ranked : list of Ranked, the cheapest of each equipment and model that reach the target, by the
-        time they take; empty if none does
-    stricter : Candidate, the cheapest with the equipment of the first that reaches the target by
-        the other measure (95 % of the calibrations, or the rms); None if there is none
-    instead : Candidate, the cheapest with a robot where none by hand reaches the target and a robot
-        was not asked for; None if that would not do either
+    compared : list of Candidate, all that were compared
+    ranked : list of Ranked, for each equipment and model the cheapest that reaches the target, by
+        the time they take; empty if none does
+    stricter : Candidate, the cheapest with the same equipment as the first that reaches the target
+        by the other measure (95 % of the calibrations, or the rms); None if there is none
+    instead : Candidate, the cheapest with a robot, if only calibrations by hand were asked for and
+        none reaches the target; None if a robot does not reach it either
     seed, replicates : int, of the simulation
     """
 
@@ -55,14 +55,14 @@ class Answer:
 
     @property
     def first(self) -> Ranked:
-        """What to do: by hand if that reaches the target, else with the robot."""
+        """The recommended candidate: by hand if that reaches the target, else with the robot."""
         checked = [r for r in self.ranked if r.simulated is not None]
         by_hand = [r for r in checked if r.candidate.equipment.name == "gravity"]
         return (by_hand or checked)[0]
 
     @property
     def best(self) -> Candidate | None:
-        """The most accurate candidate, whatever it takes."""
+        """The most accurate candidate, however long it takes."""
         return min(self.compared, key=self._accuracy, default=None)
 
     def _accuracy(self, candidate: Candidate) -> float:
@@ -102,7 +102,7 @@ def answer(question: Question, seed: int = 1, replicates: int = 10_000) -> Answe
 
 
 def _shown(ranked: list[Ranked]) -> list[Ranked]:
-    """Rows of the table by time: those that were simulated, and the quickest of the others."""
+    """Rows of the table, by time: the simulated candidates, and the quickest of the others."""
     ranked = sorted(ranked, key=lambda r: _effort(r.candidate))
     others = [r for r in ranked if r.simulated is None]
     left_out = others[max(0, SHOWN - len(ranked) + len(others)) :]
@@ -110,7 +110,7 @@ def _shown(ranked: list[Ranked]) -> list[Ranked]:
 
 
 def _with_a_robot(question: Question) -> Candidate | None:
-    """Cheapest candidate with a robot, by linear theory, where there is none by hand alone."""
+    """Cheapest candidate with a robot by linear theory, if only those by hand were compared."""
     if any(equipment.name != "gravity" for equipment in question.equipment):
         return None
     compared = candidates(replace(question, equipment=(ROBOT,)))
@@ -130,7 +130,7 @@ def _effort(candidate: Candidate) -> tuple[float, float, int]:
 def _checked(
     question: Question, good: list[Candidate], seed: int, replicates: int
 ) -> Ranked | None:
-    """Cheapest candidate of a kind that reaches the target when it is simulated, too."""
+    """Cheapest candidate of a kind that also reaches the target in simulation."""
     for candidate in good[:TRIES]:
         (result,) = simulate(study_of(question, [candidate], seed, replicates))
         if result.accuracy(question.confidence) <= question.target:
@@ -139,7 +139,7 @@ def _checked(
 
 
 def _in_front(kinds: list[tuple[str, str]]) -> list[tuple[str, str]]:
-    """Kinds, the first of each equipment before the others."""
+    """Reorder kinds: the first kind of each equipment comes before all others."""
     first: dict[str, tuple[str, str]] = {}
     for kind in kinds:
         first.setdefault(kind[0], kind)

@@ -1,4 +1,4 @@
-"""All calibrations that a plan compares, by linear theory."""
+"""The candidates: all calibrations that a plan compares, by linear theory."""
 
 from __future__ import annotations
 
@@ -29,15 +29,16 @@ PLANNED_MODELS = (
 )
 FAMILY = "fibonacci"
 SIZES = (*range(9, 61), *range(65, 121, 5), *range(140, 401, 20))
-"""Positions of its members, which are evenly spread, that are tried."""
+"""Family of evenly spread positions, and the sizes of it that are tried."""
 OPTIMAL = "i-optimal"
 OPTIMAL_SIZES = (*range(9, 17), 18, 20, 22, 24, 27, 30, 33, 36, 40, 45, 50, 60, 70, 80, 100, 120)
-"""Likewise of positions that are the best for leveling, of which few are tried: each is the outcome
-of a search."""
+"""Family of positions that are the best for leveling, and its sizes. Few of them are tried, since
+each takes a search."""
 LEAST_OPTIMAL = 0.6
-"""Part of the positions that optimal ones need at least of evenly spread ones; it is about 2/3."""
+"""Optimal schemes need about 2/3 of the positions of evenly spread ones; fewer than this part are
+not tried."""
 LEAST_REDUNDANCY = 0.25
-"""Part of the conditions that must be redundant, or a position in error would not be noticed."""
+"""Least share of redundant conditions; with fewer a wrong position would not be noticed."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,7 @@ class Candidate:
 
     @property
     def kind(self) -> tuple[str, str, str]:
-        """Equipment, model and family: what differs in more than effort."""
+        """Equipment, model and family of schemes; candidates of one kind differ in effort only."""
         return self.equipment.name, self.model.name, family_of(self.scheme.name)
 
     @cached_property
@@ -84,14 +85,14 @@ class Candidate:
 
     def reaches(self, target: float, confidence: float | None) -> bool:
         """Whether the tilt accuracy is reached."""
-        # No quantile of interest lies below the rms by much, and the rms is worked out faster.
+        # Such a quantile is not much below the rms, which is faster to compute.
         if confidence is not None and confidence >= 0.7 and self.rms > target:
             return False
         return self.accuracy(confidence) <= target
 
 
 def family_of(scheme: str) -> str:
-    """Name of a scheme without its number of positions if it is of a family that is tried."""
+    """Name of a scheme; of a family that is tried, without the number of positions."""
     found = re.fullmatch(r"(.+)-\d+", scheme)
     return found[1] if found and found[1] in (FAMILY, OPTIMAL) else scheme
 
@@ -120,9 +121,9 @@ def with_optimal(
     known: Sequence[Candidate],
     confidence: float | None,
 ) -> list[Candidate]:
-    """Candidates with optimal positions; fewer of them than of the cheapest that is known.
+    """Candidates with optimal positions, at most as many as the cheapest known candidate has.
 
-    The fewest that reach the target by the measure of `confidence` are found by halving.
+    Bisection finds the smallest number that reaches the target by the measure of `confidence`.
     """
 
     def good(found: Iterable[Candidate]) -> list[Candidate]:
@@ -147,7 +148,7 @@ def with_optimal(
 
 
 def shortest(question: Question) -> Candidate | None:
-    """Quickest calibration that there is, whatever the limits; None if there is none."""
+    """Quickest calibration without limits of time and positions; None if there is none."""
     free = replace(question, most_seconds=math.inf, most_positions=SIZES[-1])
     first: dict[str, Candidate] = {}
     for scheme in schemes_for(free.most_positions, free.schemes):
@@ -184,7 +185,7 @@ def _of_scheme(
         sigma = _tidy(question.sheet.sigma_mean(hold, n * (hold + equipment.moving)))
         rows: Array | None = None
         for model in models:
-            if equipment.name == "gravity":  # scales with its only noise
+            if equipment.name == "gravity":  # with a single noise the result scales with it
                 if model.name not in at_unit:
                     if rows is None:
                         rows = theory.rows(directions, "gravity", Noise(sigma_force=1.0))

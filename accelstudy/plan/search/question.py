@@ -1,4 +1,4 @@
-"""What is asked of a plan, and what it takes for granted."""
+"""The question that a plan answers, and its assumptions."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from accelstudy.schemes import Scheme, get_scheme, is_scheme_file
 HOLDS = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0)
 """Durations of a hold that are tried, s."""
 USUAL_HOLD = 10.0
-"""s, of a sensor of which only the noise of a position is known."""
+"""s, for a sensor of which only the noise of a position is known."""
 
 
 @dataclass(frozen=True)
 class Equipment:
-    """With what positions are made, and how long that takes.
+    """The equipment that makes positions, and the time it takes.
 
     Attributes
     ----------
-    name : "gravity" or "robot", which is the approach, too
-    moving : float, s from the end of a hold to the begin of the next
+    name : "gravity" or "robot", which is also the approach
+    moving : float, s, from the end of a hold to the beginning of the next
     setup : float, s, before the first hold
     """
 
@@ -45,7 +45,7 @@ ROBOT = Equipment("robot", moving=10.0, setup=1800.0)
 
 @dataclass(frozen=True)
 class Size:
-    """Usual size of the parameters of an effect, SI: their standard deviation over sensors.
+    """Usual size of the parameters of an effect: their standard deviation over sensors, SI.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Size:
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked of a plan, in SI.
+    """The question that a plan answers, in SI.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class Question:
     sigma_angle : float, rad, of the robot's roll and pitch
     most_seconds : float, s in the field
     most_positions : int
-    schemes : tuple of str, names or files of schemes beside those that are always compared
+    schemes : tuple of str, names or files of schemes besides those that are always compared
     """
 
     target: float
@@ -95,11 +95,11 @@ class Question:
 
     @property
     def neglectable(self) -> dict[str, float]:
-        """Sizes of the effects that count where a model lacks them."""
+        """Sizes of the effects that cause errors if a model lacks them."""
         return {name: size.value for name, size in self.sizes.items()}
 
     def written(self, scheme: Scheme) -> str:
-        """How a scheme is asked for elsewhere: by its name, or by the path of its file."""
+        """Name of a scheme in commands and configurations: a name, or the path of its file."""
         for text in self.schemes:
             if is_scheme_file(text) and get_scheme(text).name == scheme.name:
                 return str(Path(text).resolve())
@@ -107,10 +107,10 @@ class Question:
 
 
 def sizes_of(sheet: DataSheet) -> dict[str, Size]:
-    """How large the effects of a sensor are: by its data sheet, else as is usual.
+    """Sizes of the effects of a sensor: from its data sheet, else typical ones.
 
-    A nonlinearity is shared alike by a quadratic and a cubic part. The rotation of the axes against
-    the housing is not among them: it is no matter of the sensor's own tilt.
+    A nonlinearity is divided equally into a quadratic and a cubic part. The rotation of the axes
+    against the housing is left out, since it does not change the sensor's own tilt.
     """
     shared = math.sqrt(0.5)
     stated = {

@@ -1,4 +1,4 @@
-"""The sensor of a plan, by whatever a person has of it."""
+"""The sensor of a plan, from whatever the user has of it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def get_sensor(text: str) -> DataSheet:
     Raises
     ------
     InputError
-        If there is none; of a log the message says how to make a data sheet of it.
+        If there is no such sensor; for a log the message says how to make a data sheet of it.
     """
     path = Path(text)
     if path.is_dir():

@@ -1,4 +1,4 @@
-"""The candidates at the top of a plan as cells of a study, and what their simulation says."""
+"""The candidates at the top of a plan as cells of a study, and their simulation."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from accelstudy.study.monte_carlo.simulate import blocks
 Array = NDArray[np.float64]
 
 SIGNS = (1.0, -1.0, 1.0)
-"""Of the parameters of the three axes of the simulated sensor, which all have the usual size."""
+"""Signs of the parameters of the three axes of the simulated sensor; all have the usual size."""
 ALWAYS = ("bias", "scale", "nonorthogonality")
 """Effects that every simulated sensor has."""
 
 
 @dataclass(frozen=True)
 class Simulated:
-    """What simulated calibrations left, of roll and of pitch.
+    """The errors of roll and of pitch that simulated calibrations left.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class Simulated:
     simulated: int
 
     def quantile(self, probability: float) -> Array:
-        """What a share of the calibrations stayed below, (2,), rad."""
+        """Error below which this share of the calibrations stayed, (2,), rad."""
         return np.quantile(self.per_calibration, probability, axis=0)
 
     def accuracy(self, confidence: float | None) -> float:
@@ -62,7 +62,7 @@ def study_of(
 ) -> dict[str, Any]:
     """Configuration of a study whose cells are the chosen candidates.
 
-    It overlays `config/config.yaml`, and stands by itself, too.
+    It can overlay `config/config.yaml`, and is also complete by itself.
     """
     sigma = chosen[0].sigma
     planned = ("cross_axis_misalignment", "quadratic_scale", "cubic_scale")
@@ -134,8 +134,8 @@ def _quantity(question: Question, effect: str) -> dict[str, Any]:
 
 
 def true_size(question: Question, effect: str) -> float:
-    """Size of an effect of the simulated sensor, SI; 0 for what it has not."""
-    if effect == "cross_axis_misalignment":  # its own axes are what its tilt refers to
+    """Size of an effect of the simulated sensor, SI; 0 if it does not have the effect."""
+    if effect == "cross_axis_misalignment":  # its tilt refers to its own axes
         return 0.0
     if effect in question.sizes:
         return question.sizes[effect].value

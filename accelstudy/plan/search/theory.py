@@ -1,13 +1,13 @@
-"""Linear theory of what a calibration leaves, for all models of a plan at once.
+"""Linear theory of the errors that a calibration leaves, for all models of a plan at once.
 
-One model has every effect that matters. Its rows for a scheme are worked out once; a calibration
-with fewer effects estimates some of its columns, A, and neglects others, N. With the noise n and
-the sizes p of what is neglected, the estimates are off by
+One model has every effect that matters. Its design rows for a scheme are computed once; a
+calibration with fewer effects estimates some of its columns, A, and neglects others, N. With the
+noise n and the parameters p of the neglected effects, the estimates are wrong by
 
-    δx = (AᵀA)⁻¹Aᵀ (n + N p),        and what is neglected by −p,
+    δx = (AᵀA)⁻¹Aᵀ (n + N p),        and the neglected parameters by −p.
 
-so that the mean square of the tilt error is tr(Q C), C the covariance of both together and Q the
-quadratic form of `accelstudy.leveling.error`.
+So the mean square of the tilt error is tr(Q C), with the covariance C of both together and the
+quadratic form Q of `accelstudy.leveling.error`.
 """
 
 from __future__ import annotations
@@ -41,21 +41,21 @@ OF_SENSOR = (
     "mounting_rotation",
 )
 OF_RIG = ("base_tilt", "encoder_scale", "encoder_offset", "gravity_error")
-"""Effects that a plan thinks of."""
+"""Effects of the sensor and of the rig that a plan considers."""
 
 
 @dataclass(frozen=True)
 class Expected:
-    """What one calibration after another would leave, by linear theory.
+    """Errors that calibrations leave on average, by linear theory.
 
     Attributes
     ----------
-    noise : (2,) array, rad², mean square of the error of roll and of pitch that noise leaves
-    neglected : dict of effect to (2,) array, rad², what neglecting it adds
-    quadratic : (2, u, u) array, rad² per SI², mean square of an error of all parameters
-    scatter : (u, s) array, errors of all parameters per unit of s independent normal variables,
-        of which the first are the noise's
-    of_noise : int, how many of them are the noise's
+    noise : (2,) array, rad², mean square error of roll and of pitch that noise leaves
+    neglected : dict of effect to (2,) array, rad², mean square error that neglecting it adds
+    quadratic : (2, u, u) array, rad² per SI², quadratic form of the errors of all parameters
+    scatter : (u, s) array, errors of all parameters per unit of s independent normal variables;
+        the first of these variables are those of the noise
+    of_noise : int, number of variables of the noise
     redundancy, conditions : int
     """
 
@@ -68,7 +68,7 @@ class Expected:
     conditions: int
 
     def with_noise(self, factor: float) -> Expected:
-        """The same with so many times the noise, in all observations alike."""
+        """The same with the noise of all observations multiplied by a factor."""
         scatter = self.scatter.copy()
         scatter[:, : self.of_noise] *= factor
         return replace(self, noise=self.noise * factor**2, scatter=scatter)
@@ -79,9 +79,10 @@ class Expected:
         return np.sqrt(self.noise + sum(self.neglected.values(), np.zeros(2)))
 
     def quantile(self, probability: float) -> Array:
-        """What a share of the calibrations stays below in roll and in pitch, (2,), rad.
+        """Error of roll and of pitch below which this share of the calibrations stays, (2,), rad.
 
-        The mean square is a sum of χ² with weights, taken as a χ² of the same mean and variance.
+        The mean square is a weighted sum of χ² variables, approximated by a scaled χ² of the same
+        mean and variance.
         """
         form = np.einsum("uj,auw,wk->ajk", self.scatter, self.quadratic, self.scatter)
         mean = np.trace(form, axis1=1, axis2=2)
@@ -125,14 +126,14 @@ class Theory:
     def expected(
         self, rows: Array, model: SensorModel, sizes: Mapping[str, float]
     ) -> Expected | None:
-        """What a calibration with a model leaves.
+        """Errors that calibrations with a model leave.
 
         Parameters
         ----------
         rows : (n, u) array, of `rows`
         model : SensorModel, that is estimated
-        sizes : mapping of effect to the sd of its parameters over sensors, SI; where the model
-            has the effect it is estimated, else neglected
+        sizes : mapping of effect to the sd of its parameters over sensors, SI; an effect that the
+            model lacks is neglected
 
         Returns
         -------
@@ -168,7 +169,7 @@ class Theory:
     def response(
         self, rows: Array, estimated: Sequence[int], solve: Array, columns: Sequence[int]
     ) -> Array:
-        """Errors of all parameters per unit of those that are neglected, (u, j)."""
+        """Errors of all parameters per unit of the neglected parameters, (u, j)."""
         error = np.zeros((self.model.n_parameters, len(columns)))
         error[list(estimated)] = solve @ rows[:, list(columns)]
         error[list(columns), range(len(columns))] = -1.0
@@ -187,7 +188,7 @@ class Theory:
 
 @cache
 def theory_of(tilt_range: float) -> Theory:
-    """Theory up to a tilt range, rad; worked out once."""
+    """Theory up to a tilt range, rad; computed once."""
     return Theory(tilt_range)
 
 
