@@ -53,11 +53,11 @@ SECTIONS = {
     type=Quantity("rad", 1e-3, math.pi / 2),
     default="30gon",
     show_default=True,
-    help="Tilts up to which it is to hold.",
+    help="Largest tilt at which the accuracy is wanted.",
 )
 @approach_option(None)
 @model_option
-@click.option("--prior", type=PATH, help="A calibration.json of before, with the same model.")
+@click.option("--prior", type=PATH, help="An earlier calibration.json with the same model.")
 @click.option(
     "--attitudes",
     help="Attitudes to choose from: cube (faces, edges, corners), grid (roll and pitch in steps of "
@@ -74,7 +74,7 @@ SECTIONS = {
 @click.option(
     "--max-pitch", type=Quantity("rad", 0.0, 4.0), help="Largest pitch, either way.  [default: any]"
 )
-@click.option("--watch", is_flag=True, help="Wait for further positions, until Ctrl-C.")
+@click.option("--watch", is_flag=True, help="Wait for further positions until Ctrl-C.")
 @angle_unit_option
 @quiet_option
 def advise_command(
@@ -90,11 +90,12 @@ def advise_command(
     max_pitch: float | None,
     watch: bool,
 ) -> None:
-    """In a running session: where to go next, when to stop.
+    """Say in a session where to go next, and when to stop.
 
-    CAMPAIGN is the folder of the session. Its campaign.yaml is there; its positions.csv may have
-    few positions, none, or not be there yet. Each position is tested by those before it, and used
-    if it agrees with them. What is not determined yet is said, and the tilt accuracy so far.
+    CAMPAIGN is the folder of the session. It has a campaign.yaml; its positions.csv may have few
+    positions or none, or be missing still. Each position is tested against those before it, and
+    used if it agrees with them. The command says what is not determined yet, and the tilt accuracy
+    so far.
     """
     from accelstudy.approaches import get_approach
     from accelstudy.sensors.models import get_model

@@ -20,10 +20,10 @@ from accelstudy.commands.options import PATH, angle_unit_option, example, force_
 @click.option(
     "--columns", help="By name, or place from 0: fx=1,fy=2,fz=3,temperature=temp,vibration=5."
 )
-@click.option("--time", help="Column of time, by name or place.")
-@click.option("--time-unit", help="One of s, ms, us and ns.")
-@click.option("--rate", type=float, help="Samples per second, without a column of time.")
-@click.option("--unit", help="One of m/s^2, g and counts.")
+@click.option("--time", help="Column of the time, by name or number.")
+@click.option("--time-unit", help="Unit of the time: s, ms, us or ns.")
+@click.option("--rate", type=float, help="Samples per second, where there is no time.")
+@click.option("--unit", help="Unit of the readings: m/s^2, g or counts.")
 @click.option(
     "--start",
     type=click.FloatRange(min=0),
@@ -32,7 +32,7 @@ from accelstudy.commands.options import PATH, angle_unit_option, example, force_
 @click.option(
     "--sigma",
     type=click.FloatRange(min=0),
-    help="Noise of a reading, m/s².  [default: that within the holds of the campaign]",
+    help="Sd of a reading, m/s².  [default: as within the holds of the campaign]",
 )
 @force_option
 @angle_unit_option
@@ -51,15 +51,15 @@ def apply_command(
     """Apply a CALIBRATION to a LOG and level with it.
 
     CALIBRATION is a calibration.json, LOG any file that `import` reads. It is read as the log of
-    the campaign was; options say what is different in it. Its columns are written, and beside them
-    the calibrated force, roll and pitch, with their sigmas, in the axes of the LOG. A row that
-    cannot be corrected is left empty.
+    the campaign was; options say what is different. The output has its columns, and beside them
+    the calibrated force, roll and pitch with their sigmas, in the axes of the LOG. A row that
+    cannot be corrected stays empty.
 
-    Effects that depend on time count it from the start of the calibration session, and the first
-    row is taken for that: right for the log of the session, and for a warm-up wherever the sensor
-    is switched on as the log starts. For a log that starts later give --start. A drift is known in
-    its session only: later rows are corrected by what it was at the end. Hysteresis and settling
-    depend on the position before, which a log does not tell, and are not corrected.
+    Some effects depend on the time since the calibration session began. The first row is taken for
+    that moment. This is right for the log of the session itself, and for a warm-up if the log
+    begins when the sensor is switched on. For a log that begins later give --start. A drift is
+    known in its session only; later rows are corrected by what it was at the end. Hysteresis and
+    settling depend on the position before, which a log does not tell; they are not corrected.
     """
     from accelstudy.campaign.use.applying import read_calibration
     from accelstudy.campaign.use.leveling import level_log

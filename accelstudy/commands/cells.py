@@ -16,8 +16,8 @@ from accelstudy.commands.options import PATH, example
 def cells_command(configs: tuple[Path, ...]) -> None:
     """List the cells of a study and what it will take.
 
-    Cells that cannot be estimated are listed with the reason. CONFIGS are YAML files; later ones
-    overlay earlier ones, as with --configfile.
+    Cells that cannot be estimated are listed with the reason. CONFIGS are YAML files; a later one
+    overlays those before it, as with Snakemake's --configfile.
     """
     from accelstudy.design.estimability import estimability
     from accelstudy.study.cells.cell import study_cells

@@ -13,7 +13,7 @@ from accelstudy.commands.options import example
 def config_schema_command() -> None:
     """Print the JSON schema of configurations.
 
-    It is kept in workflow/schemas/config.schema.json.
+    Editors check a configuration against it while you write.
     """
     from accelstudy.study.config import config_schema
 

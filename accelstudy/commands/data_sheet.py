@@ -22,13 +22,18 @@ UNUSED = ("offset", "full_range", "gravity", "threshold", "robot_sigma", "robot_
 )
 @click.argument("source", type=PATH)
 @click.option("--out", type=PATH, required=True, help="YAML file to write.")
-@click.option("--columns", help="By name, or place from 0: fx=1,fy=2,fz=3.")
-@click.option("--time", help="Column of time, by name or place.")
-@click.option("--time-unit", help="One of s, ms, us and ns, also since 1970.  [default: s]")
-@click.option("--rate", type=float, help="Samples per second, without a column of time.")
-@click.option("--unit", help="One of m/s^2, g and counts.  [default: m/s^2]")
-@click.option("--scale", help="With counts: m/s² per count, one number or three.")
-@click.option("--settings", "settings_path", type=PATH, help="YAML file of an import instead.")
+@click.option("--columns", help="Columns by name, or by number from 0: fx=1,fy=2,fz=3.")
+@click.option("--time", help="Column of the time, by name or number.")
+@click.option("--time-unit", help="Unit of the time: s, ms, us or ns.  [default: s]")
+@click.option("--rate", type=float, help="Samples per second, where there is no time.")
+@click.option("--unit", help="Unit of the readings: m/s^2, g or counts.  [default: m/s^2]")
+@click.option("--scale", help="For counts: m/s² per count, one number or three.")
+@click.option(
+    "--settings",
+    "settings_path",
+    type=PATH,
+    help="YAML file with these settings, as for an import.",
+)
 @force_option
 @quiet_option
 def data_sheet_command(

@@ -64,26 +64,26 @@ _TURN = 200 * GON
 @click.option("--out", type=PATH, required=True, help="YAML file for the positions.")
 @model_option
 @approach_option("robot")
-@click.option("--positions", default=24, show_default=True, help="How many.")
+@click.option("--positions", default=24, show_default=True, help="Number of positions.")
 @click.option(
     "--sigma",
     type=Quantity("m/s^2"),
     default="2mm/s^2",
     show_default=True,
-    help="Noise of a position mean.",
+    help="Sd of a position's mean.",
 )
 @click.option(
     "--robot-sigma",
     type=Quantity("rad"),
     default="3.2mgon",
     show_default=True,
-    help="Noise of the robot's roll and pitch.",
+    help="Sd of the robot's roll and pitch.",
 )
 @click.option(
     "--gravity-sigma",
     type=Quantity("m/s^2"),
     default="0",
-    help="Noise of the value of gravity; 0, the default, holds it fixed.",
+    help="Sd of the value of gravity; 0, the default, holds it fixed.",
 )
 @click.option(
     "--criterion",
@@ -97,21 +97,21 @@ _TURN = 200 * GON
     type=Quantity("rad", GON / 10, 100 * GON),
     default="50gon",
     show_default=True,
-    help="Up to which tilt the calibrated sensor is used.",
+    help="Largest tilt at which the calibrated sensor is used.",
 )
 @click.option(
     "--neglect",
     multiple=True,
     metavar="EFFECT[=SIZE]",
-    help="An effect that the model leaves out; the tilt is to be good all the same. SIZE is the sd "
-    "of its parameters, by default that of cheap equipment.",
+    help="An effect that the model leaves out, though the tilt is to be good. SIZE is the sd of "
+    "its parameters, by default that of cheap equipment.",
 )
 @click.option(
     "--discriminate",
     nargs=2,
     type=EFFECT,
     metavar="EFFECT EFFECT",
-    help="Two effects that are to be told from each other, instead of good tilt.",
+    help="Two effects that are to be told from each other; then the tilt does not count.",
 )
 @click.option(
     "--prior",
@@ -119,7 +119,7 @@ _TURN = 200 * GON
     metavar="NAME=SIGMA",
     help="Sd of what is known of an effect or a parameter before, as bias=20mg or s_x=500ppm.",
 )
-@click.option("--after", type=SCHEME, help="Scheme that is measured already.")
+@click.option("--after", type=SCHEME, help="Scheme that has been measured already.")
 @click.option(
     "--attitudes",
     default="all",
@@ -132,8 +132,12 @@ _TURN = 200 * GON
     type=int,
     help="How often the sensor may be mounted; each mounting is turned about one horizontal axis.",
 )
-@click.option("--roll", nargs=2, type=Quantity("rad", -_TURN, _TURN), help="Least and most.")
-@click.option("--pitch", nargs=2, type=Quantity("rad", -_TURN / 2, _TURN / 2), help="Likewise.")
+@click.option(
+    "--roll", nargs=2, type=Quantity("rad", -_TURN, _TURN), help="Least and largest roll."
+)
+@click.option(
+    "--pitch", nargs=2, type=Quantity("rad", -_TURN / 2, _TURN / 2), help="Least and largest pitch."
+)
 @click.option(
     "--pole-distance",
     type=Quantity("rad", 0.0, _TURN / 2),
@@ -150,7 +154,7 @@ _TURN = 200 * GON
     default=8,
     show_default=True,
     type=click.IntRange(1, 1000),
-    help="Random sets to begin the search with.",
+    help="Number of random sets from which the search starts.",
 )
 @force_option
 @angle_unit_option
@@ -168,9 +172,9 @@ def design_command(
 ) -> None:
     """Find the best positions for a calibration.
 
-    The YAML file that comes out is a scheme: any configuration and command takes its path where it
-    takes the name of a scheme. The positions are in an order of short ways, the last one near the
-    first.
+    The YAML file that comes out is a scheme: configurations and commands take its path wherever
+    they take the name of a scheme. The positions are in an order that makes the ways between them
+    short, with the last one near the first.
     """
     from accelstudy.basics import bounds
     from accelstudy.files.outputs import new_file

@@ -47,8 +47,8 @@ def diagnose_command(
 ) -> None:
     """Find what a sensor model lacks to explain a CAMPAIGN.
 
-    CAMPAIGN is a folder. Tells missing effects, wrong noise and gross errors apart, adds what is
-    missing to the model and tests it on positions that were not used.
+    CAMPAIGN is a folder. The command tells missing effects, wrong noise and gross errors apart. It
+    adds what is missing to the model, and tests it on positions that were not used.
     """
     # Nothing that is imported is ever garbage, and to look for it there takes a tenth of the time.
     gc.disable()

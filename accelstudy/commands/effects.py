@@ -33,9 +33,9 @@ def effects_command(
 ) -> None:
     """List all effects, or what a campaign can show of them.
 
-    Models are composed of effects; parameters are in the units shown, settings in SI. With a
-    campaign or a scheme: which effects it can show beside the model, how large they must be to be
-    detected and to be named, and with what they would be confused.
+    Models are composed of effects. Parameters are in the units shown, settings in SI. With
+    --campaign or --scheme the command tells which effects can show beside the model, how large they
+    must be to be detected and to be named, and with what they would be confused.
     """
     from accelstudy.basics.units import angle_note
 

@@ -40,27 +40,31 @@ _SECTIONS = {
     ),
 )
 @click.argument("log", type=PATH, nargs=-1, required=True)
-@click.option("--columns", help="By name, or place from 0: fx=1,fy=2,fz=3,temperature=temp.")
-@click.option("--sensor", multiple=True, help="One of several: NAME=ax,ay,az; repeat it.")
-@click.option("--time", help="Column of time, by name or place.")
-@click.option("--time-unit", help="One of s, ms, us and ns, also since 1970.  [default: s]")
-@click.option("--rate", type=float, help="Samples per second, without a column of time.")
-@click.option("--unit", help="One of m/s^2, g and counts.  [default: m/s^2]")
-@click.option("--scale", help="With counts: m/s² per count, one number or three.")
-@click.option("--offset", help="With counts: reading at 0 m/s².  [default: from the holds]")
-@click.option("--range", "full_range", help="The sensor measures ± this: 78.5, 8g, 32767counts.")
+@click.option("--columns", help="Columns by name, or by number from 0: fx=1,fy=2,fz=3.")
+@click.option("--sensor", multiple=True, help="Columns of one of several sensors: NAME=ax,ay,az.")
+@click.option("--time", help="Column of the time, by name or number.")
+@click.option("--time-unit", help="Unit of the time: s, ms, us or ns.  [default: s]")
+@click.option("--rate", type=float, help="Samples per second, where there is no time.")
+@click.option("--unit", help="Unit of the readings: m/s^2, g or counts.  [default: m/s^2]")
+@click.option("--scale", help="For counts: m/s² per count, one number or three.")
+@click.option("--offset", help="For counts: reading at 0 m/s².  [default: from the holds]")
+@click.option("--range", "full_range", help="Measuring range, ±: 78.5 (m/s²), 8g or 32767counts.")
 @click.option("--frame", help="Where x, y, z point: frd, flu (ROS), rfu …  [default: frd]")
-@click.option("--threshold", type=float, help="Sd of a window at rest, m/s², instead of chosen.")
-@click.option("--exclude", multiple=True, help="Leave out 13:moved or 120s-135s:moved; repeat it.")
-@click.option("--join", multiple=True, help="Holds that are one, as 4,5 or 120s-135s; repeat it.")
+@click.option("--threshold", type=float, help="Largest sd at rest, m/s².  [default: from the log]")
+@click.option(
+    "--exclude", multiple=True, help="What to leave out, and why: 13:moved, 120s-135s:moved."
+)
+@click.option("--join", multiple=True, help="Holds that are one: 4,5 or 120s-135s.")
 @click.option("--figure/--no-figure", default=True, help="Draw the log with its holds.")
-@click.option("--means", is_flag=True, help="LOG is a table of means already.")
-@click.option("--robot-sigma", type=float, help="Sd of its robot angles roll and pitch, mgon.")
-@click.option("--robot-unit", help="Unit of these angles: gon, deg or rad.  [default: gon]")
+@click.option("--means", is_flag=True, help="LOG is a table with the mean of each hold.")
+@click.option("--robot-sigma", type=float, help="Sd of the robot's roll and pitch, mgon.")
+@click.option("--robot-unit", help="Unit of the robot's angles: gon, deg, rad.  [default: gon]")
 @click.option("--out", type=PATH, required=True, help="Folder of the campaign.")
 @click.option("--name", help="Name of the campaign.  [default: that of the file]")
 @click.option("--gravity", type=float, help="Local gravity, m/s².  [default: 9.80665]")
-@click.option("--settings", "settings_path", type=PATH, help="YAML file; options overlay it.")
+@click.option(
+    "--settings", "settings_path", type=PATH, help="YAML file with settings; options go before it."
+)
 @force_option
 @angle_unit_option
 @quiet_option
@@ -75,9 +79,11 @@ def import_command(
 ) -> None:
     """Make a campaign of a raw LOG: find its static holds.
 
-    LOG is text (CSV or columns, perhaps .gz), MATLAB or Parquet. Several files, a folder or a
-    pattern are one position each. Without --threshold the noise of the log itself says what is at
-    rest; segmentation.png in the folder shows the outcome, with the numbers of the holds.
+    LOG is text (CSV or columns, perhaps .gz), MATLAB or Parquet. Of several files, a folder or a
+    pattern, each file is one position. The noise of the log itself tells what is at rest, unless
+    --threshold does. segmentation.png in the folder shows the holds with their numbers.
+
+    --sensor, --exclude and --join may be repeated.
     """
     from accelstudy.campaign.importing.logs import import_each
     from accelstudy.commands.import_options import files_of, settings_of

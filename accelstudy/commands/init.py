@@ -16,8 +16,8 @@ from accelstudy.commands.options import PATH, example, force_option
 def init_command(folder: Path, force: bool) -> None:
     """Set up a study of your own in a new FOLDER.
 
-    It gets a Snakefile, a small configuration to edit, and a README. The workflow itself stays in
-    the installed package.
+    It gets a Snakefile, a small configuration to edit, a profile and a README. The workflow itself
+    stays in the installed package.
     """
     from importlib.util import find_spec
 

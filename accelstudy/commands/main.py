@@ -110,7 +110,7 @@ class Commands(click.Group):
 def main(ctx: click.Context, angle_unit: str) -> None:
     """Monte Carlo study of accelerometer calibration for leveling.
 
-    `snakemake --cores 2` runs the study; these commands show what it can be made of, and calibrate
-    measured data with the same adjustment.
+    Snakemake runs studies. These commands calibrate measured data, plan and judge calibrations, and
+    list what studies are made of.
     """
     ctx.with_resource(angles_in(angle_unit))

@@ -111,7 +111,7 @@ model_option = click.option(
     type=MODEL,
     default="bias-scale-nonorthogonality",
     show_default=True,
-    help="A name that `accelstudy models` lists, a composition, or the path of a model.yaml.",
+    help="A model: one that `accelstudy models` lists, a composition, or a YAML file.",
 )
 
 
@@ -123,14 +123,14 @@ def approach_option(default: str | None) -> Callable[[Command], Command]:
         type=APPROACH,
         default=default,
         show_default=bool(default),
-        help=f"One of gravity and robot, which has the robot's angles, too.{words}",
+        help=f"Calibrate by gravity alone, or with the angles of a robot, too.{words}",
     )
 
 
 force_option = click.option(
     "--force",
     is_flag=True,
-    help="Replace files of the same names, where there are any; never an input.",
+    help="Overwrite files of the same names, but never an input.",
 )
 
 
@@ -141,7 +141,7 @@ def angle_unit_option(command: Command) -> Command:
         "--angle-unit",
         type=ANGLE_UNIT,
         metavar="[gon|deg]",
-        help=f"Unit of the angles that are shown.  [default: gon, or {ANGLE_UNIT_VARIABLE}]",
+        help=f"Unit in which angles are shown.  [default: gon, or {ANGLE_UNIT_VARIABLE}]",
     )
     @wraps(command)
     def within(*args: Any, angle_unit: str | None, **kwargs: Any) -> Any:
@@ -157,7 +157,7 @@ def quiet_option(command: Command) -> Command:
     @click.option(
         "--quiet",
         is_flag=True,
-        help="Show no progress, and print the result and warnings only.",
+        help="Print only the result and warnings.",
     )
     @wraps(command)
     def within(*args: Any, quiet: bool, **kwargs: Any) -> Any:
@@ -172,7 +172,7 @@ seed_option = click.option(
     default=1,
     show_default=True,
     type=click.IntRange(min=0),
-    help="Of all random numbers.",
+    help="Seed of all random numbers.",
 )
 
 

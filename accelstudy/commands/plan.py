@@ -84,7 +84,7 @@ _SECTIONS = {
     "--tilt-accuracy",
     type=TARGET,
     required=True,
-    help="Wanted of roll and of pitch, as 10mgon or 0.01deg.",
+    help="Accuracy wanted of roll and of pitch, as 10mgon or 0.01deg.",
 )
 @click.option(
     "--tilt-range",
@@ -96,7 +96,8 @@ _SECTIONS = {
 @click.option(
     "--sensor",
     type=Name("sensor", "accelstudy.data_sheets", "data_sheet_names"),
-    help="A data sheet that comes along, a YAML file like it, or the folder of a campaign.",
+    help="A data sheet that comes with accelstudy, a YAML file like it, or the folder of a "
+    "campaign.",
 )
 @click.option(
     "--sigma",
@@ -132,34 +133,34 @@ _SECTIONS = {
     multiple=True,
     help="One more to compare: a name, or a file of `accelstudy design`; may be repeated.",
 )
-@click.option("--max-time", type=SECONDS, help="Time in the field at most, as 20min.")
+@click.option("--max-time", type=SECONDS, help="Longest time in the field, as 20min.")
 @click.option(
     "--max-positions",
     type=click.IntRange(4, 400),
     default=200,
     show_default=True,
-    help="Positions at most.",
+    help="Largest number of positions.",
 )
 @click.option(
     "--moving-time",
     type=Quantity("s", most=3600.0),
     default="20s",
     show_default=True,
-    help="From position to position by hand.",
+    help="Time from position to position by hand.",
 )
 @click.option(
     "--robot-moving-time",
     type=Quantity("s", most=3600.0),
     default="10s",
     show_default=True,
-    help="From position to position with the robot.",
+    help="Time from position to position with the robot.",
 )
 @click.option(
     "--robot-setup-time",
     type=Quantity("s", most=86400.0),
     default="30min",
     show_default=True,
-    help="To mount the sensor on the robot.",
+    help="Time to mount the sensor on the robot.",
 )
 @click.option(
     "--robot-accuracy",
@@ -202,7 +203,7 @@ def plan_command(
 ) -> None:
     """Find the cheapest calibration for a tilt accuracy.
 
-    Compares models, position schemes, numbers of positions and durations by linear theory, and
+    The command compares models, schemes, numbers of positions and durations by linear theory, and
     simulates those at the top. The sensor is --sensor or, if only its noise is known, --sigma. If
     nothing reaches the accuracy, one line says what would be reachable, and the exit status is 1.
     """

@@ -13,7 +13,7 @@ from accelstudy.commands.options import SCHEME, angle_unit_option, example
 def scheme_command(name: str) -> None:
     """Print the directions of a scheme, with its source.
 
-    They are those of gravity in the body frame, as a CSV table.
+    They are directions of gravity in the axes of the sensor, as a CSV table.
     """
     import numpy as np
     import pandas as pd

@@ -26,7 +26,7 @@ from accelstudy.commands.options import (
 def schemes_command(model: str, approach: str, names: tuple[str, ...]) -> None:
     """List position schemes and what they can determine.
 
-    NAMES chooses schemes (fibonacci-60, random-20-7, ...); all named ones by default.
+    NAMES are those of schemes, such as fibonacci-60 or random-20-7. Without them all are listed.
     """
     import pandas as pd
 

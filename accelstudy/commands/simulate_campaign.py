@@ -42,9 +42,9 @@ _SECTIONS = {
     ),
 )
 @click.option("--out", type=PATH, required=True, help="Folder of the campaign.")
-@click.option("--truth", "truth_path", type=PATH, help="YAML file for the truth, apart from it.")
+@click.option("--truth", "truth_path", type=PATH, help="YAML file for the truth.")
 @click.option("--name", help="Name of the campaign.  [default: that of the folder]")
-@click.option("--seed", default=1, show_default=True, help="Of all random numbers.")
+@click.option("--seed", default=1, show_default=True, help="Seed of all random numbers.")
 @click.option(
     "--scheme",
     type=SCHEME,
@@ -52,9 +52,16 @@ _SECTIONS = {
     show_default=True,
     help="Positions; `accelstudy schemes` lists them.",
 )
-@click.option("--repeats", default=1, show_default=True, help="How often the whole scheme.")
-@click.option("--repeat-first", default=0, show_default=True, help="First holds, at the end again.")
-@click.option("--order", default="scheme", show_default=True, help="Of holds: scheme or random.")
+@click.option("--repeats", default=1, show_default=True, help="How often the scheme is measured.")
+@click.option(
+    "--repeat-first",
+    default=0,
+    show_default=True,
+    help="First holds that are measured again at the end.",
+)
+@click.option(
+    "--order", default="scheme", show_default=True, help="Order of the holds: scheme or random."
+)
 @approach_option("robot")
 @model_option
 @click.option(
@@ -62,41 +69,52 @@ _SECTIONS = {
     "effects",
     type=EFFECT,
     multiple=True,
-    help="Beyond the model: 'warm_up(tau=400)' or 'thermal_bias: 0.004, -0.002, 0.001' (SI).",
+    help="An effect beside the model, as 'warm_up(tau=400)' or, with its parameters in SI, "
+    "'thermal_bias: 0.004, -0.002, 0.001'.",
 )
-@click.option("--size", default=1.0, show_default=True, help="Factor of effects' typical sizes.")
+@click.option(
+    "--size",
+    default=1.0,
+    show_default=True,
+    help="Factor of the typical sizes of effects.",
+)
 @click.option(
     "--noise-effect",
     "noise_effects",
     type=NOISE_EFFECT,
     multiple=True,
-    help="As 'heavy_tails(nu=3)'.",
+    help="A noise effect, as 'heavy_tails(nu=3)'.",
 )
 @click.option(
     "--gross",
     "gross_errors",
     type=GROSS_ERROR,
     multiple=True,
-    help="As 'row_order(first=3, second=4)'.",
+    help="A gross error, as 'row_order(first=3, second=4)'.",
 )
-@click.option("--sigma", default=0.002, show_default=True, help="Noise of a position mean, m/s².")
-@click.option("--sigma-unknown", is_flag=True, help="Leave it out of the header.")
+@click.option("--sigma", default=0.002, show_default=True, help="Sd of a position's mean, m/s².")
+@click.option("--sigma-unknown", is_flag=True, help="Leave the noise out of the header.")
 @click.option(
-    "--robot-sigma-mgon", default=3.2, show_default=True, help="Noise of the robot's angles, mgon."
+    "--robot-sigma-mgon", default=3.2, show_default=True, help="Sd of the robot's angles, mgon."
 )
 @click.option("--interval", default=60.0, show_default=True, help="Seconds between holds.")
 @click.option("--no-time", is_flag=True, help="Leave out the time of the holds.")
-@click.option("--temperature", help="From and to, °C, as 20:40.")
+@click.option("--temperature", help="First and last temperature, °C, as 20:40.")
 @click.option(
     "--temperature-order",
     default="linear",
     show_default=True,
-    help="As linear, ABBA or random.",
+    help="Course of the temperature: linear, ABBA or random.",
 )
 @click.option("--vibration", help="Lowest and highest rms, m/s², as 0:1.")
-@click.option("--yaw", default="none", show_default=True, help="Of the holds: none or random.")
-@click.option("--samples-per-hold", "n_samples", type=int, help="Adds n_samples and their sds.")
-@click.option("--hold", "duration", type=float, help="Its seconds; adds the slopes of samples.")
+@click.option("--yaw", default="none", show_default=True, help="Yaw of the holds: none or random.")
+@click.option(
+    "--samples-per-hold",
+    "n_samples",
+    type=int,
+    help="Samples of a hold; adds columns on them.",
+)
+@click.option("--hold", "duration", type=float, help="Duration of a hold, s; adds slopes.")
 @force_option
 @quiet_option
 def simulate_campaign_command(
@@ -114,8 +132,8 @@ def simulate_campaign_command(
 ) -> None:
     """Simulate a campaign with effects of your choice.
 
-    It can have noise effects and gross errors, too: `accelstudy effects` lists them. What is not
-    given is drawn from the seed; the truth goes to --truth and nowhere else.
+    It can have noise effects and gross errors, too; `accelstudy effects` lists them. What is not
+    given is drawn at random. The truth goes to --truth and nowhere else.
     """
     from accelstudy.basics.units import MGON
     from accelstudy.campaign.files.format import write_campaign

@@ -53,7 +53,7 @@ def _given(*arguments: Any, **options: Any) -> Any:
 
 HOLD = Given("", "s", "10s", "Time at each position.", 1e-3, 1e6)
 ROBOT_SIGMA = Given("", "rad", "3.2mgon", "Sd of the robot's roll and of its pitch.", 1e-9, 0.1)
-TILT_SIGMA = Given("", "rad", "", "Of roll and of pitch, if no more is known.", 1e-9, 0.5)
+TILT_SIGMA = Given("", "rad", "", "Sd of roll and of pitch, if no more is known.", 1e-9, 0.5)
 TILT_RANGE = Given("", "rad", "50gon", "Largest tilt.", 1e-3, 1.5)
 """What may be given beside a pole: of the calibration of its sensor, and how far it is tilted."""
 
@@ -66,7 +66,9 @@ class Setup:
     that of forward. Lengths along the pole count to the centre of the antenna or prism.
     """
 
-    length: float = _given(POLE, "m", "2m", "From the foot to the antenna or prism.", 0.1, 30.0)
+    length: float = _given(
+        POLE, "m", "2m", "Length from the foot to the antenna or prism.", 0.1, 30.0
+    )
     offset_forward: float = _given(
         POLE, "m", "0", "Antenna or prism before the axis of the pole.", -1.0, 1.0
     )
@@ -74,34 +76,32 @@ class Setup:
         POLE, "m", "0", "Antenna or prism to the right of the axis.", -1.0, 1.0
     )
     sensor_height: float | None = _given(
-        POLE, "m", "", "Of the sensor above the foot.  [default: the length]"
+        POLE, "m", "", "Height of the sensor above the foot.  [default: the length]"
     )
     hand_height: float | None = _given(
-        POLE, "m", "", f"Of the hand that holds the pole.  [default: {HAND:g} of the length]"
+        POLE, "m", "", f"Height of the hand above the foot.  [default: {HAND:g} of the length]"
     )
-    head_mass: float = _given(POLE, "kg", "1.1kg", "Of what sits on top.", 0.0, 50.0)
-    pole_mass: float = _given(POLE, "kg/m", "0.6kg/m", "Of a metre of the pole.", 0.0, 50.0)
+    head_mass: float = _given(POLE, "kg", "1.1kg", "Mass of what sits on top.", 0.0, 50.0)
+    pole_mass: float = _given(POLE, "kg/m", "0.6kg/m", "Mass of a metre of the pole.", 0.0, 50.0)
     stiffness: float = _given(
-        POLE, "Nm^2", "1500Nm2", "Of the pole against bending, E·I.", 1.0, 1e9
+        POLE, "Nm^2", "1500Nm2", "Stiffness of the pole against bending, E·I.", 1.0, 1e9
     )
 
     averaging: float = _given(USE, "s", "2s", "Time over which a reading is averaged.", 1e-3, 1e6)
     age: float = _given(
-        USE, "s", "8h", "Time since the calibration, the sensor being switched off.", 0.0, 1e9
+        USE, "s", "8h", "Time since the calibration, with the sensor off.", 0.0, 1e9
     )
-    temperature_change: float = _given(
-        USE, "K", "10K", "Against the temperature of the calibration.", 0.0, 200.0
-    )
+    temperature_change: float = _given(USE, "K", "10K", "Change since the calibration.", 0.0, 200.0)
 
-    heading_sigma: float = _given(ERRORS, "rad", "0.3gon", "Of the heading.", 0.0, 0.5)
+    heading_sigma: float = _given(ERRORS, "rad", "0.3gon", "Sd of the heading.", 0.0, 0.5)
     mounting_sigma: float = _given(
-        ERRORS, "rad", "20mgon", "Of the sensor's axes against the pole, each.", 0.0, 0.2
+        ERRORS, "rad", "20mgon", "Sd of each of the sensor's axes against the pole.", 0.0, 0.2
     )
-    length_sigma: float = _given(ERRORS, "m", "0.5mm", "Of the length.", 0.0, 1.0)
+    length_sigma: float = _given(ERRORS, "m", "0.5mm", "Sd of the length.", 0.0, 1.0)
     top_sigma: float = _given(
-        ERRORS, "m", "8mm", "Of the antenna's or prism's position, horizontal.", 0.0, 10.0
+        ERRORS, "m", "8mm", "Sd of the antenna's or prism's horizontal position.", 0.0, 10.0
     )
-    top_sigma_vertical: float = _given(ERRORS, "m", "15mm", "Of its height.", 0.0, 10.0)
+    top_sigma_vertical: float = _given(ERRORS, "m", "15mm", "Sd of its height.", 0.0, 10.0)
 
     def __post_init__(self) -> None:
         for name in ("sensor_height", "hand_height"):
