@@ -139,6 +139,9 @@ def test_all_is_made(single):
     assert not list(results.glob("claims*"))
     assert (results / "logs" / "simulate" / "0000.log").read_text().count(" replicates, ") == 7
     assert remains(single) == []
+    page = (results / "explorer.html").read_text(encoding="utf-8")
+    links = re.findall(r'href="(figures/[^"]+)"', page)
+    assert {results / link for link in links} == {*results.glob("figures/*.svg")}
 
 
 def test_a_second_run_does_nothing(single):

@@ -18,7 +18,7 @@ from accelstudy.approaches import get_approach
 from accelstudy.drawing.style import group_label, group_of, in_order, model_title, shown, symbol
 from accelstudy.schemes import get_scheme
 from accelstudy.study.figures.base import Tables
-from accelstudy.study.figures.factors import NOISES, Factor
+from accelstudy.study.figures.factors import NOISES, Factor, family
 
 ANGLES = ("roll", "pitch")
 QUANTITIES = {
@@ -130,7 +130,10 @@ def setups(
     heads = {
         "fields": list(columns),
         "models": [{"name": name, "title": model_title(name)} for name in codes["model"]],
-        "schemes": [{"name": name, "title": get_scheme(name).title} for name in codes["scheme"]],
+        "schemes": [
+            {"name": name, "title": get_scheme(name).title, "family": family(name)}
+            for name in codes["scheme"]
+        ],
         "approaches": list(codes["approach"]),
         "reasons": list(codes["reason"]),
         "figures": [list(names) for names in codes["figures"]],

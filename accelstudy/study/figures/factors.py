@@ -105,7 +105,7 @@ def cell_table(study: StudyConfig) -> pd.DataFrame:
             "model": cell.model,
             "scheme": cell.scheme,
             "approach": cell.approach,
-            "family": _family(cell.scheme),
+            "family": family(cell.scheme),
             "n_positions": cell.positions.n_positions,
             "sensor_sigma_mps2": cell.noise.sigma_force,
             "robot_sigma_mgon": (
@@ -167,12 +167,12 @@ def _lists_values(study: StudyConfig, factor: Factor) -> bool:
 
 def _names_sizes(study: StudyConfig) -> bool:
     """Whether a grid names schemes of one family: `all` is no question about positions."""
-    families = [[_family(name) for name in grid.schemes] for grid in study.grids]
+    families = [[family(name) for name in grid.schemes] for grid in study.grids]
     return any(len(names) > len(set(names)) for names in families)
 
 
-def _family(scheme: str) -> str:
-    """Name of a scheme without its number of positions: "fibonacci" of "fibonacci-24"."""
+def family(scheme: str) -> str:
+    """Return the name of a scheme without its number: "fibonacci" of "fibonacci-24"."""
     return re.sub(r"-\d+", "", scheme, count=1)
 
 
