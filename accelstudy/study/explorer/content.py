@@ -54,7 +54,7 @@ _PLAIN = {
 
 def plain(parameter: str) -> str:
     """Return the symbol of a parameter as text: ``α_zx``."""
-    text = re.sub(r"\\([a-z]+) ?", lambda match: _PLAIN[match[1]], symbol(parameter))
+    text = re.sub(r"\\([a-z]+) ?", lambda match: _PLAIN.get(match[1], match[1]), symbol(parameter))
     return re.sub(r"[${}]", "", text)
 
 
