@@ -136,7 +136,7 @@ def check_needs_no_plan(model: SensorModel) -> None:
         if column := HoldPlan().missing(effect):
             raise InputError(
                 f"the effect {effect.name!r} of the model needs the {column} of each position, "
-                "which a scheme does not tell; take a campaign"
+                "which a scheme does not give; use a measured campaign"
             )
 
 

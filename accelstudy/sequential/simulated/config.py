@@ -25,7 +25,7 @@ class SequentialConfig(Block):
     approaches: OneOrMore[str] = Field(default=["gravity", "robot"], description="equipment")
     rules: OneOrMore[str] = Field(
         default=["known", "bound", "plain"],
-        description="what the noise is taken for: known, an upper bound from residuals, plain σ̂0",
+        description="how the noise is judged: known, an upper bound from residuals, plain σ̂0",
     )
     instead_of: str = Field(default="mclaren-24", description="fixed scheme to compare with")
     accuracies: OneOrMore[Positive] = Field(
@@ -38,9 +38,11 @@ class SequentialConfig(Block):
     sigma_mps2: Positive = Field(default=0.002, description="noise of a position, per axis")
     robot_sigma_mgon: Positive = Field(default=3.2, description="noise of the robot's angles")
     placing_gon: Annotated[float, Field(ge=0, le=20)] = Field(
-        default=2.0, description="how far off the chosen attitudes are taken, sd per axis"
+        default=2.0, description="sd per axis by which positions miss the chosen attitudes"
     )
-    seconds: Positive = Field(default=60.0, description="of a position, with the turn to it")
+    seconds: Positive = Field(
+        default=60.0, description="time for a position, including the turn to it"
+    )
     sessions: Annotated[int, Field(ge=2, le=1_000_000)] = Field(
         default=300, description="for each of the above"
     )

@@ -67,8 +67,9 @@ def calibrator(cell: Cell) -> Callable[[SensorModel, Approach, Observations], Bl
         return lambda *problem: Block.of(calibrate(*problem))
     if not installed():
         raise InputError(
-            f"{cell.name}: is to be compiled, as where the study was planned, but llvmlite is not "
-            "installed here: install accelstudy[kernel], or plan the study without it"
+            f"{cell.name}: must be compiled, because the study was planned with the compiler, but "
+            "llvmlite is not installed here: install accelstudy[kernel], or plan the study without "
+            "it"
         )
     from accelstudy.kernel import calibrate as kernel  # loads the compiler
 

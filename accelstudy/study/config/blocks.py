@@ -70,7 +70,7 @@ class NoiseConfig(Block):
     effects: list[str] = Field(
         default_factory=list,
         description="noise effects of the forces, e.g. heavy_tails(nu=3), in the order in which "
-        "they work; the calibration does not know of them",
+        "they act; the calibration ignores them",
     )
 
 
@@ -146,7 +146,9 @@ class LevelingConfig(Block):
     max_tilt_gon: Tilt = Field(
         MAX_TILT_GON, description="largest tilt of the z axis from the vertical"
     )
-    attitudes: Attitudes = Field(ATTITUDES, description="attitudes, spread evenly over that cap")
+    attitudes: Attitudes = Field(
+        ATTITUDES, description="number of attitudes, spread evenly over these tilts"
+    )
 
 
 class SensitivityConfig(Block):

@@ -83,8 +83,8 @@ class StudyConfig(Block):
     presets: Presets | None = Field(None, description="Table 1 of the paper")
     keep: Literal["replicates", "summary"] = Field(
         "replicates",
-        description="replicates: store every calibration in estimates/; summary: store none. All "
-        "tables and figures come out either way; with summary quantiles are within 0.1 %",
+        description="replicates: store every calibration in estimates/; summary: store none. Both "
+        "give all tables and figures; with summary, quantiles are right to 0.1 %",
     )
     leveling: LevelingConfig = LevelingConfig()
     sensitivity: SensitivityConfig | None = Field(None, description="figures 4 to 6")
@@ -105,7 +105,9 @@ class StudyConfig(Block):
         """Remember these schemes before the grids name them."""
         for name, content in given.items():
             if (found := remember(content, name).name) != name:
-                raise InputError(f"{name}: is the name of other positions; these are {found}")
+                raise InputError(
+                    f"{name}: is the name of other positions; the name of these is {found}"
+                )
         return dict(given)
 
     @model_validator(mode="after")
@@ -116,7 +118,7 @@ class StudyConfig(Block):
                     raise InputError("is the name of a registered model; choose another")
                 if name == "all" or not re.fullmatch(_NAME, name) or len(name) > LONGEST:
                     raise InputError(
-                        "is no name: use letters, digits, _ and -, "
+                        "is not a valid name: use letters, digits, _ and -, "
                         f"at most {LONGEST} of them, and not `all`"
                     )
                 SensorModel.of(name, effects)
@@ -182,8 +184,8 @@ class StudyConfig(Block):
             missing = set(CLAIMED_EFFECTS) - {effect.name for effect in model.effects}
             if self.paper and missing:
                 raise InputError(
-                    f"{settings.model!r} lacks {', '.join(sorted(missing))}, of which the paper's "
-                    "claims are; choose another model, or paper: false"
+                    f"{settings.model!r} lacks {', '.join(sorted(missing))}, which the paper's "
+                    "claims need; choose another model, or paper: false"
                 )
         with _at("sensitivity.scheme"):
             scheme = get_scheme(settings.scheme)
@@ -194,7 +196,7 @@ class StudyConfig(Block):
             )
         for name in ("roll_gon", "pitch_gon"):
             if self.paper and 0 not in getattr(settings, name):
-                raise ValueError(f"sensitivity.{name}: must contain 0, as paper: true looks there")
+                raise ValueError(f"sensitivity.{name}: must contain 0, which paper: true needs")
         for approach in ("gravity", "robot"):
             cell = f"{settings.model}/{settings.scheme}/{approach}"
             if self._usual_replicates(settings.model, settings.scheme, approach) < 2:
