@@ -1,5 +1,9 @@
 # From a log to a leveled sensor.
 
+# --8<-- [start:box]
+python draw_box.py
+# --8<-- [end:box]
+
 # --8<-- [start:logs]
 python make_logs.py
 head -n 3 calibration.csv

@@ -32,7 +32,7 @@ SHOWN = ROOT / "docs" / "tutorials" / "shown"
 """What pages show of the examples: output as <example>/<section>.txt, figures as PNG."""
 FIGURES = {
     "paper": ["paper.png"],
-    "log": ["box/segmentation.png", "calibrated/figures/residuals.png"],
+    "log": ["box.png", "box/segmentation.png", "calibrated/figures/residuals.png"],
     "hidden": ["diagnosed/figures/gap.png", "diagnosed/figures/evidence.png"],
 }
 """Figures of the examples that pages show."""
