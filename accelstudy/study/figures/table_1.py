@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from itertools import groupby
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -112,6 +114,7 @@ def _places(approaches: list[str]) -> dict[str, float]:
 
 
 def _draw_group(ax: Axes, rows: pd.DataFrame, approaches: list[str]) -> None:
+    marks = []
     for y, preset in enumerate(PRESETS):
         known = False
         for approach, offset in _places(approaches).items():
@@ -120,15 +123,11 @@ def _draw_group(ax: Axes, rows: pd.DataFrame, approaches: list[str]) -> None:
                 continue
             known = True
             values, _ = shown(its["sd_empirical"], its["unit"].iloc[0])
-            _mark(
-                ax,
-                values.mean(),
-                y + offset,
-                approach,
-                pale=bool(its["estimable"].all()),
-            )
+            pale = bool(its["estimable"].all())
+            marks.append(_Mark(approach, y + offset, values.mean(), pale))
         if not known:
             _dash(ax, y)
+    _draw_marks(ax, marks)
 
 
 def _draw_tilt(
@@ -139,37 +138,61 @@ def _draw_tilt(
     known = {} if leveling.empty else leveling.set_index("cell")["roll_rms_mgon"].to_dict()
     rms = dict(zip(known, shown(list(known.values()), "mgon")[0], strict=True))
     run = set(summary["cell"])
+    marks = []
     for y, preset in enumerate(PRESETS):
         for approach, offset in _places(approaches).items():
             cell = _cell(preset, approach)
             if cell in run:
-                _mark(ax, rms.get(cell, np.nan), y + offset, approach, pale=False)
+                marks.append(_Mark(approach, y + offset, rms.get(cell, np.nan)))
+    _draw_marks(ax, marks)
 
 
-def _mark(ax: Axes, value: float, y: float, approach: str, *, pale: bool) -> None:
-    """Marker and number at a standard deviation, or a cross if there is none."""
-    colour = approach_colour(approach)
-    if np.isfinite(value) and value > 0:
-        ax.plot(value, y, approach_marker(approach), color=colour)
-        ax.annotate(
-            _number(value),
-            (value, y),
-            (4, 0),
-            textcoords="offset points",
-            color=colour,
-            va="center",
-            fontsize=6.5,
-            in_layout=False,
-        )
-    else:
-        ax.plot(
-            CROSS_AT,
-            y,
-            "x",
-            color=colour,
-            transform=ax.get_yaxis_transform(),
-            alpha=PALE if pale else 1,
-        )
+@dataclass(frozen=True)
+class _Mark:
+    """A standard deviation in a row; NaN or 0 where there is none, then pale or not."""
+
+    approach: str
+    y: float
+    value: float
+    pale: bool = False
+
+    @property
+    def known(self) -> bool:
+        return bool(np.isfinite(self.value) and self.value > 0)
+
+
+def _draw_marks(ax: Axes, marks: list[_Mark]) -> None:
+    """Markers and numbers at standard deviations, or crosses where there are none."""
+    for (approach, known, pale), found in groupby(sorted(marks, key=_alike), key=_alike):
+        its = list(found)
+        colour, y = approach_colour(approach), [mark.y for mark in its]
+        if not known:
+            ax.plot(
+                np.full(len(its), CROSS_AT),
+                y,
+                "x",
+                color=colour,
+                transform=ax.get_yaxis_transform(),
+                alpha=PALE if pale else 1,
+            )
+            continue
+        ax.plot([mark.value for mark in its], y, approach_marker(approach), color=colour)
+        for mark in its:
+            ax.annotate(
+                _number(mark.value),
+                (mark.value, mark.y),
+                (4, 0),
+                textcoords="offset points",
+                color=colour,
+                va="center",
+                fontsize=6.5,
+                in_layout=False,
+            )
+
+
+def _alike(mark: _Mark) -> tuple[str, bool, bool]:
+    """Marks that are alike are one artist, which is faster to draw."""
+    return mark.approach, mark.known, mark.pale and not mark.known
 
 
 def _number(value: float) -> str:
@@ -187,6 +210,7 @@ def _dash(ax: Axes, y: int) -> None:
         color="#999999",
         ha="center",
         va="center",
+        in_layout=False,
     )
 
 
@@ -200,8 +224,8 @@ def _finish(ax: Axes) -> None:
     )
     ax.grid(False, axis="y")
     ax.tick_params(axis="y", length=0)
-    for y in range(len(PRESETS) - 1):
-        ax.axhline(y + 0.5, color="#EEEEEE", linewidth=0.6, zorder=0)
+    between: Style = {"transform": ax.get_yaxis_transform(), "colors": "#EEEEEE", "zorder": 0}
+    ax.hlines(np.arange(len(PRESETS) - 1) + 0.5, 0, 1, linewidth=0.6, **between)
     if len(values) == 0:
         ax.set_xticks([])
         say_empty(ax)
