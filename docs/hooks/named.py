@@ -1,9 +1,10 @@
-"""Check what a page names: files of the repository, commands and their options, make targets."""
+"""Check what a page names: files, commands and their options, make targets, names in Python."""
 
 import logging
 import re
 import shlex
 from pathlib import Path
+from pkgutil import resolve_name
 
 import click
 
@@ -13,6 +14,7 @@ ROOT = Path(__file__).parents[2]
 CODE = re.compile(r"^```.*?^```|(?:^ {4}.*\n)+|`[^`]+`", re.MULTILINE | re.DOTALL)
 FILE = re.compile(r"`((?:accelstudy|benchmarks|config|docs|examples|profiles|workflow)/[\w/.-]*)`")
 COMMAND = re.compile(r"(?:^ *|`)accelstudy ([^`\n]*(?:\\\n[^`\n]*)*)", re.MULTILINE)
+DOTTED = re.compile(r"\b(accelstudy\.[a-z_]\w*(?:\.\w+)*)(?: import (\([^)]*|[\w, ]+))?")
 TARGET = re.compile(r"(?:^ *|`)make ([a-z][a-z-]*)", re.MULTILINE)
 
 log = logging.getLogger("mkdocs.hooks.named")
@@ -25,8 +27,21 @@ def on_page_markdown(markdown, page, **_):
     missing = [name for name in FILE.findall(code) if not (ROOT / name).exists()]
     missing += [f"make {t}" for t in TARGET.findall(code) if f"\n{t}:" not in makefile]
     missing += filter(None, map(_unknown, COMMAND.findall(code)))
+    missing += [name for found in DOTTED.findall(code) for name in _names(*found) if _absent(name)]
     for name in dict.fromkeys(missing):
         log.warning("%s names %s, which there is not", page.file.src_uri, name)
+
+
+def _names(name, imported):
+    return [f"{name}.{each}" for each in re.findall(r"\w+", imported)] or [name]
+
+
+def _absent(name):
+    try:
+        resolve_name(name)
+    except (ImportError, AttributeError):
+        return True
+    return False
 
 
 def _unknown(text):
