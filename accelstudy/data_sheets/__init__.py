@@ -1,7 +1,7 @@
-"""What a sensor is, as its data sheet says: noise, drift, temperature, and its usual errors.
+"""Data sheets of sensors: noise, drift, temperature dependence and usual errors.
 
-The files beside this module are sensors that come along, each value with its source. A file of a
-user's own has the same form.
+The YAML files next to this module are the sensors of the package; each value has its source. The
+user's own files have the same form.
 """
 
 from accelstudy.data_sheets.reading import (

@@ -1,4 +1,4 @@
-"""A data sheet from what was measured: the Allan deviation of a log, or the noise of a campaign."""
+"""A data sheet from measurements: the Allan deviation of a log, or the noise of a campaign."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from accelstudy.data_sheets.flicker import FLICKER
 from accelstudy.data_sheets.sheet import QUANTITIES, DataSheet
 
 SEEN = 0.02
-"""Part of the Allan variance, where it is largest, below which a kind of noise is not seen."""
+"""A kind of noise must make up this part of the Allan variance at some averaging time."""
 
 
 def sheet_of_log(path: str | Path, settings: ImportSettings) -> DataSheet:
@@ -41,8 +41,8 @@ def sheet_of_log(path: str | Path, settings: ImportSettings) -> DataSheet:
 def sheet_of_allan(curve: AllanDeviation, name: str, source: str) -> DataSheet:
     """Fit σ²(τ) = N²/τ + (0.664 B)² + K²τ/3 to an Allan deviation.
 
-    None of the three is negative, and each value counts by how well it is known: the relative
-    variance of σ² is two over the independent differences.
+    None of the three is negative. Values are weighted by how well they are known: the relative
+    variance of σ² is two over the number of independent differences.
 
     Raises
     ------
@@ -70,16 +70,16 @@ def sheet_of_allan(curve: AllanDeviation, name: str, source: str) -> DataSheet:
 
 
 def sheet_of_campaign(folder: str | Path) -> DataSheet:
-    """Data sheet of the sensor of a campaign: what its positions' noise is, and no more.
+    """Data sheet of the sensor of a campaign, which states only the noise of its positions.
 
     Raises
     ------
     InputError
-        If it is no campaign, or its noise is not known.
+        If the folder is not a campaign, or the campaign does not state its noise.
     """
     campaign = read_campaign(folder)
     if campaign.sigma_force is None:
-        raise InputError(f"{folder}: says nothing of the noise of its positions (sigma)")
+        raise InputError(f"{folder}: the campaign does not state the noise of its positions")
     source = f"sigma of the campaign {campaign.name}"
     return DataSheet(
         campaign.name,
@@ -91,7 +91,7 @@ def sheet_of_campaign(folder: str | Path) -> DataSheet:
 
 
 def yaml_of(sheet: DataSheet) -> str:
-    """Write a data sheet as the YAML that `read_data_sheet` takes; what is unknown as a comment."""
+    """Write a data sheet as YAML for `read_data_sheet`; unknown quantities are comments."""
     content: dict[str, object] = {
         "name": sheet.name,
         "title": sheet.title,
@@ -109,5 +109,5 @@ def yaml_of(sheet: DataSheet) -> str:
         f"# {key}: {QUANTITIES[key][1]} (as in 1 {recorded_unit(QUANTITIES[key][0])})"
         for key in sheet.unknown
     ]
-    more = ["# Not known; add what the maker says:", *rest] if rest else []
+    more = ["# Unknown; add what the manufacturer states:", *rest] if rest else []
     return lines + "\n".join(more) + "\n"

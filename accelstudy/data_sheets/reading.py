@@ -1,4 +1,4 @@
-"""Data sheets from YAML: those that come along, and a user's own."""
+"""Data sheets from YAML: those of the package, and the user's own."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ DENSITY = "noise_density"
 
 
 def data_sheet_names() -> tuple[str, ...]:
-    """Names of the sensors that come along."""
+    """Names of the sensors of the package."""
     return tuple(
         sorted(f.name.removesuffix(".yaml") for f in _folder().iterdir() if ".yaml" in f.name)
     )
 
 
 def get_data_sheet(name_or_path: str | Path) -> DataSheet:
-    """Return a sensor by its name, or from a YAML file of the user's.
+    """Return a sensor by its name, or from the user's own YAML file.
 
-    A path has a separator or ends in .yaml or .yml.
+    A text with a path separator or the ending .yaml or .yml is a path.
 
     Raises
     ------
     UnknownNameError
         If there is no such sensor.
     InputError
-        If the file cannot be read, or holds no data sheet.
+        If the file cannot be read, or is not a data sheet.
     """
     text = str(name_or_path)
     if text.endswith((".yaml", ".yml")) or os.sep in text or "/" in text:
@@ -60,9 +60,9 @@ def read_data_sheet(path: str | Path) -> DataSheet:
 
 
 def parse_data_sheet(content: Mapping[str, Any], source: str = "data sheet") -> DataSheet:
-    """Make a data sheet of what a YAML file says.
+    """Make a data sheet of the content of a YAML file.
 
-    Each quantity is a text with its unit, or a mapping with such a `value` and its `source`.
+    A quantity is a text with its unit, or a mapping with such a `value` and its `source`.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A sensor's data sheet as numbers, and what follows from it for a hold and for the time after."""
+"""The data sheet of a sensor: its quantities, and what follows for a hold and for later times."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ QUANTITIES: dict[str, tuple[str, str]] = {
 
 @dataclass(frozen=True)
 class DataSheet:
-    """What is known of a sensor before it is calibrated; None where nothing is known.
+    """What is known of a sensor before its calibration; None if a quantity is unknown.
 
-    Quantities are in SI, those of `QUANTITIES`. White noise follows the Allan deviation: a
-    one-sided noise density, as data sheets have it, is √2 times `velocity_random_walk`.
+    Quantities are in SI; `QUANTITIES` explains them. White noise is given as its part of the Allan
+    deviation: the one-sided noise density of most data sheets is √2 times `velocity_random_walk`.
 
     Attributes
     ----------
     name, title, source : str
     sources : mapping of quantity to where its value comes from
-    assumed : frozenset of quantities whose value is taken for granted
+    assumed : frozenset of quantities whose value is an assumption
     """
 
     name: str
@@ -81,17 +81,18 @@ class DataSheet:
 
     @property
     def unknown(self) -> tuple[str, ...]:
-        """Quantities without a value, of which none stands in for another."""
+        """Quantities without a value; the noise always has one."""
         noise = ("velocity_random_walk", "position_sigma")
         return tuple(n for n in QUANTITIES if n not in self.known and n not in noise)
 
     def sigma_mean(self, seconds: float, session: float | None = None) -> float:
         """Standard deviation of the mean of a hold, m/s².
 
-        By itself it is the Allan deviation, √(N²/τ + (0.664 B)² + K² τ/3). Holds of one session
-        scatter more about their common mean, since the bias wanders while the session lasts: by
-        the bias functions B1 = n ln n / (2 (n − 1) ln 2) for flicker noise and n/2 for a random
-        walk, with the n = session/τ means that follow one another (NIST SP 1065, section 5.2.4).
+        For a single hold it is the Allan deviation, √(N²/τ + (0.664 B)² + K² τ/3). The holds of a
+        session scatter more about their common mean, since the bias wanders during the session.
+        The variances grow by the bias functions B1 = n ln n / (2 (n − 1) ln 2) for flicker noise
+        and n/2 for a random walk, with n = session/τ consecutive means (NIST SP 1065, section
+        5.2.4).
 
         Parameters
         ----------
@@ -112,14 +113,14 @@ class DataSheet:
     def bias_change(self, seconds: float, kelvin: float = 0.0, restarted: bool = False) -> float:
         """Standard deviation of the bias's change since the calibration, m/s².
 
-        It is √(F² + K² t + (b_T ΔT)² + repeatability²) with F of `flicker_change`; what is not
-        known counts as zero, and `unknown` tells what that is.
+        It is √(F² + K² t + (b_T ΔT)² + repeatability²) with F of `flicker_change`. Unknown
+        quantities count as zero; `unknown` lists them.
 
         Parameters
         ----------
         seconds : float, s, since the calibration; 0 for none
         kelvin : float, K, by which the temperature differs from that of the calibration
-        restarted : bool, whether the sensor was switched off in the meantime
+        restarted : bool, whether the sensor was switched off and on in between
         """
         floor = flicker_change(
             self.bias_instability or 0.0, self.velocity_random_walk or 0.0, seconds
@@ -131,23 +132,29 @@ class DataSheet:
 
     @property
     def quadratic_scale(self) -> float | None:
-        """Size of k2 if the whole nonlinearity is quadratic; a parabola leaves a line by half."""
+        """Size of k2 if the nonlinearity is purely quadratic.
+
+        A parabola differs from the best line by half of its term at full scale.
+        """
         if self.nonlinearity is None or self.full_scale is None:
             return None
         return 2 * self.nonlinearity * STANDARD_GRAVITY / self.full_scale
 
     @property
     def cubic_scale(self) -> float | None:
-        """Size of k3 if the whole nonlinearity is cubic; a cubic leaves a line by a quarter."""
+        """Size of k3 if the nonlinearity is purely cubic.
+
+        A cubic differs from the best line by a quarter of its term at full scale.
+        """
         if self.nonlinearity is None or self.full_scale is None:
             return None
         return 4 * self.nonlinearity * (STANDARD_GRAVITY / self.full_scale) ** 2
 
 
 def of_sigma(sigma: float) -> DataSheet:
-    """Sensor of which only the noise of a position's mean is known, m/s².
+    """Sensor of which only the noise of the mean of a position is known, m/s².
 
-    It is taken to be linear, as the paper's is.
+    It is assumed to be linear, like that of the paper.
     """
     return DataSheet(
         "sigma",

@@ -1,1 +1,1 @@
-"""What makes roll and pitch uncertain in the field, when the calibration is some time ago."""
+"""What makes roll and pitch uncertain in the field, some time after the calibration."""

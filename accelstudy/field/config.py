@@ -21,16 +21,16 @@ from accelstudy.pole.instrument.setup import quantities
 USUAL = quantities()
 
 Pitch = Annotated[float, Field(ge=-80, le=80), Number]
-"""Pitch in gon, so far from the roll pole that leveling is linear."""
+"""Pitch in gon, far enough from ±100 gon that leveling is linear."""
 
 
 class FieldCase(SensorCase):
     """A calibrated sensor in use."""
 
-    averaging: str = Field(USUAL["averaging"].usual, description="time of a reading")
+    averaging: str = Field(USUAL["averaging"].usual, description="duration of a reading")
     age: str = Field(USUAL["age"].usual, description="time since the calibration")
     temperature_change: str = Field(
-        USUAL["temperature_change"].usual, description="against that of the calibration"
+        USUAL["temperature_change"].usual, description="difference from the calibration"
     )
     restarted: bool = Field(True, description="whether the sensor was switched off since")
     roll_gon: OneOrMore[Angle] = Field(default=[-30, 0, 30], description="rolls of the grid")
@@ -71,6 +71,6 @@ class FieldCase(SensorCase):
 
 
 class FieldConfig(Block):
-    """Sensors in use; each has a folder of its name."""
+    """Sensors in use; each result goes to a folder of that name."""
 
     cases: dict[PathName, FieldCase] = Field(default_factory=dict, description="by name")

@@ -21,9 +21,9 @@ from accelstudy.pole.errors.sources import sources
 Array = NDArray[np.float64]
 
 MOST = 1e4
-"""Ratio of the largest contribution to the smallest that is shown."""
+"""Largest ratio of contributions that is shown."""
 LINE = 100
-"""Letters of a line of the title."""
+"""Characters in a line of the title."""
 MATTERS = {
     "bias_instability": "bias instability",
     "acceleration_random_walk": "random walk of the bias",
@@ -31,7 +31,7 @@ MATTERS = {
     "bias_per_kelvin": "bias over temperature",
     "scale_per_kelvin": "scale over temperature",
 }
-"""Quantities of a data sheet that make a calibration age, in words."""
+"""Quantities of a data sheet by which a calibration ages, in words."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Look:
 
 
 def looks() -> dict[str, Look]:
-    """All sources by name, in order; those of a pole look as they do there."""
+    """All sources by name, in order; sources of a pole look as in the figure of a pole."""
     found = {each.name: Look(each.title, each.colour, each.hatch) for each in sources()}
     restart = Look("switching off and on", "#882255", "xxxx")
     names = ("calibration", "noise", "drift", RESTART, "temperature")

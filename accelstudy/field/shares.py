@@ -1,9 +1,9 @@
 """Shares of the variance of roll and pitch in use: calibration, noise, time and temperature.
 
-A reading in the field has the errors of the calibration, the noise of the reading, and what became
-of the sensor since: its bias drifted with time, it was switched off and on, and bias and scales
-changed with the temperature. These causes are independent of each other, so that their Shapley
-effects are their parts of the variance; within the calibration the parameters are correlated.
+A reading in the field has the errors of the calibration, its own noise, and the changes of the
+sensor since: its bias drifted with time, it was switched off and on, and bias and scales changed
+with the temperature. These causes are independent, so their Shapley effects are their parts of the
+variance. Within the calibration the parameters are correlated.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ RESTART = "restart"
 AGES = np.geomspace(60.0, 1e4 * 3600, 30)
 """Times since the calibration, s, over which shares are shown."""
 KELVINS = np.geomspace(0.1, 40.0, 30)
-"""Temperature differences, K, over which they are."""
+"""Temperature differences, K, over which shares are shown."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +41,8 @@ class Use:
     ----------
     averaging : float, s, over which a reading is averaged
     age : float, s, since the calibration
-    temperature_change : float, K, against the temperature of the calibration
-    restarted : bool, whether the sensor was switched off since
+    temperature_change : float, K, difference from the temperature of the calibration
+    restarted : bool, whether the sensor was switched off and on since the calibration
     """
 
     averaging: float = 2.0
@@ -57,9 +57,10 @@ class Errors:
 
     Attributes
     ----------
-    source, names : of the kind, and of its inputs
+    source : str, name of the kind
+    names : tuple of str, of its inputs
     sigma : float, SI
-    of_force : bool, whether they are in parts of the force rather than added to it
+    of_force : bool, whether they are proportional to the force, instead of added to it
     """
 
     source: str
@@ -69,7 +70,7 @@ class Errors:
 
 
 def errors_in_use(sensor: CalibratedSensor, use: Use) -> tuple[Errors, ...]:
-    """List what is wrong beside the calibration; what the data sheet does not know is zero."""
+    """List the errors besides those of the calibration; unknown ones of the data sheet are zero."""
     sheet = sensor.sheet
     bias, scale = sensor.warmed(use.temperature_change)
     biases, scales = ("b_x", "b_y", "b_z"), ("s_x", "s_y", "s_z")
@@ -129,7 +130,7 @@ def field_shares(
 ) -> pd.DataFrame:
     """Shares over a grid of attitudes: in one use, over time, and over the temperature.
 
-    Over time the temperature is that of the calibration, which else hides what time does.
+    Over time the temperature is that of the calibration, so that it does not hide the drift.
 
     Parameters
     ----------
@@ -140,7 +141,7 @@ def field_shares(
     Returns
     -------
     DataFrame
-        As of `shares_in_use`, with `over` (use, time or temperature), hours and kelvin first.
+        Columns of `shares_in_use`, after `over` (use, time or temperature), hours and kelvin.
     """
     attitudes = np.array(list(product(roll_gon, pitch_gon))) * GON
     parts = []

@@ -1,1 +1,1 @@
-"""What roll and pitch are worth on a pole: the error of its foot, and where it comes from."""
+"""The pole: the error of its foot if roll and pitch correct the tilt, and its sources."""

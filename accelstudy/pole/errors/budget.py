@@ -1,4 +1,4 @@
-"""The budget of a pole: what each source contributes to the error of its foot, by linear theory."""
+"""The budget of a pole: contribution of each source to the error of its foot, by linear theory."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Contribution:
 
 
 def contribution(source: Source, situation: Situation) -> Contribution:
-    """What a source contributes in the attitudes of a situation."""
+    """Contribution of a source in the attitudes of a situation."""
     wrong = source.wrong(situation)
     slope = situation.slope(wrong.on)
     covariance = slope @ wrong.covariance @ np.swapaxes(slope, -2, -1)
@@ -67,7 +67,7 @@ def contribution(source: Source, situation: Situation) -> Contribution:
 
 
 def together(parts: Sequence[Contribution]) -> Contribution:
-    """Independent sources together."""
+    """Sum of independent contributions."""
     return Contribution(
         np.sum([part.covariance for part in parts], axis=0),
         np.sum([part.shift for part in parts], axis=0),
@@ -77,7 +77,7 @@ def together(parts: Sequence[Contribution]) -> Contribution:
 def situation_at(
     setup: Setup, sensor: CalibratedSensor, tilts: Array, directions: int = DIRECTIONS
 ) -> Situation:
-    """All tilts (rad) with all directions of leaning, directions in a row."""
+    """All tilts (rad) in all directions of leaning; the direction varies fastest."""
     around = np.arange(directions) * 2 * np.pi / directions
     return Situation(setup, sensor, np.repeat(tilts, directions), np.tile(around, len(tilts)))
 
@@ -115,10 +115,10 @@ class Budget:
         return np.sqrt(np.mean(self.parts[name].vertical ** 2, axis=-1))
 
     def table(self) -> pd.DataFrame:
-        """One row per tilt, direction and source, in SI but for the angles, which are in gon.
+        """One row per tilt, direction and source, in SI; angles are in gon.
 
-        `share` is the part of the mean square of the total horizontal error, and `radius_95_m`
-        holds that error in 95 of 100 cases.
+        `share` is the part of the mean square of the total horizontal error. The total error lies
+        within `radius_95_m` in 95 of 100 cases.
         """
         tilts, directions = np.meshgrid(self.tilts / GON, self.directions / GON, indexing="ij")
         whole = np.maximum(self.total.horizontal**2, np.finfo(float).tiny)

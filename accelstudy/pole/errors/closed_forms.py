@@ -1,7 +1,7 @@
-"""Closed forms of the sources that have one, against which the budget is held.
+"""Closed forms of some sources, with which the budget is compared.
 
-They are for a sensor whose axes are those of the pole (frd), an antenna on the pole's axis, and
-small errors. A pole of length L leans by τ into the direction α, from forward towards right.
+They hold for a sensor whose axes are those of the pole (frd), an antenna on the pole's axis, and
+small errors. A pole of length L leans by τ in the direction α, counted from forward towards right.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ from accelstudy.basics.units import STANDARD_GRAVITY
 def of_force(
     length: float, tilt: float, direction: float, sigma: float, g: float = STANDARD_GRAVITY
 ) -> tuple[float, float]:
-    """Errors of a force alike on all axes (noise, drift): horizontal and vertical, m.
+    """Errors of a force, equal on all axes (noise, drift): horizontal and vertical, m.
 
     The horizontal variance is (L σ/g)² {cos²τ + [cos²τ + sin⁴τ sin²α cos²α] / (1 − sin²τ cos²α)²}
-    and the vertical one (L σ/g)² sin²τ. The braces hold 2 at level, cos²τ + 1/cos²τ for a pole that
-    leans forward, and 2 cos²τ for one that leans to the side: the heading is that of forward, and
-    where forward points up or down, roll turns the lean about the vertical.
+    and the vertical one (L σ/g)² sin²τ. The expression in braces is 2 at level, cos²τ + 1/cos²τ for
+    a pole that leans forward, and 2 cos²τ for one that leans to the side. They differ since the
+    heading is that of the forward axis: if this axis points up or down, an error of roll turns the
+    lean about the vertical.
     """
     s, c = np.sin(tilt), np.cos(tilt)
     across = s**2 * np.sin(direction) * np.cos(direction)

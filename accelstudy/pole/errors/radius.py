@@ -1,4 +1,4 @@
-"""The circle that holds an error of two components with a probability."""
+"""The circle that contains an error of two components with a given probability."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ Array = NDArray[np.float64]
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(96)
 WIDTH = 9.0
-"""Standard deviations beyond which nothing is counted."""
+"""Standard deviations beyond which the density is neglected."""
 HALVINGS = 40
 FLAT = 1e-6
 """No standard deviation is smaller than this part of the larger one, or of the mean error."""
 
 
 def radius(covariance: ArrayLike, shift: ArrayLike, probability: float = 0.95) -> Array:
-    """Radius about the true place that holds a normal error with a probability.
+    """Radius of the circle about zero that contains a normal error with a probability.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def radius(covariance: ArrayLike, shift: ArrayLike, probability: float = 0.95) -
 def _probability(r: Array, mean: Array, sigma: Array) -> Array:
     """Probability of a circle of radius r (...), with the errors along the axes of the ellipse."""
     (mean_1, mean_2), (sigma_1, sigma_2) = np.moveaxis(mean, -1, 0), np.moveaxis(sigma, -1, 0)
-    # The larger component is integrated within the circle, over the angle: its ends are no trouble.
+    # The larger component is integrated over the angle, which has no singular ends.
     start = np.arcsin(np.clip((mean_2 - WIDTH * sigma_2) / r, -1, 1))
     end = np.arcsin(np.clip((mean_2 + WIDTH * sigma_2) / r, -1, 1))
     angle = ((end + start)[..., None] + (end - start)[..., None] * NODES) / 2

@@ -1,4 +1,4 @@
-"""Monte Carlo of a pole: all sources at once, with the exact geometry and the exact correction."""
+"""Monte Carlo of a pole: all sources at once, with exact geometry and exact correction."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ Array = NDArray[np.float64]
 
 
 def draw(situation: Situation, replicates: int, rng: np.random.Generator) -> Array:
-    """Errors of the foot, (R, k, 3), m, with errors of their own from every source."""
+    """Draw errors of the foot, (R, k, 3), m, with independent errors from every source."""
     wrong: dict[tuple[str, ...], Array] = {}
     for source in sources():
         each = source.wrong(situation)
-        # By eigenvectors, since a covariance may be singular, or zero.
+        # Eigenvectors, since a covariance may be singular or zero.
         variance, axes = np.linalg.eigh(each.covariance)
         root = axes * np.sqrt(np.maximum(variance, 0.0))[:, None]
         normal = rng.standard_normal((replicates, *each.shift.shape))
@@ -45,9 +45,9 @@ def simulate(
 
     Returns
     -------
-    DataFrame, a row per tilt: rms by linear theory (`linear_…`), by Monte Carlo (`simulated_…`)
-    and the standard error of that (`standard_error_…`), horizontal and vertical, in m; and the
-    part of the horizontal errors inside of the circles that should hold 95 % (`inside_95`)
+    DataFrame, one row per tilt: rms by linear theory (`linear_…`) and by Monte Carlo
+    (`simulated_…`) with its standard error (`standard_error_…`), horizontal and vertical, in m; and
+    the part of the horizontal errors inside the circles for 95 % (`inside_95`)
     """
     rows = []
     for tilt in tilts:
@@ -69,7 +69,7 @@ def _compared(linear: Budget, errors: Array) -> dict[str, float]:
     }
     for name, ((expected,), square) in squares.items():
         rms = np.sqrt(np.mean(square))
-        # The directions differ, which is no matter of chance: the variance is that within them.
+        # Directions differ systematically, so the variance is taken within each.
         variance = np.mean(np.var(square, axis=0, ddof=1)) / square.size
         row[f"linear_{name}_m"] = float(expected)
         row[f"simulated_{name}_m"] = float(rms)

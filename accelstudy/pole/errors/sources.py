@@ -1,7 +1,7 @@
-"""What makes the foot of a pole wrong: a registry, in which each source is one small function.
+"""Sources of error of the foot of a pole: a registry in which each source is one small function.
 
-To add one, write a function of a `Situation` that says of what it makes wrong by how much, and
-register it with a title and with what would make it smaller.
+To add one, write a function of a `Situation` that returns which inputs are wrong and by how much,
+and register it with a title and a remedy.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Wrong:
-    """What a source makes wrong: a normal error of some inputs.
+    """The inputs that a source makes wrong, with normal errors.
 
     Attributes
     ----------
     on : tuple of str, as in `Situation.slope`
     covariance : (k, m, m) array
-    shift : (k, m) array, mean of the error, which is the same each time
+    shift : (k, m) array, mean of the errors
     """
 
     on: tuple[str, ...]
@@ -36,7 +36,7 @@ class Wrong:
 
 
 def scatter(situation: Situation, on: tuple[str, ...], *sigma: Array | float) -> Wrong:
-    """Independent errors, of each input with its standard deviation, a number or (k,)."""
+    """Independent errors; each input has its standard deviation, a number or (k,)."""
     variance = np.stack(np.broadcast_arrays(*sigma, situation.tilt)[:-1], axis=-1) ** 2
     return Wrong(on, variance[..., None] * np.eye(len(sigma)), np.zeros_like(variance))
 
@@ -49,9 +49,9 @@ class Source:
     ----------
     name : str, of tables
     title : str, of figures and sentences
-    remedy : str, what would make it smaller
-    colour, hatch : str, in figures; colours keep apart with red-green blind eyes, too
-    sensor : bool, whether it is a matter of the tilt sensor
+    remedy : str, advice that makes it smaller
+    colour, hatch : str, in figures; red-green blind readers can distinguish the colours, too
+    sensor : bool, whether it belongs to the tilt sensor
     wrong : function of a `Situation`
     """
 
@@ -93,7 +93,7 @@ def sources() -> tuple[Source, ...]:
     sensor=True,
 )
 def calibration(situation: Situation) -> Wrong:
-    """Parameters with their full covariance, the same error until the next calibration."""
+    """Errors of the parameters with their full covariance, constant until the next calibration."""
     if (sigma := situation.sensor.tilt_sigma) is not None:
         return scatter(situation, ("roll", "pitch"), sigma, sigma)
     k, u = len(situation.tilt), situation.sensor.model.n_parameters
@@ -110,7 +110,7 @@ def calibration(situation: Situation) -> Wrong:
     sensor=True,
 )
 def noise(situation: Situation) -> Wrong:
-    """Noise of the mean of a reading, alike on all axes."""
+    """Noise of the mean of a reading, equal on all axes."""
     sigma = situation.sensor.sheet.sigma_mean(situation.setup.averaging)
     return scatter(situation, (FORCE,), sigma, sigma, sigma)
 
@@ -123,7 +123,7 @@ def noise(situation: Situation) -> Wrong:
     sensor=True,
 )
 def drift(situation: Situation) -> Wrong:
-    """Change of the bias with time, and as the sensor was switched off in the meantime."""
+    """Change of the bias with time, and by switching the sensor off and on."""
     age = situation.setup.age
     sigma = situation.sensor.sheet.bias_change(age, restarted=True) if age > 0 else 0.0
     return scatter(situation, (FORCE,), sigma, sigma, sigma)
@@ -138,7 +138,7 @@ def drift(situation: Situation) -> Wrong:
     sensor=True,
 )
 def temperature(situation: Situation) -> Wrong:
-    """Change of the bias and of the scales, of what the calibration does not correct."""
+    """Change of bias and scales, as far as the calibration does not correct it."""
     bias, scale = situation.sensor.warmed(situation.setup.temperature_change)
     return scatter(situation, (FORCE,), *np.hypot(bias, scale * situation.sensor_forces.T))
 
@@ -150,7 +150,7 @@ def temperature(situation: Situation) -> Wrong:
     "#CC79A7",
 )
 def mounting(situation: Situation) -> Wrong:
-    """Angles between the axes of the sensor and the pole; the same error until it is taken off."""
+    """Angles between the axes of sensor and pole, constant as long as the sensor stays mounted."""
     sigma = situation.setup.mounting_sigma
     return scatter(situation, ("mounting_forward", "mounting_right"), sigma, sigma)
 
@@ -162,7 +162,7 @@ def mounting(situation: Situation) -> Wrong:
     "#D55E00",
 )
 def heading(situation: Situation) -> Wrong:
-    """The direction of the lean turns with the heading; a pole that stands upright has none."""
+    """An error of the heading turns the direction of the lean; an upright pole does not lean."""
     return scatter(situation, ("yaw",), situation.setup.heading_sigma)
 
 
@@ -174,12 +174,12 @@ def heading(situation: Situation) -> Wrong:
     hatch="\\\\\\\\",
 )
 def bending(situation: Situation) -> Wrong:
-    """The foot lies beside the straight line by the flexibility times the sine of the tilt.
+    """The foot is off the straight line by the flexibility times the sine of the tilt.
 
-    The same tilt gives the same error each time, and it is not corrected.
+    The error is not corrected, and the same each time for the same tilt.
     """
     across = situation.forces[:, :2] / situation.sensor.gravity
-    # The foot that is computed lacks the bending that the true one has, whose sign is that of −f.
+    # The computed foot lacks the bending of the true one, which has the sign of −f.
     shift = across * flexibility(situation.setup, situation.sensor.gravity)
     return Wrong(("bend_forward", "bend_right"), np.zeros((len(shift), 2, 2)), shift)
 
@@ -197,6 +197,6 @@ def length(situation: Situation) -> Wrong:
     "#332288",
 )
 def top(situation: Situation) -> Wrong:
-    """Position of the antenna or prism, alike in north and in east."""
+    """Position of the antenna or prism, with equal errors in north and in east."""
     each, up = situation.setup.top_sigma / np.sqrt(2), situation.setup.top_sigma_vertical
     return scatter(situation, ("top_north", "top_east", "top_down"), each, each, up)

@@ -1,8 +1,8 @@
-"""How far the foot of a bent pole lies beside the straight line that the sensor takes for it.
+"""How far the foot of a bent pole lies from the straight line that leveling assumes.
 
-Small deflections of a beam of the same stiffness all along (Euler and Bernoulli). The foot stands
-on its tip, the hand holds against the weight by a force across the pole, and the top is free. Only
-the part of the weight across the pole bends it, which grows with the sine of the tilt.
+The pole is a beam of constant stiffness with small deflections (Euler and Bernoulli). It stands on
+its tip, the hand balances the weight by a force across the pole, and the top is free. Only the
+component of the weight across the pole bends it, which grows with the sine of the tilt.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from accelstudy.pole.instrument.setup import Setup
 
 
 def flexibility(setup: Setup, g: float = STANDARD_GRAVITY) -> float:
-    """Distance of the foot from the straight line through the top, for a pole that lies level, m.
+    """Distance of the foot from the straight line through the top, for a horizontal pole, m.
 
     With the bending moment M(x) = P (L − x) + w (L − x)²/2 − R (h − x) of the weight P of the top,
     the weight w of a metre and the force R of the hand at h, whose last term counts below the hand
@@ -20,9 +20,9 @@ def flexibility(setup: Setup, g: float = STANDARD_GRAVITY) -> float:
 
         (∫₀ᴸ M x dx − L ∫ₛᴸ M dx) / (E I),        R = (P L + w L²/2) / h.
 
-    With h = 0 the pole is a cantilever that is clamped at its foot. The sensor turns with the pole
-    where it sits, so the foot that is computed is this much too far from where the top leans to;
-    a negative distance means the other side.
+    With h = 0 the pole is a cantilever that is clamped at its foot. The sensor follows the slope of
+    the pole where it sits. So the computed foot is this much too far away from the side to which
+    the top leans; a negative distance means the other side.
 
     Parameters
     ----------

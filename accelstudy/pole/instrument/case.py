@@ -1,4 +1,4 @@
-"""A calibrated sensor as a configuration names it: a data sheet, and how it is calibrated."""
+"""A calibrated sensor in a configuration: its data sheet, and how it is calibrated."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from accelstudy.sensors.frames import FRD, Frame
 
 
 class SensorCase(Block):
-    """A sensor with its calibration: one's own, or one that linear theory foretells."""
+    """A sensor with its calibration: an existing one, or one that linear theory predicts."""
 
-    sensor: str = Field("adxl355", description="data sheet: a name, or a path of one's own")
+    sensor: str = Field("adxl355", description="data sheet: a name, or the path of your own")
     calibration: str | None = Field(None, description="calibration.json, instead of what follows")
     model: ModelName = Field("bias-scale-nonorthogonality", description="what is calibrated")
     scheme: str = Field("mclaren-24", description="positions")
@@ -31,7 +31,7 @@ class SensorCase(Block):
 
     @property
     def checks(self) -> Mapping[str, tuple[Callable[[Any], Any], Any]]:
-        """Function that raises `InputError` where the value of a key is bad, and that value."""
+        """For each key the function that checks its value, and the value."""
         return {
             "sensor": (get_data_sheet, self.sensor),
             "scheme": (get_scheme, self.scheme),
@@ -67,6 +67,6 @@ class SensorCase(Block):
 
     @property
     def files(self) -> list[str]:
-        """Files that are read: the calibration, and a data sheet of the user's."""
+        """Files that are read: the calibration, and the user's own data sheet."""
         known = self.sensor in data_sheet_names()
         return [*([] if known else [self.sensor]), *filter(None, [self.calibration])]

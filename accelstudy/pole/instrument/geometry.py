@@ -1,7 +1,7 @@
-"""Where the foot of a pole is: the one definition, of which every derivative is taken.
+"""Position of the foot of a pole: the one definition from which all derivatives are traced.
 
-North-east-down. The pole's own axes are forward, right and down along it; its attitude is yaw,
-pitch and roll as everywhere in the project, so that at level all three are zero.
+Positions are north, east, down. The pole's own axes are forward, right and down along the pole. Its
+attitude is yaw, pitch and roll, as everywhere in the project; upright all three are zero.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ INPUTS = (
 )
 """Arguments of `foot`, in order.
 
-The top is the centre of the antenna or prism, m, and the offset is where it lies beside the pole's
-axis. The mounting angles turn the pole against the axes that are leveled, about forward and about
-right, rad. Bending moves the foot from the straight line that the sensor takes for the pole, m.
+The top is the centre of the antenna or prism, m, and the offset is its distance from the pole's
+axis. The mounting angles turn the pole against the leveled axes, about forward and about right,
+rad. Bending moves the foot away from the straight line that leveling assumes, m.
 """
 
 
 def foot(inputs: Sequence[Number], xp: Any = np) -> Vector:
-    """North, east and down of the foot, m, of the `INPUTS`."""
+    """North, east and down of the foot, m, as a function of the `INPUTS`."""
     (north, east, down, roll, pitch, yaw, length, offset_forward, offset_right,
      mounting_forward, mounting_right, bend_forward, bend_right) = inputs  # fmt: skip
     arm = (bend_forward - offset_forward, bend_right - offset_right, length)
@@ -92,8 +92,8 @@ def leaning(tilt: ArrayLike, direction: ArrayLike, g: float = STANDARD_GRAVITY) 
 
     Parameters
     ----------
-    tilt : (...) array, rad, of the pole against the vertical
-    direction : (...) array, rad, into which the top leans, from forward towards right
+    tilt : (...) array, rad, angle between the pole and the vertical
+    direction : (...) array, rad, in which the top leans, from forward towards right
     g : float, m/s²
 
     Returns

@@ -1,4 +1,4 @@
-"""The calibrated sensor on a pole: from a calibration of one's own, or from linear theory."""
+"""The calibrated sensor on a pole: from an existing calibration, or from linear theory."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ Array = NDArray[np.float64]
 
 
 COEFFICIENTS = {"bias": "m/s^2/K", "scale": "1/K"}
-"""What changes with the temperature, and the unit of the parameters by which it does."""
+"""Parameters that change with temperature, and the unit of their temperature coefficient."""
 
 
 @dataclass(frozen=True)
 class CalibratedSensor:
-    """A sensor with what is known of it.
+    """A sensor, its calibration and its data sheet.
 
     Attributes
     ----------
@@ -43,12 +43,12 @@ class CalibratedSensor:
     parameters : (u,) array, SI
     covariance : (u, u) array, SI, of the parameters
     sheet : DataSheet
-    tilt_sigma : float, rad, of roll and of pitch, where no more is known than that
+    tilt_sigma : float, rad, sd of roll and of pitch, if nothing else is known of the calibration
     gravity : float, m/s²
-    mounting : Frame, where its axes point when the pole stands upright
+    mounting : Frame, where the axes point when the pole is upright
     temperature : float, °C, of the calibration
-    time : float, s, at which its session ended
-    origin : str, where the calibration comes from, in words
+    time : float, s, end of its session
+    origin : str, where the calibration comes from
     warnings : tuple of str
     """
 
@@ -66,24 +66,24 @@ class CalibratedSensor:
 
     @property
     def corrected(self) -> tuple[str, ...]:
-        """Which of bias and scale the calibration corrects for the temperature."""
+        """Those of bias and scale whose change with temperature the calibration corrects."""
         units = {parameter.unit for parameter in self.model.parameters}
         return tuple(name for name, unit in COEFFICIENTS.items() if unit in units)
 
     def warmed(self, kelvin: float) -> tuple[float, float]:
-        """Sds by which bias, m/s², and scale change with the temperature, uncorrected.
+        """Sds of the uncorrected change of bias, m/s², and of scale with the temperature.
 
-        What the data sheet does not know is zero.
+        Coefficients that the data sheet does not have count as zero.
         """
         bias = 0.0 if "bias" in self.corrected else self.sheet.bias_change(0.0, kelvin)
         per_kelvin = 0.0 if "scale" in self.corrected else self.sheet.scale_per_kelvin or 0.0
         return bias, per_kelvin * kelvin
 
     def conditions(self, forces: Array, temperature_change: float) -> HoldConditions | None:
-        """What effects depend on beside the force, in attitudes with forces (k, 3), m/s².
+        """Conditions besides the force, in attitudes with forces (k, 3), m/s².
 
-        All columns are (k, 1). The sensor has the temperature of the air and does not vibrate, and
-        nothing is left of the position before. Drifts stay as they were when the session ended.
+        All columns are (k, 1). The sensor has the temperature of the air, does not vibrate, and has
+        no position before. Drifts keep their values at the end of the session.
         """
         if not self.model.hold_columns:
             return None
@@ -131,8 +131,8 @@ def from_calibration(path: str | Path, sheet: DataSheet, mounting: Frame = FRD) 
     doubts = [f"do not use this calibration: {fault}" for fault in faults]
     if quality["state"] == "rejected":
         doubts.append(
-            "the residuals of the calibration contradict its noise, so it may be worse than its "
-            f"sigmas say; `accelstudy diagnose` looks for what its model lacks ({path})"
+            "the residuals of the calibration contradict its noise, so its errors may exceed its "
+            f"sigmas; `accelstudy diagnose` looks for what the model lacks ({path})"
         )
     return CalibratedSensor(
         calibration.model,
@@ -159,7 +159,7 @@ def from_linear_theory(
     robot_sigma: float = Noise.sigma_angle,
     mounting: Frame = FRD,
 ) -> CalibratedSensor:
-    """Sensor as a calibration would leave it, by linear theory at the ideal sensor.
+    """Sensor after a calibration, predicted by linear theory at the ideal sensor.
 
     Parameters
     ----------
@@ -198,7 +198,7 @@ def from_linear_theory(
 
 
 def from_tilt_sigma(sigma: float, sheet: DataSheet, mounting: Frame = FRD) -> CalibratedSensor:
-    """Sensor of whose calibration only the sd that it leaves in roll and in pitch is known, rad."""
+    """Sensor whose calibration is known only by the sd, rad, that it leaves in roll and pitch."""
     model = get_model("bias")
     return CalibratedSensor(
         model,

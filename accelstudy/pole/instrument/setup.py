@@ -1,6 +1,6 @@
-"""A pole, how it is used and how well all that belongs to it is known, as numbers.
+"""The quantities of a pole and of its use, and how well they are known.
 
-Commands and configurations take each quantity from here: its unit, its usual value, its bounds.
+Commands and configurations take the unit, usual value and bounds of each quantity from here.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from accelstudy.basics.units import parse_quantity
 POLE, USE, ERRORS = "The pole", "Its use", "How well it is known (standard deviations)"
 """Sections of the quantities."""
 HAND = 0.6
-"""Height of the hand in parts of the length, unless it is given."""
+"""Usual height of the hand as a part of the length."""
 
 
 @dataclass(frozen=True)
 class Given:
-    """What may be given for a quantity.
+    """A quantity that the user may give.
 
     Attributes
     ----------
     section : str
     unit : str, SI
-    usual : str, with its unit; empty if another quantity tells it
+    usual : str, with its unit; empty if it follows from another quantity
     help : str
     least, most : float, SI, both allowed
     """
@@ -40,7 +40,7 @@ class Given:
     most: float = math.inf
 
     def read(self, text: str) -> float:
-        """Value of a text with its unit, SI; raises `InputError` if it is none."""
+        """Value of a text with its unit, SI; raises `InputError` if it is not one."""
         return parse_quantity(text, self.unit, self.least, self.most)
 
 
@@ -55,7 +55,7 @@ HOLD = Given("", "s", "10s", "Time at each position.", 1e-3, 1e6)
 ROBOT_SIGMA = Given("", "rad", "3.2mgon", "Sd of the robot's roll and of its pitch.", 1e-9, 0.1)
 TILT_SIGMA = Given("", "rad", "", "Sd of roll and of pitch, if no more is known.", 1e-9, 0.5)
 TILT_RANGE = Given("", "rad", "50gon", "Largest tilt.", 1e-3, 1.5)
-"""What may be given beside a pole: of the calibration of its sensor, and how far it is tilted."""
+"""Quantities besides those of the pole: of the sensor's calibration, and the largest tilt."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Setup:
         POLE, "m", "2m", "Length from the foot to the antenna or prism.", 0.1, 30.0
     )
     offset_forward: float = _given(
-        POLE, "m", "0", "Antenna or prism before the axis of the pole.", -1.0, 1.0
+        POLE, "m", "0", "Antenna or prism in front of the axis of the pole.", -1.0, 1.0
     )
     offset_right: float = _given(
         POLE, "m", "0", "Antenna or prism to the right of the axis.", -1.0, 1.0
@@ -124,17 +124,17 @@ class Setup:
 
 
 LINEAR = ("model", "scheme", "approach", "hold", "robot_sigma")
-"""What tells of a calibration that is not made yet."""
+"""Options that describe a calibration that has not been made yet."""
 KINDS = (("calibration",), ("tilt_sigma",), LINEAR)
-"""Ways to tell how the sensor is calibrated, of which one is taken."""
+"""Ways to say how the sensor is calibrated; they exclude each other."""
 
 
 def check_one_kind(given: Mapping[str, str]) -> None:
-    """Check that the calibration is told in one way.
+    """Check that the calibration is described in one way.
 
     Parameters
     ----------
-    given : mapping of what is given, of the names of `KINDS`, to how a person writes it
+    given : mapping of the names in `KINDS` that the user gave, to how the user writes them
 
     Raises
     ------
@@ -147,17 +147,17 @@ def check_one_kind(given: Mapping[str, str]) -> None:
 
 
 def quantities() -> dict[str, Given]:
-    """What may be given for each quantity, by its name."""
+    """All quantities of a pole, by name."""
     return {each.name: _of(each) for each in fields(Setup)}
 
 
 def setup_of(texts: Mapping[str, Any]) -> Setup:
-    """Pole and use of texts with units, as a configuration has them.
+    """Make a pole and its use from texts with units, as in a configuration.
 
     Raises
     ------
     InputError
-        If there is no such quantity, or a text is none.
+        If there is no such quantity, or a text cannot be read.
     """
     known = quantities()
     values = {}

@@ -1,4 +1,4 @@
-"""A pole with its sensor in attitudes: what its foot depends on, and how strongly."""
+"""A pole with its sensor in given attitudes: what its foot depends on, and how strongly."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ FORCE = "force"
 
 @dataclass(frozen=True)
 class Situation:
-    """A pole that leans in k ways; the heading is zero, since errors turn with it.
+    """A pole in k attitudes; the heading is zero, since errors turn with it.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class Situation:
 
     @cached_property
     def hold(self) -> HoldConditions | None:
-        """What effects of the sensor depend on beside the force; each attitude is by itself."""
+        """Conditions of the sensor's effects besides the force; each attitude stands alone."""
         return self.sensor.conditions(self.sensor_forces, self.setup.temperature_change)
 
     @cached_property
@@ -63,7 +63,7 @@ class Situation:
 
     @cached_property
     def inputs(self) -> Array:
-        """True `INPUTS` of `foot`, (k, 13), but for the bending."""
+        """True `INPUTS` of `foot`, (k, 13), without bending."""
         known = np.zeros((len(self.tilt), len(INPUTS)))
         roll, pitch = roll_pitch(tuple(self.forces.T))
         values = {
@@ -82,7 +82,7 @@ class Situation:
         return jacobian(self.inputs)
 
     def slope(self, on: tuple[str, ...]) -> Array:
-        """Derivative of the foot with respect to what is wrong, (k, 3, m).
+        """Derivative of the foot with respect to wrong inputs, (k, 3, m).
 
         Parameters
         ----------
@@ -92,7 +92,7 @@ class Situation:
             return self._jacobian[..., [INPUTS.index(name) for name in on]]
         angles = [INPUTS.index("roll"), INPUTS.index("pitch")]
         by_force = self._jacobian[..., angles] @ leveling_jacobian(self.forces)
-        # A reading's error reaches the corrected force by ∂f_b/∂f_s, which is close to I.
+        # Errors of a reading propagate by ∂f_b/∂f_s, which is close to I.
         by_force = by_force @ self.sensor.mounting.matrix
         if on == (FORCE,):
             return by_force
@@ -103,11 +103,11 @@ class Situation:
         return by_force @ by_parameters[:, 0]
 
     def errors(self, wrong: Mapping[tuple[str, ...], Array]) -> Array:
-        """Error of the foot that is computed of wrong values, with the exact geometry.
+        """Error of the foot that is computed from wrong values, with the exact geometry.
 
         Parameters
         ----------
-        wrong : mapping of what is wrong, as in `slope`, to errors (R, k, m)
+        wrong : mapping of the wrong inputs, as in `slope`, to errors (R, k, m)
 
         Returns
         -------

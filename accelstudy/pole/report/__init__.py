@@ -1,1 +1,1 @@
-"""What comes of a pole: sentences, figure, files, and the configuration that asks for them."""
+"""The results for a pole: sentences, figure, files, and the configuration that asks for them."""

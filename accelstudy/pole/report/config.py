@@ -22,7 +22,7 @@ class PoleCase(SensorCase):
     """A pole with its sensor: the options of `accelstudy pole`."""
 
     tilt_sigma: str | None = Field(
-        None, description="of roll and pitch, if no more is known of the calibration"
+        None, description="sd of roll and pitch, if nothing else is known of the calibration"
     )
     mounting: str = Field("frd", description="where the axes point on the upright pole")
     tilt_range: str = Field(TILT_RANGE.usual, description="largest tilt")
@@ -49,7 +49,7 @@ class PoleCase(SensorCase):
         return from_tilt_sigma(sigma, get_data_sheet(self.sensor), mounting)
 
     def write(self, seed: int, folder: Path, provenance: Mapping[str, Any]) -> PoleResult:
-        """Work the case out and write it into a folder; see `write_pole`."""
+        """Calculate the case and write it into a folder; see `write_pole`."""
         return write_pole(
             setup_of(self.setup),
             self.calibrated_sensor(parse_frame(self.mounting)),
@@ -62,6 +62,6 @@ class PoleCase(SensorCase):
 
 
 class PoleConfig(Block):
-    """Poles that are worked out; each has a folder of its name."""
+    """Poles; each result goes to a folder of that name."""
 
     cases: dict[PathName, PoleCase] = Field(default_factory=dict, description="by name")

@@ -1,4 +1,4 @@
-"""The figure of a budget: what each source contributes, over the tilt."""
+"""The figure of a budget: contribution of each source over the tilt."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from accelstudy.pole.errors.sources import sources
 WIDEST = 1e4
 """Largest ratio of the largest error to the smallest that is shown."""
 NAMED = 8.0
-"""Per cent at the largest tilt from which on an area has room for its name."""
+"""Per cent at the largest tilt; larger areas have room for their name."""
 
 
 def budget_figure(budget: Budget, simulated: pd.DataFrame) -> Figure:
@@ -33,7 +33,7 @@ def budget_figure(budget: Budget, simulated: pd.DataFrame) -> Figure:
         drawn = [each for each in sources() if budget.horizontal(each.name).max() > 0]
         squares = []
         for each in drawn:
-            # What is a matter of the tilt sensor has a full line.
+            # Sources of the tilt sensor have full lines.
             line = "-" if each.sensor else (0, (5, 1.5))
             values = 1e3 * budget.horizontal(each.name)
             curves.plot(tilts, values, color=each.colour, linestyle=line, label=each.title)

@@ -1,4 +1,4 @@
-"""What comes of a pole: table, figure, Monte Carlo and sentences, as files."""
+"""The results for a pole as files: tables, figure and sentences."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ STEPS = 50
 
 @dataclass(frozen=True)
 class PoleResult:
-    """What a pole comes to.
+    """Results for a pole.
 
     Attributes
     ----------
     shown : Budget, at the tilts that are printed
-    said : tuple of str, what limits the foot, and whether the Monte Carlo agrees
+    said : tuple of str, sentences on what limits the foot, and whether the Monte Carlo agrees
     """
 
     shown: Budget
@@ -50,18 +50,18 @@ def write_pole(
     folder: Path,
     provenance: Mapping[str, Any] | None = None,
 ) -> PoleResult:
-    """Work out a pole and write `pole.json`, two tables and the figure into a folder.
+    """Calculate a pole and write `pole.json`, two tables and the figure into a folder.
 
     Parameters
     ----------
     setup : Setup
     sensor : CalibratedSensor
     tilt_range : float, rad
-    replicates : int, of the Monte Carlo, of each tilt and direction
+    replicates : int, of the Monte Carlo, for each tilt and direction
     seed : int
     folder : Path
     provenance : mapping, optional
-        Origin of the tables; by default a hash of all that they depend on, and the seed.
+        Provenance of the tables; by default a hash of all their inputs, and the seed.
     """
     given = {
         "setup_si": asdict(setup),

@@ -1,4 +1,4 @@
-"""The budget in words: what the foot is worth, what limits it, and what would help."""
+"""The budget in words: the error of the foot, what limits it, and what would help."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from accelstudy.pole.errors.sources import sources
 from accelstudy.pole.instrument.sensor import COEFFICIENTS
 
 BEYOND_CHANCE = 4.0
-"""Standard errors of the Monte Carlo beyond which linear theory is said to be wrong."""
+"""Standard errors of the Monte Carlo; linear theory is called wrong beyond them."""
 TOP = "top"
-"""Name of the source that a pole has even where it stands upright."""
+"""Name of the source that remains even if the pole is upright."""
 
 
 def shown_tilts(tilt_range: float) -> np.ndarray:
@@ -50,7 +50,7 @@ def _cells(texts: list[str]) -> str:
 
 
 def sentences(budget: Budget) -> list[str]:
-    """Say what the foot is worth at the last tilt of a budget, and what limits it."""
+    """Say how wrong the foot is at the last tilt of a budget, and what limits it."""
     tilt = quantity_text(float(budget.tilts[-1]), "rad")
     total, up = budget.horizontal()[-1], budget.vertical()[-1]
     radius = float(np.max(budget.total.radius[-1]))
@@ -65,7 +65,7 @@ def sentences(budget: Budget) -> list[str]:
         top = next(each for each in sources() if each.name == TOP)
         said.append(f"The {top.title} limits it: {_mm(own[TOP])}. {top.remedy}")
         said.append(
-            f"All else together makes {_mm(rest)}, and of that the {worst.title} makes most: "
+            f"All other sources together contribute {_mm(rest)}, most of it the {worst.title}: "
             f"{_mm(own[worst.name])}. {worst.remedy}"
         )
     elif own[worst.name] > 0:
@@ -77,12 +77,12 @@ def sentences(budget: Budget) -> list[str]:
     parts = {each.title: own[each.name] for each in sources() if each.sensor and own[each.name] > 0}
     inside = float(np.sqrt(sum(value**2 for value in parts.values())))
     named = comma_list([f"{title} {_mm(value)}" for title, value in parts.items()])
-    said.append(f"The tilt sensor makes {_mm(inside)} of it: {named or 'nothing is counted'}.")
+    said.append(f"The tilt sensor contributes {_mm(inside)}: {named or 'nothing is counted'}.")
     return said
 
 
 def remarks(budget: Budget) -> list[str]:
-    """Say what is not counted, as nothing is known of it."""
+    """Say what is not counted, since the data sheet lacks it or the calibration corrects it."""
     sensor, setup = budget.sensor, budget.setup
     wanted = (
         {"bias_instability", "acceleration_random_walk", "repeatability"} if setup.age else set()
@@ -92,13 +92,13 @@ def remarks(budget: Budget) -> list[str]:
     said = []
     if missing := [words(name) for name in sensor.sheet.unknown if name in wanted]:
         said.append(
-            f"The data sheet {sensor.sheet.name!r} does not tell {comma_list(missing, 'or')}: "
-            "counted as zero."
+            f"The data sheet {sensor.sheet.name!r} lacks {comma_list(missing, 'and')}: counted as "
+            "zero."
         )
     if setup.temperature_change and sensor.corrected:
         what = comma_list([f"the {name}" for name in sensor.corrected])
         said.append(
-            f"The calibration corrects what the temperature does to {what}; that is not counted."
+            f"The calibration corrects the change of {what} with temperature; it is not counted."
         )
     return said
 
@@ -123,7 +123,7 @@ def agreement(simulated: pd.DataFrame) -> str:
     if worst > BEYOND_CHANCE:
         tilt = quantity_text(float(where["tilt_gon"]) * GON, "rad")
         said += (
-            f" At {tilt} it differs from linear theory by more than chance: it is the one to trust."
+            f" At {tilt} it differs from linear theory by more than chance: trust the Monte Carlo."
         )
     return said
 
