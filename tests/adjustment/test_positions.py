@@ -158,7 +158,7 @@ def test_a_page_of_many_positions_lists_those_that_fit_worst(tmp_path):
     fit = fit_campaign(campaign, NINE, ROBOT)
     write_calibration(fit, tmp_path)
     page = (tmp_path / "report.html").read_text()
-    assert "200 positions of 1200 that fit worst" in page
+    assert "200 of 1200 positions that fit worst" in page
     assert '<tr class="suspect"><td>77</td>' in page
     # The points are one image within the figure.
     assert "<image" in (tmp_path / "figures" / "residuals.svg").read_text()
