@@ -368,7 +368,7 @@ SETTINGS = st.fixed_dictionaries(
 
 @given(SETTINGS)
 @settings(
-    max_examples=25, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
+    max_examples=15, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
 )
 def test_every_campaign_has_a_verdict_or_a_reason(keys):
     """Nothing but `InputError`, and a document that JSON takes."""

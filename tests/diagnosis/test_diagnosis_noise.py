@@ -22,7 +22,7 @@ from accelstudy.diagnosis.evidence.noise.resolution import resolution_test
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.simulation.sessions import Noise
 
-RUNS, SIMULATED = 300, 300
+RUNS, SIMULATED = 200, 200
 RARE = 1e-4
 """Probability with which a test of p-values fails by chance."""
 SHAPE_TESTS = {"axis": axis_test, "colour": colour_test, "tail": tail_test}
@@ -58,10 +58,10 @@ def independent(errors):
 
 
 def assert_uniform(p):
-    """KS, which steps of 1/301 change little; and rejections at the usual levels."""
+    """KS, which steps of 1/201 change little; and rejections at the usual levels."""
     assert stats.kstest(p, "uniform").pvalue > RARE
     for level in (0.01, 0.05, 0.10):
-        # A simulated p-value of at most `level` has the probability ⌊301 level⌋ / 301.
+        # A simulated p-value of at most `level` has the probability ⌊201 level⌋ / 201.
         exact = np.floor((SIMULATED + 1) * level) / (SIMULATED + 1)
         assert least(len(p), exact, RARE) <= np.sum(p <= level) <= most(len(p), level, RARE)
 
@@ -168,7 +168,7 @@ def test_variance_factors_of_the_axes_are_unbiased(approach, scheme, kappa, sigm
         f"axis_noise(kappa_x={x}, kappa_y={y}, kappa_z={z})",
         seed=10,
         scheme=scheme,
-        runs=600,
+        runs=300,
         sigma_angle=sigma_angle,
     )
     factors = np.array([axis_factors(r) for r in residuals])
@@ -193,8 +193,8 @@ def test_variance_factors_of_the_axes_are_unbiased(approach, scheme, kappa, sigm
 )
 def test_what_is_large_is_found(name, effect, approach, scheme):
     """At 1 % in more than 80 % of the sessions."""
-    residuals, _ = sessions(approach, effect, seed=12, scheme=scheme, runs=100)
-    assert np.sum(p_values(SHAPE_TESTS[name], residuals) <= 0.01) >= least(100, 0.8, RARE)
+    residuals, _ = sessions(approach, effect, seed=12, scheme=scheme, runs=50)
+    assert np.sum(p_values(SHAPE_TESTS[name], residuals) <= 0.01) >= least(50, 0.8, RARE)
 
 
 def test_a_wrong_level_is_found_as_often_as_theory_says():
@@ -213,13 +213,13 @@ def test_unequal_axes_do_not_look_like_colour(approach):
     """Weighted as they are, the axes leave the test what it is; unweighted it errs twice as often
     at most, while the test of the axes finds them."""
     kappa = np.array([1.0, 1.0, 4.0])
-    drawn = draw(14, noise=Noise(effects=("axis_noise(kappa_z=4)",)), replicates=200)
+    drawn = draw(14, noise=Noise(effects=("axis_noise(kappa_z=4)",)), replicates=120)
     raw = [Residuals.of(s) for s in solutions(approach, drawn)]
     assert np.sum(p_values(colour_test, raw) <= 0.05) <= most(len(raw), 0.1, RARE)
     sigma = np.broadcast_to(SIGMA * np.sqrt(kappa), (24, 3))
     weighted = [
         Residuals.of(solve(NINE, approach, replace(one(drawn, i), sigma_force=sigma)))
-        for i in range(100)
+        for i in range(80)
     ]
     assert_uniform(p_values(colour_test, weighted))
 

@@ -37,6 +37,7 @@ from accelstudy.diagnosis.report.output import diagnose_folder, write_diagnosis
 from accelstudy.diagnosis.report.words.summary import headline
 from accelstudy.diagnosis.result import Gap
 from accelstudy.diagnosis.round_trip import parse_round_trip
+from accelstudy.drawing import saving
 from accelstudy.drawing.style import STYLE
 from accelstudy.sensors.models import get_model
 from accelstudy.study.config import read_study
@@ -88,6 +89,25 @@ def simulated(case, folder):
     return campaign
 
 
+RENDERED = {"named": ("residuals", "gap"), "unknown": ("evidence", "location")}
+"""Figures that are rendered, by case; all others are only composed, which takes far less time."""
+render = saving.save
+
+
+def rendering(*names):
+    """A way to save figures that renders those of some names, and writes a stand-in for others."""
+
+    def save(figure, svg_path, png_path, title, dpi):
+        if title in names:
+            return render(figure, svg_path, png_path, title, dpi)
+        svg_path.parent.mkdir(exist_ok=True)
+        svg_path.write_text("<svg></svg>", encoding="utf-8")
+        png_path.write_bytes(bytes(2000))
+        return "<svg></svg>"
+
+    return save
+
+
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     """Diagnoses of all cases, each made once."""
@@ -97,7 +117,9 @@ def written(tmp_path_factory):
         if case not in made:
             simulated(case, root / case)
             out = root / f"{case}-out"
-            result = run("diagnose", root / case, "--out", out, "--replicates", 100)
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setattr(saving, "save", rendering(*RENDERED.get(case, ())))
+                result = run("diagnose", root / case, "--out", out, "--replicates", 100)
             assert result.exit_code == 0, result.output
             content = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
             made[case] = out, content, result.output
@@ -163,6 +185,7 @@ def explained(*explanations):
     return tuple(Explanation(names, tuple((n,) for n in names), p) for *names, p in explanations)
 
 
+@pytest.mark.usefixtures("not_rendered")
 def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
     shapes = named.examined.candidates
     thermal, drift = (shapes[name][0] for name in ("thermal_bias", "thermal_scale"))
@@ -203,10 +226,10 @@ def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
         "credible set explanations, the most probable first",
     ):
         assert words in text, words
-    assert (tmp_path / "figures/explanations.svg").stat().st_size > 1000
     assert yaml.safe_load((tmp_path / "model.yaml").read_text("utf-8"))["models"]
 
 
+@pytest.mark.usefixtures("not_rendered")
 def test_what_is_certain_of_the_unknown_is_its_headline(named, tmp_path):
     others = ("hysteresis", "settling", "saturation", "cubic_scale", "quadratic_scale")
     diagnosis = replace(
@@ -318,7 +341,8 @@ def test_the_model_is_a_study(written, case):
     assert len(study.grids[0].models) == (2 if case != "noise_model" else 1)
 
 
-def test_same_seed_same_files(written, tmp_path):
+def test_same_seed_same_files(written, tmp_path, monkeypatch):
+    monkeypatch.setattr(saving, "save", rendering(*RENDERED["named"]))
     out, _, _ = written("named")
     diagnose_folder(out.parent / "named", tmp_path / "again", replicates=100)
     for path in sorted(out.rglob("*.*")):
@@ -331,9 +355,9 @@ def test_same_seed_same_files(written, tmp_path):
         pd.testing.assert_frame_equal(*tables)
 
 
-def test_the_old_simulation_lacks_the_measurement(written, named, tmp_path):
+def test_the_old_simulation_lacks_the_measurement(written, named, tmp_path, monkeypatch):
     diagnosis = named
-    loop = close_loop(diagnosis, 400, seed=3)
+    loop = close_loop(diagnosis, 300, seed=3)
     assert not loop.contains("old", "base")
     assert loop.contains("new", "base")
     assert loop.measured["base"] == pytest.approx(diagnosis.gap.before)
@@ -345,14 +369,13 @@ def test_the_old_simulation_lacks_the_measurement(written, named, tmp_path):
     assert loop.tilt("new", "base") == pytest.approx(before, rel=0.05)
     assert loop.tilt("new", "extended") == pytest.approx(after, rel=0.1)
     assert loop.tilt("old", "base") < 0.5 * before
-    again = close_loop(diagnosis, 400, seed=3)
-    pd.testing.assert_frame_equal(again.sessions, loop.sessions)
     out, content, _ = written("named")
     shown = number(content["loop"]["cases"][0]["tilt_rms_mgon"])
     assert f"promises a tilt error of {shown} mgon" in text_of(
         (out / "report.html").read_text("utf-8")
     )
 
+    monkeypatch.setattr(saving, "save", rendering("loop"))
     with angles_in("deg"):
         document = write_diagnosis(diagnosis, tmp_path / "deg", loop=loop)
     assert document["gap"]["leveling_rms_mgon"]["before"] == pytest.approx(before / MGON)
@@ -363,6 +386,7 @@ def test_the_old_simulation_lacks_the_measurement(written, named, tmp_path):
     assert re.findall(r"(?:[^.\w]|m)gon", page) == []
 
 
+@pytest.mark.usefixtures("not_rendered")
 def test_positions_that_are_just_enough_to_calibrate_show_nothing(tmp_path):
     settings = CampaignSettings(scheme="d-optimal-10", approach="gravity")
     diagnosis = diagnose(simulate_campaign(settings)[0], NINE)
@@ -370,7 +394,7 @@ def test_positions_that_are_just_enough_to_calibrate_show_nothing(tmp_path):
     write_diagnosis(diagnosis, tmp_path)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "Too few positions to show whether anything is missing" in page
-    assert {path.stem for path in (tmp_path / "figures").glob("*.svg")} == {"residuals"}
+    assert page.count("<svg") == 1  # that of the residuals
 
 
 def test_nothing_to_compare_without_an_effect(tmp_path):
@@ -395,6 +419,7 @@ def test_bad_input_is_one_line(arguments, words, tmp_path, monkeypatch):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.usefixtures("not_rendered")
 def test_a_figure_that_fails_takes_nothing_with_it(tmp_path, monkeypatch, capsys):
     campaign = simulated("no_effect", tmp_path / "c")
     diagnosis = diagnose(campaign, NINE)

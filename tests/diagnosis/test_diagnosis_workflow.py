@@ -92,16 +92,18 @@ def test_what_was_damaged_since_is_refused(made, tmp_path):
     assert "Diagnose the campaign" in run(folder, TINY, "--dry-run").stdout
 
 
-def test_a_campaign_that_is_too_small(tmp_path):
-    campaign = {"name": "tiny", "scheme": "d-optimal-9", "approach": "gravity"}
-    result = run(tmp_path, {"campaign": campaign})
+def test_a_campaign_that_is_too_small(made, tmp_path):
+    """For the model, so that the campaign that is there is diagnosed again, and that fails."""
+    folder = Path(shutil.copytree(made, tmp_path / "copy"))
+    shutil.rmtree(folder / "results/tiny/diagnosis")
+    model = "bias+scale+nonorthogonality+cross_coupling+cubic_scale"
+    result = run(folder, {**TINY, "model": model, "approach": "gravity"})
     assert result.returncode != 0
     assert "Traceback" not in result.stdout
-    one_line(result.stdout, "error: tiny: 9 positions leave no redundancy", "more positions")
-    results = tmp_path / "results" / "tiny"
-    assert (results / "campaign" / "campaign.yaml").exists()
-    assert not (results / "diagnosis").exists()
-    assert remains(tmp_path) == []
+    assert "Simulate" not in result.stdout
+    one_line(result.stdout, "error: tiny: 18 positions leave no redundancy", "more positions")
+    assert not (folder / "results/tiny/diagnosis").exists()
+    assert remains(folder) == []
 
 
 def test_a_wrong_key(tmp_path):
