@@ -1,6 +1,6 @@
-"""What a diagnosis says beside its verdict, each computed when it is asked for first.
+"""What a diagnosis says beside its verdict.
 
-Whoever diagnoses many campaigns asks for little of it.
+Each part is computed at first use: a study of many campaigns needs few of them.
 """
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ COLUMNS = [
 POSITIONS = 500_000
 """Positions of all sessions of a simulation together, at most; they are drawn at once."""
 LEAST = 100
-"""Sessions of a simulation that are simulated all the same."""
+"""Least number of sessions of a simulation, however many positions they have."""
 
 
 @dataclass(frozen=True)

@@ -61,7 +61,7 @@ def diagnose(
 
 @dataclass(frozen=True)
 class _Run:
-    """One diagnosis on its way; every stage is computed once, when it is needed."""
+    """One diagnosis in progress; every stage is computed once, at first use."""
 
     campaign: Campaign
     model: SensorModel
@@ -70,7 +70,7 @@ class _Run:
     recognised: Recognised | None
 
     def stage(self, number: int) -> np.random.SeedSequence:
-        """Seed of a stage, which no other stage changes."""
+        """Seed of a stage; no other stage changes it."""
         return np.random.SeedSequence(self.seed, spawn_key=(number,))
 
     @cached_property

@@ -170,7 +170,7 @@ def test_the_page_tells_its_story_in_order(written):
         "Where does it live?",
         "What is it called?",
         "How sure is that, and what else could it be?",
-        "Is the noise what it is taken for?",
+        "Is the noise as assumed?",
         "What is it worth?",
         "Did the gap shrink on data that were not used?",
         "Does the simulation now look like the measurement?",

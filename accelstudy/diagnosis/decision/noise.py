@@ -27,8 +27,8 @@ from accelstudy.diagnosis.space.examined import ExaminedFit
 from accelstudy.diagnosis.space.residuals import Residuals
 
 LEVEL_NOISE = 0.01
-"""Family-wise level of the tests of the noise beside that of its level, which has `REFUTED`; with
-the test for anything that is missing they alarm in 5 % of the campaigns in which nothing is."""
+"""Family-wise level of all tests of the noise but that of its level, which has `REFUTED`. With the
+test for anything that is missing they make 5 % false alarms."""
 
 
 @dataclass(frozen=True)

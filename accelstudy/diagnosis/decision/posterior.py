@@ -1,9 +1,9 @@
 """One posterior over everything that could be the case once something is missing.
 
-What is said of it are fewer explanations than were weighed (`Posterior.told`). The kinds of wrong
-noise count as one, named by the most probable of them. Where one effect is more probable than two,
-a pair counts for the more probable of its two effects: "this one is missing" then leaves open
-whether something beside it is, too, that is too small to be told.
+Fewer explanations are told than were weighed (`Posterior.told`). All kinds of wrong noise count as
+one, named by the most probable of them. Where one effect is more probable than two, a pair counts
+for the more probable of its two effects. "This effect is missing" then leaves open whether a second
+one, too small to be seen, is missing as well.
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
 """Prior weights of everything that could be the case, and the thresholds of a decision.
 
-Beside "one effect is missing", which weighs 1 and is shared evenly by the classes of effects and a
-bumped position. The probability that a given sigma is wrong is with the level (`evidence.size`).
+The weights are relative to "one effect is missing", which weighs 1; the classes of effects and a
+bumped position share it evenly. The probability that a given sigma is wrong is in `evidence.size`.
 """
 
 TWO = 0.15
 """Two effects are missing: of the models that lack something one in eight lacks more."""
 UNKNOWN = 0.04
-"""Something is missing that is no effect of the catalogue, which has what is usual."""
+"""Something is missing that is not in the catalogue, which has the usual effects."""
 COLOUR = 0.06
 """Nothing is missing but the noise has some colour, as all real noise has."""
 AXES = 0.03

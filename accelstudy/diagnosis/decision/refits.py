@@ -20,7 +20,7 @@ from accelstudy.sensors.sensor import SensorModel
 SAME = 0.5
 """Difference of Ω within which two fits are equally good."""
 BEYOND = 1.6
-"""How far a setting may lie beyond the first and the last that are tried."""
+"""Factor by which a setting may lie beyond the first and the last that are tried."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Refits:
             model = self.extended_model(chosen)
         except InputError:  # two effects whose parameters have the same names
             return None
-        # From an ideal sensor the iterations may not reach a large effect.
+        # Started from an ideal sensor, the iterations may not reach a large effect.
         start = dict(zip(base.model.parameter_names, base.parameters, strict=False))
         observed = replace(base.observed, initial=model.vector(start))
         bumped = [h.place for h in chosen if h.place is not None]
@@ -126,5 +126,5 @@ class Refits:
         if not solved:
             return None
         least = min(fit.omega for _, fit in solved)
-        # What differs by less is the same, and the name does not hang on rounding errors.
+        # Fits that differ by less count as equal: rounding errors must not choose the name.
         return next(item for item in solved if item[1].omega <= least + SAME)

@@ -38,7 +38,7 @@ RIVAL = 0.5
 ROUNDING = 1e-10
 """Residuals below this share of gravity are rounding errors, and no measurement."""
 WORTH = 12.0
-"""Log odds to the strongest beyond which shapes between those tried at first do not matter."""
+"""A candidate whose log evidence is this far below the strongest needs no further shapes."""
 UNDECIDED = 2.0
 """Log evidence by which a shape may fall short of the best and still be the true one."""
 SAME = 0.25
@@ -98,8 +98,8 @@ class Search:
     def examined(self) -> ExaminedFit:
         """The base fit and the hypotheses about it.
 
-        The axes are weighted by their noise where that they differ is the best that can be said of
-        the residuals: better than that nothing is missing, or any one effect.
+        The axes are weighted by their noise where unequal axes explain the residuals better than
+        equal ones do, with nothing missing or with any single effect.
         """
         if self.exact:
             return self.equal
@@ -188,7 +188,7 @@ class Search:
             members = self.members(self.best_shape(name))
             alike = [other for other in left if other in members]
             left = [other for other in left if other not in members]
-            # Of what is equally good the name does not hang on rounding errors.
+            # Rounding errors must not choose among equally good names: the first one is taken.
             least = self.densities[name] - SAME
             name = min(other for other in (name, *alike) if self.densities[other] >= least)
             classes.append((self.best_shape(name), members))
@@ -272,10 +272,10 @@ class Search:
 
     @cached_property
     def noises(self) -> list[Weighed]:
-        """Nothing but the noise is not what it is taken for."""
+        """Only the noise is wrong, in one of its kinds."""
         residuals, by_level = self.residuals, self.detection.noise
         nothing = float(np.logaddexp.reduce(by_level))
-        # Where the axes are weighted, that they differ needs no further evidence.
+        # Weighted axes need no further evidence that they differ.
         unequal = nothing + np.log(priors.AXES) + self.axes.log_evidence
         if self.examined is not self.equal:
             unequal = float(by_level[0])
@@ -301,7 +301,7 @@ class Search:
 
     @cached_property
     def posterior(self) -> Posterior:
-        """All that could be the case, if not nothing."""
+        """Everything that could be the case, given that something is wrong."""
         return Posterior.of([*self.singles, *self.pairs, *self.noises])
 
     @cached_property

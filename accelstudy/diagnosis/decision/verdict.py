@@ -25,7 +25,7 @@ from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.spaces import LackOfFit, Spaces
 
 LARGE = 300.0
-"""Noncentrality beyond which an effect is judged by its refit, as it is not of first order."""
+"""Noncentrality beyond which first order is not enough, and a refit judges an effect."""
 
 
 @dataclass(frozen=True)
@@ -153,9 +153,9 @@ def _is_large(search: Search, top: Weighed) -> bool:
 
 
 def _judged_by_refits(search: Search, single: Weighed) -> Posterior:
-    """Posterior if an effect is large: it alone, or with another one in what its refit leaves.
+    """Posterior where an effect is large: it alone, or with another one in what its refit leaves.
 
-    To first order a large effect leaves so much that anything would be found beside it.
+    To first order a large effect leaves so much that anything would seem to be beside it.
     """
     pairs = [one for one in search.pairs if len(one.best) == 2]
     refitted = [_refitted(search, one) for one in (single, *sorted(pairs, key=_weight)[-1:])]
@@ -210,10 +210,10 @@ def _beside(search: Search, alone: Weighed, solution: Solution) -> list[Weighed]
 
 
 def _misfit(search: Search, solution: Solution) -> str:
-    """By how much residuals are still larger than a sigma that holds; empty if they are not.
+    """Say how much larger than the noise the residuals still are; empty if they are not.
 
-    Where sigma is not given, or where repeated positions refute it after the refit, too, they are
-    themselves the measure of what is left.
+    The noise is the given sigma. Where none is given, or where repeated positions refute it even
+    after the refit, it is the difference of repeated positions.
     """
     known = search.level.known
     if known and 2 * float(special.chdtrc(solution.redundancy, solution.omega)) >= REFUTED:
@@ -234,7 +234,7 @@ def _misfit(search: Search, solution: Solution) -> str:
 
 
 def lack_of_fit(search: Search) -> float:
-    """Probability that repeats agree so much better with each other than with the model."""
+    """p-value of the test whether repeats agree better with each other than with the model."""
     if LACK_OF_FIT not in search.groups:
         return 1.0
     return _of_fit(search.residuals, *_of_repeats(search.residuals, search.groups[LACK_OF_FIT]))

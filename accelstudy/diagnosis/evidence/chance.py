@@ -17,20 +17,20 @@ Array = NDArray[np.float64]
 
 SIMULATIONS = 1000
 AT_ONCE = 500_000
-"""Numbers that are drawn at once; all sets of very many positions together would not fit."""
+"""Numbers that are drawn at once; all sets of very many positions would not fit in memory."""
 
 
 SLOPES = 1
-"""Sets what is drawn for the slopes apart from all else that is drawn from the same seed."""
+"""Stream of the slopes, apart from all others of the same seed."""
 KEPT = 16_000_000
-"""Numbers that are kept; more are drawn again."""
+"""Most numbers that are kept; more are drawn anew whenever they are needed."""
 
 
 @dataclass(frozen=True)
 class Chance:
     """Simulated residuals without any effect: white noise of unit weight less what a fit absorbs.
 
-    They are drawn again, the same, whenever they are needed; only few are kept.
+    The same numbers are drawn again whenever they are needed; only small sets are kept.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Chance:
 
     @cached_property
     def kept(self) -> list[Array] | None:
-        """All of it, if it is little."""
+        """All draws, if they are few."""
         few = self.simulations * self.conditions <= KEPT
         return list(self.noise()) if few else None
 
@@ -69,13 +69,13 @@ class Chance:
         for drawn in track(self.kept or self.noise(), "null simulation", len(self.counts)):
             noise = drawn[:, :m]
             if residuals.slopes:
-                # From a stream of their own, so that the positions have the same draws as ever.
+                # From a stream of their own: the draws of the positions stay what they are.
                 slopes = rng.standard_normal((len(noise), residuals.slopes))
                 noise = np.concatenate([noise, slopes], axis=1)
             yield noise - (noise @ residuals.absorbed) @ residuals.absorbed.T
 
     def errors_with_effects(self, residuals: Residuals, field: Field) -> Iterator[Array]:
-        """Yield residuals without and residuals with an effect at random, as many of either."""
+        """Yield residuals without an effect and as many with a random one."""
         key = (*self.seed.spawn_key, 0)
         rng = np.random.default_rng(np.random.SeedSequence(self.seed.entropy, spawn_key=key))
         for errors in self.errors(residuals):

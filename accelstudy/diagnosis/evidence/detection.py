@@ -4,11 +4,10 @@ The statistic is the log odds that a candidate is missing rather than nothing,
 
     S = log Σ_k π_k m_k(z) − log m_0(z),
 
-over all candidates, shapes, sizes and levels of the noise. How large it becomes by chance is found
-by simulation of the same fit. Half of the simulated residuals have an effect at random. They count
-with the weight that makes them noise again (importance sampling), so that small probabilities are
-found by few simulations, too. Beyond what was simulated P(S ≥ s) ≤ exp(−s) holds, as exp(S) has the
-mean 1 in noise alone.
+over all candidates, shapes, sizes and levels of the noise. Simulations of the same fit show how
+large it becomes by chance. Half of the simulated residuals carry a random effect and are weighted
+back to noise (importance sampling), so that few simulations give small probabilities. Beyond the
+simulated values the bound P(S ≥ s) ≤ exp(−s) is used: in noise alone exp(S) has the mean 1.
 """
 
 from __future__ import annotations
@@ -27,12 +26,12 @@ from accelstudy.diagnosis.space.residuals import Residuals
 Array = NDArray[np.float64]
 
 ENOUGH = 10
-"""Simulated values beyond one that is observed, from which on their number is trusted."""
+"""Simulated values beyond the observed one that are enough to take their share as its p-value."""
 
 
 @dataclass(frozen=True)
 class Simulated:
-    """A statistic by chance: values (s, ...) of simulated residuals, and their weights (s,)."""
+    """A statistic of noise alone: values (s, ...) of simulated residuals, with weights (s,)."""
 
     values: Array
     weights: Array
@@ -55,8 +54,8 @@ class Detection:
     p_value : float, probability of a larger one by noise alone
     densities : dict of candidate to log density of the residuals
     noise : (c,) array, log density of the residuals in noise alone, by the components of the level
-    p_candidate : dict of candidate to p-value of it alone, over its shapes
-    p_family : dict of candidate to p-value of it as the strongest of all
+    p_candidate : dict of candidate to its p-value alone, over its shapes
+    p_family : dict of candidate to its p-value as the strongest of all
     by_chance : Simulated, S of simulated residuals
     """
 
@@ -110,7 +109,7 @@ def detect(field: Field, evidence: Evidence, residuals: Residuals, chance: Chanc
 
 
 def total_odds(each: Array) -> Array:
-    """S of log odds of each candidate, (b, K): that one of them is missing, whichever, (b,)."""
+    """S, (b,), of the log odds of each candidate, (b, K): that any one of them is missing."""
     return log_mean(each)
 
 

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 UNKNOWN = "unknown"
 """Something in one of the groups of regressors that is none of the effects."""
 PROPOSED = np.array([12.0, 25.0, 50.0])
-"""Noncentralities of effects that are simulated, of which a test at any usual level decides."""
+"""Noncentralities of the simulated effects: where tests at the usual levels decide."""
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ class Field:
         return chosen, weights[chosen] / weights[chosen].sum()
 
     def with_effects(self, noise: Array, rng: np.random.Generator) -> Array:
-        """Add effects at random to noise (b, m), one to each."""
+        """Add a random effect to each of sets of noise (b, m)."""
         chosen, weights = self._proposed
         drawn = rng.choice(chosen, size=len(noise), p=weights)
         sizes = rng.choice(PROPOSED, size=len(noise))
@@ -150,7 +150,7 @@ class Field:
         return changed
 
     def proposal(self, parts: Array) -> Array:
-        """Log density of residuals with an effect at random beside that of noise alone, (b,).
+        """Log ratio of the densities of residuals with a random effect and of noise alone, (b,).
 
         Parameters
         ----------

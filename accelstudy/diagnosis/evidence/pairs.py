@@ -20,7 +20,7 @@ COLLINEAR = 0.05
 POSITIONS = 100
 """Bumped positions that are tried in pairs, at most."""
 ROWS = 4096
-"""Conditions that are looked at at once."""
+"""Conditions in one block of work."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +36,8 @@ def all_pairs(
 ) -> list[Pair]:
     """Evidence for all pairs of candidates, over all shapes of both.
 
-    Of the positions that may be bumped, the `POSITIONS` are tried that explain most by themselves;
-    pairs with others count as pairs without any evidence.
+    Of the bumped positions only the `POSITIONS` that explain most by themselves are tried; pairs
+    with the others count as pairs without any evidence.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def all_pairs(
     apart &= dims[one] + dims[other] < r
     one, other = one[apart], other[apart]
     part, independent = np.zeros(len(one)), np.zeros(len(one), dtype=bool)
-    # Of two spaces the smaller one is looked at beside the larger one, which is less to compute.
+    # The smaller space is taken beside the larger one, which is less to compute.
     large = np.where(dims[one] < dims[other], other, one)
     small = one + other - large
     sizes = dims[large] * r + dims[small]

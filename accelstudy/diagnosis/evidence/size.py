@@ -8,8 +8,8 @@ noncentrality that is to be expected of it (Zellner's prior; Liang et al. 2008, 
     m(z) ∝ c(ν) (1 + g)^(−d/2) (ν + ‖z‖² − g/(1 + g) ‖Qᵀz‖²)^(−(ν + r)/2),
     c(ν) = ν^(ν/2) Γ((ν + r)/2) / Γ(ν/2).
 
-λ has one prior for all hypotheses and is integrated. It is the same for large and for small spaces,
-so that a hypothesis with many parameters pays for them.
+λ is integrated over one prior for all hypotheses, with large and with small spaces alike; so a
+hypothesis with many parameters pays for them.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ Array = NDArray[np.float64]
 
 SIZES = np.geomspace(4.0, 4e6, 13)
 SIZE_WEIGHTS = np.where(SIZES < 1500, 0.9 / 6, 0.1 / 7)
-"""Prior of λ: even on a scale of logarithms from what is hardly seen (4) to what is plain (1000).
-Beyond that an effect would have been noticed without any test: one tenth."""
+"""Prior of λ: even in its logarithm from hardly visible (4) to plain (1000), and one tenth beyond,
+where an effect would have been noticed without any test."""
 
 DOUBT = 0.15
 """Prior probability that a sigma that is given is wrong."""
@@ -146,7 +146,7 @@ class Evidence:
 
 def _looked_up(tables: Array, which: NDArray[np.int_], at: Array) -> Array:
     """Interpolate tables (t, k) at some of `_LOGS`, (..., s), each of s with a table of its own."""
-    # Evenly spaced, so that no place has to be searched for.
+    # Evenly spaced: a division finds the place.
     steps = np.minimum(at, _EVEN[-1]) * (1 / _EVEN[1])
     place = np.minimum(steps.astype(np.int32), len(_EVEN) - 2)
     steps -= place

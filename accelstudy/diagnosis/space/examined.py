@@ -26,12 +26,12 @@ from accelstudy.effects import Effect, effect_names, get_effect
 
 Array = NDArray[np.float64]
 AT_ONCE = 10_000_000
-"""Numbers that are worked on at once, about."""
+"""Numbers in one block of work, about."""
 
 
 @dataclass(frozen=True)
 class ExaminedFit:
-    """A calibrated session and the hypotheses about it, evaluated when they are asked for first.
+    """A calibrated session with the hypotheses about it, each evaluated at first use.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ class ExaminedFit:
         """Effects of which a shape cannot be told from one of other hypotheses."""
         dims = np.array([other.dim for other in others])
         products = self._ideals.parts(np.concatenate([other.ideal.T for other in others]))
-        # The squares of the cosines sum to those of all products: most need no decomposition.
+        # The squared cosines sum to the squares of all products, so most need no decomposition.
         squares = np.add.reduceat(products, np.cumsum(dims) - dims, axis=0)
         found: set[str] = set()
         for i, k in np.argwhere(squares > dims[:, None] * ALIKE**2).tolist():

@@ -22,7 +22,7 @@ from accelstudy.leveling.angles import angles_of
 Array = NDArray[np.float64]
 
 ROUNDING = 1e-9
-"""Share of a signature that may be left of nothing by rounding."""
+"""Share of a signature that rounding errors may leave where nothing is left."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +36,8 @@ class Frame:
     ideal : Residuals, of an ideal sensor in the same positions
     forces : (n, 3) array, m/s², of the ideal sensor
     sensed : (n, 3) array, m/s², the same along the sensitive axes as the base fit finds them
-    angles : (n, 2) array, rad, attitude as it is read or, without a robot, as the forces say
-    moments : Moments, of the holds with what is implied filled in
+    angles : (n, 2) array, rad, attitude as the robot reads it, else as the forces show it
+    moments : Moments, of the holds, completed with what is implied
     """
 
     solution: Solution
@@ -50,7 +50,7 @@ class Frame:
 
     @property
     def hold(self) -> HoldConditions:
-        """The holds with what is implied filled in."""
+        """The holds, completed with what is implied."""
         return self.moments.hold
 
     @classmethod
@@ -84,7 +84,7 @@ class Frame:
         return signatures(shapes, forces, self.angles, self.solution.gravity, self.moments)
 
     def with_slopes(self) -> Frame:
-        """Add the slopes within the holds, as far as they add to what the means say."""
+        """Add the slopes within the holds where they tell more than the means."""
         without = replace(self, moments=Moments(self.hold, rates=False))
         slopes = Slopes.of(self.solution.observed, self.forces)
         if slopes is None:

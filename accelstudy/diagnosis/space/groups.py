@@ -20,13 +20,13 @@ Array = NDArray[np.float64]
 ROBOT = "robot_angles"
 """Group of the effects on what a robot reads, and of its base."""
 COURSES = ("slow_time", "temperature")
-"""Groups of whatever depends smoothly on a column of the holds."""
+"""Groups of anything that depends smoothly on a column of the holds."""
 LACK_OF_FIT = "lack_of_fit"
 """Everything but the differences of repeated positions, which are noise alone (pure error)."""
 
 
 def groups(examined: ExaminedFit) -> dict[str, Spaces]:
-    """Groups that the campaign can show, each one space; beside repeats also the lack of fit."""
+    """Groups that the campaign can show, each one space; with repeats also the lack of fit."""
     residuals, hold, n = examined.frame.residuals, examined.frame.hold, len(examined.frame.forces)
     found: dict[str, Spaces] = {}
 
@@ -106,8 +106,8 @@ def _per_axis(values: Array) -> Array:
 def _signatures(frame: Frame) -> dict[str, list[Signature]]:
     """Signatures of the effects of each group that the campaign can show.
 
-    An effect whose shape is searched finely has no space of its own. Groups of `COURSES` have what
-    any smooth course can do, which is more than their effects.
+    Effects whose settings are searched finely are left out: they have no single space. The groups
+    of `COURSES` hold any smooth course, which is more than their effects.
     """
     found: dict[str, list[Signature]] = {}
     for effect in map(get_effect, effect_names()):

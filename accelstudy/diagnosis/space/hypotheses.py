@@ -1,4 +1,4 @@
-"""What could be missing: hypotheses, each a space of residuals, in shapes that are alternatives."""
+"""Hypotheses about what the model lacks: each shape of an effect is a space of residuals."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Hypothesis:
     effect : Effect; None for what is no effect of the sensor or the rig
     directions : (k, l) array, combinations of the parameters that the positions show
     basis : (m, l) array, orthonormal, of the space of its signature in the residuals
-    ideal : (m, l) array, likewise for an ideal sensor, where what is equal is exactly so
+    ideal : (m, l) array, likewise for an ideal sensor, at which equal effects are exactly equal
     place : int, index of the position that was bumped; None for an effect
     """
 
@@ -100,7 +100,7 @@ class EffectShapes(Bases, Sequence[Hypothesis]):
         return cls(own.together, own.dims, tuple(replace(h, basis=q) for h, q in shared))
 
     def drawn(self, places: NDArray[np.int_], amounts: Array) -> Array:
-        """Sums of the columns of some bases by amounts (Σ l,) of one after the other, (b, m)."""
+        """Sum the columns of some bases, (b, m), with weights (Σ l,), one basis after the other."""
         dims = self.dims[places]
         rows = np.repeat(np.arange(len(places)), dims)
         first = np.repeat(self.ends[places] - (np.cumsum(dims) - dims), dims)
@@ -121,15 +121,15 @@ class EffectShapes(Bases, Sequence[Hypothesis]):
 
 @dataclass(frozen=True)
 class BumpedPositions(Sequence[Hypothesis]):
-    """One hypothesis per position: that its conditions are shifted by anything.
+    """One hypothesis per position: its conditions are shifted by an arbitrary amount.
 
     Its space is spanned by R E_i H_i, with E_i the columns of the unit matrix that belong to the
-    position and H_i H_iᵀ = R_ii⁺, so that z has H_iᵀ z_i in it.
+    position and H_i H_iᵀ = R_ii⁺. The part of z in it is H_iᵀ z_i.
 
     Attributes
     ----------
     residuals : Residuals
-    places : (s,) int array, the positions that are controlled by others
+    places : (s,) int array, the positions that others control
     root : (s, c, c) array, H of these; columns of zeros for what is not controlled
     dims : (s,) int array
     """
@@ -169,7 +169,7 @@ class BumpedPositions(Sequence[Hypothesis]):
         return Hypothesis(OUTLIER, None, directions, basis, basis, place)
 
     def drawn(self, places: NDArray[np.int_], amounts: Array) -> Array:
-        """Sums of the columns of some bases by amounts (Σ l,) of each, (b, m), but for R."""
+        """Sum the columns of some bases as `EffectShapes.drawn` does, but without R, (b, m)."""
         n, c = len(self.residuals.whitening), self.root.shape[-1]
         each = np.zeros((len(places), c))
         # The columns of H that are zero are the first ones.

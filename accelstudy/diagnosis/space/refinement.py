@@ -40,7 +40,7 @@ def refined(examined: ExaminedFit, shapes: Shapes) -> Shapes:
 
 
 def shaped(examined: ExaminedFit, hypothesis: Hypothesis, value: float) -> Hypothesis | None:
-    """Return a smooth effect with another value of its setting; None if it shows less."""
+    """Return a smooth effect with another value of its setting; None if less of it shows."""
     return _all_shaped(examined, hypothesis, [value])[0]
 
 
@@ -56,7 +56,7 @@ def _all_shaped(
 
 
 def _completed(examined: ExaminedFit, shapes: EffectShapes) -> EffectShapes:
-    """Add shapes that were passed over next to the best one, until there are none."""
+    """Add the shapes next to the best one that were passed over, until none is left."""
     z, hold = examined.frame.residuals.z, examined.frame.hold
     while True:
         best = int(np.argmax(shapes.parts(z)))

@@ -8,7 +8,7 @@ tests of the diagnosis work in this space, so they take into account what the pa
 model have already absorbed.
 
 The rows are those of the positions, of observed gravity and, where they tell something, of the
-slopes within the holds. What needs a row for each position asks for `Residuals.positions`.
+slopes within the holds. `Residuals.positions` has those of the positions only.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ class SlopeRows:
     Attributes
     ----------
     rates : (q, n, 3) array, their derivatives by the rates of the output
-    design : (q, u) array, likewise of what they lack of the model, by its parameters
-    errors : (q,) array, what they lack of it
+    design : (q, u) array, derivatives of their misclosures by the parameters of the model
+    errors : (q,) array, slopes less those that the model predicts
     """
 
     rates: Array
@@ -110,7 +110,7 @@ class Residuals:
 
     @property
     def redundancy(self) -> int:
-        """R."""
+        """Rows less parameters, r."""
         m, u = self.design.shape
         return m - u
 
@@ -143,9 +143,9 @@ class Residuals:
         return self.stacked(change, signature.rate)
 
     def size(self, signature: Signature, g: float) -> Array:
-        """Size of a signature in the observations, of which the approach may see little, (k,).
+        """Size of a signature in the observations, (k,), however little the approach sees of it.
 
-        Angles count as the forces by which they would show.
+        Angles count as the forces that they change.
         """
         unit = np.sqrt(np.mean(np.sum(self.whitening**2, axis=2)))
         force, turned = signature.force, g * signature.angles
@@ -189,7 +189,7 @@ def position_products(
     """
     c = matrices.shape[1]
     chosen = slice(len(matrices)) if places is None else places
-    # Condition by condition, which is several times as fast as a sum over a last axis of three.
+    # Condition by condition: several times as fast as a sum over a last axis of three.
     parts = [errors[..., i::c][..., chosen] for i in range(c)]
     products = []
     for column in np.moveaxis(matrices, 2, 0):
@@ -203,8 +203,8 @@ def position_products(
 def ideal_residuals(solution: Solution) -> tuple[Residuals, Array]:
     """Residual space of an ideal sensor in the same positions, and its forces (n, 3).
 
-    What is exactly invisible or exactly alike is so at the ideal sensor: a real one differs from it
-    by some hundredths, and so do the signatures.
+    Effects that are invisible or equal are exactly so at the ideal sensor. A real sensor differs
+    from it by a few percent, and so do its signatures.
     """
     observed, model, approach = solution.observed, solution.model, solution.approach
     g = solution.gravity
@@ -223,7 +223,7 @@ def ideal_residuals(solution: Solution) -> tuple[Residuals, Array]:
     values = [forces, angles] if approach.uses_angles else [forces]
     at = problem.linearised(x, np.concatenate(values, axis=1))
     b = np.moveaxis(at.jac_observations[:, :, 0], -1, 0)
-    # With weights that the residuals suggest, an axis could drop out of sight.
+    # Weights that are taken from the residuals could hide an axis.
     variances = solution.variances.copy()
     variances[:, :3] = variances[:, :3].mean()
     whitening = whitening_of(b, variances)

@@ -1,4 +1,4 @@
-"""What an effect would leave in the observations: its signature, from its one definition.
+"""The signature of an effect: what it would leave in the observations, from its one definition.
 
 An effect of time changes the output within a hold, too. Its rate is the derivative of the same
 definition by the time of the hold, the temperature going on as it does from hold to hold.
@@ -18,10 +18,10 @@ from accelstudy.effects import Effect, HoldConditions
 Array = NDArray[np.float64]
 
 MOMENT = 0.01
-"""s, beside which all courses of time are straight."""
+"""s, so short that every course in time is straight."""
 STEADY = 0.25
-"""Deviation of a temperature from the mean of those before and after it, beside their difference,
-up to which its course is steady."""
+"""The course of a temperature is steady if its values deviate from the mean of their neighbours by
+less than this share of the neighbours' difference."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Signature:
 class Moment:
     """The columns of a `HoldConditions` at some moment of each hold.
 
-    One that is absent raises `InputError` when a formula uses it. They are computed once.
+    A column that is absent raises `InputError` when a formula uses it. Each is computed once.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ class Moment:
         return np.stack([self._behind(t) for t in tau.ravel().tolist()], axis=1)[..., None]
 
     def _behind(self, tau: float) -> Array:
-        """Temperature behind a lag, (n,), which follows from the difference of the two."""
+        """Temperature behind a lag, (n,); its rate follows from the difference of the two."""
         if tau == 0:
             return self._column("temperature")
         if tau not in self._known:
@@ -206,10 +206,10 @@ def _rate(before: Array, shortly: Array, soon: Array, after: Array) -> Array:
 
 
 def temperature_rate(time: Array, temperature: Array) -> Array:
-    """Rate of the temperature within each hold, (n,), K/s, as it goes on from hold to hold.
+    """Rate of the temperature within each hold, (n,), K/s, as it changes from hold to hold.
 
-    That is honest where its course is steady. Where it is set anew between the holds, it rests
-    within them as far as anybody knows.
+    This needs a steady course. Where the temperature is set anew between the holds, nothing shows
+    that it changes within them, and the rate is zero.
     """
     at = np.unique(time, return_index=True)[1]
     t, values = time[at], temperature[at]

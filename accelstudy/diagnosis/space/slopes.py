@@ -30,23 +30,23 @@ from accelstudy.diagnosis.space.spaces import VISIBLE, span
 Array = NDArray[np.float64]
 
 FREEDOM = 6
-"""Slopes beyond those that a smooth course takes up, which tell how far they scatter, at least."""
+"""Least number of slopes beyond those that a smooth course takes up: they show the scatter."""
 MOVED = 4.0
-"""Standard deviations beyond which a hold moved, and its slope tells nothing of the sensor."""
+"""Standard deviations of a slope beyond which the hold moved and tells nothing of the sensor."""
 TENTH = 10
-"""One of so many holds, and one more, may have moved."""
+"""One of so many holds may have moved, and one more."""
 ALONE = 0.8
 """Share of a slope that a smooth course takes up, beyond which no other slope controls it."""
 DOUBT = 1.0
-"""By how much the variance of a slope is larger, beside 1, that no other controls: a long hold has
-slower noise than the others, and its standard deviation is carried on from theirs."""
+"""Added to the variance 1 of a slope that no other controls: a long hold has slower noise than the
+others, but its standard deviation is extrapolated from theirs."""
 WORTH = 0.1
-"""Part of what the means say of an effect that a combination of slopes adds at least."""
+"""Least that a combination of slopes adds, as a part of what the means tell of an effect."""
 APART = 0.3
-"""Length of what is left of a combination beside the others, or it is one of them."""
+"""Least length of what is left of a combination beside the others; a shorter one repeats them."""
 SHARE = 0.25
-"""Rows of slopes beside the redundancy of the means, at most: the slopes have a level of their own,
-and must not tell that of the means."""
+"""Most rows of slopes, as a share of the redundancy of the means. The slopes have a noise level of
+their own, which must not decide that of the means."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Slopes:
     ----------
     values : (n,) array; zero where a hold moved
     by_rate : (n, 3) array, their derivatives by the rates of the output, likewise
-    variance : float, by which they scatter more than they say, at least 1
+    variance : float, of their scatter in units of their own variances, at least 1
     """
 
     values: Array
@@ -137,7 +137,7 @@ class Slopes:
 
 
 def smooth_course(time: Array, by_rate: Array) -> Array:
-    """What smooth changes of the biases do to slopes: even, ever faster or slower, and at first."""
+    """Effects of smooth changes of the biases on slopes: constant, linear, and decaying."""
     t = (time - time.min()) / np.ptp(time)
     functions = np.column_stack([np.ones_like(t), t, np.exp(-t / 0.1)])
     return np.asarray(np.einsum("nk,na->nka", functions, by_rate).reshape(len(t), -1))
@@ -152,7 +152,7 @@ def about(course: Array, values: Array) -> tuple[Array, Array]:
 
 
 def trimmed_mean_square(squares: Array) -> float:
-    """Variance of normal numbers by their squares (k,), of which the largest may be anything."""
+    """Variance of normal numbers from their squares (k,); the largest of them are left out."""
     kept = np.sort(squares)[: len(squares) - len(squares) // TENTH - 1]
     limit = chdtri(1, 1 - (len(kept) + 0.5) / (len(squares) + 0.5))
     usual = chdtr(3, limit) / chdtr(1, limit)

@@ -1,8 +1,8 @@
 """Spaces of residuals in which something that is missing from a model would lie.
 
-Of a space only two things count: its dimension, and how large the part of residuals is that lies in
-it. Many spaces of one kind are looked at together. None of it needs a matrix of all conditions by
-all conditions, so that the effort grows like the number of positions.
+Two things count of a space: its dimension, and the size of the part of the residuals that lies in
+it. Many spaces of one kind are evaluated together. No matrix of all conditions by all conditions is
+formed, so the effort grows with the number of positions.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from accelstudy.diagnosis.space.residuals import Residuals
 Array = NDArray[np.float64]
 
 ABSORBED = 1e-2
-"""Share of a direction that has to be left of it, or it counts as absorbed by the model."""
+"""A direction counts as absorbed by the model if less than this share of it is left."""
 VISIBLE = 3e-3
 """An effect is invisible where the model absorbs all but this share of its signature."""
 
@@ -71,7 +71,7 @@ class Bases:
 
 @dataclass(frozen=True)
 class LackOfFit:
-    """What is the same in positions of one attitude: all that is no difference between repeats.
+    """All that positions of one attitude have in common: everything but their differences.
 
     A change of conditions by t that is the same in all positions of an attitude is L_iᵀ t at unit
     weight (but for what varies between them). Of these directions, orthonormal within each

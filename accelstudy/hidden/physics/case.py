@@ -19,8 +19,8 @@ class Case:
     approach : str, "gravity" or "robot"
     sigma_known : bool, whether the campaign states its sigma
     effect : tuple of str, what is hidden
-    lam : tuple of float, the noncentralities that they shall have; none for usual sizes, of what
-        cannot be seen
+    lam : tuple of float, the noncentralities that they shall have; empty for effects that cannot be
+        seen, which have usual sizes
     noise : str, kind of wrong noise; None where it is right
     gross : str, gross error; None for none
     """

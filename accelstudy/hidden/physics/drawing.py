@@ -81,7 +81,7 @@ def _scaled(
     parameters = rng.standard_normal(shape.effect.k)
     if shape.effect.loses:
         parameters = abs(parameters)
-    # What cannot be seen has no size.
+    # Directions that cannot be seen have no size.
     parameters = shape.directions @ (shape.directions.T @ parameters)
     cause = Cause(shape.effect, dict(shape.settings), shape.effect.typical * parameters[None])
     without = conditions.misclosures(*observe(session, conditions.sensor, ()))

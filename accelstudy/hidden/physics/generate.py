@@ -103,7 +103,7 @@ def _left(own: Atlas, sensor: Sensor, output: Array, reading: Array) -> Array:
 
 
 def _campaign(case: Case, session: Session, forces: Array, reading: Array) -> Campaign:
-    """What was written down, but for the samples within the holds."""
+    """The campaign as it was recorded, without the samples within the holds."""
     robot = case.approach == "robot"
     return Campaign(
         name=f"hidden {case.design}",
@@ -129,7 +129,7 @@ def _with_samples(
     noise: Noise,
     rng: np.random.Generator,
 ) -> Campaign:
-    """Add what the samples within the holds tell, where they were kept."""
+    """Add the statistics of the samples within the holds, where they were kept."""
     if not session.n_samples:
         return campaign
     sd = noise.sds(session, rng)

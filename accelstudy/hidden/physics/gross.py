@@ -1,4 +1,4 @@
-"""Gross errors: the data are not what they say they are."""
+"""Gross errors: units, axes, the order of rows, and bumped holds."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Settings = dict[str, float]
 LEAST = 100.0
 """Noncentrality of a bumped hold, at least."""
 FAR = 0.3 * GRAVITY
-"""m/s², by which the forces of exchanged rows differ, or nobody could notice."""
+"""m/s², least difference of the forces of exchanged rows, or nothing would show."""
 SIGNED, UNSIGNED = ("forces", "slope"), ("sd", "sd_slope")
 PER_AXIS = (*SIGNED, *UNSIGNED)
 """Columns with a value for each axis, those with a sign first."""

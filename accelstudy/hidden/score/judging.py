@@ -64,7 +64,7 @@ def _judged(row: dict[Any, Any]) -> dict[str, Any]:
     right = answered and same_effects(found, true)
     correct = answered and all_true(found, true)
     judged_set = _judged_set(json.loads(row["credible_set"]) if ok else [], true)
-    # To narrow it down to a set says no more than that it is one of the set.
+    # A narrowed answer only says that it is one of the set.
     held = row["verdict"] == "narrowed" and bool(judged_set.get("set_holds"))
     return {
         "ok": ok,
@@ -80,7 +80,7 @@ def _judged(row: dict[Any, Any]) -> dict[str, Any]:
 
 
 def _recognised(row: dict[Any, Any]) -> bool:
-    """Whether a gross error was; one that ended the diagnosis was not."""
+    """Whether a gross error was recognised; one that ended the diagnosis was not."""
     if row["error"] or row["verdict"] != "gross_error":
         return False
     places = dict(zip(json.loads(row["found"]), json.loads(row["positions"]), strict=True))

@@ -1,4 +1,4 @@
-"""What a design should show of each effect, beside what the study finds of it."""
+"""The smallest size of each effect that a design should show, and what the study finds of it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
 
 ALPHA = 0.001
-"""Level of the tests of which the minimal detectable and identifiable sizes are."""
+"""Level of the tests for which the minimal detectable and identifiable sizes are computed."""
 
 
 def limit_rows(campaign: Campaign, model: SensorModel) -> list[dict[str, object]]:

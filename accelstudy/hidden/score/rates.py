@@ -10,7 +10,7 @@ import pandas as pd
 from accelstudy.basics.shares import clopper_pearson
 
 ALL = "all"
-"""Stands in a column by which a share is not divided."""
+"""Value of a column by which a share is not divided."""
 COLUMNS = ("set", "what", "size", "design", "approach", "sigma")
 """What campaigns are divided by; of the size NaN stands for all, and for none."""
 SPLITS: tuple[tuple[str, ...], ...] = (

@@ -1,4 +1,4 @@
-"""What the diagnosis should reach, and what it does reach: one row for each target."""
+"""The targets of the diagnosis, and what it achieves: one row for each."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from accelstudy.basics.shares import clopper_pearson
 from accelstudy.basics.wording import number
 
 LARGE = 150.0
-"""λ from which on physics outside the catalogue has to be seen as that."""
+"""λ from which on physics outside the catalogue must not get a name of the catalogue."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What simpler methods say of the same campaigns, with the same signatures of the effects.
+"""Simpler methods on the same campaigns, with the same signatures of the effects.
 
 They work on the residuals z of unit weight after the parameters of the model (r dimensions), in
 which a shape of an effect lies in the space of an orthonormal basis Q (d columns).
@@ -77,7 +77,7 @@ Answer = tuple[bool, list[str]]
 
 
 def omnibus(problem: Problem) -> Answer | None:
-    """Test the sum of squares against the given sigma: it finds, and names nothing."""
+    """Test the sum of squares against the given sigma: this detects and names nothing."""
     if not problem.sigma_known:
         return None
     p = stats.chi2.sf(problem.z @ problem.z, problem.redundancy)
@@ -94,7 +94,7 @@ def known_sigma(problem: Problem) -> Answer | None:
 
 
 def f_test(problem: Problem) -> Answer:
-    """Test each shape against what is left of the residuals; of those found name the BIC's best."""
+    """Test each shape against what it leaves; of those found, name the one with the best BIC."""
     dims, total = np.array([h.dim for h in problem.shapes]), float(problem.z @ problem.z)
     parts, rest = _parts(problem), problem.redundancy - dims
     p = stats.f.logsf(parts / dims / ((total - parts) / rest), dims, rest)

@@ -29,7 +29,7 @@ from accelstudy.hidden.physics.seen.atlas import atlas
 from accelstudy.hidden.study.config import HiddenConfig
 
 CHUNK = 800
-"""Campaigns in one job: some minutes, beside which starting Python does not matter."""
+"""Campaigns in one job: minutes of work, so that starting Python does not matter."""
 
 
 @dataclass(frozen=True)
@@ -78,12 +78,12 @@ class Cell:
         return np.random.SeedSequence([seed, *words], spawn_key=(campaign,))
 
     def one_in(self, every: int, campaign: int) -> bool:
-        """Whether a campaign is of one in so many, whatever other campaigns there are."""
+        """Whether a campaign is chosen as one in so many, whatever other campaigns there are."""
         return int.from_bytes(_digest(self.case, campaign)[:8], "big") % every == 0
 
 
 def _digest(case: Case, *numbers: int) -> bytes:
-    """Hash of a case and of what more is given."""
+    """Hash of a case and of further numbers."""
     text = json.dumps([asdict(case), *numbers], sort_keys=True)
     return hashlib.sha256(text.encode()).digest()
 
@@ -213,7 +213,7 @@ def _pairs(design: str, approach: str) -> tuple[tuple[str, str], ...]:
 
 
 def _spread(cases: Sequence[Case], count: int) -> Iterator[Cell]:
-    """Spread campaigns over cases; of those that get one more the first are as good as random."""
+    """Spread campaigns over cases; which cases get one more is as good as random."""
     if not cases:
         return
     each, more = divmod(count, len(cases))

@@ -1,4 +1,4 @@
-"""One job of the comparison: simpler methods answer to the campaigns of the study."""
+"""One job of the comparison: simpler methods judge campaigns of the study."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ def run_baselines(
     output: str | Path,
     provenance: Mapping[str, Any],
 ) -> None:
-    """Let the simpler methods answer to some of the campaigns.
+    """Let the simpler methods judge some of the campaigns.
 
-    Parameters are those of `accelstudy.hidden.study.diagnosing.run_chunk`. Where none of them can
-    work, as the model cannot be fitted, they find nothing, with the error.
+    Parameters are those of `accelstudy.hidden.study.diagnosing.run_chunk`. Where the
+    model cannot be fitted, no method can work: each finds nothing, and the row has the error.
     """
     model, rows = get_model(config.model), []
 

@@ -152,7 +152,7 @@ class HiddenConfig(Block):
 
 
 CAMPAIGNS = Range(1, 1_000_000)
-"""Campaigns of a study: a day of computing and more."""
+"""Campaigns of a study; the most take days of computing."""
 
 
 def parse_hidden(content: Mapping[str, Any], source: str = "config") -> HiddenConfig:

@@ -29,8 +29,8 @@ def run_chunk(
 ) -> None:
     """Diagnose the campaigns of a chunk.
 
-    The diagnosis is given the campaign, and nothing else. One that fails is a row with its error.
-    How long each took stands apart, as it is another time in every run.
+    The diagnosis gets the campaign and nothing else. One that fails is a row with its error. The
+    times stand apart, as they differ in every run.
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ def made(cell: Cell, k: int, seed: int) -> tuple[Campaign | None, Row]:
 
 
 def tried(work: Callable[[Any], Any], given: Any, what: str) -> tuple[Any, str]:
-    """Return what comes of what is given, and the error if nothing does; None comes of None."""
+    """Return the result of a work and no error, or None and the error; None is not worked on."""
     if given is None:
         return None, ""
     try:
@@ -41,7 +41,7 @@ def tried(work: Callable[[Any], Any], given: Any, what: str) -> tuple[Any, str]:
     except InputError as error:
         logging.info("%s: %s", what, error)
         return None, f"refused: {error}"
-    except OSError:  # a full disk, say, which is no matter of this campaign
+    except OSError:  # such as a full disk, which is no fault of this campaign
         raise
     except Exception as error:
         logging.exception("%s", what)
@@ -54,7 +54,7 @@ def _truth(cell: Cell, truth: Truth | None, error: str) -> Row:
     known = {} if truth is None else truth.to_dict()
     oracle = known.get("oracle") or {}
     gross = known.get("gross") or {}
-    # What a session cannot show, or is not in the catalogue, is nothing that can be named rightly.
+    # No name is right for what a session cannot show or the catalogue lacks.
     classes = [] if case.set in ("invisible", "outside") else known.get("classes", [])
     left = [[name for name in one if name not in cell.removed] for one in classes]
     return {

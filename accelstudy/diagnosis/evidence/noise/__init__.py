@@ -1,1 +1,1 @@
-"""Whether the noise is what it is taken for: level, axes, colour, tails, resolution."""
+"""Whether the noise is as assumed: its level, axes, colour, tails and resolution."""

@@ -1,8 +1,8 @@
 """Unequal axes: how probable it is that they differ in noise, and by how much.
 
 The variances of the axes have the ratios κ, log κ_i summing to zero. Residuals alone say little of
-them where the redundancy is small, so κ has a prior: equal axes within a factor of two or so and,
-where the samples within the holds are known, as these have it.
+them where the redundancy is small, so κ has a prior: about equal axes, within a factor of two or
+so, and where the noise within the holds is known, about its ratios.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ SPREAD = 0.7
 AS_WITHIN = 0.35
 """Likewise about the ratios within the holds."""
 AT_ONCE = 10_000_000
-"""Numbers that are worked on at once, about."""
+"""Numbers in one block of work, about."""
 GRID = np.linspace(-2.5, 2.5, 9)
 CONTRASTS = np.array([[2.0, -1.0, -1.0], [0.0, 1.0, -1.0]]) / np.sqrt([[6.0], [2.0]])
 
@@ -76,7 +76,7 @@ def _normal(x: Array, y: Array, centre: Array, spread: float) -> Array:
 def _restricted(residuals: Residuals, ratios: Array) -> tuple[Array, Array]:
     """log|Nᵀ Σ N| and zᵀ (Nᵀ Σ N)⁻¹ z for variances (g, 3) of the axes, (g,) each.
 
-    The axes of the grid are taken some at a time, as all together would need much memory.
+    The ratios are taken in blocks, to save memory.
     """
     n, c = residuals.whitening.shape[:2]
     columns = np.column_stack([residuals.absorbed, residuals.z])

@@ -1,8 +1,8 @@
 """Coloured noise: correlations of successive holds, without matrices of holds by holds.
 
 The processes are those of `LENGTHS`: the first-order Gauss–Markov process of `coloured_noise`,
-whose τ counts holds here, and a random walk, min(i, j)/n. Their quadratic forms are those of a
-convolution and of sums, and their likelihood is that of a Kalman filter, which is exact.
+whose τ counts holds here, and a random walk, min(i, j)/n. Their quadratic forms follow from a
+convolution and from sums, and a Kalman filter gives their exact likelihood.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 LENGTHS = (1.0, 3.0, 8.0, np.inf)
 """Correlation lengths in holds; infinite for the random walk."""
 STRENGTHS = (0.25, 1.0, 4.0, 16.0, 64.0)
-"""Variances of the process beside that of white noise, for which the evidence is averaged."""
+"""Variances of the process, with white noise of 1, over which the evidence is averaged."""
 
 
 def colour_density(residuals: Residuals, evidence: Evidence) -> float:

@@ -13,7 +13,7 @@ NOISES = {
     TAILS: "large residuals are more frequent than in a normal distribution",
     STEPS: "the readings are coarse",
 }
-"""What is said where the noise is not what it is taken for."""
+"""The reason that is given for each kind of wrong noise."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class NoiseTest:
 
     Attributes
     ----------
-    name : str, the noise effect that it would show
+    name : str, the noise effect that it looks for
     statistic : float
     p_value : float
     estimate : tuple of float, what the data say of it: variance factor, variance factors of the

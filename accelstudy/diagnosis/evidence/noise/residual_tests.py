@@ -1,7 +1,7 @@
-"""Tests of the stochastic model on the residuals: level, axes, colour, tails, resolution.
+"""Tests of the stochastic model by the residuals: level, axes, colour, tails, noise within holds.
 
-All but the first need no sigma: they are shares of the residuals, and what is usual is found by
-simulation of white, equal, Gaussian noise in the same adjustment.
+Those of axes, colour and tails need no sigma. Their statistics are shares of the residuals, and
+simulations of white Gaussian noise, equal on all axes, in the same adjustment show what is usual.
 """
 
 from __future__ import annotations
@@ -65,8 +65,8 @@ def axis_test(residuals: Residuals, chance: Chance) -> NoiseTest:
 def axis_factors(residuals: Residuals) -> Array:
     """Variance factors of the three axes (MINQUE with equal a-priori weights), (3,), at least 0.
 
-    The noise of the axes has the covariance Σ κ_a G_a G_aᵀ in z, G_a = R F_a, and what is left to I
-    is that of the robot's angles. With t_ia = U_iᵀ f_ia, of position i, G_aᵀ G_b has the elements
+    The noise of the axes has the covariance Σ κ_a G_a G_aᵀ in z, G_a = R F_a; the rest, up to I, is
+    that of the robot's angles. With t_ia = U_iᵀ f_ia, of position i, G_aᵀ G_b has the elements
     δ_ij f_iaᵀ f_ib − t_iaᵀ t_jb, of which only sums of squares are needed.
     """
     n, c = residuals.whitening.shape[:2]

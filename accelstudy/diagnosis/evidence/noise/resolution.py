@@ -12,17 +12,19 @@ from accelstudy.diagnosis.space.repeats import clusters
 Array = NDArray[np.float64]
 
 GRID = 1e-5
-"""Probability with which noise on a grid of attitudes passes for steps, at each resolution."""
+"""Probability that noise about a regular grid of attitudes looks like steps, at each resolution."""
 
 
 def resolution_test(forces: Array, sigma: float) -> NoiseTest:
     """Whether the readings of an axis are whole multiples of a resolution that matters.
 
-    The Rayleigh power of the readings is searched over resolutions q from σ to 30 σ, of which the
-    readings span four at least; without quantisation n times the power is a standard exponential
-    variable at each. The attitudes may form a grid themselves, but with noise of σ about it
-    −n log(power) is (2π σ/q)² χ² with n − 1 degrees of freedom at least, so only a power that this
-    does not reach counts, and of repeated attitudes only one.
+    The Rayleigh power of the readings is searched over resolutions q from σ to 30 σ, as long as the
+    readings span at least four steps. Without quantisation n times the power is a standard
+    exponential variable at each q.
+
+    The attitudes may themselves form a regular grid. With noise of σ about it −n log(power) is at
+    least (2π σ/q)² χ² with n − 1 degrees of freedom. So only a power that exceeds what such noise
+    reaches counts. Of repeated attitudes one is used.
     """
     forces = forces[np.unique(clusters(forces))]
     n = len(forces)

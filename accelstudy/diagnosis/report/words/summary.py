@@ -258,8 +258,8 @@ def _where(d: Diagnosis) -> str:
         if share > 0
     ]
     if not shares:
-        return "Beside the noise level that is taken, nothing says where it lives."
-    return f"Of what the residuals have too much, {comma_list(shares)} (shares overlap)."
+        return "Above the assumed noise level, nothing shows where it lives."
+    return f"Of the excess of the residuals over the noise, {comma_list(shares)} (shares overlap)."
 
 
 def sentence(text: str) -> str:

@@ -1,4 +1,4 @@
-"""What can be wrong with a sensor and its rig, as forward physics of its own.
+"""What can be wrong with a sensor and its rig, as independent forward physics.
 
 Each effect changes one pass through the rig and the sensor, for a batch of parameters (B, k) at
 once. It shares names and units with the catalogue of effects, but no code.
@@ -18,21 +18,21 @@ Array = NDArray[np.float64]
 Settings = Mapping[str, float]
 
 STILL = 0.02
-"""m/s², a step between holds that nothing takes notice of."""
+"""m/s², a step between holds that is too small for any effect."""
 REFERENCE = 20.0
-"""°C, at which bias and scale are what they are said to be."""
+"""°C, at which bias and scale have their stated values."""
 
 
 @dataclass
 class Rig:
-    """How a rig differs from an ideal one; batches of B in front.
+    """How a rig differs from an ideal one; the first axis is the batch.
 
     Attributes
     ----------
-    gravity : (B, 1, 1) array, m/s², by which true gravity is more than it is said to be
+    gravity : (B, 1, 1) array, m/s², true gravity less the stated one
     tilt : (B, 1, 3) array, rad, rotation of the base
     skew : (B, 1) array, rad, by which the roll axis is not perpendicular to the pitch axis
-    deflection : (B, n, 2) array, rad, by which the flange is ahead of the joints' encoders
+    deflection : (B, n, 2) array, rad, attitude of the flange less that of the joints
     mounting : (B, n, 3) array, rad, rotation of the sensor on the flange
     reading : (B, n, 2) array, rad, errors of the encoders
     """
@@ -47,7 +47,7 @@ class Rig:
 
 RigAction = Callable[[Rig, Array, Settings, Session], None]
 SensorAction = Callable[[Array, Array, Settings, Session], Array]
-"""From forces along the sensitive axes (B, n, 3) and parameters (B, 1, k) to what is added."""
+"""From forces along the axes (B, n, 3) and parameters (B, 1, k) to what the output gains."""
 Draw = Callable[[Session, np.random.Generator], dict[str, float]]
 Grid = Callable[[Session], list[dict[str, float]]]
 
@@ -65,7 +65,7 @@ class Effect:
     sensor : callable, what is added to the output; None for an effect of the rig
     needs : tuple of str, attributes of a session without which it cannot be seen
     in_time : bool, whether it changes within a hold
-    loses : bool, whether its parameters are positive
+    loses : bool, whether its parameters can only be positive
     draw : callable, random settings
     grid : callable, settings that cover all there may be
     """
@@ -95,7 +95,7 @@ def steps_of(f: Array) -> Array:
 
 
 def column(values: Array | None) -> Array:
-    """What each hold has (n,), beside batches of axes."""
+    """A value of each hold (n,), as a column beside the axes, (n, 1)."""
     if values is None:
         raise ValueError("the session does not have what an effect needs")
     return values[:, None]
@@ -149,7 +149,7 @@ def _rectified(f: Array, p: Array, s: Settings, session: Session) -> Array:
 
 
 def warmth(session: Session, tau: float = 0.0) -> Array:
-    """How much warmer than `REFERENCE` a body with a lag of `tau` seconds is, (n, 1), K."""
+    """Temperature above `REFERENCE` of a body with a lag of `tau` seconds, (n, 1), K."""
     if session.course is None or session.time is None:
         raise ValueError(f"{session.name}: has no temperature")
     return session.course.lagged(session.time, tau)[:, None] - REFERENCE
@@ -228,7 +228,7 @@ def _eccentricity(rig: Rig, p: Array, s: Settings, session: Session) -> None:
 # Settings.
 
 FEWEST = 3
-"""Holds at least on either side of what happens once."""
+"""Least number of holds on either side of a sudden change."""
 
 
 def _between_holds(session: Session, i: int, part: float) -> dict[str, float]:

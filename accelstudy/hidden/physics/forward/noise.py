@@ -26,11 +26,11 @@ COARSE_SAMPLES = 64
 
 @dataclass(frozen=True)
 class Noise:
-    """How the noise is.
+    """The noise of a session.
 
     Attributes
     ----------
-    kind : str, of `NOISES`; None where it is as it is said to be
+    kind : str, of `NOISES`; None where it is as stated
     settings : dict of str to float
     """
 
@@ -45,7 +45,7 @@ class Noise:
         if kind == "level":
             below = rng.random() < 0.4
             factor = rng.uniform(0.6, 0.8) if below else rng.uniform(1.25, 2.0)
-            # What disturbs the means may or may not show within the holds.
+            # What disturbs the means may show within the holds, or not.
             return cls(kind, {"factor": factor, "within": float(rng.random() < 0.5)})
         if kind == "axes":
             factors = np.ones(3)

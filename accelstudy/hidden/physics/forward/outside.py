@@ -1,4 +1,4 @@
-"""Physics that no catalogue has: what a diagnosis must not take for something that it knows."""
+"""Physics that is not in the catalogue, and that a diagnosis must not give a name of it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 RIPPLES = 2.5
-"""Periods of a ripple in 1 g; a smooth curve would be as good as two that the catalogue has."""
+"""Periods of a ripple in 1 g; fewer would look like two smooth effects of the catalogue."""
 
 
 def _ripple(f: Array, p: Array, s: Settings, session: Session) -> Array:
@@ -52,7 +52,7 @@ def _any_swing(session: Session, rng: np.random.Generator) -> dict[str, float]:
 
 
 def _sticking(f: Array, p: Array, s: Settings, session: Session) -> Array:
-    # What the step before the last one has left behind.
+    # The remains of the step before the last one.
     behind = np.zeros(f.shape)
     behind[:, 1:] = np.sign(steps_of(f)[:, :-1])
     return p * behind
@@ -65,14 +65,14 @@ def _third_harmonic(rig: Rig, p: Array, s: Settings, session: Session) -> None:
 
 
 def _cable(rig: Rig, p: Array, s: Settings, session: Session) -> None:
-    # The more it is wound up the harder it pulls; the encoders were set to zero on the average.
+    # The cable pulls harder the more it is wound; the encoders were zeroed at the mean pull.
     wound = column(session.yaw)
     pull = np.concatenate([wound, abs(wound)], axis=1)
     rig.deflection = rig.deflection + p * (pull - pull.mean(axis=0))
 
 
 def _shaken_mounting(rig: Rig, p: Array, s: Settings, session: Session) -> None:
-    # The mounting was adjusted while it shook as it does on the average.
+    # The mounting was adjusted at the mean vibration.
     square = column(session.vibration) ** 2
     rig.mounting = rig.mounting + p * (square - square.mean())
 

@@ -40,8 +40,8 @@ class Course:
             return self.at(time)
         moments = np.union1d(self.times, time)
         outside = self.at(moments)
-        # Behind what changes linearly a body stays back by tau times the slope, when it is used to
-        # it; what else it is away from that decays.
+        # Behind a linear change a body lags, in the long run, by tau times the slope. Any other
+        # difference decays.
         steps = np.diff(moments)
         back = tau * np.diff(outside) / steps
         decay = np.exp(-steps / tau)
@@ -54,7 +54,7 @@ class Course:
 
 @dataclass(frozen=True)
 class Session:
-    """What the holds of a session have in common with one another, whatever the sensor does.
+    """The holds of a session as they really are, whatever the sensor does.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class Session:
 
     @cached_property
     def clock(self) -> Array:
-        """What grows from hold to hold: time, or the number of the hold where there is no time."""
+        """Time of each hold, or its number where there is no time."""
         return np.arange(1.0, self.n + 1) if self.time is None else self.time
 
     @property

@@ -78,7 +78,7 @@ class Atlas:
 
     @cached_property
     def shapes(self) -> tuple[Shape, ...]:
-        """Shapes of all effects, in settings that cover what there may be."""
+        """Shapes of all effects, in settings that cover all their values."""
         found = (
             self.shape(effect, settings)
             for effect in EFFECTS.values()
@@ -137,7 +137,7 @@ def visible_effects(design: str, approach: str) -> tuple[str, ...]:
 
 
 def invisible_effects(design: str, approach: str) -> tuple[str, ...]:
-    """Names of the effects that are in what a design measures, but cannot be seen."""
+    """Names of the effects that a design has, but cannot see."""
     own = atlas(design, approach)
     return tuple(
         name

@@ -1,9 +1,9 @@
-"""The likelihood-ratio oracle: what could be said of a campaign by who knows all but the answer.
+"""The likelihood-ratio oracle: the best answer for a campaign if all but the answer is known.
 
 It knows sigma, the sensor, the shapes of all effects, how many are missing and how large they are.
-It detects by the smallest p-value of all likelihood ratios; the total evidence of all effects, of
-known size, would detect some points more where little can be detected (at λ = 10: 0.48 for 0.41).
-What it names is the most probable answer, which nobody beats on the average.
+It detects by the smallest p-value of all likelihood ratios. The total evidence of all effects, of
+known size, would detect a little more of small effects (at λ = 10: 0.48 for 0.41). It names the
+most probable answer, which no method beats on average.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ Array = NDArray[np.float64]
 Class = tuple[str, ...]
 
 OUTSIDE_SHARE = 0.15
-"""Share of a noncentrality that two effects of the catalogue leave of what is outside it."""
+"""Least share that two effects of the catalogue leave of the noncentrality of one outside it."""
 DRAWS = 7
-"""Draws of what may be outside the catalogue, most of which must be."""
+"""Draws of an effect, most of which must be outside the catalogue."""
 LEVEL = 0.05
 CREDIBLE = 0.9
 """Probability with which a set of alternatives holds the truth."""
@@ -105,7 +105,7 @@ class Oracle:
         return np.asarray(chdtrc(self.atlas.dims, self.atlas.parts(z)))
 
     def _one(self, z: Array, sizes: Sequence[float]) -> tuple[tuple[Class, ...], int]:
-        # Where nothing or something unheard of is missing, its size is as good as unknown.
+        # Where nothing is missing, or nothing of the catalogue, any usual size will do.
         size = sizes[0] if sizes else 25.0
         evidence = _evidence(self.atlas.parts(z), self.atlas.dims, size)
         names = [shape.effect.name for shape in self.atlas.shapes]
