@@ -1,1 +1,1 @@
-"""A study: its configuration, its cells, their simulation, and the tables that come of it."""
+"""A study: its configuration, its cells, their simulation, and its tables and figures."""

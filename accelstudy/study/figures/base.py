@@ -1,4 +1,4 @@
-"""What a figure of a study is, and all figures by their names."""
+"""What a figure of a study is, and the registry of figures."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Tables: TypeAlias = "Mapping[str, pd.DataFrame]"
 Draw: TypeAlias = "Callable[[Tables, StudyConfig], Figure]"
 
 TABLES = ("cells", "summary", "correlations", "leveling", "quantiles", "sensitivity", "shapley")
-"""What a figure may ask for."""
+"""Names of the tables that a figure may need."""
 
 _REGISTRY: Registry[FigureEntry] = Registry("figure")
 
@@ -36,7 +36,7 @@ class FigureEntry:
     category : str, heading under which a report lists it
     tables : tuple of str, those of `TABLES` that it draws
     when : callable, whether a study has this figure
-    note : callable, what the caption says of this study beside its text
+    note : callable, returns what the caption adds for this study
     angles : bool, whether it shows angles; then the caption explains their unit
     """
 

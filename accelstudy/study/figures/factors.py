@@ -1,4 +1,4 @@
-"""What varies over the cells of a study, and at which levels a figure holds everything else."""
+"""The factors that vary over the cells of a study, and the levels at which others are held."""
 
 from __future__ import annotations
 
@@ -54,13 +54,13 @@ FACTORS = (*NOISES, POSITIONS)
 
 @dataclass(frozen=True)
 class Level:
-    """The value of a factor that a block holds fixed, of those that the study ran.
+    """The value at which a block holds a factor, of those that the study has.
 
     Attributes
     ----------
     value : float, as in the tables
-    others : tuple of float, the other values that ran
-    usual : bool, whether it is the study's default, rather than the middle of those that ran
+    others : tuple of float, the other values of the study
+    usual : bool, whether it is the study's default; else it is the middle value
     """
 
     value: float
@@ -84,7 +84,7 @@ class Block:
 
     @property
     def series_of_cells(self) -> list[tuple[str, str]]:
-        """Model and subject of each cell: a line each."""
+        """Model and subject of each cell; each pair is a line."""
         return list(zip(self.cells["model"], self.cells["subject"], strict=True))
 
     @property
@@ -95,7 +95,7 @@ class Block:
 
 def cell_table(study: StudyConfig) -> pd.DataFrame:
     """One row per cell of a study; the robot's noise is NaN where no robot is used."""
-    import pandas as pd  # slow, and studies that vary nothing do without
+    import pandas as pd  # slow, and not needed by studies that vary nothing
 
     from accelstudy.study.cells.cell import study_cells
 
@@ -128,9 +128,8 @@ def varies(study: StudyConfig, factor: Factor) -> bool:
 def blocks(study: StudyConfig, factor: Factor) -> list[Block]:
     """Cells over one factor, in blocks that hold all others at the same levels.
 
-    Each model and scheme takes, of the levels of another factor over which this one varies, the
-    study's default, or the middle one if the default is not among them (of an even number the
-    lower of the two in the middle).
+    For each model and scheme, another factor is held at the study's default. If this factor does
+    not vary at the default, the middle level is taken (of an even number the lower middle one).
     """
     if not (_names_sizes(study) if factor is POSITIONS else _lists_values(study, factor)):
         return []
@@ -166,7 +165,7 @@ def _lists_values(study: StudyConfig, factor: Factor) -> bool:
 
 
 def _names_sizes(study: StudyConfig) -> bool:
-    """Whether a grid names schemes of one family: `all` is no question about positions."""
+    """Whether a grid names schemes of one family; `all` does not count."""
     families = [[family(name) for name in grid.schemes] for grid in study.grids]
     return any(len(names) > len(set(names)) for names in families)
 
@@ -203,7 +202,7 @@ def factor_note(study: StudyConfig, factor: Factor) -> str:
 
 
 def levels_text(levels: Mapping[str, Level]) -> str:
-    """Say at which levels a block holds the other factors, and which ran beside them."""
+    """Say at which levels a block holds the other factors, and which other levels there are."""
     return ", ".join(
         _level_text(factor, levels[factor.column]) for factor in NOISES if factor.column in levels
     )

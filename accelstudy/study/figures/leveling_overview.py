@@ -1,4 +1,4 @@
-"""Which model, scheme and approach leaves which tilt error."""
+"""The tilt error that each model, scheme and approach leaves."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The Monte Carlo held against closed forms and linear theory."""
+"""The Monte Carlo compared with closed forms and linear theory."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 BAND = "#DDDDDD"
 GAP = 0.25
-"""Between two groups of parameters, which are 1 wide each."""
+"""Space between two groups of parameters, whose width is 1."""
 
 
 @register(

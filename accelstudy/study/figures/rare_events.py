@@ -1,4 +1,4 @@
-"""What happens once in thousands of calibrations and more: tails of tilt errors, and failures."""
+"""Rare events, once in thousands of calibrations: tails of tilt errors, and failures."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 LINES: Style = {"roll": "-", "pitch": "--"}
 MOST = 3
-"""Set-ups whose tails are drawn; a panel each."""
+"""Number of set-ups whose tails are drawn, one panel each."""
 NONE: Style = {"linestyle": "", "marker": "v", "markersize": 4, "fillstyle": "none"}
 
 

@@ -1,4 +1,4 @@
-"""How a figure of a study is drawn and written, and what its caption says."""
+"""Drawing and writing of the figures of a study, with their captions."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def draw(name: str, tables: Tables, study: StudyConfig) -> Figure:
 
 
 def captions(names: Iterable[str], study: StudyConfig) -> dict[str, str]:
-    """Captions of figures by their names, with what they say of this study."""
+    """Captions of figures by their names, with the notes on this study."""
     with angles_in(angle_unit(study)):
         return {entry.name: _caption(entry, study) for entry in map(get_figure, names)}
 

@@ -104,7 +104,7 @@ def _draw_total(ax: Axes, table: pd.DataFrame, styles: dict[str, Style]) -> None
 
 
 def _write_overtaking(ax: Axes, pairs: pd.DataFrame, styles: dict[str, Style]) -> None:
-    """Write at each roll, above all shares, which inputs overtake others there."""
+    """Write above the shares at each roll which inputs overtake others."""
     ax.axhspan(BAND, TOP, color="#F0F0F0", linewidth=0, zorder=0)
     for roll in pairs["roll_gon"].unique():
         names = list(dict.fromkeys(pairs.loc[pairs["roll_gon"] == roll, "input"]))

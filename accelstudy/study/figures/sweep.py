@@ -1,4 +1,4 @@
-"""What a noise setting or the number of positions does to the calibration."""
+"""The effect of a noise setting or of the number of positions on a calibration."""
 
 from __future__ import annotations
 
@@ -64,11 +64,11 @@ TILTS = ("roll", "pitch")
 MARKERS = ("o", "^", "s", "D")
 LINES = ("-", "--", ":", "-.")
 IN_A_BLOCK = len(MARKERS)
-"""Series that one can still tell apart in a small panel."""
+"""Number of series that can be told apart in a small panel."""
 MOST_BLOCKS = 24
-"""Blocks of one figure; more would be taller than a figure can be."""
+"""Most blocks of one figure; more would make it too tall."""
 TOP = 0.97
-"""Height in a panel of the crosses of what failed, as a share; values stay below them."""
+"""Height of the crosses of failures in a panel, as a share; values stay below."""
 ROW_MM = 45
 BIAS_STYLE: Style = {"linestyle": ":", "linewidth": 0.8, "marker": "x", "markersize": 4}
 FAILED_STYLES: dict[str, Style] = {
@@ -169,7 +169,7 @@ def _values(block: Block, tables: Tables) -> pd.DataFrame:
 
 
 def _title(block: Block, factor: Factor) -> str:
-    """What all series of a block have in common, and the levels of the other factors."""
+    """Title of a block: what its series have in common, and the levels of the other factors."""
     models, schemes = (list(dict.fromkeys(names)) for names in zip(*block.series, strict=True))
     common = [_scheme_title(schemes[0], factor)] if len(schemes) == 1 else []
     common = [model_title(models[0]), *common] if len(models) == 1 else common
@@ -181,7 +181,7 @@ def _scheme_title(scheme: str, factor: Factor) -> str:
 
 
 def _series_names(series: list[tuple[str, str]], factor: Factor) -> list[str]:
-    """Names of the series of a block, without what its title says of all."""
+    """Names of the series of a block, without the part in its title."""
     models, schemes = (set(names) for names in zip(*series, strict=True))
     return [
         ", ".join(
@@ -213,7 +213,7 @@ def _draw_panel(
 def _draw_series(ax: Axes, rows: pd.DataFrame, factor: Factor, style: Style, height: float) -> None:
     """Line of one series and approach; crosses at `height`, a share of the panel, where it fails.
 
-    What uses no robot is drawn as a line across, as its noise does not matter to it.
+    Series without a robot are drawn as a line across, as they do not depend on its noise.
     """
     unit = rows["unit"].iloc[0]
     x, (y, _) = factor.shown(rows["x"]), shown(rows["value"], unit)

@@ -1,4 +1,4 @@
-"""Table 1 of the paper as a figure: which published calibration determines what how well."""
+"""Table 1 of the paper as a figure: the accuracy of published calibrations."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 ROW_MM = 9.5
 CROSS_AT = 0.9
-"""Where the cross of what cannot be estimated stands, as a share of the panel's width."""
+"""Place of the cross for parameters that cannot be estimated, as a share of the panel's width."""
 PALE = 0.3
 
 

@@ -143,7 +143,7 @@ def styles_of(inputs: list[str]) -> dict[str, Style]:
 
 
 def draw_pitch(ax: Axes, table: pd.DataFrame, styles: dict[str, Style], top: float = 1.25) -> None:
-    """Draw the effects at one pitch, each with its symbol; what never reaches 1 % is left out."""
+    """Draw the effects at one pitch, each with its symbol, without those that never reach 1 %."""
     from matplotlib.ticker import NullLocator
 
     ax.set_yscale("log")
