@@ -39,36 +39,34 @@ REQUIRED = ("positions", "forces")
 
 def study_tables():
     """Tables of a study and their columns: {table: (row, {column: (unit, meaning)})}."""
-    content = yaml.safe_load((HERE / "tables.yaml").read_text(encoding="utf-8"))
-    shared = {"cell": content["cells"]["columns"], "attitude": content["sensitivity"]["columns"]}
     return {
-        name: (
-            each["row"],
-            {
-                **{
-                    k: v
-                    for key, columns in shared.items()
-                    if key in each
-                    for k, v in columns.items()
-                },
-                **each.get("columns", {}),
-                **each.get("more", {}),
-            },
-        )
-        for name, each in content.items()
+        name: (each["row"], {**each.get("columns", {}), **each.get("more", {})})
+        for name, each in _read("tables.yaml").items()
     }
+
+
+def calibration_files():
+    """Files of a calibration and of a batch: {file: (what it is, {key: (unit, meaning)})}."""
+    return {name: (each["about"], each["columns"]) for name, each in _read("files.yaml").items()}
+
+
+def _read(name):
+    return yaml.safe_load((HERE / name).read_text(encoding="utf-8"))
+
+
+def _columns(heads, columns):
+    return table(heads, [(code(name), *rest) for name, rest in columns.items()])
 
 
 def tables():
     """The page of the tables of a study."""
     parts = []
     for name, (row, columns) in study_tables().items():
-        rows = [(code(column), unit, meaning) for column, (unit, meaning) in columns.items()]
         file = "estimates/*.parquet" if name == "estimates" else f"{name}.parquet"
         parts += [
             f"## `{file}`",
             f"A row per {row}.",
-            table(("column", "unit", "meaning"), rows),
+            _columns(("column", "unit", "meaning"), columns),
         ]
     return page(
         "# Tables of a study",
@@ -99,6 +97,12 @@ def formats():
                 MEANINGS[attribute],
             )
         )
+    calibration = []
+    for name, (about, columns) in calibration_files().items():
+        kind = "key" if name.endswith(".json") else "column"
+        whose = "Batch" if about.startswith("A batch") else "Calibration"
+        heads = (kind, "unit", "meaning")
+        calibration += [f"## {whose}: `{name}`", about, _columns(heads, columns)]
     schema = HERE.parent / "reference" / "diagnosis.schema.yaml"
     return page(
         "# File formats",
@@ -110,6 +114,7 @@ def formats():
         "Columns that belong together are all there or all absent. *unit* is the unit of the "
         "header.",
         table(("columns", "type", "unit", "range", "", "meaning"), rows),
+        *calibration,
         blocks(
             yaml.safe_load(schema.read_text(encoding="utf-8")),
             "Diagnosis: `diagnosis.json`",

@@ -1,4 +1,4 @@
-"""What the documentation says of tables is what a study writes.
+"""What the documentation says of files is what studies, calibrations and batches write.
 
 `make docs` checks the rest: links, anchors, and the files, commands and options that pages name.
 """
@@ -9,7 +9,18 @@ import pytest
 from places import ROOT
 from study_helpers import grid, make_study, run_study
 
+from accelstudy.approaches import get_approach
+from accelstudy.campaign.batch.overview import CAMPAIGN_COLUMNS, PARAMETER_COLUMNS
+from accelstudy.campaign.calibration.assessment import assess
+from accelstudy.campaign.calibration.document import (
+    assessed_positions,
+    calibration_document,
+    quality_document,
+)
+from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
 from accelstudy.files.tables import read_table
+from accelstudy.sensors.models import get_model
 from accelstudy.study.results.sensitivity import analyse_sensitivity, analyse_shapley
 
 SENSITIVITY = {"base_samples": 2, "resamples": 2, "roll_gon": 10, "pitch_gon": 0}
@@ -17,16 +28,17 @@ PROVENANCE = {"config_hash": "0123456789abcdef", "seed": 1}
 
 
 @pytest.fixture(scope="module")
-def described():
+def pages():
     sys.path.insert(0, str(ROOT / "docs/hooks"))
     try:
-        from file_formats import study_tables
+        import file_formats
     finally:
         sys.path.pop(0)
-    return {name: list(columns) for name, (_, columns) in study_tables().items()}
+    return file_formats
 
 
-def test_each_column_of_a_study_is_described(tmp_path, described):
+def test_each_column_of_a_study_is_described(tmp_path, pages):
+    described = {name: list(columns) for name, (_, columns) in pages.study_tables().items()}
     keys = {"grids": [grid(replicates=20)], "sensitivity": SENSITIVITY}
     written = run_study(tmp_path, **keys)
     study, summary = make_study(**keys), tmp_path / "summary.parquet"
@@ -38,3 +50,28 @@ def test_each_column_of_a_study_is_described(tmp_path, described):
     written["shapley"] = read_table(path)
     for name, table in written.items():
         assert described[name] == list(table), name
+
+
+def test_each_key_of_a_calibration_is_described(pages):
+    campaign, _ = simulate_campaign(CampaignSettings(scheme="fibonacci-12"))
+    fit = fit_campaign(campaign, get_model("bias-scale"), get_approach("robot"))
+    assessment = assess(fit)
+    document = {**calibration_document(fit), "quality": quality_document(assessment)}
+    written = {
+        "calibration.json": set(_keys(document)),
+        "positions.parquet": set(assessed_positions(assessment)),
+        "campaigns.parquet": set(CAMPAIGN_COLUMNS),
+        "parameters.parquet": set(PARAMETER_COLUMNS),
+    }
+    described = {name: set(columns) for name, (_, columns) in pages.calibration_files().items()}
+    assert described == written
+
+
+def _keys(document):
+    """Keys as the page has them: those of blocks that it takes apart stand behind a dot."""
+    for key, value in document.items():
+        if key != "quality":
+            yield key
+        inner = value[0] if key == "parameters" else value
+        if key in ("parameters", "affine", "quality"):
+            yield from (f"{key}.{each}" for each in inner)
