@@ -33,6 +33,11 @@ def angles_of(forces: ArrayLike) -> Array:
     return np.stack(roll_pitch(tuple(np.moveaxis(forces, -1, 0))), axis=-1)
 
 
+def usual_norm(forces: ArrayLike) -> float:
+    """Median norm of specific forces (n, 3), m/s²; at rest it is close to gravity."""
+    return float(np.median(np.linalg.norm(forces, axis=1)))
+
+
 def wrapped(angle: ArrayLike) -> Array:
     """Return the angles in [−π, π) that point the same way, in rad; arrays of any shape."""
     return np.asarray((np.asarray(angle, dtype=float) + np.pi) % (2 * np.pi) - np.pi)

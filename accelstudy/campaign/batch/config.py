@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import glob
-import hashlib
-import json
 import os
 import re
 from collections import Counter
@@ -22,6 +20,7 @@ from accelstudy.campaign.importing.public import import_settings
 from accelstudy.campaign.importing.settings import GravitySettings, ImportSettings
 from accelstudy.config_names import ModelName
 from accelstudy.files.layers import overlay, read_layer
+from accelstudy.files.provenance import config_hash
 from accelstudy.files.types import PathName
 from accelstudy.files.validation import Block, checked
 from accelstudy.sensors.models import get_model
@@ -163,8 +162,7 @@ class BatchConfig(Block):
     @property
     def fingerprint(self) -> str:
         """Hash of the whole configuration, defaults included."""
-        text = json.dumps(self.model_dump(mode="json"), sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()[:16]
+        return config_hash(self.model_dump(mode="json"))
 
 
 def parse_batch(content: Mapping[str, Any], source: str = "config") -> BatchConfig:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import ROBOT_UNITS, STANDARD_GRAVITY, UNITS
 from accelstudy.campaign.files.header import ANY, COLUMNS, COUNTING, HEADER, MOST, RANGES, Header
-from accelstudy.leveling.angles import specific_force
+from accelstudy.leveling.angles import specific_force, usual_norm
 
 Array = NDArray[np.float64]
 
@@ -70,7 +70,7 @@ def check_robot(given: Mapping[str, Array], header: Header, path: Path) -> None:
 
 def check_size(raw: Array, forces: Array, header: Header, path: Path) -> None:
     """Check that forces are numbers that can be calculated with, in whatever unit they are."""
-    norm, given = (float(np.median(np.linalg.norm(array, axis=1))) for array in (forces, raw))
+    norm, given = usual_norm(forces), usual_norm(raw)
     if not (norm > 1 / MOST and np.max(abs(forces)) < MOST):
         raise InputError(
             f"{path}: fx, fy, fz: their norm is about {given:.3g} {header.unit}, which no unit "
@@ -114,7 +114,7 @@ def likely_fault(given: float, norm: float, unit: str, gravity: float) -> str | 
 def check_norm(raw: Array, forces: Array, header: Header, path: Path) -> None:
     """Check that forces are roughly as large as gravity; the error names the unit that fits."""
     gravity, unit = header.gravity.value_mps2, header.unit
-    norm, given = (float(np.median(np.linalg.norm(array, axis=1))) for array in (forces, raw))
+    norm, given = usual_norm(forces), usual_norm(raw)
     fault = likely_fault(given, norm, unit, gravity)
     if fault is None:
         return

@@ -21,6 +21,7 @@ from accelstudy.campaign.gross_errors.base import (
     gross_error_names,
 )
 from accelstudy.campaign.gross_errors.real_sensor import CLEARLY, RealSensor
+from accelstudy.leveling.angles import usual_norm
 
 if TYPE_CHECKING:
     from accelstudy.approaches import Approach
@@ -163,7 +164,7 @@ def _clear(mending: Mending, before: RealSensor, after: RealSensor) -> bool:
 
 def _check_norm(campaign: Campaign) -> None:
     """Raise `InputError` if the forces differ from gravity by more than even a bad sensor does."""
-    norm = float(np.median(np.linalg.norm(campaign.forces, axis=1)))
+    norm = usual_norm(campaign.forces)
     if not 0.5 < norm / campaign.gravity < 2:
         raise InputError(
             f"{campaign.name}: fx, fy, fz: their norm is about {norm:.3g} m/s^2, nowhere near "

@@ -21,6 +21,7 @@ from accelstudy.campaign.gross_errors.base import (
     with_readings,
 )
 from accelstudy.campaign.gross_errors.real_sensor import RealSensor
+from accelstudy.leveling.angles import usual_norm
 
 NEAR = 0.8
 """Share of gravity that even a bad sensor reads in the right unit."""
@@ -60,7 +61,7 @@ class UnitError(GrossError):
 
     def mendings(self, campaign: Campaign, sensor: RealSensor) -> Iterator[Mending]:
         """Convert the forces, or the angles, as if they were in another unit."""
-        norm = float(np.median(np.linalg.norm(campaign.forces, axis=1))) / campaign.gravity
+        norm = usual_norm(campaign.forces) / campaign.gravity
         for said in ("g", "m/s^2") if campaign.unit == "g" else ("m/s^2", "g"):
             for unit, factor in _other_units("m/s^2", SENSOR_UNITS, said).items():
                 if NEAR < factor * norm < 1 / NEAR:

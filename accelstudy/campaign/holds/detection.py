@@ -35,6 +35,7 @@ from accelstudy.campaign.holds.threshold import (
 from accelstudy.campaign.holds.windows import samples_in
 from accelstudy.campaign.logs.columns import AXES
 from accelstudy.campaign.logs.recording import Recording
+from accelstudy.leveling.angles import usual_norm
 
 Array = NDArray[np.float64]
 
@@ -221,7 +222,7 @@ def find_joint_holds(
         holds = _holds(
             segments, selection.left_out(segments), log, chosen[i], surveys[i], width, warnings
         )
-        radius = float(np.median(np.linalg.norm(holds.mean - holds.center, axis=1)))
+        radius = usual_norm(holds.mean - holds.center)
         spread = float(np.sqrt(np.mean(holds.noise**2)))
         if threshold is None and moves(chosen[i], holds.allan, spread, step, radius):
             why = (

@@ -15,6 +15,7 @@ from accelstudy.campaign.files.layout import LogLayout, Place
 from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.campaign.logs.sources import Source
+from accelstudy.leveling.angles import usual_norm
 from accelstudy.sensors.conversion import conversion_of
 
 Array = NDArray[np.float64]
@@ -58,7 +59,7 @@ def imported_campaign(
 def _check_size(path: str | Path, settings: ImportSettings, raw: Array, forces: Array) -> None:
     """Check that forces are roughly as large as gravity; the error names the options to change."""
     gravity, unit = settings.gravity.value_mps2, settings.unit
-    norm, given = (float(np.median(np.linalg.norm(array, axis=1))) for array in (forces, raw))
+    norm, given = usual_norm(forces), usual_norm(raw)
     fault = likely_fault(given, norm, unit, gravity)
     if fault is None:
         return

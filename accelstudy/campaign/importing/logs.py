@@ -27,6 +27,7 @@ from accelstudy.campaign.importing.settings import (
 from accelstudy.campaign.logs.columns import AXES
 from accelstudy.campaign.logs.recording import Log, Recording, open_log
 from accelstudy.campaign.logs.series import LogSeries
+from accelstudy.leveling.angles import usual_norm
 from accelstudy.sensors.conversion import conversion_of
 
 __all__ = [
@@ -285,7 +286,7 @@ def _with_offset(
 ) -> tuple[ImportSettings, Array, list[str]]:
     """Offset of counts, from the positions, unless it is zero apart from the sensor's bias."""
     frame = settings.axes
-    radius = float(np.median(np.linalg.norm(holds.mean - holds.center, axis=1)))
+    radius = usual_norm(holds.mean - holds.center)
     if not (holds.directed and np.linalg.norm(holds.center) > radius / 2):
         return settings, holds.mean, []
     scale = conversion_of("counts", settings.scale).scale

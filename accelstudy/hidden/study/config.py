@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal, Self
 
@@ -13,6 +11,7 @@ from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.config_names import ModelName
 from accelstudy.effects import effect_names
+from accelstudy.files.provenance import config_hash
 from accelstudy.files.types import OneOrMore, PathName, Positive, Replicates, Seed
 from accelstudy.files.validation import Block, checked
 from accelstudy.hidden.physics import APPROACHES, DESIGNS, EFFECTS, GROSS, NOISES, OUTSIDE
@@ -147,8 +146,7 @@ class HiddenConfig(Block):
     @property
     def fingerprint(self) -> str:
         """Hash of the whole configuration, defaults included."""
-        text = json.dumps(self.model_dump(mode="json"), sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()[:16]
+        return config_hash(self.model_dump(mode="json"))
 
 
 CAMPAIGNS = Range(1, 1_000_000)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Mapping
 from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, Field
 
+from accelstudy.files.provenance import config_hash
 from accelstudy.files.types import PathName, Seed
 from accelstudy.files.validation import Block, checked
 
@@ -29,11 +28,7 @@ class Example(Block):
     @property
     def provenance(self) -> dict[str, Any]:
         """Provenance that tables record."""
-        text = json.dumps(self.model_dump(mode="json"), sort_keys=True)
-        return {
-            "config_hash": hashlib.sha256(text.encode()).hexdigest()[:16],
-            "seed": self.seed,
-        }
+        return {"config_hash": config_hash(self.model_dump(mode="json")), "seed": self.seed}
 
 
 def parse_example(content: Mapping[str, Any], source: str = "config") -> Example:

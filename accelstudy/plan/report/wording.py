@@ -76,9 +76,9 @@ def answer_lines(answer: Answer) -> list[str]:
         lines += _linear(question, candidate)
     more = [f"{_angle(use.reading)} of noise in each reading {_like(question, use)}"]
     if not math.isnan(use.drift):
-        more.append(f"{_angle(use.drift)} after {number_of(use.hours)} h")
+        more.append(f"{_angle(use.drift)} after {use.hours:g} h")
     if not math.isnan(use.warmth):
-        more.append(f"{_angle(use.warmth)} where it is {number_of(use.kelvin)} K warmer or colder")
+        more.append(f"{_angle(use.warmth)} where it is {use.kelvin:g} K warmer or colder")
     lines.append(f"In use this adds: {comma_list(more)}.")
     return lines
 
@@ -99,7 +99,7 @@ def unreachable(answer: Answer) -> str:
     question, best = answer.question, answer.best
     within = []
     if question.most_seconds < math.inf:
-        within.append(f"within {number_of(question.most_seconds / 60)} min")
+        within.append(f"within {question.most_seconds / 60:g} min")
     if question.most_positions < 200:
         within.append(f"with at most {question.most_positions} positions")
     within.append({1: _equipment(question.equipment[0])}.get(len(question.equipment), ""))
@@ -123,7 +123,7 @@ def effort(candidate: Candidate, imperative: bool = False) -> str:
     """Positions and time of a candidate: ``28 positions by hand, 10 s each, about 14 minutes``."""
     n = candidate.scheme.n_positions
     how = _equipment(candidate.equipment)
-    text = f"{n} positions {how}, {number_of(candidate.hold)} s each"
+    text = f"{n} positions {how}, {candidate.hold:g} s each"
     setup = candidate.equipment.setup
     extra = f", with {minutes(setup)} to set it up" if setup else ""
     link = ": about" if imperative else ", about"
@@ -136,11 +136,6 @@ def minutes(seconds: float) -> str:
     if seconds < 5400:
         return f"{math.ceil(seconds / 60)} minutes"
     return f"{number(seconds / 3600)} hours"
-
-
-def number_of(value: float) -> str:
-    """Show a number without digits that say nothing."""
-    return f"{value:g}"
 
 
 def table_lines(answer: Answer) -> list[str]:
@@ -181,7 +176,7 @@ def _row(answer: Answer, rank: int, ranked: Ranked) -> list[str]:
         model_words(candidate.model),
         candidate.scheme.name,
         str(candidate.scheme.n_positions),
-        number_of(candidate.hold),
+        f"{candidate.hold:g}",
         f"{candidate.seconds / 60:.1f}",
         *cells,
         limits(answer.question, candidate),
@@ -257,8 +252,8 @@ def use_lines(question: Question, use: InUse) -> list[str]:
 
     return [
         f"noise of a reading {like}: {told(use.reading)}",
-        f"drift of the bias within {number_of(use.hours)} h: {told(use.drift)}",
-        f"temperature {number_of(use.kelvin)} K off that of the calibration: {told(use.warmth)}",
+        f"drift of the bias within {use.hours:g} h: {told(use.drift)}",
+        f"temperature {use.kelvin:g} K off that of the calibration: {told(use.warmth)}",
         f"switched off and on again: {told(use.restart)}",
     ]
 
@@ -267,7 +262,7 @@ def _like(question: Question, use: InUse) -> str:
     """Duration of the reading whose noise is stated."""
     if question.sheet.position_sigma is not None:
         return "as long as a position"
-    return f"of {number_of(use.seconds)} s"
+    return f"of {use.seconds:g} s"
 
 
 def assumption_lines(question: Question) -> list[str]:
@@ -282,9 +277,9 @@ def assumption_lines(question: Question) -> list[str]:
         sigma = quantity_text(question.sheet.position_sigma, "m/s^2")
         lines.append(f"The mean of a position has a noise of {sigma}, however long it is held.")
     for equipment in question.equipment:
-        setup = f", {number_of(equipment.setup / 60)} minutes to set up" if equipment.setup else ""
+        setup = f", {equipment.setup / 60:g} minutes to set up" if equipment.setup else ""
         lines.append(
-            f"Time {_equipment(equipment)}: {number_of(equipment.moving)} s to move from position "
+            f"Time {_equipment(equipment)}: {equipment.moving:g} s to move from position "
             f"to position{setup}."
         )
     if any(equipment.name == "robot" for equipment in question.equipment):
