@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from diagnosis_helpers import ROTATIONS
+from diagnosis_helpers import ROTATIONS, most
 from places import SHARED
 
 from accelstudy.adjustment.quality import solve
@@ -68,7 +68,7 @@ def test_calibration_and_diagnosis_do_not_contradict_each_other(approach):
 def test_a_wrong_sigma_is_no_effect():
     runs = 8
     found = [diagnose(replace(campaign(k)[0], sigma_force=0.002 / 1.5), NINE) for k in range(runs)]
-    assert not any(d.verdict in ("named", "narrowed") for d in found)
+    assert sum(d.verdict in ("named", "narrowed") for d in found) <= most(runs, 0.05, 0.01)
     assert sum(names(d) == ["noise_level"] for d in found) > runs / 2
 
 
@@ -265,9 +265,5 @@ def test_the_noise_of_the_xsens_is_not_white(tmp_path):
         found = diagnose(replace(measured, sigma_force=sigma), NINE)
         assert found.verdict == "noise_model"
         assert names(found) == ["coloured_noise"]
-    assert (
-        diagnose(measured, NINE).verdict == "no_effect"
-    )  # with the sigma from the Allan deviation
-
-
-# --- the command ---------------------------------------------------------------------------------
+    # With the sigma from the Allan deviation.
+    assert diagnose(measured, NINE).verdict == "no_effect"
