@@ -71,8 +71,9 @@ def test_the_generator_and_the_diagnosis_know_nothing_of_each_other():
         assert [one for one in imports(folder) if one[1].startswith("accelstudy.hidden")] == []
 
 
-def test_each_effect_of_the_catalogue_can_be_hidden():
-    assert {*EFFECTS} == {*effect_names()} - {effect.name for effect in NINE.effects}
+def test_what_is_hidden_is_in_the_catalogue():
+    assert len(EFFECTS) >= 24
+    assert {*EFFECTS} <= {*effect_names()} - {effect.name for effect in NINE.effects}
 
 
 def test_rotations_are_rotations():
