@@ -1,9 +1,9 @@
 from accelstudy.jobs.job import job, lists
-from accelstudy.study.config import parse_study
+from accelstudy.study.config import StudyConfig
 from accelstudy.study.results.judging import judge_claims
 
 with job(snakemake) as provenance:
-    study = parse_study(snakemake.config)
+    study = StudyConfig.model_validate(snakemake.config)
     judge_claims(
         study,
         lists(snakemake.input),

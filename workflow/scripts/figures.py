@@ -1,12 +1,12 @@
 from pathlib import Path
 
 from accelstudy.jobs.job import job
-from accelstudy.study.config import parse_study
+from accelstudy.study.config import StudyConfig
 from accelstudy.study.results.figure_files import draw_figures
 
 with job(snakemake):
     draw_figures(
-        parse_study(snakemake.config),
+        StudyConfig.model_validate(snakemake.config),
         snakemake.params.captions,
         dict(snakemake.input.items()),
         Path(snakemake.output[0]).parent,

@@ -1,9 +1,9 @@
 from accelstudy.jobs.job import job
-from accelstudy.study.config import parse_study
+from accelstudy.study.config import StudyConfig
 from accelstudy.study.results.sensitivity import analyse_sensitivity, analyse_shapley
 
 with job(snakemake) as provenance:
-    study = parse_study(snakemake.config)
+    study = StudyConfig.model_validate(snakemake.config)
     tables, output = snakemake.input, snakemake.output
     analyse_sensitivity(study, tables.summary, output.sensitivity, provenance)
     analyse_shapley(study, tables.summary, tables.correlations, output.shapley, provenance)

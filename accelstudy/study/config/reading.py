@@ -6,8 +6,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from accelstudy.basics.errors import InputError
 from accelstudy.files.layers import overlay, read_layer
 from accelstudy.files.validation import checked
+from accelstudy.study.config.formulas import check_formulas
 from accelstudy.study.config.schema import StudyConfig
 
 
@@ -24,7 +26,12 @@ def parse_study(content: Mapping[str, Any], source: str = "config") -> StudyConf
     InputError
         One line that names the source, the key, what is wrong and what would be right.
     """
-    return checked(StudyConfig, content, source)
+    study = checked(StudyConfig, content, source)
+    try:
+        check_formulas(study)
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from None
+    return study
 
 
 def read_study(*paths: str | Path) -> StudyConfig:

@@ -17,8 +17,7 @@ from accelstudy.basics import bounds
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.names import LONGEST
 from accelstudy.basics.units import STANDARD_GRAVITY, to_si
-from accelstudy.design.estimability import estimability
-from accelstudy.effects import Effect, get_effect
+from accelstudy.effects import get_effect
 from accelstudy.files.provenance import config_hash
 from accelstudy.files.types import (
     Gravity,
@@ -32,9 +31,8 @@ from accelstudy.schemes.files import held, remember
 from accelstudy.sensors.models import MODELS, PRESETS, get_model
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.hold_plan import HoldPlan
-from accelstudy.simulation.sessions import Noise, sigma_of_mean
+from accelstudy.simulation.sessions import sigma_of_mean
 from accelstudy.study.config.blocks import (
-    HOLD_KEYS,
     Grid,
     HoldPlanConfig,
     LevelingConfig,
@@ -138,14 +136,10 @@ class StudyConfig(Block):
             with _at("simulated_effects"):
                 SensorModel.of("simulated", self.simulated_effects)
         with _at("holds"):
-            plan = self.hold_plan
-        if self.simulated_effects != ["model"]:
-            _check_columns(plan, map(get_effect, self.simulated_effects))
+            self.hold_plan  # noqa: B018
         for index, grid in enumerate(self.grids):
             with _at(f"grids.{index}.models"):
-                names = self.model_names(grid.models)
-            for name in names:
-                _check_columns(plan, get_model(name, self.models).effects)
+                self.model_names(grid.models)
             with _at(f"grids.{index}.schemes"):
                 _known_schemes(grid.schemes)
             with _at(f"grids.{index}.approaches"):
@@ -188,12 +182,7 @@ class StudyConfig(Block):
                     "claims need; choose another model, or paper: false"
                 )
         with _at("sensitivity.scheme"):
-            scheme = get_scheme(settings.scheme)
-        if model.hold_columns:
-            raise ValueError(
-                f"sensitivity.model: {settings.model!r} depends on the {model.hold_columns[0]} of "
-                "each hold, and leveling is analysed without; choose another model"
-            )
+            get_scheme(settings.scheme)
         for name in ("roll_gon", "pitch_gon"):
             if self.paper and 0 not in getattr(settings, name):
                 raise ValueError(f"sensitivity.{name}: must contain 0, which paper: true needs")
@@ -204,12 +193,6 @@ class StudyConfig(Block):
                     f"sensitivity: needs at least 2 replicates of the cell {cell}, with the noise "
                     "of `noise`; add it to `grids`"
                 )
-            noise = Noise(sigma_gravity=self.noise.gravity.sigma_mps2)
-            found = estimability(scheme, model, get_approach(approach), noise)
-            if not found.estimable:
-                raise ValueError(f"sensitivity: {cell} cannot be estimated: {found.reason}")
-            if self.paper and found.redundancy == 0:
-                raise ValueError(f"sensitivity: {cell} has no redundancy, which paper: true needs")
 
     def _n_cells(self, grid: Grid) -> int:
         """Number of combinations in a grid, counted without making them."""
@@ -316,15 +299,6 @@ class StudyConfig(Block):
     def fingerprint(self) -> str:
         """Hash of everything that the numbers depend on, defaults included."""
         return config_hash(self.model_dump(mode="json"))
-
-
-def _check_columns(plan: HoldPlan, effects: Iterable[Effect]) -> None:
-    for effect in effects:
-        if column := plan.missing(effect):
-            raise ValueError(
-                f"{HOLD_KEYS[column]}: missing; the effect {effect.name!r} needs the {column} of "
-                "each hold"
-            )
 
 
 class _at:
