@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import Solution
-from accelstudy.approaches import Approach, get_approach
+from accelstudy.approaches import Approach
 from accelstudy.basics.progress import stage
+from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.gross_errors.recognition import Recognised, recognise
 from accelstudy.diagnosis.base_fit import BaseFit
@@ -51,8 +52,7 @@ def diagnose(
     InputError
         If the positions do not determine the model, or leave no redundancy to test anything.
     """
-    if approach is None:
-        approach = get_approach("gravity" if campaign.angles is None else "robot")
+    approach = approach or usual_approach(campaign)
     recognised = recognise(campaign, approach)
     if recognised is not None:
         campaign = recognised.mended

@@ -22,8 +22,14 @@ from accelstudy.effects import effect_names
 from accelstudy.leveling.angles import specific_force
 
 N = 36
-pytestmark = pytest.mark.usefixtures("not_rendered")
 VERDICTS = {"no_effect", "named", "unknown", "noise_model", "gross_error"}
+
+
+@pytest.fixture(autouse=True)
+def not_drawn(monkeypatch):
+    """Pages have no figures here: no test looks at one, and to compose them takes longest."""
+    place = "accelstudy.diagnosis.report.page.report.save_all"
+    monkeypatch.setattr(place, lambda figures, _: dict.fromkeys(figures, "<svg></svg>"))
 
 
 @pytest.fixture(scope="module")

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment import quality
 from accelstudy.adjustment.quality import VarianceComponents, variance_components
-from accelstudy.approaches import get_approach
 from accelstudy.basics.units import GON
-from accelstudy.campaign.calibration.fit import CampaignFit, campaign_noise
+from accelstudy.campaign.calibration.fit import CampaignFit, campaign_noise, usual_approach
 from accelstudy.campaign.calibration.states import ACCEPTED, IMPLAUSIBLE, REJECTED, UNCHECKED
 from accelstudy.campaign.gross_errors.recognition import Recognised, recognise
 from accelstudy.leveling.angles import jacobian, tilt_slope
@@ -99,7 +98,7 @@ def assess(fit: CampaignFit) -> Assessment:
         *implausible_tilt(*np.hypot(left, missing)),
     )
     # A gross error of the angles shows even where the fit does not use them.
-    full = get_approach("gravity" if fit.campaign.angles is None else "robot")
+    full = usual_approach(fit.campaign)
     return Assessment(
         fit=fit,
         solution=solution,

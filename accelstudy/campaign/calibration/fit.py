@@ -157,6 +157,11 @@ class CampaignFit:
         return float(np.sqrt(np.mean(self.norm_residuals**2)))
 
 
+def usual_approach(campaign: Campaign) -> Approach:
+    """Return the approach that uses all that a campaign has: robot-aided if it has the angles."""
+    return get_approach("gravity" if campaign.angles is None else "robot")
+
+
 def campaign_noise(campaign: Campaign) -> Noise:
     """Stochastic model of a campaign; an unknown sigma is `UNIT_SIGMA`."""
     return Noise(
@@ -277,7 +282,7 @@ def campaign_estimability(
 
 def _cause(campaign: Campaign, theory: Estimability) -> str:
     """Say what may keep an adjustment from converging."""
-    found = recognise(campaign, get_approach("gravity" if campaign.angles is None else "robot"))
+    found = recognise(campaign, usual_approach(campaign))
     more = "`accelstudy diagnose` looks for more"
     if found is not None:
         return f"this looks like a gross error ({words(found.name)}): {found.reason}; {more}"

@@ -6,10 +6,10 @@ import numpy as np
 import pandas as pd
 
 from accelstudy.adjustment.quality import solve
-from accelstudy.approaches import Approach, get_approach
+from accelstudy.approaches import Approach
 from accelstudy.basics.units import display_unit, to_display
 from accelstudy.basics.wording import number
-from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.calibration.fit import fit_campaign, usual_approach
 from accelstudy.campaign.files.session import Campaign
 from accelstudy.diagnosis.space.examined import ExaminedFit, examine
 from accelstudy.diagnosis.worth.limits import visibilities
@@ -31,9 +31,7 @@ def examine_campaign(
     model : SensorModel
     approach : Approach; by default robot-aided if the campaign has the robot's angles
     """
-    if approach is None:
-        approach = get_approach("gravity" if campaign.angles is None else "robot")
-    fit = fit_campaign(campaign, model, approach)
+    fit = fit_campaign(campaign, model, approach or usual_approach(campaign))
     return examine(solve(fit.model, fit.approach, fit.observed, fit.adjustment))
 
 

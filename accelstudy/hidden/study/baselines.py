@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from accelstudy.adjustment.quality import solve
-from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.calibration.fit import fit_campaign, usual_approach
 from accelstudy.campaign.files.session import Campaign
 from accelstudy.diagnosis.space.examined import examine
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis
@@ -51,7 +50,7 @@ class Problem:
     @classmethod
     def of(cls, campaign: Campaign, model: SensorModel) -> Problem:
         """Problem of a campaign; an unknown sigma is that of the residuals."""
-        approach = get_approach("gravity" if campaign.angles is None else "robot")
+        approach = usual_approach(campaign)
         known = campaign.sigma_force is not None
         fit = fit_campaign(campaign, model, approach)
         for _ in range(0 if known else 2):
