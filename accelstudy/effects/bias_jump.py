@@ -10,7 +10,7 @@ LEAST = 2
 
 @register
 class BiasJump(Effect):
-    """Bias step c for t > t_c; the time t_c is searched between the holds."""
+    """Bias step c for t > t_c; the time t_c is searched for between the holds."""
 
     name = "bias_jump"
     family = "sudden change"

@@ -8,7 +8,7 @@ from accelstudy.effects.base import Effect, per_axis, register
 
 @register
 class WarmUp(Effect):
-    """Warm-up transient w exp(−t/τ); the time constant τ is searched."""
+    """Warm-up transient w exp(−t/τ); the time constant τ is searched for."""
 
     name = "warm_up"
     family = "slow change in time"
