@@ -20,11 +20,17 @@ def code(value: object) -> str:
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     """A table; columns that are empty throughout are left out."""
-    filled = [[" ".join(str(value).split()).replace("|", "\\|") for value in row] for row in rows]
+    filled = [[_cell(value) for value in row] for row in rows]
     kept = [i for i in range(len(heads)) if any(row[i] for row in filled)]
     lines = [[heads[i] for i in kept], ["---" for _ in kept]]
     lines += [[row[i] for i in kept] for row in filled]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
+
+
+def _cell(value: object) -> str:
+    """Text on one line; a bar outside code does not end the cell."""
+    parts = " ".join(str(value).split()).split("`")
+    return "`".join(p.replace("|", "\\|") if i % 2 == 0 else p for i, p in enumerate(parts))
 
 
 def page(*parts: str) -> str:
