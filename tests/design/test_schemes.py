@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from places import SHARED
+from scheme_helpers import KNOWN
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
@@ -60,26 +61,8 @@ def sphere_moment(*powers):
 
 
 def test_names_are_those_of_the_literature_and_more():
-    known = (
-        "faces-6",
-        "d-optimal-9",
-        "icosahedron-12",
-        "faces-edges-18",
-        "dodecahedron-20",
-        "antipodal-free-24",
-        "fibonacci-24",
-        "mclaren-24",
-        "rhombicuboctahedron-24",
-        "rings-24",
-        "faces-edges-corners-26",
-        "icosidodecahedron-30",
-        "fibonacci-36",
-        "random-38",
-        "xsens-38",
-        "fibonacci-50",
-    )
     names = scheme_names()
-    assert tuple(name for name in names if name in known) == known
+    assert tuple(name for name in names if name in KNOWN) == KNOWN
     sizes = [get_scheme(name).n_positions for name in names]
     assert sizes == sorted(sizes)
     assert {*scheme_families()} >= {
@@ -287,9 +270,7 @@ def test_aligned_orbits_do_not_determine_cubic_terms_by_gravity():
     assert condition(np.hstack([gravity_design(u), u**4])) == pytest.approx(16, abs=0.5)
 
 
-@pytest.mark.parametrize(
-    "name", [name for name in scheme_names() if get_scheme(name).n_positions > 17]
-)
+@pytest.mark.parametrize("name", [name for name in KNOWN if get_scheme(name).n_positions > 17])
 def test_orders_keep_a_drift_apart_from_the_parameters(name):
     """A linear drift of each bias, beside the 9 parameters (norm) and beside the affine ones."""
     u = get_scheme(name).directions

@@ -54,7 +54,7 @@ json.dump(found, open("found.json", "w"))
 """
 COMMANDS = {
     "effects": ("effects",),
-    "scheme": ("schemes", "cones-16", "cones-40", "--approach", "turntable"),
+    "scheme": ("schemes", "cones-18", "cones-40", "--approach", "turntable"),
     "simulate": (
         "simulate-campaign", "--out", "mine", "--scheme", "fibonacci-60",
         "--effect", "dead_zone(width=2): 0.02, 0.01, -0.01", "--noise-effect", "shared_noise",
@@ -114,7 +114,7 @@ def test_a_noise_effect_is_in_the_catalogue(found):
 
 def test_a_scheme_and_an_approach_say_what_they_determine(found):
     rows = {line.split()[0]: line.split() for line in found["scheme"].splitlines() if line.strip()}
-    for n in (16, 40):
+    for n in (18, 40):
         assert rows[f"cones-{n}"][1:4] == [str(n), "generated", "9/9"]
         assert int(rows[f"cones-{n}"][5]) == 2 * n - 9
 
