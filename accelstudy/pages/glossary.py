@@ -1,4 +1,4 @@
-"""The glossary: what the terms on the pages mean, in hover and at the foot of each page."""
+"""The glossary: the terms of the pages, explained by hovering and at the foot of each page."""
 
 from __future__ import annotations
 
@@ -11,27 +11,28 @@ FOOT = "<!-- terms -->"
 TERMS = {
     "a posteriori": "from the residuals of the adjustment",
     "a priori": "as stated beforehand, in the header of the campaign",
-    "condition": "how much worse the least well known combination of parameters is known than the "
-    "best; of the scaled design, 1 is ideal and 10⁶ hopeless",
-    "credible set": "explanations, the most probable first, until they hold a probability of 0.9 "
-    "together",
-    "excess χ²": "what the squared residuals sum up to beyond what the noise explains",
-    "family": "effects that are alike in what they do, and easily taken for each other",
+    "condition": "uncertainty of the least known combination of parameters over that of the best "
+    "known; for the scaled design 1 is ideal and 10⁶ hopeless",
+    "credible set": "the most probable explanations, as many as it takes for a probability of 0.9",
+    "excess χ²": "sum of the squared residuals beyond what the noise explains",
+    "family": "effects that act alike and are easily confused",
     "global test": "whether the residuals together are as large as the stated noise says (χ² test "
     "of the whole model)",
-    "held-out": "of positions that a fit did not use and then predicted",
+    "held-out": "not used by a fit, which then predicts it; said of positions",
     "MDB": "minimal detectable bias: the error that a test of level 0.1 % finds with a power of "
     "80 %",
-    "MIB": "minimal identifiable bias: the size at which an effect can also be told from the one "
-    "that it is most like",
-    "misclosure": "what is left of a condition, such as |f| = g, before the adjustment",
-    "p-value": "how often noise alone would look like this; no probability that a name is right",
-    "posterior probability": "how probable an explanation is once the data are seen, given that "
+    "MIB": "minimal identifiable bias: the size at which an effect can also be distinguished from "
+    "the one that is most similar to it",
+    "misclosure": "amount by which a condition, such as |f| = g, fails before the adjustment",
+    "p-value": "how often noise alone would look like this; not the probability that a name is "
+    "right",
+    "posterior probability": "how probable an explanation is after the data are seen, given that "
     "something is missing",
-    "purity": "how alike the members of a set are, by the smallest cosine of two of them: near 1 "
-    "they are rivals, near 0 they are what happened to be left over",
-    "redundancy": "conditions less unknowns: what is left to check a fit; 0 checks nothing",
-    "residual": "what a fit leaves of an observation",
+    "purity": "similarity of the members of a set, by the smallest cosine of two of them: near 1 "
+    "they are rivals, near 0 they have nothing in common",
+    "redundancy": "number of conditions minus number of unknowns: what is left to check a fit; 0 "
+    "checks nothing",
+    "residual": "difference between an observation and its value by the fit",
     "rms": "root of the mean square",
     "signature": "the pattern that an effect would leave in the residuals",
     "variance components": "factors on the stated variances of sensor and robot; 1 if both are "
@@ -53,7 +54,7 @@ FORMS = {
     "signatures": "signature",
     "variances of unit weight": "variance of unit weight",
 }
-"""Other forms under which they stand on a page."""
+"""Other forms of the terms."""
 
 _KNOWN = {**{term.lower(): term for term in TERMS}, **FORMS}
 _WORD = re.compile(
@@ -64,9 +65,9 @@ _APART = re.compile(r"(<(svg|style|script|select|title|pre|code|a)\b.*?</\2>|<[^
 
 
 def explained(page: str) -> str:
-    """Explain the terms of a page: the first time by hovering, and all of them at its foot.
+    """Explain the terms of a page: at their first use by hovering, and all of them at its foot.
 
-    Figures, links and commands are left as they are. A page without the mark `FOOT` has no list.
+    Figures, links and commands stay unchanged. A page without the mark `FOOT` gets no list.
     """
     found: dict[str, str] = {}
 

@@ -66,7 +66,7 @@ class Spoiler:
     unit : str, SI
     size : float, SI; inf if no size of it matters
     usual : (float, float), SI, sizes of good and of cheap equipment
-    verdict : "spoils it", "may spoil it" or "no matter"
+    verdict : "spoils it", "may spoil it" or "does not matter"
     """
 
     effect: str
@@ -173,7 +173,9 @@ def spoilers(question: Question, candidate: Candidate) -> list[Spoiler]:
         # An effect without influence leaves rounding errors only.
         size = math.inf if each < 1e-6 else question.target / each
         low, high = effect.typical
-        verdict = "no matter" if size > high else "may spoil it" if size > low else "spoils it"
+        verdict = "spoils it"
+        if size > low:
+            verdict = "may spoil it" if size <= high else "does not matter"
         unit = effect.parameters[0].unit
         found.append(Spoiler(name, unit, size, (low, high), verdict))
     return found

@@ -225,11 +225,11 @@ def _need(need: Need) -> str:
     size = f"{quantity_text(need.size, unit)}, {need.source}"
     what = []
     if not math.isnan(need.left):
-        leaves = "would leave" if need.in_model else "leaves"
-        what.append(f"left out, it {leaves} {_angle(need.left)}")
+        remains = "would remain" if need.in_model else "remains"
+        what.append(f"without it {_angle(need.left)} {remains}")
     if not math.isnan(need.cost):
         costs = "costs" if need.in_model else "would cost"
-        what.append(f"to estimate it {costs} {_angle(need.cost)}")
+        what.append(f"estimating it {costs} {_angle(need.cost)}")
     elif not need.in_model:
         what.append("these positions do not determine it")
     return f"{effect} ({size}): {VERDICTS[need.verdict]}; {comma_list(what)}"
@@ -238,7 +238,7 @@ def _need(need: Need) -> str:
 def _spoiler(spoiler: Spoiler) -> str:
     low, high = (quantity_text(v, spoiler.unit) for v in spoiler.usual)
     if math.isinf(spoiler.size):
-        return f"{PLAIN[spoiler.effect]}: no matter, of whatever size"
+        return f"{PLAIN[spoiler.effect]}: does not matter, whatever its size"
     size = quantity_text(spoiler.size, spoiler.unit)
     return f"{PLAIN[spoiler.effect]}: {size} (usual: {low} to {high}): {spoiler.verdict}"
 
