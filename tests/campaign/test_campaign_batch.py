@@ -284,9 +284,10 @@ def test_code_on_which_it_depends(tmp_path, monkeypatch):
     stages = ("calibrate", "overview", "simulate")
     monkeypatch.setattr(accelstudy, "__file__", str(package / "__init__.py"))
     expected = {
-        "campaign/calibration/fit.py": {"calibrate", "overview"},
+        "campaign/calibration/fit.py": {"calibrate"},
         "campaign/batch/overview.html.j2": {"calibrate", "overview"},
-        "adjustment/quality/positions.py": {"calibrate", "overview"},
+        "adjustment/quality/positions.py": {"calibrate"},
+        "campaign/calibration/states.py": {"calibrate", "overview"},
         "effects/bias.py": {*stages},
         "study/monte_carlo/simulate.py": {"simulate"},
         "commands/main.py": set(),

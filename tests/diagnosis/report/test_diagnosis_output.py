@@ -223,7 +223,7 @@ def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
         "temperature / °C",
         "takes thermal bias, and its sigmas do not know of the others",
         "accelstudy diagnose CAMPAIGN --model bias-scale-nonorthogonality --approach robot",
-        "credible set explanations, the most probable first",
+        "credible set the most probable explanations",
     ):
         assert words in text, words
     assert yaml.safe_load((tmp_path / "model.yaml").read_text("utf-8"))["models"]
