@@ -180,6 +180,7 @@ def schemes():
         rows.append(
             (
                 code(scheme.name),
+                _positions(scheme.directions),
                 scheme.n_positions,
                 scheme.status,
                 f"{scheme.fourth_moment:.4f}",
@@ -194,7 +195,10 @@ def schemes():
         "1/15 = 0.0667 on the sphere, and the closed forms of the standard deviations contain it. "
         "*Pole* is the smallest angle to the x axis, where roll is undefined. What a scheme can "
         "determine is listed by `accelstudy schemes`, and its directions by `accelstudy scheme`.",
-        table(("scheme", "n", "status", "m", "pole [gon]", "source"), rows),
+        table(("scheme", "positions", "n", "status", "m", "pole [gon]", "source"), rows),
+        "The small drawings show where gravity points in the frame of the sensor, on maps of equal "
+        "area: left the half with the sensor upright, with x up and y to the right, right the half "
+        "with it upside down.",
         "*exact* are the positions of the source, *standard* the usual set of that kind, "
         "*stand-in* a substitute because the source does not publish its own, and *generated* "
         "positions follow a rule.",
@@ -202,8 +206,24 @@ def schemes():
         "A family has a member for each number: N positions (1 to 9999), and a seed where it is "
         "random.",
         table(("family", "for example"), [(code(f), code(_member(f))) for f in scheme_families()]),
-        "A scheme of your own is a YAML file such as `accelstudy design` writes, or a "
-        "`positions.csv`; its path stands wherever a scheme is asked for.",
+        "A scheme of your own is a YAML file such as `accelstudy design` writes. Its path stands "
+        "wherever a scheme is asked for. [A new scheme](../tutorials/scheme.md) shows both ways.",
+    )
+
+
+def _positions(directions):
+    """Two maps of equal area, of the directions with z positive and of those with z negative."""
+    dots = []
+    for x, y, z in directions:
+        stretch = 20 * math.sqrt(1 / (1 + abs(z)))
+        middle = 22 if z >= 0 else 68
+        dots.append(
+            f'<circle cx="{middle + stretch * y:.1f}" cy="{22 - stretch * x:.1f}" r="1.9"/>'
+        )
+    edges = "".join(f'<circle class="edge" cx="{x}" cy="22" r="20"/>' for x in (22, 68))
+    return (
+        f'<svg class="positions" viewBox="0 0 90 44" role="img" '
+        f'aria-label="{len(directions)} positions">{edges}{"".join(dots)}</svg>'
     )
 
 
