@@ -42,7 +42,7 @@ class BaseFit:
 
     @cached_property
     def _fit(self) -> tuple[Solution, bool]:
-        """The fit, and whether its sigma is supposed to be that of the noise within the holds."""
+        """The fit, and whether its sigma is that of the noise within the holds."""
         campaign = self.campaign
         # Without a sigma the weights of forces and angles need one: that of the residuals.
         for _ in range(1 if self.sigma_known else 3):

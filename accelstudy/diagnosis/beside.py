@@ -44,10 +44,10 @@ class Beside:
 
     @cached_property
     def location(self) -> dict[str, float]:
-        """Shares of the excess χ² above the given noise or, without it, above what is left.
+        """Shares of the excess χ² above the noise.
 
-        That is the noise after what was found or, if something unknown is missing, the least that
-        any group of regressors leaves.
+        The noise is the given one. Where none is given, it is what remains after what was found or,
+        if something unknown is missing, the least that any group of regressors leaves.
         """
         residuals, groups = self.search.residuals, self.search.groups
         variance = self.variance
@@ -103,7 +103,7 @@ class Beside:
 
     @cached_property
     def suspects(self) -> tuple[tuple[int, float], ...]:
-        """Places of positions that a calibration by the base model marks, and their p-values."""
+        """Indices of positions that a calibration with the base model marks, and their p-values."""
         if self.search.exact:
             return ()
         first = self.search.first

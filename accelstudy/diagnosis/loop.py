@@ -2,7 +2,7 @@
 
 Sessions of the campaign's own positions, holds and noise are simulated with the base model as it
 was fitted (the old simulation) and with the extended one (the new simulation), and calibrated. The
-variance of unit weight of the measurement has to be one of those of the right simulation.
+right simulation contains the variance of unit weight of the measurement.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ Array = NDArray[np.float64]
 
 REPLICATES = 1000
 CASES = (("old", "base"), ("new", "base"), ("new", "extended"))
-"""Simulations and the calibrations that are made of them."""
+"""Each simulation with a model by which it is calibrated."""
 COLUMNS = [
     *("simulation", "calibration", "replicate"),
     *("sigma0_squared", "tilt_error_rad", "converged"),
 ]
 POSITIONS = 500_000
-"""Positions of all sessions of a simulation together, at most; they are drawn at once."""
+"""Most positions in all sessions of a simulation together; they are drawn at once."""
 LEAST = 100
 """Least number of sessions of a simulation, however many positions they have."""
 

@@ -140,7 +140,7 @@ class _Run:
     def probabilities(self, finding: Finding) -> dict[str, float]:
         """Posterior of each name, alone or with another; a class stands under its first name.
 
-        Where nothing is missing they only say what would come first, each name by itself.
+        Where nothing is missing, they only show which name would come first, each by itself.
         """
         if finding.posterior is None:
             return self.search.probabilities

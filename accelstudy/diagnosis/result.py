@@ -25,13 +25,13 @@ from accelstudy.diagnosis.worth.next_positions import NextPosition
 from accelstudy.sensors.sensor import SensorModel
 
 LEVEL_EFFECTS = 0.04
-"""Level of the test for anything that is missing, where the noise level is not tested, too."""
+"""Level of the test for anything that is missing, where the noise level is not tested as well."""
 
 
 def level_of_effects(sigma_known: bool) -> float:
     """Level of the test for anything that is missing.
 
-    With the tests of the noise it makes 5 %; with a stated sigma its level is one of them.
+    With the tests of the noise it makes 5 % in all. Where sigma is given, its test takes a part.
     """
     return LEVEL_EFFECTS - REFUTED if sigma_known else LEVEL_EFFECTS
 
@@ -177,7 +177,7 @@ class Diagnosis:
 
     @property
     def sigma_position(self) -> float:
-        """Noise of a position mean, m/s², as it is taken."""
+        """Noise of a position mean, m/s², that the diagnosis assumes."""
         return float(
             np.sqrt(self.unit_variance) * np.mean(self.final.frame.residuals.sigmas[:, :3])
         )

@@ -1,4 +1,4 @@
-"""What is said of the noise: its tests, and the verdict where no effect was significant."""
+"""The judgement of the noise: its tests, and the verdict where no effect is significant."""
 
 from __future__ import annotations
 
@@ -57,17 +57,17 @@ class NoiseJudge:
         return tuple(tests)
 
     def level(self, examined: ExaminedFit) -> NoiseTest:
-        """Test the level of the noise; of the base fit as the calibration does, by its own Ω."""
+        """Test the level of the noise; the base fit by its own Ω, as the calibration does."""
         if examined is self.search.examined:
             return level_test(Residuals.of(self.search.first))
         return level_test(examined.frame.residuals.positions)
 
     @cached_property
     def resolution(self) -> NoiseTest:
-        """Whether the readings are coarse, beside the noise of the base fit."""
+        """Whether the readings are coarse compared with the noise of the base fit."""
         residuals = self.search.residuals.positions
         sigma = float(np.mean(residuals.sigmas[:, :3]))
-        # A sigma far too large would take the attitudes for steps.
+        # With a sigma far too large, the attitudes would look like steps.
         noise = sigma * min(1.0, float(np.sqrt(residuals.variance)))
         return resolution_test(self.campaign.forces, noise)
 

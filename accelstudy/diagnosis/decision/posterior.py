@@ -52,7 +52,7 @@ class Posterior:
 
     @classmethod
     def of(cls, weighed: Sequence[Weighed]) -> Posterior:
-        """Gather; what means the same in this campaign is one."""
+        """Gather them; those that mean the same in this campaign become one."""
         merged: dict[tuple[tuple[str, ...], ...], Weighed] = {}
         for one in sorted(weighed, key=lambda one: -one.log_weight):
             key = tuple(sorted(one.classes))
@@ -66,7 +66,7 @@ class Posterior:
 
     @cached_property
     def told(self) -> tuple[Weighed, ...]:
-        """What is said of them, most probable first."""
+        """Those that are told, most probable first."""
         noise = next((i for i, one in enumerate(self.all) if one.names[0] in NOISES), None)
         single = {
             one.classes[0]: i for i, one in enumerate(self.all) if len(one.names) == 1 and one.best
@@ -93,7 +93,7 @@ class Posterior:
 
     @cached_property
     def explanations(self) -> tuple[Explanation, ...]:
-        """What is said, most probable first."""
+        """What is told, most probable first."""
         return tuple(
             Explanation(one.names, one.classes, p)
             for one, p in zip(self.told, _shares(self.told), strict=True)
@@ -101,12 +101,12 @@ class Posterior:
 
     @property
     def credible_set(self) -> tuple[Explanation, ...]:
-        """Smallest set of explanations that holds what is the case with 0.9."""
+        """Smallest set of explanations that holds the truth with a probability of 0.9."""
         return credible_set(self.explanations)
 
     @property
     def top(self) -> Weighed:
-        """The most probable of what is said."""
+        """The most probable of those that are told."""
         return self.told[0]
 
     @property
@@ -116,7 +116,7 @@ class Posterior:
 
 
 def _shares(weighed: Sequence[Weighed]) -> tuple[float, ...]:
-    """Probabilities of what excludes each other."""
+    """Probabilities of things that exclude each other."""
     return tuple(softmax([one.log_weight for one in weighed]).tolist())
 
 

@@ -67,7 +67,7 @@ class Refits:
         except (InputError, np.linalg.LinAlgError):
             return None
         if not base.approach.uses_angles:
-            # Readings without a force that belongs to them have no attitude either.
+            # Without a force that belongs to them, readings have no attitude.
             p = solution.parameters[: model.n_parameters]
             f_b = model.correct(observed.forces[0], p, solution.gravity, observed.hold)
             if np.isnan(f_b).any():

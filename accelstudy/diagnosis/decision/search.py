@@ -1,4 +1,4 @@
-"""The search for what a fitted model lacks: the evidence of all that could be the case."""
+"""The search for what a fitted model lacks: the evidence for each possibility."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ class Search:
 
     @cached_property
     def axes(self) -> UnequalAxes:
-        """How probable it is that the axes differ in noise, by the fit with equal ones."""
+        """How probable it is that the axes differ in noise, from the fit with equal ones."""
         residuals = self.equal.frame.residuals
         evidence = Evidence(self.level, residuals.redundancy)
         return UnequalAxes.of(residuals, evidence, self.within)

@@ -1,4 +1,4 @@
-"""The verdict: which explanation is given, of the posterior over all."""
+"""The verdict: which explanation of the posterior is given."""
 
 from __future__ import annotations
 
@@ -241,7 +241,7 @@ def lack_of_fit(search: Search) -> float:
 
 
 def _of_fit(residuals: Residuals, square: float, freedom: int) -> float:
-    """F test of all that is no difference of repeats against their differences."""
+    """F test of all but the differences of repeats against these differences."""
     rest = residuals.redundancy - freedom
     if not freedom or not rest:
         return 1.0

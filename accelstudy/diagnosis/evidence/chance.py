@@ -85,5 +85,5 @@ class Chance:
             yield changed - (changed @ residuals.absorbed) @ residuals.absorbed.T
 
     def statistic(self, residuals: Residuals, function: Callable[[Array], Array]) -> Array:
-        """Return a statistic of residuals (b, m), the first axis of its values being the set."""
+        """Return a statistic of all simulated residuals (b, m); its first axis is the set."""
         return np.concatenate([function(errors) for errors in self.errors(residuals)])

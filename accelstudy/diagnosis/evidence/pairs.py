@@ -16,7 +16,7 @@ from accelstudy.diagnosis.space.residuals import Residuals
 Array = NDArray[np.float64]
 
 COLLINEAR = 0.05
-"""Two spaces are tried together only if the second keeps this share beside the first."""
+"""Two spaces are tried together only if this share of the second is left beside the first."""
 POSITIONS = 100
 """Bumped positions that are tried in pairs, at most."""
 ROWS = 4096
@@ -122,7 +122,7 @@ class _Products:
         starts = np.cumsum(dims) - dims
         gram = np.zeros((dims.sum(),) * 2)
         seen = np.zeros(len(gram))
-        # Some conditions after the other: all bases together would need the memory once more.
+        # In blocks of conditions: all bases together would need twice the memory.
         for rows in np.array_split(np.arange(len(z)), len(z) // ROWS + 1):
             part = np.concatenate([h.basis[rows[0] : rows[-1] + 1] for h in hypotheses], axis=1)
             gram += part.T @ part
@@ -134,7 +134,7 @@ class _Products:
     ) -> tuple[Array, NDArray[np.bool_]]:
         """Squares of what residuals have in two spaces together, and whether these are two.
 
-        All of one dimension, (j,) each, the first of either is not the smaller one.
+        (j,) each. All large ones have one dimension, and all small ones.
         """
         a, b = (
             self.starts[places][:, None] + np.arange(self.dims[places[0]])

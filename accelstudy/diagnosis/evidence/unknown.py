@@ -17,7 +17,7 @@ def unknown_beside(
 ) -> float | None:
     """Log evidence of something unknown beside a hypothesis, against the hypothesis alone.
 
-    None where no group has anything beside it.
+    None where no group has a direction of its own beside it.
     """
     q = hypothesis.basis
     left = residuals.z - q @ (q.T @ residuals.z)

@@ -1,1 +1,1 @@
-"""What positions say of a finding that were used neither to choose nor to fit it."""
+"""The test of a finding on positions that were used neither to choose nor to fit it."""

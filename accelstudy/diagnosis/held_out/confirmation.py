@@ -21,7 +21,7 @@ from accelstudy.diagnosis.held_out.linear import LinearSplit
 Array = NDArray[np.float64]
 
 LEAST = 3
-"""Positions that are to be predicted, at least."""
+"""Least number of positions to predict."""
 BESIDE = 3
 """Other explanations with which a name is compared."""
 
@@ -128,7 +128,7 @@ def _same(classes: Sequence[Sequence[str]], names: Sequence[str]) -> bool:
 
 
 def _refit(part: Search, chosen: Sequence[Choice]) -> Solution | str:
-    """Fit to a part with what was chosen; why not if that cannot be."""
+    """Fit to a part with what was chosen, or say why that cannot be."""
     alternatives = []
     for choice in chosen:
         shown = tuple(m for m in choice.members if m in part.examined.candidates)

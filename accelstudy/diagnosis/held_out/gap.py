@@ -1,4 +1,4 @@
-"""Whether a named effect helps where it was neither chosen nor fitted: on held-out positions.
+"""Whether a named effect helps on held-out positions, where it was neither chosen nor fitted.
 
 Base model and extended model are fitted to some positions and predict the others. With r the
 misclosures of unit weight that the base model leaves there, A₂ their derivatives, C the cofactors
@@ -67,8 +67,8 @@ def split_positions(
 ) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
     """Split positions into fitted and held-out ones, alike in direction, time and temperature.
 
-    Of many random splits the one whose two parts agree best in the first and second moments is
-    taken. It looks at where and when was measured, never at what.
+    Of many random splits the one is taken whose two parts agree best in the first and second
+    moments. It depends on where and when was measured, never on the readings.
 
     Parameters
     ----------

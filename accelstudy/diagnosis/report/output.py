@@ -50,7 +50,7 @@ def diagnose_folder(
     """
     chosen = get_model(model), None if approach is None else get_approach(approach)
     with result_folder(out, DIAGNOSIS, [campaign], force) as folder, stage("diagnosis"):
-        # A unit or an axis that is wrong is for the diagnosis to find, not for the reader.
+        # The diagnosis, not the reader, looks for wrong units and axes.
         measured = read_campaign(campaign, plausible=False)
         with stage("search for what is missing"):
             diagnosis = diagnose(measured, *chosen, seed=seed)

@@ -1,7 +1,7 @@
 """The signature of an effect: what it would leave in the observations, from its one definition.
 
 An effect of time changes the output within a hold, too. Its rate is the derivative of the same
-definition by the time of the hold, the temperature going on as it does from hold to hold.
+definition by the time of the hold; the temperature changes as it does from hold to hold.
 """
 
 from __future__ import annotations

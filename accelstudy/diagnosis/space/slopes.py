@@ -1,14 +1,14 @@
 """The slope of |f| within each hold, as evidence for effects of time.
 
-A hold that lasts shows how the bias changes while nothing moves. Of the slope of the samples only
-the part along gravity is taken: it is the rate of |f|, which no turning of the sensor changes, and
-real holds do turn. Beside a smooth course over the session the slopes show how far they scatter
-themselves. They often do so by more than their standard deviations say.
+A long hold shows how the bias changes while nothing moves. Only the part of the slope along gravity
+is used. It is the rate of |f|, which does not depend on how the sensor turns; in real holds it does
+turn. The deviations from a smooth course over the session show how far the slopes scatter, which is
+often more than their standard deviations say.
 
-One row for each hold would be many rows that tell nothing: for a change over the whole session the
-means of the holds know more than the slopes within them, by the square of its length over that of a
-hold. So only those combinations become rows of the residual space that add to what the means say of
-an effect of time.
+One row for each hold would add many rows without information. Of a change over the whole session
+the means of the holds tell more than the slopes, by the square of the ratio of the session's length
+to that of a hold. So only those combinations of slopes become rows of the residual space that add
+to what the means tell of an effect of time.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 An effect with the signature S (whitened, by its parameters p) that a model with the design Ã lacks
 shifts the estimates of the model by −(ÃᵀÃ)⁻¹ Ãᵀ S p (omitted-variable bias). With the effect added
-they shift back, by that much if all is of first order and the model is right now.
+they shift back: by as much, if first order is enough and the extended model is right.
 """
 
 from __future__ import annotations

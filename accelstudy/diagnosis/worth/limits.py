@@ -75,8 +75,8 @@ def upper_limits(examined: ExaminedFit, variance: float, named: Sequence[str]) -
     """95 % limits |p̂| + 1.96 σ of the parameters of all effects that were not found.
 
     Each effect is estimated beside the parameters of the model, in the shape that fits best of
-    those in which all its parameters show; given is the parameter that is known worst. Effects of
-    which a combination of parameters shows in no shape have no limit.
+    those in which all its parameters show. The limit is that of the parameter that is known worst.
+    An effect without such a shape has no limit.
     """
     limits = []
     for name, shapes in examined.candidates.items():
@@ -103,11 +103,13 @@ def visibilities(
 ) -> list[Visibility]:
     """What a campaign can show of each effect that is not in its model.
 
-    The MDB is the size √(λ0 / dᵀd) of a single parameter whose test of level `alpha` has `power`;
-    for the minimal identifiable bias only what the nearest rival cannot imitate of d counts. An
-    effect with a setting is taken in the shape that shows best of those that a diagnosis tries, and
-    in which all its parameters show if there is one; as a jump may happen at any time, the shape
-    that shows worst is given, too.
+    The minimal detectable bias (MDB) is the size √(λ0 / dᵀd) of a single parameter at which its
+    test of level `alpha` has `power`. For the minimal identifiable bias (MIB) only the part of d
+    counts that the nearest rival cannot imitate.
+
+    Of the shapes of an effect that a diagnosis tries, the one that shows best is judged, and of
+    those in which all parameters show if there are any. The shape that shows worst is given as
+    well, since a jump may happen at any time.
     """
     root = np.sqrt(noncentrality(1, alpha, power))
     rows = []

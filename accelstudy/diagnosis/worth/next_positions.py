@@ -58,13 +58,14 @@ class NextPosition:
 def next_positions(frame: Frame, first: Explanation, second: Explanation) -> list[NextPosition]:
     """Positions that separate two explanations of the same residuals best.
 
-    Both are fitted to all positions, each together with the parameters of the model. Of a grid of
-    attitudes, at the lowest, middle and highest temperature so far and right after the session or
-    later, those are chosen one after the other that add most to the separation, in which the
-    explanation that is wrong may be fitted to them, too (`accelstudy.proposal.separation`).
-    Temperature and time vary only where one of the effects depends on them. Where the attitude
-    hardly matters, those from the start of the session are to be repeated, so that readings can be
-    compared without any model.
+    Both are fitted to all positions, each together with the parameters of the model. The candidates
+    are a grid of attitudes, at the lowest, middle and highest temperature so far, right after the
+    session or later. Temperature and time vary only where one of the effects depends on them. One
+    after the other, the candidate is chosen that adds most to the separation. The wrong explanation
+    is fitted to the new positions as well (`accelstudy.proposal.separation`).
+
+    Where the attitude hardly matters, the first attitudes of the session are repeated, so that
+    readings can be compared without any model.
 
     Parameters
     ----------

@@ -34,8 +34,8 @@ def leveling_rms(
     None if readings of the extended sensor, which clips, have no tilt.
 
     It is taken over all tilts up to 50 gon and over the temperatures, times and changes of position
-    of the campaign. The noise of the leveled reading itself is not in it, and neither is what
-    belongs to the rig, which is not there when the sensor is used.
+    of the campaign. The noise of the leveled reading is not included, nor are effects of the rig,
+    which is absent when the sensor is used.
 
     Parameters
     ----------

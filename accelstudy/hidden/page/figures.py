@@ -59,7 +59,7 @@ def figures(tables: Tables) -> dict[str, Callable[[], Figure]]:
 
 
 def alarms(tables: Tables) -> Figure:
-    """How often something is found where nothing is missing, and an effect where it is noise."""
+    """False alarms where nothing is missing, and effects named where only the noise is wrong."""
     fig = _wide_labels(new_figure(FULL, 88))
     left, right = fig.subplots(1, 2)
     table = tables["shares"]
@@ -304,7 +304,7 @@ def _rows(ax: Axes, labels: pd.Series) -> None:
 
 
 def _legend(fig: Figure, columns: int) -> None:
-    """Add one legend below all axes, or say where there is nothing to be seen."""
+    """Add one legend below all axes, and say in empty axes that there is nothing to show."""
     entries: dict[str, Artist] = {}
     for ax in fig.axes:
         handles, labels = ax.get_legend_handles_labels()
@@ -316,7 +316,7 @@ def _legend(fig: Figure, columns: int) -> None:
 
 
 def _over_size(ax: Axes) -> None:
-    """Make the abscissa that of sizes, with a tick at each that was simulated."""
+    """Make the abscissa one of sizes, with a tick at each simulated size."""
     drawn = [np.asarray(curve[0].get_xdata(), dtype=float) for curve in ax.containers]
     sizes = np.unique(np.concatenate(drawn)) if drawn else np.array([25.0])
     ax.set_xscale("log")

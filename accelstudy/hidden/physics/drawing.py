@@ -77,7 +77,7 @@ def _of_usual_size(effect: Effect, session: Session, rng: np.random.Generator) -
 def _scaled(
     shape: Shape, lam: float, session: Session, conditions: Conditions, rng: np.random.Generator
 ) -> tuple[Cause, Array]:
-    """Draw parameters of a noncentrality; return the effect, and what it leaves, (m,)."""
+    """Draw parameters with a given noncentrality; return the effect and what it leaves, (m,)."""
     parameters = rng.standard_normal(shape.effect.k)
     if shape.effect.loses:
         parameters = abs(parameters)

@@ -67,7 +67,7 @@ def _unit_error(
 def _row_order(
     campaign: Campaign, session: Session, conditions: Conditions, rng: np.random.Generator
 ) -> tuple[Campaign, Settings]:
-    """Exchange what the sensor measured in two holds, in three in a ring, or turn some around."""
+    """Exchange the readings of two holds, of three in a ring, or reverse the order of some."""
     n = campaign.n_positions
     while True:
         order = np.arange(n)
@@ -122,6 +122,6 @@ GROSS: dict[str, GrossError] = {
 
 
 def visible_gross(design: str, approach: str) -> tuple[str, ...]:
-    """Names of the gross errors that an approach can see; of axes and order the norm tells none."""
+    """Names of the gross errors that an approach can see; the norm shows neither axes nor order."""
     blind = () if approach == "robot" else ("axis_error", "row_order")
     return tuple(name for name in GROSS if name not in blind)

@@ -23,9 +23,9 @@ ALPHA = 0.001
 def limit_rows(campaign: Campaign, model: SensorModel) -> list[dict[str, object]]:
     """Minimal detectable and identifiable sizes of all effects that a campaign can show.
 
-    Both are also given as noncentralities λ, which are the same for all parameters and units:
-    λ of the MDB is that of a test of one parameter, and grows by (MIB/MDB)² where the nearest
-    rival has to be excluded, too.
+    Both are also given as noncentralities λ, which do not depend on parameters and units. λ of the
+    MDB is that of a test of one parameter. λ of the MIB is larger by (MIB/MDB)², since the nearest
+    rival has to be excluded as well.
     """
     least = noncentrality(1, ALPHA, POWER)
     return [
@@ -107,7 +107,7 @@ def limit_table(judged: pd.DataFrame, limits: pd.DataFrame) -> pd.DataFrame:
 
 
 EDGES = (0.4, 0.6, 0.75, 0.9, 1.1, 1.35, 1.7, 2.2, 3.0, 4.5, 7.0)
-"""Bounds of sizes beside a limit that are looked at together."""
+"""Bounds of the classes of sizes relative to a limit."""
 
 
 def power_over(

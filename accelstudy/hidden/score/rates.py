@@ -12,7 +12,7 @@ from accelstudy.basics.shares import clopper_pearson
 ALL = "all"
 """Value of a column by which a share is not divided."""
 COLUMNS = ("set", "what", "size", "design", "approach", "sigma")
-"""What campaigns are divided by; of the size NaN stands for all, and for none."""
+"""Columns by which campaigns are divided; a size of NaN stands for all sizes, or none."""
 SPLITS: tuple[tuple[str, ...], ...] = (
     ("set",),
     ("set", "size"),

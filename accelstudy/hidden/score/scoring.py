@@ -18,7 +18,7 @@ from accelstudy.hidden.score.targets import targets
 from accelstudy.hidden.study.tables import KEY
 
 BINS = (0.0, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 1.0)
-"""Bounds of the stated probabilities that are looked at together."""
+"""Bounds of the classes of stated probabilities."""
 
 
 def score_tables(
@@ -102,7 +102,7 @@ def _answer_family(row: Mapping[Any, Any]) -> str:
 
 
 def calibration(judged: pd.DataFrame) -> pd.DataFrame:
-    """Probabilities that are stated, beside how often what they are stated of is true.
+    """Stated probabilities, beside how often they come true.
 
     Of campaigns with one or two effects in which something was found.
 

@@ -71,8 +71,8 @@ class Cell:
     def seed(self, seed: int, campaign: int) -> np.random.SeedSequence:
         """Seed of a campaign.
 
-        It depends on the study's seed, on the case and on the number of the campaign, so that no
-        other cell and no other campaign changes it.
+        It depends on the study's seed, the case and the number of the campaign only: no other cell
+        or campaign changes it.
         """
         words = np.frombuffer(_digest(self.case), dtype="<u4").tolist()
         return np.random.SeedSequence([seed, *words], spawn_key=(campaign,))
@@ -116,7 +116,7 @@ def study_cells(config: HiddenConfig) -> list[Cell]:
 
 
 def write_plan(config: HiddenConfig, path: str | Path) -> None:
-    """Write which campaigns there are in each chunk, which takes longer than to read it."""
+    """Write the campaigns of each chunk, so that the jobs need not plan the study again."""
     plan = [
         [{"case": asdict(cell.case), "campaigns": [part.start, part.stop]} for cell, part in chunk]
         for chunk in chunks(study_cells(config), number_of_chunks(config))

@@ -12,7 +12,7 @@ from accelstudy.diagnosis.result import Diagnosis, Named
 
 
 def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
-    """Describe a diagnosis; all numbers are in SI but those whose key names another unit."""
+    """Describe a diagnosis; numbers are in SI unless their key names another unit."""
     d = diagnosis
     test = d.global_test
     return {

@@ -31,7 +31,7 @@ def study_overlay(diagnosis: Diagnosis) -> dict[str, Any]:
     models = [composition_name(d.model.effects)]
     own: dict[str, list[str]] = {}
     if extended is not d.model:
-        # One model of the file's own, which is thus the one that it stands for.
+        # The one model of the file's own is the one that the file stands for.
         added = [e.name for e in extended.effects[len(d.model.effects) :]]
         name = "-".join([study_name(models[0]), *added])
         own = {"extended" if name in MODELS or len(name) > LONGEST else name: list(effects)}

@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 def positions_table(diagnosis: Diagnosis) -> pd.DataFrame:
-    """One row per position, in SI but where the name of a column says otherwise.
+    """One row per position, in SI unless the name of a column says otherwise.
 
     Columns
     -------

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 def diagnosis_figures(
     diagnosis: Diagnosis, positions: pd.DataFrame, loop: Loop | None = None
 ) -> dict[str, Callable[[], Figure]]:
-    """What draws each figure of a diagnosis; those of which there is nothing to show are left out.
+    """Return a function that draws each figure; figures that would show nothing are left out.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def diagnosis_figures(
         figures["explanations"] = lambda: explanations_figure(d.credible_set)
     if d.gap.held_out is not None:
         figures["gap"] = lambda: gap_figure(d, positions)
-    # Without sigma, the residuals of noise have no size that would be too much.
+    # Without sigma, no size of the residuals is too large for noise.
     if any(d.location.values()) and (d.sigma_known or d.verdict != "noise_model"):
         figures["location"] = lambda: location_figure(d)
     if loop is not None:

@@ -21,7 +21,7 @@ SIMULATION_COLOURS = {"old": "#999999", "new": "#56B4E9"}
 DIFFERENT = 5
 """Ratio of variances or tilt errors from which on an axis is logarithmic."""
 DIGITS = 48
-"""Digits of the numbers of positions that stand beside each other."""
+"""Most digits of position numbers along the axis."""
 LARGE = 20
 """Ratio of mean squares from which on bars are drawn on a logarithmic scale."""
 
@@ -107,7 +107,7 @@ def _draw_variances(ax: Axes, loop: Loop, calibration: str, simulations: tuple[s
     bins = np.geomspace(low, high, 50) if high > DIFFERENT * low else np.linspace(low, high, 30)
     for simulation, drawn in values.items():
         counts, _ = np.histogram(drawn, bins)
-        # To the same height, or a narrow distribution would hide a wide one.
+        # Scaled to the same height, or a narrow distribution would hide a wide one.
         ax.stairs(counts / counts.max(), bins, fill=True, color=SIMULATION_COLOURS[simulation])
     ax.axvline(measured, color=INK, linewidth=1.2, linestyle="--")
     _scale(ax, low, high)

@@ -39,7 +39,7 @@ def residual_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
     grid = figure.subplots(len(rows), len(panels), sharey=sharey, sharex="col", squeeze=False)
     # Labels of narrow panels must not meet.
     ticks = 3 if len(panels) > 2 else 5
-    # What is too large beside the noise that was stated has to look so.
+    # Residuals that exceed the stated noise must look too large.
     gap = diagnosis.gap
     posteriori = gap.before if gap.after is None else gap.after
     sigma = 1e3 * condition_sigma(diagnosis.base, 1.0 if diagnosis.sigma_known else posteriori)
@@ -64,7 +64,7 @@ def residual_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
 def _panels(
     diagnosis: Diagnosis, positions: pd.DataFrame, count: int
 ) -> dict[str, Callable[[int], Array]]:
-    """Abscissas of the panels by their labels, each a function of the component, of so many."""
+    """Abscissa of each panel by its label, as a function of the component; there are `count`."""
     frame = diagnosis.examined.frame
     unit = frame.forces / frame.solution.gravity
     panels: dict[str, Callable[[int], Array]] = {}
@@ -84,7 +84,7 @@ def _panels(
 
 
 def _abreast(values: Array, i: int, count: int) -> Array:
-    """Move component i of so many aside where so few values would let them hide each other."""
+    """Move component i of `count` aside where few values would let components hide each other."""
     if len(np.unique(values)) > FEW:
         return values
     return values + ABREAST * np.ptp(values) * (i - (count - 1) / 2)

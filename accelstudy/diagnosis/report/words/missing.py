@@ -21,12 +21,12 @@ FAMILIES = {
     "noise": "noise of another kind",
     "temperature": "an effect of temperature",
 }
-"""Families as what is missing; the others have an article before them."""
+"""What is missing, by family; other families get an article."""
 
 WORTH = 0.1
 """Posterior from which on something open is worth a word; the figure has all of it."""
 NOT_AN_EFFECT = {"unknown": "something that is not in the catalogue"}
-"""How names that stand for no effect are said."""
+"""Words for names that stand for no effect."""
 
 
 def name_words(name: str) -> str:
@@ -66,9 +66,9 @@ def without_a_name(credible_set: Sequence[Explanation]) -> str:
 
 
 def refuted(credible_set: Sequence[Explanation]) -> bool:
-    """Whether a set would be an answer, so that what has no name all the same is none of it.
+    """Whether a set would have been an answer if no test had refuted it.
 
-    Adding it left a misfit, say. It may imitate what is missing, and nothing of it is certain.
+    Added to the model, it left a misfit, say. It may imitate what is missing; nothing is certain.
     """
     effects, _ = _apart(credible_set)
     named = any(one.posterior >= SURE for one in effects)

@@ -1,4 +1,4 @@
-"""What a credible set says in all: what is certain, one thing after the other, and what is open.
+"""What a credible set says as a whole: what is certain, and what is open.
 
 Explanations of near rivals share the posterior, so that each has little of it. Together they may
 leave no doubt that a slow change in time is missing, say, and with it an even nonlinearity, while
@@ -20,7 +20,7 @@ from accelstudy.diagnosis.space.hypotheses import cosines
 Names = tuple[str, ...]
 
 DIGITS = 9
-"""To which sums of the same probabilities agree."""
+"""Decimals to which sums of the same probabilities agree."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Statement:
-    """What is known of that which is missing.
+    """What is known of what is missing.
 
     Attributes
     ----------
@@ -81,8 +81,8 @@ def statement(
 ) -> Statement:
     """Say what a credible set leaves no doubt of, and what it leaves open.
 
-    A name is certain if the explanations that have it hold enough together, and so is a family if
-    those that have one of its effects do. A set does not hold all explanations, so that these
+    A name is certain if the explanations that have it hold enough together. A family is certain if
+    those that have one of its effects do. A set does not hold all explanations, so these
     probabilities are lower bounds.
 
     Parameters
@@ -158,7 +158,7 @@ def _without(explanation: Explanation, names: Sequence[str]) -> Explanation:
 
 
 def cosine_in(examined: ExaminedFit) -> Callable[[str, str], float]:
-    """Return what tells the largest canonical cosine of two effects; 0 of what is no effect."""
+    """Return a function for the largest canonical cosine of two effects; 0 for other names."""
 
     def cosine(one: str, other: str) -> float:
         shapes = [examined.candidates.get(name, ()) for name in (one, other)]

@@ -122,7 +122,7 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
 
 
 def advice(diagnosis: Diagnosis) -> list[str]:
-    """Say what, beside further positions, would show more."""
+    """Say what would show more, apart from further positions."""
     d = diagnosis
     hidden = [words(name) for name in d.examined.invisible if name != "gravity_error"]
     lines = []
@@ -161,7 +161,7 @@ def confirmation(diagnosis: Diagnosis) -> str:
 
 
 def changed(diagnosis: Diagnosis) -> str:
-    """Say what the final fit does otherwise: with what was added, without what was left out."""
+    """Say how the final fit differs: with what was added, and without what was left out."""
     added = [words(named.name) for named in diagnosis.found if _is_effect(named)]
     out = [str(named.position) for named in diagnosis.found if named.position is not None]
     said = [f"with {comma_list(added)}"] if added else []
@@ -203,7 +203,7 @@ def _agreement(d: Diagnosis) -> str:
 
 
 def _narrowed(d: Diagnosis) -> list[str]:
-    """Say what cannot be told apart, what could tell it, and what the rest is said of."""
+    """Say what cannot be told apart, what could do it, and what all else refers to."""
     if d.verdict != "narrowed":
         return []
     said = not_told_apart(d.credible_set)

@@ -187,7 +187,7 @@ def _gravity(rig: Rig, p: Array, s: Settings, session: Session) -> None:
 
 
 def _tilt(rig: Rig, p: Array, s: Settings, session: Session) -> None:
-    # So turned, the base sees g (a, b, −1) instead of g (0, 0, −1).
+    # With this turn the base sees g (a, b, −1) instead of g (0, 0, −1).
     turn = np.zeros((*p.shape[:-1], 3))
     turn[..., 0], turn[..., 1] = p[..., 1], -p[..., 0]
     rig.tilt = rig.tilt + turn

@@ -222,7 +222,7 @@ def oracle(design: str, approach: str) -> Oracle:
 
 @cache
 def visible_outside(design: str, approach: str) -> tuple[str, ...]:
-    """Names of what can be seen, is in no catalogue, and is not like any two effects that are."""
+    """Names of effects outside the catalogue that show, and that no two effects of it imitate."""
     knowing, rng = oracle(design, approach), np.random.default_rng(0)
     own, found = knowing.atlas, []
     for name, effect in OUTSIDE.items():
