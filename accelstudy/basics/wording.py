@@ -14,7 +14,7 @@ def words(name: str) -> str:
 
 
 def comma_list(items: Sequence[str], last: str = "and") -> str:
-    """Join words: a, b and c; nothing of none."""
+    """Join words: a, b and c; an empty text for no words."""
     if len(items) < 2:
         return "".join(items)
     return f"{', '.join(items[:-1])} {last} {items[-1]}"
@@ -58,17 +58,17 @@ def interval(low: float, high: float) -> str:
 
 
 def one_line(text: object, length: int = 100) -> str:
-    """Text, or what an error says, in one line that fits into a message."""
+    """Text, or the message of an error, shortened to one line."""
     line = " ".join(str(text).split()) or type(text).__name__
     return line if len(line) <= length else f"{line[:length]} …"
 
 
 def counted(number: int, noun: str) -> str:
-    """Number and noun, in the plural where that is right."""
+    """Number and noun, in the plural unless the number is 1."""
     return f"{number} {noun}" + ("" if number == 1 else "s")
 
 
 def short_list(names: Sequence[str], most: int = 20) -> str:
-    """Names, the first ones of many and the beginnings of long ones, in one line."""
+    """Names in one line: the first of many, and the beginnings of long ones."""
     shown = ", ".join(one_line(name, 30) if name.strip() else repr(name) for name in names[:most])
     return shown + (", …" if len(names) > most else "")

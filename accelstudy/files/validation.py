@@ -16,7 +16,7 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 class Block(BaseModel):
-    """A part of the configuration; keys that it does not know are errors."""
+    """A part of the configuration; unknown keys are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=False)
 
@@ -45,14 +45,13 @@ def checked(
     try:
         return model.model_validate(content)
     except ValidationError as error:
-        at = f"{source}: {section}." if section else f"{source}: "
-        raise InputError(f"{at}{_first_error(error, model)}") from None
+        raise InputError(f"{source}: {_first_error(error, model, section)}") from None
 
 
-def _first_error(error: ValidationError, root: type[BaseModel]) -> str:
+def _first_error(error: ValidationError, root: type[BaseModel], section: str) -> str:
     """Say in one line which key of a `root` is wrong, and what would be right."""
     first, *others = error.errors()
-    key = ".".join(str(part)[:100] for part in first["loc"])
+    key = ".".join(str(part)[:100] for part in (section, *first["loc"]) if part != "")
     if first["type"] == "extra_forbidden":
         text = f"{key}: unknown key"
         siblings = _keys_beside(first["loc"], root)
@@ -73,7 +72,7 @@ def _first_error(error: ValidationError, root: type[BaseModel]) -> str:
 
 
 def _keys_beside(location: Sequence[str | int], root: type[BaseModel]) -> list[str]:
-    """Keys that are known where an unknown one stands."""
+    """Keys that are known in the place of an unknown one."""
     block = root
     for part in location[:-1]:
         field = _keys(block).get(str(part))

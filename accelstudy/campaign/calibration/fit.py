@@ -177,7 +177,7 @@ def least_sigma(campaign: Campaign, approach: Approach) -> float:
 
 
 def campaign_observations(campaign: Campaign) -> Observations:
-    """Return a campaign as the adjustment takes it, R = 1."""
+    """Observations of a campaign for the adjustment, R = 1."""
     noise, known = campaign_noise(campaign), campaign.sigma_force is not None
     return Observations(
         forces=campaign.forces[None],

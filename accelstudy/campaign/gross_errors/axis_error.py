@@ -107,7 +107,7 @@ def _reason(matrix: Array) -> str:
     words = ", ".join(
         f"{axis} is read as {'−' if sign < 0 else ''}{'xyz'[other]}"
         for axis, other, sign in zip("xyz", axes, signs, strict=True)
-        if (axis, sign) != ("xyz"[other], 1.0)
+        if sign < 0 or axis != "xyz"[other]
     )
     wrong = "have the wrong sign" if (axes == range(3)).all() else "are swapped"
     return f"axes {wrong}: {words}"

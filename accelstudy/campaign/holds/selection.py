@@ -24,8 +24,8 @@ class Selection:
     ----------
     numbers : mapping of int to str, holds that are left out, with the reason
     spans : tuple of (from, to, reason), s since the start of the log; holds in them are left out
-    joined : tuple of tuples of int, holds that are one
-    joined_spans : tuple of (from, to), s likewise; holds in one of them are one
+    joined : tuple of tuples of int, holds that are one hold
+    joined_spans : tuple of (from, to), s since the start of the log; holds in one are one hold
     """
 
     numbers: Mapping[int, str] = field(default_factory=dict)

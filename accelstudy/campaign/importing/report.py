@@ -1,4 +1,4 @@
-"""What an import found, in plain lines."""
+"""The report of an import, as lines of text."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from accelstudy.campaign.holds.detection import DetectedHolds
 
 @dataclass(frozen=True)
 class ImportReport:
-    """What an import found.
+    """The report of an import.
 
     Attributes
     ----------
     n_holds : int
     accuracy : MeanAccuracy, of the mean of a typical hold; None from a table of means
-    sigma_white : float, m/s², of a mean if the noise were white; None if unknown
+    sigma_white : float, m/s², sd of a mean if the noise were white; None if unknown
     holds : DetectedHolds, None from a table of means
-    notes : tuple of str, what was taken for what
+    notes : tuple of str, assumptions of the import
     warnings : tuple of str
     """
 
@@ -41,7 +41,7 @@ class ImportReport:
         return None if self.accuracy is None else self.accuracy.ratio
 
     def lines(self) -> list[str]:
-        """Return the report in plain lines."""
+        """Return the report as lines of text."""
         if self.holds is None or self.accuracy is None:
             sigma = "unknown" if self.sigma_white is None else shown(self.sigma_white)
             return [f"{self.n_holds} positions; sigma of a mean: {sigma}", *self.notes]

@@ -1,4 +1,4 @@
-"""Figure of a log with its static holds, by which a person judges the segmentation."""
+"""The figure of a log with its static holds, to judge the segmentation by eye."""
 
 from __future__ import annotations
 
@@ -25,14 +25,15 @@ from accelstudy.drawing.style import DPI, FULL, INK, STYLE, new_figure
 Array = NDArray[np.float64]
 
 COLUMNS = 1200
-"""Points of time drawn, about as many as a page can show."""
+"""Spans of time that are drawn, about as many as a page can show."""
 # Okabe & Ito's colours.
 _COLOURS = ("#0072B2", "#D55E00", "#009E73")
 _THRESHOLD = "#CC79A7"
 _SHADE = "#DCE6F0"
 _LEFT_OUT: dict[str, Any] = {"facecolor": "#F2E4E4", "hatch": "////", "edgecolor": "#B08080"}
 _DIGITS = 130
-"""Digits that stand beside each other; of more only every second, third, … number is shown."""
+"""Digits that fit beside each other; if there are more, only every second, third … number is
+shown."""
 
 
 def draw_segmentation(log: Recording, holds: DetectedHolds) -> Figure:
@@ -78,7 +79,7 @@ def draw_segmentation(log: Recording, holds: DetectedHolds) -> Figure:
 def render_segmentation(
     log: Recording, holds: DetectedHolds, svg_path: str | Path, png_path: str | Path
 ) -> None:
-    """Draw the segmentation and write it as SVG and PNG, each whole or not at all.
+    """Draw the segmentation and write it as SVG and PNG.
 
     If the figure fails, the import goes on: a warning on stderr says why there is no figure.
     """

@@ -17,7 +17,7 @@ from accelstudy.plan.search.sensors import get_sensor
 
 
 class PlanCase(Block):
-    """One question, as `accelstudy plan` takes it."""
+    """One question, with the options of `accelstudy plan`."""
 
     tilt_accuracy: str = Field(description="target for roll and for pitch, as 10mgon")
     tilt_range: str = Field("30gon", description="largest tilt at which the sensor is used")
