@@ -69,7 +69,7 @@ HEADLINES = {
     "no_effect": "Nothing that these data can show",
     "unknown": "it has no name here",
     "noise_model": "its noise is not",
-    "gross_error": "The data are not what they say",
+    "gross_error": "The data have a gross error",
 }
 
 
@@ -218,7 +218,7 @@ def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
         "➜ NARROWED The model lacks an effect of temperature: thermal bias or thermal scale.",
         "This campaign cannot tell thermal bias (0.55) and thermal scale (0.4) apart; further",
         "that such an effect is missing; not that it is thermal bias rather than a rival",
-        "where a wrong name counts 7 and a right one that is withheld 3",
+        "a wrong name costs 7, a right name that is withheld 3",
         "to separate thermal bias and thermal scale",
         "temperature / °C",
         "takes thermal bias, and its sigmas do not know of the others",

@@ -32,7 +32,7 @@ HEADLINES = {
     "named": "The model lacks {names}.",
     "narrowed": "The model lacks {names}.",
     "noise_model": "The sensor model is adequate, its noise is not: {names}.",
-    "gross_error": "The data are not what they say: {names}.",
+    "gross_error": "The data have a gross error: {names}.",
 }
 
 
