@@ -59,7 +59,9 @@ def _first_error(error: ValidationError, root: type[BaseModel], section: str) ->
         text += f"; did you mean {near[0]!r}?" if near else ""
         text += f" (known: {', '.join(siblings)})"
     elif first["type"] == "value_error":
-        text = ": ".join(filter(None, [key, str(first["ctx"]["error"])]))
+        # The check of a whole block names the key itself.
+        mark = ": " if first["loc"] else "."
+        text = mark.join(filter(None, [key, str(first["ctx"]["error"])]))
     elif first["type"] == "model_type":
         text = ": ".join(
             filter(None, [key, f"expected keys and values, not {shown(first['input'])}"])
