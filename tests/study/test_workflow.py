@@ -36,7 +36,9 @@ TINY = {
     "sensitivity": None,
     "presets": None,
     "leveling": {"attitudes": 20},
-    "grids": [grid(["bias-scale", NINE], ["mclaren-24", "faces-6"], 60, approaches="all")],
+    "grids": [
+        grid(["bias-scale", NINE], ["mclaren-24", "faces-6"], 60, approaches=["gravity", "robot"])
+    ],
 }
 TABLE_PATHS = [f"results/tiny/{name}.parquet" for name in TABLES]
 
