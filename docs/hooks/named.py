@@ -26,6 +26,7 @@ def on_page_markdown(markdown, page, **_):
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     missing = [name for name in FILE.findall(code) if not (ROOT / name).exists()]
     missing += [f"make {t}" for t in TARGET.findall(code) if f"\n{t}:" not in makefile]
+    missing += re.findall(r"--8 .*", code)  # a formatter took a snippet for Python
     missing += filter(None, map(_unknown, COMMAND.findall(code)))
     missing += [name for found in DOTTED.findall(code) for name in _names(*found) if _absent(name)]
     for name in dict.fromkeys(missing):
