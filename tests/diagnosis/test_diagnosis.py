@@ -5,9 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from diagnosis_helpers import ROTATIONS, most
-from places import SHARED
 
 from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
@@ -15,9 +13,7 @@ from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.states import ACCEPTED, REJECTED
-from accelstudy.campaign.files.format import read_campaign
 from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
-from accelstudy.commands.main import main
 from accelstudy.diagnosis.held_out import gap
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.effects import HoldConditions
@@ -238,32 +234,3 @@ def test_the_same_seed_gives_the_same_diagnosis():
     assert first.gap == again.gap
     assert first.found == again.found
     assert first.probabilities == again.probabilities
-
-
-# --- real data -----------------------------------------------------------------------------------
-
-
-def real(tmp_path, name):
-    if not (SHARED / "data").is_dir():
-        pytest.skip("the public measurements are not on this machine (ACCELSTUDY_SHARED)")
-    run = CliRunner().invoke(
-        main, ["public", name, "--out", str(tmp_path / name), "--folder", str(SHARED / "data")]
-    )
-    assert run.exit_code == 0, run.output
-    return read_campaign(tmp_path / name)
-
-
-@pytest.mark.parametrize("name", ["mpu9150-0", "mpu9150-1", "mpu9150-2"])
-def test_nothing_is_missing_in_the_mpu9150(tmp_path, name):
-    assert diagnose(real(tmp_path, name), NINE).verdict == "no_effect"
-
-
-def test_the_noise_of_the_xsens_is_not_white(tmp_path):
-    measured = real(tmp_path, "xsens-mti")
-    white = float(np.sqrt(np.mean(measured.sd**2 / measured.n_samples[:, None])))
-    for sigma in (None, white):
-        found = diagnose(replace(measured, sigma_force=sigma), NINE)
-        assert found.verdict == "noise_model"
-        assert names(found) == ["coloured_noise"]
-    # With the sigma from the Allan deviation.
-    assert diagnose(measured, NINE).verdict == "no_effect"

@@ -133,7 +133,7 @@ def test_odd_noise_is_no_effect():
 
 def test_of_two_effects_both_names_are_right_or_none_is_given():
     """A name too few is a name that is right; a wrong one is as rare as among single effects."""
-    runs, wrong, both = 6, 0, 0
+    runs, wrong, both = 4, 0, 0
     for k in range(runs):
         design, approach = ("full", "robot") if k % 3 else ("full", "gravity")
         measured, classes = hidden(design, approach, 80.0, 900 + k, count=2)
