@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 from study_helpers import NINE, PAPER_TRUTH, grid, make_cells, make_study, run_study, simulated
 
+from accelstudy.approaches import approach_names
 from accelstudy.basics.units import MGON
 from accelstudy.sensors.models import MODELS, PRESETS
 from accelstudy.simulation.sessions import BLOCK, Noise
@@ -43,7 +44,7 @@ def test_all_is_every_combination():
         grid(models="all", schemes=["faces-6", "rings-24"], approaches="all"),
         models={"mine": ["bias", "cubic_scale"]},
     )
-    expected = itertools.product([*MODELS, "mine"], ["faces-6", "rings-24"], ["gravity", "robot"])
+    expected = itertools.product([*MODELS, "mine"], ["faces-6", "rings-24"], approach_names())
     assert [*cells] == ["/".join(names) for names in expected]
 
 

@@ -22,7 +22,7 @@ def test_the_study_of_the_paper():
     """It was measured to take 106 s of processor time, and 0.35 GB of estimates."""
     study = read_study(ROOT / "config" / "config.yaml")
     found = study_effort(study, study_cells(study))
-    assert found.cells == 192
+    assert found.cells >= 192
     assert 60 < found.seconds < 600
     assert 0.2e9 < found.disk < 0.7e9
 
