@@ -93,8 +93,8 @@ def test_a_composition_is_calibrated_and_checked(made):
         (["diagnose", "c", "--out", "no"], "no vibration_mps2"),
         (["check-sigmas", "c"], "no vibration_mps2"),
         (["effects", "--campaign", "c"], "no vibration_mps2"),
-        (["effects", "--scheme", "mclaren-24"], "which a scheme does not tell"),
-        (["schemes", "mclaren-24"], "which a scheme does not tell"),
+        (["effects", "--scheme", "mclaren-24"], "which a scheme does not give"),
+        (["schemes", "mclaren-24"], "which a scheme does not give"),
         (["simulate-campaign", "--out", "no"], "vibration: missing"),
     ],
 )
