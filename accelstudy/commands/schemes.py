@@ -59,8 +59,9 @@ def schemes_command(model: str, approach: str, names: tuple[str, ...]) -> None:
     say(f"model {chosen_model.name}, approach {approach}\n")
     click.echo(pd.DataFrame(rows).to_string(index=False))
     say(
-        "\nrank and condition: of the scaled design at the ideal sensor; r: conditions - unknowns;"
-        "\nm: mean of x²y²; pole: distance to the x axis, where roll is undefined;"
+        "\nrank and condition: of the scaled design matrix at the ideal sensor;"
+        "\nr: conditions - unknowns; m: mean of x²y²;"
+        "\npole: distance to the x axis, where roll is undefined;"
         f"\n{angle_note()}."
         f"\nFamilies: {', '.join(scheme_families())}."
     )

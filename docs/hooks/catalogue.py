@@ -137,7 +137,7 @@ def gross_errors():
     ]
     return page(
         "# Gross errors",
-        "With a gross error, the data are not what they say they are. `accelstudy "
+        "A gross error is a mistake in the data, not in the sensor. `accelstudy "
         "simulate-campaign --gross` puts one in, and `accelstudy diagnose` recognises and "
         "mends it where that can be done. A setting that is *drawn* is drawn for the campaign if "
         "it is not given.",

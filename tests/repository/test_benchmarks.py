@@ -18,16 +18,15 @@ def in_benchmarks():
     patch.undo()
 
 
-# Not that of Ceres, which takes 20 s to compile; each run of the benchmarks compares all of them.
+# Neither Ceres, which takes 20 s to compile, nor JAX, which only benchmarks need; each run of the
+# benchmarks compares all of them.
 @pytest.mark.parametrize("approach", ["gravity", "robot"])
-@pytest.mark.parametrize("name", ["compiled", "numpy", "scipy", "scipy_jacobian", "jax"])
+@pytest.mark.parametrize("name", ["compiled", "numpy", "scipy", "scipy_jacobian"])
 def test_a_way_gives_the_estimates_of_the_adjustment(name, approach):
     from problem import drawn, ideal_session
     from ways import WAYS
 
     way = WAYS.get(name)
-    if needs := way.missing():
-        pytest.skip(f"needs: {needs}")
     approach = get_approach(approach)
     observed = drawn(ideal_session(), approach).first(3)
     expected = WAYS.get("numpy")(approach).solve(observed)

@@ -9,6 +9,7 @@ rule figures:
         f"{RESULTS}/logs/figures.log",
     benchmark:
         f"{RESULTS}/benchmarks/figures.tsv"
+    priority: 1
     threads: 1
     resources:
         mem_mb=1000,

@@ -9,6 +9,8 @@ rule sensitivity:
         f"{RESULTS}/logs/sensitivity.log",
     benchmark:
         f"{RESULTS}/benchmarks/sensitivity.tsv"
+    # What waits for it takes longer than all else that is left.
+    priority: 2
     threads: 1
     resources:
         mem_mb=2000,
