@@ -1,8 +1,8 @@
 # A hidden effect, found.
 
 # --8<-- [start:hide]
-accelstudy simulate-campaign --out session --truth truth.yaml --scheme fibonacci-30 --order random \
-  --temperature 15:40 --temperature-order random --yaw random \
+accelstudy simulate-campaign --out session --truth truth.yaml --scheme fibonacci-30 \
+  --order random --temperature 15:40 --temperature-order random --yaw random \
   --effect "thermal_bias: 0.0004, -0.0003, 0.0005"
 # --8<-- [end:hide]
 
