@@ -13,6 +13,7 @@ from typing import Any
 from accelstudy.basics.errors import InputError, UnknownNameError, shown
 from accelstudy.basics.units import parse_quantity
 from accelstudy.data_sheets.sheet import QUANTITIES, DataSheet
+from accelstudy.files.layers import read_layer
 
 TEXTS = ("name", "title", "source")
 DENSITY = "noise_density"
@@ -54,8 +55,6 @@ def read_data_sheet(path: str | Path) -> DataSheet:
     InputError
         One line that names the file, the key, what is wrong and what would be right.
     """
-    from accelstudy.files.layers import read_layer  # its package needs all models
-
     return parse_data_sheet(read_layer(path), str(path))
 
 

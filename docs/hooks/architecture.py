@@ -26,32 +26,14 @@ def rooms():
 
 
 def imports(known):
-    """Rooms that each room imports, and of these what only its functions import, against the way.
-
-    A function may import what is slow to load. Where that leads up, it is no part of the order.
-
-    Returns
-    -------
-    graph : {room: rooms}
-    exceptions : list of (room, room)
-    """
-    loaded, later = ({room: set() for room in known} for _ in range(2))
+    """Rooms that each room imports, within functions too, but not for type checkers."""
+    graph = {room: set() for room in known}
     for path in ROOT.glob("*/**/*.py"):
         room = path.relative_to(ROOT).parts[0]
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-        for node in tree.body:
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
             if not (isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"):
-                found = loaded if isinstance(node, ast.ImportFrom) else later
-                found[room] |= {target for target in _targets(node) if target in known}
-    graph = {room: targets - {room} for room, targets in loaded.items()}
-    exceptions = []
-    for room in sorted(known):
-        for target in sorted(later[room] - {room} - graph[room]):
-            if room in _below(graph, target):
-                exceptions.append((room, target))
-            else:
-                graph[room].add(target)
-    return graph, exceptions
+                graph[room] |= {target for target in _targets(node) if target in known}
+    return {room: targets - {room} for room, targets in graph.items()}
 
 
 def _targets(tree):
@@ -201,7 +183,7 @@ def on_page_markdown(markdown, page, **_):
     if page.file.src_uri != "contribute/architecture.md":
         return markdown
     known = rooms()
-    graph, exceptions = imports(known)
+    graph = imports(known)
     order = [room for row in reversed(levels(graph)) for room in sorted(row)]
     lines = [
         (
@@ -213,8 +195,6 @@ def on_page_markdown(markdown, page, **_):
         for room in order
     ]
     heads = ("room", "what it holds", "files", "imports")
-    above = "; ".join(f"`{room}` imports `{target}`" for room, target in exceptions)
-    note = f"\n\nAgainst the way, and only within a function: {above}." if above else ""
-    return markdown.replace("<!-- drawing of the rooms -->", drawing(graph) + note).replace(
+    return markdown.replace("<!-- drawing of the rooms -->", drawing(graph)).replace(
         "<!-- table of the rooms -->", table(heads, lines)
     )

@@ -1,6 +1,5 @@
 """The configuration of a study: its schema, and how it is read and checked."""
 
-from accelstudy.files.layers import overlay, read_layer
 from accelstudy.study.config.blocks import Grid
 from accelstudy.study.config.reading import config_schema, parse_study, read_study
 from accelstudy.study.config.schema import StudyConfig
@@ -9,8 +8,6 @@ __all__ = [
     "Grid",
     "StudyConfig",
     "config_schema",
-    "overlay",
     "parse_study",
-    "read_layer",
     "read_study",
 ]
