@@ -2,33 +2,60 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 from pathlib import Path
+
+from accelstudy.basics.names import LONGEST
 
 HERE = "calibration.json"
 """Name of a calibration file, as pages mention it."""
 
 
-def apply(calibration: str | Path = HERE) -> str:
+def apply(calibration: str | Path) -> str:
     """Level a log."""
-    return _line("apply", calibration, "LOG", "--out", "leveled.csv")
+    out = new_name(Path(calibration).parent, "leveled.csv")
+    return _line("apply", Path(calibration), "LOG", "--out", out)
 
 
-def export(form: str, calibration: str | Path = HERE) -> str:
+def export(form: str, calibration: str | Path) -> str:
     """Turn a calibration into what a device can use."""
-    return _line("export", calibration, "--form", form)
+    return _line("export", Path(calibration), "--form", form)
 
 
-def calibrate(campaign: str | Path, model: str | Path, approach: str, out: str) -> str:
+def calibrate(campaign: str | Path, model: str | Path, approach: str) -> str:
     """Calibrate a campaign."""
-    return _line("calibrate", campaign, "--model", model, "--approach", approach, "--out", out)
+    return _of_campaign("calibrate", campaign, model, approach, "calibrated")
 
 
-def diagnose(campaign: str | Path, model: str, approach: str, name: str) -> str:
-    """Find what a model lacks to explain a campaign of that name."""
-    chosen = ["--model", model, "--approach", approach]
-    return _line("diagnose", campaign, *chosen, "--out", f"{name}-diagnosis")
+def diagnose(campaign: str | Path, model: str | Path, approach: str) -> str:
+    """Find what a model lacks to explain a campaign."""
+    return _of_campaign("diagnose", campaign, model, approach, "diagnosis")
+
+
+def new_name(folder: str | Path, what: str) -> Path:
+    """Name in the current folder for what comes of a folder.
+
+    It is made of the whole path as it was typed: imu/left and imu/right have results of their own,
+    and so have first/left and second/left.
+    """
+    path = Path(folder)
+    parts = [part for part in path.relative_to(path.anchor).parts if part != os.pardir]
+    name = "-".join([*parts, what]).encode(errors="replace")
+    return Path(name[-2 * LONGEST :].decode(errors="ignore"))
+
+
+def _of_campaign(
+    command: str, campaign: str | Path, model: str | Path, approach: str, what: str
+) -> str:
+    path, chosen = Path(campaign), ["--model", model, "--approach", approach]
+    out = new_name(path, what)
+    if Path.cwd().is_relative_to(path.resolve()):  # nothing is written into a campaign
+        out = path / os.pardir / new_name(path.resolve().name, what)
+    return _line(command, path, *chosen, "--out", out)
 
 
 def _line(*parts: str | Path) -> str:
-    return shlex.join(["accelstudy", *map(str, parts)])
+    """A command; a path that begins with a dash is not to be taken for an option."""
+    words = [f"./{p}" if isinstance(p, Path) and str(p).startswith("-") else str(p) for p in parts]
+    return shlex.join(["accelstudy", *words])

@@ -175,8 +175,8 @@ def test_the_overview(made):
         assert (results / link).is_file()
     assert "held out roll, pitch" in text_of(page)
     assert_sound(page)
-    use = "accelstudy apply results/bench/campaigns/plain/calibration.json LOG --out leveled.csv"
-    assert use in text_of(page)
+    use = "accelstudy apply results/bench/campaigns/plain/calibration.json LOG "
+    assert f"{use}--out results-bench-campaigns-plain-leveled.csv" in text_of(page)
 
 
 def test_a_calibration_that_no_sensor_has_is_not_among_the_calibrated(made, tmp_path):
@@ -200,7 +200,7 @@ def test_a_calibration_that_no_sensor_has_is_not_among_the_calibrated(made, tmp_
     assert "aided" not in after
     assert "plain ✗ REJECTED" in text_of(after)
     assert "accelstudy diagnose campaigns/plain --model" in text_of(after)
-    assert "--approach gravity --out plain-diagnosis" in text_of(after)
+    assert "--approach gravity --out campaigns-plain-diagnosis" in text_of(after)
 
 
 def test_origin(made, monkeypatch):

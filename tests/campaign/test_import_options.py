@@ -357,7 +357,7 @@ def test_sensors_of_one_log_share_their_holds(tmp_path, turned):
     np.testing.assert_array_equal(one.time, two.time)
     np.testing.assert_allclose(two.forces, 1.01 * one.forces[:, [1, 0, 2]] * [1, 1, -1], atol=0.02)
     assert two.log.columns == {"fx": "d", "fy": "e", "fz": "f"}
-    assert (one.sensor, one.name) == ("imu0", "log")
+    assert (one.sensor, one.name) == ("imu0", "log-imu0")
 
 
 @pytest.mark.parametrize("clock", ["one", "each", "rate"])

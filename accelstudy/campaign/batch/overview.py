@@ -178,9 +178,7 @@ def _next_steps(rows: list[dict[str, Any]]) -> list[tuple[str, str]]:
     if doubtful is not None:
         own = doubtful["kind"] == "campaign"
         measured = doubtful["source"] if own else f"{doubtful['folder']}/campaign"
-        command = suggested.diagnose(
-            measured, doubtful["model"], doubtful["approach"], doubtful["campaign"]
-        )
+        command = suggested.diagnose(measured, doubtful["model"], doubtful["approach"])
         steps.append(("Find what is wrong or missing, for example", command))
     return steps
 

@@ -8,6 +8,7 @@ from typing import Any
 import pandas as pd
 
 from accelstudy.basics.levels import REFUTED
+from accelstudy.basics.suggested import HERE
 from accelstudy.basics.units import display_unit, to_display, unit_label
 from accelstudy.basics.wording import number
 from accelstudy.campaign.calibration.assessment import assess
@@ -29,7 +30,10 @@ LISTED = 200
 
 
 def write_calibration(
-    fit: CampaignFit, folder: str | Path, source: str | Path = "CAMPAIGN"
+    fit: CampaignFit,
+    folder: str | Path,
+    source: str | Path = "CAMPAIGN",
+    place: str | Path = "",
 ) -> dict[str, Any]:
     """Assess a fit and write calibration.json, positions.parquet, figures/ and report.html.
 
@@ -40,7 +44,7 @@ def write_calibration(
     ----------
     fit : CampaignFit
     folder : path, to write to
-    source : path of the campaign, for the commands that the page gives
+    source, place : paths of the campaign and of the results, for the commands that the page gives
 
     Returns
     -------
@@ -75,7 +79,7 @@ def write_calibration(
         unit=lambda unit: unit_label(display_unit(unit)),
         refuted=REFUTED,
         figures=drawn,
-        next_steps=next_steps(fit, assessment.state, source),
+        next_steps=next_steps(fit, assessment.state, source, Path(place) / HERE),
     )
     content = {**document, "quality": quality}
     with whole_file(folder / "calibration.json") as path:

@@ -31,8 +31,8 @@ def verdict_lines(assessment: Assessment) -> list[str]:
 def next_steps(
     fit: CampaignFit,
     state: str,
-    campaign: str | Path = "CAMPAIGN",
-    result: str | Path = "calibration.json",
+    campaign: str | Path,
+    result: str | Path,
 ) -> list[tuple[str, str]]:
     """Say what to do next, most urgent first.
 
@@ -47,7 +47,7 @@ def next_steps(
     -------
     list of (purpose, command)
     """
-    diagnose = suggested.diagnose(campaign, fit.model.name, fit.approach.name, fit.campaign.name)
+    diagnose = suggested.diagnose(campaign, fit.model.name, fit.approach.name)
     if state in (REJECTED, IMPLAUSIBLE):
         return [("Find what is wrong or missing", diagnose)]
     return [

@@ -15,7 +15,7 @@ from accelstudy.campaign.files.format import write_campaign
 from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.holds.allan import MeanAccuracy, accuracy_of_mean
 from accelstudy.campaign.holds.detection import DetectedHolds, find_joint_holds
-from accelstudy.campaign.importing.imported import imported_campaign, layout_of
+from accelstudy.campaign.importing.imported import default_name, imported_campaign, layout_of
 from accelstudy.campaign.importing.means import import_means
 from accelstudy.campaign.importing.report import ImportReport, shown
 from accelstudy.campaign.importing.settings import (
@@ -100,7 +100,7 @@ def import_sensors(
     InputError
         If a log cannot be read or has no static hold.
     """
-    chosen = _settings_of_sensors(settings)
+    chosen = _settings_of_sensors(settings, default_name(paths))
     logs = {name: _recording(paths, each) for name, each in chosen.items()}
     found = find_joint_holds(
         list(logs.values()),
@@ -170,15 +170,15 @@ def import_each(
             from accelstudy.campaign.importing.segmentation_figure import render_segmentation
 
             files = (folders[name] / f"segmentation.{kind}" for kind in ("svg", "png"))
-            own = _settings_of_sensors(settings)[name]
+            own = _settings_of_sensors(settings, default_name(paths))[name]
             if campaign.log is not None:  # it has the offset that the positions determined
                 own = own.model_copy(update={"offset": campaign.log.offset})
             render_segmentation(_recording(paths, own), report.holds, *files)
     return campaigns
 
 
-def _settings_of_sensors(settings: ImportSettings) -> dict[str, ImportSettings]:
-    """Settings of each sensor, as if it were the only one."""
+def _settings_of_sensors(settings: ImportSettings, default: str) -> dict[str, ImportSettings]:
+    """Settings of each sensor, as if it were the only one; `default` names a campaign."""
     if settings.robot is not None:
         raise InputError("robot: its angles go with a table of means (--means)")
     if not settings.sensors:
@@ -189,7 +189,7 @@ def _settings_of_sensors(settings: ImportSettings) -> dict[str, ImportSettings]:
         name: settings.model_copy(
             update={
                 "columns": {**dict(zip(AXES, places, strict=True)), **settings.columns},
-                "name": None if settings.name is None else f"{settings.name}-{name}",
+                "name": f"{settings.name or default}-{name}",
                 "sensor": settings.sensor or name,
             }
         )

@@ -56,7 +56,7 @@ def diagnose_folder(
             diagnosis = diagnose(measured, *chosen, seed=seed)
         loop = close_loop(diagnosis, replicates, seed)
         with stage("figures and page"):
-            write_diagnosis(diagnosis, folder, loop=loop, source=campaign)
+            write_diagnosis(diagnosis, folder, loop=loop, source=campaign, place=out)
     return diagnosis
 
 
@@ -66,6 +66,7 @@ def write_diagnosis(
     report: bool = True,
     loop: Loop | None = None,
     source: str | Path = "CAMPAIGN",
+    place: str | Path = "",
 ) -> dict[str, Any]:
     """Write what a diagnosis found; each file is whole or not there, diagnosis.json comes last.
 
@@ -75,7 +76,7 @@ def write_diagnosis(
     folder : path, made if it is not there
     report : bool, whether to write figures/ and report.html beside the files for programs
     loop : Loop, optional, simulations with the old and with the new model
-    source : path of the campaign, for the commands that the page gives
+    source, place : paths of the campaign and of the results, for the commands that the page gives
 
     Returns
     -------
@@ -102,7 +103,7 @@ def write_diagnosis(
         # Drawing takes as long to import as all of the above to compute.
         from accelstudy.diagnosis.report.page.report import write_report
 
-        write_report(diagnosis, document, positions, loop, folder, calibration, source)
+        write_report(diagnosis, document, positions, loop, folder, calibration, source, place)
     with whole_file(folder / "diagnosis.json") as path:
         path.write_text(json_text(document), encoding="utf-8")
     return document

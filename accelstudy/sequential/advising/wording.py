@@ -204,4 +204,4 @@ def _to_go(advice: Advice, campaign: Campaign) -> str:
 
 def finished(campaign: Path, model: str, approach: str) -> str:
     """Say what to do when the accuracy is reached."""
-    return f"calibrate: {calibrate(campaign, model, approach, 'calibrated')}"
+    return f"calibrate: {calibrate(campaign, model, approach)}"

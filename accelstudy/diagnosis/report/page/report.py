@@ -30,6 +30,7 @@ def write_report(
     folder: Path,
     calibration: dict[str, Any] | None = None,
     source: str | Path = "CAMPAIGN",
+    place: str | Path = "",
 ) -> None:
     """Write figures/ and report.html.
 
@@ -41,7 +42,7 @@ def write_report(
     loop : Loop, optional
     folder : Path
     calibration : dict, of `diagnosed_calibration`, optional
-    source : path of the campaign, for the commands that the page gives
+    source, place : paths of the campaign and of the results, for the commands that the page gives
     """
     drawn = save_all(diagnosis_figures(diagnosis, positions, loop), folder / "figures")
     lines = wording.verdict_lines(diagnosis)
@@ -77,5 +78,5 @@ def write_report(
         level_noise=LEVEL_NOISE,
         level_sigma=REFUTED,
         sure=SURE,
-        next_steps=next_steps(diagnosis, calibration, source),
+        next_steps=next_steps(diagnosis, calibration, source, place),
     )
