@@ -22,6 +22,7 @@ from accelstudy.basics.units import (
 from accelstudy.basics.wording import comma_list, interval, number, p_value, probability, words
 from accelstudy.files.outputs import whole_file
 from accelstudy.pages.glossary import explained
+from accelstudy.sensors.frames import axes_note
 
 BADGES = {
     "accepted": ("✓ ACCEPTED", "good"),
@@ -94,6 +95,7 @@ def _template(name: str) -> Template:
     )
     environment.filters.update(
         angle=lambda mgon: number(to_display(mgon * MGON, "rad").item()),
+        axes=axes_note,
         attitude=lambda gon: to_attitude(gon * GON).item(),
         badge=lambda verdict: BADGES[verdict][0],
         colour=lambda verdict: BADGES[verdict][1],

@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 
 _LETTERS = ("fb", "rl", "du")
 """Letters of the axes of frd, in its order; the first of each pair points along the axis."""
+WAYS = {"f": "forward", "b": "back", "r": "right", "l": "left", "d": "down", "u": "up"}
+"""Where an axis points, by the letter of a frame."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,12 @@ class Frame:
                 for i, pair in zip(self.order, _LETTERS, strict=True)
             ]
         )
+
+    @property
+    def description(self) -> str:
+        """Name of the frame, and where its axes point."""
+        ways = zip("xyz", self.name, strict=True)
+        return f"{self.name}: {', '.join(f'{axis} {WAYS[letter]}' for axis, letter in ways)}"
 
     @property
     def matrix(self) -> Array:
@@ -99,3 +107,22 @@ def parse_frame(name: str) -> Frame:
 
 
 FRD = parse_frame("frd")
+
+
+def axes_note(log: str | None) -> str:
+    """Say in which axes parameters are, and how those of the log lie in them.
+
+    Parameters
+    ----------
+    log : str, name of the frame of the log; None without a log
+    """
+    if log in (None, FRD.name):
+        return f"Parameters are in the axes{' of the log,' if log else ''} {FRD.description}."
+    frame = parse_frame(str(log))
+    signs = frame.from_frd(np.ones(3))
+    axes = frame.from_frd(frame.signs * np.arange(3)).astype(int)
+    x, y, z = (("−" if s < 0 else "") + "xyz"[i] for s, i in zip(signs, axes, strict=True))
+    return (
+        f"Parameters are in the axes {FRD.description}. Those of the log are {frame.description}; "
+        f"its x, y and z are {x}, {y} and {z} here."
+    )

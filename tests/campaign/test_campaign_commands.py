@@ -75,10 +75,36 @@ def test_degrees_on_the_page_and_gon_in_the_file(campaign, tmp_path):
     assert float(shown[2]) == pytest.approx(1e3 * np.degrees(alpha["sigma"]), abs=1e-4)
 
 
-def test_quiet(campaign, tmp_path):
-    result = run("calibrate", campaign, "--out", tmp_path / "out", "--quiet")
-    assert (result.exit_code, result.output) == (0, "")
-    assert (tmp_path / "out/report.html").exists()
+LAID = {"frd": ("x", "y", "z"), "flu": ("x", "−y", "−z"), "rfu": ("y", "x", "−z")}
+"""Where x, y and z of a log lie forward, right and down."""
+
+
+@pytest.mark.parametrize("frame", LAID)
+def test_it_is_said_in_which_axes_the_parameters_are(tmp_path, frame):
+    """The same sensor, logged in the axes of others, has the same parameters."""
+    forces = simulated_campaign(TRUTH).forces
+    logged = [(-1 if "−" in way else 1) * forces[:, "xyz".index(way[-1])] for way in LAID[frame]]
+    table = pd.DataFrame(dict(zip(("fx", "fy", "fz"), logged, strict=True)))
+    table.to_csv(tmp_path / "means.csv", index=False)
+    made = run(
+        *("import", tmp_path / "means.csv", "--means", "--frame", frame),
+        *("--out", tmp_path / "campaign"),
+    )
+    assert made.exit_code == 0, made.output
+    result = run("calibrate", tmp_path / "campaign", "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    x, y, z = LAID[frame]
+    whole = f"Those of the log are {frame}: "
+    said = "axes of the log, frd: x forward, y right, z down" if frame == "frd" else whole
+    page = (tmp_path / "out/report.html").read_text(encoding="utf-8")
+    for text in (result.stdout, text_of(page)):
+        assert said in text
+        assert (f"its x, y and z are {x}, {y} and {z} here" in text) == (frame != "frd")
+    content = json.loads((tmp_path / "out/calibration.json").read_text(encoding="utf-8"))
+    assert content["axes"] == "frd"
+    found = {p["name"]: (p["value"], p["sigma"]) for p in content["parameters"]}
+    for name, value in TRUTH.items():
+        assert found[name][0] == pytest.approx(value, abs=4.5 * found[name][1])
 
 
 def test_pages_say_what_was_left_out_and_how_the_log_was_read(tmp_path):
@@ -88,9 +114,11 @@ def test_pages_say_what_was_left_out_and_how_the_log_was_read(tmp_path):
         out = tmp_path / command
         result = run(command, tmp_path / "campaign", "--out", out)
         assert result.exit_code == 0, result.output
-        assert (out / file).exists()
         page = (out / "report.html").read_text(encoding="utf-8")
-        assert "The log's axes are flu" in page
+        axes = "Those of the log are flu: x forward, y left, z up; its x, y and z are x, −y and −z"
+        assert axes in page
+        assert axes in result.stdout
+        assert json.loads((out / file).read_text(encoding="utf-8"))["axes"] == "frd"
         assert "Left out of every fit: position 5 (moved)." in page
         content = json.loads((out / "calibration.json").read_text(encoding="utf-8"))
         assert content["log"]["frame"] == "flu"

@@ -16,12 +16,13 @@ from accelstudy.campaign.calibration.ranges import ranges_of
 from accelstudy.campaign.calibration.wording import verdict_lines
 from accelstudy.campaign.files.session import Campaign
 from accelstudy.leveling.error import MAX_TILT_GON
+from accelstudy.sensors.frames import FRD
 
 
 def calibration_document(fit: CampaignFit) -> dict[str, Any]:
     """Describe a fit: parameters with sigmas, correlation, accuracy, matrix and gauges.
 
-    All numbers are in SI but those whose key names another unit.
+    All numbers are in SI but those whose key names another unit, and in forward, right, down.
     """
     campaign, adjustment = fit.campaign, fit.adjustment
     covariance, sigma = fit.covariance, fit.sigma
@@ -33,6 +34,7 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
         "model": fit.model.name,
         "effects": [effect.spec for effect in fit.model.effects],
         "approach": fit.approach.name,
+        "axes": FRD.name,
         "unit": campaign.unit,
         "nominal": _nominal(fit),
         "gravity_mps2": fit.gravity,

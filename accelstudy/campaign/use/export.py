@@ -44,9 +44,6 @@ SYMBOLS = {
     "roll": "rad, attitude of the rig; likewise pitch, yaw",
 }
 
-WAYS = {"f": "forward", "b": "back", "r": "right", "l": "left", "d": "down", "u": "up"}
-"""Where an axis points, by the letter of a frame."""
-
 
 def device_matrix(calibration: Mapping[str, Any]) -> Array:
     """M (3, 4) with f = M · (raw, 1), from raw readings to m/s², both in the axes of the log.
@@ -186,11 +183,10 @@ def _row(values: ArrayLike, separator: str) -> str:
 def _c_header(calibration: Mapping[str, Any]) -> str:
     rows = ",\n".join(f"    {{{_row(row, ', ')}}}" for row in device_matrix(calibration))
     _, frame = _readings(calibration)
-    ways = ", ".join(f"{i} {WAYS[letter]}" for i, letter in zip("xyz", frame.name, strict=True))
     lines = [
         f"Accelerometer calibration of {calibration['campaign']}.",
         f"Specific force in m/s^2 = M * (x, y, z, 1), with x, y, z in {_unit(calibration)}.",
-        f"Both are in the axes {frame.name}: {ways}.",
+        f"Both are in the axes {frame.description}.",
     ]
     if (calibration.get("mended") or {}).get("matrix") is not None:
         lines.append(f"M mends the readings, too: {calibration['mended']['reason']}.")

@@ -9,6 +9,7 @@ from accelstudy.campaign.calibration.document import json_number
 from accelstudy.diagnosis.report.words.missing import refuted
 from accelstudy.diagnosis.report.words.statement import cosine_in, statement
 from accelstudy.diagnosis.result import Diagnosis, Named
+from accelstudy.sensors.frames import FRD
 
 
 def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -20,6 +21,7 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
         "campaign": d.campaign.name,
         "approach": d.approach.name,
         "model": d.model.name,
+        "axes": FRD.name,
         "verdict": d.verdict,
         "reason": d.reason,
         "global_test": {
