@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from accelstudy.basics.progress import say, warn
+from accelstudy.basics.progress import warn
 from accelstudy.commands.options import PATH, angle_unit_option, example, force_option, quiet_option
 
 
@@ -76,4 +76,4 @@ def apply_command(
         leveled = level_log(read_calibration(calibration), log, path, given, sigma, start)
     for warning in leveled.warnings:
         warn(warning)
-    say(f"{leveled.rows - leveled.empty} of {leveled.rows} rows leveled: {out}")
+    click.echo(f"{leveled.rows - leveled.empty} of {leveled.rows} rows leveled: {out}")

@@ -35,13 +35,14 @@ def calibrate_command(campaign: Path, model: str, approach: str, out: Path, forc
     from accelstudy.campaign.calibration.wording import next_steps
     from accelstudy.campaign.files.format import read_campaign
     from accelstudy.files.outputs import CALIBRATION, result_folder
+    from accelstudy.sensors.frames import axes_note
     from accelstudy.sensors.models import get_model
 
     chosen = get_model(model), get_approach(approach)
     with result_folder(out, CALIBRATION, [campaign], force) as folder, stage("calibration"):
         measured = read_campaign(campaign)
         fit = fit_campaign(measured, *chosen)
-        content = write_calibration(fit, folder, campaign)
+        content = write_calibration(fit, folder, campaign, out)
     for warning in measured.warnings:
         warn(warning)
     for entry in content["parameters"]:
@@ -51,7 +52,8 @@ def calibrate_command(campaign: Path, model: str, approach: str, out: Path, forc
         value = f"{to_display(entry['value'], unit):12.4f}"
         say(f"{entry['name']:>9} = {value} ± {sigma} {display_unit(unit)}")
     quality = content["quality"]
-    say(f"{quality['state'].upper()}: {quality['verdict']}")
+    say(axes_note(None if measured.log is None else measured.log.frame))
+    click.echo(f"{quality['state'].upper()}: {quality['verdict']}")
     what, command = next_steps(fit, quality["state"], campaign, out / "calibration.json")[0]
     say(f"{what}: {command}")
     say(f"report: {out / 'report.html'}")

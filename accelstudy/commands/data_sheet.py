@@ -63,7 +63,8 @@ def data_sheet_command(
         path.write_text(yaml_of(sheet), encoding="utf-8")
     durations = (1.0, 10.0, 100.0) if sheet.position_sigma is None else ()
     for duration in durations:
-        say(f"sigma of the mean of {duration:g} s: {1e3 * sheet.sigma_mean(duration):.3g} mm/s²")
+        sigma = 1e3 * sheet.sigma_mean(duration)
+        click.echo(f"sigma of the mean of {duration:g} s: {sigma:.3g} mm/s²")
     if sheet.position_sigma is not None:
-        say(f"sigma of the mean of a position: {1e3 * sheet.position_sigma:.3g} mm/s²")
+        click.echo(f"sigma of the mean of a position: {1e3 * sheet.position_sigma:.3g} mm/s²")
     say(f"data sheet: {out}")

@@ -56,6 +56,7 @@ def diagnose_command(
         import accelstudy.diagnosis.report.page.report  # noqa: F401, draws at the end
         from accelstudy.diagnosis.report.output import diagnose_folder
         from accelstudy.diagnosis.report.words.summary import verdict_lines
+        from accelstudy.sensors.frames import FRD, axes_note
     finally:
         gc.freeze()
         gc.enable()
@@ -65,6 +66,10 @@ def diagnose_command(
         warn(warning)
     if diagnosis.recognised is not None:
         warn(f"calibration.json is of mended data: {diagnosis.recognised.reason}")
-    for line in verdict_lines(diagnosis):
+    verdict, *lines = verdict_lines(diagnosis)
+    click.echo(verdict)
+    for line in lines:
         say(line)
+    if (log := diagnosis.campaign.log) is not None and log.frame != FRD.name:
+        say(axes_note(log.frame))
     say(f"report: {out / 'report.html'}")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from accelstudy.basics.progress import say, warn
+from accelstudy.basics.wording import counted
 from accelstudy.commands.options import (
     PATH,
     Sectioned,
@@ -19,6 +20,7 @@ from accelstudy.commands.options import (
 )
 
 if TYPE_CHECKING:
+    from accelstudy.campaign.files.session import Campaign
     from accelstudy.campaign.importing.logs import ImportReport
 
 
@@ -99,13 +101,13 @@ def import_command(
             for name, folder in folders.items()
         }
         imported = import_each(campaigns, files, settings, figure)
-    for name, (_, report) in imported.items():
+    for name, result in imported.items():
         if name:
             say(f"sensor {name}")
-        show_report(report, folders[name], figure)
+        show_result(*result, folders[name], figure)
 
 
-def show_report(report: ImportReport, out: Path, figure: bool = True) -> None:
+def show_result(campaign: Campaign, report: ImportReport, out: Path, figure: bool = True) -> None:
     """Tell what was imported, with its warnings, and where to."""
     for line in report.lines():
         say(line)
@@ -113,4 +115,4 @@ def show_report(report: ImportReport, out: Path, figure: bool = True) -> None:
         warn(warning)
     if figure and report.holds is not None:
         say(f"figure: {out / 'segmentation.png'}")
-    say(f"campaign: {out}")
+    click.echo(f"campaign: {out} ({counted(campaign.n_positions, 'position')})")

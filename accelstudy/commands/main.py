@@ -112,5 +112,9 @@ def main(ctx: click.Context, angle_unit: str) -> None:
 
     Snakemake runs studies. These commands calibrate measured data, plan and judge calibrations, and
     list what studies are made of.
+
+    Results go to standard output; warnings, errors and progress go to standard error. The exit
+    status is 0 with any verdict, a rejected calibration included, 1 if `plan` finds nothing that
+    reaches the accuracy or the command was broken off, and 2 if an input or an option is wrong.
     """
     ctx.with_resource(angles_in(angle_unit))

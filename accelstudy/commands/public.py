@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from accelstudy.basics.errors import InputError
-from accelstudy.commands.importing import show_report
+from accelstudy.commands.importing import show_result
 from accelstudy.commands.options import PATH, angle_unit_option, example, force_option, quiet_option
 
 
@@ -44,5 +44,5 @@ def public_command(name: str | None, out: Path | None, folder: Path, force: bool
     if out is None:
         raise InputError("--out: give the folder of the campaign")
     with result_folder(out, CAMPAIGN, [folder], force) as campaign:
-        _, report = import_to(campaign, public_file(name, folder), settings)
-    show_report(report, out)
+        imported = import_to(campaign, public_file(name, folder), settings)
+    show_result(*imported, out)

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.progress import say, stage
+from accelstudy.basics.progress import stage
 from accelstudy.commands.options import (
     EFFECT,
     GROSS_ERROR,
@@ -163,7 +163,7 @@ def simulate_campaign_command(
         write_campaign(campaign, folder, plausible=not settings.gross_errors)
         if truth_file is not None:
             write_truth(truth, truth_file)
-    say(f"campaign: {out} ({campaign.n_positions} positions)")
+    click.echo(f"campaign: {out} ({campaign.n_positions} positions)")
 
 
 def _range(option: str, text: str | None) -> tuple[float, float] | None:
