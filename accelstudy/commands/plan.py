@@ -250,11 +250,12 @@ def plan_command(
     for line in ("", *assumption_lines(question)):
         say(line)
     if out is not None:
+        from accelstudy.basics.suggested import study_again
         from accelstudy.plan.report.output import write_plan
 
         inputs = [Path(sensor)] if sensor is not None and Path(sensor).exists() else []
         write_plan(found, out, {"config_hash": None, "seed": seed}, inputs, force)
         say(f"\nplan, table and figure: {out}")
-        say(f"the same numbers again: snakemake --cores 2 --configfile {out / 'study.yaml'}")
+        say(f"the same numbers again: {study_again(out / 'study.yaml')}")
     else:
         say("\n--out FOLDER keeps the table, the figure, and a study that makes the numbers again.")

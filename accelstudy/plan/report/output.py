@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import yaml
 
+from accelstudy.basics.suggested import study_again
 from accelstudy.basics.units import MGON
 from accelstudy.files.outputs import PLAN, result_folder
 from accelstudy.plan.report.advice import limits
@@ -26,7 +27,7 @@ from accelstudy.plan.search.candidates import Candidate
 
 STUDY_HEAD = """\
 # The simulated candidates of a plan as a study, made by `accelstudy plan`. It reproduces their
-# numbers: snakemake --cores 2 --configfile {path}
+# numbers: {command}
 """
 ANGLES = ("roll", "pitch")
 
@@ -72,7 +73,7 @@ def plan_files(
     from accelstudy.plan.report.figure import plan_figure
 
     write_table(folder / "plan.parquet", plan_table(answer), provenance)
-    head = STUDY_HEAD.format(path=shown / "study.yaml")
+    head = STUDY_HEAD.format(command=study_again(shown / "study.yaml"))
     content = yaml.safe_dump({**answer.study, "study": study}, sort_keys=False, allow_unicode=True)
     (folder / "study.yaml").write_text(head + content, encoding="utf-8")
     (folder / "plan.md").write_text(plan_page(answer), encoding="utf-8")
