@@ -27,7 +27,12 @@ from accelstudy.commands.options import (
 @angle_unit_option
 @quiet_option
 def calibrate_command(campaign: Path, model: str, approach: str, out: Path, force: bool) -> None:
-    """Calibrate a CAMPAIGN (a folder) and report on it."""
+    """Calibrate a CAMPAIGN (a folder) and report on it.
+
+    The folder of results gets report.html for you, calibration.json for `apply`, `export` and
+    programs, positions.parquet and figures. Parameters are in the axes frd (forward, right, down),
+    whatever those of the log are.
+    """
     from accelstudy.approaches import get_approach
     from accelstudy.basics.units import display_unit, to_display
     from accelstudy.campaign.calibration.fit import fit_campaign

@@ -9,9 +9,7 @@ import click
 from accelstudy.commands.options import PATH, example
 
 
-@click.command(
-    "cells", epilog=example("accelstudy cells config/config.yaml config/sweeps/positions.yaml")
-)
+@click.command("cells", epilog=example("accelstudy cells config/config.yaml"))
 @click.argument("configs", nargs=-1, required=True, type=PATH)
 def cells_command(configs: tuple[Path, ...]) -> None:
     """List the cells of a study and what it will take.

@@ -85,7 +85,8 @@ def import_command(
     pattern, each file is one position. The noise of the log itself tells what is at rest, unless
     --threshold does. segmentation.png in the folder shows the holds with their numbers.
 
-    --sensor, --exclude and --join may be repeated.
+    --sensor, --exclude and --join may be repeated. With --sensor each sensor has a campaign of its
+    own in the folder, which is named after the log and the sensor.
     """
     from accelstudy.campaign.importing.logs import import_each
     from accelstudy.commands.import_options import files_of, settings_of

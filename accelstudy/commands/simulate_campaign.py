@@ -76,7 +76,7 @@ _SECTIONS = {
     "--size",
     default=1.0,
     show_default=True,
-    help="Factor of the typical sizes of effects.",
+    help="Factor of the typical size of each --effect without parameters.",
 )
 @click.option(
     "--noise-effect",

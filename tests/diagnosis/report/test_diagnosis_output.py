@@ -3,8 +3,10 @@
 import hashlib
 import json
 import re
+import shutil
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 from types import SimpleNamespace
 
 import matplotlib as mpl
@@ -344,14 +346,15 @@ def test_the_model_is_a_study(written, case):
 def test_same_seed_same_files(written, tmp_path, monkeypatch):
     monkeypatch.setattr(saving, "save", rendering(*RENDERED["named"]))
     out, _, _ = written("named")
-    diagnose_folder(out.parent / "named", tmp_path / "again", replicates=100)
-    for path in sorted(out.rglob("*.*")):
+    first = Path(shutil.copytree(out, tmp_path / "first"))
+    diagnose_folder(out.parent / "named", out, replicates=100)  # its commands name the folder
+    for path in sorted(first.rglob("*.*")):
         if path.is_file() and path.suffix != ".parquet":
-            again = tmp_path / "again" / path.relative_to(out)
+            again = out / path.relative_to(first)
             digests = [hashlib.sha256(p.read_bytes()).hexdigest() for p in (path, again)]
             assert digests[0] == digests[1], path.name
     for name in ("positions", "loop"):
-        tables = [pd.read_parquet(f / f"{name}.parquet") for f in (out, tmp_path / "again")]
+        tables = [pd.read_parquet(f / f"{name}.parquet") for f in (first, out)]
         pd.testing.assert_frame_equal(*tables)
 
 
