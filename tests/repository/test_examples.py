@@ -181,26 +181,3 @@ def test_the_theory_of_evidence_has_the_priors_of_the_code():
     assert f"from **{priors.SURE:g}** on" in text
     assert f"hold **{CREDIBLE:g}** together" in text
     assert f"with a probability of {1 - DOUBT:g}" in text
-
-
-def test_limitations_have_the_numbers_of_the_score():
-    score = (ROOT / "docs/guides/hidden-effects-score.md").read_text("utf-8")
-    text = (ROOT / "docs/limitations.md").read_text("utf-8")
-
-    def measured(row, column=4):
-        line = re.search(rf"^\| {re.escape(row)} .*", score, re.MULTILINE)
-        return float(line[0].split("|")[column])
-
-    said = {
-        r"A wrong name\*\* is given in ([\d.]+) %": measured("named, and wrong | one and two"),
-        r"given in (\d+) %\.\n": measured(
-            "best name right, named or narrowed | one effect, λ = 25"
-        ),
-        r"both named in (\d+) %": measured("both of two right | two effects, λ = 25"),
-        r"gets a name in (\d+) %": measured("named or narrowed wrongly | never"),
-        r"in (\d+) % where a whole family": measured("named or narrowed wrongly | family"),
-        r"nothing missing that is ([\d.]+) %": measured("confirmed | nothing missing"),
-        r"taken for an effect in ([\d.]+) %": measured("named or narrowed to effects | wrong"),
-    }
-    for pattern, value in said.items():
-        assert float(re.search(pattern, text)[1]) == pytest.approx(100 * value), pattern
