@@ -17,6 +17,7 @@ import re
 import shutil
 import sys
 import tempfile
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -64,7 +65,8 @@ DRAWN = {
                *(f"config/sweeps/{name}.yaml" for name in
                  ("gravity_error", "noise_level", "positions", "robot_accuracy"))),
     "hidden": ("make hidden-docs", "accelstudy/hidden/page/figures.py"),
-    "speed": ("make benchmarks", "benchmarks/figure.py"),
+    "speed": ("make benchmarks",
+              *sorted(str(path.relative_to(ROOT)) for path in ROOT.glob("benchmarks/**/*.py"))),
 }  # fmt: skip
 """Pictures that no test makes: what makes them, and the code that draws them."""
 
@@ -117,7 +119,9 @@ def code_of(*paths):
 
 
 def of_code():
-    return {name: code_of(*sources) for name, (_, *sources) in DRAWN.items()}
+    """Hashes of the code that draws; speed is also that of a version of the package."""
+    hashes = {name: code_of(*sources) for name, (_, *sources) in DRAWN.items()}
+    return {**hashes, "speed": f"{hashes['speed']} of {version('accelstudy')}"}
 
 
 def of_study(folder):
