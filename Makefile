@@ -25,7 +25,7 @@ export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: help env test coverage test-cluster test-faults smoke reproduce anew unlock report campaigns diagnose-example plan-example hidden-effects hidden-docs benchmarks docs wheel lint lock clean
+.PHONY: help env test coverage test-cluster test-faults smoke reproduce anew unlock report campaigns diagnose-example plan-example hidden-effects hidden-docs pictures benchmarks docs wheel lint lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-18s%s\n", $$1, $$2 }' Makefile
@@ -51,6 +51,7 @@ test-faults: $(READY) ## kill jobs and runs, fill a disk, and compare what comes
 smoke: $(READY) ## run the whole workflow on a small configuration
 	snakemake --cores $(CORES) --configfile config/smoke.yaml
 	snakemake --cores $(CORES) --snakefile workflow/hidden.smk --configfile $(HIDDEN) config/hidden-smoke.yaml
+	python tests/helpers/pictures.py check
 
 reproduce: $(READY) ## reproduce the paper
 	snakemake --cores $(CORES)
@@ -84,9 +85,16 @@ hidden-docs: $(READY) ## study hidden effects, and take score and figures into d
 	cp results/hidden-effects/score.md docs/guides/hidden-effects-score.md
 	for name in alarms naming methods sets calibration confusion outside limits; do \
 	  cp results/hidden-effects/figures/$$name.png docs/figures/hidden-$$name.png; done
+	python tests/helpers/pictures.py drawn hidden
+
+pictures: reproduce ## make the pictures of reports, studies and tutorials in docs anew
+	snakemake --cores $(CORES) --configfile config/smoke.yaml
+	python tests/helpers/example_helpers.py
+	python tests/helpers/pictures.py
 
 benchmarks: $(READY) ## measure the speed, and take tables and figure into docs
 	python benchmarks/run.py docs/guides/speed.md docs/figures/speed.png
+	python tests/helpers/pictures.py drawn speed
 
 docs: $(READY) ## build the documentation in site/, offline; open site/index.html
 	NO_MKDOCS_2_WARNING=1 mkdocs build --strict

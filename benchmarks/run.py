@@ -37,7 +37,8 @@ def machine():
     cpuinfo = Path("/proc/cpuinfo")
     names = cpuinfo.read_text().splitlines() if cpuinfo.exists() else []
     name = next((line.split(": ")[1] for line in names if line.startswith("model name")), "")
-    packages = [f"{each} {version(each)}" for each in ("numpy", "scipy", "llvmlite")]
+    used = ("accelstudy", "numpy", "scipy", "llvmlite")
+    packages = [f"{each} {version(each)}" for each in used]
     packages += [f"jax {version('jax')}"] if not WAYS.get("jax").missing() else []
     load = ", ".join(f"{each:.1f}" for each in os.getloadavg())
     return (

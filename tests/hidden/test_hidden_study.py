@@ -14,7 +14,6 @@ from accelstudy.basics.errors import InputError
 from accelstudy.effects import effect_names, effects_without
 from accelstudy.files.layers import overlay, read_layer
 from accelstudy.files.tables import read_table, write_table
-from accelstudy.hidden.page.figures import figures
 from accelstudy.hidden.physics import Case
 from accelstudy.hidden.study import diagnosing, making
 from accelstudy.hidden.study.baselines import METHODS
@@ -27,9 +26,9 @@ from accelstudy.hidden.study.cells import (
     write_plan,
 )
 from accelstudy.hidden.study.comparing import run_baselines
-from accelstudy.hidden.study.config import KNOWN, SETS, parse_hidden
+from accelstudy.hidden.study.config import KNOWN, parse_hidden
 from accelstudy.hidden.study.diagnosing import run_chunk
-from accelstudy.hidden.study.tables import KEY, TABLES
+from accelstudy.hidden.study.tables import KEY
 from accelstudy.jobs.code import code_hash
 
 TINY = {
@@ -171,27 +170,6 @@ def test_a_family_that_is_taken_out():
     with effects_without(cell.removed):
         assert not {"bias_drift", "warm_up"} & set(effect_names())
     assert {"bias_drift", "warm_up"} <= set(effect_names())
-
-
-# --- the documents --------------------------------------------------------------------------------
-
-
-def test_the_score_in_the_documents_is_that_of_the_study():
-    """Of this configuration and, where the study was run here, of this very run."""
-    path = ROOT / "docs/guides/hidden-effects-score.md"
-    text = path.read_text(encoding="utf-8")
-    config = parse_hidden(read_layer(ROOT / "config/hidden-effects.yaml"))
-    assert f"configuration `{config.fingerprint}`, seed {config.seed}" in text
-    made = ROOT / "results/hidden-effects/score.md"
-    assert not made.exists() or made.read_text(encoding="utf-8") == text
-
-
-def test_the_documents_name_every_figure_set_and_method():
-    text = (ROOT / "docs/guides/hidden-effects.md").read_text(encoding="utf-8")
-    make = (ROOT / "Makefile").read_text(encoding="utf-8")
-    for name in (*figures({}), *SETS, *METHODS, *TABLES):
-        assert f"| `{name}` |" in text
-    assert f"for name in {' '.join(figures({}))};" in make
 
 
 # --- jobs ----------------------------------------------------------------------------------------

@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from accelstudy.basics.wording import number
+from accelstudy.basics.wording import number, words
+from accelstudy.hidden.score.further import further
 from accelstudy.hidden.score.rates import ALL, share_of
+from accelstudy.hidden.score.sample import sample
 
 Tables = Mapping[str, pd.DataFrame]
 
@@ -34,6 +36,8 @@ def score_page(tables: Tables, seconds: pd.DataFrame, origin: Mapping[str, Any])
         f"below {number(float(each.quantile(0.95)))} s).",
         "## Targets",
         target_table(tables["targets"]),
+        "## Beside the targets",
+        share_table(further(campaigns)),
         "## One effect, over its size",
         size_table(tables["shares"]),
         "## Verdicts",
@@ -45,6 +49,7 @@ def score_page(tables: Tables, seconds: pd.DataFrame, origin: Mapping[str, Any])
         "## Each effect",
         effect_table(tables["shares"], tables["limits"]),
     ]
+    parts += ["## A sample", SAMPLE_TEXT, sample_table(sample(campaigns))]
     failed = campaigns[~campaigns["ok"].astype(bool)]
     if len(failed):
         parts += ["## Without an answer", failure_table(failed)]
@@ -69,6 +74,21 @@ def target_table(targets: pd.DataFrame) -> str:
     return _table(heads, rows)
 
 
+def share_table(table: pd.DataFrame) -> str:
+    """Each share or mean with its interval."""
+    rows = [
+        (
+            row["figure"],
+            row["cases"],
+            _value(row["measured"]),
+            _interval(row["ci95_low"], row["ci95_high"]) if row["n"] else "",
+            row["n"],
+        )
+        for row in table.to_dict("records")
+    ]
+    return _table(("figure", "campaigns", "measured", "95 % interval", "n"), rows)
+
+
 SHOWN = {
     "found": "alarm",
     "oracle": "oracle found",
@@ -78,6 +98,7 @@ SHOWN = {
     "name right": "right",
     "oracle right": "oracle right",
     "wrong": "wrong",
+    "explanation right": "explanation right",
     "set holds the truth": "set holds the truth",
 }
 """Columns of the table over the size."""
@@ -174,6 +195,36 @@ def effect_table(shares: pd.DataFrame, limits: pd.DataFrame) -> str:
         )
     heads = ("effect", "found", "name right", "oracle", "wrong", "found from the MDB on",
              "right from the MIB on")  # fmt: skip
+    return _table(heads, rows)
+
+
+SAMPLE_TEXT = (
+    "A test diagnoses these campaigns again. Where another answer comes out, the score is older "
+    "than the code. The explanation is the most probable one, with its posterior; σ₀² is that of "
+    "the base fit."
+)
+
+
+def sample_table(chosen: pd.DataFrame) -> str:
+    """Campaigns of a sample, and what was said of each.
+
+    Parameters
+    ----------
+    chosen : DataFrame, of `accelstudy.hidden.score.sample.sample`
+    """
+    rows = [
+        (
+            row["cell"],
+            row["campaign"],
+            words(row["verdict"]) if isinstance(row["verdict"], str) else "no answer",
+            "yes" if row["confirmed"] is True else "no",
+            words(row["explanation"]),
+            number(row["posterior"]),
+            number(row["sigma0_before"]),
+        )
+        for row in chosen.to_dict("records")
+    ]
+    heads = ("cell", "campaign", "verdict", "confirmed", "explanation", "posterior", "σ₀²")
     return _table(heads, rows)
 
 

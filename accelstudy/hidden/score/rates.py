@@ -67,6 +67,9 @@ QUESTIONS: Mapping[str, Answers] = {
     "wrong, of those answered": _of(_answer("answered"), _answer("wrong")),
     "confirmed, of those answered": _of(_answer("answered"), _answer("confirmed")),
     "set holds the truth": _answer("set_holds"),
+    "explanation right": _of(
+        lambda judged: judged["oracle_right"].notna(), lambda judged: judged["top_right"].eq(True)
+    ),
     "oracle found": _of(lambda judged: judged["oracle_right"].notna(), _answer("oracle_detected")),
     "oracle right": _answer("oracle_right"),
     "oracle right if told": _answer("told_right"),

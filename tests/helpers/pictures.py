@@ -1,0 +1,221 @@
+"""Pictures of the documents, and what each of them showed when it was made.
+
+    python tests/helpers/pictures.py               # make the pictures of reports and studies anew
+    python tests/helpers/pictures.py check         # compare the small study with what stands there
+    python tests/helpers/pictures.py drawn NAME    # take note that others of `DRAWN` are made anew
+
+docs/figures/shown.json holds what a reader sees on each picture: the words and numbers of a report,
+the texts of a figure and where its lines are. Figures of a study are compared by those of the small
+study, which CI runs anyway. Of a picture that no test makes, it is a hash of the code that draws
+it, without layout and comments.
+"""
+
+import contextlib
+import hashlib
+import json
+import re
+import shutil
+import sys
+import tempfile
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+from example_helpers import FIGURES, run_example
+from page_helpers import text_of
+from PIL import Image, ImageChops
+from places import ROOT
+from playwright.sync_api import sync_playwright
+
+from accelstudy.campaign.batch.config import parse_batch
+from accelstudy.campaign.batch.overview import summarise_campaigns
+from accelstudy.campaign.batch.run import run_task
+
+PICTURES = ROOT / "docs" / "figures"
+KEPT = PICTURES / "shown.json"
+PAPER, SMALL = ROOT / "results" / "paper", ROOT / "results" / "smoke"
+MADE_BY = "make pictures"
+
+NUMBER = re.compile(r"(?<![\w.])[-−]?\d+\.?\d*(?:e[-+]?\d+)?")
+CLOSE = {"rel": 2e-3, "abs": 0.011}
+"""Of a printed number: other processors may round another way."""
+
+REPORTS = {
+    "report-calibration": ("log", "calibrated/report.html", (1000, 1010)),
+    "report-diagnosis": ("hidden", "diagnosed/report.html", (1000, 1250)),
+}
+"""Pictures of reports: the example that writes the report, its path, and the size."""
+BATCH = ("report-batch", (1000, 680))
+OF_STUDIES = {
+    "report-claims": ("claims.html", (1000, 890)),
+    "report-explorer": ("explorer.html", (1100, 1085)),
+}
+"""Pictures of the pages of a study."""
+DRAWN = {
+    "plan": ("make plan-example", "accelstudy/plan/report/figure.py"),
+    "plan-sensors": ("make plan-example", "accelstudy/plan/batch/comparison.py"),
+    "designs-efficiency": ("make plan-example", "accelstudy/proposal/figure.py"),
+    "sequential": ("make plan-example", "accelstudy/sequential/simulated/figure.py"),
+    "pole-gnss": ("make plan-example", "accelstudy/pole/report/figure.py"),
+    "field-adxl355": ("make plan-example", "accelstudy/field/figure.py"),
+    "residuals": ("make campaigns", "accelstudy/campaign/calibration/figures.py"),
+    "rare-events": ("the study config/sweeps/rare_events.yaml",
+                    "accelstudy/study/figures/rare_events.py", "config/sweeps/rare_events.yaml"),
+    "sweeps": ("the studies in config/sweeps", "accelstudy/study/figures/sweep.py",
+               *(f"config/sweeps/{name}.yaml" for name in
+                 ("gravity_error", "noise_level", "positions", "robot_accuracy"))),
+    "hidden": ("make hidden-docs", "accelstudy/hidden/page/figures.py"),
+    "speed": ("make benchmarks",
+              *sorted(str(path.relative_to(ROOT)) for path in ROOT.glob("benchmarks/**/*.py"))),
+}  # fmt: skip
+"""Pictures that no test makes: what makes them, and the code that draws them."""
+
+
+def numbers(text):
+    return np.array([float(number.replace("−", "-")) for number in NUMBER.findall(text)])
+
+
+def alike(one, other):
+    """Whether two texts say the same, but for the rounding of their numbers."""
+    if NUMBER.sub("#", one) != NUMBER.sub("#", other):
+        return False
+    return np.allclose(numbers(one), numbers(other), rtol=CLOSE["rel"], atol=CLOSE["abs"])
+
+
+def same_picture(one, other):
+    """Whether two pictures look the same: hardly a point differs by more than a shade."""
+    pair = [Image.open(path).convert("L") for path in (one, other)]
+    if pair[0].size != pair[1].size:
+        return False
+    return (np.asarray(ImageChops.difference(*pair)) > 60).mean() < 2e-4
+
+
+def seen(path):
+    """What a reader sees of a page (HTML) or of a figure (SVG)."""
+    text = path.read_text(encoding="utf-8")
+    if path.suffix == ".html":
+        return text_of(re.sub(r"<script\b.*?</script>", "", text, flags=re.DOTALL))
+    texts = re.findall(r"<!-- (.*?) -->", text)
+    parts = re.split(r'<g id="axes_\d+">', re.sub(r"<defs>.*?</defs>", "", text, flags=re.DOTALL))
+    return "; ".join([*texts, *map(_drawn, parts[1:])])
+
+
+def _drawn(axes):
+    """How many paths and markers axes have, and where they are in the middle, points."""
+    found = re.findall(r' d="([^"]*)"|<use [^>]*x="([\d.]+)" y="([\d.]+)"', axes)
+    places = [re.findall(r"[\d.]+", d) if d else (x, y) for d, x, y in found]
+    middle = [np.mean([float(p[i]) for p in places if len(p) > 1] or [0]) for i in (0, 1)]
+    return f"{len(found)} drawn at {middle[0]:.2f} {middle[1]:.2f}"
+
+
+def code_of(*paths):
+    """Hash of files without comments, docstrings and layout."""
+    digest = hashlib.sha256()
+    for path in paths:
+        text = (ROOT / path).read_text(encoding="utf-8")
+        text = re.sub(r'"""(?:.|\n)*?"""|^ *#.*$|  #.*$', "", text, flags=re.MULTILINE)
+        digest.update(re.sub(r"\s", "", text).encode())
+    return digest.hexdigest()[:16]
+
+
+def of_code():
+    """Hashes of the code that draws; speed is also that of a version of the package."""
+    hashes = {name: code_of(*sources) for name, (_, *sources) in DRAWN.items()}
+    return {**hashes, "speed": f"{hashes['speed']} of {version('accelstudy')}"}
+
+
+def of_study(folder):
+    """What is seen of a study, by the names of the pictures."""
+    figures = {path.stem: path for path in sorted(folder.glob("figures/*.svg"))}
+    pages = {name: folder / page for name, (page, _) in OF_STUDIES.items()}
+    found = {name: path for name, path in (figures | pages).items() if path.exists()}
+    return {name: seen(path) for name, path in found.items() if (PICTURES / f"{name}.png").exists()}
+
+
+def overview(log, hidden, folder):
+    """Calibrate the campaigns of two examples as a batch, in an empty folder; the page."""
+    for path in (log / "box", hidden / "session"):
+        shutil.copytree(path, folder / path.name)
+    entries = [{"campaign": "box"}, {"campaign": "session", "approach": "robot"}]
+    with contextlib.chdir(folder):  # as the page says where the campaigns are
+        tasks = parse_batch({"batch": "examples", "campaigns": entries}).tasks()
+        out = [Path("results", task.name) for task in tasks]
+        for task, path in zip(tasks, out, strict=True):
+            run_task(task, path)
+        tables = (Path("campaigns.parquet"), Path("parameters.parquet"))
+        page = Path("overview.html")
+        summarise_campaigns("examples", out, *tables, page, {"config_hash": "0", "seed": None})
+    return folder / page
+
+
+def kept():
+    return json.loads(KEPT.read_text(encoding="utf-8"))
+
+
+def keep(texts):
+    """Take note of what pictures show that were made anew."""
+    content = {**kept(), **texts}
+    KEPT.write_text(
+        json.dumps(content, indent=1, sort_keys=True, ensure_ascii=False) + "\n", "utf-8"
+    )
+
+
+def stale(found):
+    """Names of pictures that show something else than what is found now."""
+    stored = kept()
+    return [name for name, text in found.items() if not alike(stored.get(name, ""), text)]
+
+
+def photograph(browser, page, picture, size):
+    """Take the top of a page as a picture of few colours."""
+    tab = browser.new_page(viewport=dict(zip(("width", "height"), size, strict=True)))
+    tab.goto(page.resolve().as_uri())
+    tab.screenshot(path=picture)
+    tab.close()
+    Image.open(picture).convert("RGB").quantize(128).save(picture, optimize=True)
+
+
+def shrink(drawn, picture):
+    """Take a figure of a study in the size of the picture that it replaces."""
+    width = Image.open(picture).width
+    image = Image.open(drawn).convert("RGB")
+    image = image.resize((width, round(image.height * width / image.width)), Image.LANCZOS)
+    image.quantize(128).save(picture, optimize=True)
+
+
+def make_anew():
+    """Make pictures of the reports of the examples and of the study of the paper."""
+    with sync_playwright() as playwright, tempfile.TemporaryDirectory() as folder:
+        path = shutil.which("chromium") or shutil.which("chromium-browser")
+        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        reports, texts = {}, {}
+        for name in FIGURES:
+            run_example(name, Path(folder, name))
+        for name, (example, report, size) in REPORTS.items():
+            reports[name] = Path(folder, example, report), size
+        batch = overview(Path(folder, "log"), Path(folder, "hidden"), Path(folder, "batch"))
+        reports[BATCH[0]] = batch, BATCH[1]
+        for name, (page, size) in reports.items():
+            photograph(browser, page, PICTURES / f"{name}.png", size)
+            texts[name] = seen(page)
+        for name, (page, size) in OF_STUDIES.items():
+            photograph(browser, PAPER / page, PICTURES / f"{name}.png", size)
+    for name in of_study(PAPER).keys() - OF_STUDIES.keys():
+        shrink(PAPER / "figures" / f"{name}.png", PICTURES / f"{name}.png")
+    keep(texts | of_study(SMALL))
+
+
+def main(*arguments):
+    """Make pictures anew, compare them, or take note of them."""
+    if not arguments:
+        make_anew()
+    elif arguments[0] == "drawn":
+        keep({name: of_code()[name] for name in arguments[1:]})
+    elif old := stale(of_study(SMALL)):
+        sys.exit(
+            f"docs/figures: {', '.join(old)}: older than the code; `{MADE_BY}` makes them anew"
+        )
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,55 @@
+"""Pictures in the documents that are older than the code are noticed.
+
+Those of reports and tutorials are compared in test_examples.py, those of studies by `make smoke`.
+"""
+
+import pytest
+from pictures import DRAWN, PICTURES, alike, code_of, kept, of_code, same_picture, seen
+
+SVG = """<svg><defs><path d="M 0 0"/></defs><g id="axes_1"><!-- error / mgon -->
+<path d="M 10 20 L 30 40"/><use xlink:href="#m" x="{x}" y="50.0"/></g></svg>"""
+
+
+def test_no_picture_is_drawn_by_other_code_than_it_was():
+    stored = kept()
+    old = [f"{n}: {DRAWN[n][0]}" for n, now in of_code().items() if stored.get(n) != now]
+    assert not old, "\n".join(["docs/figures has pictures that other code drew:", *old,
+                               "then: python tests/helpers/pictures.py drawn NAME"])  # fmt: skip
+
+
+def test_each_picture_says_what_made_it():
+    beginnings = {"sweep-": "sweeps", "hidden-": "hidden", "residuals-": "residuals"}
+    for path in PICTURES.glob("*.png"):
+        own = next((v for k, v in beginnings.items() if path.stem.startswith(k)), path.stem)
+        assert own in kept(), path.name
+
+
+@pytest.mark.parametrize(
+    ("other", "same"),
+    [("right to 9.25 mgon", True), ("right to 9.26 mgon", True), ("right to 9.4 mgon", False),
+     ("wrong to 9.25 mgon", False), ("right to 9.25 and 3 mgon", False)],
+)  # fmt: skip
+def test_words_count_and_last_digits_do_not(other, same):
+    assert alike("right to 9.25 mgon", other) == same
+
+
+@pytest.mark.parametrize(("x", "same"), [("60.0", True), ("60.02", True), ("66.0", False)])
+def test_a_point_that_moved_is_seen(tmp_path, x, same):
+    paths = [tmp_path / "one.svg", tmp_path / "other.svg"]
+    for path, place in zip(paths, ("60.0", x), strict=True):
+        path.write_text(SVG.format(x=place), encoding="utf-8")
+    assert alike(*map(seen, paths)) == same
+    assert "error / mgon" in seen(paths[0])
+
+
+def test_comments_and_layout_do_not_make_a_picture_old(tmp_path):
+    files = [tmp_path / name for name in ("a.py", "b.py", "c.py")]
+    for path, text in zip(files, ('"""A."""\nx = 1\n', "x  =  1  # one\n", "x = 2\n"), strict=True):
+        path.write_text(text, encoding="utf-8")
+    assert code_of(files[0]) == code_of(files[1]) != code_of(files[2])
+
+
+def test_pictures_that_differ_in_a_word_differ():
+    one, other = (PICTURES / f"figure-5{end}.png" for end in ("", "-robot"))
+    assert same_picture(one, one)
+    assert not same_picture(one, other)
