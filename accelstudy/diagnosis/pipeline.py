@@ -229,5 +229,4 @@ class _Run:
         level = level_of_effects(self.fit.sigma_known)
         seeds = [self.stage(number) for number in (1, 2, 3, 4)]
         held = held_out(self.search, finding, known, level, seeds)
-        confirmed = held.statement is not None
-        return Gap(before, after, held.gap, confirmed, held.reason, held.statement)
+        return Gap(before, after, held.gap, held.confirmed, held.reason, held.names)

@@ -202,7 +202,7 @@ def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
         named,
         verdict="narrowed",
         credible_set=finding.credible_set,
-        gap=replace(named.gap, statement="effect"),
+        gap=replace(named.gap, names=()),
         beside=replace(named.beside, finding=finding),
     )
     content = write_diagnosis(diagnosis, tmp_path)

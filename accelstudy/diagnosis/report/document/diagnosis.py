@@ -66,6 +66,7 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
         "effects": [_effect(named) for named in d.found],
         "suspects": [{"position": label, "p_value": json_number(p)} for label, p in d.suspects],
         "location": {name: json_number(share) for name, share in d.location.items()},
+        "location_untestable": dict(d.not_located),
         "gap": _gap(d),
         "parameter_changes": [
             {
@@ -164,7 +165,9 @@ def _gap(d: Diagnosis) -> dict[str, Any]:
             "before": None if roll_pitch is None else json_number(roll_pitch[0]),
             "after": None if roll_pitch is None else json_number(roll_pitch[1]),
         },
+        "better_for_leveling": d.better_for_leveling,
         "confirmed": gap.confirmed,
         "confirmed_statement": gap.statement,
+        "confirmed_names": list(gap.names),
         "reason": gap.reason,
     }

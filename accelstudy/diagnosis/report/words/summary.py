@@ -14,6 +14,7 @@ from accelstudy.diagnosis.report.words.missing import (
     without_a_name,
 )
 from accelstudy.diagnosis.result import Diagnosis, Named
+from accelstudy.diagnosis.space.groups import REPEAT
 from accelstudy.effects import effect_names, get_effect
 
 GROUPS = {
@@ -111,6 +112,7 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
             f"Tilt error of the calibrated sensor: {before} {unit} as it is, {after} {unit} "
             f"{changed(d)}."
         )
+        lines += keep_base(d)
     if judged(d):
         lines.append(confirmation(d))
     if d.examined.invisible:
@@ -130,9 +132,19 @@ def advice(diagnosis: Diagnosis) -> list[str]:
         lines.append(f"The angles of a robot in each position could show {comma_list(hidden)}.")
     if "gravity_error" in d.examined.invisible:
         lines.append("No position shows an error of g; it takes another measurement of gravity.")
-    if "repeat" not in d.location and (d.verdict == "noise_model" or not d.sigma_known):
+    if REPEAT not in d.beside.search.groups and (d.verdict == "noise_model" or not d.sigma_known):
         lines.append("Repeated attitudes would show the noise from hold to hold without any model.")
     return lines
+
+
+def keep_base(diagnosis: Diagnosis) -> list[str]:
+    """Advise the base model for leveling where what was added makes the tilt error larger."""
+    if diagnosis.better_for_leveling != "base":
+        return []
+    return [
+        f"For leveling keep the base model: the tilt error is larger {changed(diagnosis)}, as "
+        "these positions determine what was added too weakly."
+    ]
 
 
 def judged(diagnosis: Diagnosis) -> bool:
@@ -151,13 +163,16 @@ def confirmation(diagnosis: Diagnosis) -> str:
     )
     if not gap.confirmed:
         return f"Not confirmed {tested}" + (f": {gap.reason}." if gap.reason else ".")
-    names = comma_list([words(named.name) for named in diagnosis.found if _is_effect(named)])
-    if gap.statement == "name":
-        return f"Confirmed {tested}: that it is {names}."
-    return (
-        f"Confirmed {tested}: that such an effect is missing; not that it is {names} rather than a "
-        "rival."
-    )
+    if gap.names:
+        is_one = f"that it is {comma_list([words(name) for name in gap.names], 'or')}"
+        open_ = "; each of them could leave what was found, so which it is stays open"
+        return f"Confirmed {tested}: {is_one}{open_ if len(gap.names) > 1 else ''}."
+    found = [_title(named, {named.name}) for named in diagnosis.found if _is_effect(named)]
+    if len(found) > 1:
+        said = f"that such effects are missing; not that they are {comma_list(found)}"
+        return f"Confirmed {tested}: {said} rather than rivals."
+    said = f"that such an effect is missing; not that it is {found[0]}"
+    return f"Confirmed {tested}: {said} rather than a rival."
 
 
 def changed(diagnosis: Diagnosis) -> str:
