@@ -211,6 +211,7 @@ class _Run:
                     p_value=p,
                     posterior=choice.probability,
                     rivals=search.rivals(best, choice.members),
+                    imitators=search.imitators(best, choice.members),
                     parameters=parameters,
                 )
             )

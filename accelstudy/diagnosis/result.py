@@ -51,6 +51,7 @@ class Named:
     p_value : float, family-wise; None of a gross error that is recognised by its size
     posterior : float; None of what is no rival of the others
     rivals : tuple of (name, cosine)
+    imitators : tuple of str, further names that could leave the same, and more
     parameters : tuple of (name, value, sigma, unit), SI
     position : int, of a bumped position
     """
@@ -61,6 +62,7 @@ class Named:
     p_value: float | None
     posterior: float | None
     rivals: tuple[tuple[str, float], ...] = ()
+    imitators: tuple[str, ...] = ()
     parameters: tuple[tuple[str, float, float | None, str], ...] = ()
     position: int | None = None
 

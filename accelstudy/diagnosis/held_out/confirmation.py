@@ -144,8 +144,8 @@ def _refit(part: Search, chosen: Sequence[Choice]) -> Solution | str:
 
 def _group(search: Search, choice: Choice) -> tuple[str, ...]:
     """Name of an effect, and all that could leave the same in this campaign."""
-    alike = (*choice.members, *search.examined.imitators(choice.best))
-    return tuple(dict.fromkeys((choice.best.name, *alike)))
+    others = search.imitators(choice.best, choice.members)
+    return tuple(dict.fromkeys((choice.best.name, *choice.members, *others)))
 
 
 def _is_of(

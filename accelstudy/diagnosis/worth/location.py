@@ -1,8 +1,8 @@
 """Where a disagreement lives: the share of the excess χ² that each group of regressors takes up.
 
 A group of k regressors takes up k of r redundant conditions. Of a pattern that has nothing to do
-with it, it has a share of Beta(k/2, (r − k)/2) by chance. Where that is often most of it, the share
-says nothing, and is not told.
+with it, it has a share of Beta(k/2, (r − k)/2) by chance, k/r on average. Where that is often
+nearly all of it, the share says nothing, and is not told.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ ABSENT = {
     SINGLE: "no position is checked by the others",
 }
 """Why nothing is known of groups that need no column of a name."""
-MOST = 0.75
+NEARLY_ALL = 0.9
 """Share that would seem to say where a pattern lives."""
 SELDOM = 0.05
 """Probability with which any pattern may have such a share in a group by chance."""
@@ -62,6 +62,17 @@ class Location:
     def shares(self) -> dict[str, float]:
         """Share of the excess χ² in the space of each group that can be told, in [0, 1]."""
         return {name: self._share(name) for name in self._spaces if name not in self.untestable}
+
+    @cached_property
+    def by_chance(self) -> dict[str, float]:
+        """Share that each of these groups has of any pattern, on average."""
+        found = {
+            n: float(self._spaces[n].dims[0]) / self._residuals.redundancy for n in self.shares
+        }
+        if SINGLE in found:
+            largest, total = self._single.T
+            found[SINGLE] = float(np.mean(largest / total))
+        return found
 
     @cached_property
     def untestable(self) -> dict[str, str]:
@@ -95,8 +106,8 @@ class Location:
         k, r = int(self._spaces[name].dims.max()), self._residuals.redundancy
         if k == 0:
             return "the parameters of the model absorb all of it"
-        if self._most(name, k, r) > SELDOM:
-            return f"with a redundancy of {r} it could have most of any pattern by chance"
+        if self._nearly_all(name, k, r) > SELDOM:
+            return f"with a redundancy of {r}, nearly all of any pattern could be in it by chance"
         return ""
 
     def _absent(self, name: str) -> str:
@@ -109,12 +120,12 @@ class Location:
             return f"the {column} is the same in all positions"
         return ABSENT[name]
 
-    def _most(self, name: str, k: int, r: int) -> float:
-        """Probability that a group has most of any pattern by chance."""
+    def _nearly_all(self, name: str, k: int, r: int) -> float:
+        """Probability that a group has nearly all of any pattern by chance."""
         if name == SINGLE:
             largest, total = self._single.T
-            return float(np.mean(largest >= MOST * total))
-        return 1.0 if k >= r else float(special.betainc((r - k) / 2, k / 2, 1 - MOST))
+            return float(np.mean(largest >= NEARLY_ALL * total))
+        return 1.0 if k >= r else float(special.betainc((r - k) / 2, k / 2, 1 - NEARLY_ALL))
 
     @cached_property
     def _single(self) -> Array:

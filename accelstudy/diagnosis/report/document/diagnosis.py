@@ -66,6 +66,7 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
         "effects": [_effect(named) for named in d.found],
         "suspects": [{"position": label, "p_value": json_number(p)} for label, p in d.suspects],
         "location": {name: json_number(share) for name, share in d.location.items()},
+        "location_by_chance": {n: json_number(p) for n, p in d.beside.location.by_chance.items()},
         "location_untestable": dict(d.not_located),
         "gap": _gap(d),
         "parameter_changes": [
@@ -139,6 +140,7 @@ def _effect(named: Named) -> dict[str, Any]:
             {"name": name, "value": json_number(value), "sigma": json_number(sigma), "unit": unit}
             for name, value, sigma, unit in named.parameters
         ],
+        "imitators": list(named.imitators),
         "rivals": [{"name": name, "cosine": json_number(cosine)} for name, cosine in named.rivals],
     }
 

@@ -15,8 +15,9 @@ from accelstudy.diagnosis.loop import Loop
 from accelstudy.diagnosis.report.figures.choice import diagnosis_figures
 from accelstudy.diagnosis.report.page.next_steps import next_steps
 from accelstudy.diagnosis.report.words import summary as wording
-from accelstudy.diagnosis.report.words.missing import family_words, separates
+from accelstudy.diagnosis.report.words.missing import family_words, question
 from accelstudy.diagnosis.result import Diagnosis
+from accelstudy.diagnosis.space.examined import IMITATES
 from accelstudy.drawing.saving import save_all
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.pages import write_page
@@ -70,8 +71,9 @@ def write_report(
         calibration=calibration,
         added=diagnosis.extended is not diagnosis.model,
         judged=wording.judged(diagnosis),
-        separates=separates(diagnosis.next_positions),
+        question=question(diagnosis.next_positions),
         family=family_words,
+        shares_a_direction=IMITATES,
         credible=CREDIBLE,
         wrong=round(10 * SURE),
         withheld=round(10 * (1 - SURE)),
