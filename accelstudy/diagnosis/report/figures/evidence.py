@@ -75,11 +75,13 @@ def location_figure(diagnosis: Diagnosis) -> Figure:
     figure = new_figure(FULL * 0.62, 14 + 5.5 * len(shares))
     ax = figure.add_subplot()
     titles = [GROUPS.get(name, words(name)) for name, _ in shares]
-    drawn = ax.barh(titles, [100 * share for _, share in shares], color=AFTER, height=0.6)
-    ax.bar_label(drawn, fmt="{:.0f} %", padding=2, fontsize=7.5)
-    usual = diagnosis.beside.location.by_chance
+    percent = [100 * share for _, share in shares]
+    usual = [100 * diagnosis.beside.location.by_chance[name] for name, _ in shares]
     place = np.arange(len(shares))
-    ax.vlines([100 * usual[n] for n, _ in shares], place - 0.42, place + 0.42, color=INK)
+    ax.barh(titles, percent, color=AFTER, height=0.6)
+    ax.vlines(usual, place - 0.42, place + 0.42, color=INK)
+    for row, ends in enumerate(zip(percent, usual, strict=True)):
+        ax.text(max(ends) + 1.5, row, f"{ends[0]:.0f} %", va="center", fontsize=7.5)
     ax.set(xlim=(0, 112), xlabel="share of the excess χ² / %")
     ax.grid(axis="y", visible=False)
     return figure
