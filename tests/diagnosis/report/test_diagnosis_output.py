@@ -300,6 +300,24 @@ def test_noise_alone_is_blamed_only_where_it_is_probable():
         assert any("may be an effect" in line for line in verdict_lines(found)) != sure
 
 
+@pytest.mark.usefixtures("not_rendered")
+def test_every_redundancy_of_a_page_says_what_it_counts(tmp_path):
+    """Slopes within a long first hold add to that of the means, which the head and table give."""
+    measured, _ = simulate_campaign(CampaignSettings(approach="gravity", interval=15.0))
+    n = measured.n_positions
+    duration = np.where(np.arange(n) == 0, 90.0, 10.0)
+    time = np.cumsum(duration + 5) - 5 - duration / 2
+    sd = np.tile(0.04 / duration[:, None] ** 1.5, 3)
+    slope = sd * np.random.default_rng(7).standard_normal((n, 3))
+    found = diagnose(replace(measured, time=time, slope=slope, sd_slope=sd), NINE)
+    content = write_diagnosis(found, tmp_path)
+    added = content["redundancy"] - content["global_test"]["dof"]
+    assert added > 0
+    page = text_of((tmp_path / "report.html").read_text(encoding="utf-8"))
+    assert set(re.findall(r"redundancy (\d+)", page)) == {str(found.base.redundancy)}
+    assert f"add {added} to the redundancy of {found.base.redundancy}" in page
+
+
 def test_the_question_of_further_positions_is_a_sentence():
     """Of two explanations, of which one may hold the other and more."""
     for separates, asked in (
