@@ -15,10 +15,9 @@ from accelstudy.diagnosis.decision.posterior import of_effects
 from accelstudy.diagnosis.decision.search import Search
 from accelstudy.diagnosis.decision.verdict import Finding
 from accelstudy.diagnosis.space.groups import LACK_OF_FIT
-from accelstudy.diagnosis.space.hypotheses import OUTLIER
 from accelstudy.diagnosis.worth.changes import Change, parameter_changes
 from accelstudy.diagnosis.worth.limits import UpperLimit, upper_limits
-from accelstudy.diagnosis.worth.location import locate
+from accelstudy.diagnosis.worth.location import Location
 from accelstudy.diagnosis.worth.next_positions import NextPosition, next_positions
 from accelstudy.diagnosis.worth.tilt import leveling_rms
 
@@ -43,8 +42,8 @@ class Beside:
     trusted: bool
 
     @cached_property
-    def location(self) -> dict[str, float]:
-        """Shares of the excess χ² above the noise.
+    def location(self) -> Location:
+        """Where the excess χ² above the noise lives.
 
         The noise is the given one. Where none is given, it is what remains after what was found or,
         if something unknown is missing, the least that any group of regressors leaves.
@@ -58,8 +57,7 @@ class Beside:
             spaces = [space for name, space in groups.items() if name != LACK_OF_FIT]
             left = [float((z @ z - q.parts(z)[0]) / (r - q.dims[0])) for q in spaces]
             variance = min([variance, *left])
-        bumped = self.search.examined.candidates.get(OUTLIER)
-        return locate(groups, bumped, residuals, self.search.chance, variance)
+        return Location(self.search.examined, self.search.chance, variance)
 
     @cached_property
     def leveling(self) -> tuple[float, float] | None:

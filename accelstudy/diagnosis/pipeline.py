@@ -211,6 +211,7 @@ class _Run:
                     p_value=p,
                     posterior=choice.probability,
                     rivals=search.rivals(best, choice.members),
+                    imitators=search.imitators(best, choice.members),
                     parameters=parameters,
                 )
             )
@@ -229,5 +230,4 @@ class _Run:
         level = level_of_effects(self.fit.sigma_known)
         seeds = [self.stage(number) for number in (1, 2, 3, 4)]
         held = held_out(self.search, finding, known, level, seeds)
-        confirmed = held.statement is not None
-        return Gap(before, after, held.gap, confirmed, held.reason, held.statement)
+        return Gap(before, after, held.gap, held.confirmed, held.reason, held.names)

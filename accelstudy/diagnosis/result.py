@@ -28,6 +28,10 @@ LEVEL_EFFECTS = 0.04
 """Level of the test for anything that is missing, where the noise level is not tested as well."""
 
 
+LARGER = 1.02
+"""Ratio of tilt errors from which on one counts as larger."""
+
+
 def level_of_effects(sigma_known: bool) -> float:
     """Level of the test for anything that is missing.
 
@@ -47,6 +51,7 @@ class Named:
     p_value : float, family-wise; None of a gross error that is recognised by its size
     posterior : float; None of what is no rival of the others
     rivals : tuple of (name, cosine)
+    imitators : tuple of str, further names that could leave the same, and more
     parameters : tuple of (name, value, sigma, unit), SI
     position : int, of a bumped position
     """
@@ -57,6 +62,7 @@ class Named:
     p_value: float | None
     posterior: float | None
     rivals: tuple[tuple[str, float], ...] = ()
+    imitators: tuple[str, ...] = ()
     parameters: tuple[tuple[str, float, float | None, str], ...] = ()
     position: int | None = None
 
@@ -65,8 +71,9 @@ class Named:
 class Gap:
     """How far the disagreement shrinks; None where it does not apply.
 
-    `statement` says what is confirmed: "effect", that one of the credible set is missing, or
-    "name", that it is the most probable one; None if nothing is.
+    If it is confirmed that such an effect is missing, `names` says of which names one is confirmed
+    against all others: what was found, with all that could leave the same. It is empty if that is
+    open.
     """
 
     before: float
@@ -74,7 +81,14 @@ class Gap:
     held_out: HeldOutGap | None = None
     confirmed: bool = False
     reason: str = ""
-    statement: str | None = None
+    names: tuple[str, ...] = ()
+
+    @property
+    def statement(self) -> str | None:
+        """What is confirmed: "name", that it is this effect, or "effect", that there is one."""
+        if not self.confirmed:
+            return None
+        return "name" if len(self.names) == 1 else "effect"
 
 
 @dataclass(frozen=True)
@@ -135,13 +149,26 @@ class Diagnosis:
 
     @property
     def location(self) -> Mapping[str, float]:
-        """Share of the excess χ² in each group."""
-        return self.beside.location
+        """Share of the excess χ² in each group of which it can be told."""
+        return self.beside.location.shares
+
+    @property
+    def not_located(self) -> Mapping[str, str]:
+        """Why nothing can be told of the other groups."""
+        return self.beside.location.untestable
 
     @property
     def leveling(self) -> tuple[float, float] | None:
         """Tilt error without and with the effects that were found, rad; None if there is none."""
         return self.beside.leveling
+
+    @property
+    def better_for_leveling(self) -> str | None:
+        """Model that leaves the smaller tilt error, "base" or "extended"; None if there is one."""
+        if self.leveling is None or self.extended is self.model:
+            return None
+        before, after = self.leveling
+        return "base" if after > LARGER * before else "extended"
 
     @property
     def changes(self) -> tuple[Change, ...]:

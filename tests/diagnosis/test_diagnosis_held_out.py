@@ -4,15 +4,19 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from diagnosis_helpers import NINE, ROBOT, G, shuffled
+from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, design, shuffled, some_holds
 
 from accelstudy.adjustment.quality import solve
+from accelstudy.basics.wording import words
+from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.decision.search import Search
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.held_out import confirmation as held_out
 from accelstudy.diagnosis.held_out import given_a_name
 from accelstudy.diagnosis.held_out.gap import SIGNIFICANT, held_out_gap, split_positions
 from accelstudy.diagnosis.held_out.linear import LinearSplit
+from accelstudy.diagnosis.pipeline import diagnose
+from accelstudy.diagnosis.report.words.summary import confirmation
 from accelstudy.diagnosis.result import LEVEL_EFFECTS
 from accelstudy.simulation.sessions import Noise, session
 
@@ -68,6 +72,49 @@ def test_prediction_to_first_order_is_that_of_refits(parts):
     change = split.corrections(search.best_shape("quadratic_scale"), left)
     assert np.mean(missed**2) == pytest.approx(gap.before, rel=0.02)
     assert np.mean((missed - change) ** 2) == pytest.approx(gap.after, rel=0.02)
+
+
+GROUPS = {
+    ("thermal_bias", "ABBA", "robot"): {"thermal_bias", "thermal_curve"},
+    ("thermal_bias", "random", "robot"): {"thermal_bias"},
+    ("quadratic_scale", "random", "gravity"): {"quadratic_scale", "cross_coupling"},
+}
+"""What is confirmed of an effect, by the order of the temperatures and the approach."""
+
+
+@pytest.mark.parametrize("case", GROUPS)
+def test_a_name_is_confirmed_only_where_no_other_could_leave_the_same(case):
+    """At two temperatures a curve is a line; by gravity alone a coupling can do what a scale does.
+
+    At many temperatures, with a robot, a linear effect is told from a quadratic one: by its name.
+    """
+    effect, order, approach = case
+    settings = CampaignSettings(
+        scheme="fibonacci-30", order="random", approach=approach, effects=(effect,), yaw="random",
+        temperature=(15.0, 40.0), temperature_order=order, seed=3,
+    )  # fmt: skip
+    found = diagnose(simulate_campaign(settings)[0], NINE)
+    assert found.verdict == "named"
+    assert found.gap.confirmed
+    assert set(found.gap.names) == GROUPS[case]
+    assert found.gap.statement == ("name" if len(GROUPS[case]) == 1 else "effect")
+    said = confirmation(found)
+    assert all(words(name) in said for name in GROUPS[case])
+
+
+def test_an_imitator_leaves_nothing_of_what_it_imitates():
+    """By least squares: of the imitators, and of no others, a shape takes up all of an effect."""
+    frame_of = design(shuffled("fibonacci-30"), GRAVITY, some_holds(30))
+    one = frame_of.candidates["quadratic_scale"][0]
+    could = set()
+    for name, shapes in frame_of.candidates.items():
+        if name not in ("quadratic_scale", "outlier_position"):
+            left = (
+                one.ideal - s.ideal @ np.linalg.lstsq(s.ideal, one.ideal, rcond=None)[0]
+                for s in shapes
+            )
+            could |= {name for rest in left if np.linalg.norm(rest, 2) <= np.sqrt(1 - 0.9995**2)}
+    assert set(frame_of.imitators(one)) == could == {"cross_coupling"}
 
 
 def test_a_part_that_can_show_no_pair_chooses_none():

@@ -232,6 +232,12 @@ class Search:
             if cosine >= RIVAL and name not in members
         )
 
+    def imitators(self, best: Hypothesis, members: Sequence[str]) -> tuple[str, ...]:
+        """Other effects that could leave all that one does, and more."""
+        if best.effect is None:
+            return ()
+        return tuple(n for n in self.examined.imitators(best) if n not in members)
+
     # --- everything -----------------------------------------------------------------------------
 
     @cached_property

@@ -34,12 +34,14 @@ class HeldOut:
     ----------
     gap : HeldOutGap or None
     reason : str, why nothing is confirmed; empty if it is
-    statement : str or None, "name" or "effect", what is confirmed
+    confirmed : bool, whether such an effect is confirmed
+    names : tuple of str, of which one is confirmed against all others; empty if none is
     """
 
     gap: HeldOutGap | None
     reason: str
-    statement: str | None = None
+    confirmed: bool = False
+    names: tuple[str, ...] = ()
 
 
 def held_out(
@@ -91,8 +93,9 @@ def held_out(
     if not gap.significant:
         return HeldOut(gap, "")
     alone = finding.verdict == "named" and len(finding.chosen) == 1
-    sure = alone and _is_the_name(search, part, finding, split)
-    return HeldOut(gap, "", "name" if sure else "effect")
+    group = _group(search, finding.chosen[0]) if alone else ()
+    sure = alone and _is_of(group, search, part, finding, split)
+    return HeldOut(gap, "", True, group if sure else ())
 
 
 def _chosen_alike(part: Search, finding: Finding) -> tuple[Sequence[Choice], bool]:
@@ -139,14 +142,23 @@ def _refit(part: Search, chosen: Sequence[Choice]) -> Solution | str:
     return "the fit to the fitted positions alone has no solution" if fit is None else fit[1]
 
 
-def _is_the_name(search: Search, part: Search, finding: Finding, split: LinearSplit) -> bool:
-    """Whether held-out positions by themselves prefer a name to the other explanations."""
+def _group(search: Search, choice: Choice) -> tuple[str, ...]:
+    """Name of an effect, and all that could leave the same in this campaign."""
+    others = search.imitators(choice.best, choice.members)
+    return tuple(dict.fromkeys((choice.best.name, *choice.members, *others)))
+
+
+def _is_of(
+    group: Sequence[str], search: Search, part: Search, finding: Finding, split: LinearSplit
+) -> bool:
+    """Whether held-out positions by themselves prefer some names to the other explanations."""
     assert finding.posterior is not None
     left, missed = split.beside(search.residuals.errors[None])
     variance = 1.0 if part.level.known else part.residuals.variance
-    logs = []
+    logs, own = [], []
     for one in finding.posterior.told[: BESIDE + 1]:
         if len(one.best) == 1 and one.best[0].effect is not None:
             rest = missed - split.corrections(one.best[0], left)
             logs.append(-float(np.sum(rest**2)) / (2 * variance))
-    return bool(softmax(logs)[0] >= SURE)
+            own.append(one.names[0] in group)
+    return bool(np.sum(softmax(logs)[own]) >= SURE)

@@ -25,6 +25,8 @@ from accelstudy.diagnosis.space.spaces import Bases
 from accelstudy.effects import Effect, effect_names, get_effect
 
 Array = NDArray[np.float64]
+IMITATES = 0.9995
+"""Canonical cosine from which on two signatures are held to be the same in what is confirmed."""
 AT_ONCE = 10_000_000
 """Numbers in one block of work, about."""
 
@@ -109,18 +111,28 @@ class ExaminedFit:
 
     def nearest(self, hypothesis: Hypothesis) -> tuple[tuple[str, float], ...]:
         """Other effects and their largest canonical cosines, nearest first."""
-        products = hypothesis.ideal.T @ self._ideals.together
-        largest = np.zeros(len(self._shapes))
-        for d in np.unique(self._ideals.dims):
-            own = np.flatnonzero(self._ideals.dims == d)
-            blocks = products[:, self._ideals.ends[own][:, None] + np.arange(d)]
-            values = np.linalg.svd(np.swapaxes(blocks, 0, 1), compute_uv=False)[:, 0]
-            largest[own] = np.minimum(values, 1.0)
         near: dict[str, float] = {}
-        for shape, cosine in zip(self._shapes, largest.tolist(), strict=True):
+        for shape, cosine in zip(self._shapes, self._cosines(hypothesis, 1).tolist(), strict=True):
             if shape.name != hypothesis.name:
                 near[shape.name] = max(near.get(shape.name, 0.0), cosine)
         return tuple(sorted(near.items(), key=lambda item: -item[1]))
+
+    def imitators(self, hypothesis: Hypothesis) -> tuple[str, ...]:
+        """Other effects that could leave all that a hypothesis does, and perhaps more."""
+        smallest = self._cosines(hypothesis, hypothesis.dim)
+        names = {self._shapes[k].name for k in np.flatnonzero(smallest >= IMITATES)}
+        return tuple(sorted(names - {hypothesis.name}))
+
+    def _cosines(self, hypothesis: Hypothesis, rank: int) -> Array:
+        """Canonical cosine of this rank, 1 for the largest, with each shape; 0 if it has fewer."""
+        products = hypothesis.ideal.T @ self._ideals.together
+        found = np.zeros(len(self._shapes))
+        for d in np.unique(self._ideals.dims[self._ideals.dims >= rank]):
+            own = np.flatnonzero(self._ideals.dims == d)
+            blocks = products[:, self._ideals.ends[own][:, None] + np.arange(d)]
+            values = np.linalg.svd(np.swapaxes(blocks, 0, 1), compute_uv=False)[:, rank - 1]
+            found[own] = np.minimum(values, 1.0)
+        return found
 
     @cached_property
     def _shapes(self) -> list[Hypothesis]:

@@ -21,12 +21,24 @@ ROBOT = "robot_angles"
 """Group of the effects on what a robot reads, and of its base."""
 COURSES = ("slow_time", "temperature")
 """Groups of anything that depends smoothly on a column of the holds."""
+REPEAT = "repeat"
+"""Group of the differences of repeated positions."""
 LACK_OF_FIT = "lack_of_fit"
 """Everything but the differences of repeated positions, which are noise alone (pure error)."""
 
 
 def groups(examined: ExaminedFit) -> dict[str, Spaces]:
-    """Groups that the campaign can show, each one space; with repeats also the lack of fit."""
+    """Groups that the campaign can show, each one space; with repeats also the lack of fit.
+
+    They leave something of the residuals, and the model does something of them.
+    """
+    r, found = examined.frame.residuals.redundancy, all_groups(examined)
+    shown = {name for name, space in found.items() if 0 < space.dims[0] < r}
+    return {n: q for n, q in found.items() if (REPEAT if n == LACK_OF_FIT else n) in shown}
+
+
+def all_groups(examined: ExaminedFit) -> dict[str, Spaces]:
+    """Groups whose columns are there, those as well of which nothing shows or in which all does."""
     residuals, hold, n = examined.frame.residuals, examined.frame.hold, len(examined.frame.forces)
     found: dict[str, Spaces] = {}
 
@@ -39,8 +51,7 @@ def groups(examined: ExaminedFit) -> dict[str, Spaces]:
     def add_rows(name: str, rows: Array) -> None:
         projected = residuals.project(rows)
         basis = span(projected, np.linalg.norm(rows, axis=0), ABSORBED)[1]
-        if 0 < basis.shape[1] < residuals.redundancy:
-            found[name] = Bases(basis, np.array([basis.shape[1]]))
+        found[name] = Bases(basis, np.array([basis.shape[1]]))
 
     for name, signatures in _signatures(examined.frame).items():
         rows = [residuals.whitened(s) for s in signatures]
@@ -55,9 +66,7 @@ def groups(examined: ExaminedFit) -> dict[str, Spaces]:
     labels = clusters(examined.frame.forces)
     if len(np.unique(labels)) < n:
         same = LackOfFit.of(residuals, labels)
-        repeats = Repeats(same, residuals.redundancy)
-        if 0 < repeats.dims[0] < residuals.redundancy:
-            found |= {"repeat": repeats, LACK_OF_FIT: same}
+        found |= {REPEAT: Repeats(same, residuals.redundancy), LACK_OF_FIT: same}
     return found
 
 

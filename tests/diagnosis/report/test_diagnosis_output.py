@@ -30,13 +30,15 @@ from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_ca
 from accelstudy.commands.main import main
 from accelstudy.diagnosis.decision.explanations import Explanation
 from accelstudy.diagnosis.decision.posterior import Posterior, Weighed
+from accelstudy.diagnosis.decision.priors import SURE
 from accelstudy.diagnosis.decision.verdict import Finding
 from accelstudy.diagnosis.loop import CASES as CASES_OF_LOOP
 from accelstudy.diagnosis.loop import Loop, close_loop
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.figures.gap import gap_figure, loop_figure
 from accelstudy.diagnosis.report.output import diagnose_folder, write_diagnosis
-from accelstudy.diagnosis.report.words.summary import headline
+from accelstudy.diagnosis.report.words.missing import question
+from accelstudy.diagnosis.report.words.summary import headline, verdict_lines
 from accelstudy.diagnosis.result import Gap
 from accelstudy.diagnosis.round_trip import parse_round_trip
 from accelstudy.drawing import saving
@@ -204,7 +206,7 @@ def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
         named,
         verdict="narrowed",
         credible_set=finding.credible_set,
-        gap=replace(named.gap, statement="effect"),
+        gap=replace(named.gap, names=()),
         beside=replace(named.beside, finding=finding),
     )
     content = write_diagnosis(diagnosis, tmp_path)
@@ -221,7 +223,7 @@ def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
         "This campaign cannot tell thermal bias (0.55) and thermal scale (0.4) apart; further",
         "that such an effect is missing; not that it is thermal bias rather than a rival",
         "a wrong name costs 7, a right name that is withheld 3",
-        "to separate thermal bias and thermal scale",
+        "whether thermal bias or thermal scale is missing",
         "temperature / °C",
         "takes thermal bias, and its sigmas do not know of the others",
         "accelstudy diagnose CAMPAIGN --model bias-scale-nonorthogonality --approach robot",
@@ -246,6 +248,87 @@ def test_what_is_certain_of_the_unknown_is_its_headline(named, tmp_path):
     assert [part["names"] for part in content["certain"]] == [["thermal_bias"]]
     text = text_of((tmp_path / "report.html").read_text(encoding="utf-8"))
     assert "The model lacks thermal bias; what is missing beside it has no name here." in text
+
+
+@pytest.mark.usefixtures("not_rendered")
+@pytest.mark.parametrize(("after", "better"), [(98.0, "base"), (82.5, "extended")])
+def test_a_model_that_levels_worse_is_not_advised(named, tmp_path, after, better):
+    """On the page and its commands, in the terminal, and in both files for programs."""
+    beside = replace(named.beside)
+    beside.__dict__["leveling"] = (82.0 * MGON, after * MGON)
+    content = write_diagnosis(replace(named, beside=beside), tmp_path)
+    assert [error.message for error in SCHEMA.iter_errors(content)] == []
+    assert content["gap"]["better_for_leveling"] == better
+    diagnosis = replace(named, beside=beside)
+    page = text_of((tmp_path / "report.html").read_text(encoding="utf-8"))
+    calibration = json.loads((tmp_path / "calibration.json").read_text(encoding="utf-8"))
+    advised = "keep the base model"
+    for said in (page, *verdict_lines(diagnosis), *calibration["warnings"]):
+        assert better == "base" or advised not in said
+    if better == "base":
+        assert advised in page
+        assert any(advised in line for line in verdict_lines(diagnosis))
+        assert any(advised in line for line in calibration["warnings"])
+    assert ("accelstudy apply" in page) == (better == "extended")
+
+
+@pytest.mark.usefixtures("not_rendered")
+def test_no_other_signature_is_said_only_without_a_rival_like_it(named, tmp_path):
+    """A rival whose cosine prints as 1.000 is named instead."""
+    (found,) = named.found
+    for change, said in (
+        ({"rivals": (("thermal_curve", 0.9412),)}, False),
+        ({"rivals": (("thermal_curve", 0.99996),)}, True),
+        ({"imitators": ("thermal_curve",), "rivals": (("thermal_curve", 1.0),)}, True),
+    ):
+        write_diagnosis(replace(named, found=(replace(found, **change),)), tmp_path)
+        page = text_of((tmp_path / "report.html").read_text(encoding="utf-8"))
+        part = page.split("What is it called?")[1].split("How sure is that")[0]
+        assert ("No other effect" in part) != said
+        assert ("thermal curve" in part) == said
+
+
+def test_noise_alone_is_blamed_only_where_it_is_probable():
+    """A test of the noise fails by a drift too small to show as one; and by noise that is large."""
+    keys = {"scheme": "fibonacci-16", "approach": "gravity", "order": "random", "seed": 2}
+    hold = {"temperature": (15, 40), "temperature_order": "random", "vibration": (0, 2)}
+    drift = CampaignSettings(**keys, **hold, effects=("warm_up",), size=0.1)
+    noise = CampaignSettings(scheme="fibonacci-36", noise_effects=("noise_level(kappa=4)",))
+    for settings, sure in ((drift, False), (noise, True)):
+        found = diagnose(simulate_campaign(settings)[0], NINE)
+        assert found.verdict == "noise_model"
+        assert (found.found[0].posterior >= SURE) == sure
+        assert ("sensor model is adequate" in headline(found)) == sure
+        assert any("may be an effect" in line for line in verdict_lines(found)) != sure
+
+
+@pytest.mark.usefixtures("not_rendered")
+def test_every_redundancy_of_a_page_says_what_it_counts(tmp_path):
+    """Slopes within a long first hold add to that of the means, which the head and table give."""
+    measured, _ = simulate_campaign(CampaignSettings(approach="gravity", interval=15.0))
+    n = measured.n_positions
+    duration = np.where(np.arange(n) == 0, 90.0, 10.0)
+    time = np.cumsum(duration + 5) - 5 - duration / 2
+    sd = np.tile(0.04 / duration[:, None] ** 1.5, 3)
+    slope = sd * np.random.default_rng(7).standard_normal((n, 3))
+    found = diagnose(replace(measured, time=time, slope=slope, sd_slope=sd), NINE)
+    content = write_diagnosis(found, tmp_path)
+    added = content["redundancy"] - content["global_test"]["dof"]
+    assert added > 0
+    page = text_of((tmp_path / "report.html").read_text(encoding="utf-8"))
+    assert set(re.findall(r"redundancy (\d+)", page)) == {str(found.base.redundancy)}
+    assert f"add {added} to the redundancy of {found.base.redundancy}" in page
+
+
+def test_the_question_of_further_positions_is_a_sentence():
+    """Of two explanations, of which one may hold the other and more."""
+    for separates, asked in (
+        ((("bias_drift",), ("warm_up",)), "whether bias drift or warm up is missing"),
+        (((), ("scale_asymmetry",)), "whether scale asymmetry is missing as well"),
+        ((("scale_asymmetry",), ()), "whether scale asymmetry is missing as well"),
+    ):
+        assert question([SimpleNamespace(separates=separates)]) == asked
+    assert question([]) == ""
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.document import calibration_document, quality_document
 from accelstudy.campaign.calibration.fit import CampaignFit, JudgedNoise, campaign_estimability
 from accelstudy.diagnosis.report.words.missing import explanation_words, missing
+from accelstudy.diagnosis.report.words.summary import keep_base
 from accelstudy.diagnosis.result import Diagnosis
 
 
@@ -58,6 +59,7 @@ def diagnosed_calibration(diagnosis: Diagnosis) -> dict[str, Any]:
             f"takes {explanation_words(diagnosis.credible_set[0])}, and its sigmas do not know of "
             "the others."
         )
+    warnings += keep_base(diagnosis)
     weights = np.asarray(fit.observed.sigma_force)
     if weights.ndim:
         sigmas = np.sqrt(fit.variance_factor) * weights[0]

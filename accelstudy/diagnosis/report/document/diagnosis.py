@@ -68,6 +68,8 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
         "effects": [_effect(named) for named in d.found],
         "suspects": [{"position": label, "p_value": json_number(p)} for label, p in d.suspects],
         "location": {name: json_number(share) for name, share in d.location.items()},
+        "location_by_chance": {n: json_number(p) for n, p in d.beside.location.by_chance.items()},
+        "location_untestable": dict(d.not_located),
         "gap": _gap(d),
         "parameter_changes": [
             {
@@ -140,6 +142,7 @@ def _effect(named: Named) -> dict[str, Any]:
             {"name": name, "value": json_number(value), "sigma": json_number(sigma), "unit": unit}
             for name, value, sigma, unit in named.parameters
         ],
+        "imitators": list(named.imitators),
         "rivals": [{"name": name, "cosine": json_number(cosine)} for name, cosine in named.rivals],
     }
 
@@ -166,7 +169,9 @@ def _gap(d: Diagnosis) -> dict[str, Any]:
             "before": None if roll_pitch is None else json_number(roll_pitch[0]),
             "after": None if roll_pitch is None else json_number(roll_pitch[1]),
         },
+        "better_for_leveling": d.better_for_leveling,
         "confirmed": gap.confirmed,
         "confirmed_statement": gap.statement,
+        "confirmed_names": list(gap.names),
         "reason": gap.reason,
     }

@@ -11,7 +11,7 @@ from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.report.figures.colours import AFTER, BEFORE, OTHER
 from accelstudy.diagnosis.report.words.summary import GROUPS
 from accelstudy.diagnosis.result import Diagnosis
-from accelstudy.drawing.style import FULL, new_figure
+from accelstudy.drawing.style import FULL, INK, new_figure
 
 SHOWN = 12
 """Candidates in the figure of the evidence; weaker ones would only make it long."""
@@ -70,13 +70,18 @@ def _percent(probability: float | None) -> str:
 
 
 def location_figure(diagnosis: Diagnosis) -> Figure:
-    """Share of the excess χ² that each group of regressors takes up."""
+    """Share of the excess χ² that each group of regressors takes up, of those that can be told."""
     shares = sorted(diagnosis.location.items(), key=lambda item: item[1])
     figure = new_figure(FULL * 0.62, 14 + 5.5 * len(shares))
     ax = figure.add_subplot()
     titles = [GROUPS.get(name, words(name)) for name, _ in shares]
-    drawn = ax.barh(titles, [100 * share for _, share in shares], color=AFTER, height=0.6)
-    ax.bar_label(drawn, fmt="{:.0f} %", padding=2, fontsize=7.5)
+    percent = [100 * share for _, share in shares]
+    usual = [100 * diagnosis.beside.location.by_chance[name] for name, _ in shares]
+    place = np.arange(len(shares))
+    ax.barh(titles, percent, color=AFTER, height=0.6)
+    ax.vlines(usual, place - 0.42, place + 0.42, color=INK)
+    for row, ends in enumerate(zip(percent, usual, strict=True)):
+        ax.text(max(ends) + 1.5, row, f"{ends[0]:.0f} %", va="center", fontsize=7.5)
     ax.set(xlim=(0, 112), xlabel="share of the excess χ² / %")
     ax.grid(axis="y", visible=False)
     return figure

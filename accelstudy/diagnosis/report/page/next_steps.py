@@ -35,6 +35,9 @@ def next_steps(
         which = "the next positions" if d.next_positions else "positions"
         what = f"Add {which} to the campaign, and diagnose it again"
         steps.append((what, suggested.diagnose(*chosen)))
+    if d.better_for_leveling == "base":
+        command = suggested.calibrate(*chosen)
+        return [*steps, ("Calibrate with the base model, which levels better", command)]
     if calibration is None:
         return steps
     use = "Level a log with the calibration that is beside this page"

@@ -15,8 +15,9 @@ from accelstudy.diagnosis.loop import Loop
 from accelstudy.diagnosis.report.figures.choice import diagnosis_figures
 from accelstudy.diagnosis.report.page.next_steps import next_steps
 from accelstudy.diagnosis.report.words import summary as wording
-from accelstudy.diagnosis.report.words.missing import family_words, separates
+from accelstudy.diagnosis.report.words.missing import family_words, question
 from accelstudy.diagnosis.result import Diagnosis
+from accelstudy.diagnosis.space.examined import IMITATES
 from accelstudy.drawing.saving import save_all
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.pages import write_page
@@ -52,6 +53,7 @@ def write_report(
         " ".join(lines),
         d=diagnosis,
         doc=document,
+        groups=wording.GROUPS,
         verdict="cannot tell" if wording.too_few(diagnosis) else diagnosis.verdict,
         headline=lines[0],
         lines=lines[1:],
@@ -66,11 +68,13 @@ def write_report(
         estimate=wording.estimate,
         figures=drawn,
         changed=wording.changed(diagnosis),
+        keep_base=wording.keep_base(diagnosis),
         calibration=calibration,
         added=diagnosis.extended is not diagnosis.model,
         judged=wording.judged(diagnosis),
-        separates=separates(diagnosis.next_positions),
+        question=question(diagnosis.next_positions),
         family=family_words,
+        shares_a_direction=IMITATES,
         credible=CREDIBLE,
         wrong=round(10 * SURE),
         withheld=round(10 * (1 - SURE)),

@@ -121,12 +121,14 @@ def _listed(alternatives: Sequence[tuple[str, float]], last: str = "and") -> str
     return comma_list([f"{what} ({probability(p)})" for what, p in alternatives], last)
 
 
-def separates(positions: Sequence[NextPosition]) -> str:
-    """Say which two explanations further positions would separate; nothing without any."""
+def question(positions: Sequence[NextPosition]) -> str:
+    """Say what further positions would show of the two most probable explanations, if any would."""
     if not positions:
         return ""
     first, second = (" with ".join(map(name_words, names)) for names in positions[0].separates)
-    return comma_list([first or "nothing more", second or "nothing more"])
+    if first and second:
+        return f"whether {first} or {second} is missing"
+    return f"whether {first or second} is missing as well"
 
 
 def _missing(known: Statement) -> str:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 from accelstudy.basics.units import display_unit, to_display, unit_label
-from accelstudy.basics.wording import comma_list, number, p_value, words
+from accelstudy.basics.wording import comma_list, number, p_value, probability, words
+from accelstudy.diagnosis.decision.priors import SURE
 from accelstudy.diagnosis.report.words.missing import (
     explanation_words,
     missing,
@@ -14,6 +15,7 @@ from accelstudy.diagnosis.report.words.missing import (
     without_a_name,
 )
 from accelstudy.diagnosis.result import Diagnosis, Named
+from accelstudy.diagnosis.space.groups import REPEAT
 from accelstudy.effects import effect_names, get_effect
 
 GROUPS = {
@@ -32,6 +34,7 @@ HEADLINES = {
     "named": "The model lacks {names}.",
     "narrowed": "The model lacks {names}.",
     "noise_model": "The sensor model is adequate, its noise is not: {names}.",
+    "noise or effect": "No effect shows, but the residuals fail a test of the noise: {names}.",
     "gross_error": "The data have a gross error: {names}.",
 }
 
@@ -70,7 +73,16 @@ def headline(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "gross_error":
         found = tuple(f for f in found if not _is_effect(f))
     names = {named.name for named in found}
-    return HEADLINES[diagnosis.verdict].format(names=comma_list([_title(f, names) for f in found]))
+    kind = "noise or effect" if _may_be_an_effect(diagnosis) else diagnosis.verdict
+    return HEADLINES[kind].format(names=comma_list([_title(f, names) for f in found]))
+
+
+def _may_be_an_effect(diagnosis: Diagnosis) -> bool:
+    """Whether a test of the noise fails, and yet it is not sure that only the noise is wrong."""
+    if diagnosis.verdict != "noise_model":
+        return False
+    posterior = diagnosis.found[0].posterior
+    return posterior is not None and posterior < SURE
 
 
 def _title(named: Named, known: set[str]) -> str:
@@ -87,6 +99,9 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
     lines = [headline(d), *_narrowed(d)]
     if d.reason:
         lines.append(sentence(d.reason))
+    if _may_be_an_effect(d):
+        p = probability(d.found[0].posterior)
+        lines.append(f"That only the noise is wrong has a probability of {p}; it may be an effect.")
     if d.recognised is not None:
         lines.append("All else is said of the data as they would be without this error.")
     if d.verdict == "no_effect":
@@ -111,6 +126,7 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
             f"Tilt error of the calibrated sensor: {before} {unit} as it is, {after} {unit} "
             f"{changed(d)}."
         )
+        lines += keep_base(d)
     if judged(d):
         lines.append(confirmation(d))
     if d.examined.invisible:
@@ -130,9 +146,19 @@ def advice(diagnosis: Diagnosis) -> list[str]:
         lines.append(f"The angles of a robot in each position could show {comma_list(hidden)}.")
     if "gravity_error" in d.examined.invisible:
         lines.append("No position shows an error of g; it takes another measurement of gravity.")
-    if "repeat" not in d.location and (d.verdict == "noise_model" or not d.sigma_known):
+    if REPEAT not in d.beside.search.groups and (d.verdict == "noise_model" or not d.sigma_known):
         lines.append("Repeated attitudes would show the noise from hold to hold without any model.")
     return lines
+
+
+def keep_base(diagnosis: Diagnosis) -> list[str]:
+    """Advise the base model for leveling where what was added makes the tilt error larger."""
+    if diagnosis.better_for_leveling != "base":
+        return []
+    return [
+        f"For leveling keep the base model: the tilt error is larger {changed(diagnosis)}, as "
+        "these positions determine what was added too weakly."
+    ]
 
 
 def judged(diagnosis: Diagnosis) -> bool:
@@ -145,19 +171,22 @@ def confirmation(diagnosis: Diagnosis) -> str:
     gap = diagnosis.gap
     if gap.held_out is None:
         return f"Not confirmed on data that were not used: {gap.reason}."
-    tested = (
-        f"on {len(gap.held_out.held)} held-out positions (z = {number(gap.held_out.z)}, "
-        f"{number(gap.held_out.needed)} needed)"
-    )
+    where = f"on {len(gap.held_out.held)} held-out positions"
+    if gap.reason:  # what z would have to be was not asked then
+        return f"Not confirmed {where}: {gap.reason}."
+    tested = f"{where} (z = {number(gap.held_out.z)}, {number(gap.held_out.needed)} needed)"
     if not gap.confirmed:
-        return f"Not confirmed {tested}" + (f": {gap.reason}." if gap.reason else ".")
-    names = comma_list([words(named.name) for named in diagnosis.found if _is_effect(named)])
-    if gap.statement == "name":
-        return f"Confirmed {tested}: that it is {names}."
-    return (
-        f"Confirmed {tested}: that such an effect is missing; not that it is {names} rather than a "
-        "rival."
-    )
+        return f"Not confirmed {tested}."
+    if gap.names:
+        is_one = f"that it is {comma_list([words(name) for name in gap.names], 'or')}"
+        not_which = "; not which, as each could leave what was found" * (len(gap.names) > 1)
+        return f"Confirmed {tested}: {is_one}{not_which}."
+    found = [_title(named, {named.name}) for named in diagnosis.found if _is_effect(named)]
+    if len(found) > 1:
+        said = f"that such effects are missing; not that they are {comma_list(found)}"
+        return f"Confirmed {tested}: {said} rather than rivals."
+    said = f"that such an effect is missing; not that it is {found[0]}"
+    return f"Confirmed {tested}: {said} rather than a rival."
 
 
 def changed(diagnosis: Diagnosis) -> str:
@@ -179,7 +208,9 @@ def _effect_line(named: Named) -> str:
         for name, value, sigma, unit in named.parameters
     )
     same = [words(name) for name in named.equivalence_class if name != named.name]
+    more = [words(name) for name in named.imitators]
     alike = f" In these positions {comma_list(same)} would be the same." if same else ""
+    alike += f" In these positions {comma_list(more)} could leave the same, and more." * bool(more)
     return f"{words(named.name).capitalize()}, {equation}: {values}.{alike}"
 
 
