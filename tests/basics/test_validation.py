@@ -19,9 +19,9 @@ class Plan(Block):
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        ({"grid": {"size": 0}}, "grid.size: input should be greater than or equal to 1, not 0"),
+        ({"grid": {"size": 0}}, "grid.size: must be at least 1, not 0"),
         ({"grid": {"sise": 1, "size": 1}}, "grid.sise: unknown key; did you mean 'size'? (known:"),
-        ({}, "grid: field required"),
+        ({}, "grid: must be given"),
         ({"grid": [1]}, "grid: expected keys and values, not [1]"),
         ({"grid": {"size": 0}, "names": 3}, "(and 1 more)"),
     ],

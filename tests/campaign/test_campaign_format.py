@@ -326,7 +326,7 @@ POSITIONS, YAML = "positions.csv: ", "campaign.yaml: "
 ROBOT_COLUMNS = ("roll_robot_gon", "pitch_robot_gon", "yaw_robot_gon")
 
 BAD = {
-    "no header": (remove("campaign.yaml"), "campaign.yaml", "No such file"),
+    "no header": (remove("campaign.yaml"), "campaign.yaml", "no such file"),
     "no table": (remove("positions.csv"), "no table", "positions.csv or positions.parquet"),
     "two tables": (text("positions.parquet", ""), "two tables", "either positions.csv or"),
     "no YAML": (text("campaign.yaml", "a: [1"), YAML, "not valid YAML", "line 1"),
@@ -339,7 +339,12 @@ BAD = {
         "gravity.sigma: unknown key",
         "did you mean 'sigma_mps2'",
     ),
-    "version": (header(schema_version=2), YAML, "schema_version", "be 1, not 2"),
+    "version": (
+        header(schema_version=2),
+        YAML,
+        "schema_version",
+        "2 is of a newer version of accelstudy",
+    ),
     "version true": (header(schema_version=True), YAML, "schema_version", "not true"),
     "no version": (header(schema_version=None), YAML, "schema_version", "required"),
     "no name": (header(name=None), YAML, "name", "required"),
