@@ -108,14 +108,18 @@ def _place(error: ErrorDetails, content: Any) -> tuple[str | int, ...]:
     """Keys and numbers of entries that lead to an error, without the marks of pydantic."""
     keys = []
     for number, part in enumerate(error["loc"], start=1):
-        if (isinstance(content, Mapping) and part in content) or (
-            isinstance(content, list | tuple) and part in range(len(content))
-        ):
+        if _has(content, part):
             content = content[part]
         elif number < len(error["loc"]) or error["type"] not in ("missing", "extra_forbidden"):
             continue
         keys.append(part)
     return tuple(keys)
+
+
+def _has(content: object, part: str | int) -> bool:
+    if isinstance(content, list | tuple):
+        return part in range(len(content))
+    return isinstance(content, Mapping) and part in content
 
 
 def _said(error: ErrorDetails) -> str:
