@@ -5,6 +5,8 @@ from __future__ import annotations
 import shlex
 from pathlib import Path
 
+from accelstudy.basics.names import path_name
+
 HERE = "calibration.json"
 """Name of a calibration file, as pages mention it."""
 
@@ -27,7 +29,12 @@ def calibrate(campaign: str | Path, model: str | Path, approach: str, out: str) 
 def diagnose(campaign: str | Path, model: str, approach: str, name: str) -> str:
     """Find what a model lacks to explain a campaign of that name."""
     chosen = ["--model", model, "--approach", approach]
-    return _line("diagnose", campaign, *chosen, "--out", f"{name}-diagnosis")
+    return _line("diagnose", campaign, *chosen, "--out", folder(name, "diagnosis"))
+
+
+def folder(name: str, kind: str) -> str:
+    """Name of a folder for the results of a campaign, whose name may be any text."""
+    return f"{path_name(name, 'campaign')}-{kind}"
 
 
 def _line(*parts: str | Path) -> str:

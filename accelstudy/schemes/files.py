@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from accelstudy.basics.errors import InputError, UnknownNameError
-from accelstudy.basics.names import check_path_name
+from accelstudy.basics.names import check_path_name, path_name
 from accelstudy.files.layers import read_layer
 from accelstudy.positions.scheme import Scheme
 
@@ -76,7 +76,7 @@ def parse_scheme(content: Mapping[str, Any], name: str) -> Scheme:
         if key not in KEYS:
             raise UnknownNameError("key", key, KEYS)
     texts = {
-        "scheme": re.sub(r"[^\w.-]+", "-", name).lstrip(".-") or "scheme",
+        "scheme": path_name(name, "scheme"),
         "title": "of a file",
         "source": "",
         **{key: content[key] for key in KEYS[:3] if content.get(key) is not None},

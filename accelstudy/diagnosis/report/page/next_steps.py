@@ -26,7 +26,9 @@ def next_steps(
     d, steps = diagnosis, []
     model, approach, name = d.model.name, d.approach.name, d.campaign.name
     if d.recognised is not None:
-        command = suggested.calibrate(campaign, model, approach, f"{name}-calibrated")
+        command = suggested.calibrate(
+            campaign, model, approach, suggested.folder(name, "calibrated")
+        )
         steps.append(("Correct the campaign, and calibrate it then", command))
     if d.verdict in ("narrowed", "unknown"):
         which = "the next positions" if d.next_positions else "positions"
