@@ -12,7 +12,7 @@ LONGEST = 100
 
 def path_name(text: str, otherwise: str) -> str:
     """Make the name of a file or folder of any text; `otherwise`, if it has no usable letter."""
-    name = re.sub(r"[^\w.-]+", "-", text).strip(".-").encode()[:LONGEST]
+    name = re.sub(r"[^\w.-]+", "-", text).lstrip(".-").encode()[:LONGEST]
     return name.decode(errors="ignore") or otherwise
 
 
