@@ -1,9 +1,12 @@
 """Names that become folders stay within them."""
 
+import shlex
+
 import pytest
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.names import check_path_name
+from accelstudy.basics.suggested import diagnose
 from accelstudy.campaign.batch.config import parse_batch
 from accelstudy.diagnosis.round_trip import parse_round_trip
 
@@ -36,3 +39,21 @@ def test_names_of_sources(tmp_path):
     assert [task.name for task in tasks] == ["a-x-", "b-c", "d-"]
     with pytest.raises(InputError, match=r"too long for a folder.*give it a `name`"):
         parse_batch({"batch": "x", "campaigns": [{"log": "x" * 300}]})
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        ("adxl355", "adxl355"),
+        ("../../etc", "etc"),
+        ("a/b c", "a-b-c"),
+        ("\x1b[31mred", "31mred"),
+        ("Prüfling 7", "Prüfling-7"),
+        ("ü" * 300, "ü" * 50),
+        ("\ud800..", "campaign"),
+        ("…", "campaign"),
+    ],
+)
+def test_a_folder_is_suggested_in_the_folder_where_one_is(text, name):
+    assert shlex.split(diagnose("c", "m", "gravity", text))[-1] == f"{name}-diagnosis"
+    assert check_path_name(name) == name

@@ -127,10 +127,9 @@ def _with_types(read: Callable[[], Iterable[pa.Table]]) -> Iterator[pa.Table]:
             while kinds and not _holds(table[name], kinds[0]):
                 kinds.pop(0)
     for table in read():
-        for i, (name, kinds) in enumerate(possible.items()):
-            if kinds:
-                table = table.set_column(i, name, _cast(table[name], kinds[0]))
-        yield table
+        columns = zip(table.columns, possible.values(), strict=True)
+        typed = [_cast(column, kinds[0]) if kinds else column for column, kinds in columns]
+        yield pa.table(typed, names=[*possible])
 
 
 def _cells(source: TextSource) -> Iterator[Sequence[str | None]]:
