@@ -106,8 +106,8 @@ def _directions(given: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
         raise InputError(wrong)
     for number, row in enumerate(given, start=1):
         numbers = isinstance(row, Sequence) and all(
-            isinstance(x, int | float) and not isinstance(x, bool) for x in row
+            isinstance(x, int | float) and not isinstance(x, bool) and abs(x) < 1e100 for x in row
         )
-        if not numbers or len(row) != 3 or not 0 < np.linalg.norm(row) < np.inf:
+        if not numbers or len(row) != 3 or not np.linalg.norm(row) > 0:
             raise InputError(f"{wrong}; row {number} is not")
     return np.asarray(given, dtype=float)

@@ -29,7 +29,7 @@ def test_an_error_of_the_disk_names_the_file(read, tmp_path):
 @pytest.mark.parametrize("read", [read_layer, read_calibration])
 def test_a_device_that_never_ends_is_refused(read, monkeypatch):
     monkeypatch.setattr(reading, "LARGEST", 3_000_000)
-    with pytest.raises(InputError, match="^/dev/zero: larger than 3 MB; is"):
+    with pytest.raises(InputError, match=r"^/dev/zero: larger than 3 MB; is"):
         read("/dev/zero")
 
 
