@@ -1,16 +1,28 @@
 """The command `accelstudy`, also as ``python -m accelstudy``."""
 
+import _signal  # type: ignore[import-not-found]  # `signal` is slow: it makes enums first
 import gc
+import os
 
 
 def run() -> None:
     """Run the command line."""
+    # Until a command begins nothing is written, so Ctrl-C may end it at once.
+    if _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler:
+        _signal.signal(_signal.SIGINT, _end)
     # Imports and figures make a million objects that stay. To look for garbage among them again
     # and again takes a tenth of the time of a command.
     gc.set_threshold(100_000, 50, 50)
+    os.environ["MPLBACKEND"] = "agg"  # figures go to files; a name of no backend would be an error
     from accelstudy.commands.main import main
 
     main(prog_name="accelstudy")
+
+
+def _end(number: int, frame: object) -> None:
+    """End as `accelstudy.commands.ending` does, which is not imported yet."""
+    os.write(2, b"interrupted\n")
+    os._exit(130)
 
 
 if __name__ == "__main__":

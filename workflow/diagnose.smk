@@ -11,12 +11,12 @@ from accelstudy.files.outputs import CAMPAIGN, DIAGNOSIS
 from accelstudy.schemes import is_scheme_file
 from accelstudy.files.layers import read_layer
 from accelstudy.jobs.earlier import earlier_run
-from accelstudy.jobs.job import killed_notice, quote_python
+from accelstudy.jobs.job import killed_notice, prepare_jobs
 from accelstudy.files.provenance import check_writable
 from accelstudy.jobs.code import code_hash
 
 min_version("9.10")
-quote_python()
+prepare_jobs()
 
 
 # Jobs run in the environment of the Makefile. This is for executors that need a container.

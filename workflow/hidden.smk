@@ -9,12 +9,12 @@ from accelstudy.hidden.study.config import parse_hidden
 from accelstudy.hidden.study.tables import TABLES
 from accelstudy.files.layers import read_layer
 from accelstudy.jobs.earlier import earlier_run
-from accelstudy.jobs.job import killed_notice, quote_python
+from accelstudy.jobs.job import killed_notice, prepare_jobs
 from accelstudy.files.provenance import check_writable
 from accelstudy.jobs.code import code_hash
 
 min_version("9.10")
-quote_python()
+prepare_jobs()
 
 
 configfile: "config/hidden-effects.yaml"

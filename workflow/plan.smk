@@ -2,10 +2,10 @@
 # snakemake --cores 2 --snakefile workflow/plan.smk --configfile config/plan-example.yaml
 from snakemake.utils import min_version
 
-from accelstudy.jobs.job import quote_python
+from accelstudy.jobs.job import prepare_jobs
 
 min_version("9.10")
-quote_python()
+prepare_jobs()
 
 
 # Jobs run in the environment of the Makefile. This is for executors that need a container.

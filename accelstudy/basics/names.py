@@ -10,6 +10,12 @@ LONGEST = 100
 """Bytes. Endings are added to a name, and the name of a file must stay below 255 bytes."""
 
 
+def path_name(text: str, otherwise: str) -> str:
+    """Make the name of a file or folder of any text; `otherwise`, if it has no usable letter."""
+    name = re.sub(r"[^\w.-]+", "-", text).lstrip(".-").encode()[:LONGEST]
+    return name.decode(errors="ignore") or otherwise
+
+
 def check_path_name(name: str) -> str:
     """Return the name if it can name a folder on any disk and in any pattern of the workflow.
 

@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, TypeVar
 
 import click
 
+from accelstudy.basics.errors import printable
+
 if TYPE_CHECKING:
     from rich.progress import Progress
 
@@ -42,12 +44,20 @@ def feedback(quiet: bool = False) -> Iterator[None]:
 def say(text: str) -> None:
     """Print a line about what was done, unless the command is quiet."""
     if not _quiet.get():
-        click.echo(text)
+        show(text)
+
+
+def show(text: str) -> None:
+    """Print a line of the result, whether the command is quiet or not.
+
+    It may quote a file, so characters that control a terminal are spelled out.
+    """
+    click.echo("\n".join(map(printable, text.split("\n"))))
 
 
 def warn(text: str) -> None:
     """Print a warning on standard error, whether the command is quiet or not."""
-    click.echo(f"warning: {text}", err=True)
+    click.echo(f"warning: {printable(text)}", err=True)
 
 
 def failure(what: str, error: Exception) -> str:

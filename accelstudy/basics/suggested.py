@@ -49,8 +49,8 @@ def new_name(folder: str | Path, what: str) -> Path:
     """
     path = Path(folder)
     parts = [part for part in path.relative_to(path.anchor).parts if part != os.pardir]
-    name = "-".join([*parts, what]).encode(errors="replace")
-    return Path(name[-2 * LONGEST :].decode(errors="ignore"))
+    text = "".join(sign if sign.isprintable() else "-" for sign in "-".join([*parts, what]))
+    return Path(text.encode(errors="replace")[-2 * LONGEST :].decode(errors="ignore"))
 
 
 def _of_campaign(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from accelstudy.basics.progress import say, warn
+from accelstudy.basics.progress import say, show, warn
 from accelstudy.commands.options import (
     PATH,
     Quantity,
@@ -125,11 +125,11 @@ def advise_command(
         """Print the advice."""
         advisor.check(now)
         advice = advisor.advise(now)
-        click.echo(heading(advice, now, sensor, name))
+        show(heading(advice, now, sensor, name))
         for line in lines(advice, now, sensor, promise):
-            click.echo(f"  {line}")
+            show(f"  {line}")
         if advice.enough:
-            click.echo(f"  {finished(campaign, model, name)}")
+            show(f"  {finished(campaign, model, name)}")
 
     for warning in now.warnings:
         warn(warning)

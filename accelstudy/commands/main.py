@@ -5,9 +5,10 @@ The study itself is run by Snakemake.
 
 from __future__ import annotations
 
+from typing import Any
+
 import click
 
-from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, angles_in
 from accelstudy.commands.advise import advise_command
 from accelstudy.commands.apply import apply_command
@@ -20,6 +21,7 @@ from accelstudy.commands.data_sheet import data_sheet_command
 from accelstudy.commands.design import design_command
 from accelstudy.commands.diagnose import diagnose_command
 from accelstudy.commands.effects import effects_command
+from accelstudy.commands.ending import bad_input_as_one_line, interruptible
 from accelstudy.commands.export import export_command
 from accelstudy.commands.importing import import_command
 from accelstudy.commands.init import init_command
@@ -85,13 +87,15 @@ class Commands(click.Group):
                     ]
                 )
 
+    def main(self, *args: Any, **kwargs: Any) -> Any:
+        """Run the command line; also its help may meet a full disk."""
+        with bad_input_as_one_line():
+            return super().main(*args, **kwargs)
+
     def invoke(self, ctx: click.Context) -> object:
         """Run the chosen command."""
-        try:
+        with interruptible():
             return super().invoke(ctx)
-        except InputError as error:
-            click.echo(f"error: {error}", err=True)
-            ctx.exit(2)
 
 
 @click.group(cls=Commands, commands=[each for its in SECTIONS.values() for each in its])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from accelstudy.basics.progress import show
 from accelstudy.commands.options import SCHEME, angle_unit_option, example
 
 
@@ -23,7 +24,7 @@ def scheme_command(name: str) -> None:
     from accelstudy.schemes import get_scheme
 
     chosen = get_scheme(name)
-    click.echo(f"# {chosen.title} ({chosen.status}): {chosen.source}")
+    show(f"# {chosen.title} ({chosen.status}): {chosen.source}")
     attitudes = to_attitude(angles_of(-chosen.directions))
     columns = ["x", "y", "z", *(f"{angle}_{attitude_unit()}" for angle in ("roll", "pitch"))]
     click.echo(

@@ -9,6 +9,7 @@ from typing import Any
 import yaml
 
 from accelstudy.basics.errors import InputError
+from accelstudy.files.reading import check_version, read_text
 
 LARGEST = 100_000
 """Most values of a file with its aliases expanded; a file without aliases may have more."""
@@ -20,13 +21,13 @@ def read_layer(path: str | Path) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If it cannot be read, is not valid YAML, names a key twice, is no mapping, or becomes
-        very large by aliases of aliases.
+        If it cannot be read, is not valid YAML, names a key twice, is no mapping, becomes very
+        large by aliases of aliases, or was written by a newer version.
     """
     try:
-        layer = _load(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}") from None
+        layer = _load(read_text(path))
+    except InputError:
+        raise
     except RecursionError:
         raise InputError(f"{path}: not valid YAML: nested too deeply") from None
     except yaml.MarkedYAMLError as error:
@@ -39,6 +40,7 @@ def read_layer(path: str | Path) -> dict[str, Any]:
         raise InputError(f"{path}: not valid YAML: {line}") from None
     if not isinstance(layer, dict):
         raise InputError(f"{path}: not a mapping of keys to values")
+    check_version(layer, path)
     return layer
 
 

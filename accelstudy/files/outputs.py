@@ -249,6 +249,8 @@ def _check_apart(out: Path, inputs: Iterable[str | Path]) -> None:
         if not source.exists():
             continue  # the reader reports it
         above = _identities(source)
+        if above[0] is None:
+            continue  # a pipe is nowhere on the disk
         if above[0] == above_out[0]:
             raise InputError(f"{out}: is the input; give another name for the results")
         if above[0] in above_out and S_ISDIR(source.stat().st_mode):

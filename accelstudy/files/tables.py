@@ -16,7 +16,7 @@ import pyarrow as pa
 from accelstudy import __version__
 from accelstudy.basics.errors import InputError
 from accelstudy.files.outputs import whole_file
-from accelstudy.files.parquet import parquet_file, read_parquet, whole_parquet, write_parquet
+from accelstudy.files.parquet import parquet_file, read_frame, whole_parquet, write_parquet
 
 if (
     TYPE_CHECKING
@@ -124,7 +124,7 @@ def read_table(path: str | Path | Sequence[str | Path], **options: Any) -> pd.Da
             raise InputError(f"{path}: holds no tables")
         _check_seeds(paths)
         return read_table(paths, **options)
-    return read_parquet(path, REMEDY, **options).to_pandas()
+    return read_frame(path, REMEDY, **options)
 
 
 def _check_seeds(paths: Sequence[Path]) -> None:
@@ -157,7 +157,7 @@ def read_origin(path: str | Path) -> dict[str, Any]:
         If the file is missing, is not whole, or was not written by this package.
     """
     with whole_parquet(path, REMEDY) as file:
-        metadata = file.schema_arrow.metadata or {}
-    if METADATA_KEY not in metadata:
+        found = json.loads((file.schema_arrow.metadata or {}).get(METADATA_KEY, b"{}"))
+    if not isinstance(found, dict) or not {"config_hash", "seed"} <= found.keys():
         raise InputError(f"{path}: does not say where it comes from; it is no table of a study")
-    return json.loads(metadata[METADATA_KEY])
+    return found

@@ -9,10 +9,37 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails
 
 from accelstudy.basics.errors import InputError, shown
 
 Model = TypeVar("Model", bound=BaseModel)
+
+
+_KEYS = "expected keys and values"
+_LEAST, _MOST = "must have at least {min_length}", "must have at most {max_length}"
+WORDS = {
+    "missing": "must be given",
+    "greater_than": "must be greater than {gt}",
+    "greater_than_equal": "must be at least {ge}",
+    "less_than": "must be less than {lt}",
+    "less_than_equal": "must be at most {le}",
+    "finite_number": "must be a finite number",
+    **dict.fromkeys(("float_type", "float_parsing"), "must be a number"),
+    **dict.fromkeys(("int_type", "int_parsing", "int_from_float"), "must be a whole number"),
+    "int_parsing_size": "must be a smaller number",
+    "string_type": "must be a text",
+    "string_unicode": "must be a text in UTF-8",
+    "string_too_short": f"{_LEAST} characters",
+    "string_too_long": f"{_MOST} characters",
+    **dict.fromkeys(("list_type", "tuple_type"), "must be a list"),
+    "too_short": f"{_LEAST} entries",
+    "too_long": f"{_MOST} entries",
+    **dict.fromkeys(("bool_type", "bool_parsing"), "must be true or false"),
+    "literal_error": "must be {expected}",
+    **dict.fromkeys(("model_type", "dict_type", "dataclass_type"), _KEYS),
+}
+"""What would be right, by the type of pydantic's error; two types have a text of their own."""
 
 
 class Block(BaseModel):
@@ -45,13 +72,17 @@ def checked(
     try:
         return model.model_validate(content)
     except ValidationError as error:
-        raise InputError(f"{source}: {_first_error(error, model, section)}") from None
+        raise InputError(f"{source}: {_first_error(error, content, model, section)}") from None
 
 
-def _first_error(error: ValidationError, root: type[BaseModel], section: str) -> str:
+def _first_error(
+    error: ValidationError, content: object, root: type[BaseModel], section: str
+) -> str:
     """Say in one line which key of a `root` is wrong, and what would be right."""
-    first, *others = error.errors()
-    key = ".".join(str(part)[:100] for part in (section, *first["loc"]) if part != "")
+    errors = error.errors()
+    places = [_place(each, content) for each in errors]
+    first, place = errors[0], places[0]
+    key = ".".join(str(part)[:100] for part in (section, *place) if part != "")
     if first["type"] == "extra_forbidden":
         text = f"{key}: unknown key"
         siblings = _keys_beside(first["loc"], root)
@@ -60,17 +91,45 @@ def _first_error(error: ValidationError, root: type[BaseModel], section: str) ->
         text += f" (known: {', '.join(siblings)})"
     elif first["type"] == "value_error":
         # The check of a whole block names the key itself.
-        mark = ": " if first["loc"] else "."
+        mark = ": " if place else "."
         text = mark.join(filter(None, [key, str(first["ctx"]["error"])]))
-    elif first["type"] == "model_type":
-        text = ": ".join(
-            filter(None, [key, f"expected keys and values, not {shown(first['input'])}"])
-        )
     else:
+        # Where several kinds of values are right, there is an error for each of them.
+        said = [_said(e) for e, p in zip(errors, places, strict=True) if p == place]
+        wanted = " or ".join([said[0], *(text.removeprefix("must be ") for text in said[1:])])
         value = "" if first["type"] == "missing" else f", not {shown(first['input'])}"
-        text = f"{key}: {first['msg'][0].lower()}{first['msg'][1:]}{value}"
-    more = f" (and {len(others)} more)" if others else ""
+        text = ": ".join(filter(None, [key, f"{wanted}{value}"]))
+    others = len({*places} - {place})
+    more = f" (and {others} more)" if others else ""
     return " ".join(f"{text}{more}".split())
+
+
+def _place(error: ErrorDetails, content: Any) -> tuple[str | int, ...]:
+    """Keys and numbers of entries that lead to an error, without the marks of pydantic."""
+    keys = []
+    for number, part in enumerate(error["loc"], start=1):
+        if _has(content, part):
+            content = content[part]
+        elif number < len(error["loc"]) or error["type"] not in ("missing", "extra_forbidden"):
+            continue
+        keys.append(part)
+    return tuple(keys)
+
+
+def _has(content: object, part: str | int) -> bool:
+    if isinstance(content, list | tuple):
+        return part in range(len(content))
+    return isinstance(content, Mapping) and part in content
+
+
+def _said(error: ErrorDetails) -> str:
+    """Say what would be right, in plain words."""
+    if error["type"] not in WORDS:
+        return error["msg"][0].lower() + error["msg"][1:]
+    context = error.get("ctx", {})
+    if context.get("min_length") == 1:
+        return "must not be empty"
+    return WORDS[error["type"]].format(**context)
 
 
 def _keys_beside(location: Sequence[str | int], root: type[BaseModel]) -> list[str]:

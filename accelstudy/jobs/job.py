@@ -7,6 +7,7 @@ import gc
 import hashlib
 import json
 import logging
+import os
 import shlex
 import sys
 from collections.abc import Container, Iterable, Iterator, Mapping
@@ -30,12 +31,13 @@ _NOT_OURS = {
 """Errors of the operating system, and what a person can do about them."""
 
 
-def quote_python() -> None:
-    """Let jobs start though the path of Python has a space.
+def prepare_jobs() -> None:
+    """Let jobs start though the path of Python has a space, or MPLBACKEND names no backend.
 
-    Snakemake writes that path into commands of the shell as it is.
+    Snakemake writes that path into commands of the shell as it is. Figures go to files.
     """
     sys.executable = shlex.quote(sys.executable)
+    os.environ["MPLBACKEND"] = "agg"
 
 
 def setup_digest(spec: Any) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from html import escape
 from pathlib import Path
@@ -23,6 +24,8 @@ from accelstudy.basics.wording import comma_list, interval, number, p_value, pro
 from accelstudy.files.outputs import whole_file
 from accelstudy.pages.glossary import explained
 from accelstudy.sensors.frames import axes_note
+
+_CONTROLS = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]")  # no page may have them
 
 BADGES = {
     "accepted": ("✓ ACCEPTED", "good"),
@@ -61,7 +64,8 @@ def render(template: str, **content: Any) -> str:
         "attitude_unit": attitude_unit(),
         "angle_note": angle_note(),
     }
-    return explained(_template(template).render({**units, **content}))
+    page = explained(_template(template).render({**units, **content}))
+    return _CONTROLS.sub(lambda found: found[0].encode("unicode_escape").decode("ascii"), page)
 
 
 def write_page(path: Path, template: str, fallback: str, **content: Any) -> None:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from accelstudy.basics.errors import InputError, UnknownNameError
-from accelstudy.basics.names import check_path_name
+from accelstudy.basics.names import check_path_name, path_name
 from accelstudy.files.layers import read_layer
 from accelstudy.positions.scheme import Scheme
 
@@ -76,7 +76,7 @@ def parse_scheme(content: Mapping[str, Any], name: str) -> Scheme:
         if key not in KEYS:
             raise UnknownNameError("key", key, KEYS)
     texts = {
-        "scheme": re.sub(r"[^\w.-]+", "-", name).lstrip(".-") or "scheme",
+        "scheme": path_name(name, "scheme"),
         "title": "of a file",
         "source": "",
         **{key: content[key] for key in KEYS[:3] if content.get(key) is not None},
@@ -106,8 +106,8 @@ def _directions(given: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
         raise InputError(wrong)
     for number, row in enumerate(given, start=1):
         numbers = isinstance(row, Sequence) and all(
-            isinstance(x, int | float) and not isinstance(x, bool) for x in row
+            isinstance(x, int | float) and not isinstance(x, bool) and abs(x) < 1e100 for x in row
         )
-        if not numbers or len(row) != 3 or not 0 < np.linalg.norm(row) < np.inf:
+        if not numbers or len(row) != 3 or not np.linalg.norm(row) > 0:
             raise InputError(f"{wrong}; row {number} is not")
     return np.asarray(given, dtype=float)

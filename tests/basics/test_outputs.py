@@ -309,6 +309,24 @@ def test_commands_write_nothing_into_input(measured, name):
     assert content(measured) == before
 
 
+def test_an_error_of_reading_names_what_was_read(measured, tmp_path):
+    calibration = measured / "calibrated/calibration.json"
+    result = command("apply", calibration, "/proc/self/mem", "--out", tmp_path / "out.csv")
+    assert result.stderr == "error: /proc/self/mem: cannot be read: Input/output error\n"
+    assert content(tmp_path) == {}
+
+
+def test_a_pipe_is_not_taken_for_the_output(measured, tmp_path):
+    end, start = os.pipe()
+    os.write(start, (measured / "calibrated/calibration.json").read_bytes())
+    os.close(start)
+    out = tmp_path / "out.csv"
+    result = command("apply", f"/dev/fd/{end}", measured / "log.csv", "--out", out)
+    os.close(end)
+    assert result.exit_code == 0, result.output
+    assert out.is_file()
+
+
 @pytest.mark.parametrize(
     ("name", "room"),
     [*((name, 0) for name in commands(Path(), Path())), ("calibrate", 7000), ("calibrate", 20_000)],

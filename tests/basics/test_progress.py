@@ -7,7 +7,7 @@ from contextlib import redirect_stderr
 import pytest
 
 from accelstudy.basics import progress
-from accelstudy.basics.progress import feedback, say, stage, track
+from accelstudy.basics.progress import feedback, say, show, stage, track, warn
 from accelstudy.commands.main import main
 
 
@@ -94,3 +94,11 @@ def test_a_bar_goes_when_the_work_fails():
     assert "null simulation" in bar
     assert after.strip() == "\x1b[?25h"  # which shows the cursor again
     assert "sets" in seen(Terminal())
+
+
+def test_a_text_of_a_file_does_not_control_the_terminal(capsys):
+    show("name \x1b[31m\nsecond line\x07")
+    warn("column \x1b]0;title\x07")
+    said = capsys.readouterr()
+    assert said.out == "name \\x1b[31m\nsecond line\\x07\n"
+    assert said.err == "warning: column \\x1b]0;title\\x07\n"

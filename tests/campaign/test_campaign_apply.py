@@ -71,7 +71,7 @@ def test_what_is_no_calibration_is_one_line(tmp_path, content):
         read_calibration(path)
     assert str(path) in str(error.value)
     assert "\n" not in str(error.value)
-    with pytest.raises(InputError, match="No such file"):
+    with pytest.raises(InputError, match="no such file"):
         read_calibration(tmp_path / "none.json")
     with pytest.raises(InputError, match="a folder; give the calibration"):
         read_calibration(tmp_path)

@@ -262,7 +262,7 @@ def test_a_mended_campaign_is_good(changed, made):
 
 def test_a_campaign_that_got_worse_leaves_nothing_old(changed):
     results, text = changed
-    one_line(text, "not calibrated: plain: campaigns/plain/campaign.yaml: No such file")
+    one_line(text, "not calibrated: plain: campaigns/plain/campaign.yaml: no such file")
     remaining = {path.name for path in (results / "campaigns/plain").iterdir()}
     assert remaining <= {"status.json", ".snakemake_timestamp"}
 
@@ -402,7 +402,7 @@ def test_patterns(tmp_path, monkeypatch):
     ("change", "message"),
     [
         ({"campaings": []}, "campaings: unknown key; did you mean 'campaigns'?"),
-        ({"campaigns": []}, "campaigns: list should have at least 1 item"),
+        ({"campaigns": []}, "campaigns: must not be empty, not []"),
         ({"campaigns": [{}]}, "campaigns.0: give exactly one of campaign, log, public"),
         ({"campaigns": [{"log": "a", "public": "b"}]}, "campaigns.0: give exactly one of"),
         ({"campaigns": [{"logg": "a"}]}, "campaigns.0.logg: unknown key; did you mean 'log'?"),

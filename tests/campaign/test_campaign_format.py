@@ -326,7 +326,7 @@ POSITIONS, YAML = "positions.csv: ", "campaign.yaml: "
 ROBOT_COLUMNS = ("roll_robot_gon", "pitch_robot_gon", "yaw_robot_gon")
 
 BAD = {
-    "no header": (remove("campaign.yaml"), "campaign.yaml", "No such file"),
+    "no header": (remove("campaign.yaml"), "campaign.yaml", "no such file"),
     "no table": (remove("positions.csv"), "no table", "positions.csv or positions.parquet"),
     "two tables": (text("positions.parquet", ""), "two tables", "either positions.csv or"),
     "no YAML": (text("campaign.yaml", "a: [1"), YAML, "not valid YAML", "line 1"),
@@ -339,13 +339,18 @@ BAD = {
         "gravity.sigma: unknown key",
         "did you mean 'sigma_mps2'",
     ),
-    "version": (header(schema_version=2), YAML, "schema_version", "be 1, not 2"),
+    "version": (
+        header(schema_version=2),
+        YAML,
+        "schema_version",
+        "2 is of a newer version",
+    ),
     "version true": (header(schema_version=True), YAML, "schema_version", "not true"),
-    "no version": (header(schema_version=None), YAML, "schema_version", "required"),
-    "no name": (header(name=None), YAML, "name", "required"),
+    "no version": (header(schema_version=None), YAML, "schema_version", "must be given"),
+    "no name": (header(name=None), YAML, "name", "must be given"),
     "number for a name": (header(name=2014), YAML, "name", "not 2014"),
     "unit": (header(unit="mg"), YAML, "unit", "'m/s^2', 'g' or 'counts'", "not 'mg'"),
-    "no gravity": (header(gravity={}), YAML, "gravity.value_mps2", "required"),
+    "no gravity": (header(gravity={}), YAML, "gravity.value_mps2", "must be given"),
     "negative gravity": (header(gravity={"value_mps2": -9.81}), YAML, "from 0.001 to 1000"),
     "infinite gravity": (
         header(gravity={"value_mps2": float("inf")}),

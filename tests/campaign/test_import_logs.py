@@ -214,7 +214,7 @@ def test_bad_options(tmp_path, options, message):
 def test_bad_files(tmp_path):
     with pytest.raises(InputError, match="no such file"):
         open_log(tmp_path / "none.csv")
-    with pytest.raises(InputError, match="is a directory"):
+    with pytest.raises(InputError, match="a folder"):
         open_log(tmp_path)
     frame = pd.DataFrame(TABLE, columns=["time", "fx", "fy", "fz"])
     whole = tmp_path / "whole.parquet"

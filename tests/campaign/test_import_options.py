@@ -175,7 +175,7 @@ def test_sigma_does_not_depend_on_the_offset():
         (1, ["--unit", "g"], "look like m/s^2; give --unit m/s^2"),
         (1e3, [], "look like counts; give --unit counts and --scale"),
         (1, ["--gravity", "1.62"], "does not fit a gravity of 1.62 m/s²; give --gravity"),
-        (1, ["--threshold", "1e300"], "threshold_mps2: input should be less than"),
+        (1, ["--threshold", "1e300"], "threshold_mps2: must be at most 1"),
         (1, ["--frame", "fru"], "is left-handed"),
         (1, ["--range", "8 feet"], "--range: expected a number"),
         (1, ["--robot-sigma", "3"], r"its angles go with a table of means"),

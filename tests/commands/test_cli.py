@@ -267,11 +267,11 @@ def test_claims(tmp_path):
     ("arguments", "expected"),
     [
         (["scheme", "mclaren-42"], "unknown scheme 'mclaren-42'"),
-        (["scheme", "../etc"], "../etc: No such file"),
+        (["scheme", "../etc"], "../etc: no such file"),
         (["schemes", "faces-6", "nothing"], "unknown scheme 'nothing'"),
         (["schemes", "--model", "bias-scales"], "did you mean 'bias-scale'?"),
         (["schemes", "--approach", "robots"], "did you mean 'robot'?"),
-        (["cells", "/nowhere/study.yaml"], "/nowhere/study.yaml: No such file"),
+        (["cells", "/nowhere/study.yaml"], "/nowhere/study.yaml: no such file"),
         (["claims", "/nowhere"], "/nowhere/claims.parquet: no such file"),
     ],
 )

@@ -174,6 +174,7 @@ def test_a_job_needs_no_file(tmp_path, monkeypatch):
         "scheme: a\n": "directions: must be a list of rows",
         "directions: [[1, 2]]\n": "row 1 is not",
         "directions: [[0, 0, 1], [0, 0, 0]]\n": "row 2 is not",
+        f"directions: [[0, 0, {10**400}]]\n": "row 1 is not",
         "directions: [[0, 0, .inf]]\n": "row 1 is not",
         "directions: [[0, 0, true]]\n": "row 1 is not",
         "direction: [[0, 0, 1]]\n": "unknown key 'direction'; did you mean 'directions'",

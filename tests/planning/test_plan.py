@@ -396,7 +396,7 @@ def test_an_unreachable_target_has_an_exit_status_of_its_own():
         (("--tilt-accuracy", "10mgon"), "give the sensor by --sensor, or its noise by --sigma"),
         (("--tilt-accuracy", "10mgon", "--sensor", "paper", "--sigma", "2mm/s2"), "not both"),
         (("--tilt-accuracy", "10mgon", "--sensor", "adxl35"), "did you mean 'adxl355'"),
-        (("--tilt-accuracy", "10mgon", "--sensor", "no.yaml"), "no.yaml: No such file"),
+        (("--tilt-accuracy", "10mgon", "--sensor", "no.yaml"), "no.yaml: no such file"),
         (("--tilt-accuracy", "10mgon", "--sigma", "0mm/s2"), "must be at least"),
         (("--tilt-accuracy", "10mgon", "--sigma", "2mm/s2", "--tilt-range", "95gon"), "at most 90"),
         (

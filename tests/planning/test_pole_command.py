@@ -96,7 +96,7 @@ def test_degrees_are_shown_where_they_are_wanted(tmp_path):
         (("--hand-height", "3m"), "above the top of the pole"),
         (("--sensor", "adxl356"), "did you mean 'adxl355'"),
         (("--scheme", "faces-6"), "scheme faces-6"),
-        (("--calibration", "no/calibration.json"), "no/calibration.json: No such file"),
+        (("--calibration", "no/calibration.json"), "no/calibration.json: no such file"),
         (("--calibration", "c.json", "--scheme", "faces-6"), "--calibration and --scheme exclude"),
         (("--tilt-sigma", "9mgon", "--hold", "2s"), "--tilt-sigma and --hold exclude each other"),
         (("--model", "bias+warm_up"), "warm_up"),

@@ -54,7 +54,7 @@ def test_a_composition_has_one_name(text, name, number):
         ("bias+warm_up(tau=1,tau=2)", "tau is given twice"),
         ("bias++scale", "a part is empty"),
         ("bias+saturation[k_sat]", "did you mean 'k_sat_"),
-        ("nowhere/model.yaml", "nowhere/model.yaml: No such file"),
+        ("nowhere/model.yaml", "nowhere/model.yaml: no such file"),
         (f"{'x' * 300}.yaml", "File name too long"),
         ("x" * 5000, "unknown model"),
     ],

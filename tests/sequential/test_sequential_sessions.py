@@ -212,7 +212,7 @@ def test_the_figure_shows_all_set_ups(summary):
         ({"instead_of": "mclaren"}, "unknown scheme 'mclaren'"),
         ({"model": "bias-scale+warm_up"}, "needs the time of each position"),
         ({"session": 3}, "sequential.session: unknown key; did you mean 'sessions'?"),
-        ({"accuracies": 0}, "sequential.accuracies.0: input should be greater"),
+        ({"accuracies": 0}, "sequential.accuracies: must be greater"),
     ],
 )
 def test_what_cannot_be_used_is_said_in_a_line(section, message):

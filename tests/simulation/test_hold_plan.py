@@ -165,9 +165,9 @@ def test_any_effect_can_be_switched_on(name):
             {"holds": {"temperature_degC": [-300, 20]}},
             "holds.temperature_degC.0: must be from -273.15 to 10000 °C, not -300",
         ),
-        ({"holds": {"temperature_degC": [20]}}, "holds.temperature_degC.1: field required"),
+        ({"holds": {"temperature_degC": [20]}}, "holds.temperature_degC.1: must be given"),
         ({"holds": {"interval_s": 0}}, "holds.interval_s: must be from 1e-06 to 1000000 s, not 0"),
-        ({"holds": {"yaw": "all"}}, "holds.yaw: input should be 'none' or 'random'"),
+        ({"holds": {"yaw": "all"}}, "holds.yaw: must be 'none' or 'random'"),
         ({"holds": {"vibration": [0, 1]}}, "did you mean 'vibration_mps2'?"),
         ({"sensor": {"warm_up(t=3)": {"value": 1, "unit": "mg"}}}, "unknown setting of the effect"),
         (

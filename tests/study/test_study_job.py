@@ -13,7 +13,7 @@ from study_helpers import make_study
 
 from accelstudy.basics.errors import InputError
 from accelstudy.files.tables import write_table
-from accelstudy.jobs.job import job, killed_notice, quote_python, setup_digest
+from accelstudy.jobs.job import job, killed_notice, prepare_jobs, setup_digest
 
 
 @contextmanager
@@ -136,5 +136,5 @@ def test_a_defect_leaves_its_traceback_in_the_log(log):
 def test_the_path_of_python_may_have_a_space(monkeypatch):
     for path in ("/usr/bin/python", "/tmp/with space/bin/python"):
         monkeypatch.setattr(sys, "executable", path)
-        quote_python()
+        prepare_jobs()
         assert shlex.split(sys.executable) == [path]

@@ -23,6 +23,7 @@ from accelstudy.campaign.calibration.fit import CampaignFit
 from accelstudy.campaign.calibration.wording import next_steps, verdict_lines
 from accelstudy.drawing.saving import save_all
 from accelstudy.files.outputs import whole_file
+from accelstudy.files.parquet import write_frame
 from accelstudy.pages import write_page
 
 LISTED = 200
@@ -63,8 +64,7 @@ def write_calibration(
         },
         folder / "figures",
     )
-    with whole_file(folder / "positions.parquet") as path:
-        positions.to_parquet(path, index=False)
+    write_frame(folder / "positions.parquet", positions)
 
     lines = verdict_lines(assessment)
     write_page(

@@ -21,9 +21,11 @@ FARTHEST = 1000
 
 def check_names(names: Sequence[str], path: Path) -> None:
     """Check that no column occurs twice."""
+    seen: set[str] = set()
     for name in names:
-        if names.count(name) > 1:
+        if name in seen:
             raise InputError(f"{path}: {name!r}: the column stands twice")
+        seen.add(name)
 
 
 def check_column(

@@ -14,6 +14,10 @@ from accelstudy.basics.wording import one_line
 from accelstudy.campaign.files.checks import check_names
 from accelstudy.campaign.files.header import KNOWN
 from accelstudy.files.parquet import whole_parquet
+from accelstudy.files.reading import read_text
+
+MOST_NAMED = 5
+"""Unknown columns of which each has a line."""
 
 Columns = Mapping[str, Sequence[Any]]
 
@@ -37,15 +41,17 @@ def read_positions(path: Path) -> tuple[Columns, list[str]]:
 
 def ignored_in(columns: Columns, path: Path) -> list[str]:
     """Warnings about columns that the format does not know."""
-    return [_ignored(path, name) for name in columns if name not in KNOWN]
+    unknown = [name for name in columns if name not in KNOWN]
+    if len(unknown) > MOST_NAMED:
+        first = ", ".join(one_line(repr(name), 30) for name in unknown[:MOST_NAMED])
+        return [f"{path}: {len(unknown)} columns are not known and ignored: {first}, …"]
+    return [_ignored(path, name) for name in unknown]
 
 
 def _read_csv(path: Path) -> tuple[Columns, list[str]]:
     """Columns of text, and warnings."""
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}") from None
+        text = read_text(path)
     except UnicodeDecodeError as error:
         raise _not_whole(path, error) from None
     columns = columns_of(text, path)
@@ -91,6 +97,6 @@ def _read_parquet(path: Path) -> tuple[Columns, list[str]]:
 
 
 def _ignored(path: Path, name: str) -> str:
-    near = get_close_matches(name, KNOWN, n=1)
+    near = get_close_matches(name[:100], KNOWN, n=1)
     hint = f"; did you mean {near[0]!r}?" if near else ""
-    return f"{path}: column {name!r} is not known and ignored{hint}"
+    return f"{path}: column {one_line(repr(name))} is not known and ignored{hint}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -16,6 +17,8 @@ from scipy.io import loadmat, whosmat
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.wording import one_line
 from accelstudy.campaign.logs.text_files import GZIP, TextSource, since
+from accelstudy.files.parquet import whole_parquet
+from accelstudy.files.reading import readable
 
 __all__ = ["CHUNK", "MatlabSource", "ParquetSource", "Source", "TextSource", "open_source"]
 
@@ -60,11 +63,8 @@ class Source(Protocol):
 def open_source(path: str | Path, variable: str | None = None) -> Source:
     """Open a file of numbers, by its ending and its first bytes."""
     path = Path(path)
-    try:
-        with path.open("rb") as file:
-            start = file.read(128)
-    except OSError as error:
-        raise InputError(f"{path}: {(error.strerror or str(error)).lower()}") from None
+    with readable(path), path.open("rb") as file:
+        start = file.read(128)
     if not start:
         raise InputError(f"{path}: the file is empty")
     if path.suffix.lower() in (".parquet", ".pq"):
@@ -88,21 +88,8 @@ class MatlabSource:
     def __init__(self, path: Path, variable: str | None = None) -> None:
         self.path = path
         try:
-            arrays = {
-                name: shape
-                for name, shape, kind in whosmat(path)
-                if _IS_NUMBER.fullmatch(kind) and len(shape) == 2 and all(shape)
-            }
-            if variable is not None and variable not in arrays:
-                raise UnknownNameError(f"array of {path}", variable, arrays)
-            if variable is None and len(arrays) != 1:
-                raise InputError(f"{path}: which array? There are {', '.join(arrays) or 'none'}")
-            name = next(iter(arrays)) if variable is None else variable
-            array = loadmat(path, variable_names=[name])[name]
-            if np.iscomplexobj(array):
-                raise InputError(f"{path}: array {name} has complex numbers")
-            # An array with few rows and many columns has the samples in its columns.
-            self.values = array.T if array.shape[0] < array.shape[1] else array
+            with readable(path):
+                self.values = _matlab_array(path, variable)
         except InputError:
             raise
         except NotImplementedError:
@@ -132,9 +119,28 @@ class MatlabSource:
         return f"row {row + 1}", f"{self.values[row, place]:g}"
 
 
-def open_parquet(path: Path) -> pq.ParquetFile:
+def _matlab_array(path: Path, variable: str | None) -> NDArray[Any]:
+    """Array of a MATLAB file, a row per sample."""
+    arrays = {
+        name: shape
+        for name, shape, kind in whosmat(path)
+        if _IS_NUMBER.fullmatch(kind) and len(shape) == 2 and all(shape)
+    }
+    if variable is not None and variable not in arrays:
+        raise UnknownNameError(f"array of {path}", variable, arrays)
+    if variable is None and len(arrays) != 1:
+        raise InputError(f"{path}: which array? There are {', '.join(arrays) or 'none'}")
+    name = next(iter(arrays)) if variable is None else variable
+    array = loadmat(path, variable_names=[name])[name]
+    if np.iscomplexobj(array):
+        raise InputError(f"{path}: array {name} has complex numbers")
+    # An array with few rows and many columns has the samples in its columns.
+    return array.T if array.shape[0] < array.shape[1] else array
+
+
+def open_parquet(path: Path) -> AbstractContextManager[pq.ParquetFile]:
     """Open a file to be read page by page, since one group of rows may be the whole file."""
-    return pq.ParquetFile(path, pre_buffer=False, buffer_size=_BUFFER)
+    return whole_parquet(path, pre_buffer=False, buffer_size=_BUFFER)
 
 
 class ParquetSource:
@@ -142,10 +148,8 @@ class ParquetSource:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        try:
-            schema = pq.read_schema(path)
-        except (pa.ArrowException, OSError) as error:
-            raise InputError(f"{path}: not a whole Parquet file ({one_line(error)})") from None
+        with open_parquet(path) as file:
+            schema = file.schema_arrow
         self._columns, self._types = schema.names, schema.types
         self.names = [" ".join(name.split()) for name in schema.names]
         self.named = True
@@ -161,20 +165,17 @@ class ParquetSource:
             if self._columns.count(self._columns[place]) > 1:
                 raise InputError(f"{self.path}: there are several columns {self.names[place]!r}")
         names = [self._columns[place] for place in places]
-        try:
-            with open_parquet(self.path) as file:
-                origins: list[Any] = []
-                for batch in file.iter_batches(chunk_size, columns=names):
-                    if not len(batch):
-                        continue
-                    columns = [_numbers(batch.column(name)) for name in names]
-                    origins = origins or [
-                        column[0] if place == clock else None
-                        for column, place in zip(columns, places, strict=True)
-                    ]
-                    yield np.column_stack([since(*c) for c in zip(columns, origins, strict=True)])
-        except (pa.ArrowException, OSError) as error:
-            raise InputError(f"{self.path}: not a whole Parquet file ({one_line(error)})") from None
+        with open_parquet(self.path) as file:
+            origins: list[Any] = []
+            for batch in file.iter_batches(chunk_size, columns=names):
+                if not len(batch):
+                    continue
+                columns = [_numbers(batch.column(name)) for name in names]
+                origins = origins or [
+                    column[0] if place == clock else None
+                    for column, place in zip(columns, places, strict=True)
+                ]
+                yield np.column_stack([since(*c) for c in zip(columns, origins, strict=True)])
 
     def look_up(self, row: int, place: int) -> tuple[str, str]:
         """Where a value stands, and the value; see `Source`."""

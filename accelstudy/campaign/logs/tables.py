@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import csv
 import gzip
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -32,6 +33,7 @@ from accelstudy.campaign.logs.sources import (
     open_parquet,
 )
 from accelstudy.files.outputs import whole_file
+from accelstudy.files.parquet import parquet_file
 
 Array = NDArray[np.float64]
 
@@ -71,10 +73,10 @@ def column_names(source: Source) -> list[str]:
     """Names of the columns, all different: `column_0` … of a log without names."""
     if not source.named:
         return [f"column_{place}" for place in range(len(source.names))]
-    names: list[str] = []
+    names, seen = [], Counter[str]()
     for name in source.names:
-        same = source.names[: len(names)].count(name)
-        names.append(f"{name}.{same}" if same else name)
+        names.append(f"{name}.{seen[name]}" if seen[name] else name)
+        seen[name] += 1
     return names
 
 
@@ -125,10 +127,9 @@ def _with_types(read: Callable[[], Iterable[pa.Table]]) -> Iterator[pa.Table]:
             while kinds and not _holds(table[name], kinds[0]):
                 kinds.pop(0)
     for table in read():
-        for i, (name, kinds) in enumerate(possible.items()):
-            if kinds:
-                table = table.set_column(i, name, _cast(table[name], kinds[0]))
-        yield table
+        columns = zip(table.columns, possible.values(), strict=True)
+        typed = [_cast(column, kinds[0]) if kinds else column for column, kinds in columns]
+        yield pa.table(typed, names=[*possible])
 
 
 def _cells(source: TextSource) -> Iterator[Sequence[str | None]]:
@@ -146,15 +147,12 @@ def _cells(source: TextSource) -> Iterator[Sequence[str | None]]:
 
 
 def _parquet_chunks(source: ParquetSource, names: list[str], chunk_size: int) -> Iterator[pa.Table]:
-    try:
-        with open_parquet(source.path) as file:
-            # The row labels that pandas writes as a column are not part of the log.
-            kept = [name for name in names if not name.startswith("__index_level_")]
-            for batch in file.iter_batches(chunk_size):
-                table = pa.Table.from_batches([batch]).replace_schema_metadata(None)
-                yield table.rename_columns(names).select(kept)
-    except (pa.ArrowException, OSError) as error:
-        raise InputError(f"{source.path}: not a whole Parquet file ({one_line(error)})") from None
+    with open_parquet(source.path) as file:
+        # The row labels that pandas writes as a column are not part of the log.
+        kept = [name for name in names if not name.startswith("__index_level_")]
+        for batch in file.iter_batches(chunk_size):
+            table = pa.Table.from_batches([batch]).replace_schema_metadata(None)
+            yield table.rename_columns(names).select(kept)
 
 
 # --- Writing -------------------------------------------------------------------------------------
@@ -227,15 +225,12 @@ def _text(name: str, column: pa.ChunkedArray) -> pa.ChunkedArray:
 @contextmanager
 def _parquet_writer(path: Path) -> Iterator[Callable[[pa.Table], None]]:
     writer: pq.ParquetWriter | None = None
+    with ExitStack() as stack:
 
-    def write(table: pa.Table) -> None:
-        nonlocal writer
-        if writer is None:
-            writer = pq.ParquetWriter(path, table.schema)
-        writer.write_table(table)
+        def write(table: pa.Table) -> None:
+            nonlocal writer
+            if writer is None:
+                writer = stack.enter_context(parquet_file(path, table.schema))
+            writer.write_table(table)
 
-    try:
         yield write
-    finally:
-        if writer is not None:
-            writer.close()

@@ -19,6 +19,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
+from accelstudy.files.reading import readable
 
 Array = NDArray[np.float64]
 
@@ -165,7 +166,8 @@ class TextSource:
     @contextmanager
     def _readable(self) -> Iterator[None]:
         try:
-            yield
+            with readable(self.path):
+                yield
         except (gzip.BadGzipFile, EOFError, zlib.error):
             raise InputError(f"{self.path}: not a whole gzip file") from None
 

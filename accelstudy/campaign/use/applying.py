@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -14,10 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, Field, model_validator
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.wording import one_line
 from accelstudy.campaign.files.header import Nominal, PerAxis
 from accelstudy.campaign.files.layout import LogLayout
 from accelstudy.effects import HoldConditions
+from accelstudy.files.reading import read_json
 from accelstudy.files.types import Finite, NotNegative, Number, Positive
 from accelstudy.files.validation import checked
 from accelstudy.leveling.angles import angles_of, jacobian, tilt_slope
@@ -220,13 +219,7 @@ def read_calibration(path: str | Path) -> Calibration:
     """
     if Path(path).is_dir():
         raise InputError(f"{path}: a folder; give the calibration.json in it")
-    try:
-        content = json.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}") from None
-    except (ValueError, RecursionError) as error:
-        reason = "nested too deeply" if isinstance(error, RecursionError) else one_line(error)
-        raise InputError(f"{path}: {NO_CALIBRATION}: {reason}") from None
+    content = read_json(path, NO_CALIBRATION)
     return _calibration(checked(_Document, content, f"{path}: {NO_CALIBRATION}"))
 
 

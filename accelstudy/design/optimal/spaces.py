@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from io import StringIO
 from itertools import combinations, product
 from pathlib import Path
 
@@ -13,6 +14,8 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import ANGLE_UNITS, to_si
+from accelstudy.basics.wording import short_list
+from accelstudy.files.reading import read_text
 from accelstudy.leveling.angles import angles_of, specific_force
 from accelstudy.positions.cube import corners, edges, faces
 from accelstudy.positions.sphere import evenly_spread
@@ -161,16 +164,17 @@ def listed_in(path: Path) -> Listed:
         If it cannot be read, or has neither.
     """
     try:
-        table = pd.read_csv(path, comment="#")
-    except (OSError, UnicodeDecodeError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "is no CSV table"
-        raise InputError(f"{path}: {reason}") from None
+        table = pd.read_csv(StringIO(read_text(path)), comment="#")
+    except InputError:
+        raise
+    except ValueError:
+        raise InputError(f"{path}: is no CSV table") from None
     units = (*ANGLE_UNITS, "rad")
     pairs = [("x", "y", "z"), *((f"roll_{u}", f"pitch_{u}") for u in units)]
     found = next((names for names in pairs if set(names) <= set(table.columns)), None)
     if found is None:
         wanted = "; ".join(", ".join(names) for names in pairs)
-        raise InputError(f"{path}: has the columns {', '.join(table.columns)}; expected {wanted}")
+        raise InputError(f"{path}: has the columns {short_list(table.columns)}; expected {wanted}")
     values = table[list(found)].apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
     bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
     if len(bad):

@@ -21,6 +21,7 @@ from accelstudy.diagnosis.report.document.model_file import study_overlay
 from accelstudy.diagnosis.report.document.positions import positions_table
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.files.outputs import DIAGNOSIS, result_folder, whole_file
+from accelstudy.files.parquet import write_frame
 from accelstudy.sensors.models import get_model
 
 
@@ -87,11 +88,9 @@ def write_diagnosis(
     document = diagnosis_document(diagnosis)
     if loop is not None:
         document["loop"] = loop.document
-        with whole_file(folder / "loop.parquet") as path:
-            loop.sessions.to_parquet(path, index=False)
+        write_frame(folder / "loop.parquet", loop.sessions)
     positions = positions_table(diagnosis)
-    with whole_file(folder / "positions.parquet") as path:
-        positions.to_parquet(path, index=False)
+    write_frame(folder / "positions.parquet", positions)
     calibration = _calibration(diagnosis, document)
     if calibration is not None:
         with whole_file(folder / "calibration.json") as path:

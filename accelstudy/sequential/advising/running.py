@@ -18,6 +18,7 @@ from accelstudy.campaign.files.format import (
 from accelstudy.campaign.files.header import HEADER, Header
 from accelstudy.campaign.files.position_files import columns_of, ignored_in
 from accelstudy.campaign.files.session import Campaign
+from accelstudy.files.reading import read_text
 
 
 @dataclass(frozen=True)
@@ -61,9 +62,7 @@ def read_running(folder: str | Path, settled: str = "") -> Running:
     if path.suffix != ".csv":
         return Running(read_campaign(folder), "")
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}") from None
+        text = read_text(path)
     except UnicodeDecodeError as error:  # the last character may be incomplete
         raise InputError(f"{path}: not a CSV file in UTF-8 ({error.reason})") from None
     whole, unfinished = _split(text)

@@ -1,0 +1,67 @@
+"""How a command ends that something stops: one line on standard error, and an exit status."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from threading import current_thread, main_thread
+from types import FrameType
+from typing import NoReturn
+
+import click
+
+from accelstudy.basics.errors import InputError
+
+INTERRUPTED = 130
+"""Exit status after Ctrl-C, as shells have it."""
+
+
+@contextmanager
+def bad_input_as_one_line() -> Iterator[None]:
+    """End with one line and exit status 2 where the input is bad, or a system call fails."""
+    try:
+        yield
+    except InputError as error:
+        _end(str(error))
+    except BrokenPipeError:  # whoever read the output needs no more; click ends quietly
+        raise
+    except OSError as error:
+        # Errors of files name the file. What is without a name is a stream that is open always.
+        where = "standard output" if error.filename is None else error.filename
+        _end(f"{where}: {error.strerror or error}")
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """End with one line where Ctrl-C comes, whatever a library makes of it.
+
+    Some report it as an error of their own: pandas as one of the file that it reads, numpy as one
+    of its import.
+    """
+    came = False
+
+    def stop(number: int, frame: FrameType | None) -> NoReturn:
+        nonlocal came
+        came = True
+        raise KeyboardInterrupt
+
+    before = signal.getsignal(signal.SIGINT)
+    ours = before is not signal.SIG_IGN and current_thread() is main_thread()
+    if ours:
+        signal.signal(signal.SIGINT, stop)
+    try:
+        yield
+    except (Exception, KeyboardInterrupt) as error:
+        if not came and not isinstance(error, KeyboardInterrupt):
+            raise
+        click.echo("interrupted", err=True)
+        raise SystemExit(INTERRUPTED) from None
+    finally:
+        if ours:
+            signal.signal(signal.SIGINT, before)
+
+
+def _end(message: str) -> NoReturn:
+    click.echo(f"error: {message}", err=True)
+    raise SystemExit(2) from None

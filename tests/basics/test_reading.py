@@ -1,0 +1,51 @@
+"""Files of the user: errors name the file that was read, and none is read without end."""
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from accelstudy.basics.errors import InputError
+from accelstudy.campaign.logs.sources import open_source
+from accelstudy.campaign.use.applying import read_calibration
+from accelstudy.files import reading
+from accelstudy.files.layers import read_layer
+from accelstudy.files.parquet import read_parquet
+
+UNREADABLE = Path("/proc/self/mem")  # it opens, and its first byte cannot be read
+READERS = (read_layer, read_calibration, open_source, read_parquet)
+
+
+@pytest.mark.parametrize("read", READERS)
+def test_an_error_of_the_disk_names_the_file(read, tmp_path):
+    for suffix in (".yaml", ".mat", ".parquet"):
+        path = tmp_path / f"input{suffix}"
+        path.symlink_to(UNREADABLE)
+        with pytest.raises(InputError, match=rf"^{path}: cannot be read: \w[^\n]*$"):
+            read(path)
+
+
+@pytest.mark.parametrize("read", [read_layer, read_calibration])
+def test_a_device_that_never_ends_is_refused(read, monkeypatch):
+    monkeypatch.setattr(reading, "LARGEST", 3_000_000)
+    with pytest.raises(InputError, match=r"^/dev/zero: larger than 3 MB; is"):
+        read("/dev/zero")
+
+
+def test_a_pipe_is_read():
+    end, start = os.pipe()
+    os.write(start, b"a: 1\r\nb: \xc3\xa4\r\n")
+    os.close(start)
+    assert read_layer(f"/dev/fd/{end}") == {"a": 1, "b": "ä"}
+    os.close(end)
+
+
+@pytest.mark.parametrize("read", [read_layer, read_calibration])
+def test_what_a_newer_version_wrote_is_said_to_be_newer(read, tmp_path):
+    """Also where it has keys that this version does not know."""
+    path = tmp_path / "file"
+    for version, said in ((2, "2"), (10**300, "1000")):
+        path.write_text(json.dumps({"new_key": 1, "schema_version": version}), encoding="utf-8")
+        with pytest.raises(InputError, match=rf"^{path}: schema_version: {said}\S* is of a newer"):
+            read(path)

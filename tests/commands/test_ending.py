@@ -1,0 +1,102 @@
+"""How commands end: one line and an exit status, whatever stops them."""
+
+import os
+import signal
+import subprocess
+import sys
+
+import click
+import pandas as pd
+import pytest
+from click.testing import CliRunner
+
+from accelstudy.basics.errors import InputError
+from accelstudy.commands.ending import INTERRUPTED
+from accelstudy.commands.main import Commands
+
+PLAN = ["plan", "--tilt-accuracy", "10mgon", "--sigma", "2mm/s2"]
+
+
+def started(code, *arguments, **options):
+    """Run `accelstudy` in a process of its own, some code before."""
+    code += "\nfrom accelstudy.__main__ import run\nrun()"
+    command = [sys.executable, "-c", code, *arguments]
+    return subprocess.run(command, stderr=subprocess.PIPE, text=True, check=False, **options)
+
+
+@pytest.mark.parametrize("module", ["click", "accelstudy.plan.search.answer"])
+def test_an_interrupt_of_an_import_is_one_line(module):
+    code = (
+        "import signal, sys\n"
+        "class Ctrl:\n"
+        "    def find_spec(self, name, path, target=None):\n"
+        f"        if name == {module!r}: signal.raise_signal(signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Ctrl())"
+    )
+    ended = started(code, *PLAN)
+    assert (ended.returncode, ended.stderr) == (INTERRUPTED, "interrupted\n")
+
+
+def one(function):
+    """Result of a command line with one command."""
+    return CliRunner().invoke(Commands(commands=[click.command("one")(function)]), ["one"])
+
+
+def an_odd_line():
+    """A library turns the interrupt into an error of the file."""
+    try:
+        signal.raise_signal(signal.SIGINT)
+    except KeyboardInterrupt:
+        raise InputError("log.csv: some line has too many columns") from None
+
+
+def a_long_read():
+    """pandas reads, and the interrupt comes in the midst of it."""
+
+    class Endless:
+        def __iter__(self):
+            return self
+
+        def read(self, size):
+            signal.raise_signal(signal.SIGINT)
+            return "1,2,3\n"
+
+    pd.read_csv(Endless())
+
+
+@pytest.mark.parametrize("function", [an_odd_line, a_long_read])
+def test_an_interrupt_is_no_error_of_a_file(function):
+    before = signal.getsignal(signal.SIGINT)
+    result = one(function)
+    assert (result.exit_code, result.stderr) == (INTERRUPTED, "interrupted\n")
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_an_error_of_the_system_is_one_line():
+    result = one(lambda: os.stat("/nowhere/at/all"))
+    assert result.stderr == "error: /nowhere/at/all: No such file or directory\n"
+    assert result.exit_code == 2
+
+
+@pytest.mark.parametrize("arguments", [["models"], ["plan", "--help"], ["--version"]])
+def test_a_full_disk_behind_the_output_is_one_line(arguments):
+    with open("/dev/full", "w") as full:
+        ended = started("", *arguments, stdout=full)
+    assert ended.stderr == "error: standard output: No space left on device\n"
+    assert ended.returncode == 2
+
+
+def test_a_reader_that_needs_no_more_is_no_error():
+    end, start = os.pipe()
+    os.close(end)
+    ended = started("", "models", stdout=start)
+    os.close(start)
+    assert ended.stderr == ""
+
+
+def test_figures_need_no_backend():
+    code = "import atexit, os\natexit.register(lambda: __import__('matplotlib.figure'))"
+    ended = started(
+        code, "models", env={**os.environ, "MPLBACKEND": "nonsense"}, stdout=subprocess.DEVNULL
+    )
+    assert (ended.returncode, ended.stderr) == (0, "")
