@@ -151,8 +151,38 @@ def test_apply_levels_a_log(campaign, tmp_path):
     result = run("--angle-unit", "deg", "apply", calibration, log, "--out", degrees)
     assert result.exit_code == 0, result.output
     level = level.rename(columns=lambda name: name.replace("gon", "deg"))
-    turned = level * np.where(level.columns.str.contains("deg"), 0.9, 1.0)
-    pd.testing.assert_frame_equal(pd.read_csv(degrees), turned, atol=1e-5)
+    angles = level.columns[level.columns.str.contains("deg")]
+    level[angles] *= 0.9
+    pd.testing.assert_frame_equal(pd.read_csv(degrees), level, atol=1e-5)
+
+
+def test_near_the_pole_the_rows_say_that_their_sigmas_do_not_hold(campaign, tmp_path):
+    """Readings of a sensor that stands upright, at the pole and 4 gon beside it, noise 20 mm/s²."""
+    run("calibrate", campaign, "--approach", "robot", "--out", tmp_path / "out")
+    n, sigma, rng = 4000, 0.02, np.random.default_rng(8)
+    beside = np.repeat([0.0, 4 * np.pi / 200], n)
+    roll = rng.uniform(-np.pi, np.pi, 2 * n)
+    up, level = 9.80665 * np.cos(beside), 9.80665 * np.sin(beside)
+    f_b = np.column_stack([up, -level * np.sin(roll), -level * np.cos(roll)])
+    readings = NINE.sense(f_b, NINE.vector(TRUTH)) + sigma * rng.standard_normal(f_b.shape)
+    log, out = tmp_path / "log.csv", tmp_path / "level.csv"
+    pd.DataFrame(readings, columns=["fx", "fy", "fz"]).to_csv(log, index=False)
+    calibration = tmp_path / "out/calibration.json"
+    result = run("apply", calibration, log, "--out", out, "--sigma", sigma)
+    assert "use the calibrated force" in result.output
+    level = pd.read_csv(out)
+    near = level["near_pole"].to_numpy()
+    assert near[:n].mean() > 0.99
+    assert not near[n:].any()
+    assert f"{near.sum()} of {2 * n} rows are too close to a pitch of ±100 gon" in result.output
+    errors = {
+        "roll": (level["roll_gon"] - roll * 200 / np.pi + 200) % 400 - 200,
+        "pitch": level["pitch_gon"] - (100 - beside * 200 / np.pi),
+    }
+    inside = {k: (abs(e) < 2e-3 * level[f"sigma_{k}_mgon"]).to_numpy() for k, e in errors.items()}
+    assert inside["roll"][:n].mean() < 0.7
+    assert inside["pitch"][:n].mean() < 0.9
+    assert all(abs(ok[n:].mean() - 0.954) < 0.02 for ok in inside.values())
 
 
 def test_a_bad_log_is_one_line(campaign, tmp_path):
