@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 CURVED = 0.2
 """Size of the terms of second order, beside those of first order, beyond which standard deviations
-of roll and pitch do not hold. With equal noise on all axes the pole is nearer than 5 sigmas then."""
+of roll and pitch do not hold. With equal noise on all axes it is nearer than 5 sigmas then."""
 
 
 def roll_pitch(f: Vector, xp: Any = np) -> tuple[Number, Number]:

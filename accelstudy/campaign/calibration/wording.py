@@ -28,6 +28,15 @@ def verdict_lines(assessment: Assessment) -> list[str]:
     return lines
 
 
+def interval_words(fit: CampaignFit) -> str:
+    """Say what the sigmas are, and how many of them hold 95 %."""
+    many = f"{fit.sigmas_95:.2f} of them hold 95 %"
+    if fit.trusts_sigma:
+        return f"sigmas of the stated noise; {many}"
+    r = fit.adjustment.redundancy
+    return f"sigmas of the noise in the residuals; {many} (Student's t, r = {r})"
+
+
 def next_steps(
     fit: CampaignFit,
     state: str,

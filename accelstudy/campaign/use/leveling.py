@@ -90,7 +90,7 @@ def level_log(
             write(_with(table, added))
         account.close()
     assumed = account.assumptions() if start is None else ()
-    doubts = (*_implausible(calibration), *_mended(calibration, readings))
+    doubts = (*_implausible(calibration), *_mended(calibration, readings), *_estimated(calibration))
     warnings = (*doubts, *assumed, *account.warnings())
     return Leveled(account.rows, account.empty, warnings)
 
@@ -114,6 +114,17 @@ def _mended(calibration: Calibration, readings: Readings) -> tuple[str, ...]:
     if np.array_equal(readings.mending, np.eye(3)):
         return (f"{said}; readings are converted by the options only, and are not mended",)
     return (f"{said}; readings are mended in the same way",)
+
+
+def _estimated(calibration: Calibration) -> tuple[str, ...]:
+    """Say how many sigmas hold 95 %, if a calibration with few residuals makes that more than 2."""
+    needed = calibration.content["sigmas_95"] or 0.0
+    if needed <= 2:
+        return ()
+    return (
+        "the sigmas of the calibration come from few residuals: to hold 95 % of the errors it "
+        f"takes up to {needed:.2f} sigmas of roll and pitch",
+    )
 
 
 def noise_of_reading(calibration: Calibration) -> float:
