@@ -11,10 +11,12 @@ from campaign_helpers import NINE, simulated_campaign
 from click.testing import CliRunner
 from page_helpers import assert_sound, text_of
 
-from accelstudy.campaign.files.format import write_campaign
+from accelstudy.campaign.files.format import read_campaign, write_campaign
 from accelstudy.campaign.files.layout import LogLayout
 from accelstudy.campaign.files.session import Campaign
 from accelstudy.commands.main import main
+from accelstudy.diagnosis.pipeline import diagnose
+from accelstudy.diagnosis.report.words.summary import verdict_lines
 from accelstudy.simulation.sessions import Noise
 
 TRUTH = {"b_x": 0.05, "b_y": 0.01, "b_z": 0.03, "s_x": 2e-4, "alpha_zx": 7e-4}
@@ -183,6 +185,37 @@ def test_near_the_pole_the_rows_say_that_their_sigmas_do_not_hold(campaign, tmp_
     assert inside["roll"][:n].mean() < 0.7
     assert inside["pitch"][:n].mean() < 0.9
     assert all(abs(ok[n:].mean() - 0.954) < 0.02 for ok in inside.values())
+
+
+def test_what_cannot_be_a_sensor_is_said(tmp_path):
+    """Counts with about half of their scale, and a bias of 0.48 g: import, calibrate and diagnose say it.
+
+    They fit perfectly, so no residual tells. A sensor of any data sheet passes without a word.
+    """
+    i = np.arange(20) + 0.5
+    z, azimuth = 1 - i / 10, i * np.pi * (1 + np.sqrt(5))
+    level = np.sqrt(1 - z**2)
+    f_b = np.column_stack([level * np.cos(azimuth), level * np.sin(azimuth), z])
+    noise = 3e-4 * np.random.default_rng(2).standard_normal(f_b.shape)
+    scale, names = 9.80665 / 16384, ("fx", "fy", "fz")
+    for offset, factor, said in ((0.0, 0.51, "s_x"), (0.48, 1.0, "b_x"), (0.2, 1.1, None)):
+        read = np.round(16384 * (f_b + noise + [offset, 0, 0]))
+        table, campaign = tmp_path / "means.csv", tmp_path / "c"
+        pd.DataFrame(read, columns=names).to_csv(table, index=False)
+        options = "--unit", "counts", "--scale", factor * scale, "--offset", 0, "--force"
+        imported = run("import", table, "--means", "--out", campaign, *options).output
+        assert ("49 % less than gravity" in imported) == (said == "s_x")
+        assert ("check --scale and --offset" in imported) == (said == "s_x")
+        out = tmp_path / "out"
+        verdict = run("calibrate", campaign, "--out", out, "--force").output
+        outputs = [verdict]
+        if said == "b_x":
+            outputs.append(" ".join(verdict_lines(diagnose(read_campaign(campaign), NINE))))
+        quality = json.loads((out / "calibration.json").read_text(encoding="utf-8"))["quality"]
+        assert quality["state"] == ("cannot tell" if said is None else "implausible")
+        for output in outputs:
+            assert (f"No sensor is like this: {said}" in output) == (said is not None)
+            assert ("a wrong --scale" in output) == (said is not None)
 
 
 def test_a_bad_log_is_one_line(campaign, tmp_path):

@@ -13,6 +13,7 @@ from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.fit import CampaignFit
 from accelstudy.campaign.calibration.states import BLIND, IMPLAUSIBLE, REJECTED
 from accelstudy.leveling.error import MAX_TILT_GON
+from accelstudy.sensors.plausibility import USUAL_CAUSE
 
 
 def verdict_lines(assessment: Assessment) -> list[str]:
@@ -72,7 +73,7 @@ def _implausible(assessment: Assessment) -> list[str]:
     if gross is not None:
         lines.append(f"This looks like a gross error ({words(gross.name)}): {gross.reason}.")
     if found:
-        cause = "" if gross is not None else " A wrong unit, sign, axis or row is the usual cause."
+        cause = "" if gross is not None else f" {USUAL_CAUSE}"
         lines.append(f"No sensor is like this: {comma_list(found)}.{cause}")
     return lines
 

@@ -32,7 +32,7 @@ def next_steps(
         which = "the next positions" if d.next_positions else "positions"
         what = f"Add {which} to the campaign, and diagnose it again"
         steps.append((what, suggested.diagnose(campaign, model, approach, name)))
-    if calibration is None:
+    if calibration is None or not calibration["quality"]["plausible"]:
         return steps
     use = "Level a log with the calibration that is beside this page"
     steps.append((use, suggested.apply()))
