@@ -96,6 +96,9 @@ def advise_command(
     positions or none, or be missing still. Each position is tested against those before it, and
     used if it agrees with them. The command says what is not determined yet, and the tilt accuracy
     so far.
+
+    The accuracy is the rms over all calibrations that could have come out. If the noise is known,
+    about half of single ones leave more in roll or in pitch.
     """
     from accelstudy.approaches import get_approach
     from accelstudy.sensors.models import get_model

@@ -53,7 +53,8 @@ def apply_command(
     CALIBRATION is a calibration.json, LOG any file that `import` reads. It is read as the log of
     the campaign was; options say what is different. The output has its columns, and beside them
     the calibrated force, roll and pitch with their sigmas, in the axes of the LOG. A row that
-    cannot be corrected stays empty.
+    cannot be corrected stays empty. Where the x axis is so near the vertical that the sigmas of
+    roll and pitch do not hold, near_pole is true.
 
     Some effects depend on the time since the calibration session began. The first row is taken for
     that moment. This is right for the log of the session itself, and for a warm-up if the log

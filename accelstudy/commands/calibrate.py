@@ -37,7 +37,7 @@ def calibrate_command(campaign: Path, model: str, approach: str, out: Path, forc
     from accelstudy.basics.units import display_unit, to_display
     from accelstudy.campaign.calibration.fit import fit_campaign
     from accelstudy.campaign.calibration.output import write_calibration
-    from accelstudy.campaign.calibration.wording import next_steps
+    from accelstudy.campaign.calibration.wording import interval_words, next_steps
     from accelstudy.campaign.files.format import read_campaign
     from accelstudy.files.outputs import CALIBRATION, result_folder
     from accelstudy.sensors.frames import axes_note
@@ -56,6 +56,8 @@ def calibrate_command(campaign: Path, model: str, approach: str, out: Path, forc
         sigma = f"{to_display(entry['sigma'], unit):.4f}" if known else "unknown"
         value = f"{to_display(entry['value'], unit):12.4f}"
         say(f"{entry['name']:>9} = {value} ± {sigma} {display_unit(unit)}")
+    if content["sigmas_95"] is not None:
+        say(f"±: {interval_words(fit)}")
     quality = content["quality"]
     say(axes_note(None if measured.log is None else measured.log.frame))
     click.echo(f"{quality['state'].upper()}: {quality['verdict']}")

@@ -39,11 +39,13 @@ def check_sigmas_command(
 ) -> None:
     """Check the sigmas of a calibration by simulation.
 
-    CAMPAIGN is the folder of the campaign that is calibrated.
+    CAMPAIGN is the folder of the campaign that is calibrated. It is simulated with the noise that
+    its sigmas are from. So the check finds whether the adjustment turns that noise into the right
+    sigmas, and not whether the noise is right.
     """
     from accelstudy.approaches import get_approach
     from accelstudy.campaign.calibration.fit import fit_campaign
-    from accelstudy.campaign.calibration.sigma_check import check_sigmas
+    from accelstudy.campaign.calibration.sigma_check import check_sigmas, what_it_finds
     from accelstudy.campaign.files.format import read_campaign
     from accelstudy.sensors.models import get_model
 
@@ -51,3 +53,4 @@ def check_sigmas_command(
     table = check_sigmas(fit, replicates, seed)
     click.echo(table.to_string(index=False, float_format=lambda value: f"{value:.4g}"))
     say("sigma: as the adjustment claims it; ratio: sigma / sd_empirical.")
+    click.echo(what_it_finds(fit))

@@ -33,6 +33,7 @@ class Beside:
     variance : float, of unit weight, after what was found
     sigma_known : bool, whether sigma is given
     trusted : bool, whether it is, and the base fit does not refute it
+    holds : bool, whether it is, and the final fit does not refute it
     """
 
     search: Search
@@ -40,6 +41,7 @@ class Beside:
     variance: float
     sigma_known: bool
     trusted: bool
+    holds: bool
 
     @cached_property
     def location(self) -> Location:
@@ -84,7 +86,7 @@ class Beside:
         if self.finding.verdict == "narrowed":
             classes = [alike for one in self.finding.credible_set for alike in one.classes]
             names += [name for alike in classes for name in alike]
-        return tuple(upper_limits(self.finding.examined, self.variance, names))
+        return tuple(upper_limits(self.finding.examined, self.holds, names))
 
     @cached_property
     def next_positions(self) -> tuple[NextPosition, ...]:

@@ -110,7 +110,7 @@ class _Run:
             found = (*gross, *found)
         final, variance = finding.examined, self.noise.unit_variance(finding.examined)
         known = self.fit.sigma_known
-        trusted = self.noise.sigma_holds(search.examined)
+        trusted, holds = (self.noise.sigma_holds(fit) for fit in (search.examined, final))
         with stage("held-out positions"):
             gap = self.gap(finding, variance)
         return Diagnosis(
@@ -125,13 +125,13 @@ class _Run:
             examined=search.examined,
             final=final,
             sigma_known=known,
-            sigma_holds=self.noise.sigma_holds(final),
+            sigma_holds=holds,
             unit_variance=variance,
             noise_tests=tests,
             screening=search.detection,
             probabilities=self.probabilities(finding),
             gap=gap,
-            beside=Beside(search, finding, variance, known, trusted),
+            beside=Beside(search, finding, variance, known, trusted, holds),
             simulations=SIMULATIONS,
             recognised=self.recognised,
             reason=reason,

@@ -22,6 +22,7 @@ from accelstudy.diagnosis.space.examined import ExaminedFit
 from accelstudy.diagnosis.worth.changes import Change
 from accelstudy.diagnosis.worth.limits import UpperLimit
 from accelstudy.diagnosis.worth.next_positions import NextPosition
+from accelstudy.sensors.plausibility import implausible_parameters
 from accelstudy.sensors.sensor import SensorModel
 
 LEVEL_EFFECTS = 0.04
@@ -189,6 +190,14 @@ class Diagnosis:
     def suspects(self) -> tuple[tuple[int, float], ...]:
         """Label and p-value of positions that the calibration marks, on their own."""
         return tuple((int(self.campaign.positions[i]), p) for i, p in self.beside.suspects)
+
+    @property
+    def implausible(self) -> tuple[str, ...]:
+        """Parameters of the final fit that no sensor has."""
+        solution, u = self.final.frame.solution, self.extended.n_parameters
+        sigma = np.sqrt(np.diag(solution.cofactors)[:u] * self.unit_variance)
+        effects = self.extended.effects
+        return tuple(implausible_parameters(effects, solution.parameters[:u], sigma))
 
     @property
     def level(self) -> float:

@@ -20,9 +20,21 @@ FACTOR = 20.0
 """A parameter is implausible beyond so many times the typical size of cheap equipment."""
 CLEARLY = 3.0
 """Standard deviations by which an estimate must be beyond its bound."""
-LARGEST = {"scale": 0.5, "base_tilt": 0.1, "encoder_offset": 0.1}
-"""Effects with a bound of their own, SI. A scale error beyond a half comes from a wrong unit, range
-or sign. The tilt of a rig and the zeros of its circles depend on its set-up, not on its quality."""
+LARGEST = {
+    "bias": 0.3 * STANDARD_GRAVITY,
+    "scale": 0.2,
+    "base_tilt": 0.1,
+    "encoder_offset": 0.1,
+}
+"""Effects with a bound of their own, SI. Data sheets of cheap digital sensors allow a bias of
+0.25 g and a scale error of 10 % (Analog Devices ADXL345), and public measurements have up to 0.13 g
+and 4 %. What is clearly beyond both comes from a wrong unit, range, offset or sign. The tilt of a
+rig and the zeros of its circles depend on its set-up, not on its quality."""
+USUAL_CAUSE = (
+    "The usual cause is a wrong --scale, --offset, --unit or --gravity of the import, or a wrong "
+    "sign, axis or row."
+)
+"""What to check if no sensor can have some parameters."""
 
 
 def largest(effect: Effect) -> float:

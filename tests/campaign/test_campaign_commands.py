@@ -7,14 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from campaign_helpers import NINE, simulated_campaign
+from campaign_helpers import GRAVITY, NINE, simulated_campaign
 from click.testing import CliRunner
 from page_helpers import assert_sound, text_of
 
-from accelstudy.campaign.files.format import write_campaign
+from accelstudy.campaign.calibration.assessment import assess
+from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.calibration.wording import verdict_lines
+from accelstudy.campaign.files.format import read_campaign, write_campaign
 from accelstudy.campaign.files.layout import LogLayout
 from accelstudy.campaign.files.session import Campaign
 from accelstudy.commands.main import main
+from accelstudy.diagnosis.pipeline import diagnose
+from accelstudy.diagnosis.report.words.summary import verdict_lines as diagnosis_lines
 from accelstudy.simulation.sessions import Noise
 
 TRUTH = {"b_x": 0.05, "b_y": 0.01, "b_z": 0.03, "s_x": 2e-4, "alpha_zx": 7e-4}
@@ -179,8 +184,69 @@ def test_apply_levels_a_log(campaign, tmp_path):
     result = run("--angle-unit", "deg", "apply", calibration, log, "--out", degrees)
     assert result.exit_code == 0, result.output
     level = level.rename(columns=lambda name: name.replace("gon", "deg"))
-    turned = level * np.where(level.columns.str.contains("deg"), 0.9, 1.0)
-    pd.testing.assert_frame_equal(pd.read_csv(degrees), turned, atol=1e-5)
+    angles = level.columns[level.columns.str.contains("deg")]
+    level[angles] *= 0.9
+    pd.testing.assert_frame_equal(pd.read_csv(degrees), level, atol=1e-5)
+
+
+def test_near_the_pole_the_rows_say_that_their_sigmas_do_not_hold(campaign, tmp_path):
+    """Readings of a sensor that stands upright, at the pole and 4 gon beside it, noise 20 mm/s²."""
+    run("calibrate", campaign, "--approach", "robot", "--out", tmp_path / "out")
+    n, sigma, rng = 4000, 0.02, np.random.default_rng(8)
+    beside = np.repeat([0.0, 4 * np.pi / 200], n)
+    roll = rng.uniform(-np.pi, np.pi, 2 * n)
+    up, level = 9.80665 * np.cos(beside), 9.80665 * np.sin(beside)
+    f_b = np.column_stack([up, -level * np.sin(roll), -level * np.cos(roll)])
+    readings = NINE.sense(f_b, NINE.vector(TRUTH)) + sigma * rng.standard_normal(f_b.shape)
+    log, out = tmp_path / "log.csv", tmp_path / "level.csv"
+    pd.DataFrame(readings, columns=["fx", "fy", "fz"]).to_csv(log, index=False)
+    calibration = tmp_path / "out/calibration.json"
+    result = run("apply", calibration, log, "--out", out, "--sigma", sigma)
+    assert "use the calibrated force" in result.output
+    level = pd.read_csv(out)
+    near = level["near_pole"].to_numpy()
+    assert near[:n].mean() > 0.99
+    assert not near[n:].any()
+    assert f"{near.sum()} of {2 * n} rows are too close to a pitch of ±100 gon" in result.output
+    errors = {
+        "roll": (level["roll_gon"] - roll * 200 / np.pi + 200) % 400 - 200,
+        "pitch": level["pitch_gon"] - (100 - beside * 200 / np.pi),
+    }
+    inside = {k: (abs(e) < 2e-3 * level[f"sigma_{k}_mgon"]).to_numpy() for k, e in errors.items()}
+    assert inside["roll"][:n].mean() < 0.7
+    assert inside["pitch"][:n].mean() < 0.9
+    assert all(abs(ok[n:].mean() - 0.954) < 0.02 for ok in inside.values())
+
+
+def test_what_cannot_be_a_sensor_is_said(tmp_path):
+    """Counts with about half of their scale, and a bias of 0.48 g, fit perfectly.
+
+    So no residual tells; import, calibrate and diagnose say it. A sensor of any data sheet passes
+    without a word.
+    """
+    i = np.arange(20) + 0.5
+    z, azimuth = 1 - i / 10, i * np.pi * (1 + np.sqrt(5))
+    level = np.sqrt(1 - z**2)
+    f_b = np.column_stack([level * np.cos(azimuth), level * np.sin(azimuth), z])
+    noise = 3e-4 * np.random.default_rng(2).standard_normal(f_b.shape)
+    scale, names = 9.80665 / 16384, ("fx", "fy", "fz")
+    for offset, factor, said in ((0.0, 0.51, "s_x"), (0.48, 1.0, "b_x"), (0.2, 1.1, None)):
+        read = np.round(16384 * (f_b + noise + [offset, 0, 0]))
+        table, campaign = tmp_path / "means.csv", tmp_path / "c"
+        pd.DataFrame(read, columns=names).to_csv(table, index=False)
+        options = "--unit", "counts", "--scale", factor * scale, "--offset", 0, "--force"
+        imported = run("import", table, "--means", "--out", campaign, *options).output
+        assert ("49 % less than gravity" in imported) == (said == "s_x")
+        assert ("check --scale and --offset" in imported) == (said == "s_x")
+        measured = read_campaign(campaign)
+        assessment = assess(fit_campaign(measured, NINE, GRAVITY))
+        assert assessment.state == ("cannot tell" if said is None else "implausible")
+        found = [verdict_lines(assessment)]
+        if said == "b_x":
+            found.append(diagnosis_lines(diagnose(measured, NINE)))
+        for lines in found:
+            assert (f"No sensor is like this: {said}" in " ".join(lines)) == (said is not None)
+            assert ("a wrong --scale" in " ".join(lines)) == (said is not None)
 
 
 def test_a_bad_log_is_one_line(campaign, tmp_path):

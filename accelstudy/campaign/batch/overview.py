@@ -61,6 +61,7 @@ PARAMETER_COLUMNS = {
     "parameter": "string",
     "value": "float64",
     "sigma": "float64",
+    "ci95": "float64",
     "sigma_priori": "float64",
     "sigma_posteriori": "float64",
     "unit": "string",

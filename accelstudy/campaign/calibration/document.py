@@ -40,6 +40,7 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
         "gravity_mps2": fit.gravity,
         "n_positions": campaign.n_positions,
         "sigma_source": "a priori" if fit.trusts_sigma else "a posteriori",
+        "sigmas_95": json_number(fit.sigmas_95),
         "sigma_position_mps2": json_number(fit.sigma_position),
         "sigma_position_priori_mps2": json_number(campaign.sigma_force),
         "sigma_position_posteriori_mps2": json_number(fit.sigma_position_posteriori),
@@ -49,6 +50,7 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
                 "name": parameter.name,
                 "value": float(fit.parameters[i]),
                 "sigma": json_number(sigma[i]),
+                "ci95": json_number(fit.sigmas_95 * sigma[i]),
                 "sigma_priori": json_number(
                     adjustment.sigma_priori[0, i] if fit.sigma_known else None
                 ),

@@ -12,6 +12,7 @@ from accelstudy.adjustment import Adjustment, Observations, calibrate
 from accelstudy.adjustment.quality import GlobalTest, global_test
 from accelstudy.approaches import Approach, get_approach
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.shares import sigmas_95
 from accelstudy.basics.units import MGON
 from accelstudy.basics.wording import words
 from accelstudy.campaign.calibration.gauges import not_affine
@@ -132,6 +133,11 @@ class CampaignFit:
     def sigma(self) -> Array:
         """Standard deviations of the parameters to quote, (u,), SI."""
         return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def sigmas_95(self) -> float:
+        """Number of quoted sigmas on either side that hold 95 %; by Student's t a posteriori."""
+        return sigmas_95(None if self.trusts_sigma else self.adjustment.redundancy)
 
     @property
     def gravity(self) -> float:

@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
-from scipy import stats
+from scipy import special
 
 from accelstudy.adjustment import calibrate
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import track
-from accelstudy.basics.units import display_unit, to_display
+from accelstudy.basics.units import display_unit, quantity_text, to_display
+from accelstudy.basics.wording import p_value
 from accelstudy.campaign.calibration.fit import CampaignFit, campaign_noise
 from accelstudy.simulation.sessions import BLOCK, session
 
@@ -22,7 +23,9 @@ AT_ONCE = 500_000
 def check_sigmas(fit: CampaignFit, replicates: int = 2000, seed: int = 1) -> pd.DataFrame:
     """Simulate sessions with the positions, noise and parameters of a campaign, and calibrate them.
 
-    If the campaign does not state its noise, the simulation takes the sigma a posteriori.
+    The simulation has the noise that the sigmas are quoted from: the stated one if it is trusted,
+    else that of the residuals. So it finds sigmas that are wrong because the model is not linear
+    within its errors, and none that are wrong because this noise is; see `what_it_finds`.
 
     Parameters
     ----------
@@ -40,11 +43,16 @@ def check_sigmas(fit: CampaignFit, replicates: int = 2000, seed: int = 1) -> pd.
     Raises
     ------
     InputError
-        If fewer than two simulated calibrations converge.
+        If there are no sigmas, or fewer than two simulated calibrations converge.
     """
     model, approach = fit.model, fit.approach
     noise = campaign_noise(fit.campaign)
     if not fit.trusts_sigma:
+        if not np.isfinite(fit.sigma_position):
+            raise InputError(
+                f"{fit.campaign.name}: no noise is stated, and no redundancy tells it: there is no "
+                "sigma to check"
+            )
         noise = replace(noise, sigma_force=fit.sigma_position)
     directions = -fit.corrected
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
@@ -69,7 +77,7 @@ def check_sigmas(fit: CampaignFit, replicates: int = 2000, seed: int = 1) -> pd.
             "can be checked"
         )
     sd = errors.std(axis=0, ddof=1)
-    low, high = (sd * np.sqrt((n - 1) / stats.chi2.ppf(p, n - 1)) for p in (0.975, 0.025))
+    low, high = (sd * np.sqrt((n - 1) / special.chdtri(n - 1, p)) for p in (0.025, 0.975))
     rows = []
     for i, parameter in enumerate(model.parameters):
         shown = {
@@ -90,3 +98,28 @@ def check_sigmas(fit: CampaignFit, replicates: int = 2000, seed: int = 1) -> pd.
             }
         )
     return pd.DataFrame(rows)
+
+
+def what_it_finds(fit: CampaignFit) -> str:
+    """Say what `check_sigmas` can find, and what it cannot: the noise that it takes may be wrong.
+
+    The noise of the residuals has the 95 % interval σ̂ √(r/χ²_r), if they are Gaussian noise alone.
+    """
+    noise, test = quantity_text(fit.sigma_position, "m/s^2"), fit.global_test
+    if fit.trusts_sigma:
+        told = (
+            "nothing tells" if test is None else f"the global test tells ({p_value(test.p_value)})"
+        )
+        return (
+            f"The simulation has the stated noise of {noise}, and so have the sigmas. A ratio far "
+            f"from 1 says that the adjustment is wrong; whether that noise is right, {told}."
+        )
+    r = fit.adjustment.redundancy
+    ends = (fit.sigma_position * np.sqrt(r / special.chdtri(r, p)) for p in (0.025, 0.975))
+    low, high = (quantity_text(end, "m/s^2") for end in ends)
+    why = "No noise is stated" if test is None else "The residuals refute the stated noise"
+    return (
+        f"{why}: the simulation has that of the residuals, {noise}, and so have the sigmas. A "
+        "ratio far from 1 says that the adjustment is wrong; that this noise is wrong, no ratio "
+        f"can show. With r = {r}, chance alone puts the true noise from {low} to {high} (95 %)."
+    )

@@ -13,6 +13,7 @@ from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.fit import CampaignFit
 from accelstudy.campaign.calibration.states import BLIND, IMPLAUSIBLE, REJECTED
 from accelstudy.leveling.error import MAX_TILT_GON
+from accelstudy.sensors.plausibility import USUAL_CAUSE
 
 
 def verdict_lines(assessment: Assessment) -> list[str]:
@@ -26,6 +27,15 @@ def verdict_lines(assessment: Assessment) -> list[str]:
     if not fit.approach.uses_angles:
         lines.append(BLIND)
     return lines
+
+
+def interval_words(fit: CampaignFit) -> str:
+    """Say what the sigmas are, and how many of them hold 95 %."""
+    many = f"{fit.sigmas_95:.2f} of them hold 95 %"
+    if fit.trusts_sigma:
+        return f"sigmas of the stated noise; {many}"
+    r = fit.adjustment.redundancy
+    return f"sigmas of the noise in the residuals; {many} (Student's t, r = {r})"
 
 
 def next_steps(
@@ -63,7 +73,7 @@ def _implausible(assessment: Assessment) -> list[str]:
     if gross is not None:
         lines.append(f"This looks like a gross error ({words(gross.name)}): {gross.reason}.")
     if found:
-        cause = "" if gross is not None else " A wrong unit, sign, axis or row is the usual cause."
+        cause = "" if gross is not None else f" {USUAL_CAUSE}"
         lines.append(f"No sensor is like this: {comma_list(found)}.{cause}")
     return lines
 

@@ -22,8 +22,9 @@ from accelstudy.campaign.gross_errors.base import (
 )
 from accelstudy.campaign.gross_errors.real_sensor import RealSensor
 from accelstudy.leveling.angles import usual_norm
+from accelstudy.sensors.plausibility import LARGEST
 
-NEAR = 0.8
+NEAR = 1 - LARGEST["scale"]
 """Share of gravity that even a bad sensor reads in the right unit."""
 
 

@@ -17,6 +17,7 @@ from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.campaign.logs.sources import Source
 from accelstudy.leveling.angles import usual_norm
 from accelstudy.sensors.conversion import conversion_of
+from accelstudy.sensors.plausibility import LARGEST
 
 Array = NDArray[np.float64]
 
@@ -75,6 +76,20 @@ def _check_size(path: str | Path, settings: ImportSettings, raw: Array, forces: 
     advice = "--scale and --offset" if unit == "counts" else "--unit or --columns"
     converted = f", by --scale and --offset {norm:.3g} m/s²," if unit == "counts" else ","
     raise InputError(f"{at_rest}{converted} which is nowhere near gravity; give other {advice}")
+
+
+def far_from_gravity(settings: ImportSettings, forces: Array) -> list[str]:
+    """Warn if forces (n, 3), m/s², at rest differ from gravity by more than a scale error can."""
+    norm, gravity = usual_norm(forces), settings.gravity.value_mps2
+    share = norm / gravity - 1
+    if abs(share) <= LARGEST["scale"]:
+        return []
+    options = "--scale and --offset" if settings.unit == "counts" else "--unit"
+    return [
+        f"at rest the forces are about {norm:.3g} m/s², {100 * abs(share):.0f} % "
+        f"{'more' if share > 0 else 'less'} than gravity, {gravity:g} m/s²: no accelerometer is so "
+        f"far off; check {options}, and --gravity"
+    ]
 
 
 def layout_of(settings: LogLayout, source: Source, places: Mapping[str, int]) -> LogLayout:

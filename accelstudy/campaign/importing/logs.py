@@ -15,7 +15,12 @@ from accelstudy.campaign.files.format import write_campaign
 from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.holds.allan import MeanAccuracy, accuracy_of_mean
 from accelstudy.campaign.holds.detection import DetectedHolds, find_joint_holds
-from accelstudy.campaign.importing.imported import default_name, imported_campaign, layout_of
+from accelstudy.campaign.importing.imported import (
+    default_name,
+    far_from_gravity,
+    imported_campaign,
+    layout_of,
+)
 from accelstudy.campaign.importing.means import import_means
 from accelstudy.campaign.importing.report import ImportReport, shown
 from accelstudy.campaign.importing.settings import (
@@ -231,6 +236,7 @@ def _campaign(
         else:
             hold = holds.number[np.argmin(np.isfinite(values))]
             warnings.append(f"hold {hold} has no {name}; the column is left out")
+    warnings += far_from_gravity(settings, forces)
     campaign = imported_campaign(
         paths,
         settings,

@@ -13,7 +13,7 @@ from accelstudy.basics.units import MGON, ROBOT_UNITS, UNITS
 from accelstudy.campaign.files.checks import clearly_worse, misfit_of_angles
 from accelstudy.campaign.files.layout import LogLayout
 from accelstudy.campaign.files.session import Campaign
-from accelstudy.campaign.importing.imported import imported_campaign
+from accelstudy.campaign.importing.imported import far_from_gravity, imported_campaign
 from accelstudy.campaign.importing.report import ImportReport
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.campaign.logs.columns import AXES, locate, read_columns
@@ -76,6 +76,7 @@ def import_means(
         sigma = float(np.sqrt(np.mean(sd**2 / n_samples[:, None])))
         warnings.append("sigma of a mean assumes white noise; coloured noise makes it larger")
     forces = frame.to_frd(conversion.to_si(np.column_stack([values[axis] for axis in AXES])))
+    warnings += far_from_gravity(settings, forces)
     campaign = imported_campaign(
         [path],
         settings,

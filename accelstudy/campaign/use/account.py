@@ -9,7 +9,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import display_unit, to_display
+from accelstudy.basics.units import display_unit, quantity_text, to_display
 from accelstudy.basics.wording import counted, short_list
 from accelstudy.campaign.calibration.ranges import MARGIN, Watch
 from accelstudy.campaign.files.checks import likely_fault
@@ -23,6 +23,9 @@ Array = NDArray[np.float64]
 CLIPPED = 0.999
 """A reading beyond this part of the sensor's range is saturated: the last count is often below the
 range."""
+
+NEAR_POLE = "near_pole"
+"""Column that says whether a row is too close to the roll pole for its sigmas."""
 
 RAGGED = "ragged"
 """Key of an unusable line that has more or fewer cells than the others."""
@@ -47,12 +50,21 @@ class Account:
         self._calibration, self._readings = calibration, readings
         self._watch = Watch(calibration.ranges)
         self._norms = np.empty(0)
-        self._usable = self._far = self._after = 0
+        self._usable = self._far = self._after = self._near = 0
         self._first_empty: tuple[int, str | None] = (0, None)
         self.rows = self.empty = 0
 
-    def add(self, table: pa.Table, forces: Array, corrected: Array, hold: HoldConditions) -> None:
+    def add(
+        self,
+        table: pa.Table,
+        forces: Array,
+        corrected: Array,
+        near: NDArray[np.bool_],
+        hold: HoldConditions,
+    ) -> None:
         """Add rows, their readings and calibrated forces (k, 3), m/s² in frd, and conditions.
+
+        `near` says which of them are too close to the roll pole for their sigmas.
 
         Raises
         ------
@@ -65,6 +77,7 @@ class Account:
             self._first_empty = self.rows + first, self._unusable(table, first)
         self.rows += len(lost)
         self.empty += int(lost.sum())
+        self._near += int(near.sum())
         norms = np.linalg.norm(forces, axis=1)
         norms = norms[np.isfinite(norms)]
         # Even bad sensors are wrong by some tenths only; larger differences come from motion.
@@ -107,6 +120,12 @@ class Account:
         if self.empty:
             first = self._reason()
             yield f"{self.empty} {of_all} have no calibrated force and get empty cells; {first}"
+        if self._near:
+            yield (
+                f"{self._near} {of_all} are too close to a pitch of "
+                f"±{quantity_text(np.pi / 2, 'rad')}, where roll has no meaning, for their sigmas "
+                f"of roll and pitch to hold ({NEAR_POLE} is true there); use the calibrated force"
+            )
         if self._after:
             yield (
                 f"{short_list(self._calibration.drifts)}: kept constant after the end of the "

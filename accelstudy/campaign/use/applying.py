@@ -188,6 +188,7 @@ class _Document(BaseModel):
     gravity_mps2: Positive
     sigma_position_mps2: NotNegative | None
     sigma_reading_mps2: NotNegative | None = None
+    sigmas_95: Positive | None = None
     parameters: list[_Parameter]
     covariance: list[list[Finite | None]]
     affine: _Affine | None

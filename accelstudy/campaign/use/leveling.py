@@ -17,10 +17,11 @@ from accelstudy.basics.units import attitude_unit, display_unit, to_attitude, to
 from accelstudy.campaign.logs.columns import AXES
 from accelstudy.campaign.logs.sources import CHUNK
 from accelstudy.campaign.logs.tables import chunk_writer, is_parquet
-from accelstudy.campaign.use.account import Account, clipped
+from accelstudy.campaign.use.account import NEAR_POLE, Account, clipped
 from accelstudy.campaign.use.applying import Calibration
 from accelstudy.campaign.use.readings import Readings, readings_of
 from accelstudy.effects import HoldConditions
+from accelstudy.leveling.angles import near_pole
 from accelstudy.sensors.frames import Frame
 
 Array = NDArray[np.float64]
@@ -84,12 +85,12 @@ def level_log(
     with chunk_writer(out) as write:
         chunks = readings.chunks(chunk_size, typed=is_parquet(out))
         for table, forces, hold in track(chunks, "leveling"):
-            corrected, added = _leveled(calibration, readings.frame, forces, hold, noise)
-            account.add(table, forces, corrected, hold)
+            corrected, near, added = _leveled(calibration, readings.frame, forces, hold, noise)
+            account.add(table, forces, corrected, near, hold)
             write(_with(table, added))
         account.close()
     assumed = account.assumptions() if start is None else ()
-    doubts = (*_implausible(calibration), *_mended(calibration, readings))
+    doubts = (*_implausible(calibration), *_mended(calibration, readings), *_estimated(calibration))
     warnings = (*doubts, *assumed, *account.warnings())
     return Leveled(account.rows, account.empty, warnings)
 
@@ -115,6 +116,17 @@ def _mended(calibration: Calibration, readings: Readings) -> tuple[str, ...]:
     return (f"{said}; readings are mended in the same way",)
 
 
+def _estimated(calibration: Calibration) -> tuple[str, ...]:
+    """Say how many sigmas hold 95 %, if a calibration with few residuals makes that more than 2."""
+    needed = calibration.content["sigmas_95"] or 0.0
+    if needed <= 2:
+        return ()
+    return (
+        "the sigmas of the calibration come from few residuals: to hold 95 % of the errors it "
+        f"takes up to {needed:.2f} sigmas of roll and pitch",
+    )
+
+
 def noise_of_reading(calibration: Calibration) -> float:
     """Noise of a reading, m/s²: the noise within the holds of the campaign.
 
@@ -127,8 +139,11 @@ def noise_of_reading(calibration: Calibration) -> float:
 
 def _leveled(
     calibration: Calibration, frame: Frame, forces: Array, hold: HoldConditions, noise: float
-) -> tuple[Array, dict[str, Array]]:
-    """Calibrated forces in frd of readings (k, 3), m/s², and the columns that are added."""
+) -> tuple[Array, NDArray[np.bool_], dict[str, pa.Array]]:
+    """Calibrated forces in frd of readings (k, 3), m/s², and the columns that are added.
+
+    Between them, which rows (k,) are too close to the roll pole for their sigmas.
+    """
     with np.errstate(all="ignore"):  # forces that are not finite are counted below
         corrected = calibration.correct(forces, hold)
         angles, sigmas = calibration.level(forces, noise, hold)
@@ -140,15 +155,17 @@ def _leveled(
     for i, angle in enumerate(("roll", "pitch")):
         added[f"{angle}_{attitude_unit()}"] = frame.signs[i] * to_attitude(angles[:, i])
         added[f"sigma_{angle}_{display_unit('rad')}"] = to_display(sigmas[:, i], "rad")
-    for name, values in added.items():
-        added[name] = np.where(lost | ~np.isfinite(values), np.nan, np.round(values, DECIMALS))
-    return corrected, added
+    columns = {
+        name: pa.array(np.round(values, DECIMALS), mask=lost | ~np.isfinite(values))
+        for name, values in added.items()
+    }
+    near = ~lost & near_pole(angles, sigmas)
+    return corrected, near, {**columns, NEAR_POLE: pa.array(near, mask=lost)}
 
 
-def _with(table: pa.Table, added: dict[str, Array]) -> pa.Table:
+def _with(table: pa.Table, added: dict[str, pa.Array]) -> pa.Table:
     """Table with added columns; existing columns of the same name are replaced."""
-    for name, values in added.items():
-        column = pa.array(values, from_pandas=True)  # NaN becomes null
+    for name, column in added.items():
         if name in table.column_names:
             table = table.set_column(table.column_names.index(name), name, column)
         else:

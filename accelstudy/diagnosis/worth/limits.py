@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import noncentrality
+from accelstudy.basics.shares import sigmas_95
 from accelstudy.diagnosis.space.examined import ExaminedFit
 from accelstudy.diagnosis.space.frame import Frame
 from accelstudy.diagnosis.space.hypotheses import ALIKE, OUTLIER, Hypothesis, cosines
@@ -71,8 +72,11 @@ def whole_shapes(shapes: Sequence[Hypothesis]) -> list[Hypothesis]:
     return [h for h in shapes if h.effect is not None and h.dim == len(h.effect.parameters)]
 
 
-def upper_limits(examined: ExaminedFit, variance: float, named: Sequence[str]) -> list[UpperLimit]:
+def upper_limits(examined: ExaminedFit, known: bool, named: Sequence[str]) -> list[UpperLimit]:
     """95 % limits |p̂| + 1.96 σ of the parameters of all effects that were not found.
+
+    Where the noise is not `known`, σ comes from what the model and the effect together leave of the
+    residuals, and Student's t takes the place of 1.96; without any residual left there is no limit.
 
     Each effect is estimated beside the parameters of the model, in the shape that fits best of
     those in which all its parameters show. The limit is that of the parameter that is known worst.
@@ -89,9 +93,14 @@ def upper_limits(examined: ExaminedFit, variance: float, named: Sequence[str]) -
         assert best.effect is not None
         columns = signature_columns(examined.frame, best)
         inverse = np.linalg.pinv(columns)
-        values = inverse @ examined.frame.residuals.z
-        sigma = np.sqrt(variance * np.sum(inverse**2, axis=1))
-        bounds = np.abs(values) + 1.96 * sigma
+        residuals = examined.frame.residuals
+        values, variance, needed = inverse @ residuals.z, 1.0, sigmas_95()
+        if not known:
+            left, r = residuals.z - columns @ values, residuals.redundancy - columns.shape[1]
+            if r < 1:
+                continue
+            variance, needed = float(left @ left) / r, sigmas_95(r)
+        bounds = np.abs(values) + needed * np.sqrt(variance * np.sum(inverse**2, axis=1))
         worst = int(np.argmax(bounds))
         parameter = best.effect.parameters[worst]
         limits.append(UpperLimit(name, parameter.name, float(bounds[worst]), parameter.unit))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from accelstudy.basics.shares import clopper_pearson
+from accelstudy.basics.shares import clopper_pearson, sigmas_95
 from accelstudy.basics.wording import number
 
 LARGE = 150.0
@@ -150,7 +150,7 @@ def _mean(figure: str, cases: str, part: pd.DataFrame, most: float) -> Target:
     """Mean number of names, beside how many the oracle needs for the same campaigns."""
     x = part["set_names"].to_numpy(float)
     best = part["oracle_alternatives"].mean()
-    spread = 1.96 * x.std(ddof=1) / np.sqrt(len(x)) if len(x) > 1 else np.nan
+    spread = sigmas_95(len(x) - 1) * x.std(ddof=1) / np.sqrt(len(x)) if len(x) > 1 else np.nan
     mean = x.mean() if len(x) else np.nan
     wanted = f"≤ {number(most)} (oracle {best:.1f})"
     return Target(figure, cases, wanted, 0, most, mean, mean - spread, mean + spread, len(x))

@@ -191,7 +191,10 @@ def _next(advice: Advice, frame: Frame) -> str:
 
 def _to_go(advice: Advice, campaign: Campaign) -> str:
     if advice.enough:
-        return "YOU CAN STOP: the accuracy is reached"
+        return (
+            "YOU CAN STOP: the accuracy is reached, as an rms over calibrations; a single one may "
+            "leave more"
+        )
     if advice.to_go is not None:
         return f"to go: about {counted(advice.to_go, 'position')}"
     if advice.noise.taken is None:

@@ -9,12 +9,11 @@ from functools import cached_property
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy import special
 
 from accelstudy.adjustment import Observations
 from accelstudy.approaches import Approach, get_approach
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.shares import Z95
+from accelstudy.basics.shares import sigmas_95
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
 from accelstudy.design.estimability import estimability
 from accelstudy.design.optimal.information import position_rows
@@ -219,12 +218,11 @@ def _outcome(set_up: SetUp, recursion: Recursion, truth: Array) -> pd.DataFrame:
     delta = recursion.parameters - truth
     true_rms, actual = rms_of(error, cofactors), error.rms(delta)
     r = recursion.redundancy
-    # The usual intervals: normal with known noise, else Student's t.
     if set_up.rule == "known":
-        width = np.full(len(truth), Z95)
+        width = np.full(len(truth), sigmas_95())
     else:
         sigma0 = np.sqrt(recursion.omega / r) if r > 0 else np.full(len(truth), np.nan)
-        width = special.stdtrit(max(r, 1), 0.975) * sigma0
+        width = sigmas_95(r) * sigma0
     sigma = np.sqrt(np.diagonal(cofactors, axis1=1, axis2=2))
     inside = np.abs(delta) <= width[:, None] * sigma
     angles = np.stack([each.rms(delta) for each in set_up.attitudes], axis=1)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from accelstudy.basics.shares import clopper_pearson
+from accelstudy.basics.shares import clopper_pearson, sigmas_95
 from accelstudy.schemes import get_scheme
 from accelstudy.sequential.simulated.sessions import SetUp
 
@@ -76,4 +76,5 @@ def _variance(sessions: pd.DataFrame) -> pd.Series[float]:
 
 def _mean(values: np.ndarray[Any, np.dtype[np.float64]]) -> tuple[float, float]:
     """Mean, and half the width of its interval."""
-    return float(np.mean(values)), float(1.96 * np.std(values, ddof=1) / np.sqrt(len(values)))
+    half = sigmas_95(len(values) - 1) * np.std(values, ddof=1) / np.sqrt(len(values))
+    return float(np.mean(values)), float(half)

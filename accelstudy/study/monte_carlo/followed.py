@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 
 from accelstudy.adjustment.block import Block
+from accelstudy.basics.shares import sigmas_95
 from accelstudy.basics.units import GON
 from accelstudy.effects import get_effect
 from accelstudy.leveling.error import TiltError, cap_forces, tilt_error
@@ -79,8 +79,8 @@ class Followed:
 
     def moments(self, block: Block, values: Array) -> Moments:
         """Moments of a chunk, given its `values`."""
-        t = special.stdtrit(max(block.redundancy, 1), 0.975)
-        half = t * values[:, self.columns(POSTERIORI)]  # NaN without redundancy: outside
+        # NaN without redundancy: outside.
+        half = sigmas_95(block.redundancy) * values[:, self.columns(POSTERIORI)]
         inside = np.count_nonzero(np.abs(values[:, self.columns(ERROR)]) <= half, axis=0)
         return moments_of(
             values, len(block.converged), block.redundancy, inside, block.correlation_sum

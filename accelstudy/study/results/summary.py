@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy import special
 
-from accelstudy.basics.shares import Z95, wilson
+from accelstudy.basics.shares import Z95, sigmas_95, wilson
 from accelstudy.basics.units import GON, MGON, recorded_unit, to_recorded
 from accelstudy.design import closed_forms
 from accelstudy.design.estimability import Estimability, estimability
@@ -173,7 +172,7 @@ def _summary_rows(cell: Cell, theory: Estimability, statistics: Statistics) -> p
 
 def _bias(n: int, mean: float, sd: float) -> dict[str, float]:
     """Mean error with its 95 % confidence interval."""
-    half = special.stdtrit(n - 1, 0.975) * sd / np.sqrt(n) if n > 1 else np.nan
+    half = sigmas_95(n - 1) * sd / np.sqrt(n) if n > 1 else np.nan
     return {"bias": mean, "bias_ci95_low": mean - half, "bias_ci95_high": mean + half}
 
 

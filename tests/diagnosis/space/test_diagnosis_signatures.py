@@ -1,12 +1,14 @@
 """Signatures of effects: derivatives of the observations, and what a design shows of them."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, campaign, design, shuffled, some_holds
 
 from accelstudy.adjustment.quality import solve
+from accelstudy.diagnosis.space.hypotheses import OUTLIER
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.signatures import signature
 from accelstudy.diagnosis.worth.limits import signature_columns, upper_limits, visibilities
@@ -140,13 +142,36 @@ def test_an_effect_is_judged_in_the_settings_that_a_diagnosis_tries():
     assert {jump.easiest.spec, jump.hardest.spec} <= set(tried)
     assert 600 < jump.easiest.settings["t"] < 1200 < jump.hardest.settings["t"]
     assert jump.hardest_mdb > 5 * jump.mdb
-    limits = {limit.name: limit.value for limit in upper_limits(examined, 1.0, ())}
+    limits = {limit.name: limit.value for limit in upper_limits(examined, True, ())}
     for name in ("bias_jump", "warm_up", "saturation"):
         assert rows[name].mdb < 3 * limits[name], name
     for row in rows.values():
         if row.status == "visible" and len(examined.candidates[row.name]) == 1:
             assert row.mdb == row.hardest_mdb, row.name
     assert rows["bias_drift"].easiest.settings == {}
+
+
+def test_the_limit_of_a_parameter_holds_where_no_noise_is_stated():
+    """Noise of twice the unit, r = 5: a large parameter is beyond its limit in 2.5 % of all.
+
+    That is when noise takes it down by more than half of its interval of 95 %.
+    """
+    rng = np.random.default_rng(5)
+    examined = design(shuffled("fibonacci-14"), GRAVITY, some_holds(14), seed=1)
+    residuals = examined.frame.residuals
+    assert residuals.redundancy == 5
+    names = [n for n, shapes in examined.candidates.items() if {h.dim for h in shapes} == {1}]
+    shape = examined.candidates[next(n for n in names if n != OUTLIER)][0]
+    columns = residuals.whitened(examined.frame.signature(shape.effect))
+    size = 1000 / float(np.linalg.norm(residuals.project(columns)))
+    short = 0
+    for _ in range(n := 1500):
+        errors = columns[:, 0] * size + 2 * rng.standard_normal(len(columns))
+        frame = replace(examined.frame, residuals=replace(residuals, errors=errors))
+        fit = SimpleNamespace(frame=frame, candidates={shape.effect.name: (shape,)})
+        (limit,) = upper_limits(fit, False, ())
+        short += limit.value < size
+    assert abs(short / n - 0.025) < 4.5 * np.sqrt(0.025 * 0.975 / n)
 
 
 def test_a_sensor_whose_range_is_far_beyond_gravity_does_not_saturate():

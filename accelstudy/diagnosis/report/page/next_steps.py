@@ -38,7 +38,7 @@ def next_steps(
     if d.better_for_leveling == "base":
         command = suggested.calibrate(*chosen)
         return [*steps, ("Calibrate with the base model, which levels better", command)]
-    if calibration is None:
+    if calibration is None or not calibration["quality"]["plausible"]:
         return steps
     use = "Level a log with the calibration that is beside this page"
     steps.append((use, suggested.apply(result)))

@@ -17,6 +17,7 @@ from accelstudy.diagnosis.report.words.missing import (
 from accelstudy.diagnosis.result import Diagnosis, Named
 from accelstudy.diagnosis.space.groups import REPEAT
 from accelstudy.effects import effect_names, get_effect
+from accelstudy.sensors.plausibility import USUAL_CAUSE
 
 GROUPS = {
     "direction": "with the direction of gravity",
@@ -104,6 +105,8 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
         lines.append(f"That only the noise is wrong has a probability of {p}; it may be an effect.")
     if d.recognised is not None:
         lines.append("All else is said of the data as they would be without this error.")
+    if d.implausible:
+        lines.append(f"No sensor is like this: {comma_list(list(d.implausible))}. {USUAL_CAUSE}")
     if d.verdict == "no_effect":
         lines.append(_agreement(d))
     else:

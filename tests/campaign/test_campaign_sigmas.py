@@ -1,0 +1,135 @@
+"""Sigmas that a calibration quotes where its noise is estimated: intervals, and their check."""
+
+import json
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from campaign_helpers import GRAVITY, NINE, simulated_campaign
+
+from accelstudy.adjustment import Observations, calibrate
+from accelstudy.basics.errors import InputError
+from accelstudy.campaign.calibration.document import calibration_document
+from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.calibration.sigma_check import check_sigmas, what_it_finds
+from accelstudy.campaign.calibration.wording import interval_words
+from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.use.applying import read_calibration
+from accelstudy.campaign.use.leveling import level_log
+from accelstudy.simulation.sessions import Noise
+
+G, SIGMA, SESSIONS = 9.81, 0.002, 4000
+BIAS, SCALE = np.array([0.05, -0.03, 0.08]), np.array([2e-3, -2e-3, 1e-3])
+ERROR = math.sqrt(0.05 * 0.95 / SESSIONS)
+"""Monte Carlo error of a coverage of 95 %."""
+
+
+def sessions():
+    """Readings (R, 24, 3) of a sensor with biases and scales, in positions of its own."""
+    rng = np.random.default_rng(12)
+    i = np.arange(24) + 0.5
+    z, azimuth = 1 - i / 12, i * math.pi * (1 + math.sqrt(5))
+    level = np.sqrt(1 - z**2)
+    f_b = G * np.stack([level * np.cos(azimuth), level * np.sin(azimuth), z], axis=1)
+    noise = rng.standard_normal((SESSIONS, 24, 3))
+    return (1 + SCALE) * f_b + BIAS + SIGMA * noise
+
+
+def own_fit(forces):
+    """Least squares of |K (f − b)| = g, K upper triangular, of R sessions (R, n, 3) at once.
+
+    Returns b and the diagonal of K, (R, 6), and their sigmas by the residuals.
+    """
+    rows, columns = np.triu_indices(3)
+    k, b = np.tile(np.eye(3), (len(forces), 1, 1)), np.zeros((len(forces), 1, 3))
+    for _ in range(6):
+        moved = forces - b
+        h = moved @ np.swapaxes(k, 1, 2)
+        norm = np.linalg.norm(h, axis=2, keepdims=True)
+        unit = h / norm
+        design = np.concatenate([-(unit @ k), unit[..., rows] * moved[..., columns]], axis=2)
+        inverse = np.linalg.inv(np.swapaxes(design, 1, 2) @ design)
+        lack = G - norm[..., 0]
+        step = (inverse @ np.einsum("rnj,rn->rj", design, lack)[..., None])[..., 0]
+        b[:, 0] += step[:, :3]
+        k[:, rows, columns] += step[:, 3:]
+    variance = np.sum(lack**2, axis=1) / (forces.shape[1] - 9)
+    sigma = np.sqrt(variance[:, None] * np.diagonal(inverse, axis1=1, axis2=2))
+    found = np.concatenate([b[:, 0], np.diagonal(k, axis1=1, axis2=2)], axis=1)
+    return found, sigma[:, [0, 1, 2, 3, 6, 8]]
+
+
+def check(errors, sigmas, needed):
+    """Errors and sigmas (R, k): so many sigmas hold 95 %, where 1.96 of them hold 93.1 %."""
+    inside = np.mean(np.abs(errors) < needed * sigmas, axis=0)
+    assert np.abs(inside - 0.95).max() < 4.5 * ERROR
+    normal = np.mean(np.abs(errors) < 1.96 * sigmas, axis=0)
+    assert np.abs(normal - 0.931).max() < 4.5 * math.sqrt(0.931 * 0.069 / SESSIONS)
+
+
+def test_the_intervals_of_a_calibration_hold_95_percent(tmp_path):
+    """24 positions and 9 parameters: r = 15. By least squares of this test, and by the command."""
+    forces = sessions()
+    campaign = Campaign("one", np.arange(1, 25), forces[0], G)
+    fit = fit_campaign(campaign, NINE, GRAVITY)
+    document = calibration_document(fit)
+    needed = document["sigmas_95"]
+    assert document["redundancy"] == 15
+    assert needed == pytest.approx(2.131, abs=5e-4)  # of any table of Student's t
+    assert [p["ci95"] for p in document["parameters"]] == pytest.approx(needed * fit.sigma)
+    assert "2.13 of them hold 95 % (Student's t, r = 15)" in interval_words(fit)
+
+    found, sigmas = own_fit(forces)
+    check(found - np.concatenate([BIAS, 1 / (1 + SCALE)]), sigmas, needed)
+    np.testing.assert_allclose(sigmas[0, :3], fit.sigma[:3], rtol=0.01)
+
+    adjusted = calibrate(NINE, GRAVITY, Observations(forces, sigma_force=SIGMA, gravity=G))
+    truth = np.concatenate([BIAS, SCALE, np.zeros(3)])
+    check(adjusted.parameters - truth, adjusted.sigma_posteriori, needed)
+
+    known = fit_campaign(replace(campaign, sigma_force=SIGMA), NINE, GRAVITY)
+    assert known.sigmas_95 == pytest.approx(1.96, abs=5e-5)
+    priori = adjusted.sigma_priori
+    inside = np.mean(np.abs(adjusted.parameters - truth) < known.sigmas_95 * priori, axis=0)
+    assert np.abs(inside - 0.95).max() < 4.5 * ERROR
+
+    log = tmp_path / "log.csv"
+    log.write_text("fx,fy,fz\n0.1,0.2,-9.8\n", encoding="utf-8")
+    for each, said in ((fit, 1), (known, 0)):
+        path = tmp_path / f"{said}.json"
+        path.write_text(json.dumps(calibration_document(each)), encoding="utf-8")
+        leveled = level_log(read_calibration(path), log, tmp_path / "out.csv")
+        assert sum("up to 2.13 sigmas" in warning for warning in leveled.warnings) == said
+
+
+def test_a_wrong_noise_does_not_show_in_simulation_and_is_said():
+    """Each reading stands twice: its errors seem to be averaged, and the sigmas come out small."""
+    once = simulated_campaign({"b_x": 0.1}, seed=4)
+    twice = Campaign("twice", np.arange(1, 49), np.repeat(once.forces, 2, axis=0), once.gravity)
+    honest, fooled = (fit_campaign(each, NINE, GRAVITY) for each in (once, twice))
+    assert (fooled.sigma < 0.8 * honest.sigma).all()
+    table = check_sigmas(fooled, replicates=1000, seed=3)
+    assert np.abs(table["ratio"] - 1).max() < 4.5 / math.sqrt(2 * 1000)
+    assert "No noise is stated" in what_it_finds(fooled)
+    assert "no ratio can show" in what_it_finds(fooled)
+    assert "the global test tells" in what_it_finds(honest)
+    refuted = replace(once, sigma_force=1e-4)
+    assert "refute the stated noise" in what_it_finds(fit_campaign(refuted, NINE, GRAVITY))
+    few = simulated_campaign({"b_x": 0.1}, scheme="d-optimal-9", noise=Noise(0.002))
+    assert "nothing tells" in what_it_finds(fit_campaign(few, NINE, GRAVITY))
+    with pytest.raises(InputError, match="no sigma to check"):
+        check_sigmas(fit_campaign(replace(few, sigma_force=None), NINE, GRAVITY))
+
+
+def test_the_interval_of_the_noise_holds():
+    """Variances of r = 15 residuals, drawn: the interval of the noise holds 95 %."""
+    fit = fit_campaign(replace(simulated_campaign({}), sigma_force=None), NINE, GRAVITY)
+    assert fit.adjustment.redundancy == 15
+    low, high = re.search(r"from ([\d.]+) mm/s\^2 to ([\d.]+) mm/s\^2", what_it_finds(fit)).groups()
+    sigma = 1e3 * fit.sigma_position
+    drawn = np.random.default_rng(6).standard_normal((40_000, 15))
+    estimate = np.sqrt(np.mean(drawn**2, axis=1))  # of a noise of 1
+    share = np.mean((estimate * float(low) < sigma) & (sigma < estimate * float(high)))
+    assert abs(share - 0.95) < 4.5 * math.sqrt(0.05 * 0.95 / 40_000)
