@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.basics.units import display_unit, to_display
+from accelstudy.basics.units import GON, attitude_unit, display_unit, to_attitude, to_display
 from accelstudy.drawing.style import (
     FULL,
     HATCH,
-    INK,
     MISSING,
     Style,
+    ink_on,
     log_ticks,
     model_title,
     new_figure,
@@ -100,7 +100,8 @@ def tilt_errors(tables: Tables, study: StudyConfig) -> Figure:
     for ax in axes[-1]:
         ax.tick_params(axis="x", rotation=90)
     if image is not None and len(known):
-        label = f"tilt error (rms) / {unit}"
+        largest = to_attitude(study.leveling.max_tilt_gon * GON)
+        label = f"tilt error (rms) at tilts up to {largest:g} {attitude_unit()} / {unit}"
         bar = fig.colorbar(image, ax=axes, label=label, pad=0.02, aspect=50, extend="max")
         log_ticks(bar.ax.yaxis, float(norm.vmin or 1), float(norm.vmax or 10))
     text: Style = {"linestyle": "", "marker": ""}
@@ -137,9 +138,8 @@ def _draw_matrix(ax: Axes, rms: Array, q95: Array, norm: LogNorm) -> AxesImage:
     ax.grid(False)
     ax.tick_params(length=0)
     ax.spines[:].set_visible(False)
-    middle = np.sqrt(float(norm.vmin or 1) * float(norm.vmax or 1))
     for i, j in np.argwhere(np.isfinite(rms)):
-        colour = "white" if rms[i, j] > middle else INK
+        colour = ink_on(image, rms[i, j])
         for value, offset, size in ((rms[i, j], -0.2, 7), (q95[i, j], 0.24, 5.8)):
             ax.text(
                 j,
