@@ -249,7 +249,7 @@ def ink_on(image: AxesImage, value: float) -> str:
         linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
         return float(linear @ (0.2126, 0.7152, 0.0722)) + 0.05
 
-    field = luminance(image.to_rgba(value))
+    field = luminance(image.to_rgba(np.array([value]))[0])
     return "white" if field**2 < 1.05 * luminance(to_rgb(INK)) else INK
 
 

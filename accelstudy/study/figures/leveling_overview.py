@@ -27,7 +27,7 @@ from accelstudy.study.figures.factors import NOISES, varies
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
-    from matplotlib.colors import LogNorm
+    from matplotlib.colors import Colormap, LogNorm
     from matplotlib.figure import Figure
     from matplotlib.image import AxesImage
 
@@ -134,7 +134,7 @@ def _with_tilt(cells: pd.DataFrame, leveling: pd.DataFrame) -> pd.DataFrame:
 
 
 def _draw_matrix(ax: Axes, rms: Array, q95: Array, norm: LogNorm) -> AxesImage:
-    image = ax.imshow(rms, norm=norm, cmap="viridis_r", aspect="auto", interpolation="none")
+    image = ax.imshow(rms, norm=norm, cmap=_light(), aspect="auto", interpolation="none")
     ax.grid(False)
     ax.tick_params(length=0)
     ax.spines[:].set_visible(False)
@@ -154,6 +154,17 @@ def _draw_matrix(ax: Axes, rms: Array, q95: Array, norm: LogNorm) -> AxesImage:
     if not np.isfinite(rms).any():
         say_empty(ax)
     return image
+
+
+def _light() -> Colormap:
+    """Make colours from light to medium, on which dark numbers can be read; dark is beyond."""
+    from matplotlib import colormaps
+    from matplotlib.colors import LinearSegmentedColormap
+
+    whole = colormaps["YlGnBu"]
+    return LinearSegmentedColormap.from_list(
+        "light", whole(np.linspace(0, 0.55, 256))
+    ).with_extremes(over=whole(0.9))
 
 
 def _short(value: float) -> str:

@@ -15,7 +15,6 @@ from accelstudy.drawing.style import (
     group_label,
     group_of,
     in_order,
-    symbol,
 )
 from accelstudy.study.figures.base import Tables, of_the_paper, register
 from accelstudy.study.figures.total_effects import label_lines, panels_over_roll, styles_of
@@ -79,7 +78,7 @@ def shapley(tables: Tables, study: StudyConfig) -> Figure:
     rows = [(o, g) for o in OUTPUTS for g in in_order(table["group"]) if drawn.get((o, g), False)]
     pitches = sorted(table["pitch_gon"].unique())
     labels = [(f"{group_label(group)}\non {output}", group_colour(group)) for output, group in rows]
-    fig, axes = panels_over_roll(labels, pitches)
+    fig, axes = panels_over_roll(labels, pitches, f"no share changes by {SEEN:g} points")
     styles = styles_of(list(dict.fromkeys(table["input"])))
     for (output, group), panels in zip(rows, axes, strict=True):
         shown = table[(table["output"] == output) & (table["group"] == group)]
@@ -99,8 +98,8 @@ def _draw_changes(ax: Axes, table: pd.DataFrame, styles: dict[str, Style]) -> No
     """Draw the changes of a group's inputs at one pitch, with rings where one overtakes another."""
     ax.axhline(0, color=INK, linewidth=0.6)
     lines = {}
-    for name, rows in table.groupby("input", sort=False):
-        rows = rows.sort_values("roll_gon")
+    for name in dict.fromkeys(table["input"]):
+        rows = table[table["input"] == name].sort_values("roll_gon")
         roll = to_attitude(rows["roll_gon"].to_numpy(float) * GON)
         change = rows["change"].to_numpy(float)
         ax.plot(roll, change, **styles[name], markersize=1.5, linewidth=0.9)

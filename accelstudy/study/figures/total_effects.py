@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -107,15 +107,16 @@ def _effects_over_roll(table: pd.DataFrame, output: str) -> Figure:
 
 
 def panels_over_roll(
-    rows: Sequence[tuple[str, str]], pitches: Sequence[float]
+    rows: Sequence[tuple[str, str]], pitches: Sequence[float], nothing: str = NO_DATA
 ) -> tuple[Figure, list[list[Axes]]]:
     """Make panels over roll: a row for each label and colour, a column for each pitch.
 
     So each panel has few lines, and the width of a journal's column is enough for up to four.
+    Where there are no rows, the figure says `nothing`.
     """
     fig = new_figure(COLUMN if len(pitches) <= 4 else FULL, 20 + 22 * max(len(rows), 1))
     if not rows:
-        say_empty(fig.subplots(), NO_DATA)
+        say_empty(fig.subplots(), nothing)
         return fig, []
     axes = fig.subplots(len(rows), len(pitches), sharex=True, sharey="row", squeeze=False)
     fig.set_layout_engine("constrained", wspace=0, hspace=0)
