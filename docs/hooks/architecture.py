@@ -161,6 +161,11 @@ def rules():
     return graph
 
 
+def squeezed(name):
+    """What makes a long name as wide as its box."""
+    return f' textLength="{BOX - 8}" lengthAdjust="spacingAndGlyphs"' if len(name) > 14 else ""
+
+
 def drawing(graph, what, linked):
     """A graph as SVG, what is needed below; `linked` boxes lead to their lines in the table."""
     rows, ways = routed(levels(graph), needed(graph))
@@ -180,9 +185,10 @@ def drawing(graph, what, linked):
                 path += f"v{HEIGHT}"
         parts.append(f'<path class="arrow" marker-end="url(#tip)" d="{path}"/>')
     for room in graph:
+        name = room.replace("_", " ")
         box = (
             f'<rect x="{x[room] - BOX // 2}" y="{y[room]}" width="{BOX}" height="{HEIGHT}" rx="4"/>'
-            f'<text x="{x[room]}" y="{y[room] + 20}">{room.replace("_", " ")}</text>'
+            f'<text x="{x[room]}" y="{y[room] + 20}"{squeezed(name)}>{name}</text>'
         )
         parts.append(f'<a href="#{room}">{box}</a>' if linked else box)
     tip = (
@@ -190,7 +196,7 @@ def drawing(graph, what, linked):
         'markerHeight="7" orient="auto"><path d="M0 0L8 4L0 8z"/></marker></defs>'
     )
     return (
-        f'<div class="rooms"><svg role="img" aria-label="{what}" '
+        f'<div class="rooms"><svg role="img" aria-label="{what}" style="max-width: {width:.0f}px" '
         f'viewBox="0 0 {width:.0f} {len(rows) * ROW - ROW + HEIGHT + 8}">{tip}{"".join(parts)}'
         "</svg></div>"
     )
