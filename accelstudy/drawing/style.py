@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
+    from matplotlib.image import AxesImage
     from matplotlib.lines import Line2D
     from matplotlib.ticker import Locator
 
@@ -234,6 +235,22 @@ def say_empty(ax: Axes, text: str = "no estimable cell") -> None:
     """Write into axes why they are empty."""
     ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", color="#777777",
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 2})  # fmt: skip
+
+
+def ink_on(image: AxesImage, value: float) -> str:
+    """Colour of a text on the field of an image that shows `value`: the one of more contrast.
+
+    Contrast is that of WCAG 2.2, (L₁ + 0.05) / (L₂ + 0.05) of the relative luminances.
+    """
+    from matplotlib.colors import to_rgb
+
+    def luminance(colour: ArrayLike) -> float:
+        rgb = np.asarray(colour, dtype=float)[:3]
+        linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+        return float(linear @ (0.2126, 0.7152, 0.0722)) + 0.05
+
+    field = luminance(image.to_rgba(np.array([value]))[0])
+    return "white" if field**2 < 1.05 * luminance(to_rgb(INK)) else INK
 
 
 def approach_handles(approaches: Iterable[str], **options: Any) -> list[Line2D]:

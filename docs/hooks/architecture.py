@@ -1,6 +1,9 @@
-"""The page of the rooms: what each holds, and which imports which, drawn from the imports."""
+"""Graphs on the page of the architecture: rooms and their imports, and the rules of a study."""
 
 import ast
+import re
+import subprocess
+import tempfile
 from collections import defaultdict
 from itertools import pairwise
 from pathlib import Path
@@ -144,8 +147,27 @@ def _end(group):
     return group[2] + group[1] / 2
 
 
-def drawing(graph):
-    """The rooms as SVG; each box leads to its line in the table."""
+def rules():
+    """Rules of the study of the paper, and those that each needs, as Snakemake has them."""
+    root = ROOT.parent
+    study = ["--snakefile", root / "Snakefile", "--configfile", root / "config/config.yaml"]
+    with tempfile.TemporaryDirectory() as folder:  # so that it looks at no results
+        command = ["snakemake", *study, "--directory", folder, "--rulegraph", "dot"]
+        ran = subprocess.run(command, capture_output=True, text=True, check=True)
+    names = dict(re.findall(r'(\d+)\[label = "(\w+)"', ran.stdout))
+    graph = {name: set() for name in names.values()}
+    for needed, rule in re.findall(r"(\d+) -> (\d+)", ran.stdout):
+        graph[names[rule]].add(names[needed])
+    return graph
+
+
+def squeezed(name):
+    """What makes a long name as wide as its box."""
+    return f' textLength="{BOX - 8}" lengthAdjust="spacingAndGlyphs"' if len(name) > 14 else ""
+
+
+def drawing(graph, what, linked):
+    """A graph as SVG, what is needed below; `linked` boxes lead to their lines in the table."""
     rows, ways = routed(levels(graph), needed(graph))
     x = arranged(rows, ways)
     left = min(x.values()) - BOX / 2 - 4
@@ -163,16 +185,18 @@ def drawing(graph):
                 path += f"v{HEIGHT}"
         parts.append(f'<path class="arrow" marker-end="url(#tip)" d="{path}"/>')
     for room in graph:
-        parts.append(
-            f'<a href="#{room}"><rect x="{x[room] - BOX // 2}" y="{y[room]}" width="{BOX}" '
-            f'height="{HEIGHT}" rx="4"/><text x="{x[room]}" y="{y[room] + 20}">{room}</text></a>'
+        name = room.replace("_", " ")
+        box = (
+            f'<rect x="{x[room] - BOX // 2}" y="{y[room]}" width="{BOX}" height="{HEIGHT}" rx="4"/>'
+            f'<text x="{x[room]}" y="{y[room] + 20}"{squeezed(name)}>{name}</text>'
         )
+        parts.append(f'<a href="#{room}">{box}</a>' if linked else box)
     tip = (
         '<defs><marker id="tip" viewBox="0 0 8 8" refX="6" refY="4" markerWidth="7" '
         'markerHeight="7" orient="auto"><path d="M0 0L8 4L0 8z"/></marker></defs>'
     )
     return (
-        f'<div class="rooms"><svg role="img" aria-label="Rooms and their imports" '
+        f'<div class="rooms"><svg role="img" aria-label="{what}" style="max-width: {width:.0f}px" '
         f'viewBox="0 0 {width:.0f} {len(rows) * ROW - ROW + HEIGHT + 8}">{tip}{"".join(parts)}'
         "</svg></div>"
     )
@@ -195,6 +219,11 @@ def on_page_markdown(markdown, page, **_):
         for room in order
     ]
     heads = ("room", "what it holds", "files", "imports")
-    return markdown.replace("<!-- drawing of the rooms -->", drawing(graph)).replace(
-        "<!-- table of the rooms -->", table(heads, lines)
-    )
+    drawings = {
+        "<!-- drawing of the rooms -->": drawing(graph, "Rooms and their imports", linked=True),
+        "<!-- drawing of the rules -->": drawing(rules(), "Rules of a study", linked=False),
+        "<!-- table of the rooms -->": table(heads, lines),
+    }
+    for place, text in drawings.items():
+        markdown = markdown.replace(place, text)
+    return markdown

@@ -5,6 +5,7 @@ import command_pages
 import configuration_page
 import file_formats
 import gallery
+from drawings import DRAWINGS
 from markdown_text import page, table
 from mkdocs.structure.files import File
 
@@ -37,7 +38,16 @@ PAGES = {
 
 
 def on_files(files, config):
-    """Add the pages."""
-    for path, make in PAGES.items():
+    """Add the pages, the drawings, and small copies of the figures."""
+    for path, make in {**PAGES, **DRAWINGS}.items():
         files.append(File.generated(config, path, content=make()))
+    for path, content in gallery.thumbnails().items():
+        files.append(File.generated(config, path, content=content))
     return files
+
+
+def on_page_markdown(markdown, page, **_):
+    """Put the small copies where the gallery has them."""
+    if page.file.src_uri != "gallery/index.md":
+        return markdown
+    return markdown.replace("<!-- all figures, small -->", gallery.overview())

@@ -8,12 +8,13 @@ import pytest
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.shares import clopper_pearson
+from accelstudy.effects import effect_names
 from accelstudy.hidden.page.figures import figures
 from accelstudy.hidden.page.markdown import score_page
 from accelstudy.hidden.score.further import further
 from accelstudy.hidden.score.judging import all_true, judge, same_effects
 from accelstudy.hidden.score.rates import share_of
-from accelstudy.hidden.score.scoring import score_tables
+from accelstudy.hidden.score.scoring import family_name, score_tables
 from accelstudy.hidden.score.targets import targets
 from accelstudy.hidden.study.tables import SCHEMA
 
@@ -215,6 +216,11 @@ def test_confusion(tables):
     assert table["slow change in time", "slow change in time"] == 1  # warm-up for a drift, too
     assert table["even nonlinearity", "nothing"] == 1 / 2
     assert table.groupby("truth").sum().tolist() == pytest.approx([1, 1, 1])
+
+
+def test_an_effect_without_a_family_is_confused_under_its_own_name():
+    assert family_name("vibration_rectification") == "vibration rectification"
+    assert all(map(family_name, effect_names()))
 
 
 def test_calibration(tables):

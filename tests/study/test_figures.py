@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,9 @@ from study_helpers import run_study
 from accelstudy.basics.errors import InputError
 from accelstudy.drawing import style
 from accelstudy.effects import effect_names
+from accelstudy.field.figure import looks
 from accelstudy.files.tables import read_table
+from accelstudy.pole.errors.sources import sources
 from accelstudy.sensors.models import MODELS
 from accelstudy.study.config import StudyConfig, parse_study
 from accelstudy.study.figures import (
@@ -95,13 +98,9 @@ def paint(drawn: Figure) -> None:
 
 
 def texts(drawn: Figure) -> list[str]:
-    """All axis labels."""
-    return [
-        text
-        for ax in drawn.findobj(lambda artist: hasattr(artist, "get_xlabel"))
-        for text in (ax.get_xlabel(), ax.get_ylabel())
-        if text
-    ]
+    """All axis labels, also those that panels have in common."""
+    own = [text for ax in drawn.axes for text in (ax.get_xlabel(), ax.get_ylabel())]
+    return [text for text in (*own, drawn.get_supxlabel(), drawn.get_suptitle()) if text]
 
 
 ALL = figure_names(parse_study(PAPER))
@@ -147,7 +146,7 @@ def test_svg_and_png_are_the_same_bytes_each_time(name, tables, paper, tmp_path)
 def test_labels_have_units(name, tables, paper):
     quantities = texts(draw(name, tables, paper))
     assert any(
-        unit in text for text in quantities for unit in ("mgon", "gon", "ppm", "mm/s²", "share")
+        unit in text for text in quantities for unit in ("mgon", " gon", "ppm", "mm/s²", "share")
     )
     assert not any("m/s^2" in text for text in quantities)
 
@@ -189,33 +188,67 @@ def test_figure_4_shows_sobol_over_linear_theory_and_marks_what_does_not_vary(ta
 
 def test_total_effects_are_labelled_and_their_lines_go_through_zero(tables, paper):
     drawn = draw("figure-5", tables, paper)
-    ax = drawn.axes[0]
-    labels = {text.get_text(): text.get_color() for text in ax.texts}
+    labels = {text.get_text(): text.get_color() for ax in drawn.axes for text in ax.texts}
     assert {"$f_y$", "$f_z$", r"$\alpha_{zx}$", "$b_y$"} <= labels.keys()
     assert labels["$b_y$"] == style.group_colour("bias")
     rows = tables["sensitivity"].query("analysis == 'gravity' and output == 'roll'")
     small = rows.groupby("input")["total_effect"].max().loc[lambda share: share < 0.005].index
-    legend = drawn.legends[0].get_texts()[-1].get_text()
-    assert legend.startswith("below 1 % everywhere")
-    assert all(style.symbol(name) in legend for name in small)
+    title = drawn.get_suptitle()
+    assert "below 1 % everywhere" in title
+    assert all(style.symbol(name) in title for name in small)
     assert not {style.symbol(name) for name in small} & labels.keys()
-    f_z = [line for line in ax.get_lines() if line.get_marker() in ("", "None", None)]
-    assert all(np.isfinite(line.get_ydata()).all() for line in f_z)
+    lines = [line for line in drawn.axes[0].get_lines() if line.get_marker() in ("", "None")]
+    assert lines
+    assert all(np.isfinite(line.get_ydata()).all() for line in lines)
+
+
+@pytest.mark.parametrize("name", ["figure-5", "figure-6", "figure-6-robot", "shapley"])
+def test_a_panel_has_the_lines_of_one_group_each_with_its_symbol(name, tables, paper):
+    for ax in draw(name, tables, paper).axes:
+        lines = {line.get_color() for line in ax.get_lines() if line.get_linestyle() == "-"}
+        symbols = [text.get_text() for text in ax.texts]
+        assert len(lines - {style.INK}) <= 1
+        assert len(symbols) == len(set(symbols)) <= 3
+
+
+def test_symbols_of_lines_stand_apart():
+    ax = style.new_figure(style.COLUMN, 40).subplots()
+    ax.set_ylim(-1, 1)
+    x = np.linspace(-90, 90, 7)
+    names = ("f_x", "f_y", "f_z", "b_x", "b_y", "b_z")
+    ends = (0.4, 0.4, 0.41, -0.3, -0.3, -0.6)
+    total_effects.label_lines(
+        ax, {n: (x, np.full(7, end)) for n, end in zip(names, ends, strict=True)}
+    )
+    heights = {text.get_text(): text.get_position()[1] for text in ax.texts}
+    assert len(heights) == 6
+    assert np.diff(sorted(heights.values())).min() > 0.99 * total_effects.HIGH
+    for name, end in zip(names, ends, strict=True):
+        height = 2 * heights[style.symbol(name)] - 1
+        assert height > end if end > 0 else height < end
 
 
 def test_shapley_effects_name_what_overtakes(tables, paper):
     table = tables["shapley"].assign(shapley_effect=tables["shapley"]["total_effect"])
-    drawn = draw("shapley", {"shapley": table}, paper)
-    assert len(drawn.axes) == 2  # one row, as no order changes
+    (ax,) = draw("shapley", {"shapley": table}, paper).axes
+    assert [text.get_text() for text in ax.texts] == ["no share changes by 0.5 points"]
 
     at = table["output"].eq("roll") & table["roll_gon"].eq(50) & table["pitch_gon"].eq(25)
     table.loc[at & table["input"].eq("s_y"), "shapley_effect"] = 0.9
-    drawn = draw("shapley", {"shapley": table}, paper)
-    roll, pitch = drawn.axes
-    text, _ = (each for each in roll.texts if each.get_position()[1] > 1.25)  # before the label
-    assert (text.get_text(), text.get_position()[0]) == ("$s_y$", 50)
-    assert text.get_color() == style.group_colour("scale")
-    assert not [each for each in pitch.texts if each.get_position()[1] > 1.25]
+    level, tilted = draw("shapley", {"shapley": table}, paper).axes
+    assert (level.get_title(), tilted.get_title()) == (
+        r"$\theta$ = 0 gon",
+        r"$\theta$ = 25 gon",
+    )
+    assert level.get_ylabel() == "scale\non roll"
+    rings = [
+        (line.get_xdata()[0], line.get_ydata()[0])
+        for ax in (level, tilted)
+        for line in ax.get_lines()
+        if line.get_markerfacecolor() == "none"
+    ]
+    gained = 90 - 100 * float(table.loc[at & table["input"].eq("s_y"), "total_effect"].iloc[0])
+    assert rings == [(50, pytest.approx(gained))]
 
 
 def test_numbers_stand_in_table_1(tables, paper):
@@ -233,6 +266,7 @@ def test_the_tilt_overview_shows_rms_quantile_and_the_noise_of_a_reading(tables,
     legend = " ".join(text.get_text() for text in drawn.legends[0].get_texts())
     assert "95 % of the calibrations" in legend
     assert "13.0 mgon" in legend
+    assert "at tilts up to 50 gon" in drawn.axes[-1].get_ylabel()
 
 
 def test_figure_7_draws_the_mean_sd_and_the_first_simulation(tables, paper):
@@ -335,6 +369,32 @@ def test_colours_of_causes_keep_apart(eye):
         assert sorted(distances)[1] > 15, colour
 
 
+@pytest.mark.parametrize("eye", EYES)
+def test_colours_of_sources_keep_apart(eye):
+    """What makes a tilt uncertain in the field, and what the foot of a pole."""
+    pole = [each.colour for each in sources()]
+    for together in (pole, [look.colour for look in looks().values()]):
+        for one, other in combinations(together, 2):
+            assert np.linalg.norm(seen(one, eye) - seen(other, eye)) > 15, (one, other)
+
+
+@pytest.mark.parametrize("cmap", ["viridis", "cividis", "Blues", "RdBu_r"])
+def test_numbers_on_a_map_can_be_read(cmap):
+    """The threshold of WCAG 2.2 for text, 4.5, is just missed by an ink that is not black."""
+    ax = style.new_figure(1, 20).subplots()
+    image = ax.imshow([[0, 1]], cmap=cmap)
+    for value in np.linspace(0, 1, 101):
+        (one, other) = sorted(
+            brightness(colour) for colour in (style.ink_on(image, value), image.to_rgba(value))
+        )
+        assert (other + 0.05) / (one + 0.05) > 3.9
+
+
+def brightness(colour):
+    """Relative luminance, from CIE L*."""
+    return ((seen(colour, "normal")[0] + 16) / 116) ** 3
+
+
 def test_parameters_of_one_colour_differ_in_line_and_marker():
     names = ["b_x", "b_y", "b_z", "k_xy", "k_xz", "k_yx", "k_yz", "k_zx", "k_zy"]
     names += ["k_abs_x", "k_abs_y", "k_abs_z"]
@@ -347,10 +407,8 @@ def test_colours_are_the_same_in_every_figure(tables, paper):
     for name in ("figure-7", "table-1", "closed-forms"):
         lines = draw(name, tables, paper).findobj(lambda artist: hasattr(artist, "get_marker"))
         assert robot in {line.get_color() for line in lines}
-    legend = draw("figure-5", tables, paper).legends[0]
     colours = {
-        text.get_text().split()[0]: line.get_color()
-        for text, line in zip(legend.get_texts(), legend.get_lines(), strict=True)
+        ax.get_ylabel(): ax.yaxis.label.get_color() for ax in draw("figure-5", tables, paper).axes
     }
     for group in ("force", "bias", "scale"):
         assert colours[group] == style.group_colour(group)

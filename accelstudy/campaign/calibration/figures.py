@@ -7,7 +7,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from accelstudy.campaign.calibration.fit import CampaignFit
-from accelstudy.drawing.style import FULL, INK, approach_colour, new_figure, symbol
+from accelstudy.drawing.style import FULL, INK, approach_colour, ink_on, new_figure, symbol
 
 SUSPECT = "#D55E00"
 
@@ -51,8 +51,8 @@ def correlation_figure(fit: CampaignFit) -> Figure:
     ax.grid(False)
     for (i, j), value in np.ndenumerate(correlation):
         if i != j and abs(value) >= 0.1:
-            colour = "white" if abs(value) > 0.6 else INK
             text = f"{value:.1f}".replace("-", "−")
-            ax.text(j, i, text, ha="center", va="center", fontsize=6, color=colour)
+            ax.text(j, i, text, ha="center", va="center", fontsize=6,
+                    color=ink_on(image, value))  # fmt: skip
     figure.colorbar(image, label="correlation")
     return figure

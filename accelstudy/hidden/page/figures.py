@@ -17,6 +17,7 @@ from accelstudy.drawing.style import (
     FULL,
     INK,
     Style,
+    ink_on,
     log_ticks,
     new_figure,
     say_empty,
@@ -207,7 +208,7 @@ def confusion(tables: Tables) -> Figure:
     for (i, j), value in np.ndenumerate(values):
         if value >= 0.005:
             ax.text(j, i, f"{value:.2f}", ha="center", va="center", fontsize=6.5,
-                    color="white" if value < 0.55 else "black")  # fmt: skip
+                    color=ink_on(image, value))  # fmt: skip
     ax.set_xticks(range(len(answers)), answers, rotation=35, ha="right")
     ax.set_yticks(range(len(families)), families)
     ax.set_xlabel("answer: family of the first effect, or the verdict")

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.wording import words
 from accelstudy.effects import get_effect
 from accelstudy.hidden.score.judging import all_true, judge, same_effects
 from accelstudy.hidden.score.limits import limit_table
@@ -82,8 +83,8 @@ def confusion(judged: pd.DataFrame) -> pd.DataFrame:
 
 
 def family_name(name: str) -> str:
-    """Return the family of an effect in plain words."""
-    return get_effect(name).family
+    """Return the family of an effect or, where it has none, its name, in plain words."""
+    return get_effect(name).family or words(name)
 
 
 VERDICTS = {

@@ -105,7 +105,7 @@ def calibration(situation: Situation) -> Wrong:
     "noise",
     "noise of the reading",
     "Average longer, or take a quieter sensor.",
-    "#56B4E9",
+    "#CC79A7",
     hatch="....",
     sensor=True,
 )
@@ -147,7 +147,7 @@ def temperature(situation: Situation) -> Wrong:
     "mounting",
     "mounting of the sensor",
     "Determine how the sensor sits on the pole by turning the pole about itself on a fixed point.",
-    "#CC79A7",
+    "#56B4E9",
 )
 def mounting(situation: Situation) -> Wrong:
     """Angles between the axes of sensor and pole, constant as long as the sensor stays mounted."""
@@ -184,7 +184,7 @@ def bending(situation: Situation) -> Wrong:
     return Wrong(("bend_forward", "bend_right"), np.zeros((len(shift), 2, 2)), shift)
 
 
-@source("length", "length of the pole", "Measure the length of the pole.", "#999999")
+@source("length", "length of the pole", "Measure the length of the pole.", "#99CC66")
 def length(situation: Situation) -> Wrong:
     """Length from the foot to the centre of the antenna or prism."""
     return scatter(situation, ("length",), situation.setup.length_sigma)

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.basics.units import display_unit, to_display
+from accelstudy.basics.units import GON, attitude_unit, display_unit, to_attitude, to_display
 from accelstudy.drawing.style import (
     FULL,
     HATCH,
-    INK,
     MISSING,
     Style,
+    ink_on,
     log_ticks,
     model_title,
     new_figure,
@@ -27,7 +27,7 @@ from accelstudy.study.figures.factors import NOISES, varies
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
-    from matplotlib.colors import LogNorm
+    from matplotlib.colors import Colormap, LogNorm
     from matplotlib.figure import Figure
     from matplotlib.image import AxesImage
 
@@ -100,7 +100,8 @@ def tilt_errors(tables: Tables, study: StudyConfig) -> Figure:
     for ax in axes[-1]:
         ax.tick_params(axis="x", rotation=90)
     if image is not None and len(known):
-        label = f"tilt error (rms) / {unit}"
+        largest = to_attitude(study.leveling.max_tilt_gon * GON)
+        label = f"tilt error (rms) at tilts up to {largest:g} {attitude_unit()} / {unit}"
         bar = fig.colorbar(image, ax=axes, label=label, pad=0.02, aspect=50, extend="max")
         log_ticks(bar.ax.yaxis, float(norm.vmin or 1), float(norm.vmax or 10))
     text: Style = {"linestyle": "", "marker": ""}
@@ -133,13 +134,12 @@ def _with_tilt(cells: pd.DataFrame, leveling: pd.DataFrame) -> pd.DataFrame:
 
 
 def _draw_matrix(ax: Axes, rms: Array, q95: Array, norm: LogNorm) -> AxesImage:
-    image = ax.imshow(rms, norm=norm, cmap="viridis_r", aspect="auto", interpolation="none")
+    image = ax.imshow(rms, norm=norm, cmap=_light(), aspect="auto", interpolation="none")
     ax.grid(False)
     ax.tick_params(length=0)
     ax.spines[:].set_visible(False)
-    middle = np.sqrt(float(norm.vmin or 1) * float(norm.vmax or 1))
     for i, j in np.argwhere(np.isfinite(rms)):
-        colour = "white" if rms[i, j] > middle else INK
+        colour = ink_on(image, rms[i, j])
         for value, offset, size in ((rms[i, j], -0.2, 7), (q95[i, j], 0.24, 5.8)):
             ax.text(
                 j,
@@ -154,6 +154,17 @@ def _draw_matrix(ax: Axes, rms: Array, q95: Array, norm: LogNorm) -> AxesImage:
     if not np.isfinite(rms).any():
         say_empty(ax)
     return image
+
+
+def _light() -> Colormap:
+    """Make colours from light to medium, on which dark numbers can be read; dark is beyond."""
+    from matplotlib import colormaps
+    from matplotlib.colors import LinearSegmentedColormap
+
+    whole = colormaps["YlGnBu"]
+    return LinearSegmentedColormap.from_list(
+        "light", whole(np.linspace(0, 0.55, 256))
+    ).with_extremes(over=whole(0.9))
 
 
 def _short(value: float) -> str:

@@ -19,6 +19,7 @@ from accelstudy.drawing.style import (
     group_label,
     group_of,
     in_order,
+    ink_on,
     new_figure,
     say_empty,
     shown,
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.image import AxesImage
 
     from accelstudy.study.config import StudyConfig
 
@@ -221,7 +223,7 @@ def correlations(tables: Tables, study: StudyConfig) -> Figure:
             say_empty(ax)
             continue
         image = ax.imshow(matrix, cmap="Blues", vmin=0, vmax=top)
-        _write_values(ax, matrix, top)
+        _write_values(ax, image, matrix)
         _separate(ax, [group_of(name) for name in names])
     if image is not None:
         fig.colorbar(image, ax=axes, label="|correlation| − I", pad=0.02, shrink=0.8)
@@ -236,7 +238,7 @@ def _matrix(table: pd.DataFrame, cell: str, names: list[str]) -> NDArray[np.floa
     return np.abs(square.reindex(index=names, columns=names).to_numpy(float)) - np.eye(len(names))
 
 
-def _write_values(ax: Axes, matrix: NDArray[np.float64], top: float) -> None:
+def _write_values(ax: Axes, image: AxesImage, matrix: NDArray[np.float64]) -> None:
     if len(matrix) > 12:  # no room
         return
     for i, j in np.argwhere(np.abs(matrix) > ANNOTATED):
@@ -247,7 +249,7 @@ def _write_values(ax: Axes, matrix: NDArray[np.float64], top: float) -> None:
             ha="center",
             va="center",
             fontsize=7,
-            color="white" if matrix[i, j] > 0.6 * top else INK,
+            color=ink_on(image, matrix[i, j]),
         )
 
 

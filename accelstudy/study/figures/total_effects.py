@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from accelstudy.basics.units import GON, attitude_unit, to_attitude
 from accelstudy.drawing.style import (
+    COLUMN,
     FULL,
     HATCH,
     MISSING,
+    STYLE,
     Style,
     group_colour,
     group_label,
@@ -28,18 +31,19 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
 
     from accelstudy.study.config import StudyConfig
+
+Array = NDArray[np.float64]
 
 LINE_STYLES = ("-", "--", ":")
 MARKERS = ("o", "^", "s")
 """Styles of the first, second and third member of a group."""
 SMALLEST = 0.01
 """Shares below this are drawn at `SMALL_AT`, in a band of their own."""
-SMALL_AT, BOTTOM = 0.0065, 0.005
-LABEL_APART = 0.06
-"""Least distance of two labels at the right, as a share of the panel's height."""
+SMALL_AT, BOTTOM, TOP = 0.0033, 0.002, 5.0
+WIDE, HIGH = 0.25, 0.17
+"""Size of a label as a share of its panel."""
 NO_DATA = "no total effects"
 
 
@@ -84,46 +88,49 @@ def read_shares(table: pd.DataFrame, analysis: str) -> pd.DataFrame:
 
 
 def _effects_over_roll(table: pd.DataFrame, output: str) -> Figure:
-    from matplotlib.lines import Line2D
-
     table = table[(table["output"] == output) & (table["pitch_gon"] >= 0)]
+    highest = table.groupby("input", sort=False)["share"].max()
+    styles = styles_of(list(highest.index))
+    drawn = {name: styles[name] for name in styles if highest[name] >= SMALLEST}
+    groups = in_order(map(group_of, drawn))
     pitches = sorted(table["pitch_gon"].unique())
-    columns = min(2, max(1, len(pitches)))
-    rows = max(1, -(-len(pitches) // columns))
-    fig = new_figure(FULL, 28 + 58 * rows)
-    axes = fig.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
-    inputs = list(dict.fromkeys(table["input"]))
-    highest = table.groupby("input")["share"].max()
-    drawn = [name for name in inputs if highest[name] >= SMALLEST]
-    styles = styles_of(drawn)
-    for ax, pitch in zip(axes, pitches, strict=False):
-        draw_pitch(ax, table[table["pitch_gon"] == pitch], styles)
-        angle = to_attitude(pitch * GON)
-        ax.set_title(f"pitch $\\theta$ = {angle:g} {attitude_unit()}")
-    for ax in axes[len(pitches) :]:
-        ax.set_axis_off()
-    if not pitches:
-        say_empty(axes[0], NO_DATA)
-    for i, ax in enumerate(axes):
-        if i >= len(axes) - columns:
-            ax.set_xlabel(f"roll $\\phi$ / {attitude_unit()}")
-        if i % columns == 0:
-            ax.set_ylabel(f"total effect on {output}")
-    if drawn:
-        handles = group_handles(drawn)
-        if small := [symbol(name) for name in inputs if name not in drawn]:
-            text = f"below {SMALLEST:.0%} everywhere: {', '.join(small)}".replace("%", " %")
-            handles.append(Line2D([], [], linestyle="", label=text))
-        fig.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    fig, axes = panels_over_roll([(group_label(g), group_colour(g)) for g in groups], pitches)
+    for group, row in zip(groups, axes, strict=True):
+        for pitch, ax in zip(pitches, row, strict=True):
+            _share_axis(ax)
+            its = {name: style for name, style in drawn.items() if group_of(name) == group}
+            _draw_shares(ax, table[table["pitch_gon"] == pitch], its)
+    small = ", ".join(symbol(name) for name in highest.index if name not in drawn)
+    title = f"total effect on {output} / %" + (f"\nbelow 1 % everywhere: {small}" if small else "")
+    fig.suptitle(title, fontsize=STYLE["axes.titlesize"])
     return fig
 
 
-def group_handles(inputs: Iterable[str]) -> list[Line2D]:
-    """Entries of a legend, one for each group of the inputs."""
-    from matplotlib.lines import Line2D
+def panels_over_roll(
+    rows: Sequence[tuple[str, str]], pitches: Sequence[float], nothing: str = NO_DATA
+) -> tuple[Figure, list[list[Axes]]]:
+    """Make panels over roll: a row for each label and colour, a column for each pitch.
 
-    groups = in_order(group_of(name) for name in inputs)
-    return [Line2D([], [], color=group_colour(group), label=group_label(group)) for group in groups]
+    So each panel has few lines, and the width of a journal's column is enough for up to four.
+    Where there are no rows, the figure says `nothing`.
+    """
+    fig = new_figure(COLUMN if len(pitches) <= 4 else FULL, 20 + 22 * max(len(rows), 1))
+    if not rows:
+        say_empty(fig.subplots(), nothing)
+        return fig, []
+    axes = fig.subplots(len(rows), len(pitches), sharex=True, sharey="row", squeeze=False)
+    fig.set_layout_engine("constrained", wspace=0, hspace=0)
+    for ax in axes.flat:
+        ax.label_outer(remove_inner_ticks=True)
+        ax.tick_params(labelsize=7, pad=2)
+    for row, (label, colour) in zip(axes, rows, strict=True):
+        row[0].set_ylabel(label.replace("-", "-\n"), color=colour)
+    fig.align_ylabels()
+    unit = attitude_unit()
+    for ax, pitch in zip(axes[0], pitches, strict=True):
+        ax.set_title(f"$\\theta$ = {to_attitude(pitch * GON):g} {unit}")
+    fig.supxlabel(f"roll $\\phi$ / {unit}", fontsize=STYLE["axes.labelsize"])
+    return fig, axes.tolist()
 
 
 def styles_of(inputs: list[str]) -> dict[str, Style]:
@@ -142,18 +149,20 @@ def styles_of(inputs: list[str]) -> dict[str, Style]:
     return styles
 
 
-def draw_pitch(ax: Axes, table: pd.DataFrame, styles: dict[str, Style], top: float = 1.25) -> None:
-    """Draw the effects at one pitch, each with its symbol, without those that never reach 1 %."""
+def _share_axis(ax: Axes) -> None:
+    """Make the vertical axis one of shares on a log scale, with a band for small ones."""
     from matplotlib.ticker import NullLocator
 
     ax.set_yscale("log")
-    ax.set_ylim(BOTTOM, top)
-    ax.set_yticks(
-        [SMALL_AT, 0.01, 0.03, 0.1, 0.3, 1], ["less", "1 %", "3 %", "10 %", "30 %", "100 %"]
-    )
+    ax.set_ylim(BOTTOM, TOP)
+    ax.set_yticks([SMALL_AT, 0.01, 0.1, 1], ["<1", "1", "10", "100"])
     ax.yaxis.set_minor_locator(NullLocator())
     ax.axhspan(BOTTOM, SMALLEST, color="#F0F0F0", linewidth=0, zorder=0)
-    labels: dict[float | None, list[tuple[float, str, str]]] = {}
+
+
+def _draw_shares(ax: Axes, table: pd.DataFrame, styles: dict[str, Style]) -> None:
+    """Draw the effects at one pitch, without those that never reach 1 %."""
+    lines = {}
     for name, style in styles.items():
         rows = table[table["input"] == name].sort_values("roll_gon")
         share = rows["share"].to_numpy(float)
@@ -162,49 +171,55 @@ def draw_pitch(ax: Axes, table: pd.DataFrame, styles: dict[str, Style], top: flo
         roll = to_attitude(rows["roll_gon"].to_numpy(float) * GON)
         # A line goes on where its share is too small to show, and ends only where there is none.
         y = np.where(share < SMALLEST, SMALL_AT, share)
-        ax.plot(roll, y, **{**style, "marker": ""}, linewidth=1)
+        ax.plot(roll, y, **{**style, "marker": ""}, linewidth=0.9)
         seen = share >= SMALLEST
         ax.errorbar(
             roll[seen],
             share[seen],
             yerr=rows["ci95"].to_numpy(float)[seen],
             **{**style, "linestyle": ""},
-            markersize=2.5,
-            elinewidth=0.6,
+            markersize=1.8,
+            elinewidth=0.5,
         )
-        best = int(np.nanargmax(np.where(roll >= 0, share, -1) if (roll >= 0).any() else share))
-        # A symbol stands at the right end of its line, or at the peak of one that falls to there.
-        at = len(share) - 1 if share[-1] >= 0.5 * share[best] else best
-        place = None if at == len(share) - 1 else float(roll[at])
-        labels.setdefault(place, []).append((float(share[at]), symbol(name), style["color"]))
-    for place, its in labels.items():
-        _write(ax, place, its)
+        lines[name] = roll, share
+    label_lines(ax, lines)
     undefined = table.loc[table["share"].isna(), "roll_gon"].unique()
     for roll in to_attitude(undefined * GON):
         ax.axvspan(roll - 2, roll + 2, facecolor=MISSING, hatch=HATCH, edgecolor="#999999", lw=0)
 
 
-def _write(ax: Axes, x: float | None, labels: list[tuple[float, str, str]]) -> None:
-    """Write symbols (share, text, colour) above a roll, or at the right edge; none over another."""
-    from matplotlib.patheffects import Normal, Stroke
-    from scipy.optimize import isotonic_regression
+def label_lines(ax: Axes, lines: Mapping[str, tuple[Array, Array]]) -> None:
+    """Write the symbol of each line above its right end or, if it falls to there, its peak.
 
-    labels = sorted(labels)
-    low, high = np.log(ax.get_ylim())
-    wanted = (np.log([share for share, _, _ in labels]) - low) / (high - low)
-    if x is not None:
-        wanted += 0.75 * LABEL_APART
-    apart = LABEL_APART * np.arange(len(labels))
-    heights = isotonic_regression(wanted - apart).x + apart
-    for height, (_, text, colour) in zip(heights, labels, strict=True):
-        ax.text(
-            1.01 if x is None else x,
-            height,
-            text,
-            transform=ax.transAxes if x is None else ax.get_xaxis_transform(),
-            color=colour,
-            ha="left" if x is None else "center",
-            va="center",
-            fontsize=7.5,
-            path_effects=[Stroke(linewidth=2, foreground="white"), Normal()],
-        )
+    Symbols of negative values stand below. None stands over another one or covers the line of
+    another one that ends there. The limits of the vertical axis must be set.
+    """
+    from matplotlib.patheffects import Normal, Stroke
+
+    labels: dict[int, list[tuple[float, float, float, str]]] = {1: [], -1: []}
+    for name, (x, y) in lines.items():
+        size = np.abs(y)
+        best = int(np.nanargmax(np.where(x >= 0, size, -1.0) if (x >= 0).any() else size))
+        at = len(y) - 1 if size[-1] >= 0.5 * size[best] else best
+        _, height = ax.transAxes.inverted().transform(ax.transData.transform((x[at], y[at])))
+        side = -1 if y[at] < 0 else 1
+        labels[side].append((side * height, float(x[at]), WIDE * float(np.ptp(x)), name))
+    for side, its in labels.items():
+        taken: list[tuple[float, float]] = []
+        for out, at_x, wide, name in sorted(its):
+            place = out + 0.6 * HIGH
+            for other_x, other in taken:
+                if abs(other_x - at_x) < wide:
+                    place = max(place, other + HIGH)
+            taken.append((at_x, place))
+            ax.text(
+                at_x,
+                side * place,
+                symbol(name),
+                transform=ax.get_xaxis_transform(),
+                color=group_colour(group_of(name)),
+                ha="center",
+                va="center",
+                fontsize=7.5,
+                path_effects=[Stroke(linewidth=2, foreground="white"), Normal()],
+            )
