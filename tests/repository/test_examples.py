@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import yaml
 from example_helpers import EXAMPLES, FIGURES, SHOWN, run_example
+from page_helpers import assert_told_alike, numbers
 from places import ROOT
 
 from accelstudy.approaches import get_approach
@@ -22,9 +23,6 @@ from accelstudy.simulation.sessions import Noise
 
 NINE = get_model("bias-scale-nonorthogonality")
 NAMES = sorted(path.parent.name for path in EXAMPLES.glob("*/commands.sh"))
-NUMBER = re.compile(r"(?<![\w.])[-−]?\d+\.?\d*(?:e[-+]?\d+)?")
-TOLERANCE = {"rel": 2e-3, "abs": 0.011}
-"""Of a printed number: other processors may round another way."""
 
 
 class Runs(dict):
@@ -44,19 +42,13 @@ def run(tmp_path_factory):
     return Runs(tmp_path_factory.mktemp)
 
 
-def numbers(text):
-    return [float(number.replace("−", "-")) for number in NUMBER.findall(text)]
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_the_tutorial_shows_what_the_example_prints(run, name):
     outputs, folder = run[name]
     shown = {path.stem: path.read_text("utf-8") for path in (SHOWN / name).glob("*.txt")}
     assert shown.keys() == {section for section, output in outputs.items() if output}
     for section, text in shown.items():
-        printed = outputs[section]
-        assert NUMBER.sub("#", printed) == NUMBER.sub("#", text), section
-        assert numbers(printed) == pytest.approx(numbers(text), **TOLERANCE), section
+        assert_told_alike(outputs[section], text)
     assert all((folder / figure).stat().st_size > 5000 for figure in FIGURES.get(name, ()))
 
 

@@ -62,8 +62,7 @@ def optimal_design(
 ) -> Design:
     """Find the n positions that are best by a criterion.
 
-    The same arguments give the same positions, on every processor. The bound, and with it the
-    efficiency, agrees to 1e-5.
+    The same arguments give the same positions, on every processor.
 
     Parameters
     ----------
