@@ -377,7 +377,7 @@ def test_positions_that_hardly_differ_are_one_that_is_repeated():
     criterion = get_criterion("I", task)
     best = optimal_design(task, criterion, 12, starts=3, bounded=False).directions
     cosines = (best @ best.T)[np.triu_indices(12, 1)]
-    same = cosines > 1 - 1e-12
+    same = cosines > 1 - 1e-8  # of directions to 9 decimals
     assert same.any()
     assert cosines[~same].max() < np.cos(1 * GON)
 
