@@ -8,6 +8,7 @@ SHELL := bash
 ENV := .venv
 READY := $(ENV)/.ready
 TEST = pytest --numprocesses $(CORES) --dist loadfile --no-loadscope-reorder
+OLD_NUMPY := NPY_DISABLE_CPU_FEATURES="X86_V3 X86_V4 AVX512_ICL AVX512_SPR"
 INSTALL := pip install --quiet --no-build-isolation --require-hashes --requirement requirements.lock
 
 # The workflow's shell commands find the environment's python by the path alone.
@@ -25,7 +26,7 @@ export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: help env test coverage test-cluster test-faults smoke reproduce anew unlock report campaigns diagnose-example plan-example hidden-effects hidden-docs pictures benchmarks docs wheel lint lock clean
+.PHONY: help env test coverage test-processors test-processors-part test-cluster test-faults smoke reproduce anew unlock report campaigns diagnose-example plan-example hidden-effects hidden-docs optimal-schemes pictures benchmarks docs wheel lint lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-18s%s\n", $$1, $$2 }' Makefile
@@ -41,6 +42,16 @@ test: lint ## check and test the package
 # Apart from `make test`, as measuring takes as long as all tests.
 coverage: $(READY) ## test the package, and list the lines that no test runs
 	$(TEST) --cov
+
+# Libraries choose their instructions by the processor; they are told to choose those of others.
+test-processors: $(READY) ## run all tests with the instructions of other processors
+	for other in OPENBLAS_CORETYPE=Haswell OPENBLAS_CORETYPE=Nehalem $(OLD_NUMPY); do \
+	  echo "$$other"; env "$$other" $(TEST) || exit; done
+
+test-processors-part: $(READY) ## run a few tests with the instructions of an old processor
+	OPENBLAS_CORETYPE=Nehalem $(OLD_NUMPY) $(TEST) $(addprefix tests/,commands/test_walk.py \
+	  repository/test_examples.py design/test_schemes.py planning/test_plan.py \
+	  planning/test_pole.py simulation/test_simulation.py)
 
 test-cluster: $(READY) ## run the small configuration by a SLURM on this machine, and compare
 	python tests/helpers/cluster.py
@@ -91,6 +102,9 @@ pictures: reproduce ## make the pictures of reports, studies and tutorials in do
 	snakemake --cores $(CORES) --configfile config/smoke.yaml
 	python tests/helpers/example_helpers.py
 	python tests/helpers/pictures.py
+
+optimal-schemes: $(READY) ## search the table of optimal schemes anew
+	python tests/helpers/optimal_schemes.py
 
 benchmarks: $(READY) ## measure the speed, and take tables and figure into docs
 	python benchmarks/run.py docs/guides/speed.md docs/figures/speed.png

@@ -1,11 +1,18 @@
 """Positions that minimise the variances of the nine parameters, or of leveling with them."""
 
+import json
+from collections.abc import Iterable
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 
+from accelstudy.basics.errors import InputError
 from accelstudy.positions.scheme import Array
 from accelstudy.schemes.registry import register
 
-MODEL = "bias-scale-nonorthogonality"
+TABLE = Path(__file__).with_name("optimal.json")
 
 
 @register(
@@ -29,31 +36,52 @@ def d_optimal_9() -> Array:
     return np.vstack([triangle, [x, 0, 0] - r * triangle, [-x, 0, 0] - r * triangle])
 
 
-@register("d-optimal-N", title="D-optimal", status="generated", source="accelstudy.optimal")
+@register("d-optimal-N", title="D-optimal", status="generated", source="accelstudy design")
 def d_optimal(n: int) -> Array:
     """The n positions of the largest determinant for a calibration by the norm of gravity.
 
     From 16 positions on there are many such sets, all as good as the whole sphere.
     """
-    return _optimal(n, "D")
+    return _stored(n, "D")
 
 
-@register("i-optimal-N", title="I-optimal", status="generated", source="accelstudy.optimal")
+@register("i-optimal-N", title="I-optimal", status="generated", source="accelstudy design")
 def i_optimal(n: int) -> Array:
     """The n positions after which roll and pitch are best, for tilts up to 50 gon.
 
     They are for a calibration by the norm of gravity; `accelstudy design` makes others.
     """
-    return _optimal(n, "I")
+    return _stored(n, "I")
 
 
-def _optimal(n: int, criterion: str) -> Array:
-    # Slow to import, and only these schemes need them.
-    from accelstudy.approaches import get_approach
-    from accelstudy.design.optimal.criteria import get_criterion
-    from accelstudy.design.optimal.search import optimal_design
-    from accelstudy.design.optimal.task import Task
-    from accelstudy.sensors.models import get_model
+def _stored(n: int, criterion: str) -> Array:
+    table = stored_designs()[criterion]
+    if n not in table:
+        raise InputError(
+            f"{criterion.lower()}-optimal-{n} is not stored; {criterion}-optimal are "
+            f"{ranges(table)} positions. Others are found by accelstudy design --positions {n} "
+            f"--criterion {criterion} --approach gravity --out mine.yaml"
+        )
+    return np.array(table[n]["directions"])
 
-    task = Task(get_model(MODEL), get_approach("gravity"))
-    return optimal_design(task, get_criterion(criterion, task), n, bounded=False).directions
+
+@lru_cache
+def stored_designs() -> dict[str, dict[int, dict[str, Any]]]:
+    """Designs by criterion and number of positions.
+
+    Each has its directions, the lower bound of the criterion (a logarithm, of `TASK` in
+    `tests/helpers/optimal_schemes.py`, which made the table) and its efficiency against it.
+    """
+    read = json.loads(TABLE.read_text(encoding="utf-8"))
+    return {name: {int(n): one for n, one in table.items()} for name, table in read.items()}
+
+
+def ranges(numbers: Iterable[int]) -> str:
+    """Ascending whole numbers for people, as "9 to 40, 45, 50"."""
+    runs: list[list[int]] = []
+    for n in numbers:
+        if runs and n == runs[-1][-1] + 1:
+            runs[-1].append(n)
+        else:
+            runs.append([n])
+    return ", ".join(f"{r[0]} to {r[-1]}" if len(r) > 1 else f"{r[0]}" for r in runs)

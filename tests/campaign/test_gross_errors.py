@@ -53,7 +53,7 @@ def test_a_campaign_with_it_can_be_written_and_read(name, tmp_path):
         write_campaign(error, tmp_path, plausible=False)
         read = read_campaign(tmp_path, plausible=False)
         np.testing.assert_allclose(read.forces, error.forces, rtol=1e-14)
-        np.testing.assert_allclose(read.angles, error.angles, rtol=1e-14, atol=1e-15)
+        np.testing.assert_allclose(read.angles, error.angles, rtol=1e-14, atol=1e-14)
 
 
 def test_an_outlier_is_in_one_position():

@@ -85,7 +85,7 @@ def test_a_scheme_is_what_its_name_says(name):
     assert found.title.startswith(f"{n} ")
     assert found.source
     assert found.status in {"exact", "standard", "stand-in", "generated"}
-    np.testing.assert_allclose(np.linalg.norm(found.directions, axis=1), 1, rtol=1e-15)
+    np.testing.assert_allclose(np.linalg.norm(found.directions, axis=1), 1, rtol=1e-14)
 
 
 def test_directions_are_read_only():
@@ -164,7 +164,7 @@ def test_rotation_is_about_fixed_axes():
     about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
     about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
     expected = scheme(LOPSIDED).directions @ (about_z @ about_y @ about_x).T
-    np.testing.assert_allclose(turned.directions, expected, atol=1e-15)
+    np.testing.assert_allclose(turned.directions, expected, atol=1e-14)
     assert turned.name == "test-rotated"
     assert not turned.directions.flags.writeable
 
@@ -228,7 +228,7 @@ def test_mclaren_is_a_7_design():
         for powers in product(range(8), repeat=3):
             if sum(powers) <= 7:
                 moment = np.mean(np.prod(directions**powers, axis=1))
-                assert moment == pytest.approx(sphere_moment(*powers), abs=1e-14), powers
+                assert moment == pytest.approx(sphere_moment(*powers), abs=1e-13), powers
 
 
 def test_mclaren_positions_are_apart_and_never_opposite():
@@ -243,7 +243,7 @@ def test_mclaren_is_the_orbit_of_its_point():
     np.testing.assert_allclose(np.sort(np.abs(orbit)), np.tile(point, (24, 1)), atol=5e-9)
     assert len(np.unique(orbit.round(9), axis=0)) == 24
     turned = scheme(orbit).rotated(np.radians([15, 25, 35]))
-    np.testing.assert_allclose(turned.directions, get_scheme("mclaren-24").directions, atol=1e-15)
+    np.testing.assert_allclose(turned.directions, get_scheme("mclaren-24").directions, atol=1e-14)
 
 
 def test_mclaren_is_turned_off_the_roll_pole():
@@ -252,7 +252,7 @@ def test_mclaren_is_turned_off_the_roll_pole():
 
 def test_the_generic_orientation_is_by_the_angles_it_names():
     turned = Rotation.from_euler("xyz", [15, 25, 35], degrees=True).apply(np.eye(3))
-    np.testing.assert_allclose(generic(np.eye(3)), turned, rtol=0, atol=3e-16)
+    np.testing.assert_allclose(generic(np.eye(3)), turned, rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize("name", ["mclaren-24", "dodecahedron-20", "icosidodecahedron-30"])
@@ -287,7 +287,7 @@ def test_orders_keep_a_drift_apart_from_the_parameters(name):
 def test_fibonacci(n):
     found = get_scheme(f"fibonacci-{n}")
     assert found.n_positions == n
-    np.testing.assert_allclose(np.linalg.norm(found.directions, axis=1), 1, rtol=1e-15)
+    np.testing.assert_allclose(np.linalg.norm(found.directions, axis=1), 1, rtol=1e-14)
     assert found.pole_distance == pytest.approx(np.arccos(1 - 1 / n))
     if n > 1:
         # Among n points on the sphere, two are at most about √(8 π / √3 / n) apart.
@@ -308,7 +308,7 @@ def test_random(n, seed):
     found = get_scheme(f"random-{n}-{seed}")
     assert found.n_positions == n
     assert found.title == f"{n} hand placed, seed {seed}"
-    np.testing.assert_allclose(np.linalg.norm(found.directions, axis=1), 1, rtol=1e-15)
+    np.testing.assert_allclose(np.linalg.norm(found.directions, axis=1), 1, rtol=1e-14)
     registry._registered.cache_clear()
     np.testing.assert_array_equal(get_scheme(found.name).directions, found.directions)
 

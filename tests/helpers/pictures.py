@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 from example_helpers import FIGURES, run_example
-from page_helpers import text_of
+from page_helpers import NUMBER, numbers, text_of
 from PIL import Image, ImageChops
 from places import ROOT
 from playwright.sync_api import sync_playwright
@@ -35,10 +35,6 @@ PICTURES = ROOT / "docs" / "figures"
 KEPT = PICTURES / "shown.json"
 PAPER, SMALL = ROOT / "results" / "paper", ROOT / "results" / "smoke"
 MADE_BY = "make pictures"
-
-NUMBER = re.compile(r"(?<![\w.])[-−]?\d+\.?\d*(?:e[-+]?\d+)?")
-CLOSE = {"rel": 2e-3, "abs": 0.011}
-"""Of a printed number: other processors may round another way."""
 
 REPORTS = {
     "report-calibration": ("log", "calibrated/report.html", (1000, 1010)),
@@ -71,15 +67,11 @@ DRAWN = {
 """Pictures that no test makes: what makes them, and the code that draws them."""
 
 
-def numbers(text):
-    return np.array([float(number.replace("−", "-")) for number in NUMBER.findall(text)])
-
-
 def alike(one, other):
     """Whether two texts say the same, but for the rounding of their numbers."""
     if NUMBER.sub("#", one) != NUMBER.sub("#", other):
         return False
-    return np.allclose(numbers(one), numbers(other), rtol=CLOSE["rel"], atol=CLOSE["abs"])
+    return np.allclose(numbers(one), numbers(other), rtol=2e-3, atol=0.011)
 
 
 def same_picture(one, other):

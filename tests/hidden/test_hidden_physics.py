@@ -80,13 +80,13 @@ def test_rotations_are_rotations():
         rotated(np.eye(3), turns[0]),
         np.array([in_turned_frame(v, axis, 0.7) for axis in (0,) for v in np.eye(3)]),
     ):
-        np.testing.assert_allclose(turned @ turned.T, np.eye(3), atol=1e-15)
+        np.testing.assert_allclose(turned @ turned.T, np.eye(3), atol=1e-14)
         assert np.linalg.det(turned) == pytest.approx(1)
     # A quarter turn about z takes x to y; seen from a frame so turned, y is where x was.
     np.testing.assert_allclose(
-        rotated(np.eye(3)[0], np.pi / 2 * np.eye(3)[2]), [0, 1, 0], atol=1e-15
+        rotated(np.eye(3)[0], np.pi / 2 * np.eye(3)[2]), [0, 1, 0], atol=1e-14
     )
-    np.testing.assert_allclose(in_turned_frame(np.eye(3)[1], 2, np.pi / 2), [1, 0, 0], atol=1e-15)
+    np.testing.assert_allclose(in_turned_frame(np.eye(3)[1], 2, np.pi / 2), [1, 0, 0], atol=1e-14)
     np.testing.assert_allclose(rotated(rotated(vectors, turns), -turns), vectors, atol=1e-14)
 
 

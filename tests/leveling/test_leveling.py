@@ -56,7 +56,7 @@ def test_signs_of_the_convention(f, roll, pitch):
     assert found[1] == pytest.approx(pitch, abs=1e-12)
     if roll is not None:
         assert found[0] == pytest.approx(roll, abs=1e-12)
-        np.testing.assert_allclose(force(roll * GON, pitch * GON), f, atol=1e-15 * G)
+        np.testing.assert_allclose(force(roll * GON, pitch * GON), f, atol=1e-14 * G)
 
 
 def test_upside_down_has_a_roll_of_200_gon():

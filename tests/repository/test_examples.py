@@ -7,18 +7,8 @@ import numpy as np
 import pytest
 import yaml
 from example_helpers import EXAMPLES, FIGURES, SHOWN, run_example
-from pictures import (
-    BATCH,
-    CLOSE,
-    MADE_BY,
-    NUMBER,
-    REPORTS,
-    numbers,
-    overview,
-    same_picture,
-    seen,
-    stale,
-)
+from page_helpers import assert_told_alike, numbers
+from pictures import BATCH, MADE_BY, REPORTS, overview, same_picture, seen, stale
 from places import ROOT
 
 from accelstudy.approaches import get_approach
@@ -60,8 +50,7 @@ def test_the_tutorial_shows_what_the_example_prints(run, name):
     shown = {path.stem: path.read_text("utf-8") for path in (SHOWN / name).glob("*.txt")}
     assert shown.keys() == {section for section, output in outputs.items() if output}
     for section, text in shown.items():
-        assert NUMBER.sub("#", outputs[section]) == NUMBER.sub("#", text), section
-        assert numbers(outputs[section]) == pytest.approx(numbers(text), **CLOSE), section
+        assert_told_alike(outputs[section], text)
     for figure in FIGURES.get(name, ()):
         kept = SHOWN / name / Path(figure).name
         assert same_picture(folder / figure, kept), f"{kept} is old; `{MADE_BY}` makes it anew"

@@ -239,7 +239,7 @@ def test_axes_that_are_not_perpendicular_show_where_the_roll_axis_is_vertical():
     hold = some_hold(FORCES, roll=np.full(40, 0.3), pitch=np.full(40, np.pi / 2))
     found = added(get_effect("axis_nonperpendicularity"), np.array([1e-3]), FORCES, hold)
     expected = 1e-3 * G * np.array([0.0, np.cos(0.3), -np.sin(0.3)])
-    np.testing.assert_allclose(found.output, np.tile(expected, (40, 1)), rtol=0, atol=1e-15)
+    np.testing.assert_allclose(found.output, np.tile(expected, (40, 1)), rtol=0, atol=1e-14)
 
 
 def test_a_flange_gives_way_where_its_encoders_do_not_see_it():
@@ -248,7 +248,7 @@ def test_a_flange_gives_way_where_its_encoders_do_not_see_it():
     attitude, c = np.array([[0.4, -0.3], [2.0, 0.5]]), np.array([1e-3, -2e-3])
     read = attitude + model.reading_errors(attitude, c)
     deflected = c * np.sin(2 * read) * np.cos(read[:, ::-1])
-    np.testing.assert_allclose(read + deflected, attitude, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(read + deflected, attitude, rtol=0, atol=1e-14)
     assert read[0, 0] < attitude[0, 0]
 
 
@@ -286,7 +286,7 @@ def test_a_lag_is_a_setting_of_the_thermal_bias():
     assert SensorModel.of("lag", [lagging.spec]).hold_columns == ("temperature", "time")
     p, model = np.array([1e-3, 2e-3, -1e-3]), SensorModel("lag", (lagging,))
     expected = np.outer(HOLD.lagged(500) - 20, p)
-    np.testing.assert_allclose(added(lagging, p).output, expected, atol=1e-15)
+    np.testing.assert_allclose(added(lagging, p).output, expected, atol=1e-14)
     sensed = model.sense(FORCES, p, G, HOLD)
     np.testing.assert_allclose(sensed, FORCES + expected, atol=1e-13)
     np.testing.assert_allclose(model.correct(sensed, p, G, HOLD), FORCES, atol=1e-12)
@@ -425,7 +425,7 @@ def test_a_wrong_gravity_is_a_common_scale(approach):
     assert found.not_estimable == ("s_x", "s_y", "s_z", "delta_g")
     error, scale = (get_effect(name) for name in ("gravity_error", "scale"))
     np.testing.assert_allclose(
-        added(error, [0.01]).output, added(scale, 3 * [0.01 / G]).output, rtol=0, atol=1e-15
+        added(error, [0.01]).output, added(scale, 3 * [0.01 / G]).output, rtol=0, atol=1e-14
     )
 
 

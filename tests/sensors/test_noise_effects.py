@@ -80,7 +80,7 @@ def test_axis_noise():
     for i, kappa in enumerate((0.25, 1, 9)):
         assert near_variance(v[..., i], kappa)
     np.testing.assert_allclose(
-        get_noise_effect("axis_noise(kappa_z=9)").within_hold, [1, 1, 3], rtol=1e-15
+        get_noise_effect("axis_noise(kappa_z=9)").within_hold, [1, 1, 3], rtol=1e-14
     )
 
 

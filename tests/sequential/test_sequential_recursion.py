@@ -116,7 +116,7 @@ def test_a_factory_calibration_is_observations_of_the_parameters(n):
     recursion = Recursion(model, approach, so_far, Prior.of_sigmas(mean, sigma))
     assert recursion.redundancy == n
     if n == 0:  # and nothing else is known
-        np.testing.assert_allclose(recursion.parameters, np.tile(mean, (SESSIONS, 1)), atol=1e-15)
+        np.testing.assert_allclose(recursion.parameters, np.tile(mean, (SESSIONS, 1)), atol=1e-14)
         np.testing.assert_allclose(recursion.cofactors[0], np.diag(sigma**2), rtol=1e-12)
         return
     problem = CalibrationProblem.of(model, approach, so_far)

@@ -33,9 +33,9 @@ def test_noise_of_the_paper_is_the_default():
 
 
 def test_a_session_without_noise():
-    np.testing.assert_allclose(IDEAL.f_b, -G * DIRECTIONS, rtol=1e-15)
-    np.testing.assert_allclose(IDEAL.forces, MODEL.sense(-G * DIRECTIONS, TRUTH), rtol=1e-15)
-    np.testing.assert_allclose(IDEAL.angles.T, roll_pitch(tuple(IDEAL.f_b.T)), rtol=1e-15)
+    np.testing.assert_allclose(IDEAL.f_b, -G * DIRECTIONS, rtol=1e-14)
+    np.testing.assert_allclose(IDEAL.forces, MODEL.sense(-G * DIRECTIONS, TRUTH), rtol=1e-14)
+    np.testing.assert_allclose(IDEAL.angles.T, roll_pitch(tuple(IDEAL.f_b.T)), rtol=1e-14)
     observed = IDEAL.observations(Noise())
     np.testing.assert_array_equal(observed.forces, IDEAL.forces[None])
     np.testing.assert_array_equal(observed.angles, IDEAL.angles[None])
@@ -45,8 +45,8 @@ def test_a_session_without_noise():
 def test_the_sensor_feels_the_reaction_to_gravity():
     """Level is z down, along gravity, and reads −g."""
     level = session(MODEL, np.zeros(9), np.array([[0.0, 0.0, 1.0]]))
-    np.testing.assert_allclose(level.forces, [[0, 0, -G]], atol=1e-15)
-    np.testing.assert_allclose(level.angles, [[0, 0]], atol=1e-15)
+    np.testing.assert_allclose(level.forces, [[0, 0, -G]], atol=1e-14)
+    np.testing.assert_allclose(level.angles, [[0, 0]], atol=1e-14)
 
 
 def test_moments_of_the_noise():
@@ -111,9 +111,9 @@ def test_order_of_the_draws():
     angles = rng.standard_normal((4, 24, 2))
     gravity = rng.standard_normal(4)
     observed = draw(4, sigma_gravity=0.01)
-    np.testing.assert_allclose(observed.forces, IDEAL.forces + 0.002 * forces, rtol=1e-15)
+    np.testing.assert_allclose(observed.forces, IDEAL.forces + 0.002 * forces, rtol=1e-14)
     np.testing.assert_allclose(observed.angles, IDEAL.angles + 3.2 * MGON * angles, rtol=1e-13)
-    np.testing.assert_allclose(observed.gravity, G + 0.01 * gravity, rtol=1e-15)
+    np.testing.assert_allclose(observed.gravity, G + 0.01 * gravity, rtol=1e-14)
 
 
 def test_both_approaches_see_the_same_forces():
@@ -134,7 +134,7 @@ def test_a_wrong_gravity_is_believed_but_not_felt():
     ("rate", "duration", "n"), [(100, 2, 200), (50, 2, 100), (1, 1, 1), (0.1, 2, 1), (100, 0, 1)]
 )
 def test_sigma_of_the_mean_of_a_position(rate, duration, n):
-    assert sigma_of_mean(0.02, rate, duration) == pytest.approx(0.02 / math.sqrt(n), rel=1e-15)
+    assert sigma_of_mean(0.02, rate, duration) == pytest.approx(0.02 / math.sqrt(n), rel=1e-14)
 
 
 def test_sigma_of_the_mean_by_simulation():

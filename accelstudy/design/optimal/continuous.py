@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 COARSE, FINE = 600, 6000
 """Number of attitudes that have shares, and of those on which the bound is evaluated."""
 ROUNDS = 8
+UPDATES = 2000
+"""Number of updates of all shares in a round."""
 ENOUGH = 1e-4
 """Relative gap between the criterion and its bound at which the search stops."""
 
@@ -99,28 +101,19 @@ def _flat(task: Task, directions: Array) -> Array:
     return task.informations(directions).reshape(len(directions), -1)
 
 
-def _share(prior: Array, criterion: Criterion, flat: Array, start: Array, n: int) -> Array:
-    """Best shares of given attitudes. They are squares of free numbers, so none is negative."""
-    from scipy.optimize import minimize  # slow to import
+def _share(prior: Array, criterion: Criterion, flat: Array, shares: Array, n: int) -> Array:
+    """Better shares of given attitudes: each grows by the root of what a larger one would gain.
 
+    The multiplicative algorithm of Silvey, Titterington & Torsney (1978). It takes no decisions
+    and so carries rounding on as rounding.
+    """
     u = len(prior)
-
-    def value_and_gradient(root: Array) -> tuple[float, Array]:
-        total = float(root @ root)
-        shares = root**2 / total
+    for _ in range(UPDATES):
         normal = prior + n * (shares @ flat).reshape(u, u)
-        by_shares = n * flat @ criterion.gradient(normal).ravel()
-        slope = 2 * root / total * (by_shares - shares @ by_shares)
-        return float(criterion.value(normal)), slope
-
-    found = minimize(
-        value_and_gradient,
-        np.sqrt(start),
-        jac=True,
-        method="L-BFGS-B",
-        options={"maxiter": 500, "ftol": 1e-13, "gtol": 1e-9},
-    )
-    return np.asarray(found.x**2 / (found.x @ found.x))
+        gain = -flat @ criterion.gradient(normal).ravel()
+        shares = shares * np.sqrt(np.maximum(gain, 0.0) / gain.max())
+        shares = shares / shares.sum()
+    return shares
 
 
 def _lowest(

@@ -13,6 +13,7 @@ from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.diagnosis.space.signatures import signature
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import roll_pitch
+from accelstudy.positions.choice import TIED, first_best
 from accelstudy.proposal.separation import Explained, Separation
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import compose
@@ -81,7 +82,7 @@ def next_positions(frame: Frame, first: Explanation, second: Explanation) -> lis
     rivals = _Rivals.of(frame, first, second)
     gain = np.sqrt(rivals.separation.gains(rivals.columns(forces, hold)))
 
-    start = int(np.argmax(gain)) // len(attitudes) * len(attitudes)
+    start = first_best(-gain, TIED * gain.max()) // len(attitudes) * len(attitudes)
     there = gain[start : start + len(attitudes)]  # at the best temperature and time
     anywhere = bool(there.min() >= ANYWHERE * there.max())
     if anywhere:
@@ -119,7 +120,8 @@ def _one_after_the_other(rivals: _Rivals, attitudes: Array, needed: set[str]) ->
         free = np.all(np.array(apart) > DIFFERENT * frame.solution.gravity, axis=0)
         if not np.any(free):
             break
-        chosen.append(int(np.argmax(np.where(free, separation.gains(columns), -np.inf))))
+        gains = np.where(free, separation.gains(columns), -np.inf)
+        chosen.append(first_best(-gains, TIED * gains.max()))
         taken.append(forces[chosen[-1]])
         separation = separation.taking((columns[0][chosen[-1]], columns[1][chosen[-1]]))
     return chosen

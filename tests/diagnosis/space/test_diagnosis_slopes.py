@@ -83,7 +83,7 @@ def test_rates_are_derivatives_of_the_definition_by_time():
     np.testing.assert_allclose(rate, 0.01 * forces[:, :, None] * eye, rtol=1e-6)
     rate, _ = rate_of("thermal_bias(tau=120)", hold)
     behind = 0.01 * (1 - np.exp(-time / 120))
-    np.testing.assert_allclose(rate, behind[:, None, None] * eye, rtol=1e-6, atol=1e-15)
+    np.testing.assert_allclose(rate, behind[:, None, None] * eye, rtol=1e-6, atol=1e-14)
     constant = set(effect_names()) - {"bias_drift", "warm_up", "thermal_bias", "thermal_scale"}
     changing = {name for name in constant if rate_of(name, hold)[0].any()}
     assert changing <= {"thermal_curve"}

@@ -1,0 +1,46 @@
+"""The table of the optimal schemes.
+
+python tests/helpers/optimal_schemes.py        # searches all of them anew, in minutes
+"""
+
+import json
+
+from accelstudy.approaches import get_approach
+from accelstudy.design.optimal.criteria import get_criterion
+from accelstudy.design.optimal.search import optimal_design
+from accelstudy.design.optimal.task import Task
+from accelstudy.schemes.optimal import TABLE
+from accelstudy.sensors.models import get_model
+
+SIZES = {
+    "D": range(10, 41),
+    "I": (*range(9, 41), 45, 50, 60, 70, 80, 100, 120),
+}
+TASK = Task(get_model("bias-scale-nonorthogonality"), get_approach("gravity"))
+DECIMALS = 6
+
+
+def searched(name, n):
+    """Positions that are found, their efficiency, and the bound of the criterion."""
+    criterion = get_criterion(name, TASK)
+    found = optimal_design(TASK, criterion, n)
+    directions = (found.directions.round(DECIMALS) + 0.0).tolist()
+    value = float(criterion.value(TASK.normal(directions)))
+    efficiency = min(1.0, criterion.efficiency(value, found.bound))
+    return {
+        "efficiency": round(efficiency, 5),
+        "bound": round(found.bound, 5),
+        "directions": directions,
+    }
+
+
+def line(n, entry):
+    return f'  "{n}": {json.dumps(entry)}'
+
+
+if __name__ == "__main__":
+    families = []
+    for name, sizes in SIZES.items():
+        lines = [line(n, searched(name, n)) for n in sizes]
+        families.append(f'"{name}": {{\n' + ",\n".join(lines) + "\n}")
+    TABLE.write_text("{" + ",\n".join(families) + "}\n", encoding="utf-8")
