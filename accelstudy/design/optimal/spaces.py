@@ -174,7 +174,9 @@ def listed_in(path: Path) -> Listed:
     found = next((names for names in pairs if set(names) <= set(table.columns)), None)
     if found is None:
         wanted = "; ".join(", ".join(names) for names in pairs)
-        raise InputError(f"{path}: has the columns {short_list(table.columns)}; expected {wanted}")
+        raise InputError(
+            f"{path}: has the columns {short_list([*map(str, table.columns)])}; expected {wanted}"
+        )
     values = table[list(found)].apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
     bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
     if len(bad):
