@@ -164,7 +164,7 @@ def listed_in(path: Path) -> Listed:
         If it cannot be read, or has neither.
     """
     try:
-        table = pd.read_csv(StringIO(read_text(path)), comment="#")
+        table = pd.read_csv(StringIO(read_text(path)), comment="#", dtype=str)
     except InputError:
         raise
     except ValueError:
