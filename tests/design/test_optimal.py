@@ -320,6 +320,7 @@ def test_attitudes_of_a_cube_of_a_hand_and_of_a_file(tmp_path):
     for text, wrong in {
         "a,b\n1,2\n": "expected x, y, z; roll_gon, pitch_gon",
         "x,y,z\n1,0,0\n1,?,0\n": "row 2: x, y, z must be numbers",
+        f"x,y,z\n1,0,{10**400}\n": "row 1: x, y, z must be numbers",
         "": "no CSV table",
     }.items():
         path.write_text(text, encoding="utf-8")

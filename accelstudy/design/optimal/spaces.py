@@ -164,7 +164,7 @@ def listed_in(path: Path) -> Listed:
         If it cannot be read, or has neither.
     """
     try:
-        table = pd.read_csv(StringIO(read_text(path)), comment="#")
+        table = pd.read_csv(StringIO(read_text(path)), comment="#", dtype=str)
     except InputError:
         raise
     except ValueError:
@@ -174,7 +174,9 @@ def listed_in(path: Path) -> Listed:
     found = next((names for names in pairs if set(names) <= set(table.columns)), None)
     if found is None:
         wanted = "; ".join(", ".join(names) for names in pairs)
-        raise InputError(f"{path}: has the columns {short_list(table.columns)}; expected {wanted}")
+        raise InputError(
+            f"{path}: has the columns {short_list([*map(str, table.columns)])}; expected {wanted}"
+        )
     values = table[list(found)].apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
     bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
     if len(bad):
