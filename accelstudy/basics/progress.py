@@ -45,6 +45,12 @@ def say(text: str) -> None:
         click.echo(text)
 
 
+def begin(text: str) -> None:
+    """Say on standard error that long work begins, where no bar can show it: it is no terminal."""
+    if not _quiet.get() and not sys.stderr.isatty():
+        click.echo(text, err=True)
+
+
 def warn(text: str) -> None:
     """Print a warning on standard error, whether the command is quiet or not."""
     click.echo(f"warning: {text}", err=True)

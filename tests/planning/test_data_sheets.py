@@ -66,7 +66,7 @@ def test_the_bias_changes_with_time_temperature_and_switching_on():
     )  # fmt: skip
     assert sheet.bias_change(0.0) == 0
     assert sheet.bias_change(3600.0) == pytest.approx(6e-4)
-    assert sheet.bias_change(3600.0, 10.0) == pytest.approx(math.hypot(6e-4, 1e-2))
+    assert sheet.warmed(10.0) == pytest.approx((1e-2, 0.0))
     assert sheet.bias_change(0.0, restarted=True) == pytest.approx(5e-3)
 
 
