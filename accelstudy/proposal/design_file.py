@@ -11,17 +11,10 @@ import yaml
 from numpy.typing import NDArray
 
 from accelstudy.basics.units import to_recorded
+from accelstudy.design.optimal.search import rounded
 from accelstudy.design.optimal.spaces import attitudes
 
 Array = NDArray[np.float64]
-
-DIGITS = 9
-"""Decimals of the directions, 1e-9 rad."""
-
-
-def rounded(directions: Array) -> Array:
-    """Directions as the file holds them."""
-    return np.asarray(directions).round(DIGITS) + 0.0  # -0.0 becomes 0.0
 
 
 def write_design(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from accelstudy.design.optimal.criteria import RIDGE
 from accelstudy.design.optimal.information import information, position_rows
 from accelstudy.design.optimal.task import Task
+from accelstudy.positions.choice import first_best
 from accelstudy.sensors.models import compose
 from accelstudy.simulation.hold_plan import HoldPlan
 
@@ -73,7 +74,7 @@ def _round_trip(angles: Array, tour: Order) -> Order:
                 - angles[tour[i], tour[j]]
                 - angles[ahead[i], ahead[j]]
             )
-            best = int(np.argmax(gain))
+            best = first_best(-gain)
             if gain[best] > 1e-9:
                 tour = tour.copy()
                 tour[i + 1 : j[best] + 1] = tour[i + 1 : j[best] + 1][::-1]

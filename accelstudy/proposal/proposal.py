@@ -15,7 +15,6 @@ from accelstudy.basics.units import GON, MGON, angles_in
 from accelstudy.design.optimal.criteria import Rivals
 from accelstudy.design.optimal.search import Design
 from accelstudy.design.optimal.spaces import Mountings
-from accelstudy.proposal.design_file import rounded
 from accelstudy.proposal.order import field_order
 from accelstudy.proposal.request import Request
 from accelstudy.schemes import get_scheme
@@ -52,7 +51,7 @@ class Proposal:
         if isinstance(space, Mountings):
             groups = _fewest_axes(space, design.directions)
         order = field_order(request.task, design.directions, groups)
-        return cls(request, design, rounded(design.directions[order]))
+        return cls(request, design, design.directions[order])
 
     @property
     def turns(self) -> Array:

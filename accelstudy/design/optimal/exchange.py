@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.design.optimal.constraints import Constraints
 from accelstudy.design.optimal.criteria import Criterion
+from accelstudy.positions.choice import TIED, first_best, in_order
 
 Array = NDArray[np.float64]
 
@@ -22,6 +23,9 @@ TRIED = 24
 """Number of candidates that are tried for each position, in the order of their rank."""
 GAIN = 1e-9
 """Relative improvement below which a position stays."""
+KNOWN = 1e-6
+"""Scaled information that is known of each parameter during an exchange. Where a choice does not
+determine all parameters, rounding would decide without it."""
 SWEEPS = 100
 DRAWS = 200
 """Number of random sets that are drawn to find one that keeps its distances."""
@@ -53,7 +57,8 @@ class Candidates:
 
     def normal(self, chosen: list[int]) -> Array:
         """Normal matrix of a choice."""
-        return np.asarray(self.prior + self.informations[chosen].sum(axis=0))
+        known = self.prior + KNOWN * np.eye(len(self.prior))
+        return np.asarray(known + self.informations[chosen].sum(axis=0))
 
     def random(self, n: int, rng: np.random.Generator) -> list[int]:
         """Draw n candidates that may stand together.
@@ -101,13 +106,14 @@ def exchange(candidates: Candidates, chosen: list[int], criterion: Criterion) ->
         for i, old in enumerate(chosen):
             rest = normal - candidates.informations[old]
             rank = flat @ criterion.gradient(normal).ravel()
+            tied = TIED * float(np.abs(rank).max())
             rank[~candidates.allowed(chosen[:i] + chosen[i + 1 :])] = np.inf
-            tried = np.argsort(rank, kind="stable")[:TRIED]
+            tried = in_order(rank, tied)[:TRIED]
             tried = tried[np.isfinite(rank[tried])]
             if not len(tried):
                 continue
             values = criterion.value(rest + candidates.informations[tried])
-            best = int(np.nanargmin(values))
+            best = first_best(values)
             if values[best] < value - GAIN:
                 chosen[i], value = int(tried[best]), float(values[best])
                 normal = rest + candidates.informations[chosen[i]]

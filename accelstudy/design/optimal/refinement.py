@@ -1,30 +1,39 @@
-"""Moving of positions along the sphere until the criterion is stationary."""
+"""Moving of positions along the sphere until no small move of one makes the criterion better.
+
+All positions move on grids, and a move must gain more than rounding can. So no last digit decides
+where the search ends, as it would where a minimum is flat and derivatives are followed: of many
+positions there are often endless choices that are equally good.
+"""
 
 from __future__ import annotations
+
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.design.optimal.constraints import Constraints
+from accelstudy.design.optimal.constraints import TOLERANCE, Constraints
 from accelstudy.design.optimal.criteria import Criterion
 from accelstudy.design.optimal.spaces import Space
 from accelstudy.design.optimal.task import Task
+from accelstudy.positions.choice import first_best
 
 Array = NDArray[np.float64]
 
-STEP = 1e-4
-"""rad, of the difference quotients; their error is of the order of its square."""
-ROUNDS = 6
-"""Number of rounds; each starts from new tangents at the positions."""
-ITERATIONS = 60
-NEAR = 0.35
-"""rad, of which a position moves at most half along each tangent in one round."""
+STEPS = 0.081 / 3.0 ** np.arange(5)
+"""rad, widths of the grids; from half the distance of the candidates to 0.06 gon."""
+GAIN = 0.1
+"""Smallest gain of a move, of the square of the step."""
+SWEEPS = 60
+"""Most sweeps through all positions on one grid."""
+FURTHER = np.array([1.0, 2.0, 4.0, 8.0, 16.0])
+"""Times that the moves of two sweeps are repeated at once by all positions, if that is better."""
 
 
 def refine(
     task: Task, criterion: Criterion, space: Space, constraints: Constraints, start: Array
 ) -> Array:
-    """Improve positions by their derivatives.
+    """Improve positions by small moves.
 
     Parameters
     ----------
@@ -38,107 +47,82 @@ def refine(
     -------
     (n, 3) array of unit vectors that meets all constraints, no worse than `start`
     """
-    best, smallest = start, float(criterion.value(task.normal(start)))
     if not space.tangents(start).shape[2]:
         return start
-    for _ in range(ROUNDS):
-        found = _round(_Chart(task, criterion, space, best), constraints)
-        value = float(criterion.value(task.normal(found)))
-        if not constraints.kept(found) or not value < smallest - 1e-10:
-            break
-        best, smallest = found, value
-    return best
+    directions = start
+    for step in STEPS:
+        directions = _Grid(task, criterion, space, constraints, directions, step).settled()
+    return directions
 
 
-class _Chart:
-    """Positions as functions of free coordinates: distances along the tangents at a start."""
+class _Grid:
+    """Positions as functions of whole numbers: steps along the tangents at a start."""
 
-    def __init__(self, task: Task, criterion: Criterion, space: Space, start: Array) -> None:
-        self.task, self.criterion, self.start = task, criterion, start
-        self.tangents = space.tangents(start)
-        self.shape = self.tangents.shape[::2]
+    def __init__(
+        self,
+        task: Task,
+        criterion: Criterion,
+        space: Space,
+        constraints: Constraints,
+        start: Array,
+        step: float,
+    ) -> None:
+        self.task, self.criterion, self.constraints = task, criterion, constraints
+        self.start, self.tangents = start, step * space.tangents(start)
+        self.moves = np.array(list(product((0.0, -1.0, 1.0), repeat=self.tangents.shape[2])))
+        self.gain = GAIN * step**2
 
     def directions(self, t: Array) -> Array:
-        """Positions (n, 3) at coordinates (n d,)."""
-        moved = self.start + np.einsum("nkd,nd->nk", self.tangents, t.reshape(self.shape))
-        return np.asarray(moved / np.linalg.norm(moved, axis=1, keepdims=True))
+        """Positions (..., n, 3) after whole steps (..., n, d)."""
+        moved = self.start + np.sum(self.tangents * t[..., None, :], axis=-1)
+        return np.asarray(moved / np.linalg.norm(moved, axis=-1, keepdims=True))
 
-    def around(self, t: Array) -> Array:
-        """Positions one step forward and one back in each coordinate, (2, d, n, 3)."""
-        d = self.shape[1]
-        steps = STEP * np.eye(d)[None, :, None, :] * np.array([-1.0, 1.0])[:, None, None, None]
-        return np.array(
-            [[self.directions((t.reshape(self.shape) + s).ravel()) for s in side] for side in steps]
-        )
+    def settled(self) -> Array:
+        """Positions of which none gains by a move."""
+        t = np.zeros((len(self.start), self.moves.shape[1]))
+        before = t
+        for _ in range(SWEEPS):
+            moved = self._sweep(t)
+            if not moved.any():
+                break
+            t, before = self._further(t + moved, t + moved - before), t + moved
+        return self.directions(t)
 
-    def value_and_gradient(self, t: Array) -> tuple[float, Array]:
-        """Criterion and its derivative by the coordinates."""
-        n, d = self.shape
-        points = np.concatenate([self.directions(t)[None], self.around(t).reshape(2 * d, n, 3)])
-        informations = self.task.informations(points.reshape(-1, 3))
-        normal = self.task.prior + informations[:n].sum(axis=0)
-        by_normal = self.criterion.gradient(normal)
-        each = np.einsum("kuw,uw->k", informations[n:], by_normal).reshape(2, d, n)
-        return float(self.criterion.value(normal)), ((each[1] - each[0]) / (2 * STEP)).T.ravel()
+    def _sweep(self, t: Array) -> Array:
+        """Move each position in turn to the best place beside it; the moves, (n, d)."""
+        around = self.directions(t + self.moves[:, None, :])
+        m, n = around.shape[:2]
+        flat = around.reshape(-1, 3)
+        informations = self.task.informations(flat).reshape(m, n, *self.task.prior.shape)
+        inside = np.all(self.constraints.margins(flat) >= -TOLERANCE, axis=1).reshape(m, n)
+        changes = informations - informations[0]
+        normal = self.task.prior + informations[0].sum(axis=0)
+        value, slope = float(self.criterion.value(normal)), self.criterion.gradient(normal)
+        taken = np.zeros(n, dtype=int)
+        for i in range(n):
+            # A convex criterion cannot fall by more than its derivative says.
+            promised = np.sum(changes[:, i] * slope, axis=(1, 2))
+            tried = np.flatnonzero(inside[:, i] & (promised < -self.gain))
+            if self.constraints.pair is not None:
+                others = np.delete(around[taken, np.arange(n)], i, axis=0)
+                tried = tried[self.constraints.pair.apart(around[tried, i], others).all(axis=1)]
+            if not len(tried):
+                continue
+            values = self.criterion.value(normal + changes[tried, i])
+            best = first_best(values)
+            if values[best] < value - self.gain:
+                taken[i], value = tried[best], float(values[best])
+                normal = normal + changes[taken[i], i]
+                slope = self.criterion.gradient(normal)
+        return self.moves[taken]
 
-
-def _round(chart: _Chart, constraints: Constraints) -> Array:
-    from scipy.optimize import minimize  # slow to import
-
-    t = np.zeros(np.prod(chart.shape))
-    if not constraints.texts:
-        options = {"maxiter": ITERATIONS}
-        found = minimize(chart.value_and_gradient, t, jac=True, method="L-BFGS-B", options=options)
-        return chart.directions(found.x)
-    kept = {
-        "type": "ineq",
-        "fun": lambda t: _margins(chart, constraints, t),
-        "jac": lambda t: _margins_by_coordinates(chart, constraints, t),
-    }
-    found = minimize(
-        chart.value_and_gradient,
-        t,
-        jac=True,
-        method="SLSQP",
-        bounds=[(-NEAR / 2, NEAR / 2)] * len(t),
-        constraints=[kept],
-        options={"maxiter": ITERATIONS},
-    )
-    return chart.directions(found.x)
-
-
-def _pairs(chart: _Chart, constraints: Constraints) -> tuple[NDArray[np.int_], ...]:
-    """Pairs of positions that may come too near."""
-    if constraints.pair is None:
-        return (np.zeros(0, dtype=int),) * 2
-    cosines = chart.start @ chart.start.T
-    return np.nonzero(np.triu(cosines > np.cos(min(constraints.pair.angle + 3 * NEAR, np.pi)), 1))
-
-
-def _margins(chart: _Chart, constraints: Constraints, t: Array) -> Array:
-    """Margins of all constraints, first those of single attitudes."""
-    u = chart.directions(t)
-    i, j = _pairs(chart, constraints)
-    pairs = np.zeros(0)
-    if constraints.pair is not None:
-        pairs = np.cos(constraints.pair.angle) - np.sum(u[i] * u[j], axis=1)
-    return np.concatenate([constraints.margins(u).ravel(), pairs])
-
-
-def _margins_by_coordinates(chart: _Chart, constraints: Constraints, t: Array) -> Array:
-    n, d = chart.shape
-    u, (before, behind) = chart.directions(t), chart.around(t)
-    slopes = [
-        (constraints.margins(b) - constraints.margins(a)) / (2 * STEP)
-        for a, b in zip(before, behind, strict=True)
-    ]
-    single = np.zeros((n, slopes[0].shape[1], n, d))
-    for k, slope in enumerate(slopes):
-        single[np.arange(n), :, np.arange(n), k] = slope
-    i, j = _pairs(chart, constraints)
-    pairs = np.zeros((len(i), n, d))
-    for k in range(d):
-        moved = (behind[k] - before[k]) / (2 * STEP)
-        pairs[np.arange(len(i)), i, k] -= np.sum(moved[i] * u[j], axis=1)
-        pairs[np.arange(len(i)), j, k] -= np.sum(moved[j] * u[i], axis=1)
-    return np.concatenate([single.reshape(-1, n * d), pairs.reshape(-1, n * d)])
+    def _further(self, t: Array, moved: Array) -> Array:
+        """Repeat the last moves of all positions as often as is best."""
+        tried = t + np.concatenate([[0.0], FURTHER])[:, None, None] * moved
+        found = self.directions(tried)
+        each = self.task.informations(found.reshape(-1, 3)).reshape(*found.shape[:2], -1)
+        normals = self.task.prior + each.sum(axis=1).reshape(-1, *self.task.prior.shape)
+        values = self.criterion.value(normals)
+        values[[not self.constraints.kept(u) for u in found]] = np.inf
+        best = first_best(values)
+        return np.asarray(tried[best if values[best] < values[0] - self.gain else 0])

@@ -10,6 +10,7 @@ from accelstudy.basics.units import GON
 from accelstudy.design.optimal.constraints import Constraints
 from accelstudy.design.optimal.criteria import Criterion
 from accelstudy.design.optimal.task import Task
+from accelstudy.positions.choice import first_best
 
 Array = NDArray[np.float64]
 
@@ -46,7 +47,7 @@ def with_repeats(
     joined = directions.copy()
     for i in range(count):
         members = np.flatnonzero(group == i)
-        middle = cosines[np.ix_(members, members)].sum(axis=1).argmax()
+        middle = first_best(-cosines[np.ix_(members, members)].sum(axis=1))
         joined[members] = directions[members[middle]]
     before, after = (float(criterion.value(task.normal(u))) for u in (directions, joined))
     return joined if after <= before + COST else directions
