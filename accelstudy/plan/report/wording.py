@@ -64,7 +64,9 @@ def answer_lines(answer: Answer) -> list[str]:
     lines.append(_fewest(question, first))
     target = quantity_text(question.target, "rad")
     if question.confidence is None:
-        wanted = f"For both to stay below {target} in {100 * OTHER_CONFIDENCE:g} of 100 calibrations"
+        wanted = (
+            f"For both to stay below {target} in {100 * OTHER_CONFIDENCE:g} of 100 calibrations"
+        )
     else:
         wanted = f"For {target} in the rms only"
     other = answer.stricter
@@ -99,12 +101,14 @@ def _fewest(question: Question, ranked: Ranked) -> str:
     n = ranked.candidate.scheme.n_positions
     if ranked.fewer is None:
         return "With fewer positions an error in one of them would not be noticed."
-    known = ranked.simulated.uncertainty(question.confidence)
-    return (
-        f"Fewer do not suffice: {n - 1} positions leave "
-        f"{_angle(ranked.fewer.accuracy(question.confidence))} (± {_angle(known)}, from "
-        f"{ranked.simulated.simulated} simulated calibrations)."
+    left, known = (
+        ranked.fewer.accuracy(question.confidence),
+        ranked.simulated.uncertainty(question.confidence),
     )
+    simulated = f"{_angle(left)} ± {_angle(known)}, from {ranked.simulated.simulated} simulations"
+    if left - 2 * known < question.target:
+        return f"Whether {n - 1} would do is within the error of the simulation ({simulated})."
+    return f"Fewer do not suffice: {n - 1} positions leave {simulated}."
 
 
 def _linear(question: Question, candidate: Candidate) -> list[str]:

@@ -195,9 +195,7 @@ class Simulation:
         and_no_fewer : bool, whether one position less is simulated, too, until it does not suffice
         """
         n, target = candidate.scheme.n_positions, self.question.target
-        sought = Sought(
-            self.question, candidate.equipment, candidate.model.name, candidate.hold
-        )
+        sought = Sought(self.question, candidate.equipment, candidate.model.name, candidate.hold)
         reached, missed = None, None
         for _ in range(TRIES):
             tried = candidate if n == candidate.scheme.n_positions else sought.candidate(n)

@@ -105,9 +105,7 @@ class Sought:
         return known.get(high)
 
 
-def cheapest(
-    question: Question, good: Sequence[Candidate], confidence: float | None
-) -> Candidate:
+def cheapest(question: Question, good: Sequence[Candidate], confidence: float | None) -> Candidate:
     """Cheapest calibration: a known one, or one in the fewest of the best positions.
 
     Parameters
