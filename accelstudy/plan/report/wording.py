@@ -32,7 +32,6 @@ from accelstudy.plan.search.answer import OTHER_CONFIDENCE, Answer, Ranked
 from accelstudy.plan.search.candidates import NINE, Candidate, shortest
 from accelstudy.plan.search.optimised import is_best, request_of
 from accelstudy.plan.search.question import Equipment, Question
-from accelstudy.proposal.request import Request
 from accelstudy.sensors.sensor import SensorModel
 
 VERDICTS = {

@@ -143,7 +143,7 @@ def setups(
 
 
 def _tilt(cells: pd.DataFrame, tables: Tables) -> dict[str, NDArray[np.float64]]:
-    """Tilt error of each cell: rms, central 95 %, and what 95 % stay below in each angle, in both."""
+    """Tilt error of each cell: rms, central 95 %, and what 95 % stay below, singly and in both."""
     leveling, quantiles = tables["leveling"].set_index("cell"), tables["quantiles"]
     quantiles = quantiles[quantiles["quantity"] == "tilt"]
     found = {}
