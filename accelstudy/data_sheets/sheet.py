@@ -26,6 +26,18 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "full_scale": ("m/s^2", "the sensor measures ± this"),
 }
 """Quantities of a data sheet: SI unit and meaning."""
+MOST = {
+    "m/s^2/sqrt(Hz)": 10.0,
+    "m/s^2/sqrt(s)": 10.0,
+    "m/s^2/K": 10.0,
+    "m/s^2": 1e6,
+    "1/K": 1.0,
+    "1": 1.0,
+    "rad": 1.0,
+}
+"""Largest value of a quantity by its unit; beyond it nothing is a sensor for leveling."""
+LEAST_FULL_SCALE = 1.0
+"""m/s²."""
 
 
 @dataclass(frozen=True)

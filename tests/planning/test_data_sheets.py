@@ -201,3 +201,17 @@ def test_a_log_that_is_too_short_ends_with_one_line(rows, message, tmp_path):
 def test_a_log_is_no_sensor_and_says_how_to_make_one(still_log):
     with pytest.raises(InputError, match=r"accelstudy data-sheet .*still\.csv --out still\.yaml"):
         get_sensor(str(still_log))
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "noise_density: 1e300 ug/sqrt(Hz)",
+        "{noise_density: 25 ug/sqrt(Hz), nonlinearity: 1 %, full_scale: 1e-200 g}",
+        "{noise_density: 25 ug/sqrt(Hz), scale_per_kelvin: 1e200 ppm/K}",
+    ],
+)
+def test_an_impossible_data_sheet_is_said_in_a_line(line, tmp_path):
+    (tmp_path / "mine.yaml").write_text(line, encoding="utf-8")
+    with pytest.raises(InputError, match="mine.yaml: .*must be at (most|least)"):
+        read_data_sheet(tmp_path / "mine.yaml")

@@ -73,7 +73,7 @@ class Sought:
         )
 
     def candidate(self, n: int) -> Candidate | None:
-        """Calibration in the best n positions; None if so many are not allowed or do not suffice."""
+        """Calibration in the best n positions; None if so many are not allowed, or too few."""
         if not self.least <= n <= self.most:
             return None
         alone = replace(self.question, holds=(self.hold,))

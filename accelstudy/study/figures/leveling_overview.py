@@ -54,8 +54,8 @@ NOT_ESTIMABLE: Style = {
     (left and right). The upper number is the rms over attitudes and calibrations, which also gives
     the colour; the lower one, the same for roll and pitch, is what both angles stay below in
     95 % of the calibrations: decide by it where one calibration must do. The noise of the leveled
-    reading itself comes on top. Hatched cells cannot be estimated; fields left white are not part of the study.
-    Unless the study says otherwise the simulated sensor has just the effects of the model, so that
+    reading itself comes on top. Hatched cells cannot be estimated; fields left white are not part
+    of the study. Unless the study says otherwise the simulated sensor has just the effects of the model, so that
     a larger model faces a more difficult sensor: compare schemes and approaches within a column.
     """,
     tables=("cells", "leveling"),
@@ -106,7 +106,7 @@ def tilt_errors(tables: Tables, study: StudyConfig) -> Figure:
     text: Style = {"linestyle": "", "marker": ""}
     noise = f"{study.sigma_force * 1e3:.3g} mm/s²"
     labels = [
-        f"upper number: rms / {unit}; lower one: both angles stay below in 95 % of the calibrations",
+        f"upper number: rms / {unit}; lower: both angles stay below in 95 % of the calibrations",
         f"not in it: the noise of a single reading, at {noise} and level {one_reading:.1f} {unit}",
     ]
     fig.legend(
