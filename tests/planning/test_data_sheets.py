@@ -16,6 +16,7 @@ from accelstudy.data_sheets import (
     get_data_sheet,
     of_sigma,
     parse_data_sheet,
+    read_data_sheet,
 )
 from accelstudy.data_sheets.flicker import FLICKER, flicker_change
 from accelstudy.plan.search.sensors import get_sensor
@@ -213,5 +214,5 @@ def test_a_log_is_no_sensor_and_says_how_to_make_one(still_log):
 )
 def test_an_impossible_data_sheet_is_said_in_a_line(line, tmp_path):
     (tmp_path / "mine.yaml").write_text(line, encoding="utf-8")
-    with pytest.raises(InputError, match="mine.yaml: .*must be at (most|least)"):
+    with pytest.raises(InputError, match=r"mine\.yaml: .*must be at (most|least)"):
         read_data_sheet(tmp_path / "mine.yaml")

@@ -55,8 +55,9 @@ NOT_ESTIMABLE: Style = {
     the colour; the lower one, the same for roll and pitch, is what both angles stay below in
     95 % of the calibrations: decide by it where one calibration must do. The noise of the leveled
     reading itself comes on top. Hatched cells cannot be estimated; fields left white are not part
-    of the study. Unless the study says otherwise the simulated sensor has just the effects of the model, so that
-    a larger model faces a more difficult sensor: compare schemes and approaches within a column.
+    of the study. Unless the study says otherwise the simulated sensor has just the effects of the
+    model, so that a larger model faces a more difficult sensor: compare schemes and approaches
+    within a column.
     """,
     tables=("cells", "leveling"),
     when=lambda study: not any(varies(study, noise) for noise in NOISES),
