@@ -1,19 +1,21 @@
 """The command `accelstudy`, also as ``python -m accelstudy``."""
 
-import _signal  # type: ignore[import-not-found]  # `signal` is slow: it makes enums first
 import gc
 import os
+import signal
 
 
 def run() -> None:
     """Run the command line."""
     # Until a command begins nothing is written, so Ctrl-C may end it at once.
-    if _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler:
-        _signal.signal(_signal.SIGINT, _end)
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, _end)
     # Imports and figures make a million objects that stay. To look for garbage among them again
     # and again takes a tenth of the time of a command.
     gc.set_threshold(100_000, 50, 50)
     os.environ["MPLBACKEND"] = "agg"  # figures go to files; a name of no backend would be an error
+    # The matrices are small: threads of BLAS would spend most of their time on waiting.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from accelstudy.commands.main import main
 
     main(prog_name="accelstudy")

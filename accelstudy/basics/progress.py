@@ -55,6 +55,12 @@ def show(text: str) -> None:
     click.echo("\n".join(map(printable, text.split("\n"))))
 
 
+def begin(text: str) -> None:
+    """Say on standard error that long work begins, where no bar can show it: it is no terminal."""
+    if not _quiet.get() and not sys.stderr.isatty():
+        click.echo(text, err=True)
+
+
 def warn(text: str) -> None:
     """Print a warning on standard error, whether the command is quiet or not."""
     click.echo(f"warning: {printable(text)}", err=True)

@@ -90,7 +90,7 @@ _TURN = 200 * GON
     default="I",
     show_default=True,
     help="I: variance of roll and pitch; D: determinant of the parameters' covariance matrix; "
-    "A: mean variance of the parameters.",
+    "A: mean variance of the parameters; minimax: variance of the worse of roll and pitch.",
 )
 @click.option(
     "--tilt-range",

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.progress import say
+from accelstudy.basics.progress import begin, say
 from accelstudy.basics.units import GON, MGON
 from accelstudy.commands.options import (
     PATH,
@@ -116,7 +116,7 @@ _SECTIONS = {
     type=Confidence(),
     default="rms",
     show_default=True,
-    help="What must reach the accuracy: the rms, or so many of the calibrations, as 95%.",
+    help="What must reach the accuracy: the rms, or both angles in so many calibrations, as 95%.",
 )
 @click.option(
     "--hold",
@@ -212,6 +212,7 @@ def plan_command(
             "plan: give the sensor by --sensor, or its noise by --sigma"
             + (", not both" if sensor else "")
         )
+    begin("comparing calibrations, which takes some seconds ...")
     from accelstudy.data_sheets import of_sigma
     from accelstudy.plan.report.wording import (
         answer_lines,

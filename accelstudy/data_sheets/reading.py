@@ -12,7 +12,7 @@ from typing import Any
 
 from accelstudy.basics.errors import InputError, UnknownNameError, shown
 from accelstudy.basics.units import parse_quantity
-from accelstudy.data_sheets.sheet import QUANTITIES, DataSheet
+from accelstudy.data_sheets.sheet import LEAST_FULL_SCALE, MOST, QUANTITIES, DataSheet
 from accelstudy.files.layers import read_layer
 
 TEXTS = ("name", "title", "source")
@@ -110,6 +110,11 @@ def _quantity(key: str, given: Any) -> tuple[float, str]:
         raise InputError(f"{key}: {error}") from None
     if size < 0 or (size == 0 and key in (DENSITY, "velocity_random_walk", "position_sigma")):
         raise InputError(f"{key}: must be more than 0, not {shown(text)}")
+    if size > MOST[unit] or (key == "full_scale" and size < LEAST_FULL_SCALE):
+        bound = f"at most {MOST[unit]:g} {unit}"
+        if size <= MOST[unit]:
+            bound = f"at least {LEAST_FULL_SCALE:g} {unit}"
+        raise InputError(f"{key}: must be {bound}, not {shown(text)}")
     return size, where
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 from accelstudy.basics.errors import InputError
@@ -26,6 +26,18 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "full_scale": ("m/s^2", "the sensor measures ± this"),
 }
 """Quantities of a data sheet: SI unit and meaning."""
+MOST = {
+    "m/s^2/sqrt(Hz)": 10.0,
+    "m/s^2/sqrt(s)": 10.0,
+    "m/s^2/K": 10.0,
+    "m/s^2": 1e6,
+    "1/K": 1.0,
+    "1": 1.0,
+    "rad": 1.0,
+}
+"""Largest value of a quantity by its unit; beyond it nothing is a sensor for leveling."""
+LEAST_FULL_SCALE = 1.0
+"""m/s²."""
 
 
 @dataclass(frozen=True)
@@ -110,25 +122,37 @@ class DataSheet:
         rising = (self.acceleration_random_walk or 0.0) ** 2 * seconds / 3
         return math.sqrt(white + flicker * floor + walk * rising)
 
-    def bias_change(self, seconds: float, kelvin: float = 0.0, restarted: bool = False) -> float:
+    def bias_change(self, seconds: float, restarted: bool = False) -> float:
         """Standard deviation of the bias's change since the calibration, m/s².
 
-        It is √(F² + K² t + (b_T ΔT)² + repeatability²) with F of `flicker_change`. Unknown
-        quantities count as zero; `unknown` lists them.
+        It is √(F² + K² t + repeatability²) with F of `flicker_change`. Unknown quantities count as
+        zero; `unknown` lists them. What a temperature adds says `warmed`.
 
         Parameters
         ----------
         seconds : float, s, since the calibration; 0 for none
-        kelvin : float, K, by which the temperature differs from that of the calibration
         restarted : bool, whether the sensor was switched off and on in between
         """
         floor = flicker_change(
             self.bias_instability or 0.0, self.velocity_random_walk or 0.0, seconds
         )
         walk = (self.acceleration_random_walk or 0.0) * math.sqrt(seconds)
-        warm = (self.bias_per_kelvin or 0.0) * kelvin
         again = (self.repeatability or 0.0) if restarted else 0.0
-        return math.hypot(floor, walk, warm, again)
+        return math.hypot(floor, walk, again)
+
+    def warmed(self, kelvin: float, corrected: Collection[str] = ()) -> tuple[float, float]:
+        """Standard deviations of what a temperature changes: of the bias, m/s², and of the scale.
+
+        Coefficients that are unknown count as zero.
+
+        Parameters
+        ----------
+        kelvin : float, K, difference from the temperature of the calibration
+        corrected : those of "bias" and "scale" whose change is known and corrected
+        """
+        bias = 0.0 if "bias" in corrected else (self.bias_per_kelvin or 0.0) * abs(kelvin)
+        scale = 0.0 if "scale" in corrected else (self.scale_per_kelvin or 0.0) * abs(kelvin)
+        return bias, scale
 
     @property
     def quadratic_scale(self) -> float | None:

@@ -83,7 +83,11 @@ POLE = Kind(
     "pole.json",
     ("budget.parquet", "monte-carlo.parquet", "budget.svg", "budget.png"),
 )
-PLAN = Kind("plan", "plan.parquet", ("plan.md", "study.yaml", "plan.svg", "plan.png"))
+PLAN = Kind(
+    "plan",
+    "plan.parquet",
+    ("plan.md", "positions.yaml", "study.yaml", "plan.svg", "plan.png"),
+)
 STUDY = Kind(
     "study",
     "Snakefile",

@@ -44,9 +44,9 @@ class Proposal:
     directions: Array
 
     @classmethod
-    def of(cls, request: Request) -> Proposal:
-        """Find and order the positions; errors are those of `Request.find`."""
-        design = request.find()
+    def of(cls, request: Request, found: Design | None = None) -> Proposal:
+        """Find the positions, unless they are given, and order them; errors as `Request.find`."""
+        design = request.find() if found is None else found
         space, groups = request.space, None
         if isinstance(space, Mountings):
             groups = _fewest_axes(space, design.directions)

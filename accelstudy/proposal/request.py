@@ -26,11 +26,12 @@ from accelstudy.design.optimal.spaces import Mountings, Space, Sphere, by_eye, c
 from accelstudy.design.optimal.task import Task
 from accelstudy.effects import get_effect
 from accelstudy.leveling.error import MAX_TILT_GON
+from accelstudy.proposal.worse_angle import WorseAngle, worse_angle
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise
 
-CRITERIA = ("I", "D", "A")
+CRITERIA = ("I", "D", "A", WorseAngle.name)
 SPACES = ("all", "cube", "hand")
 HAND_STEP = np.pi / 6
 """rad, step in which a person judges roll and pitch by eye."""
@@ -142,6 +143,8 @@ class Request:
         """The criterion."""
         if self.discriminate:
             return rivals(self.task, *self._rivals)
+        if self.criterion == WorseAngle.name:
+            return worse_angle(self.task)
         return get_criterion("robust" if self.neglect else self.criterion, self.task)
 
     @cached_property
@@ -176,8 +179,12 @@ class Request:
         pair = None if self.least_angle is None else LeastAngle(self.least_angle)
         return Constraints(tuple(single), pair)
 
-    def find(self) -> Design:
+    def find(self, bounded: bool = True) -> Design:
         """Find the positions.
+
+        Parameters
+        ----------
+        bounded : bool, whether a bound of how good they can be is wanted
 
         Raises
         ------
@@ -192,6 +199,7 @@ class Request:
             self.constraints,
             self.seed,
             self.starts,
+            bounded,
         )
 
 

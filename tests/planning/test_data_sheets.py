@@ -16,6 +16,7 @@ from accelstudy.data_sheets import (
     get_data_sheet,
     of_sigma,
     parse_data_sheet,
+    read_data_sheet,
 )
 from accelstudy.data_sheets.flicker import FLICKER, flicker_change
 from accelstudy.plan.search.sensors import get_sensor
@@ -66,7 +67,7 @@ def test_the_bias_changes_with_time_temperature_and_switching_on():
     )  # fmt: skip
     assert sheet.bias_change(0.0) == 0
     assert sheet.bias_change(3600.0) == pytest.approx(6e-4)
-    assert sheet.bias_change(3600.0, 10.0) == pytest.approx(math.hypot(6e-4, 1e-2))
+    assert sheet.warmed(10.0) == pytest.approx((1e-2, 0.0))
     assert sheet.bias_change(0.0, restarted=True) == pytest.approx(5e-3)
 
 
@@ -201,3 +202,17 @@ def test_a_log_that_is_too_short_ends_with_one_line(rows, message, tmp_path):
 def test_a_log_is_no_sensor_and_says_how_to_make_one(still_log):
     with pytest.raises(InputError, match=r"accelstudy data-sheet .*still\.csv --out still\.yaml"):
         get_sensor(str(still_log))
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "noise_density: 1e300 ug/sqrt(Hz)",
+        "{noise_density: 25 ug/sqrt(Hz), nonlinearity: 1 %, full_scale: 1e-200 g}",
+        "{noise_density: 25 ug/sqrt(Hz), scale_per_kelvin: 1e200 ppm/K}",
+    ],
+)
+def test_an_impossible_data_sheet_is_said_in_a_line(line, tmp_path):
+    (tmp_path / "mine.yaml").write_text(line, encoding="utf-8")
+    with pytest.raises(InputError, match=r"mine\.yaml: .*must be at (most|least)"):
+        read_data_sheet(tmp_path / "mine.yaml")

@@ -47,9 +47,8 @@ HAS = ("bias", "scale", "nonorthogonality", "quadratic_scale")
 
 @pytest.fixture(autouse=True)
 def few_schemes(monkeypatch):
-    """A few schemes are enough, and optimal ones take long."""
+    """A few schemes are enough."""
     monkeypatch.setattr(planned, "SIZES", (9, 12, 20, 30, 40, 80))
-    monkeypatch.setattr(planned, "OPTIMAL_SIZES", ())
 
 
 def asked(sheet=None, **options):
@@ -133,6 +132,8 @@ def test_the_quantile_is_that_of_draws():
     for share in (0.5, 0.9, 0.95, 0.99):
         drawn = np.sqrt(np.quantile(squares, share, axis=0))
         np.testing.assert_allclose(expected.quantile(share), drawn, rtol=0.03)
+        both = np.sqrt(np.quantile(squares.max(axis=1), share))
+        assert expected.of_both(share) == pytest.approx(both, rel=0.04)
 
 
 def test_a_rotation_that_gravity_cannot_see_makes_no_candidate():
@@ -150,7 +151,6 @@ def test_a_rotation_that_gravity_cannot_see_makes_no_candidate():
 def found():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(planned, "SIZES", (9, 12, 20, 30, 40, 80, 120))
-        patch.setattr(planned, "OPTIMAL_SIZES", (27,))
         return answer(asked(), replicates=1000)
 
 
@@ -166,8 +166,8 @@ def test_the_answer_is_the_cheapest_that_reaches_the_target(found):
     assert all(c.rms > 9.6 * MGON for c in cheaper)  # linear theory may be optimistic, by little
     times = [r.candidate.seconds for r in found.ranked]
     assert times == sorted(times)
-    assert len({r.candidate.kind[:2] for r in found.ranked}) == len(found.ranked)
-    assert found.stricter.scheme.n_positions >= 100  # docs/guides/paper.md: 100 for 95 %
+    assert len({r.candidate.kind for r in found.ranked}) == len(found.ranked)
+    assert 60 < found.stricter.candidate.scheme.n_positions < 90
 
 
 def test_simulation_agrees_with_linear_theory(found):
@@ -264,11 +264,12 @@ def test_the_answer_stands_in_the_first_line(found):
     assert lines[0] == (
         f"You need no robot. Measure {n} positions by hand, 10 s each: about {minutes} minutes."
     )
-    assert "95 stay below" in lines[1]
-    assert lines[2].startswith("For 95 of 100 calibrations to stay below 10 mgon: ")
-    assert "with a robot" in lines[3]
+    assert "in 95 of 100 such calibrations both stay below" in lines[1]
+    assert f"{n - 1}" in lines[2]
+    assert lines[3].startswith("For both to stay below 10 mgon in 95 of 100 calibrations: ")
+    assert "with a robot" in lines[4]
     table = table_lines(found)
-    assert len(table) == len(found.ranked) + 3
+    assert len(table) == len(found.ranked) + 4
     assert "noise of the sensor" in table[1]
     with angles_in("deg"):
         assert " mdeg" in answer_lines(found)[1]
@@ -338,7 +339,8 @@ def test_the_command_writes_what_it_says(tmp_path):
     assert result.exit_code == 0, result.output
     assert result.stdout.startswith("Measure ")
     names = {path.name for path in out.iterdir()}
-    assert names == {"plan.parquet", "plan.md", "plan.svg", "plan.png", "study.yaml"}
+    pages = {"plan.md", "plan.svg", "plan.png"}
+    assert names == {"plan.parquet", "positions.yaml", "study.yaml", *pages}
     table = read_table(out / "plan.parquet")
     top = table[table["rank"] == 1].iloc[0]
     assert top["roll_rms_simulated_mgon"] <= 20
@@ -370,22 +372,14 @@ def test_a_scheme_of_a_file_is_compared_and_named_by_its_path(tmp_path):
     assert result.simulated == 200
 
 
-def test_optimal_positions_are_as_few_as_suffice(monkeypatch):
-    monkeypatch.setattr(planned, "OPTIMAL_SIZES", (10, 27, 80))
-    question = asked(equipment=(BY_HAND,))
-    names = {c.scheme.name for c in candidates(question)}
-    assert "i-optimal-27" in names  # fewer than the 30 that are known to suffice
-    assert "i-optimal-10" not in names  # which would be far too few
-    assert "i-optimal-80" not in names
-
-
 def test_an_unreachable_target_has_an_exit_status_of_its_own():
     result = call(
         "plan", "--tilt-accuracy", "0.01mgon", "--sigma", "2mm/s2", "--equipment", "gravity"
     )
     assert result.exit_code == 1
     assert result.stdout.count("\n") == 1
-    assert result.stderr == ""
+    assert result.stderr == "comparing calibrations, which takes some seconds ...\n"
+    assert call(*ASKED, "--equipment", "gravity", "--quiet").stderr == ""
 
 
 @pytest.mark.parametrize(

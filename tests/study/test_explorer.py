@@ -101,6 +101,7 @@ def test_set_ups_are_those_of_the_tables(page, tables):
     same([row["robot-noise"] for row in rows], robot)
     leveling = tables["leveling"].set_index("cell").reindex(cells["cell"])
     tilt = tables["quantiles"].query("quantity == 'tilt'").set_index(["cell", "name"])
+    same([row["both_q95"] for row in rows], leveling["both_rms_q95_mgon"])
     for angle in ("roll", "pitch"):
         same([row[f"{angle}_rms"] for row in rows], leveling[f"{angle}_rms_mgon"])
         same([row[f"{angle}_q95"] for row in rows], leveling[f"{angle}_rms_q95_mgon"])
@@ -310,6 +311,8 @@ def test_a_choice_leaves_its_set_ups_and_shows_their_numbers(shown, tables):
         text = f"{angle} {number(tilt[f'{angle}_rms_mgon'])} mgon rms"
         text += f" (95 % below {number(tilt[f'{angle}_rms_q95_mgon'])})"
         assert text in facts.nth(1).inner_text()
+    both = f"95 % below {number(tilt['both_rms_q95_mgon'])} in both"
+    assert both in facts.nth(1).inner_text()
     its = tables["summary"][tables["summary"]["cell"] == robot]
     for key, name in (("empirical", "sd_empirical"), ("linear", "sd_linear")):
         assert column(shown, key, "parameters")[-len(its) :] == [number(x) for x in its[name]]
@@ -369,7 +372,7 @@ def test_the_table_sorts_by_a_click_or_a_key(shown, tables):
 
 
 def test_filters_by_tilt_error_and_by_state(shown, tables):
-    most = tables["leveling"][["roll_rms_q95_mgon", "pitch_rms_q95_mgon"]].max(axis=1)
+    most = tables["leveling"]["both_rms_q95_mgon"]
     limit = float(f"{most.median():.3g}")
     shown.fill("#need", str(limit))
     left = (most <= limit).sum()

@@ -262,7 +262,7 @@ def test_the_tilt_overview_shows_rms_quantile_and_the_noise_of_a_reading(tables,
     drawn = draw("leveling-overview", tables, paper)
     row = tables["leveling"].set_index("cell").loc[f"{NINE}/mclaren-24/gravity"]
     written = {text.get_text() for text in drawn.axes[0].texts}
-    assert {f"{row['roll_rms_mgon']:.1f}", f"{row['roll_rms_q95_mgon']:.1f}"} <= written
+    assert {f"{row['roll_rms_mgon']:.1f}", f"{row['both_rms_q95_mgon']:.1f}"} <= written
     legend = " ".join(text.get_text() for text in drawn.legends[0].get_texts())
     assert "95 % of the calibrations" in legend
     assert "13.0 mgon" in legend

@@ -127,7 +127,7 @@ def test_without_replicates_the_tables_are_the_same(kept, summed):
 
 def test_a_tilt_error_is_that_about_the_pilot(kept, summed):
     """The calibration about which tilt errors are linear is the mean of a block, not of all."""
-    column = ["roll_rms_q95_mgon", "pitch_rms_q95_mgon"]
+    column = ["roll_rms_q95_mgon", "pitch_rms_q95_mgon", "both_rms_q95_mgon"]
     rows = kept["leveling"]["model"] == "bias-scale"
     np.testing.assert_allclose(
         summed["leveling"].loc[rows, column], kept["leveling"].loc[rows, column], rtol=0.002

@@ -343,6 +343,10 @@ def test_tilt_of_a_calibrated_sensor(study, tmp_path):
         density = 2 * np.exp(-(1.96**2) / 2) / np.sqrt(2 * np.pi)
         assert abs(q95 - 1.96) < STANDARD_ERRORS * np.sqrt(0.95 * 0.05 / 3000) / density
 
+    # Two independent angles: both stay below z σ in 95 % with Φ(z) = (1 + √0.95) / 2.
+    both = level["both_rms_q95_mgon"] / expected
+    density = 4 * np.sqrt(0.95) * np.exp(-(2.2365**2) / 2) / np.sqrt(2 * np.pi)
+    assert abs(both - 2.2365) < STANDARD_ERRORS * np.sqrt(0.95 * 0.05 / 3000) / density
     table = study["leveling"].set_index("cell")
     gravity, robot = (table.loc[f"{MCLAREN}/{name}"] for name in ("gravity", "robot"))
     assert (robot.filter(like="_rms") < gravity.filter(like="_rms")).all()

@@ -1,7 +1,7 @@
 from accelstudy.plan.batch.config import PlanConfig
 
 PLAN = section("plan", PlanConfig)
-PLAN_FILES = ["plan.parquet", "plan.md", "plan.svg", "plan.png", "study.yaml"]
+PLAN_FILES = ["plan.parquet", "plan.md", "plan.svg", "plan.png", "positions.yaml", "study.yaml"]
 PLAN_OUTPUTS = [
     *[f"{RESULTS}/plan/cases/{name}/{path}" for name in PLAN.cases for path in PLAN_FILES],
     *[f"{RESULTS}/plan/sensors.{kind}" for kind in ("parquet", "svg", "png")],

@@ -86,7 +86,7 @@ class InUse:
     seconds : float, s, duration of the reading
     drift : float, by the drift of the bias since the calibration; NaN if that is not known
     hours : float, h, since the calibration
-    warmth : float, by the bias at another temperature; NaN if that is not known
+    warmth : float, by bias and scale at another temperature; NaN if neither is known
     kelvin : float, K, difference in temperature
     restart : float, by the bias after switching off and on; NaN if that is not known
     """
@@ -187,18 +187,23 @@ def in_use(
     """Tilt errors in use that add to that of the calibration."""
     sheet = question.sheet
     theory = theory_of(question.tilt_range)
-    columns = theory.columns["bias"]
-    square = np.trace(theory.quadratic[:, columns][:, :, columns], axis1=1, axis2=2).max()
-    per_bias = float(np.sqrt(square))  # rad per m/s² of an error of each axis
-    steady = sheet.bias_instability is None and sheet.acceleration_random_walk is None
-    drift = math.nan if steady else sheet.bias_change(hours * 3600) * per_bias
-    warmth = math.nan
-    if sheet.bias_per_kelvin is not None:
-        warmth = sheet.bias_change(0.0, kelvin) * per_bias
-    restart = math.nan
+
+    def tilt(**sigmas: float) -> float:
+        """Rms of the worse angle that independent errors of each axis leave; by effect, SI."""
+        variance = np.zeros(len(theory.quadratic[0]))
+        for effect, sigma in sigmas.items():
+            variance[theory.columns[effect]] = sigma**2
+        return float(np.sqrt(np.einsum("auu,u->a", theory.quadratic, variance).max()))
+
+    drift = warmth = restart = math.nan
+    if sheet.bias_instability is not None or sheet.acceleration_random_walk is not None:
+        drift = tilt(bias=sheet.bias_change(hours * 3600))
+    if sheet.bias_per_kelvin is not None or sheet.scale_per_kelvin is not None:
+        bias, scale = sheet.warmed(kelvin)
+        warmth = tilt(bias=bias, scale=scale)
     if sheet.repeatability is not None:
-        restart = sheet.bias_change(0.0, restarted=True) * per_bias
-    reading = sheet.sigma_mean(seconds) * per_bias
+        restart = tilt(bias=sheet.bias_change(0.0, restarted=True))
+    reading = tilt(bias=sheet.sigma_mean(seconds))
     return InUse(reading, seconds, drift, hours, warmth, kelvin, restart)
 
 

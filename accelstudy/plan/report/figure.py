@@ -16,9 +16,8 @@ from accelstudy.drawing.style import (
     log_ticks,
     new_figure,
 )
-from accelstudy.plan.search.answer import Answer, by_time
+from accelstudy.plan.search.answer import Answer, Ranked, by_time
 from accelstudy.plan.search.candidates import Candidate
-from accelstudy.plan.search.simulated import Simulated
 
 LABELS = {"gravity": "by hand, gravity alone", "robot": "with a robot"}
 
@@ -49,15 +48,17 @@ def plan_figure(answer: Answer) -> Figure:
         wanted, (1, target), xycoords=("axes fraction", "data"), xytext=(-2, 2),
         textcoords="offset points", ha="right", va="bottom",
     )  # fmt: skip
-    numbers: dict[tuple[str, float], list[str]] = {}
-    for number, ranked in enumerate(answer.ranked, 1):
-        if ranked.simulated is not None:
-            place = (ranked.candidate.equipment.name, ranked.candidate.seconds)
-            numbers.setdefault(place, []).append(str(number))
-            _draw_simulated(ax, numbers[place], ranked.candidate, ranked.simulated, answer)
+    simulated = {n: r for n, r in enumerate(answer.ranked, 1) if r.simulated is not None}
+    above = dict.fromkeys(question.equipment, False)
+    for number, ranked in simulated.items():
+        equipment = ranked.candidate.equipment
+        _draw_simulated(ax, str(number), ranked, above[equipment], question.confidence)
+        above[equipment] = not above[equipment]  # neighbours have their numbers on either side
     ax.set_xlabel("time in the field / minutes")
     measure = (
-        "rms" if question.confidence is None else f"{100 * question.confidence:g} % stay below"
+        "rms"
+        if question.confidence is None
+        else f"both angles stay below in {100 * question.confidence:g} %"
     )
     ax.set_ylabel(f"tilt error left, {measure} / {display_unit('rad')}")
     ax.legend(handles=_handles(answer), loc="lower left", bbox_to_anchor=(0, 1), ncols=2)
@@ -80,18 +81,20 @@ def _draw_equipment(ax: Axes, mine: list[Candidate], confidence: float | None) -
 
 
 def _draw_simulated(
-    ax: Axes, numbers: list[str], candidate: Candidate, simulated: Simulated, answer: Answer
+    ax: Axes, number: str, ranked: Ranked, above: bool, confidence: float | None
 ) -> None:
+    candidate, simulated = ranked.candidate, ranked.simulated
+    assert simulated is not None
     colour = approach_colour(candidate.equipment.name)
-    value = float(to_display(simulated.accuracy(answer.question.confidence), "rad"))
+    value = float(to_display(simulated.accuracy(confidence), "rad"))
     time = candidate.seconds / 60
     ax.plot(
         [time], [value], marker=approach_marker(candidate.equipment.name), markersize=5,
         markerfacecolor="white", markeredgecolor=colour, linestyle="", zorder=5,
     )  # fmt: skip
     ax.annotate(
-        ", ".join(numbers), (time, value), xytext=(0, -11), textcoords="offset points", ha="center",
-        color=colour, zorder=6,
+        number, (time, value), xytext=(0, 11 if above else -11), textcoords="offset points",
+        ha="center", va="center", color=colour, zorder=6,
         bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.8},
     )  # fmt: skip
 

@@ -19,11 +19,15 @@ from accelstudy.plan.report.wording import (
     answer_lines,
     assumption_lines,
     how_to,
+    positions_command,
     reason_lines,
     table_lines,
 )
 from accelstudy.plan.search.answer import Answer
 from accelstudy.plan.search.candidates import Candidate
+from accelstudy.plan.search.optimised import is_best, request_of
+from accelstudy.proposal.design_file import write_design
+from accelstudy.proposal.order import field_order
 
 STUDY_HEAD = """\
 # The simulated candidates of a plan as a study, made by `accelstudy plan`. It reproduces their
@@ -77,9 +81,20 @@ def plan_files(
     content = yaml.safe_dump({**answer.study, "study": study}, sort_keys=False, allow_unicode=True)
     (folder / "study.yaml").write_text(head + content, encoding="utf-8")
     (folder / "plan.md").write_text(plan_page(answer), encoding="utf-8")
+    write_positions(answer, folder / "positions.yaml", study)
     with mpl.rc_context(STYLE):  # type: ignore[arg-type]
         figure = plan_figure(answer)
     save(figure, folder / "plan.svg", folder / "plan.png", "Plan", DPI)
+
+
+def write_positions(answer: Answer, path: Path, name: str) -> None:
+    """Write the recommended positions as a scheme, in the order in which to take them."""
+    question, first = answer.question, answer.first.candidate
+    directions, command = first.scheme.directions, positions_command(question, first)
+    if is_best(first.scheme):
+        order = field_order(request_of(question, first).task, directions)
+        directions = directions[order]
+    write_design(path, name, f"of {name}", command, directions, {"made_by": "accelstudy plan"})
 
 
 def plan_page(answer: Answer) -> str:
@@ -120,6 +135,8 @@ def plan_table(answer: Answer) -> pd.DataFrame:
         for key, values in of_cell.items():
             for angle, value in zip(ANGLES, values, strict=True):
                 row[f"{angle}_{key}_simulated_mgon"] = float(value) / MGON
+        both = np.nan if simulated is None else simulated.of_both(0.95)
+        row["both_rms_q95_simulated_mgon"] = both / MGON
         rows.append(row)
     table = pd.DataFrame(rows)
     return table.astype({"rank": "Int64"})

@@ -8,7 +8,14 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from accelstudy.basics.units import angle_note, display_unit, quantity_text, to_display
+from accelstudy.basics.units import (
+    GON,
+    MGON,
+    angle_note,
+    display_unit,
+    quantity_text,
+    to_display,
+)
 from accelstudy.basics.wording import comma_list, number, words
 from accelstudy.effects import get_effect
 from accelstudy.plan.report.advice import (
@@ -22,7 +29,8 @@ from accelstudy.plan.report.advice import (
     spoilers,
 )
 from accelstudy.plan.search.answer import OTHER_CONFIDENCE, Answer, Ranked
-from accelstudy.plan.search.candidates import Candidate, shortest
+from accelstudy.plan.search.candidates import NINE, Candidate, shortest
+from accelstudy.plan.search.optimised import is_best, request_of
 from accelstudy.plan.search.question import Equipment, Question
 from accelstudy.sensors.sensor import SensorModel
 
@@ -49,17 +57,20 @@ def answer_lines(answer: Answer) -> list[str]:
     lines = [
         f"{opening}{effort(candidate, imperative=True)}.",
         f"Roll and pitch are then right to {_angles(simulated.rms)} (rms) at tilts up to "
-        f"{quantity_text(question.tilt_range, 'rad')}; of 100 such calibrations, "
-        f"{100 * share:g} stay below {_angle(simulated.quantile(share).max())}.",
+        f"{quantity_text(question.tilt_range, 'rad')}; in {100 * share:g} of "
+        f"100 such calibrations both stay below {_angle(simulated.of_both(share))}.",
     ]
+    lines.append(_fewest(question, first))
     target = quantity_text(question.target, "rad")
     if question.confidence is None:
-        wanted = f"For {100 * OTHER_CONFIDENCE:g} of 100 calibrations to stay below {target}"
+        wanted = (
+            f"For both to stay below {target} in {100 * OTHER_CONFIDENCE:g} of 100 calibrations"
+        )
     else:
         wanted = f"For {target} in the rms only"
     other = answer.stricter
     lines.append(
-        f"{wanted}: {effort(other)}."
+        f"{wanted}: {effort(other.candidate)}."
         if other is not None
         else f"{wanted}: nothing tried here would do."
     )
@@ -81,6 +92,22 @@ def answer_lines(answer: Answer) -> list[str]:
         more.append(f"{_angle(use.warmth)} where it is {use.kelvin:g} K warmer or colder")
     lines.append(f"In use this adds: {comma_list(more)}.")
     return lines
+
+
+def _fewest(question: Question, ranked: Ranked) -> str:
+    """Say why no fewer positions are recommended, and how well the simulation knows that."""
+    assert ranked.simulated is not None
+    n = ranked.candidate.scheme.n_positions
+    if ranked.fewer is None:
+        return "With fewer positions an error in one of them would not be noticed."
+    left, known = (
+        ranked.fewer.accuracy(question.confidence),
+        ranked.simulated.uncertainty(question.confidence),
+    )
+    simulated = f"{_angle(left)} ± {_angle(known)}, from {ranked.simulated.simulated} simulations"
+    if left - 2 * known < question.target:
+        return f"Whether {n - 1} would do is within the error of the simulation ({simulated})."
+    return f"Fewer do not suffice: {n - 1} positions leave {simulated}."
 
 
 def _linear(question: Question, candidate: Candidate) -> list[str]:
@@ -143,11 +170,11 @@ def table_lines(answer: Answer) -> list[str]:
     unit = display_unit("rad")
     head = [
         "", "equipment", "model", "scheme", "positions", "s each", "minutes",
-        f"roll/{unit}", f"pitch/{unit}", "limited by",
+        f"roll/{unit}", f"pitch/{unit}", f"both/{unit}", "limited by",
     ]  # fmt: skip
     rows = [head, *(_row(answer, i, r) for i, r in enumerate(answer.ranked, 1))]
     widths = [max(len(row[i]) for row in rows) for i in range(len(head))]
-    right = {4, 5, 6, 7, 8}
+    right = {4, 5, 6, 7, 8, 9}
     lines = [
         "  ".join(
             text.rjust(width) if i in right else text.ljust(width)
@@ -158,36 +185,33 @@ def table_lines(answer: Answer) -> list[str]:
     return [
         *lines,
         "model: number of parameters, and effects besides bias, scale and angles between axes;",
-        "roll, pitch: rms, and interval with 95 of 100 calibrations, from "
-        f"{answer.replicates} simulated ones each; ~ by linear theory",
+        "roll, pitch: rms, and interval with 95 of 100 calibrations of each angle by itself, from",
+        f"{answer.replicates} simulated ones each; ~ by linear theory;",
+        "both: what roll and pitch both stay below in 95 of 100 calibrations",
     ]
 
 
 def _row(answer: Answer, rank: int, ranked: Ranked) -> list[str]:
     candidate = ranked.candidate
-    low, mean, high = interval_of(ranked)
+    source = ranked.simulated or candidate.expected
+    about = "" if ranked.simulated else "~"
+    ends = (source.quantile(0.025), source.rms, source.quantile(0.975))
     cells = [
-        f"{'' if ranked.simulated else '~'}{number(m)} ({number(a)} … {number(b)})"
-        for a, m, b in zip(*(to_display(v, "rad") for v in (low, mean, high)), strict=True)
+        f"{about}{number(m)} ({number(a)} … {number(b)})"
+        for a, m, b in zip(*(to_display(v, "rad") for v in ends), strict=True)
     ]
     return [
         f"{rank}.",
         _equipment(candidate.equipment),
         model_words(candidate.model),
-        candidate.scheme.name,
+        candidate.scheme.name.partition("@")[0],
         str(candidate.scheme.n_positions),
         f"{candidate.hold:g}",
         f"{candidate.seconds / 60:.1f}",
         *cells,
+        f"{about}{number(float(to_display(source.of_both(OTHER_CONFIDENCE), 'rad')))}",
         limits(answer.question, candidate),
     ]
-
-
-def interval_of(ranked: Ranked) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Rms of roll and pitch, between the ends of the interval with 95 of 100 calibrations, rad."""
-    expected, simulated = ranked.candidate.expected, ranked.simulated
-    source = expected if simulated is None else simulated
-    return source.quantile(0.025), source.rms, source.quantile(0.975)
 
 
 def model_words(model: SensorModel) -> str:
@@ -290,11 +314,31 @@ def assumption_lines(question: Question) -> list[str]:
 def how_to(answer: Answer) -> list[str]:
     """Say how to get the positions, and how exactly to measure them."""
     candidate = answer.first.candidate
-    scheme = shlex.quote(answer.question.written(candidate.scheme))
-    lines = [f"The positions: accelstudy scheme {scheme}"]
+    lines = [f"The positions: {positions_command(answer.question, candidate)}"]
     if candidate.equipment.name == "gravity":
         lines.append("By hand they need not be exact, only still: gravity itself is the reference.")
     return lines
+
+
+def positions_command(question: Question, candidate: Candidate) -> str:
+    """The command that shows, or finds again, the positions of a candidate."""
+    if not is_best(candidate.scheme):
+        return f"accelstudy scheme {shlex.quote(question.written(candidate.scheme))}"
+    request = request_of(question, candidate)
+    options = {
+        "positions": str(request.positions),
+        "approach": request.approach,
+        "model": request.model,
+        "criterion": request.criterion,
+        "tilt-range": f"{request.tilt_range / GON:.6g}gon",
+        "sigma": f"{request.noise.sigma_force:.4g}m/s2",
+        "robot-sigma": f"{request.noise.sigma_angle / MGON:.6g}mgon",
+        "starts": str(request.starts),
+        "out": "positions.yaml",
+    }
+    usual = {"model": NINE, "sigma": "0.002m/s2", "robot-sigma": "3.2mgon", "approach": "robot"}
+    given = (f"--{name} {text}" for name, text in options.items() if text != usual.get(name))
+    return " ".join(["accelstudy design", *given])
 
 
 def _equipment(equipment: Equipment) -> str:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from accelstudy.basics.progress import track
-from accelstudy.plan.search.candidates import Candidate, candidates, with_optimal
-from accelstudy.plan.search.question import ROBOT, Question
+from accelstudy.plan.search.candidates import Candidate, candidates
+from accelstudy.plan.search.optimised import Sought, cheapest
+from accelstudy.plan.search.question import ROBOT, Equipment, Question
 from accelstudy.plan.search.simulated import Simulated, simulate, study_of
 
 SHOWN = 8
@@ -22,10 +23,19 @@ TRIES = 12
 
 @dataclass(frozen=True)
 class Ranked:
-    """A candidate in the table; those at the top are simulated."""
+    """A candidate in the table; those at the top are simulated.
+
+    Attributes
+    ----------
+    candidate : Candidate
+    simulated : Simulated or None
+    fewer : Simulated or None, of the best positions of which there is one less, and which miss the
+        target
+    """
 
     candidate: Candidate
     simulated: Simulated | None = None
+    fewer: Simulated | None = None
 
 
 @dataclass(frozen=True)
@@ -38,7 +48,7 @@ class Answer:
     compared : list of Candidate, all that were compared
     ranked : list of Ranked, for each equipment and model the cheapest that reaches the target, by
         the time they take; empty if none does
-    stricter : Candidate, the cheapest with the same equipment as the first that reaches the target
+    stricter : Ranked, the cheapest with the same equipment as the first that reaches the target
         by the other measure (95 % of the calibrations, or the rms); None if there is none
     instead : Candidate, the cheapest with a robot, if only calibrations by hand were asked for and
         none reaches the target; None if a robot does not reach it either
@@ -48,7 +58,7 @@ class Answer:
     question: Question
     compared: list[Candidate]
     ranked: list[Ranked]
-    stricter: Candidate | None
+    stricter: Ranked | None
     instead: Candidate | None
     seed: int
     replicates: int
@@ -78,27 +88,55 @@ class Answer:
 def answer(question: Question, seed: int = 1, replicates: int = 10_000) -> Answer:
     """Compare all calibrations, rank those that reach the target, and simulate the first."""
     compared = candidates(question)
+    for equipment in question.equipment:
+        compared += _largest(question, equipment, compared, question.confidence)
+    simulation = Simulation(question, question.confidence, seed, replicates)
     kinds: dict[tuple[str, str], list[Candidate]] = {}
-    for c in by_time(c for c in compared if c.reaches(question.target, question.confidence)):
-        kinds.setdefault(c.kind[:2], []).append(c)
+    for c in _good(question, compared, question.confidence):
+        kinds.setdefault(c.kind, []).append(c)
+    best = by_time(cheapest(question, kind, question.confidence) for kind in kinds.values())
     ranked: list[Ranked] = []
-    for kind in track(_in_front(list(kinds)), "simulated calibrations"):
+    for candidate in track(_in_front(best), "simulated calibrations"):
         checked = [r.candidate.equipment.name for r in ranked if r.simulated]
-        if len(checked) >= SIMULATED and kind[0] in checked:
-            ranked.append(Ranked(kinds[kind][0]))
-        elif found_good := _checked(question, kinds[kind], seed, replicates):
-            ranked.append(found_good)
+        if len(checked) >= SIMULATED and candidate.equipment.name in checked:
+            ranked.append(Ranked(candidate))
+        elif good := simulation.confirmed(candidate, candidate.equipment.name not in checked):
+            ranked.append(good)
     if not any(r.simulated for r in ranked):
         instead = _with_a_robot(question)
         return Answer(question, compared, [], None, instead, seed, replicates)
-    table = _shown(ranked)
-    found = Answer(question, compared, table, None, None, seed, replicates)
-    equipment = found.first.candidate.equipment
+    compared += [r.candidate for r in ranked if r.candidate not in compared]
+    found = Answer(question, compared, _shown(ranked), None, None, seed, replicates)
+    mine = replace(question, equipment=(found.first.candidate.equipment,))
     other = OTHER_CONFIDENCE if question.confidence is None else None
-    compared += with_optimal(question, equipment, compared, other)
-    mine = by_time(c for c in compared if c.equipment == equipment)
-    stricter = next((c for c in mine if c.reaches(question.target, other)), None)
-    return replace(found, stricter=stricter)
+    stricter = [c for c in compared if c.equipment in mine.equipment]
+    stricter += _largest(mine, mine.equipment[0], stricter, other)
+    good = _good(mine, stricter, other)
+    simulation = Simulation(mine, other, seed, replicates)
+    confirmed = simulation.confirmed(cheapest(mine, good, other)) if good else None
+    return replace(found, stricter=confirmed)
+
+
+def _good(
+    question: Question, compared: Iterable[Candidate], confidence: float | None
+) -> list[Candidate]:
+    """Candidates that reach the target by linear theory, by time."""
+    return by_time(c for c in compared if c.reaches(question.target, confidence))
+
+
+def _largest(
+    question: Question,
+    equipment: Equipment,
+    compared: Iterable[Candidate],
+    confidence: float | None,
+) -> list[Candidate]:
+    """Calibration in as many of the best positions as are allowed, if no known scheme suffices."""
+    mine = [c for c in compared if c.equipment == equipment]
+    if not mine or any(c.reaches(question.target, confidence) for c in mine):
+        return []
+    best = min(mine, key=lambda c: c.accuracy(confidence))
+    sought = Sought(question, equipment, best.model.name, best.hold)
+    return list(filter(None, [sought.candidate(sought.most)]))
 
 
 def _shown(ranked: list[Ranked]) -> list[Ranked]:
@@ -113,9 +151,9 @@ def _with_a_robot(question: Question) -> Candidate | None:
     """Cheapest candidate with a robot by linear theory, if only those by hand were compared."""
     if any(equipment.name != "gravity" for equipment in question.equipment):
         return None
-    compared = candidates(replace(question, equipment=(ROBOT,)))
-    good = (c for c in compared if c.reaches(question.target, question.confidence))
-    return next(iter(by_time(good)), None)
+    robot = replace(question, equipment=(ROBOT,))
+    good = _good(robot, candidates(robot), question.confidence)
+    return cheapest(robot, good, question.confidence) if good else None
 
 
 def by_time(found: Iterable[Candidate]) -> list[Candidate]:
@@ -127,20 +165,59 @@ def _effort(candidate: Candidate) -> tuple[float, float, int]:
     return candidate.seconds, candidate.rms, candidate.model.n_parameters
 
 
-def _checked(
-    question: Question, good: list[Candidate], seed: int, replicates: int
-) -> Ranked | None:
-    """Cheapest candidate of a kind that also reaches the target in simulation."""
-    for candidate in good[:TRIES]:
-        (result,) = simulate(study_of(question, [candidate], seed, replicates))
-        if result.accuracy(question.confidence) <= question.target:
-            return Ranked(candidate, result)
-    return None
+@dataclass(frozen=True)
+class Simulation:
+    """The check of candidates by simulation.
+
+    Attributes
+    ----------
+    question : Question
+    confidence : float, optional, the measure by which they must reach the target
+    seed, replicates : int
+    """
+
+    question: Question
+    confidence: float | None
+    seed: int
+    replicates: int
+
+    def of(self, candidate: Candidate) -> Simulated:
+        """Simulated calibrations."""
+        study = study_of(self.question, [candidate], self.seed, self.replicates)
+        return simulate(study)[0]
+
+    def confirmed(self, candidate: Candidate, and_no_fewer: bool = True) -> Ranked | None:
+        """The candidate, or one with a few more positions, that reaches the target in simulation.
+
+        Parameters
+        ----------
+        candidate : Candidate, that reaches it by linear theory
+        and_no_fewer : bool, whether one position less is simulated, too, until it does not suffice
+        """
+        n, target = candidate.scheme.n_positions, self.question.target
+        sought = Sought(self.question, candidate.equipment, candidate.model.name, candidate.hold)
+        reached, missed = None, None
+        for _ in range(TRIES):
+            tried = candidate if n == candidate.scheme.n_positions else sought.candidate(n)
+            if tried is None:
+                break
+            simulated = self.of(tried)
+            if simulated.accuracy(self.confidence) <= target:
+                reached = tried, simulated
+                if missed is not None or not and_no_fewer:
+                    break
+                n -= 1
+            else:
+                missed = simulated
+                if reached is not None:
+                    break
+                n += 1
+        return None if reached is None else Ranked(*reached, missed)
 
 
-def _in_front(kinds: list[tuple[str, str]]) -> list[tuple[str, str]]:
-    """Reorder kinds: the first kind of each equipment comes before all others."""
-    first: dict[str, tuple[str, str]] = {}
-    for kind in kinds:
-        first.setdefault(kind[0], kind)
-    return [*first.values(), *(kind for kind in kinds if kind not in first.values())]
+def _in_front(best: Sequence[Candidate]) -> list[Candidate]:
+    """Reorder candidates: the first of each equipment comes before all others."""
+    first: dict[str, Candidate] = {}
+    for candidate in best:
+        first.setdefault(candidate.equipment.name, candidate)
+    return [*first.values(), *(c for c in best if c not in first.values())]

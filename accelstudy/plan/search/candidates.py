@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.basics.progress import stage, track
+from accelstudy.basics.progress import track
 from accelstudy.plan.search.question import Equipment, Question
-from accelstudy.plan.search.theory import Expected, Theory, theory_of
+from accelstudy.plan.search.theory import Expected, theory_of
 from accelstudy.schemes import Scheme, get_scheme, scheme_names
 from accelstudy.sensors.models import MODELS, get_model
 from accelstudy.sensors.sensor import SensorModel
@@ -28,15 +27,9 @@ PLANNED_MODELS = (
     f"{NINE}-crossaxis+quadratic_scale+cubic_scale",
 )
 FAMILY = "fibonacci"
-SIZES = (*range(9, 61), *range(65, 121, 5), *range(140, 401, 20))
-"""Family of evenly spread positions, and the sizes of it that are tried."""
-OPTIMAL = "i-optimal"
-OPTIMAL_SIZES = (*range(9, 17), 18, 20, 22, 24, 27, 30, 33, 36, 40, 45, 50, 60, 70, 80, 100, 120)
-"""Family of positions that are the best for leveling, and its sizes. Few of them are tried, since
-each takes a search."""
-LEAST_OPTIMAL = 0.6
-"""Optimal schemes need about 2/3 of the positions of evenly spread ones; fewer than this part are
-not tried."""
+SIZES = (*range(4, 25), 27, *range(30, 61, 5), *range(70, 101, 10), *range(120, 401, 40))
+"""Family of evenly spread positions, and the sizes of it that are tried. They show about how many
+positions are needed; `accelstudy.plan.search.optimised` seeks the fewest."""
 LEAST_REDUNDANCY = 0.25
 """Least share of redundant conditions; with fewer a wrong position would not be noticed."""
 
@@ -68,9 +61,9 @@ class Candidate:
         return self.equipment.seconds(self.scheme.n_positions, self.hold)
 
     @property
-    def kind(self) -> tuple[str, str, str]:
-        """Equipment, model and family of schemes; candidates of one kind differ in effort only."""
-        return self.equipment.name, self.model.name, family_of(self.scheme.name)
+    def kind(self) -> tuple[str, str]:
+        """Equipment and model; the cheapest candidate of each kind is sought."""
+        return self.equipment.name, self.model.name
 
     @cached_property
     def rms(self) -> float:
@@ -81,7 +74,7 @@ class Candidate:
         """Tilt accuracy by the measure that is asked for, rad."""
         if confidence is None:
             return self.rms
-        return float(self.expected.quantile(confidence).max())
+        return self.expected.of_both(confidence)
 
     def reaches(self, target: float, confidence: float | None) -> bool:
         """Whether the tilt accuracy is reached."""
@@ -89,12 +82,6 @@ class Candidate:
         if confidence is not None and confidence >= 0.7 and self.rms > target:
             return False
         return self.accuracy(confidence) <= target
-
-
-def family_of(scheme: str) -> str:
-    """Name of a scheme; of a family that is tried, without the number of positions."""
-    found = re.fullmatch(r"(.+)-\d+", scheme)
-    return found[1] if found and found[1] in (FAMILY, OPTIMAL) else scheme
 
 
 def schemes_for(most_positions: int, more: Sequence[str] = ()) -> list[Scheme]:
@@ -106,44 +93,10 @@ def schemes_for(most_positions: int, more: Sequence[str] = ()) -> list[Scheme]:
 
 
 def candidates(question: Question) -> list[Candidate]:
-    """All calibrations whose positions determine their model and check it."""
+    """All calibrations in known schemes whose positions determine their model and check it."""
     found: list[Candidate] = []
     for scheme in track(schemes_for(question.most_positions, question.schemes), "calibrations"):
         found += _with_scheme(question, scheme)
-    for equipment in question.equipment:
-        found += with_optimal(question, equipment, found, question.confidence)
-    return found
-
-
-def with_optimal(
-    question: Question,
-    equipment: Equipment,
-    known: Sequence[Candidate],
-    confidence: float | None,
-) -> list[Candidate]:
-    """Candidates with optimal positions, at most as many as the cheapest known candidate has.
-
-    Bisection finds the smallest number that reaches the target by the measure of `confidence`.
-    """
-
-    def good(found: Iterable[Candidate]) -> list[Candidate]:
-        reaching = (c for c in found if c.reaches(question.target, confidence))
-        return sorted((c for c in reaching if c.equipment == equipment), key=lambda c: c.seconds)
-
-    reached = good(known)
-    most = reached[0].scheme.n_positions if reached else question.most_positions
-    done = {c.scheme.name for c in known}
-    least = LEAST_OPTIMAL * most if reached else 0.0
-    fitting = (n for n in OPTIMAL_SIZES if least <= n <= most)
-    sizes = [n for n in fitting if f"{OPTIMAL}-{n}" not in done]
-    low, high = (0, len(sizes)) if reached else (max(len(sizes) - 1, 0), len(sizes))
-    found: list[Candidate] = []
-    with stage("optimal positions"):
-        while low < high:
-            middle = (low + high) // 2
-            tried = _with_scheme(question, get_scheme(f"{OPTIMAL}-{sizes[middle]}"))
-            found += tried
-            low, high = (low, middle) if good(tried) else (middle + 1, high)
     return found
 
 
@@ -161,28 +114,25 @@ def shortest(question: Question) -> Candidate | None:
 
 def _with_scheme(question: Question, scheme: Scheme) -> list[Candidate]:
     """Candidates in one scheme, with each equipment."""
-    theory = theory_of(question.tilt_range)
     models = [get_model(name) for name in PLANNED_MODELS]
     return [
         candidate
         for equipment in question.equipment
-        for candidate in _of_scheme(question, theory, equipment, scheme, models)
+        for candidate in of_scheme(question, equipment, scheme, models)
     ]
 
 
-def _of_scheme(
-    question: Question,
-    theory: Theory,
-    equipment: Equipment,
-    scheme: Scheme,
-    models: list[SensorModel],
+def of_scheme(
+    question: Question, equipment: Equipment, scheme: Scheme, models: list[SensorModel]
 ) -> Iterator[Candidate]:
+    """Candidates in one scheme with one equipment."""
+    theory = theory_of(question.tilt_range)
     directions, n = scheme.directions, scheme.n_positions
     at_unit: dict[str, Expected | None] = {}
     for hold in question.holds:
         if equipment.seconds(n, hold) > question.most_seconds:
             continue
-        sigma = _tidy(question.sheet.sigma_mean(hold, n * (hold + equipment.moving)))
+        sigma = sigma_of(question, equipment, n, hold)
         rows: Array | None = None
         for model in models:
             if equipment.name == "gravity":  # with a single noise the result scales with it
@@ -202,6 +152,6 @@ def _of_scheme(
             yield Candidate(equipment, model, scheme, hold, sigma, expected)
 
 
-def _tidy(sigma: float) -> float:
-    """Four digits, so that the names of cells stay short."""
-    return float(f"{sigma:.4g}")
+def sigma_of(question: Question, equipment: Equipment, n: int, hold: float) -> float:
+    """Noise of the mean of a position, m/s², with four digits: so names of cells stay short."""
+    return float(f"{question.sheet.sigma_mean(hold, n * (hold + equipment.moving)):.4g}")

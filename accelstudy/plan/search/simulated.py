@@ -15,7 +15,9 @@ from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY, recorded_unit, 
 from accelstudy.effects import get_effect
 from accelstudy.leveling.error import ATTITUDES
 from accelstudy.plan.search.candidates import Candidate
+from accelstudy.plan.search.optimised import is_best
 from accelstudy.plan.search.question import Question
+from accelstudy.schemes.files import held
 from accelstudy.study.cells.cell import Cell, study_cells
 from accelstudy.study.config import parse_study
 from accelstudy.study.monte_carlo.followed import cell_tilt_error
@@ -49,12 +51,28 @@ class Simulated:
     simulated: int
 
     def quantile(self, probability: float) -> Array:
-        """Error below which this share of the calibrations stayed, (2,), rad."""
+        """Error of each angle by itself that this share of the calibrations stayed below, (2,)."""
         return np.quantile(self.per_calibration, probability, axis=0)
+
+    def of_both(self, probability: float) -> float:
+        """Error that roll and pitch both stayed below in this share of the calibrations, rad."""
+        return float(np.quantile(self.per_calibration.max(axis=1), probability))
 
     def accuracy(self, confidence: float | None) -> float:
         """Tilt accuracy by the measure that is asked for, rad."""
-        return float((self.rms if confidence is None else self.quantile(confidence)).max())
+        return float(self.rms.max()) if confidence is None else self.of_both(confidence)
+
+    def uncertainty(self, confidence: float | None) -> float:
+        """Standard error of `accuracy`, rad, by the number of calibrations.
+
+        That of a quantile follows from the share that it may be wrong by: half the distance of the
+        quantiles that lie one standard deviation of this share below and above.
+        """
+        if confidence is None:
+            return float(self.error[self.rms.argmax()])
+        step = np.sqrt(confidence * (1 - confidence) / len(self.per_calibration))
+        ends = np.clip(confidence + step * np.array([-1, 1]), 0, 1)
+        return float(np.ptp(np.quantile(self.per_calibration.max(axis=1), ends))) / 2
 
 
 def study_of(
@@ -67,6 +85,8 @@ def study_of(
     sigma = chosen[0].sigma
     planned = ("cross_axis_misalignment", "quadratic_scale", "cubic_scale")
     sensor = {effect: _quantity(question, effect) for effect in (*ALWAYS, *planned)}
+    names = [candidate.scheme.name for candidate in chosen if is_best(candidate.scheme)]
+    of_files = {name: held(name) for name in names}
     has = [effect for effect in planned if any(sensor[effect]["value"])]
     return {
         "study": name,
@@ -80,6 +100,7 @@ def study_of(
         },
         "sensor": sensor,
         "simulated_effects": [*ALWAYS, *has],
+        **({"schemes": of_files} if of_files else {}),
         "leveling": {"max_tilt_gon": _tidy(question.tilt_range / GON), "attitudes": ATTITUDES},
         "presets": None,
         "sensitivity": None,

@@ -14,11 +14,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaincinv
+from scipy.special import gammainc, gammaincinv
 
 from accelstudy.approaches import get_approach
 from accelstudy.design.estimability import SINGULAR
@@ -42,6 +42,8 @@ OF_SENSOR = (
 )
 OF_RIG = ("base_tilt", "encoder_scale", "encoder_offset", "gravity_error")
 """Effects of the sensor and of the rig that a plan considers."""
+STEPS = 17
+"""Errors at which the share of calibrations below is computed, to interpolate between."""
 
 
 @dataclass(frozen=True)
@@ -78,21 +80,33 @@ class Expected:
         """Rms over attitudes, calibrations and sensors, (2,), rad."""
         return np.sqrt(self.noise + sum(self.neglected.values(), np.zeros(2)))
 
-    def quantile(self, probability: float) -> Array:
-        """Error of roll and of pitch below which this share of the calibrations stays, (2,), rad.
+    @cached_property
+    def _spread(self) -> tuple[Array, Array]:
+        """Mean squares of roll and of pitch, and the degrees of freedom of χ² that are alike.
 
-        The mean square is a weighted sum of χ² variables, approximated by a scaled χ² of the same
+        A mean square is a weighted sum of χ² variables, approximated by a scaled χ² of the same
         mean and variance.
         """
-        form = np.einsum("uj,auw,wk->ajk", self.scatter, self.quadratic, self.scatter)
+        form = self.scatter.T @ self.quadratic @ self.scatter
         mean = np.trace(form, axis1=1, axis2=2)
-        variance = 2 * np.sum(form**2, axis=(1, 2))
-        freedom = 2 * mean**2 / variance
+        return mean, mean**2 / np.sum(form**2, axis=(1, 2))
+
+    def quantile(self, probability: float) -> Array:
+        """Error of each angle by itself that this share of the calibrations stays below, (2,)."""
+        mean, freedom = self._spread
         return np.sqrt(2 * mean / freedom * gammaincinv(freedom / 2, probability))
 
-    def at(self, probability: float | None) -> Array:
-        """Rms, or the quantile if a probability is given, (2,), rad."""
-        return self.rms if probability is None else self.quantile(probability)
+    def of_both(self, probability: float) -> float:
+        """Error that roll and pitch both stay below in this share of the calibrations, rad.
+
+        The mean squares of the two angles are taken to be independent: their correlation is 0.1 at
+        most, up to tilts of 80 gon.
+        """
+        mean, freedom = self._spread
+        ends = [self.quantile(p).max() for p in (probability, (1 + probability) / 2)]
+        squares = np.linspace(*np.square(ends), STEPS)[:, None]
+        both = gammainc(freedom / 2, freedom / 2 * squares / mean).prod(axis=1)
+        return float(np.sqrt(np.interp(probability, both, squares[:, 0])))
 
 
 class Theory:

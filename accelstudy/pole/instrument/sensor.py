@@ -71,13 +71,8 @@ class CalibratedSensor:
         return tuple(name for name, unit in COEFFICIENTS.items() if unit in units)
 
     def warmed(self, kelvin: float) -> tuple[float, float]:
-        """Sds of the uncorrected change of bias, m/s², and of scale with the temperature.
-
-        Coefficients that the data sheet does not have count as zero.
-        """
-        bias = 0.0 if "bias" in self.corrected else self.sheet.bias_change(0.0, kelvin)
-        per_kelvin = 0.0 if "scale" in self.corrected else self.sheet.scale_per_kelvin or 0.0
-        return bias, per_kelvin * kelvin
+        """Sds of the uncorrected change of bias, m/s², and of scale; see `DataSheet.warmed`."""
+        return self.sheet.warmed(kelvin, self.corrected)
 
     def conditions(self, forces: Array, temperature_change: float) -> HoldConditions | None:
         """Conditions besides the force, in attitudes with forces (k, 3), m/s².

@@ -143,7 +143,7 @@ def setups(
 
 
 def _tilt(cells: pd.DataFrame, tables: Tables) -> dict[str, NDArray[np.float64]]:
-    """Tilt error of each cell: rms, what 95 % stay below, and the central 95 %."""
+    """Tilt error of each cell: rms, central 95 %, and what 95 % stay below, singly and in both."""
     leveling, quantiles = tables["leveling"].set_index("cell"), tables["quantiles"]
     quantiles = quantiles[quantiles["quantity"] == "tilt"]
     found = {}
@@ -155,6 +155,7 @@ def _tilt(cells: pd.DataFrame, tables: Tables) -> dict[str, NDArray[np.float64]]
             found[f"{angle}_{name}"] = cells["cell"].map(
                 _at(its, probability).set_index("cell")["value"]
             )
+    found["both_q95"] = cells["cell"].map(leveling["both_rms_q95_mgon"])
     return {name: shown(values.to_numpy(float), "mgon")[0] for name, values in found.items()}
 
 

@@ -241,6 +241,7 @@ def _columns(factors: Sequence[Factor], groups: Sequence[Mapping[str, str]]) -> 
             for angle in ANGLES
             for name, title in (("rms", "rms"), ("q95", "95 % below"))
         ),
+        Column("both_q95", "both 95 % below", unit),
         *(
             Column(f"sd-{i}", f"sd of {group['label']}", group["unit"])
             for i, group in enumerate(groups)

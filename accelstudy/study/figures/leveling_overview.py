@@ -52,11 +52,12 @@ NOT_ESTIMABLE: Style = {
     The tilt error of roll (upper) and pitch (lower half) that a calibration leaves, over all
     attitudes up to the study's largest tilt, for each scheme (rows), model (columns) and approach
     (left and right). The upper number is the rms over attitudes and calibrations, which also gives
-    the colour; the lower one is what the rms over attitudes of 95 % of the calibrations stays
-    below: decide by it where one calibration must do. The noise of the leveled reading itself
-    comes on top. Hatched cells cannot be estimated; fields left white are not part of the study.
-    Unless the study says otherwise the simulated sensor has just the effects of the model, so that
-    a larger model faces a more difficult sensor: compare schemes and approaches within a column.
+    the colour; the lower one, the same for roll and pitch, is what both angles stay below in
+    95 % of the calibrations: decide by it where one calibration must do. The noise of the leveled
+    reading itself comes on top. Hatched cells cannot be estimated; fields left white are not part
+    of the study. Unless the study says otherwise the simulated sensor has just the effects of the
+    model, so that a larger model faces a more difficult sensor: compare schemes and approaches
+    within a column.
     """,
     tables=("cells", "leveling"),
     when=lambda study: not any(varies(study, noise) for noise in NOISES),
@@ -107,7 +108,7 @@ def tilt_errors(tables: Tables, study: StudyConfig) -> Figure:
     text: Style = {"linestyle": "", "marker": ""}
     noise = f"{study.sigma_force * 1e3:.3g} mm/s²"
     labels = [
-        f"upper number: rms / {unit}; lower number: what 95 % of the calibrations stay below",
+        f"upper number: rms / {unit}; lower: both angles stay below in 95 % of the calibrations",
         f"not in it: the noise of a single reading, at {noise} and level {one_reading:.1f} {unit}",
     ]
     fig.legend(
@@ -121,14 +122,14 @@ def tilt_errors(tables: Tables, study: StudyConfig) -> Figure:
 
 
 def _with_tilt(cells: pd.DataFrame, leveling: pd.DataFrame) -> pd.DataFrame:
-    """Cells with the rms of each angle and its 95 % quantile as shown, NaN where there is none."""
+    """Cells with the rms of each angle, and the 95 % quantile of both, as shown; NaN if none."""
     import pandas as pd
 
     found = leveling.set_index("cell") if len(leveling) else pd.DataFrame()
     columns = {}
     for angle in ANGLES:
-        for what, name in (("rms", "rms"), ("q95", "rms_q95")):
-            values = cells["cell"].map(found.get(f"{angle}_{name}_mgon", {})).astype(float)
+        for what, name in (("rms", f"{angle}_rms_mgon"), ("q95", "both_rms_q95_mgon")):
+            values = cells["cell"].map(found.get(name, {})).astype(float)
             columns[f"{angle}_{what}"] = shown(values, "mgon")[0]
     return cells.assign(**columns)
 

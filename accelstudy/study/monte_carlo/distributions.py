@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.leveling.error import TiltError
 from accelstudy.study.cells.cell import Cell
-from accelstudy.study.monte_carlo.followed import ANGLES, TILT, CellSketches, Followed
+from accelstudy.study.monte_carlo.followed import TILT, TILTS, CellSketches, Followed, tilts
 from accelstudy.study.monte_carlo.kept import kept_blocks, kept_sketches
 from accelstudy.study.monte_carlo.sketch import Key
 from accelstudy.study.monte_carlo.statistics import Statistics
@@ -69,7 +69,7 @@ def cell_distributions(
             sketches.add(block, statistics.followed.values(block))
         return sketches.found
     keys = statistics.followed.sketched(statistics.moments.redundancy)
-    angles = [(TILT, angle) for angle in ANGLES]
+    angles = [(TILT, name) for name in TILTS]
     values = kept_values(parts["estimates"], cell, statistics.converged, keys, tilt)
     return {key: Sample(column) for key, column in zip([*keys, *angles], values, strict=True)}
 
@@ -84,7 +84,7 @@ def kept_values(
     """Quantities of the kept calibrations of a cell that converged, (k, count), and tilt errors."""
     followed = Followed.of(cell)
     columns = [followed.keys.index(key) for key in keys]
-    found = np.empty((len(keys) + (0 if tilt is None else 2), count))
+    found = np.empty((len(keys) + (0 if tilt is None else len(TILTS)), count))
     end = 0
     for block in kept_blocks(estimates, cell):
         values = followed.values(block)
@@ -92,5 +92,5 @@ def kept_values(
         found[: len(keys), start:end] = values[:, columns].T
         if tilt is not None:
             chosen = block.estimates[block.converged][:, : len(tilt.reference)]
-            found[len(keys) :, start:end] = tilt.rms(chosen).T
+            found[len(keys) :, start:end] = tilts(tilt, chosen)
     return found

@@ -26,6 +26,9 @@ TILT = "tilt"
 """Quantities: of each parameter, of each effect (the mean of its parameters' sds a posteriori), and
 the rms over attitudes of the errors of roll and of pitch."""
 ANGLES = ("roll", "pitch")
+TILTS = (*ANGLES, "both")
+"""Names of the tilt errors that have quantiles: of each angle by itself, and of the larger of the
+two, so that both angles stay below its quantile."""
 
 
 @dataclass(frozen=True)
@@ -113,8 +116,14 @@ class CellSketches:
             self.found.setdefault(key, Sketch()).add(values[:, keys.index(key)])
         if self.tilt is not None:
             estimates = block.estimates[block.converged][:, : len(self.tilt.reference)]
-            for angle, rms in zip(ANGLES, self.tilt.rms(estimates).T, strict=True):
-                self.found.setdefault((TILT, angle), Sketch()).add(rms)
+            for name, rms in zip(TILTS, tilts(self.tilt, estimates), strict=True):
+                self.found.setdefault((TILT, name), Sketch()).add(rms)
+
+
+def tilts(tilt: TiltError, estimates: Array) -> Array:
+    """Tilt errors that calibrations leave, rms over attitudes, (3, R), as in `TILTS`."""
+    each = tilt.rms(estimates).T
+    return np.vstack([each, each.max(axis=0)])
 
 
 def cell_tilt_error(cell: Cell, reference: Array, leveling: Mapping[str, Any]) -> TiltError:

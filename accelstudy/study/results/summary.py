@@ -26,6 +26,7 @@ from accelstudy.study.monte_carlo.followed import (
     POSTERIORI,
     PRIORI,
     TILT,
+    TILTS,
     cell_tilt_error,
 )
 from accelstudy.study.monte_carlo.moments import MOMENTS, moments_table
@@ -249,7 +250,7 @@ def _quantile_rows(
     cell: Cell, statistics: Statistics, found: Mapping[Key, Distribution]
 ) -> pd.DataFrame:
     """Quantiles of the errors and sds of each parameter and of the tilt error, in shown units."""
-    units = {**statistics.followed.units, **dict.fromkeys(ANGLES, "rad")}
+    units = {**statistics.followed.units, **dict.fromkeys(TILTS, "rad")}
     n = statistics.converged
     tail = np.minimum(PROBABILITIES, 1 - PROBABILITIES)
     shown = PROBABILITIES[(tail >= 0.0249) | (n * tail >= 0.999)]
@@ -280,17 +281,18 @@ def _quantile_rows(
 def _leveling_row(
     cell: Cell, statistics: Statistics, tilt: TiltError | None, found: Mapping[Key, Distribution]
 ) -> pd.DataFrame:
-    """Rms of the tilt error over all calibrations, and its 95 % quantile."""
-    rms = q95 = np.full(2, np.nan)
+    """Rms of the tilt error over all calibrations, and its 95 % quantiles."""
+    rms, q95 = np.full(len(ANGLES), np.nan), np.full(len(TILTS), np.nan)
     n = statistics.converged
     if tilt is not None:
         u = len(tilt.reference)
         columns = statistics.followed.columns(ERROR)
         rms = tilt.rms_of_all(statistics.moments.comoment[columns, columns][:u, :u] / n)
-    if (TILT, ANGLES[0]) in found:
-        q95 = np.array([float(found[TILT, angle].quantile(0.95)) for angle in ANGLES])
+    if (TILT, TILTS[0]) in found:
+        q95 = np.array([float(found[TILT, name].quantile(0.95)) for name in TILTS])
     row = _labels(cell)
     for i, angle in enumerate(ANGLES):
         row[f"{angle}_rms_mgon"] = rms[i] / MGON
         row[f"{angle}_rms_q95_mgon"] = q95[i] / MGON
+    row["both_rms_q95_mgon"] = q95[-1] / MGON
     return pd.DataFrame({**row, "n_converged": n}, index=[0])

@@ -1,0 +1,180 @@
+"""What a plan promises, against simulations that share no code with it: the fewest positions, what
+both angles stay below, and what a temperature in use leaves."""
+
+import shlex
+
+import numpy as np
+import pytest
+import yaml
+from click.testing import CliRunner
+
+from accelstudy.basics.units import GON, MGON
+from accelstudy.commands.main import main
+from accelstudy.data_sheets import get_data_sheet, of_sigma
+from accelstudy.design.optimal.constraints import Constraints
+from accelstudy.design.optimal.continuous import continuous_optimum
+from accelstudy.design.optimal.spaces import Sphere
+from accelstudy.plan.report.advice import in_use
+from accelstudy.plan.report.wording import answer_lines, positions_command
+from accelstudy.plan.search.answer import answer
+from accelstudy.plan.search.optimised import Sought
+from accelstudy.plan.search.question import BY_HAND, ROBOT, Question
+
+G = 9.80665
+SIGMA = 0.002
+REPLICATES = 20_000
+
+
+def attitudes(tilt_range, count=300):
+    """Specific forces, (count, 3), of random attitudes up to a tilt, evenly over the cap."""
+    rng = np.random.default_rng(11)
+    cosine = rng.uniform(np.cos(tilt_range), 1, count)
+    azimuth, sine = rng.uniform(0, 2 * np.pi, count), np.sqrt(1 - cosine**2)
+    return -G * np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), cosine], axis=-1)
+
+
+def roll_and_pitch(f):
+    """Angles of forces (..., 3) with x forward, y right, z down."""
+    x, y, z = np.moveaxis(f, -1, 0)
+    return np.stack([np.arctan2(-y, -z), np.arctan2(x, np.hypot(y, z))], axis=-1)
+
+
+def corrected(readings, p):
+    """Forces M (r - b) of calibrations (R, 9): biases, and the upper triangle of M."""
+    x, y, z = np.moveaxis(readings - p[:, None, :3], -1, 0)
+    sx, sy, sz, xy, xz, yz = (p[:, i, None] for i in range(3, 9))
+    return np.stack([(1 + sx) * x + xy * y + xz * z, (1 + sy) * y + yz * z, (1 + sz) * z], -1)
+
+
+def by_hand(directions, tilt_range, sigma=SIGMA, replicates=REPLICATES, seed=5):
+    """Rms over attitudes of roll and pitch, (R, 2), that calibrations by the norm of gravity leave.
+
+    Gauss-Newton on |M (r - b)| = g, for all calibrations at once; the readings have equal noise, so
+    least squares of the norms are the weighted ones to first order.
+    """
+    rng = np.random.default_rng(seed)
+    u = np.asarray(directions, dtype=float)
+    readings = -G * u + sigma * rng.standard_normal((replicates, *u.shape))
+    p = np.zeros((replicates, 9))
+    for _ in range(3):
+        f = corrected(readings, p)
+        norm = np.linalg.norm(f, axis=-1)
+        e = f / norm[..., None]
+        x, y, z = np.moveaxis(readings - p[:, None, :3], -1, 0)
+        ex, ey, ez = np.moveaxis(e, -1, 0)
+        design = np.stack([-ex, -ey, -ez, ex * x, ey * y, ez * z, ex * y, ex * z, ey * z], axis=-1)
+        normal = np.swapaxes(design, 1, 2) @ design
+        right = np.einsum("rni,rn->ri", design, G - norm)
+        p += np.linalg.solve(normal, right[..., None])[..., 0]
+    forces = attitudes(tilt_range)
+    square = np.zeros((replicates, 2))
+    for f in forces:  # one after the other, to need no memory
+        left = roll_and_pitch(corrected(f[None, None], p))[:, 0] - roll_and_pitch(f)
+        square += left**2 / len(forces)
+    return np.sqrt(square)
+
+
+def rms(left):
+    """Rms of the worse angle, and its standard error."""
+    square = left**2
+    worse = square.mean(axis=0).argmax()
+    value = np.sqrt(square[:, worse].mean())
+    return value, square[:, worse].std() / np.sqrt(len(left)) / (2 * value)
+
+
+@pytest.fixture(scope="module")
+def plan():
+    question = Question(10 * MGON, 30 * GON, of_sigma(SIGMA), equipment=(BY_HAND,))
+    return answer(question, replicates=4000)
+
+
+@pytest.fixture(scope="module")
+def positions(plan, tmp_path_factory):
+    """Positions by the command that the plan tells."""
+    folder = tmp_path_factory.mktemp("positions")
+    command = positions_command(plan.question, plan.first.candidate)
+    words = shlex.split(command.replace("positions.yaml", str(folder / "positions.yaml")))[1:]
+    result = CliRunner().invoke(main, words)
+    assert result.exit_code == 0, result.output
+    return yaml.safe_load((folder / "positions.yaml").read_text(encoding="utf-8"))["directions"]
+
+
+def test_the_command_that_a_plan_tells_finds_the_positions_that_it_simulated(plan, positions):
+    mine = plan.first.candidate.scheme.directions
+    distances = np.linalg.norm(mine[:, None] - np.array(positions)[None], axis=-1)
+    assert len(positions) == len(mine)
+    assert distances.min(axis=0).max() < 1e-8
+    assert distances.min(axis=1).max() < 1e-8
+
+
+def test_the_recommended_positions_suffice_and_both_angles_stay_below_what_is_said(plan, positions):
+    left = by_hand(positions, 30 * GON)
+    value, error = rms(left)
+    assert value < 10 * MGON + 3 * error
+    said = plan.first.simulated
+    assert value == pytest.approx(said.rms.max(), abs=4 * np.hypot(error, said.error.max()))
+    inside = np.mean(np.all(left < said.of_both(0.95), axis=1))
+    shares = 0.05 * 0.95 * (1 / len(left) + 1 / 4000)
+    assert abs(inside - 0.95) < 4 * np.sqrt(shares)
+
+
+def test_one_position_less_does_not_suffice(plan):
+    """Neither the best that are found, nor any at all: the bound is one of all choices."""
+    n = plan.first.candidate.scheme.n_positions
+    assert n == 18
+    sought = Sought(plan.question, BY_HAND, plan.first.candidate.model.name, 10.0)
+    value, error = rms(by_hand(sought.candidate(n - 1).scheme.directions, 30 * GON))
+    assert value > 10 * MGON + 2 * error
+    request = sought.request(n - 1)
+    optimum = continuous_optimum(request.task, request.chosen, Sphere(), Constraints(), n - 1)
+    assert np.exp(optimum.bound / 2) > 10 * MGON
+    assert f"{n - 1} positions leave" in answer_lines(plan)[2]
+
+
+def test_a_share_of_the_calibrations_is_of_both_angles_at_once():
+    question = Question(20 * MGON, 30 * GON, of_sigma(SIGMA), (BY_HAND,), confidence=0.95)
+    found = answer(question, replicates=4000).first
+    n = found.candidate.scheme.n_positions
+    sought = Sought(question, BY_HAND, found.candidate.model.name, 10.0)
+    inside = {
+        count: np.mean(
+            np.all(by_hand(sought.candidate(count).scheme.directions, 30 * GON) < 20 * MGON, 1)
+        )
+        for count in (n, n - 2)
+    }
+    noise = 3 * np.sqrt(0.05 * 0.95 * (1 / REPLICATES + 1 / 4000))
+    assert inside[n] > 0.95 - noise
+    assert inside[n - 2] < 0.95
+    # One angle alone would make fewer positions seem enough.
+    alone = by_hand(found.candidate.scheme.directions, 30 * GON)
+    assert np.quantile(alone, 0.95, axis=0).max() < 0.96 * 20 * MGON
+
+
+def test_with_a_robot_five_positions_do_what_four_do_not():
+    question = Question(10 * MGON, 30 * GON, of_sigma(SIGMA), equipment=(ROBOT,))
+    found = answer(question, replicates=2000)
+    assert found.first.candidate.scheme.n_positions == 5
+    assert found.first.fewer.rms.max() > 10 * MGON
+
+
+@pytest.mark.parametrize("name", ["adxl355", "mpu-6050", "stim300"])
+@pytest.mark.parametrize(("tilt_range", "kelvin"), [(30, 10), (60, 25)])
+def test_temperature_in_use_leaves_what_warmed_sensors_do(name, tilt_range, kelvin):
+    sheet = get_data_sheet(name)
+    question = Question(10 * MGON, tilt_range * GON, sheet)
+    f = attitudes(tilt_range * GON, 2000)
+    rng = np.random.default_rng(3)
+    square = np.zeros(2)
+    for _ in range(1000):
+        bias, scale = rng.standard_normal((2, 3)) * [
+            [kelvin * (sheet.bias_per_kelvin or 0)], [kelvin * (sheet.scale_per_kelvin or 0)],
+        ]  # fmt: skip
+        square += np.mean((roll_and_pitch(f * (1 + scale) + bias) - roll_and_pitch(f)) ** 2, 0)
+    said = in_use(question, kelvin=kelvin).warmth
+    assert said == pytest.approx(np.sqrt(square.max() / 1000), rel=0.08)
+
+
+def test_the_scale_is_a_part_of_what_a_temperature_leaves():
+    """ADXL355, 30 gon, 10 K: the bias alone would leave 13 mgon, both together 24."""
+    said = in_use(Question(10 * MGON, 30 * GON, get_data_sheet("adxl355"))).warmth
+    assert 23 < said / MGON < 25
