@@ -8,7 +8,7 @@ import numpy as np
 
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.files.format import write_campaign
-from accelstudy.campaign.simulated.campaign import simulate_campaign
+from accelstudy.campaign.simulated import simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from diagnosis import settings
 from log_memory import RATE, lines, write_log

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from accelstudy.campaign.files.format import write_campaign
-from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.sensors.models import get_model
 from processes import ACCELSTUDY, took

@@ -12,7 +12,7 @@ import numpy as np
 
 from accelstudy.campaign.files.format import write_campaign
 from accelstudy.campaign.files.session import Campaign
-from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from processes import ACCELSTUDY, took
 
 FAMILY = 5000

@@ -137,7 +137,7 @@ def simulate_campaign_command(
     """
     from accelstudy.basics.units import MGON
     from accelstudy.campaign.files.format import write_campaign
-    from accelstudy.campaign.simulated.campaign import (
+    from accelstudy.campaign.simulated import (
         CampaignSettings,
         simulate_campaign,
         write_truth,

@@ -10,7 +10,7 @@ from matplotlib.patches import Arc, Circle, Polygon
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import GON, MGON
-from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.drawing.style import ANGLE_COLOURS, FULL, INK, STYLE, new_figure
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.frames import Frame

@@ -5,7 +5,7 @@ import ripple  # noqa: F401, to import it is to make it known
 
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.words.summary import verdict_lines
 from accelstudy.effects import get_effect

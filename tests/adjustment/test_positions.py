@@ -22,7 +22,7 @@ from accelstudy.adjustment.quality import (
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.output import write_calibration
-from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.decision import search
 from accelstudy.diagnosis.evidence import chance
 from accelstudy.diagnosis.evidence.noise.colour import LENGTHS, quadratic_forms, restricted

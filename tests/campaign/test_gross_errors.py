@@ -14,7 +14,7 @@ from accelstudy.campaign.files.format import read_campaign, write_campaign
 from accelstudy.campaign.gross_errors import get_gross_error, gross_error_names
 from accelstudy.campaign.gross_errors.axis_error import SIGNED_PERMUTATIONS
 from accelstudy.campaign.gross_errors.recognition import recognise
-from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.sensors.models import get_model
 

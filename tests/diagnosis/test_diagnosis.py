@@ -13,7 +13,7 @@ from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.states import ACCEPTED, REJECTED
-from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.held_out import gap
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.effects import HoldConditions

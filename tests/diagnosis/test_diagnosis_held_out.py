@@ -8,7 +8,7 @@ from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, design, shuffled, some_ho
 
 from accelstudy.adjustment.quality import solve
 from accelstudy.basics.wording import words
-from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.decision.search import Search
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.held_out import confirmation as held_out

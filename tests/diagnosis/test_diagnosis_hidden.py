@@ -14,7 +14,7 @@ from diagnosis_helpers import FULL, GRAVITY, NINE, ROBOT, most
 
 from accelstudy.adjustment.quality import solve
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.decision.priors import SURE
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.space.examined import examine

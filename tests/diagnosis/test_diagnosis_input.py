@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.files.format import write_campaign
-from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.commands.main import main
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.document.diagnosis import diagnosis_document

@@ -6,7 +6,7 @@ from scipy.stats import binom
 from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.space.examined import examine
 from accelstudy.effects import HoldConditions
 from accelstudy.schemes import get_scheme

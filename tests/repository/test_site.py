@@ -18,7 +18,7 @@ from accelstudy.campaign.calibration.document import (
     quality_document,
 )
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.files.tables import read_table
 from accelstudy.sensors.models import get_model
 from accelstudy.study.results.sensitivity import analyse_sensitivity, analyse_shapley

@@ -17,7 +17,7 @@ from accelstudy.campaign.batch.config import parse_batch
 from accelstudy.campaign.calibration.document import calibration_document
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.files.format import read_campaign
-from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.campaign.use.applying import read_calibration
 from accelstudy.campaign.use.export import export
 from accelstudy.campaign.use.readings import readings_of

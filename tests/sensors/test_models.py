@@ -8,7 +8,7 @@ import yaml
 from click.testing import CliRunner
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.commands.main import main
 from accelstudy.drawing.style import _parameters, model_title
 from accelstudy.effects import Effect, base, effect_names, get_effect, register

@@ -13,7 +13,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.files.format import read_campaign
-from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.commands.main import main
 from accelstudy.effects import get_effect
 from accelstudy.schemes import get_scheme

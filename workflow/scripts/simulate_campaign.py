@@ -1,4 +1,4 @@
-from accelstudy.campaign.simulated.campaign import CampaignSettings
+from accelstudy.campaign.simulated import CampaignSettings
 from accelstudy.diagnosis.round_trip import write_simulated
 from accelstudy.jobs.job import logged
 

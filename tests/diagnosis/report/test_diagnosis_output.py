@@ -26,7 +26,7 @@ from accelstudy.basics.wording import number, p_value
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.output import write_calibration
 from accelstudy.campaign.files.format import write_campaign
-from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.commands.main import main
 from accelstudy.diagnosis.decision.explanations import Explanation
 from accelstudy.diagnosis.decision.posterior import Posterior, Weighed

@@ -8,7 +8,7 @@ from diagnosis_helpers import GRAVITY, NINE, ROBOT
 
 from accelstudy.adjustment.quality import solve
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.space.examined import examine
 from accelstudy.diagnosis.space.frame import Frame

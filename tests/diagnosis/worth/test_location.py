@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from diagnosis_helpers import NINE
 
-from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.words.summary import GROUPS
 from accelstudy.diagnosis.space.groups import LACK_OF_FIT, all_groups

@@ -10,7 +10,7 @@ from norm_model import SHOWN, nine
 from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.simulated.campaign import CampaignSettings, simulate_campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.space.examined import examine
 from accelstudy.diagnosis.worth.next_positions import GRID, next_positions
 from accelstudy.leveling.angles import specific_force

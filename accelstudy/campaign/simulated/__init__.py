@@ -1,1 +1,0 @@
-"""Simulated campaigns with effects and gross errors of your choice, and their truth."""
