@@ -16,7 +16,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.calibration.document import calibration_document
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.files.layout import LogLayout
+from accelstudy.campaign.files.header import LogLayout
 from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.use.applying import read_calibration
 from accelstudy.campaign.use.leveling import level_log

@@ -15,7 +15,7 @@ from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.wording import verdict_lines
 from accelstudy.campaign.files.format import read_campaign, write_campaign
-from accelstudy.campaign.files.layout import LogLayout
+from accelstudy.campaign.files.header import LogLayout
 from accelstudy.campaign.files.session import Campaign
 from accelstudy.commands.main import main
 from accelstudy.diagnosis.pipeline import diagnose

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
 from accelstudy.campaign.files.format import read_campaign, write_campaign
-from accelstudy.campaign.files.layout import LogLayout
+from accelstudy.campaign.files.header import LogLayout
 from accelstudy.campaign.files.session import Campaign
 from accelstudy.leveling.angles import specific_force
 

@@ -9,10 +9,10 @@ from test_import_holds import RATE, G, session, shared, write
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON
 from accelstudy.campaign.files.format import read_campaign
-from accelstudy.campaign.files.layout import LogLayout
+from accelstudy.campaign.files.header import LogLayout
 from accelstudy.campaign.holds.allan import allan_moments
+from accelstudy.campaign.holds.detected import slope_sigmas
 from accelstudy.campaign.holds.segments import Moments, Segment
-from accelstudy.campaign.holds.slopes import slope_sigmas
 from accelstudy.campaign.importing import segmentation_figure
 from accelstudy.campaign.importing.logs import (
     ImportSettings,

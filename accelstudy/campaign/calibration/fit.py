@@ -19,7 +19,7 @@ from accelstudy.campaign.calibration.gauges import not_affine
 from accelstudy.campaign.files.header import COLUMNS
 from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.gross_errors.recognition import recognise
-from accelstudy.campaign.holds.sphere import fit_sphere
+from accelstudy.campaign.holds.detected import fit_sphere
 from accelstudy.design.estimability import Estimability, estimability
 from accelstudy.schemes import Scheme
 from accelstudy.sensors.models import compose

@@ -1,4 +1,4 @@
-"""The header of a campaign, and the columns of its table."""
+"""The header of a campaign, the layout of its log included, and the columns of its table."""
 
 from __future__ import annotations
 
@@ -6,23 +6,33 @@ from typing import Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    StrictInt,
+    StrictStr,
+    model_validator,
+)
 
 from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.units import GON
-from accelstudy.campaign.files.layout import LogLayout
 from accelstudy.files.types import (
     Finite,
     Gravity,
     Number,
+    OneOrMore,
     Positive,
+    Rate,
     SigmaAngle,
     SigmaForce,
     SigmaGravity,
 )
 from accelstudy.files.validation import Block
 from accelstudy.sensors.conversion import Conversion, conversion_of
+from accelstudy.sensors.frames import Frame, parse_frame
 
 Array = NDArray[np.float64]
 
@@ -60,6 +70,40 @@ RANGES = {
     "yaw": bounds.ANGLE,
 }
 """Ranges of the columns in the unit of the file; others have `ANY`."""
+
+
+Place = Annotated[StrictInt, Field(ge=0)] | StrictStr
+"""A column by its name in the header, or by its place, counted from 0."""
+
+
+class LogLayout(BaseModel):
+    """How the numbers of a log are read: what `import` was told, and `apply` needs again.
+
+    Scale and offset are in the order of the log's own axes, whatever its frame.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    columns: dict[str, Place] = Field(
+        {},
+        description="columns of fx, fy, fz, temperature and vibration: name, or place counted "
+        "from 0",
+    )
+    time: Place | None = Field(None, description="column of time")
+    time_unit: Literal["s", "ms", "us", "ns"] = Field("s", description="unit of that column")
+    rate_hz: Rate | None = Field(None, description="samples per second, without time")
+    variable: str | None = Field(None, description="which array of a MATLAB file")
+    unit: Literal["m/s^2", "g", "counts"] = Field("m/s^2", description="unit of the forces")
+    scale: OneOrMore[Finite] | None = Field(None, description="with counts: m/s² per count")
+    offset: OneOrMore[Finite] | None = Field(None, description="with counts: reading at 0 m/s²")
+    frame: Annotated[str, AfterValidator(lambda name: parse_frame(name).name)] = Field(
+        "frd", description="where the axes x, y, z of the log point, as frd or flu"
+    )
+
+    @property
+    def axes(self) -> Frame:
+        """The frame."""
+        return parse_frame(self.frame)
 
 
 def _not_zero(value: float) -> float:

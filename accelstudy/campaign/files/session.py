@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.files.header import COLUMNS
-from accelstudy.campaign.files.layout import LogLayout
+from accelstudy.campaign.files.header import COLUMNS, LogLayout
 from accelstudy.effects import HoldConditions
 
 Array = NDArray[np.float64]

@@ -14,15 +14,17 @@ from accelstudy.basics.units import display_unit, to_display
 from accelstudy.campaign.files.format import write_campaign
 from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.holds.allan import MeanAccuracy, accuracy_of_mean
-from accelstudy.campaign.holds.detection import DetectedHolds, find_joint_holds
+from accelstudy.campaign.holds.detected import DetectedHolds
+from accelstudy.campaign.holds.detection import find_joint_holds
 from accelstudy.campaign.importing.imported import (
+    ImportReport,
     default_name,
     far_from_gravity,
     imported_campaign,
     layout_of,
+    shown,
 )
 from accelstudy.campaign.importing.means import import_means
-from accelstudy.campaign.importing.report import ImportReport, shown
 from accelstudy.campaign.importing.settings import (
     GravitySettings,
     ImportSettings,
@@ -30,8 +32,7 @@ from accelstudy.campaign.importing.settings import (
     read_settings,
 )
 from accelstudy.campaign.logs.columns import AXES
-from accelstudy.campaign.logs.recording import Log, Recording, open_log
-from accelstudy.campaign.logs.series import LogSeries
+from accelstudy.campaign.logs.recording import Log, LogSeries, Recording, open_log
 from accelstudy.leveling.angles import usual_norm
 from accelstudy.sensors.conversion import conversion_of
 

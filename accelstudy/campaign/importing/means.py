@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import MGON, ROBOT_UNITS, UNITS
 from accelstudy.campaign.files.checks import clearly_worse, misfit_of_angles
-from accelstudy.campaign.files.layout import LogLayout
+from accelstudy.campaign.files.header import LogLayout
 from accelstudy.campaign.files.session import Campaign
-from accelstudy.campaign.importing.imported import far_from_gravity, imported_campaign
-from accelstudy.campaign.importing.report import ImportReport
+from accelstudy.campaign.importing.imported import ImportReport, far_from_gravity, imported_campaign
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.campaign.logs.columns import AXES, locate, read_columns
 from accelstudy.campaign.logs.sources import Source, open_source

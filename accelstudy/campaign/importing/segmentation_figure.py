@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import failure, stage
 from accelstudy.basics.wording import counted
-from accelstudy.campaign.holds.detection import DetectedHolds
+from accelstudy.campaign.holds.detected import DetectedHolds
 from accelstudy.campaign.holds.windows import windows
 from accelstudy.campaign.logs.recording import Recording
 from accelstudy.drawing.saving import save

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.campaign.files.layout import LogLayout, Place
+from accelstudy.campaign.files.header import LogLayout, Place
 from accelstudy.campaign.holds.selection import Selection, parse_selection
 from accelstudy.files.layers import overlay, read_layer
 from accelstudy.files.types import (

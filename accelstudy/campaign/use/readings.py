@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import UNITS
-from accelstudy.campaign.files.layout import LogLayout
+from accelstudy.campaign.files.header import LogLayout
 from accelstudy.campaign.logs.columns import AXES, locate
 from accelstudy.campaign.logs.sources import CHUNK, Source, open_source
 from accelstudy.campaign.logs.tables import column_names, numbers, read_chunks

@@ -10,13 +10,14 @@ import numpy as np
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.files.format import (
     campaign_of,
+    columns_of,
+    ignored_in,
     parse_table,
     read_campaign,
     read_header,
     table_of,
 )
 from accelstudy.campaign.files.header import HEADER, Header
-from accelstudy.campaign.files.position_files import columns_of, ignored_in
 from accelstudy.campaign.files.session import Campaign
 from accelstudy.files.reading import read_text
 
