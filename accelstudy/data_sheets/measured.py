@@ -33,8 +33,8 @@ def sheet_of_log(path: str | Path, settings: ImportSettings) -> DataSheet:
     """
     _, report = import_log(path, settings)
     assert report.holds is not None
-    holds = report.holds
-    curve = holds.allan.channels(slice(0, 1) if holds.directed else slice(0, 3))
+    noise = report.holds.noise
+    curve = noise.allan.channels(noise.of_sensor)
     return sheet_of_allan(curve, Path(path).stem, str(path))
 
 

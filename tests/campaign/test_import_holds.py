@@ -47,6 +47,12 @@ def write(folder, forces, time=None):
     return path
 
 
+def assert_same(holds, others, rtol=1e-5):
+    for attribute in ("start", "end", "t0", "t1", "n", "mean", "sd"):
+        one, other = (each.of_each(attribute) for each in (holds, others))
+        np.testing.assert_allclose(one, other, rtol=rtol, atol=1e-8)
+
+
 def opened(folder, forces, time=None, **options):
     rate = RATE if time is None else None
     return open_log(write(folder, forces, time), rate=rate, **options)
@@ -58,20 +64,19 @@ def test_known_holds(tmp_path, seed, sigma):
     forces, edges = session(seed, sigma=sigma)
     holds = find_holds(opened(tmp_path, forces))
     assert len(holds) == len(edges)
-    inside = (holds.start >= edges[:, 0]) & (holds.end <= edges[:, 1])
+    inside = (holds.of_each("start") >= edges[:, 0]) & (holds.of_each("end") <= edges[:, 1])
     assert inside.all()
     # Half a window and the trim are lost on both sides, and little else.
-    np.testing.assert_allclose(holds.start - edges[:, 0], 70, atol=15)
-    np.testing.assert_allclose(edges[:, 1] - holds.end, 70, atol=15)
-    np.testing.assert_array_equal(holds.n_samples, holds.end - holds.start)
-    np.testing.assert_allclose(holds.t0, holds.start / RATE)
-    np.testing.assert_allclose(holds.t1, (holds.end - 1) / RATE)
+    np.testing.assert_allclose(holds.of_each("start") - edges[:, 0], 70, atol=15)
+    np.testing.assert_allclose(edges[:, 1] - holds.of_each("end"), 70, atol=15)
+    np.testing.assert_array_equal(holds.n_samples, holds.of_each("end") - holds.of_each("start"))
+    np.testing.assert_allclose(holds.t0, holds.of_each("start") / RATE)
+    np.testing.assert_allclose(holds.t1, (holds.of_each("end") - 1) / RATE)
     for i in range(len(holds)):
-        own = forces[holds.start[i] : holds.end[i]]
+        own = forces[holds.of_each("start")[i] : holds.of_each("end")[i]]
         np.testing.assert_allclose(holds.mean[i], own.mean(axis=0), rtol=1e-12, atol=1e-12)
-        np.testing.assert_allclose(holds.sd[i], own.std(axis=0, ddof=1), rtol=1e-9)
+        np.testing.assert_allclose(holds.of_each("sd")[i], own.std(axis=0, ddof=1), rtol=1e-9)
     assert holds.threshold.floor == pytest.approx(sigma * 3**0.25, rel=0.1)
-    assert list(holds.table().columns[:5]) == ["start", "end", "t0_s", "t1_s", "n"]
 
 
 def test_chunks_do_not_matter(tmp_path):
@@ -79,8 +84,8 @@ def test_chunks_do_not_matter(tmp_path):
     whole = find_holds(opened(tmp_path, forces))
     for chunk_size in (64, 333, 1000):
         parts = find_holds(opened(tmp_path, forces, chunk_size=chunk_size))
-        pd.testing.assert_frame_equal(whole.table(), parts.table(), rtol=1e-9)
-        np.testing.assert_allclose(whole.allan.deviation, parts.allan.deviation)
+        assert_same(whole, parts, rtol=1e-9)
+        np.testing.assert_allclose(whole.noise.allan.deviation, parts.noise.allan.deviation)
 
 
 def test_windows_are_those_of_numpy(tmp_path):
@@ -104,10 +109,10 @@ def test_no_hold_spans_a_gap(tmp_path):
     holds = find_holds(log, shortest=0.5)
     assert "1 gap in time; no hold spans one" in holds.warnings
     assert len(holds) == len(edges) + 1
-    assert not np.any((holds.start < middle) & (holds.end > middle))
+    assert not np.any((holds.of_each("start") < middle) & (holds.of_each("end") > middle))
     # Where a chunk begins with the gap it is one gap, too.
     whole = find_holds(opened(tmp_path, forces, time, chunk_size=middle), shortest=0.5)
-    pd.testing.assert_frame_equal(whole.table(), holds.table(), rtol=1e-9)
+    assert_same(whole, holds, rtol=1e-9)
     assert whole.warnings == holds.warnings
 
 
@@ -119,7 +124,7 @@ def test_a_frozen_channel_does_not_lower_the_floor(tmp_path):
     frozen[edges[6, 0] : edges[6, 1], 1] = frozen[edges[6, 0], 1]
     holds = find_holds(opened(tmp_path, frozen))
     assert holds.threshold.sd == pytest.approx(sound.threshold.sd, rel=0.05)
-    np.testing.assert_array_equal(holds.start, sound.start[[0, 1, 7]])
+    np.testing.assert_array_equal(holds.of_each("start"), sound.of_each("start")[[0, 1, 7]])
     assert any("does not change over a window in" in text for text in holds.warnings)
 
 
@@ -138,7 +143,9 @@ def test_saturated_holds_are_left_out(tmp_path):
     beyond = [i for i, (a, b) in enumerate(edges) if sign * forces[a:b, 0].mean() > abs(level)]
     holds = find_holds(opened(tmp_path, clipped))
     assert len(holds) == len(edges) - 1 - len(beyond)
-    assert not np.any((holds.start >= edges[4, 0]) & (holds.end <= edges[4, 1]))
+    assert not np.any(
+        (holds.of_each("start") >= edges[4, 0]) & (holds.of_each("end") <= edges[4, 1])
+    )
     assert any("saturated" in text for text in holds.warnings)
 
 
@@ -157,11 +164,11 @@ def test_override_and_limits(tmp_path):
     chosen = find_holds(log)
     given = find_holds(log, threshold=chosen.threshold.sd)
     assert given.threshold.reason == "as given"
-    pd.testing.assert_frame_equal(given.table(), chosen.table())
+    assert_same(given, chosen)
     assert len(find_holds(log, threshold=100.0)) == 1
     longer = find_holds(log, trim=0.5)
-    np.testing.assert_array_equal(longer.start, chosen.start + 30)
-    np.testing.assert_array_equal(longer.end, chosen.end - 30)
+    np.testing.assert_array_equal(longer.of_each("start"), chosen.of_each("start") + 30)
+    np.testing.assert_array_equal(longer.of_each("end"), chosen.of_each("end") - 30)
     for options, message in [
         ({"shortest": 5.0}, r"no static hold of 5 s or more \(8 shorter ones"),
         ({"threshold": 1e-6}, "no static hold"),
@@ -192,8 +199,9 @@ def test_few_holds_in_much_motion(tmp_path):
 def near(holds, reference, scale=1.0):
     """Largest difference of the means, in sd of a sample, of the holds that both know."""
     worst, common = 0.0, 0
+    start, end = holds.of_each("start"), holds.of_each("end")
     for row in reference.itertuples():
-        overlap = np.minimum(holds.end, row.i1) - np.maximum(holds.start, row.i0)
+        overlap = np.minimum(end, row.i1) - np.maximum(start, row.i0)
         i = int(np.argmax(overlap))
         if overlap[i] > 0.5 * row.n:
             common += 1
@@ -245,4 +253,4 @@ def test_holds_that_are_noisier_than_the_others(tmp_path, sigma, factor):
         forces[start:end] += factor * sigma * rng.standard_normal((end - start, 3))
     holds = find_holds(opened(tmp_path, forces))
     assert len(holds) == len(edges)
-    assert np.all((holds.start >= edges[:, 0]) & (holds.end <= edges[:, 1]))
+    assert np.all((holds.of_each("start") >= edges[:, 0]) & (holds.of_each("end") <= edges[:, 1]))

@@ -111,7 +111,7 @@ def test_frames(tmp_path, turned, unit):
     np.testing.assert_allclose(found.slope, expected.slope, atol=1e-9)
     assert found.log.frame == "flu"
     if unit == "counts":
-        np.testing.assert_array_equal(found.nominal_scale, [0.001, -0.002, -0.003])
+        np.testing.assert_array_equal(found.nominal.scale, [0.001, -0.002, -0.003])
 
 
 def test_temperature_vibration_and_range(tmp_path, turned):
@@ -160,10 +160,10 @@ def test_sigma_does_not_depend_on_the_offset():
         settings = {k: v for k, v in XSENS.items() if k != "offset"}
         campaign, report = import_log(path, parse_settings(settings | {"offset": offset}))
         sigmas.append(campaign.sigma_force)
-        assert report.holds.directed
+        assert report.holds.noise.directed
         np.testing.assert_allclose(np.linalg.norm(campaign.forces, axis=1), 9.8, atol=2)
         if offset is None:
-            np.testing.assert_allclose(campaign.nominal_offset, XSENS["offset"], atol=10)
+            np.testing.assert_allclose(campaign.nominal.offset, XSENS["offset"], atol=10)
             assert any("from the positions, as none was given" in note for note in report.notes)
     np.testing.assert_allclose(sigmas, sigmas[0], rtol=0.01)
 

@@ -20,6 +20,7 @@ from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.document.diagnosis import diagnosis_document
 from accelstudy.effects import effect_names
 from accelstudy.leveling.angles import specific_force
+from accelstudy.sensors.conversion import Conversion
 
 N = 36
 VERDICTS = {"no_effect", "named", "unknown", "noise_model", "gross_error"}
@@ -144,9 +145,7 @@ def test_a_bad_header_is_one_line(robot, case, tmp_path):
 
 
 def test_counts_without_their_scale_are_one_line(robot, tmp_path):
-    counts = replace(
-        robot, unit="counts", nominal_scale=np.full(3, 1e-6), nominal_offset=np.zeros(3)
-    )
+    counts = replace(robot, unit="counts", nominal=Conversion(np.full(3, 1e-6), np.zeros(3)))
     run = command(tmp_path, counts, header=lambda content: content.pop("nominal"))
     assert_one_line(run, tmp_path, "campaign.yaml: nominal: missing")
 
@@ -236,7 +235,7 @@ def test_the_robot_is_not_used_if_told_so(robot, tmp_path):
 def test_counts_are_diagnosed_like_what_they_count(robot):
     """Up to the rounding of the conversion, the numbers are the same."""
     scale, offset = np.array([0.0236, -0.0236, 0.0236]), np.array([33123.0, 33275.0, 32364.0])
-    counts = replace(robot, unit="counts", nominal_scale=scale, nominal_offset=offset)
+    counts = replace(robot, unit="counts", nominal=Conversion(scale, offset))
     plain, counted = (diagnosis_document(diagnose(c, NINE)) for c in (robot, counts))
     assert plain["verdict"] == counted["verdict"]
     assert plain["global_test"] == pytest.approx(counted["global_test"])
@@ -245,7 +244,7 @@ def test_counts_are_diagnosed_like_what_they_count(robot):
 def test_counts_that_are_coarse_are_named_as_such(robot, tmp_path):
     """0.0236 m/s² a count and 0.002 m/s² of noise: the step is found as it is."""
     scale = np.full(3, 0.0236)
-    counts = replace(robot, unit="counts", nominal_scale=scale, nominal_offset=np.full(3, 33000.0))
+    counts = replace(robot, unit="counts", nominal=Conversion(scale, np.full(3, 33000.0)))
     whole = {f: lambda t, f=f: t[f].round() for f in ("fx", "fy", "fz")}
     found = document(tmp_path, command(tmp_path, counts, table=lambda t: t.assign(**whole)))
     assert found["effects"][0]["name"] == "quantisation"

@@ -162,8 +162,8 @@ def assessed_positions(assessment: Assessment) -> pd.DataFrame:
             table[f"v_{name}_mgon"] = residuals[:, 3 + i] / MGON
     if assessment.held_out is not None:
         table["held_out_mps2"] = np.linalg.norm(assessment.held_out.misclosures, axis=1)
-    found = {s.position for s in assessment.suspects}
-    table["suspect"] = [i in found for i in range(len(table))]
+    suspects = {s.position for s in assessment.suspects}
+    table["suspect"] = [i in suspects for i in range(len(table))]
     return table
 
 
@@ -173,10 +173,10 @@ def _sigma_reading(campaign: Campaign) -> float | None:
 
 
 def _nominal(fit: CampaignFit) -> dict[str, list[float]] | None:
-    campaign = fit.campaign
-    if campaign.nominal_scale is None or campaign.nominal_offset is None:
+    nominal = fit.campaign.nominal
+    if nominal is None:
         return None
-    return {"scale": campaign.nominal_scale.tolist(), "offset": campaign.nominal_offset.tolist()}
+    return {"scale": nominal.scale.tolist(), "offset": nominal.offset.tolist()}
 
 
 def _affine(fit: CampaignFit) -> dict[str, Any] | None:
@@ -202,12 +202,12 @@ def json_number(value: Any) -> float | None:
 
 def json_text(content: Any) -> str:
     """JSON for a file; what is no finite number is null, or the file could not be read again."""
-    return json.dumps(_known(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return json.dumps(_without_nan(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def _known(content: Any) -> Any:
+def _without_nan(content: Any) -> Any:
     if isinstance(content, dict):
-        return {key: _known(value) for key, value in content.items()}
+        return {key: _without_nan(value) for key, value in content.items()}
     if isinstance(content, (list, tuple)):
-        return [_known(value) for value in content]
+        return [_without_nan(value) for value in content]
     return json_number(content) if isinstance(content, float) else content

@@ -83,7 +83,7 @@ def read_campaign(
         raise InputError(f"{folder}: no table of positions; expected either {' or '.join(TABLES)}")
     columns, warnings = read_positions(path)
     campaign = parse_table(columns, header, path, plausible)
-    return replace(campaign, warnings=tuple(warnings), source=folder)
+    return replace(campaign, warnings=tuple(warnings))
 
 
 def read_header(folder: Path, given: Mapping[str, Any] | None = None) -> Header:
@@ -93,12 +93,12 @@ def read_header(folder: Path, given: Mapping[str, Any] | None = None) -> Header:
 
 def table_of(folder: Path) -> Path | None:
     """Table of positions in a campaign folder; None if there is none, an error if there are two."""
-    found = [folder / name for name in TABLES if (folder / name).exists()]
-    if len(found) > 1:
+    tables = [folder / name for name in TABLES if (folder / name).exists()]
+    if len(tables) > 1:
         raise InputError(
             f"{folder}: two tables of positions; expected either {' or '.join(TABLES)}"
         )
-    return found[0] if found else None
+    return tables[0] if tables else None
 
 
 def read_positions(path: Path) -> tuple[Columns, list[str]]:
@@ -192,7 +192,7 @@ def write_campaign(
     Parameters
     ----------
     campaign : Campaign
-        Its `warnings` and `source` are not written.
+        Its `warnings` are not written.
     folder : path
         Made if it does not exist. A table of positions in it is replaced, be it CSV or Parquet;
         other files stay.
@@ -273,7 +273,7 @@ def parse_table(columns: Columns, header: Header, path: Path, plausible: bool = 
 
 def campaign_of(header: Header, values: Mapping[str, Any]) -> Campaign:
     """Make a campaign of a header and of columns in SI, by attribute."""
-    nominal, noise, robot = header.nominal, header.sensor_noise, header.robot
+    noise, robot = header.sensor_noise, header.robot
     return Campaign(
         name=header.name,
         sensor=header.sensor,
@@ -282,8 +282,7 @@ def campaign_of(header: Header, values: Mapping[str, Any]) -> Campaign:
         sigma_gravity=header.gravity.sigma_mps2,
         sigma_force=None if noise is None else noise.sigma_mps2,
         sigma_angle=None if robot is None else robot.angle_sigma_mgon * MGON,
-        nominal_scale=None if nominal is None else np.array(nominal.scale),
-        nominal_offset=None if nominal is None else np.array(nominal.offset),
+        nominal=None if header.nominal is None else header.conversion("forces"),
         full_range=header.range_mps2,
         log=header.log,
         **values,
@@ -328,8 +327,8 @@ def _content_of(campaign: Campaign) -> dict[str, Any]:
         "unit": campaign.unit,
         "gravity": {"value_mps2": campaign.gravity, "sigma_mps2": campaign.sigma_gravity},
     }
-    if campaign.nominal_scale is not None or campaign.nominal_offset is not None:
-        nominal = {"scale": campaign.nominal_scale, "offset": campaign.nominal_offset}
+    if campaign.nominal is not None:
+        nominal = {"scale": campaign.nominal.scale, "offset": campaign.nominal.offset}
         content["nominal"] = {k: np.asarray(v).tolist() for k, v in nominal.items()}
     if campaign.sigma_force is not None:
         content["sensor_noise"] = {"sigma_mps2": campaign.sigma_force}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.files.header import COLUMNS, LogLayout
 from accelstudy.effects import HoldConditions
+from accelstudy.sensors.conversion import Conversion
 
 Array = NDArray[np.float64]
 
@@ -40,13 +40,12 @@ class Campaign:
     slope, sd_slope : (n, 3) arrays, m/s²/s, optional, slope of the samples within the holds, and
         its standard deviation, autocorrelation included
     time, temperature, vibration, yaw : (n,) arrays in s, °C, m/s², rad, optional
-    nominal_scale, nominal_offset : (3,) arrays with unit "counts", f = (raw − offset) · scale
+    nominal : Conversion, of the three axes; with unit "counts" only
     full_range : float, m/s², optional, the sensor measures ± this
     log : LogLayout, optional, layout of the log from which the campaign was made
     excluded : Campaign, optional, the holds that were left out, with the same columns
     reasons : mapping of int to str, why, by position
     warnings : tuple of str, what was ignored when the campaign was read
-    source : Path, folder from which it was read, optional
     """
 
     name: str
@@ -67,14 +66,12 @@ class Campaign:
     temperature: Array | None = None
     vibration: Array | None = None
     yaw: Array | None = None
-    nominal_scale: Array | None = None
-    nominal_offset: Array | None = None
+    nominal: Conversion | None = None
     full_range: float | None = None
     log: LogLayout | None = None
     excluded: Campaign | None = None
     reasons: Mapping[int, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = field(default=())
-    source: Path | None = None
 
     @property
     def n_positions(self) -> int:
@@ -150,11 +147,11 @@ class Campaign:
 
     def _rows(self) -> tuple[dict[str, Any], NDArray[np.bool_]]:
         """Columns with all the holds, and which of them are used."""
-        own = self._taken(np.ones(self.n_positions, dtype=bool))
+        used_rows = self._taken(np.ones(self.n_positions, dtype=bool))
         if self.excluded is None:
-            return own, np.ones(self.n_positions, dtype=bool)
+            return used_rows, np.ones(self.n_positions, dtype=bool)
         out = self.excluded._taken(np.ones(self.excluded.n_positions, dtype=bool))
-        order = np.argsort(np.concatenate([own["positions"], out["positions"]]))
+        order = np.argsort(np.concatenate([used_rows["positions"], out["positions"]]))
         used = np.arange(len(order)) < self.n_positions
-        rows = {k: np.concatenate([own[k], out[k]])[order] for k in own if k in out}
+        rows = {k: np.concatenate([used_rows[k], out[k]])[order] for k in used_rows if k in out}
         return rows, used[order]

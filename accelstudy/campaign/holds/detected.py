@@ -7,15 +7,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.holds.allan import AllanDeviation, AllanSums, accuracy_of_mean
 from accelstudy.campaign.holds.segments import Segment
-from accelstudy.campaign.holds.threshold import Survey, Threshold
-from accelstudy.campaign.logs.columns import AXES
+from accelstudy.campaign.holds.threshold import Threshold
+from accelstudy.campaign.holds.windows import Envelope
 from accelstudy.campaign.logs.recording import Recording
+from accelstudy.leveling.angles import usual_norm
 
 Array = NDArray[np.float64]
 
@@ -26,76 +26,101 @@ SHARE = 8.0
 
 
 @dataclass(frozen=True)
+class HoldNoise:
+    """Noise of the samples within all holds of a log together, in three channels.
+
+    The first channel is along the mean specific force of a hold, the other two are across it.
+
+    Attributes
+    ----------
+    allan : AllanDeviation, of the channels
+    sd : (3,) array, m/s², root mean square sd of the samples within holds in the channels
+    center : (3,) array, m/s², zero point of the specific forces; zero if the holds determine none
+    directed : bool, whether the means are close enough to forces for "along" to have a meaning
+    """
+
+    allan: AllanDeviation
+    sd: Array
+    center: Array
+    directed: bool
+
+    @property
+    def of_sensor(self) -> slice:
+        """Channels with the noise of the sensor: those without what moves it, if there are any."""
+        return slice(0, 1) if self.directed else slice(0, 3)
+
+
+@dataclass(frozen=True)
 class DetectedHolds:
     """Static holds of a log, n of them, in order of time.
 
     Attributes
     ----------
-    number : (n,) int array, numbers that figures and options use
-    start, end : (n,) int arrays, first sample, and the one after the last
-    t0, t1 : (n,) arrays, s, times of the first and of the last sample since the first of the log
-    n_samples : (n,) int array
-    mean, sd : (n, 3) arrays, m/s²
-    slope, sd_slope : (n, 3) arrays, m/s²/s, of the samples, and its standard deviation
+    segments : mapping of int to Segment, by the numbers that figures and options use
+    left_out : mapping of int to str, numbers of holds that are left out, with the reason
     conditions : mapping of "temperature" and "vibration" to (n,) arrays, °C (mean) and m/s² (rms);
         NaN where nothing is known
-    left_out : mapping of int to str, numbers of holds that are left out, with the reason
+    noise : HoldNoise, of the holds that are not left out
     threshold : Threshold
-    window : int, samples in a window
     step : float, s, usual time between samples
-    span : (float, float), s, first and last time in the log
-    total : int, samples in the log that a window is centred at
-    allan : AllanDeviation, of all holds together; channels: along the mean specific force of a
-        hold, and twice across
-    noise : (3,) array, m/s², root mean square sd of the samples within holds in these channels
-    center : (3,) array, m/s², zero point of the specific forces; zero if the holds determine none
-    directed : bool, whether the means are close enough to forces for "along" to have a meaning
+    envelope : Envelope, of the log, for its figure
     warnings : tuple of str
     """
 
-    number: NDArray[np.int_]
-    start: NDArray[np.int_]
-    end: NDArray[np.int_]
-    t0: Array
-    t1: Array
-    n_samples: NDArray[np.int_]
-    mean: Array
-    sd: Array
-    slope: Array
-    sd_slope: Array
-    conditions: Mapping[str, Array]
+    segments: Mapping[int, Segment]
     left_out: Mapping[int, str]
+    conditions: Mapping[str, Array]
+    noise: HoldNoise
     threshold: Threshold
-    window: int
     step: float
-    span: tuple[float, float]
-    total: int
-    allan: AllanDeviation
-    noise: Array
-    center: Array
-    directed: bool
+    envelope: Envelope
     warnings: tuple[str, ...]
 
     def __len__(self) -> int:
-        return len(self.start)
+        return len(self.segments)
+
+    def of_each(self, attribute: str) -> NDArray[Any]:
+        """Attribute of `Segment` for each hold, (n,) or (n, 3)."""
+        return np.array([getattr(segment, attribute) for segment in self.segments.values()])
+
+    @property
+    def number(self) -> NDArray[np.int_]:
+        """Numbers of the holds, (n,)."""
+        return np.array(list(self.segments))
 
     @property
     def used(self) -> NDArray[np.bool_]:
-        """Which holds are not left out."""
+        """Which holds are not left out, (n,)."""
         return ~np.isin(self.number, list(self.left_out))
 
-    def table(self) -> pd.DataFrame:
-        """Table with one row for each hold."""
-        columns: dict[str, NDArray[Any]] = {
-            "start": self.start,
-            "end": self.end,
-            "t0_s": self.t0,
-            "t1_s": self.t1,
-            "n": self.n_samples,
-        }
-        columns |= {axis: self.mean[:, i] for i, axis in enumerate(AXES)}
-        columns |= {f"sd_{axis}": self.sd[:, i] for i, axis in enumerate(AXES)}
-        return pd.DataFrame(columns)
+    @property
+    def t0(self) -> Array:
+        """Times of the first samples since the first of the log, (n,), s."""
+        return self.of_each("t0")
+
+    @property
+    def t1(self) -> Array:
+        """Times of the last samples, (n,), s."""
+        return self.of_each("t1")
+
+    @property
+    def n_samples(self) -> NDArray[np.int_]:
+        """Numbers of samples, (n,)."""
+        return self.of_each("n")
+
+    @property
+    def mean(self) -> Array:
+        """Mean specific forces, (n, 3), m/s²."""
+        return self.of_each("mean")
+
+    @property
+    def radius(self) -> float:
+        """Usual distance of the means from the zero point of the specific forces, m/s²."""
+        return usual_norm(self.mean - self.noise.center)
+
+    def slope_sigmas(self) -> Array:
+        """Standard deviations of the slopes of the samples, (n, 3), m/s²/s."""
+        return slope_sigmas(list(self.segments.values()), self.step)
 
 
 def collected(
@@ -103,46 +128,42 @@ def collected(
     left_out: Mapping[int, str],
     log: Recording,
     threshold: Threshold,
-    survey: Survey,
-    width: int,
+    envelope: Envelope,
     warnings: Sequence[str],
 ) -> DetectedHolds:
-    """Collect the segments of a sensor."""
+    """Collect the segments of a sensor.
+
+    Raises
+    ------
+    InputError
+        If all holds are left out.
+    """
     used = [segment for number, segment in segments.items() if number not in left_out]
     if not used:
         raise InputError(f"{log.path}: exclude: no hold is left")
-    center, directed = _center(np.array([segment.mean for segment in used]))
-    sums, spreads = AllanSums(), []
-    for segment in used:
+    return DetectedHolds(
+        segments=segments,
+        left_out=left_out,
+        conditions=_conditions(list(segments.values()), log.conditions),
+        noise=_noise(used, log.step),
+        threshold=threshold,
+        step=log.step,
+        envelope=envelope,
+        warnings=tuple(warnings),
+    )
+
+
+def _noise(segments: Sequence[Segment], step: float) -> HoldNoise:
+    """Turn the samples of each hold to its channels, and add them up."""
+    center, directed = _center(np.array([segment.mean for segment in segments]))
+    sums, variances = AllanSums(), []
+    for segment in segments:
         frame = _frame(segment.mean - center)
         for record in segment.noise:
             sums.add(record, frame)
-        spreads.append(np.diag(frame.T @ segment.covariance @ frame))
-    every = list(segments.values())
-    return DetectedHolds(
-        number=np.array(list(segments)),
-        start=np.array([hold.start for hold in every]),
-        end=np.array([hold.end for hold in every]),
-        t0=np.array([hold.t0 for hold in every]),
-        t1=np.array([hold.t1 for hold in every]),
-        n_samples=np.array([hold.n for hold in every]),
-        mean=np.array([hold.mean for hold in every]),
-        sd=np.sqrt([np.diag(hold.covariance) for hold in every]),
-        slope=np.array([hold.slope for hold in every]),
-        sd_slope=slope_sigmas(every, log.step),
-        conditions=_conditions(every, log.conditions),
-        left_out=left_out,
-        threshold=threshold,
-        window=width,
-        step=log.step,
-        span=survey.span,
-        total=survey.total,
-        allan=sums.deviation(log.step),
-        noise=np.sqrt(np.mean(spreads, axis=0)),
-        center=center,
-        directed=directed,
-        warnings=tuple(warnings),
-    )
+        variances.append(np.diag(frame.T @ segment.covariance @ frame))
+    sd = np.sqrt(np.mean(variances, axis=0))
+    return HoldNoise(sums.deviation(step), sd, center, directed)
 
 
 def _conditions(segments: Sequence[Segment], names: Sequence[str]) -> dict[str, Array]:

@@ -2,7 +2,8 @@
 
 The detector is that of Tedaldi, Pretto and Menegatti (ICRA 2014): it compares the norm of the
 variances of the three axes in a window with a threshold, which comes from the data. The log is read
-twice, first for the threshold, then for the holds, and only a chunk of it is in memory at a time.
+twice, first for the threshold, then for the holds and the envelope that a figure shows, and only a
+chunk of it is in memory at a time.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import stage
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.basics.wording import counted
-from accelstudy.campaign.holds.allan import RELIABLE, AllanDeviation
+from accelstudy.campaign.holds.allan import RELIABLE
 from accelstudy.campaign.holds.detected import DetectedHolds, collected
 from accelstudy.campaign.holds.segments import Segment, runs_at_rest
 from accelstudy.campaign.holds.selection import Selection
@@ -28,9 +29,8 @@ from accelstudy.campaign.holds.threshold import (
     given_threshold,
     survey_log,
 )
-from accelstudy.campaign.holds.windows import samples_in
+from accelstudy.campaign.holds.windows import Envelope, samples_in, windows
 from accelstudy.campaign.logs.recording import Recording
-from accelstudy.leveling.angles import usual_norm
 
 Array = NDArray[np.float64]
 
@@ -98,14 +98,17 @@ def find_joint_holds(
         given_threshold(threshold) if threshold is not None else choose_threshold(survey, log)
         for survey, log in zip(surveys, logs, strict=True)
     ]
+    envelopes = [Envelope(survey.span, survey.total) for survey in surveys]
     step = logs[0].step
     cut, least = round(trim / step), max(2, round(shortest / step))
     groups: list[tuple[int, list[Segment | None]]] = []
     saturated, wandering, short = [0] * len(logs), [0] * len(logs), 0
     with stage("holds", surveys[0].total) as advance:
         for group in runs_at_rest(
-            logs,
-            width,
+            [
+                envelope.along(windows(log, width))
+                for envelope, log in zip(envelopes, logs, strict=True)
+            ],
             [each.sd**2 for each in chosen],
             cut,
             [survey.extremes for survey in surveys],
@@ -137,8 +140,8 @@ def find_joint_holds(
                 f"{counted(wandering[i], 'hold')} left out: the force changes there by more than "
                 "its noise, since the sensor turns slowly"
             )
-        found = {n: part for n, (_, parts) in numbers.items() if (part := parts[i]) is not None}
-        if not found:
+        parts = {n: part for n, (_, group) in numbers.items() if (part := group[i]) is not None}
+        if not parts:
             if wandering[i]:
                 why = "it turns slowly in all that looks like a hold"
                 raise _never_still(log, surveys[i], window, why)
@@ -147,13 +150,10 @@ def find_joint_holds(
                 f"({counted(short, 'shorter one')}; a window is at rest up to "
                 f"{chosen[i].sd:.3g} m/s²)" + "".join(f"; {warning}" for warning in warnings)
             )
-        segments = selection.join(found, chosen[i].sd)
-        holds = collected(
-            segments, selection.left_out(segments), log, chosen[i], surveys[i], width, warnings
-        )
-        radius = usual_norm(holds.mean - holds.center)
-        spread = float(np.sqrt(np.mean(holds.noise**2)))
-        if threshold is None and _moves(chosen[i], holds.allan, spread, step, radius):
+        segments = selection.join(parts, chosen[i].sd)
+        left_out = selection.left_out(segments)
+        holds = collected(segments, left_out, log, chosen[i], envelopes[i], warnings)
+        if threshold is None and _moves(holds):
             why = (
                 f"what looks like rest varies by {chosen[i].floor:.3g} m/s², slowly like a hand, "
                 "not like the noise of a sensor"
@@ -183,29 +183,20 @@ def _wanders(segment: Segment, threshold: Threshold) -> bool:
     return segment.variance > (WANDERING * threshold.sd) ** 2
 
 
-def _moves(
-    threshold: Threshold, curve: AllanDeviation, noise: float, step: float, radius: float
-) -> bool:
+def _moves(holds: DetectedHolds) -> bool:
     """Whether the windows "at rest" show motion: large compared with gravity, and slow.
 
     The noise of a sensor at rest is below a few hundredths of gravity. The vibration of a machine
     may be larger, but it is quick and averages out like white noise. A human body moves slowly.
-
-    Parameters
-    ----------
-    threshold : Threshold
-    curve : AllanDeviation, of all channels in the holds
-    noise : float, m/s², standard deviation of the samples within holds
-    step : float, s, between samples
-    radius : float, m/s², norm of the means
     """
-    if not threshold.floor > RESTLESS * min(radius, STANDARD_GRAVITY):
+    if not holds.threshold.floor > RESTLESS * min(holds.radius, STANDARD_GRAVITY):
         return False
-    known = (curve.differences >= RELIABLE) & (curve.tau >= SHORTEST)
-    if not known.any():
+    curve, sd = holds.noise.allan, float(np.sqrt(np.mean(holds.noise.sd**2)))
+    reliable = (curve.differences >= RELIABLE) & (curve.tau >= SHORTEST)
+    if not reliable.any():
         return True
-    white = noise * np.sqrt(step / curve.tau[known])
-    return bool(np.max(curve.pooled[known] / white) > SLOW)
+    white = sd * np.sqrt(holds.step / curve.tau[reliable])
+    return bool(np.max(curve.pooled[reliable] / white) > SLOW)
 
 
 def _never_still(log: Recording, survey: Survey, window: float, why: str) -> InputError:

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.campaign.holds.allan import AllanMoments, allan_moments
-from accelstudy.campaign.holds.windows import Windows, windows
-from accelstudy.campaign.logs.recording import Recording
+from accelstudy.campaign.holds.windows import Windows
 
 Array = NDArray[np.float64]
 
@@ -95,6 +94,11 @@ class Segment:
         return self.moments.products[1:, 1:] / (self.n - 1)
 
     @property
+    def sd(self) -> Array:
+        """Standard deviation of the samples of the axes, (3,), m/s²."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
     def slope(self) -> Array:
         """Slope of the forces over time by least squares, (3,), m/s²/s."""
         return self.moments.products[0, 1:] / self.moments.products[0, 0]
@@ -164,9 +168,9 @@ class GrowingHold:
         new = Moments.of(rows[:, :4])
         self._moments = new if self._moments is None else self._moments + new
         others = rows[:, 4:]
-        known = np.isfinite(others)
-        values = np.where(known, others, 0.0)
-        sums = np.array([known.sum(axis=0), values.sum(axis=0), (values**2).sum(axis=0)])
+        measured = np.isfinite(others)
+        values = np.where(measured, others, 0.0)
+        sums = np.array([measured.sum(axis=0), values.sum(axis=0), (values**2).sum(axis=0)])
         self._conditions = self._conditions + sums if self.n else sums
         self.n += len(rows)
         forces = rows[:, 1:4]
@@ -207,8 +211,7 @@ class GrowingHold:
 
 
 def runs_at_rest(
-    logs: Sequence[Recording],
-    width: int,
+    streams: Sequence[Iterator[Windows]],
     largest: Sequence[float],
     cut: int,
     extremes: Sequence[Array],
@@ -219,8 +222,8 @@ def runs_at_rest(
 
     Parameters
     ----------
-    logs : sequence of Recording, of sensors that moved together; their samples are simultaneous
-    width : int, samples in a window
+    streams : sequence of iterators of Windows, of sensors that moved together; their samples are
+        simultaneous
     largest : variance up to which a window of each sensor is at rest, (m/s²)²
     cut : int, samples cut off at both ends
     extremes, full_range : as of `GrowingHold`, `extremes` for each sensor
@@ -228,7 +231,7 @@ def runs_at_rest(
     """
     holds: list[GrowingHold] | None = None
     piece = 0
-    for batches in zip(*(windows(log, width) for log in logs), strict=True):
+    for batches in zip(*streams, strict=True):
         first_batch = batches[0]
         advance(len(first_batch.time))
         if holds is not None and first_batch.piece != piece:

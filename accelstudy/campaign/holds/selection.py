@@ -33,12 +33,12 @@ class Selection:
     joined: tuple[tuple[int, ...], ...] = ()
     joined_spans: tuple[tuple[float, float], ...] = ()
 
-    def join(self, found: Mapping[int, Segment], alike: float) -> dict[int, Segment]:
+    def join(self, segments: Mapping[int, Segment], alike: float) -> dict[int, Segment]:
         """Join holds; they keep the number of the first.
 
         Parameters
         ----------
-        found : mapping of int to Segment
+        segments : mapping of int to Segment
         alike : float, m/s², by which the means of holds in one attitude may differ
 
         Raises
@@ -47,7 +47,7 @@ class Selection:
             If there is no such hold, a span of time has fewer than two, others lie between, or
             their attitudes differ.
         """
-        holds = dict(found)
+        holds = dict(segments)
         groups = list(self.joined)
         for start, end in self.joined_spans:
             groups.append(tuple(_within(holds, start, end)))

@@ -43,7 +43,7 @@ class Threshold:
 
 
 class Survey:
-    """What the first pass over a log finds."""
+    """Noise and extremes of a log, collected in a first pass over its windows."""
 
     def __init__(self) -> None:
         self.counts = np.zeros(len(_BINS) - 1, dtype=int)
@@ -79,8 +79,9 @@ class Survey:
             yield f"a channel does not change over a window in {share:.2g} % of the log; left out"
 
 
-def _two_lowest(known: Array, forces: Array) -> Array:
-    candidates = np.vstack([known, forces])
+def _two_lowest(before: Array, forces: Array) -> Array:
+    """Lowest value of each axis and the one next to it, (2, 3), with those before."""
+    candidates = np.vstack([before, forces])
     lowest = candidates.min(axis=0)
     return np.array([lowest, np.where(candidates > lowest, candidates, np.inf).min(axis=0)])
 

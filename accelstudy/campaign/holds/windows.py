@@ -1,8 +1,9 @@
-"""Windows that slide over a log, and how much the forces vary in each."""
+"""Windows that slide over a log, how much the forces vary in each, and their envelope in time."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from copy import copy
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -15,6 +16,8 @@ from accelstudy.campaign.logs.recording import GAP, Recording
 
 Array = NDArray[np.float64]
 
+SPANS = 1200
+"""Spans of time of an envelope, about as many as a page can show."""
 _SMALLEST, _LARGEST = 8, 10**6  # samples
 
 
@@ -87,6 +90,43 @@ def windows(log: Recording, width: int) -> Iterator[Windows]:
                 frozen,
             )
             times, values = times[centred:], values[centred:]
+
+
+class Envelope:
+    """Least and largest values of a log in spans of time, collected as its windows go by.
+
+    Parameters
+    ----------
+    span : (float, float), s, times of the first and of the last window
+    total : int, windows of the log
+
+    Attributes
+    ----------
+    edges : (k + 1,) array, s, of the spans
+    low, high : (k, 4) arrays, of fx, fy, fz and of the standard deviation of the windows, m/s²;
+        NaN in a gap
+    """
+
+    def __init__(self, span: tuple[float, float], total: int) -> None:
+        count = max(1, min(SPANS, total // 4))
+        self.edges = np.linspace(*span, count + 1)
+        self.low, self.high = np.full((2, count, 4), np.nan)
+
+    def along(self, batches: Iterator[Windows]) -> Iterator[Windows]:
+        """Pass windows on, and widen the envelope to hold them."""
+        for batch in batches:
+            values = np.column_stack([batch.forces, np.sqrt(batch.variance)])
+            span = np.searchsorted(self.edges, batch.time, side="right") - 1
+            span = np.clip(span, 0, len(self.low) - 1)
+            np.fmin.at(self.low, span, values)
+            np.fmax.at(self.high, span, values)
+            yield batch
+
+    def less(self, offset: Array) -> Envelope:
+        """Envelope of the forces less an offset, (3,), m/s²."""
+        shifted = copy(self)
+        shifted.low, shifted.high = (values - [*offset, 0.0] for values in (self.low, self.high))
+        return shifted
 
 
 def _spread(forces: Array, width: int) -> tuple[Array, NDArray[np.bool_]]:

@@ -20,7 +20,7 @@ from accelstudy.campaign.holds.detected import DetectedHolds
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.campaign.logs.sources import Source
 from accelstudy.leveling.angles import usual_norm
-from accelstudy.sensors.conversion import conversion_of
+from accelstudy.sensors.conversion import Conversion, conversion_of
 from accelstudy.sensors.plausibility import LARGEST
 
 Array = NDArray[np.float64]
@@ -39,10 +39,10 @@ def imported_campaign(
     conversion = conversion_of(settings.unit, settings.scale, settings.offset)
     frame = settings.axes
     raw = conversion.from_si(frame.from_frd(forces))
-    scale, offset = None, None
+    nominal = None
     if settings.unit == "counts":
         scale = frame.rearranged(conversion.scale) * frame.signs
-        offset = frame.rearranged(conversion.offset)
+        nominal = Conversion(scale, frame.rearranged(conversion.offset))
     _check_size(paths[0], settings, raw, forces)
     return Campaign(
         **{
@@ -53,8 +53,7 @@ def imported_campaign(
             "sigma_gravity": settings.gravity.sigma_mps2,
             "unit": settings.unit,
             "sensor": settings.sensor,
-            "nominal_scale": scale,
-            "nominal_offset": offset,
+            "nominal": nominal,
             "full_range": settings.range_mps2,
             **columns,
         }
@@ -155,9 +154,9 @@ class ImportReport:
             sigma = "unknown" if self.sigma_white is None else shown(self.sigma_white)
             return [f"{self.n_holds} positions; sigma of a mean: {sigma}", *self.notes]
         holds, accuracy = self.holds, self.accuracy
-        lengths = holds.n_samples * holds.step
+        lengths, edges = holds.n_samples * holds.step, holds.envelope.edges
         lines = [
-            f"log: {holds.span[1] - holds.span[0]:.1f} s at {1 / holds.step:.6g} per second",
+            f"log: {edges[-1] - edges[0]:.1f} s at {1 / holds.step:.6g} per second",
             *self.notes,
             f"threshold: {holds.threshold.sd:.3g} m/s², {holds.threshold.reason}",
             f"holds: {len(holds)}, of {lengths.min():.1f} to {lengths.max():.1f} s",

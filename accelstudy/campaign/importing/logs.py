@@ -33,7 +33,6 @@ from accelstudy.campaign.importing.settings import (
 )
 from accelstudy.campaign.logs.columns import AXES
 from accelstudy.campaign.logs.recording import Log, LogSeries, Recording, open_log
-from accelstudy.leveling.angles import usual_norm
 from accelstudy.sensors.conversion import conversion_of
 
 __all__ = [
@@ -108,7 +107,7 @@ def import_sensors(
     """
     chosen = _settings_of_sensors(settings, default_name(paths))
     logs = {name: _recording(paths, each) for name, each in chosen.items()}
-    found = find_joint_holds(
+    detected = find_joint_holds(
         list(logs.values()),
         window=settings.window_s,
         threshold=settings.threshold_mps2,
@@ -120,7 +119,7 @@ def import_sensors(
     )
     return {
         name: _campaign(paths, each, logs[name], holds)
-        for (name, each), holds in zip(chosen.items(), found, strict=True)
+        for (name, each), holds in zip(chosen.items(), detected, strict=True)
     }
 
 
@@ -176,10 +175,7 @@ def import_each(
             from accelstudy.campaign.importing.segmentation_figure import render_segmentation
 
             files = (folders[name] / f"segmentation.{kind}" for kind in ("svg", "png"))
-            own = _settings_of_sensors(settings, default_name(paths))[name]
-            if campaign.log is not None:  # it has the offset that the positions determined
-                own = own.model_copy(update={"offset": campaign.log.offset})
-            render_segmentation(_recording(paths, own), report.holds, *files)
+            render_segmentation(report.holds, *files)
     return campaigns
 
 
@@ -213,11 +209,13 @@ def _recording(paths: Sequence[str | Path], settings: ImportSettings) -> Recordi
 def _campaign(
     paths: Sequence[str | Path], settings: ImportSettings, log: Recording, holds: DetectedHolds
 ) -> tuple[Campaign, ImportReport]:
+    """Make the campaign of the holds of one sensor, and its report."""
     accuracy, warnings = _accuracy(holds, settings.gravity.value_mps2)
     notes = [] if settings.frame == "frd" else [_frame_note(settings)]
     forces = holds.mean
     if settings.unit == "counts" and settings.offset is None:
-        settings, forces, note = _with_offset(settings, holds)
+        settings, offset, note = _with_offset(settings, holds)
+        forces, holds = forces - offset, replace(holds, envelope=holds.envelope.less(offset))
         notes += note
     first, time = log, (holds.t0 + holds.t1) / 2
     if isinstance(log, LogSeries):
@@ -227,7 +225,7 @@ def _campaign(
             "before and after it does not count"
             + ("" if log.timed else "; the times of the files do not tell that of a position")
         )
-        missing = [i for i in range(1, len(paths) + 1) if i not in holds.number]
+        missing = [i for i in range(1, len(paths) + 1) if i not in holds.segments]
         warnings += [f"{paths[i - 1]}: no static hold; position {i} is missing" for i in missing]
     assert isinstance(first, Log)
     columns = {}
@@ -245,9 +243,9 @@ def _campaign(
         positions=holds.number,
         sigma_force=accuracy.allan,
         n_samples=holds.n_samples,
-        sd=holds.sd,
-        slope=holds.slope,
-        sd_slope=holds.sd_slope,
+        sd=holds.of_each("sd"),
+        slope=holds.of_each("slope"),
+        sd_slope=holds.slope_sigmas(),
         time=None if isinstance(log, LogSeries) and not log.timed else time,
         log=layout_of(settings, first.source, first.places),
         warnings=tuple(warnings),
@@ -261,15 +259,15 @@ def _campaign(
 
 def _accuracy(holds: DetectedHolds, gravity: float) -> tuple[MeanAccuracy, list[str]]:
     """How well the mean over a typical hold is known, and warnings about the holds."""
-    typical = int(np.median(holds.n_samples[holds.used]))
+    noise, typical = holds.noise, int(np.median(holds.n_samples[holds.used]))
 
     def accuracy_in(channels: slice) -> MeanAccuracy:
-        sd = float(np.sqrt(np.mean(holds.noise[channels] ** 2)))
-        return accuracy_of_mean(holds.allan.channels(channels), typical * holds.step, sd, typical)
+        sd = float(np.sqrt(np.mean(noise.sd[channels] ** 2)))
+        return accuracy_of_mean(noise.allan.channels(channels), typical * holds.step, sd, typical)
 
-    accuracy = accuracy_in(slice(0, 1) if holds.directed else slice(0, 3))
+    accuracy = accuracy_in(noise.of_sensor)
     warnings = list(holds.warnings)
-    if not holds.directed:
+    if not noise.directed:
         warnings.append(
             "the norms of the means differ too much for specific forces (is an offset missing?); "
             "sigma is taken over all axes"
@@ -291,19 +289,25 @@ def _accuracy(holds: DetectedHolds, gravity: float) -> tuple[MeanAccuracy, list[
 def _with_offset(
     settings: ImportSettings, holds: DetectedHolds
 ) -> tuple[ImportSettings, Array, list[str]]:
-    """Offset of counts, from the positions, unless it is zero apart from the sensor's bias."""
-    frame = settings.axes
-    radius = usual_norm(holds.mean - holds.center)
-    if not (holds.directed and np.linalg.norm(holds.center) > radius / 2):
-        return settings, holds.mean, []
+    """Offset of counts, from the positions, unless it is zero apart from the sensor's bias.
+
+    Returns
+    -------
+    settings : ImportSettings, with the offset
+    offset : (3,) array, m/s², in forward, right, down; zero if the settings stay
+    notes : list of str
+    """
+    noise, frame = holds.noise, settings.axes
+    if not (noise.directed and np.linalg.norm(noise.center) > holds.radius / 2):
+        return settings, np.zeros(3), []
     scale = conversion_of("counts", settings.scale).scale
-    offset = np.round(frame.from_frd(holds.center) / scale)
+    offset = np.round(frame.from_frd(noise.center) / scale)
     note = (
         f"offset: {', '.join(f'{x:.0f}' for x in offset)} counts, from the positions, as none was "
         "given"
     )
-    forces = holds.mean - frame.to_frd(offset * scale)
-    return settings.model_copy(update={"offset": offset.tolist()}), forces, [note]
+    settings = settings.model_copy(update={"offset": offset.tolist()})
+    return settings, frame.to_frd(offset * scale), [note]
 
 
 def _full_range(settings: ImportSettings) -> float:

@@ -103,10 +103,10 @@ def public_file(name: str, folder: str | Path) -> Path:
 
 
 def _known(name: str) -> PublicData:
-    known = public_data()
-    if name not in known:
-        raise UnknownNameError("public data", name, known)
-    return known[name]
+    registry = public_data()
+    if name not in registry:
+        raise UnknownNameError("public data", name, registry)
+    return registry[name]
 
 
 def record_public(name: str, folder: str | Path, path: str | Path, attempt: int) -> None:
@@ -161,11 +161,11 @@ def fetch(data: PublicData, searched: Path, target: Path) -> Path:
         path = target / data.file_name
         with whole_file(path) as temporary:
             _download_after_earlier(data.url, temporary, path.with_name(f"{path.name}.part"))
-            found = _sha256(temporary)
-            if found != data.sha256:
+            checksum = _sha256(temporary)
+            if checksum != data.sha256:
                 raise InputError(
-                    f"{data.url}: the sha256 is {found}, not {data.sha256}: damaged on the way or "
-                    "changed at its source; try again"
+                    f"{data.url}: the sha256 is {checksum}, not {data.sha256}: damaged on the way "
+                    "or changed at its source; try again"
                 )
         return path
     except (OSError, HTTPException) as error:
@@ -212,8 +212,8 @@ def _download(url: str, path: Path, have: int) -> None:
                 start = file.tell()
                 # Completeness can be checked only if the server states the size.
                 expected = response.headers.get("Content-Length", "").strip()
-                known = expected.isascii() and expected.isdigit()
-                total = int(expected[:18]) if known else None
+                stated = expected.isascii() and expected.isdigit()
+                total = int(expected[:18]) if stated else None
                 with stage(f"download of {path.name}", total) as advance:
                     while block := response.read(BLOCK):
                         advance(file.write(block))

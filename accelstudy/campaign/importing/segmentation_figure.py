@@ -14,18 +14,14 @@ from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.progress import failure, stage
+from accelstudy.basics.progress import failure
 from accelstudy.basics.wording import counted
 from accelstudy.campaign.holds.detected import DetectedHolds
-from accelstudy.campaign.holds.windows import windows
-from accelstudy.campaign.logs.recording import Recording
 from accelstudy.drawing.saving import save
 from accelstudy.drawing.style import DPI, FULL, INK, STYLE, new_figure
 
 Array = NDArray[np.float64]
 
-COLUMNS = 1200
-"""Spans of time that are drawn, about as many as a page can show."""
 # Okabe & Ito's colours.
 _COLOURS = ("#0072B2", "#D55E00", "#009E73")
 _THRESHOLD = "#CC79A7"
@@ -36,13 +32,12 @@ _DIGITS = 130
 shown."""
 
 
-def draw_segmentation(log: Recording, holds: DetectedHolds) -> Figure:
+def draw_segmentation(holds: DetectedHolds) -> Figure:
     """Draw specific forces and the standard deviation of the windows over time.
 
-    Holds are shaded and numbered, those that are left out hatched. The log is read once more, and
-    reduced to the smallest and the largest value in each of `COLUMNS` spans of time.
+    Holds are shaded and numbered, those that are left out hatched.
     """
-    edges, low, high = _envelope(log, holds)
+    edges, low, high = holds.envelope.edges, holds.envelope.low, holds.envelope.high
     middle = (edges[:-1] + edges[1:]) / 2
     with mpl.rc_context(STYLE):  # type: ignore[arg-type]
         figure = new_figure(FULL, 90)
@@ -59,7 +54,7 @@ def draw_segmentation(log: Recording, holds: DetectedHolds) -> Figure:
         _number(above, holds)
         above.set_ylabel("specific force / (m/s²)")
         below.set(yscale="log", xlabel="time / s", ylabel="window sd / (m/s²)")
-        below.set_xlim(0, holds.span[1])
+        below.set_xlim(0, edges[-1])
         below.yaxis.set_minor_locator(NullLocator())
         handles, labels = above.get_legend_handles_labels()
         lines, texts = below.get_legend_handles_labels()
@@ -76,15 +71,13 @@ def draw_segmentation(log: Recording, holds: DetectedHolds) -> Figure:
     return figure
 
 
-def render_segmentation(
-    log: Recording, holds: DetectedHolds, svg_path: str | Path, png_path: str | Path
-) -> None:
+def render_segmentation(holds: DetectedHolds, svg_path: str | Path, png_path: str | Path) -> None:
     """Draw the segmentation and write it as SVG and PNG.
 
     If the figure fails, the import goes on: a warning on stderr says why there is no figure.
     """
     try:
-        save(draw_segmentation(log, holds), svg_path, png_path, "Static holds", DPI)
+        save(draw_segmentation(holds), svg_path, png_path, "Static holds", DPI)
     except (OSError, InputError):  # such as a full disk, which is not the figure's fault
         raise
     except Exception as error:
@@ -109,23 +102,6 @@ def _number(ax: Axes, holds: DetectedHolds) -> None:
                 fontsize=5,
                 color=INK if used else _LEFT_OUT["edgecolor"],
             )
-
-
-def _envelope(log: Recording, holds: DetectedHolds) -> tuple[Array, Array, Array]:
-    """Edges of the spans (k + 1,), and least and largest fx, fy, fz and sd in each (k, 4)."""
-    count = max(1, min(COLUMNS, holds.total // 4))
-    edges = np.linspace(*holds.span, count + 1)
-    low, high = np.full((count, 4), np.inf), np.full((count, 4), -np.inf)
-    with stage("figure", holds.total) as advance:
-        for batch in windows(log, holds.window):
-            values = np.column_stack([batch.forces, np.sqrt(batch.variance)])
-            span = np.clip(np.searchsorted(edges, batch.time, side="right") - 1, 0, count - 1)
-            np.minimum.at(low, span, values)
-            np.maximum.at(high, span, values)
-            advance(len(batch.time))
-    empty = ~np.isfinite(low)
-    low[empty] = high[empty] = np.nan  # a gap
-    return edges, low, high
 
 
 def _band(ax: Axes, x: Array, low: Array, high: Array, colour: str, label: str | None) -> None:
