@@ -209,7 +209,7 @@ def _hidden_effects(
     settings: CampaignSettings, rng: np.random.Generator
 ) -> list[tuple[Effect, Array]]:
     """Effects beyond the model with their parameters."""
-    found = []
+    effects = []
     for text in settings.effects:
         spec, colon, numbers = text.partition(":")
         effect = get_effect(spec.strip())
@@ -223,8 +223,8 @@ def _hidden_effects(
             if len(values) != n or not np.isfinite(values).all():
                 names = ", ".join(f"{p.name} in {p.unit}" for p in effect.parameters)
                 raise InputError(f"effect {text!r}: expected {n} numbers after the colon ({names})")
-        found.append((effect, values))
-    return found
+        effects.append((effect, values))
+    return effects
 
 
 def _usual_parameters(effect: Effect, rng: np.random.Generator) -> Array:

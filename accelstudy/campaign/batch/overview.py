@@ -132,14 +132,14 @@ def _row(status: Mapping[str, Any], content: Mapping[str, Any] | None) -> dict[s
         quality["tilt_rms_mgon"],
     )
     priori, posteriori = (content[f"sigma_position_{key}_mps2"] for key in ("priori", "posteriori"))
-    known = priori is not None and posteriori is not None
+    both = priori is not None and posteriori is not None
     suspects = [str(suspect["position"]) for suspect in quality["suspects"]]
     return {
         **row,
         **{key: content[key] for key in CAMPAIGN_COLUMNS if key in content and key not in row},
         "sigma_priori_mps2": priori,
         "sigma_posteriori_mps2": posteriori,
-        "sigma0": posteriori / priori if known else None,
+        "sigma0": posteriori / priori if both else None,
         "p_value": test.get("p_value"),
         "accepted": test.get("accepted"),
         "state": quality["state"],
@@ -177,8 +177,8 @@ def _next_steps(rows: list[dict[str, Any]]) -> list[tuple[str, str]]:
         steps.append(("Level a log, for example", command))
     doubtful = next((row for row in rows if row["state"] in (REJECTED, IMPLAUSIBLE)), None)
     if doubtful is not None:
-        own = doubtful["kind"] == "campaign"
-        measured = doubtful["source"] if own else f"{doubtful['folder']}/campaign"
+        is_folder = doubtful["kind"] == "campaign"
+        measured = doubtful["source"] if is_folder else f"{doubtful['folder']}/campaign"
         command = suggested.diagnose(measured, doubtful["model"], doubtful["approach"])
         steps.append(("Find what is wrong or missing, for example", command))
     return steps

@@ -184,7 +184,7 @@ def least_sigma(campaign: Campaign, approach: Approach) -> float:
 
 def campaign_observations(campaign: Campaign) -> Observations:
     """Observations of a campaign for the adjustment, R = 1."""
-    noise, known = campaign_noise(campaign), campaign.sigma_force is not None
+    noise, stated = campaign_noise(campaign), campaign.sigma_force is not None
     return Observations(
         forces=campaign.forces[None],
         sigma_force=noise.sigma_force,
@@ -194,8 +194,8 @@ def campaign_observations(campaign: Campaign) -> Observations:
         sigma_gravity=campaign.sigma_gravity,
         hold=campaign.hold,
         # If the noise of the means is unknown, slopes have no weight relative to them.
-        slope=campaign.slope if known else None,
-        sd_slope=campaign.sd_slope if known else None,
+        slope=campaign.slope if stated else None,
+        sd_slope=campaign.sd_slope if stated else None,
     )
 
 
@@ -246,11 +246,11 @@ def fit_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> 
     """
     check_campaign(campaign, model, approach)
     start_of = partial(initial_values, forces=campaign.forces, gravity=campaign.gravity)
-    found = campaign_estimability(campaign, model, approach)
-    if not found.estimable:
+    theory = campaign_estimability(campaign, model, approach)
+    if not theory.estimable:
         raise InputError(
             f"{campaign.name}: {campaign.n_positions} positions do not determine the model "
-            f"{model.name!r}: {found.reason}"
+            f"{model.name!r}: {theory.reason}"
         )
     observed = replace(campaign_observations(campaign), initial=start_of(model))
     adjustment = calibrate(model, approach, observed)
@@ -265,9 +265,9 @@ def fit_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> 
     if not adjustment.converged[0]:
         raise InputError(
             f"{campaign.name}: the adjustment of the model {model.name!r} does not converge; "
-            f"{_cause(campaign, found)}"
+            f"{_cause(campaign, theory)}"
         )
-    return CampaignFit(campaign, model, approach, observed, adjustment, found)
+    return CampaignFit(campaign, model, approach, observed, adjustment, theory)
 
 
 def campaign_estimability(
@@ -288,10 +288,10 @@ def campaign_estimability(
 
 def _cause(campaign: Campaign, theory: Estimability) -> str:
     """Say what may keep an adjustment from converging."""
-    found = recognise(campaign, usual_approach(campaign))
+    gross = recognise(campaign, usual_approach(campaign))
     more = "`accelstudy diagnose` looks for more"
-    if found is not None:
-        return f"this looks like a gross error ({words(found.name)}): {found.reason}; {more}"
+    if gross is not None:
+        return f"this looks like a gross error ({words(gross.name)}): {gross.reason}; {more}"
     if theory.condition > HARDLY:
         return (
             f"the {campaign.n_positions} positions hardly determine it (condition "

@@ -73,9 +73,9 @@ def affine_form(model: SensorModel, parameters: ArrayLike) -> tuple[Array, Array
     """
     if not_affine(model):
         return None
-    own = [effect.spec for effect in model.effects if effect.part == "sensor"]
+    specs = [effect.spec for effect in model.effects if effect.part == "sensor"]
     parameters = np.asarray(parameters, dtype=float)[..., model.stays]
-    model = compose(model.name, tuple(own))
+    model = compose(model.name, tuple(specs))
     g = STANDARD_GRAVITY
     probes = g * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
     corrected = model.correct(probes, parameters)

@@ -54,14 +54,14 @@ class Watch:
     """
 
     def __init__(self, ranges: Mapping[str, list[float]]) -> None:
-        known = [
+        groups = [
             ("temperature", "°C", {"temperature_degC": ""}),
             ("vibration", "m/s²", {"vibration_mps2": ""}),
             ("specific force", "m/s²", {name: f" {way}" for name, way in FORCES.items()}),
         ]
         self._ranges = ranges
-        self._groups = [group for group in known if set(group[2]) <= set(ranges)]
-        self._rows = dict.fromkeys((what for what, _, _ in known), 0)
+        self._groups = [group for group in groups if set(group[2]) <= set(ranges)]
+        self._rows = dict.fromkeys((what for what, _, _ in groups), 0)
         self._worst: dict[str, tuple[float, str, float]] = {}
 
     def look_at(self, corrected: Array, hold: HoldConditions) -> None:
@@ -83,8 +83,8 @@ class Watch:
                 beyond |= excess > MARGIN
                 if (excess > MARGIN).any():
                     i = int(np.nanargmax(excess))
-                    found = (float(excess[i]), name, float(values[i]))
-                    self._worst[what] = max(found, self._worst.get(what, found))
+                    farthest = (float(excess[i]), name, float(values[i]))
+                    self._worst[what] = max(farthest, self._worst.get(what, farthest))
             self._rows[what] += int(beyond.sum())
 
     def warnings(self, rows: int) -> Iterator[str]:

@@ -107,12 +107,12 @@ def what_it_finds(fit: CampaignFit) -> str:
     """
     noise, test = quantity_text(fit.sigma_position, "m/s^2"), fit.global_test
     if fit.trusts_sigma:
-        told = (
+        judged = (
             "nothing tells" if test is None else f"the global test tells ({p_value(test.p_value)})"
         )
         return (
             f"The simulation has the stated noise of {noise}, and so have the sigmas. A ratio far "
-            f"from 1 says that the adjustment is wrong; whether that noise is right, {told}."
+            f"from 1 says that the adjustment is wrong; whether that noise is right, {judged}."
         )
     r = fit.adjustment.redundancy
     ends = (fit.sigma_position * np.sqrt(r / special.chdtri(r, p)) for p in (0.025, 0.975))

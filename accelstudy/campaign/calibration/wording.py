@@ -74,23 +74,23 @@ def next_steps(
 def _implausible(assessment: Assessment) -> list[str]:
     """Name the gross error and the parameters that no sensor has."""
     lines = []
-    gross, found = assessment.gross_error, assessment.implausible
+    gross, implausible = assessment.gross_error, assessment.implausible
     if gross is not None:
         lines.append(f"This looks like a gross error ({words(gross.name)}): {gross.reason}.")
-    if found:
+    if implausible:
         cause = "" if gross is not None else f" {USUAL_CAUSE}"
-        lines.append(f"No sensor is like this: {comma_list(found)}.{cause}")
+        lines.append(f"No sensor is like this: {comma_list(implausible)}.{cause}")
     return lines
 
 
 def _conflict(assessment: Assessment) -> list[str]:
     """Name the positions that contradict the others; their holds need not be at fault."""
-    found = sorted(assessment.suspects, key=lambda suspect: suspect.position)
-    if not found:
+    suspects = sorted(assessment.suspects, key=lambda suspect: suspect.position)
+    if not suspects:
         return []
-    labels = [str(assessment.fit.campaign.positions[suspect.position]) for suspect in found]
-    p = p_value(max(suspect.p_value for suspect in found))
-    if len(found) == 1:
+    labels = [str(assessment.fit.campaign.positions[suspect.position]) for suspect in suspects]
+    p = p_value(max(suspect.p_value for suspect in suspects))
+    if len(suspects) == 1:
         return [
             f"In conflict with the others: position {labels[0]} ({p}, adjusted for the number of "
             "positions). The sensor may have been bumped there, or the model lacks an effect."

@@ -87,13 +87,13 @@ class GrossError(WithSettings):
 
     def row(self, campaign: Campaign, setting: str) -> int:
         """Row of the position that a setting gives."""
-        found = np.flatnonzero(campaign.positions == self.settings[setting])
-        if not len(found):
+        rows = np.flatnonzero(campaign.positions == self.settings[setting])
+        if not len(rows):
             raise InputError(
                 f"gross error {self.name!r}: {setting}={self.settings[setting]:g} is no position "
                 f"of {campaign.name}; they are {campaign.positions[0]} to {campaign.positions[-1]}"
             )
-        return int(found[0])
+        return int(rows[0])
 
 
 _registry: RegistryWithSettings[GrossError] = RegistryWithSettings(GrossError.kind)

@@ -105,11 +105,11 @@ def _tells(design: Array) -> bool:
 
 def _conditions(campaign: Campaign) -> list[Array]:
     """Temperature and time, scaled to −1 … 1: a drift with them is not the fault of a position."""
-    found = []
+    conditions = []
     for values in (campaign.temperature, campaign.time):
         if values is not None and np.ptp(values) > 0:
-            found.append(2 * (values - values.min()) / np.ptp(values) - 1)
-    return found
+            conditions.append(2 * (values - values.min()) / np.ptp(values) - 1)
+    return conditions
 
 
 def _robust(design: Array, lacking: Array, share: float) -> Array:

@@ -54,10 +54,10 @@ class Recognised:
     @property
     def named(self) -> tuple[tuple[str, int | None], ...]:
         """Names of the errors, each once, and the number of each bumped position."""
-        found: dict[tuple[str, int | None], None] = {}
+        named: dict[tuple[str, int | None], None] = {}
         for name, mending in self.errors:
-            found |= dict.fromkeys((name, position) for position in mending.left_out or (None,))
-        return tuple(found)
+            named |= dict.fromkeys((name, position) for position in mending.left_out or (None,))
+        return tuple(named)
 
     @property
     def name(self) -> str:
@@ -67,10 +67,10 @@ class Recognised:
     @property
     def reasons(self) -> dict[str, str]:
         """What is wrong, in words, by the names of the errors."""
-        found: dict[str, list[str]] = {}
+        reasons_of: dict[str, list[str]] = {}
         for name, mending in self.errors:
-            found.setdefault(name, []).append(mending.reason)
-        return {name: "; ".join(reasons) for name, reasons in found.items()}
+            reasons_of.setdefault(name, []).append(mending.reason)
+        return {name: "; ".join(reasons) for name, reasons in reasons_of.items()}
 
     @property
     def reason(self) -> str:

@@ -118,11 +118,11 @@ def _places(cost: Array, least: float) -> NDArray[np.int_]:
 
 def _cycles(places: NDArray[np.int_]) -> list[NDArray[np.int_]]:
     """Positions that exchange their rows among each other."""
-    left, found = set(range(len(places))), []
+    left, cycles = set(range(len(places))), []
     while left:
         cycle = [left.pop()]
         while (following := int(places[cycle[-1]])) in left:
             left.remove(following)
             cycle.append(following)
-        found.append(np.array(cycle))
-    return found
+        cycles.append(np.array(cycle))
+    return cycles

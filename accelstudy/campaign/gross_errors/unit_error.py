@@ -63,10 +63,10 @@ class UnitError(GrossError):
     def mendings(self, campaign: Campaign, sensor: RealSensor) -> Iterator[Mending]:
         """Convert the forces, or the angles, as if they were in another unit."""
         norm = usual_norm(campaign.forces) / campaign.gravity
-        for said in ("g", "m/s^2") if campaign.unit == "g" else ("m/s^2", "g"):
-            for unit, factor in _other_units("m/s^2", SENSOR_UNITS, said).items():
+        for stated in ("g", "m/s^2") if campaign.unit == "g" else ("m/s^2", "g"):
+            for unit, factor in _other_units("m/s^2", SENSOR_UNITS, stated).items():
                 if NEAR < factor * norm < 1 / NEAR:
-                    reason = f"the forces are in {unit}" + (", not in g" if said == "g" else "")
+                    reason = f"the forces are in {unit}" + (", not in g" if stated == "g" else "")
                     yield Mending(reason, _forces_times(campaign, factor), factor * np.eye(3))
         if sensor.expected is not None:
             for unit, factor in _other_angles().items():
@@ -74,10 +74,10 @@ class UnitError(GrossError):
                 yield Mending(reason, _angles_times(campaign, factor))
 
 
-def _other_units(quantity: str, units: Iterable[str], said: str) -> dict[str, float]:
-    """Units that could be meant, each with the factor that mends numbers said to be in `said`."""
+def _other_units(quantity: str, units: Iterable[str], stated: str) -> dict[str, float]:
+    """Units that could be meant, each with the factor that mends numbers stated in `stated`."""
     sizes = UNITS[quantity]
-    return {unit: sizes[unit] / sizes[said] for unit in units if unit != said}
+    return {unit: sizes[unit] / sizes[stated] for unit in units if unit != stated}
 
 
 def _other_angles() -> dict[str, float]:

@@ -53,13 +53,13 @@ def locate(
     for key in wanted:
         if key not in places:
             pattern = _KNOWN_NAMES.get(key, re.escape(key))
-            found = [
+            matches = [
                 i
                 for i, name in enumerate(source.names)
                 if re.fullmatch(pattern, re.sub(r"[\s.\-]+", "_", name.strip()), re.IGNORECASE)
             ]
-            if len(found) == 1:
-                places[key] = found[0]
+            if len(matches) == 1:
+                places[key] = matches[0]
     if not places and tuple(wanted[:3]) == AXES and len(source.names) == 3:
         places = dict(zip(AXES, range(3), strict=True))
     missing = [key for key in wanted if key not in places]
@@ -109,10 +109,10 @@ def check_numbers(
     if bad.any():
         i, j = (int(k) for k in np.argwhere(bad)[0])
         key, column = list(places.items())[j]
-        where, found = source.look_up(row + i, column)
+        where, cell = source.look_up(row + i, column)
         raise InputError(
             f"{source.path}: {where}, column {source.names[column]} ({key}): "
-            f"{found}, not a usable number"
+            f"{cell}, not a usable number"
         )
 
 

@@ -137,9 +137,9 @@ def open_log(
             ) from None
     for key in CONDITIONS:
         wanted = {key: given[key]} if key in given else {}
-        found = locate(source, wanted, (key,), needed=False)
-        if key in given or not {*found.values()} & {*places.values()}:
-            places |= found
+        place = locate(source, wanted, (key,), needed=False)
+        if key in given or not {*place.values()} & {*places.values()}:
+            places |= place
     if len(set(places.values())) < len(places):
         raise InputError(f"{path}: two of {', '.join(places)} name the same column")
     return Log(
@@ -265,10 +265,10 @@ class Log:
         backward = np.diff(time, prepend=last) <= 0
         if backward.any():
             i = int(np.argmax(backward))
-            where, found = self.source.look_up(row + i, self.places["time"])
+            where, cell = self.source.look_up(row + i, self.places["time"])
             raise InputError(
                 f"{self.path}: {where}, column {self.source.names[self.places['time']]} (time): "
-                f"time does not increase ({found}); give the rate if it does not count"
+                f"time does not increase ({cell}); give the rate if it does not count"
             )
 
 

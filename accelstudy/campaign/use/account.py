@@ -167,11 +167,11 @@ class Account:
         source, places = self._readings.source, self._readings.places
         row, key = self._first_empty
         # This reads the file again to find the line.
-        where, found = source.look_up(row, places.get(key or "", places["fx"]))
+        where, cell = source.look_up(row, places.get(key or "", places["fx"]))
         if key == RAGGED:
             return f"{where} does not have {len(source.names)} columns like the others"
         if key is not None:
-            return f"{where}, column {source.names[places[key]]} ({key}): {found}"
+            return f"{where}, column {source.names[places[key]]} ({key}): {cell}"
         full = self._calibration.content.get("range_mps2")
         end = "" if full is None else f", or it is at the end of the range, ± {full:.4g} m/s²"
         return f"{where}: the calibration has no force for such a reading{end}"

@@ -125,17 +125,17 @@ class Calibration:
         kept = np.clip(time, 0.0, self.ranges["time_s"][1])
         first = 0
         for effect in self.model.effects:
-            own = slice(first, first := first + len(effect.parameters))
+            columns = slice(first, first := first + len(effect.parameters))
             if effect.drifts:
-                f, p = tuple(forces.T), tuple(self.parameters[own])
+                f, p = tuple(forces.T), tuple(self.parameters[columns])
                 then, end = (
                     np.stack(effect.output(f, p, self.gravity, HoldConditions(time=t), np), axis=-1)
                     for t in (time, kept)
                 )
                 forces = forces + (then - end)
-                share[:, 0, own] = np.divide(kept, time, out=np.ones_like(time), where=time != 0)[
-                    :, None
-                ]
+                share[:, 0, columns] = np.divide(
+                    kept, time, out=np.ones_like(time), where=time != 0
+                )[:, None]
         return forces, share
 
 
@@ -226,11 +226,11 @@ def read_calibration(path: str | Path) -> Calibration:
 def _calibration(document: _Document) -> Calibration:
     whole = compose(document.model, tuple(document.effects))
     # Effects of the rig were estimated together with those of the sensor, but stay with the rig.
-    own = [effect.spec for effect in whole.effects if effect.part == "sensor"]
+    specs = [effect.spec for effect in whole.effects if effect.part == "sensor"]
     stays = np.flatnonzero(whole.stays)
     covariance = np.array(document.covariance, dtype=float)  # None becomes NaN
     return Calibration(
-        model=compose(document.model, tuple(own)),
+        model=compose(document.model, tuple(specs)),
         parameters=np.array([entry.value for entry in document.parameters])[stays],
         covariance=covariance[np.ix_(stays, stays)],
         gravity=document.gravity_mps2,

@@ -108,12 +108,12 @@ def _mended(calibration: Calibration, readings: Readings) -> tuple[str, ...]:
     mended = calibration.content.get("mended")
     if mended is None:
         return ()
-    said = f"the calibration is of mended data: {mended['reason']}"
+    warning = f"the calibration is of mended data: {mended['reason']}"
     if mended["matrix"] is None:
-        return (said,)
+        return (warning,)
     if np.array_equal(readings.mending, np.eye(3)):
-        return (f"{said}; readings are converted by the options only, and are not mended",)
-    return (f"{said}; readings are mended in the same way",)
+        return (f"{warning}; readings are converted by the options only, and are not mended",)
+    return (f"{warning}; readings are mended in the same way",)
 
 
 def _estimated(calibration: Calibration) -> tuple[str, ...]:
@@ -133,8 +133,8 @@ def noise_of_reading(calibration: Calibration) -> float:
     If that is unknown it is the noise of the mean of a hold, which is smaller; 0 if neither is
     known.
     """
-    known = (calibration.content.get(f"sigma_{what}_mps2") for what in ("reading", "position"))
-    return next((sigma for sigma in known if sigma is not None), 0.0)
+    sigmas = (calibration.content.get(f"sigma_{what}_mps2") for what in ("reading", "position"))
+    return next((sigma for sigma in sigmas if sigma is not None), 0.0)
 
 
 def _leveled(

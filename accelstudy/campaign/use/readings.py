@@ -151,8 +151,8 @@ def readings_of(
             "change them"
         ) from None
     for effect, condition in calibration.needs:
-        known = condition in places or (condition == "time" and layout.rate_hz is not None)
-        if condition in OPTIONS and not known:
+        is_given = condition in places or (condition == "time" and layout.rate_hz is not None)
+        if condition in OPTIONS and not is_given:
             raise InputError(
                 f"{log}: the effect {effect} needs the {condition} of each row; "
                 f"give it by {OPTIONS[condition]}"
@@ -161,9 +161,9 @@ def readings_of(
     if calibration.log is None and "unit" not in given:
         unit = calibration.content["unit"]
     # What the user says of this log is right, whatever was wrong with the campaign.
-    told = {"unit_error": "unit", "axis_error": "frame"}
+    option_of = {"unit_error": "unit", "axis_error": "frame"}
     mended = calibration.content.get("mended")
-    mends = mended is None or told.get(mended["error"]) not in given
+    mends = mended is None or option_of.get(mended["error"]) not in given
     return Readings(
         source,
         places,
@@ -179,13 +179,13 @@ def readings_of(
 
 def _layout(calibration: Calibration, given: Mapping[str, Any]) -> LogLayout:
     """Layout of the campaign's log, overlaid with `given`."""
-    known = {} if calibration.log is None else calibration.log.model_dump(exclude_none=True)
+    layout = {} if calibration.log is None else calibration.log.model_dump(exclude_none=True)
     if given.keys() & {"time", "rate_hz"}:
-        known = {key: value for key, value in known.items() if key not in ("time", "rate_hz")}
+        layout = {key: value for key, value in layout.items() if key not in ("time", "rate_hz")}
     columns = given.get("columns", {})
     if not set(AXES) <= set(columns):
-        columns = {**known.get("columns", {}), **columns}
-    return checked(LogLayout, {**known, **given, "columns": columns}, "options")
+        columns = {**layout.get("columns", {}), **columns}
+    return checked(LogLayout, {**layout, **given, "columns": columns}, "options")
 
 
 def _places(
