@@ -14,13 +14,13 @@ from accelstudy.basics import suggested
 from accelstudy.basics.levels import REFUTED
 from accelstudy.basics.units import MGON, UNITS, display_unit
 from accelstudy.basics.wording import number
-from accelstudy.campaign.calibration.assessment import (
+from accelstudy.campaign.calibration.states import (
     ACCEPTED,
+    BLIND,
     IMPLAUSIBLE,
     REJECTED,
     UNCHECKED,
 )
-from accelstudy.campaign.calibration.wording import BLIND
 from accelstudy.files.outputs import BATCH_JOB, whole_file
 from accelstudy.files.tables import write_table
 from accelstudy.pages import render

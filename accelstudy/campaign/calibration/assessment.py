@@ -12,6 +12,7 @@ from accelstudy.adjustment import quality
 from accelstudy.adjustment.quality import VarianceComponents, variance_components
 from accelstudy.basics.units import GON
 from accelstudy.campaign.calibration.fit import CampaignFit, campaign_noise, usual_approach
+from accelstudy.campaign.calibration.states import ACCEPTED, IMPLAUSIBLE, REJECTED, UNCHECKED
 from accelstudy.campaign.gross_errors.recognition import Recognised, recognise
 from accelstudy.leveling.angles import jacobian, tilt_slope
 from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON, cap_forces, holds_in_use
@@ -19,9 +20,6 @@ from accelstudy.sensors.plausibility import implausible_parameters, implausible_
 
 Array = NDArray[np.float64]
 
-ACCEPTED, REJECTED = "accepted", "rejected"
-UNCHECKED, IMPLAUSIBLE = "cannot tell", "implausible"
-"""The states of a calibration."""
 SUSPECT = 0.05
 """Family-wise level of the tests of single positions."""
 

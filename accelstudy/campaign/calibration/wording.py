@@ -9,16 +9,11 @@ import numpy as np
 from accelstudy.basics import suggested
 from accelstudy.basics.units import GON, attitude_unit, display_unit, to_attitude, to_display
 from accelstudy.basics.wording import comma_list, p_value, words
-from accelstudy.campaign.calibration.assessment import IMPLAUSIBLE, REJECTED, Assessment
+from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.fit import CampaignFit
+from accelstudy.campaign.calibration.states import BLIND, IMPLAUSIBLE, REJECTED
 from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.sensors.plausibility import USUAL_CAUSE
-
-BLIND = (
-    "Gravity alone cannot see a rotation of the sensor in its housing: tilts are relative to the "
-    "sensor's own axes."
-)
-"""What holds for every calibration without a robot."""
 
 
 def verdict_lines(assessment: Assessment) -> list[str]:
