@@ -269,7 +269,7 @@ def test_the_answer_stands_in_the_first_line(found):
     assert lines[3].startswith("For both to stay below 10 mgon in 95 of 100 calibrations: ")
     assert "with a robot" in lines[4]
     table = table_lines(found)
-    assert len(table) == len(found.ranked) + 4
+    assert len(table) == len(found.ranked) + 5
     assert "noise of the sensor" in table[1]
     with angles_in("deg"):
         assert " mdeg" in answer_lines(found)[1]
