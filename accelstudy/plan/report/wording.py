@@ -104,7 +104,12 @@ def _fewest(question: Question, ranked: Ranked) -> str:
         ranked.fewer.accuracy(question.confidence),
         ranked.simulated.uncertainty(question.confidence),
     )
-    simulated = f"{_angle(left)} ± {_angle(known)}, from {ranked.simulated.simulated} simulations"
+    leaves, error = (float(to_display(value, "rad")) for value in (left, known))
+    simulated = (
+        f"{number(leaves)} ± {np.format_float_positional(error, 1, fractional=False, trim='-')} "
+        f"{display_unit('rad')}, "
+        f"from {ranked.simulated.simulated} simulations"
+    )
     if left - 2 * known < question.target:
         return f"Whether {n - 1} would do is within the error of the simulation ({simulated})."
     return f"Fewer do not suffice: {n - 1} positions leave {simulated}."
