@@ -304,6 +304,8 @@ def test_a_bias_that_no_sensor_has_is_not_taken_for_bumped_positions():
     for _ in range(20):
         up = rng.standard_normal((20, 3))
         up /= np.linalg.norm(up, axis=1, keepdims=True)
-        forces = STANDARD_GRAVITY * (up + [0.48, 0, 0]) + 0.002 * rng.standard_normal(up.shape)
+        forces = STANDARD_GRAVITY * (up + np.array([0.48, 0, 0])) + 0.002 * rng.standard_normal(
+            up.shape
+        )
         campaign = replace(GRAVITY_20, forces=forces)
         assert recognise(campaign, get_approach("gravity")) is None
