@@ -309,7 +309,8 @@ def test_what_cannot_be_reached_is_one_line_with_what_can(options, parts):
     assert "\n" not in line
 
 
-def test_by_hand_alone_it_is_said_that_a_robot_would_do():
+def test_by_hand_alone_it_is_said_that_a_robot_would_do(monkeypatch):
+    monkeypatch.setattr(planned, "SIZES", (9, 40, 200))
     question = Question(2.5 * MGON, 30 * GON, of_sigma(0.002), equipment=(BY_HAND,))
     (line,) = answer_lines(answer(question, replicates=200))
     assert re.search(r"A robot reaches it: \d+ positions with a robot, 10 s each", line)
