@@ -20,6 +20,7 @@ from accelstudy.sensors.models import get_model
 
 CLEAN, _ = simulate_campaign(CampaignSettings(n_samples=50, yaw="random"))
 BLIND = replace(CLEAN, angles=None, sigma_angle=None, yaw=None)
+GRAVITY_20, _ = simulate_campaign(CampaignSettings(scheme="fibonacci-20", approach="gravity"))
 
 
 def spoiled(spec, seed=1, campaign=CLEAN):
@@ -295,3 +296,16 @@ def test_a_position_that_no_calibration_bears_is_left_out(approach, size):
     told = re.search(r"position 17 is wrong by ([\d.]+) m/s\^2", found.reason)
     assert float(told[1]) == pytest.approx(size, rel=0.05)
     np.testing.assert_allclose(found.base.parameters, right.base.parameters, atol=0.01)
+
+
+def test_a_bias_that_no_sensor_has_is_not_taken_for_bumped_positions():
+    """Its positions are far from those of a usual sensor, and yet all agree."""
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        up = rng.standard_normal((20, 3))
+        up /= np.linalg.norm(up, axis=1, keepdims=True)
+        forces = STANDARD_GRAVITY * (up + np.array([0.48, 0, 0])) + 0.002 * rng.standard_normal(
+            up.shape
+        )
+        campaign = replace(GRAVITY_20, forces=forces)
+        assert recognise(campaign, get_approach("gravity")) is None

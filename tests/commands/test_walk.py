@@ -141,6 +141,7 @@ def test_the_answer_that_a_page_quotes_is_the_commands_own(steps, page):
     quoted = re.search(r"```[^\n]*\n(.*?)```", text, re.DOTALL)[1]
     (plan, *_) = (s for s in steps if s["command"].startswith("accelstudy plan --tilt"))
     lines = plan["output"].splitlines(keepends=True)
+    assert lines.pop(0).startswith("comparing ")  # on standard error
     assert_told_alike("".join(lines[: quoted.count("\n")]), quoted)
 
 

@@ -17,7 +17,6 @@ import re
 import shutil
 import sys
 import tempfile
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -111,9 +110,8 @@ def code_of(*paths):
 
 
 def of_code():
-    """Hashes of the code that draws; speed is also that of a version of the package."""
-    hashes = {name: code_of(*sources) for name, (_, *sources) in DRAWN.items()}
-    return {**hashes, "speed": f"{hashes['speed']} of {version('accelstudy')}"}
+    """Hashes of the code that draws; the page on speed says itself of which version it is."""
+    return {name: code_of(*sources) for name, (_, *sources) in DRAWN.items()}
 
 
 def of_study(folder):

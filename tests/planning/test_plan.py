@@ -269,7 +269,7 @@ def test_the_answer_stands_in_the_first_line(found):
     assert lines[3].startswith("For both to stay below 10 mgon in 95 of 100 calibrations: ")
     assert "with a robot" in lines[4]
     table = table_lines(found)
-    assert len(table) == len(found.ranked) + 4
+    assert len(table) == len(found.ranked) + 5
     assert "noise of the sensor" in table[1]
     with angles_in("deg"):
         assert " mdeg" in answer_lines(found)[1]
@@ -309,8 +309,9 @@ def test_what_cannot_be_reached_is_one_line_with_what_can(options, parts):
     assert "\n" not in line
 
 
-def test_by_hand_alone_it_is_said_that_a_robot_would_do():
-    question = Question(3 * MGON, 30 * GON, of_sigma(0.002), equipment=(BY_HAND,))
+def test_by_hand_alone_it_is_said_that_a_robot_would_do(monkeypatch):
+    monkeypatch.setattr(planned, "SIZES", (9, 40, 200))
+    question = Question(2.5 * MGON, 30 * GON, of_sigma(0.002), equipment=(BY_HAND,))
     (line,) = answer_lines(answer(question, replicates=200))
     assert re.search(r"A robot reaches it: \d+ positions with a robot, 10 s each", line)
 

@@ -22,15 +22,17 @@ from accelstudy.plan.search.question import BY_HAND, ROBOT, Question
 
 G = 9.80665
 SIGMA = 0.002
-REPLICATES = 20_000
+REPLICATES = 10_000
 
 
-def attitudes(tilt_range, count=300):
-    """Specific forces, (count, 3), of random attitudes up to a tilt, evenly over the cap."""
-    rng = np.random.default_rng(11)
-    cosine = rng.uniform(np.cos(tilt_range), 1, count)
-    azimuth, sine = rng.uniform(0, 2 * np.pi, count), np.sqrt(1 - cosine**2)
-    return -G * np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), cosine], axis=-1)
+def attitudes(tilt_range):
+    """Specific forces and weights of 4 × 12 attitudes, whose mean is that over the whole cap."""
+    nodes, weights = np.polynomial.legendre.leggauss(4)
+    cosine = (1 + np.cos(tilt_range)) / 2 + nodes * (1 - np.cos(tilt_range)) / 2
+    cosine, azimuth = np.meshgrid(cosine, 2 * np.pi * (np.arange(12) + 0.5) / 12, indexing="ij")
+    sine = np.sqrt(1 - cosine**2)
+    forces = -G * np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), cosine], axis=-1)
+    return forces.reshape(-1, 3), np.repeat(weights / 24, 12)
 
 
 def roll_and_pitch(f):
@@ -66,12 +68,9 @@ def by_hand(directions, tilt_range, sigma=SIGMA, replicates=REPLICATES, seed=5):
         normal = np.swapaxes(design, 1, 2) @ design
         right = np.einsum("rni,rn->ri", design, G - norm)
         p += np.linalg.solve(normal, right[..., None])[..., 0]
-    forces = attitudes(tilt_range)
-    square = np.zeros((replicates, 2))
-    for f in forces:  # one after the other, to need no memory
-        left = roll_and_pitch(corrected(f[None, None], p))[:, 0] - roll_and_pitch(f)
-        square += left**2 / len(forces)
-    return np.sqrt(square)
+    forces, weights = attitudes(tilt_range)
+    left = roll_and_pitch(corrected(forces[None], p)) - roll_and_pitch(forces)
+    return np.sqrt(np.einsum("rka,k->ra", left**2, weights))
 
 
 def rms(left):
@@ -151,10 +150,10 @@ def test_a_share_of_the_calibrations_is_of_both_angles_at_once():
 
 
 def test_with_a_robot_five_positions_do_what_four_do_not():
-    question = Question(10 * MGON, 30 * GON, of_sigma(SIGMA), equipment=(ROBOT,))
+    question = Question(9.4 * MGON, 30 * GON, of_sigma(SIGMA), equipment=(ROBOT,))
     found = answer(question, replicates=2000)
     assert found.first.candidate.scheme.n_positions == 5
-    assert found.first.fewer.rms.max() > 10 * MGON
+    assert found.first.fewer.rms.max() > 9.4 * MGON
 
 
 @pytest.mark.parametrize("name", ["adxl355", "mpu-6050", "stim300"])
@@ -162,16 +161,15 @@ def test_with_a_robot_five_positions_do_what_four_do_not():
 def test_temperature_in_use_leaves_what_warmed_sensors_do(name, tilt_range, kelvin):
     sheet = get_data_sheet(name)
     question = Question(10 * MGON, tilt_range * GON, sheet)
-    f = attitudes(tilt_range * GON, 2000)
-    rng = np.random.default_rng(3)
-    square = np.zeros(2)
-    for _ in range(1000):
-        bias, scale = rng.standard_normal((2, 3)) * [
-            [kelvin * (sheet.bias_per_kelvin or 0)], [kelvin * (sheet.scale_per_kelvin or 0)],
-        ]  # fmt: skip
-        square += np.mean((roll_and_pitch(f * (1 + scale) + bias) - roll_and_pitch(f)) ** 2, 0)
+    f, weights = attitudes(tilt_range * GON)
+    bias, scale = np.random.default_rng(3).standard_normal((2, REPLICATES, 1, 3))
+    bias *= kelvin * (sheet.bias_per_kelvin or 0)
+    scale *= kelvin * (sheet.scale_per_kelvin or 0)
+    left = roll_and_pitch(f * (1 + scale) + bias) - roll_and_pitch(f)
+    square = np.einsum("rka,k->ra", left**2, weights).mean(axis=0)
+    # With 3 degrees of freedom or more the rms of so many is right to 0.5 %.
     said = in_use(question, kelvin=kelvin).warmth
-    assert said == pytest.approx(np.sqrt(square.max() / 1000), rel=0.08)
+    assert said == pytest.approx(np.sqrt(square.max()), rel=0.025)
 
 
 def test_the_scale_is_a_part_of_what_a_temperature_leaves():

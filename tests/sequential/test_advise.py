@@ -390,7 +390,7 @@ def test_the_page_can_be_followed_word_by_word(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     blocks = re.findall(r"(?:^ {4}.*\n)+", page.partition("## To try it")[2], re.MULTILINE)
     commands, answer, watch, arrive, last = (
-        [line[4:] for line in block.splitlines()] for block in blocks[:5]
+        [line[4:] for line in block.replace("\\\n     ", "").splitlines()] for block in blocks[:5]
     )
 
     def follow(line):

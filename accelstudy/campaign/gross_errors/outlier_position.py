@@ -13,7 +13,7 @@ from accelstudy.basics.registry import Setting
 from accelstudy.basics.wording import comma_list
 from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.gross_errors.base import SINGLE, GrossError, Mending, register
-from accelstudy.campaign.gross_errors.real_sensor import LOST, RealSensor
+from accelstudy.campaign.gross_errors.real_sensor import LOST, SHOWS, RealSensor
 
 SIZE = 0.1
 """m/s², size of an error whose direction is drawn."""
@@ -60,6 +60,10 @@ class OutlierPosition(GrossError):
         far = sensor.wrong & (sensor.distance > LOST * sensor.gravity)
         bumped = tuple(campaign.positions[far].tolist())
         if not sensor.tells or not 0 < len(bumped) <= campaign.n_positions // PART:
+            return
+        # Far from a usual sensor, and yet all may fit one whose bias or scale no sensor has.
+        free = RealSensor.of(campaign, sensor.expected is not None, mounted=True)
+        if free.distance.max() < SHOWS * sensor.gravity:
             return
         sizes = comma_list([f"{size:.2g}" for size in sensor.distance[far]])
         reason = f"position {comma_list([str(p) for p in bumped])} is wrong by {sizes} m/s^2"

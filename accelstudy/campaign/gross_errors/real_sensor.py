@@ -23,6 +23,8 @@ CLEARLY = 4.0
 many times the usual distance is wrong."""
 LOST = 0.15
 """Share of gravity by which no usable sensor is wrong."""
+SHOWS = 0.005
+"""Share of gravity by which a single position must be off to be called wrong."""
 LEAST = 1e-6
 """Distance, as a share of gravity, below which differences do not count."""
 SPARE = 3
@@ -74,6 +76,7 @@ class RealSensor:
         mounted : bool, whether the sensor may be mounted in any attitude, with errors of any size
         """
         g, conditions = campaign.gravity, _conditions(campaign)
+        share = np.inf if mounted else USUAL
         if not attitude:
             # The norm of (I + D) f/g + c is 1: linear in the nine numbers of (I + D)ᵀ(I + D), c.
             x, y, z = unit = campaign.forces.T / g
@@ -81,12 +84,12 @@ class RealSensor:
             columns += [c * axis for c in conditions for axis in unit]
             design = np.stack(columns, axis=1)
             lacking = (1 - np.sum(unit**2, axis=0, keepdims=True).T) / 2
-            squares = 1 - 2 * (lacking - _robust(design, lacking, USUAL))[:, 0]
+            squares = 1 - 2 * (lacking - _robust(design, lacking, share))[:, 0]
             return cls(None, g * np.abs(np.sqrt(np.maximum(squares, 0)) - 1), g, _tells(design))
         ideal = attitude_forces(campaign)
         columns = [*ideal.T / g, np.ones(len(ideal)), *conditions]
         design, lacking = np.stack(columns, axis=1), (campaign.forces - ideal) / g
-        expected = ideal + g * _robust(design, lacking, np.inf if mounted else USUAL)
+        expected = ideal + g * _robust(design, lacking, share)
         distance = np.linalg.norm(campaign.forces - expected, axis=1)
         return cls(expected, distance, g, _tells(design))
 

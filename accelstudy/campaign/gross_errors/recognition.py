@@ -20,7 +20,7 @@ from accelstudy.campaign.gross_errors.base import (
     get_gross_error,
     gross_error_names,
 )
-from accelstudy.campaign.gross_errors.real_sensor import CLEARLY, RealSensor
+from accelstudy.campaign.gross_errors.real_sensor import CLEARLY, SHOWS, RealSensor
 from accelstudy.leveling.angles import usual_norm
 
 if TYPE_CHECKING:
@@ -33,8 +33,6 @@ TOGETHER = 4
 """Largest number of gross errors of one rank that are looked for in a campaign."""
 GROSS = 0.1
 """Share of gravity: if no position is farther off, no unit and no axis can be wrong."""
-SHOWS = 0.005
-"""Share of gravity by which a single position must be off to be called wrong."""
 AS_GOOD = 1.25
 """Two explanations whose distances differ by less than this factor fit equally well; the simpler
 one is taken."""

@@ -15,6 +15,7 @@ from accelstudy.plan.search.answer import by_time
 from accelstudy.plan.search.candidates import candidates
 from accelstudy.plan.search.question import Question
 from accelstudy.plan.search.sensors import get_sensor
+from accelstudy.schemes.optimal import stored_designs
 
 TILT_RANGE = 30 * GON
 HOLDS = (1.0, 10.0, 60.0)
@@ -26,13 +27,15 @@ COLUMNS = 3
 def front_table(sensors: Sequence[str], tilt_range: float = TILT_RANGE) -> pd.DataFrame:
     """Candidates that leave less error than all quicker ones, for each sensor and equipment.
 
-    They come from linear theory. Columns are in the units in their names.
+    They come from linear theory, for schemes that have a name. Columns are in the units in their
+    names.
     """
     rows = []
+    optimal = tuple(f"i-optimal-{n}" for n in stored_designs()["I"])
     for name in sensors:
         sheet = get_sensor(name)
         holds = HOLDS if sheet.position_sigma is None else ()
-        question = Question(1.0, tilt_range, sheet, holds=holds)
+        question = Question(1.0, tilt_range, sheet, holds=holds, schemes=optimal)
         compared = candidates(question)
         for equipment in question.equipment:
             best = np.inf

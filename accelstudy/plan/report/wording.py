@@ -100,12 +100,11 @@ def _fewest(question: Question, ranked: Ranked) -> str:
     n = ranked.candidate.scheme.n_positions
     if ranked.fewer is None:
         return "With fewer positions an error in one of them would not be noticed."
-    left, known = (
-        ranked.fewer.accuracy(question.confidence),
-        ranked.simulated.uncertainty(question.confidence),
-    )
-    simulated = f"{_angle(left)} ± {_angle(known)}, from {ranked.simulated.simulated} simulations"
-    if left - 2 * known < question.target:
+    left = ranked.fewer.accuracy(question.confidence)
+    error = ranked.simulated.uncertainty(question.confidence)
+    shown = f"{_value(left)} ± {to_display(error, 'rad'):.1g} {display_unit('rad')}"
+    simulated = f"{shown}, from {ranked.simulated.simulated} simulations"
+    if left - 2 * error < question.target:
         return f"Whether {n - 1} would do is within the error of the simulation ({simulated})."
     return f"Fewer do not suffice: {n - 1} positions leave {simulated}."
 
@@ -352,7 +351,11 @@ def _most_accurate(answer: Answer, equipment: str) -> Candidate | None:
 
 
 def _angle(value: float) -> str:
-    return f"{number(float(to_display(value, 'rad')))} {display_unit('rad')}"
+    return f"{_value(value)} {display_unit('rad')}"
+
+
+def _value(angle: float) -> str:
+    return number(float(to_display(angle, "rad")))
 
 
 def _angles(values: Sequence[float] | np.ndarray) -> str:

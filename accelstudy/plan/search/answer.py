@@ -111,9 +111,9 @@ def answer(question: Question, seed: int = 1, replicates: int = 10_000) -> Answe
     other = OTHER_CONFIDENCE if question.confidence is None else None
     stricter = [c for c in compared if c.equipment in mine.equipment]
     stricter += _largest(mine, mine.equipment[0], stricter, other)
-    good = _good(mine, stricter, other)
+    reaching = _good(mine, stricter, other)
     simulation = Simulation(mine, other, seed, replicates)
-    confirmed = simulation.confirmed(cheapest(mine, good, other)) if good else None
+    confirmed = simulation.confirmed(cheapest(mine, reaching, other)) if reaching else None
     return replace(found, stricter=confirmed)
 
 

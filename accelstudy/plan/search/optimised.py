@@ -8,10 +8,9 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 from accelstudy.basics.units import GON, MGON
-from accelstudy.design.optimal.search import optimal_design
+from accelstudy.design.optimal.search import optimal_design, rounded
 from accelstudy.plan.search.candidates import LEAST_REDUNDANCY, Candidate, of_scheme, sigma_of
 from accelstudy.plan.search.question import Equipment, Question
-from accelstudy.proposal.design_file import rounded
 from accelstudy.proposal.request import Request
 from accelstudy.proposal.worse_angle import WorseAngle
 from accelstudy.schemes import Scheme

@@ -104,7 +104,7 @@ class Expected:
         """
         mean, freedom = self._spread
         ends = [self.quantile(p).max() for p in (probability, (1 + probability) / 2)]
-        squares = np.linspace(*np.square(ends), STEPS)[:, None]
+        squares = np.linspace(ends[0] ** 2, ends[1] ** 2, STEPS)[:, None]
         both = gammainc(freedom / 2, freedom / 2 * squares / mean).prod(axis=1)
         return float(np.sqrt(np.interp(probability, both, squares[:, 0])))
 

@@ -55,6 +55,7 @@ def rare_events(tables: Tables, study: StudyConfig) -> Figure:
 
     cells, tilt = tables["cells"], tables["quantiles"]
     tilt = tilt[(tilt["quantity"] == "tilt") & (tilt["probability"] >= 0.5)]
+    tilt = tilt[tilt["name"].isin(LINES)]
     tilt = tilt[tilt["sensor_sigma_mps2"] == tilt["sensor_sigma_mps2"].min()]
     setups = list(dict.fromkeys(zip(tilt["model"], tilt["scheme"], strict=True)))
     fig = new_figure(FULL, 72)
