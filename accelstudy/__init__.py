@@ -1,10 +1,15 @@
 """Monte Carlo study of the calibration of tri-axial accelerometers for leveling."""
 
+from typing import TYPE_CHECKING
 
-def __getattr__(name: str) -> str:
-    """Version of the package; looked up when asked for, since that takes long."""
-    if name != "__version__":
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from importlib.metadata import version
+if TYPE_CHECKING:
+    __version__: str
+else:
 
-    return version(__name__)
+    def __getattr__(name):
+        """Version of the package; looked up when asked for, since that takes long."""
+        if name != "__version__":
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        from importlib.metadata import version
+
+        return version(__name__)

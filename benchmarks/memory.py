@@ -40,7 +40,7 @@ def run(step, content, folder):
     """One rule, on files in a folder."""
     from accelstudy.files.tables import collect, read_table
     from accelstudy.study.cells.batches import Share
-    from accelstudy.study.cells.cell import study_cells
+    from accelstudy.study.cells.of_study import study_cells
     from accelstudy.study.config import parse_study
     from accelstudy.study.figures import figure_names, figure_tables, render
     from accelstudy.study.monte_carlo.simulate import simulate_batch

@@ -194,16 +194,13 @@ def adjust(
     if parameter_observations is not None:
         direct[:] = np.moveaxis(np.atleast_2d(np.asarray(parameter_observations)), -1, 0)
 
-    result = Adjustment(
-        parameters=np.full((n_replicates, n_unknowns), np.nan),
-        residuals=np.full((n_replicates, n_blocks, n_observations), np.nan),
-        cofactors=np.full((n_replicates, n_unknowns, n_unknowns), np.nan),
-        omega=np.full(n_replicates, np.nan),
-        redundancy=0,
-        converged=np.zeros(n_replicates, dtype=bool),
-        iterations=np.zeros(n_replicates, dtype=int),
-        singular=np.zeros(n_replicates, dtype=bool),
-    )
+    parameters = np.full((n_replicates, n_unknowns), np.nan)
+    residuals = np.full((n_replicates, n_blocks, n_observations), np.nan)
+    q_xx = np.full((n_replicates, n_unknowns, n_unknowns), np.nan)
+    omega = np.full(n_replicates, np.nan)
+    converged = np.zeros(n_replicates, dtype=bool)
+    iterations = np.zeros(n_replicates, dtype=int)
+    singular = np.zeros(n_replicates, dtype=bool)
     tolerance = _tolerance(observed, q)
     active = np.arange(n_replicates)
     redundancy = 0
@@ -213,18 +210,18 @@ def adjust(
             redundancy = redundancy_of(at.psi.shape[0] * at.psi.shape[2], weights)
             step = _step(at, v, q, weights, direct - x)
             x, v, latent = x + step.dx, step.v, at.latent
-            converged = step.size <= tolerance[active]
-            going_on = ~converged & np.isfinite(step.size)
+            small = step.size <= tolerance[active]
+            going_on = ~small & np.isfinite(step.size)
 
-            result.iterations[active] = iteration
-            result.singular[active] = step.singular
-            result.converged[active] = converged
-            ended = active[converged]
-            result.parameters[ended] = x[:, converged].T
-            result.residuals[ended] = np.moveaxis(v[:, converged], 0, -1)
-            result.omega[ended] = step.omega[converged]
+            iterations[active] = iteration
+            singular[active] = step.singular
+            converged[active] = small
+            ended = active[small]
+            parameters[ended] = x[:, small].T
+            residuals[ended] = np.moveaxis(v[:, small], 0, -1)
+            omega[ended] = step.omega[small]
             if len(ended):
-                result.cofactors[ended] = step.cofactors(converged)
+                q_xx[ended] = step.cofactors(small)
 
             if not going_on.any():
                 break
@@ -232,7 +229,9 @@ def adjust(
                 active, x, v = active[going_on], x[:, going_on], v[:, going_on]
                 observed, direct = observed[:, going_on], direct[:, going_on]
                 latent = None if latent is None else latent[:, going_on]
-    return replace(result, redundancy=redundancy)
+    return Adjustment(
+        parameters, residuals, q_xx, omega, redundancy, converged, iterations, singular
+    )
 
 
 @dataclass(frozen=True)

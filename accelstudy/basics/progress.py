@@ -1,7 +1,8 @@
 """What a command reports while it works: lines and, for long work, bars on a terminal.
 
-A function reports by `track` and `stage`, wherever it stands. Nothing is shown unless a command
-asks for it by `feedback`, so that the package is silent when it is used from Python.
+A function reports by `track` and `stage`, wherever it stands. They show nothing unless a command
+asks for it by `feedback`, so that the package is silent when it is used from Python. `say` and
+`begin` are for commands themselves: they print unless `feedback` is quiet.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ _bars: ContextVar[Progress | None] = ContextVar("bars", default=None)
 
 @contextmanager
 def feedback(quiet: bool = False) -> Iterator[None]:
-    """Show within a ``with`` block what `track`, `stage` and `say` report, unless `quiet`."""
+    """Show within a ``with`` block what `track` and `stage` report; or be quiet, `say` included."""
     tokens = _quiet.set(quiet), _wanted.set(not quiet and sys.stderr.isatty())
     try:
         yield
@@ -42,7 +43,7 @@ def feedback(quiet: bool = False) -> Iterator[None]:
 
 
 def say(text: str) -> None:
-    """Print a line about what was done, unless the command is quiet."""
+    """Print a line about what was done, unless it is called within ``feedback(quiet=True)``."""
     if not _quiet.get():
         show(text)
 

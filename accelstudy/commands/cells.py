@@ -18,7 +18,7 @@ def cells_command(configs: tuple[Path, ...]) -> None:
     overlays those before it, as with Snakemake's --configfile.
     """
     from accelstudy.design.estimability import estimability
-    from accelstudy.study.cells.cell import study_cells
+    from accelstudy.study.cells.of_study import study_cells
     from accelstudy.study.config import read_study
     from accelstudy.study.monte_carlo.effort import study_effort
 

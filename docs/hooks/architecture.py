@@ -5,9 +5,11 @@ import re
 import subprocess
 import tempfile
 from collections import defaultdict
+from graphlib import TopologicalSorter
 from itertools import pairwise
 from pathlib import Path
 
+from grimp import build_graph
 from markdown_text import plain, table
 
 import accelstudy
@@ -30,20 +32,14 @@ def rooms():
 
 def imports(known):
     """Rooms that each room imports, within functions too, but not for type checkers."""
-    graph = {room: set() for room in known}
-    for path in ROOT.glob("*/**/*.py"):
-        room = path.relative_to(ROOT).parts[0]
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
-            if not (isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"):
-                graph[room] |= {target for target in _targets(node) if target in known}
-    return {room: targets - {room} for room, targets in graph.items()}
-
-
-def _targets(tree):
-    """Rooms that are named by the imports of a piece of code."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("accelstudy."):
-            yield node.module.split(".")[1]
+    graph = build_graph("accelstudy", exclude_type_checking_imports=True, cache_dir=None)
+    for room in known:
+        graph.squash_module(f"accelstudy.{room}")
+    targets = {
+        room: graph.find_modules_directly_imported_by(f"accelstudy.{room}") for room in known
+    }
+    names = {room: {each.split(".")[-1] for each in targets[room]} for room in known}
+    return {room: (names[room] & known.keys()) - {room} for room in known}
 
 
 def _below(graph, room):
@@ -59,19 +55,12 @@ def levels(graph):
     ValueError
         If rooms import each other in a circle.
     """
-    level = {}
-
-    def of(room, above=()):
-        if room in above:
-            raise ValueError(f"rooms import each other: {' → '.join((*above, room))}")
-        if room not in level:
-            level[room] = 1 + max((of(each, (*above, room)) for each in graph[room]), default=-1)
-        return level[room]
-
-    rows = defaultdict(list)
-    for room in sorted(graph):
-        rows[of(room)].append(room)
-    return [rows[number] for number in sorted(rows)]
+    order, rows = TopologicalSorter(graph), []
+    order.prepare()
+    while order.is_active():
+        rows.append(sorted(order.get_ready()))
+        order.done(*rows[-1])
+    return rows
 
 
 def needed(graph):
@@ -208,7 +197,7 @@ def on_page_markdown(markdown, page, **_):
         return markdown
     known = rooms()
     graph = imports(known)
-    order = [room for row in reversed(levels(graph)) for room in sorted(row)]
+    order = [room for row in reversed(levels(graph)) for room in row]
     lines = [
         (
             f'<span id="{room}"></span>`{room}/`',

@@ -1,10 +1,9 @@
 """The rooms of the package: their imports go one way, and none is too full to look through."""
 
-import ast
 import re
-from collections import defaultdict
-from graphlib import CycleError, TopologicalSorter
+from collections import Counter
 
+import grimp
 import pytest
 from places import ROOT
 
@@ -23,90 +22,33 @@ REGISTRIES = {
 """One idea a file, so that they may grow."""
 
 
-def modules():
-    """Path of each module of the package, by its name."""
-    return {
-        ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path
-        for path in (ROOT / PACKAGE).rglob("*.py")
-    }
-
-
-def imported(tree, known):
-    """Modules that a file imports, within functions too, but not for type checkers."""
-    for node in ast.iter_child_nodes(tree):
-        if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"):
-            continue
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names if alias.name in known)
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, "imports name the whole path"
-            whole = (f"{node.module}.{alias.name}" for alias in node.names)
-            found = {name if name in known else node.module for name in whole}
-            yield from sorted(found & known.keys())
-        else:
-            yield from imported(node, known)
-
-
 @pytest.fixture(scope="module")
-def arrows():
-    """What each module imports of the package."""
-    known = modules()
-    return {
-        name: set(imported(ast.parse(path.read_text(encoding="utf-8")), known))
-        for name, path in known.items()
-    }
+def graph():
+    """What each module imports, within functions too, but not for type checkers."""
+    return grimp.build_graph(PACKAGE, exclude_type_checking_imports=True, cache_dir=None)
 
 
-def among(arrows, parent):
-    """Imports between the rooms and modules right below a package."""
-    depth = len(parent.split(".")) + 1
-    found = defaultdict(set)
-    for module, others in arrows.items():
-        for other in others:
-            if all(f"{name}.".startswith(f"{parent}.") for name in (module, other)):
-                one, two = (".".join(name.split(".")[:depth]) for name in (module, other))
-                if one != two and parent not in (one, two):
-                    found[one].add(two)
-    return found
+def test_imports_between_rooms_go_one_way(graph):
+    rooms = {module.rpartition(".")[0] for module in graph.modules} - {""}
+    assert {f"{PACKAGE}.campaign", f"{PACKAGE}.study"} < rooms
+    assert [each for room in rooms for each in graph.nominate_cycle_breakers(room)] == []
 
 
-def test_imports_between_rooms_go_one_way(arrows):
-    parents = {PACKAGE, *(name.rpartition(".")[0] for name in arrows if "." in name)}
-    assert {"accelstudy.campaign", "accelstudy.study"} < parents
-    cycles = []
-    for parent in sorted(parents):
-        try:
-            TopologicalSorter(among(arrows, parent)).prepare()
-        except CycleError as error:
-            cycles.append(" → ".join(reversed(error.args[1])))
-    assert cycles == []
-
-
-def test_the_table_for_contributors_has_all_rooms_in_the_order_of_imports(arrows):
+def test_the_table_for_contributors_has_all_rooms_in_the_order_of_imports(graph):
     text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     lines = re.findall(r"^\|[^|`]*\|([^|]*`\w+/`[^|]*)\|$", text, re.MULTILINE)
-    line_of = {
-        f"{PACKAGE}.{room}": number
-        for number, line in enumerate(lines)
-        for room in re.findall(r"`(\w+)/`", line)
-    }
+    layers = [grimp.Layer(*re.findall(r"`(\w+)/`", line), independent=False) for line in lines]
     folders = {path.parent.name for path in (ROOT / PACKAGE).glob("*/__init__.py")}
-    assert {name.removeprefix(f"{PACKAGE}.") for name in line_of} == folders
-    upwards = [
-        f"{room} imports {other}"
-        for room, others in among(arrows, PACKAGE).items()
-        for other in others
-        if room in line_of and line_of.get(other, 0) > line_of[room]
-    ]
-    assert upwards == []
+    assert {room for layer in layers for room in layer.module_tails} == folders
+    upwards = graph.find_illegal_dependencies_for_layers(layers[::-1], containers={PACKAGE})
+    assert upwards == set()
 
 
 def test_no_room_is_too_full():
-    folders = {path.parent for path in modules().values()}
-    counts = {
-        folder.relative_to(ROOT / PACKAGE).as_posix(): len(list(folder.glob("[!_]*.py")))
-        for folder in folders
-    }
+    package = ROOT / PACKAGE
+    counts = Counter(
+        path.parent.relative_to(package).as_posix() for path in package.rglob("[!_]*.py")
+    )
     assert counts.keys() >= REGISTRIES
     full = {room: n for room, n in counts.items() if n > MOST_FILES and room not in REGISTRIES}
     assert full == {}

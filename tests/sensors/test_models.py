@@ -12,8 +12,7 @@ from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.commands.main import main
 from accelstudy.drawing.style import _parameters, model_title
 from accelstudy.effects import Effect, base, effect_names, get_effect, register
-from accelstudy.effects.base import per_axis
-from accelstudy.effects.defaults import equation_of, formulas, typical_of
+from accelstudy.effects.base import formulas, per_axis
 from accelstudy.sensors.models import MODELS, get_model
 from accelstudy.sensors.plausibility import largest
 from accelstudy.study.config import parse_study
@@ -156,8 +155,8 @@ def test_an_effect_that_says_no_more_than_it_must_serves_everywhere(squared, tmp
 def test_defaults_come_from_the_formulas(name):
     effect = get_effect(name)
     assert formulas(effect)
-    assert equation_of(effect)
-    low, high = typical_of(effect)
+    assert Effect.equation.fget(effect)
+    low, high = Effect.typical.fget(effect)
     assert 0 < low < high < 1
 
 
@@ -167,7 +166,7 @@ def test_formulas_are_those_of_the_effect():
     }
     assert formulas(get_effect("saturation(knee=9)[k_sat_y]"))["output"][::2] == ["0", "0"]
     assert formulas(get_effect("encoder_offset")) == {"reading": ["c_roll", "c_pitch"]}
-    assert equation_of(get_effect("quadratic_scale")) == "f_i² k2_i/g"
+    assert Effect.equation.fget(get_effect("quadratic_scale")) == "f_i² k2_i/g"
     assert set(MODELS[NINE]) <= set(effect_names())
 
 

@@ -23,7 +23,7 @@ from accelstudy.basics.wording import interval, number
 from accelstudy.files.tables import read_table, write_table
 from accelstudy.leveling.sensitivity import leveling_sensitivity
 from accelstudy.sensors.models import get_model
-from accelstudy.study.cells.cell import study_cells
+from accelstudy.study.cells.of_study import study_cells
 from accelstudy.study.claims import NOT_REPRODUCED, REPRODUCED, SLIP, evidence_from, judge
 from accelstudy.study.claims.page import claims_markdown, claims_page
 from accelstudy.study.figures import figure_tables

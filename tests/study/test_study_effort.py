@@ -8,7 +8,7 @@ from study_helpers import content, grid, make_study
 
 from accelstudy.basics.errors import InputError
 from accelstudy.commands.main import main
-from accelstudy.study.cells.cell import study_cells
+from accelstudy.study.cells.of_study import study_cells
 from accelstudy.study.config import read_study
 from accelstudy.study.monte_carlo.effort import study_effort
 

@@ -12,7 +12,7 @@ from study_helpers import grid, make_cells, make_study, parts_in, run_study
 from accelstudy.study.cells import batches as batching
 from accelstudy.study.cells import cell as cells_module
 from accelstudy.study.cells.batches import batches, job_size
-from accelstudy.study.cells.cell import study_cells
+from accelstudy.study.cells.of_study import study_cells
 from accelstudy.study.claims import evidence_from
 from accelstudy.study.monte_carlo import distributions, simulate
 from accelstudy.study.monte_carlo.moments import Moments, Node, Tree, moments_of

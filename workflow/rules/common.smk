@@ -12,7 +12,7 @@ from accelstudy.study.figures import (
     get_figure,
 )
 from accelstudy.study.cells.batches import batches
-from accelstudy.study.cells.cell import study_cells
+from accelstudy.study.cells.of_study import study_cells
 from accelstudy.study.config import parse_study
 from accelstudy.files.layers import read_layer
 from accelstudy.study.monte_carlo.effort import study_effort

@@ -14,7 +14,7 @@ from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.wording import comma_list
 from accelstudy.campaign.calibration.gauges import not_affine
 from accelstudy.effects import Effect
-from accelstudy.effects.defaults import formulas
+from accelstudy.effects.base import formulas
 from accelstudy.sensors.conversion import Conversion, conversion_of
 from accelstudy.sensors.frames import FRD, Frame, parse_frame
 from accelstudy.sensors.models import compose

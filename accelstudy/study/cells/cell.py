@@ -1,30 +1,23 @@
-"""Cells: the combinations of model, scheme, approach and noise that a study simulates."""
+"""What a cell is: one model, scheme, approach and noise that a study simulates."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from itertools import product
-from typing import TYPE_CHECKING, Any
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from accelstudy.approaches import Approach, approach_names, get_approach
-from accelstudy.basics.units import MGON
-from accelstudy.effects import HoldConditions, get_effect
-from accelstudy.noise_effects import get_noise_effect
-from accelstudy.schemes import Scheme, get_scheme, scheme_names
-from accelstudy.schemes.files import held
-from accelstudy.sensors.models import compose, get_model
+from accelstudy.approaches import Approach, get_approach
+from accelstudy.effects import HoldConditions
+from accelstudy.schemes import Scheme, get_scheme
+from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.hold_plan import HoldPlan
 from accelstudy.simulation.sessions import BLOCK, Noise
-from accelstudy.study.cells.compiling import with_compiled
-
-if TYPE_CHECKING:
-    from accelstudy.study.config import Grid, StudyConfig
 
 CHUNK = 20
 """Blocks that are held, summed up and written together; they limit the memory of a job."""
@@ -64,40 +57,45 @@ class Cell:
     compiled: bool = False
     directions: tuple[tuple[float, ...], ...] | None = None
 
-    @property
+    @cached_property
     def estimated_model(self) -> SensorModel:
         """The model of the adjustment."""
         return compose(self.model, self.effects)
 
-    @property
+    @cached_property
     def simulated_model(self) -> SensorModel:
         """The model of the simulated sensor."""
         if self.simulated_effects == self.effects:
             return self.estimated_model
         return compose("simulated", self.simulated_effects)
 
-    @property
+    @cached_property
     def positions(self) -> Scheme:
         """The scheme."""
         if self.directions is None:
             return get_scheme(self.scheme)
         return Scheme(self.scheme, self.scheme, np.array(self.directions), "generated", "")
 
-    @property
+    @cached_property
     def conditions(self) -> Approach:
         """The approach."""
         return get_approach(self.approach)
 
-    @property
+    @cached_property
     def hold(self) -> HoldConditions:
         """Conditions of the holds, without columns that follow from their attitudes."""
         return self.holds.hold(self.positions.n_positions)
 
-    @property
+    @cached_property
     def parameter_units(self) -> dict[str, str]:
         """SI unit of each parameter that is estimated; gravity is the last one if observed."""
         units = {p.name: p.unit for p in self.estimated_model.parameters}
         return {**units, "g": "m/s^2"} if self.noise.sigma_gravity > 0 else units
+
+    @property
+    def n_unknowns(self) -> int:
+        """Number of parameters that are estimated, gravity included."""
+        return len(self.parameter_units)
 
     @property
     def n_blocks(self) -> int:
@@ -159,77 +157,3 @@ def _tuples(data: Mapping[str, Any]) -> dict[str, Any]:
 
 def _rows(data: Any) -> tuple[tuple[float, ...], ...] | None:
     return None if data is None else tuple(map(tuple, data))
-
-
-def study_cells(study: StudyConfig) -> list[Cell]:
-    """All cells of a study, in the order of its configuration, without repetition.
-
-    A cell that occurs more than once, such as in Table 1 and in a grid, runs once, with the largest
-    number of replicates.
-    """
-    cells: dict[str, Cell] = {}
-    for grid in study.all_grids:
-        for cell in _grid_cells(study, grid):
-            known = cells.get(cell.name)
-            if known is None or cell.replicates > known.replicates:
-                cells[cell.name] = cell
-    return with_compiled(list(cells.values()))
-
-
-def _grid_cells(study: StudyConfig, grid: Grid) -> Iterable[Cell]:
-    noise = study.noise
-    schemes = scheme_names() if grid.schemes == ["all"] else grid.schemes
-    approaches = approach_names() if grid.approaches == ["all"] else grid.approaches
-    for model, scheme, approach, sensor, robot, gravity, error in product(
-        study.model_names(grid.models),
-        schemes,
-        approaches,
-        grid.sensor_sigma_mps2 or [noise.sensor.sigma_mps2],
-        grid.robot_sigma_mgon or [noise.robot.sigma_mgon],
-        grid.gravity_sigma_mps2 or [noise.gravity.sigma_mps2],
-        grid.gravity_error_mps2 or [noise.gravity.error_mps2],
-    ):
-        uses_angles = get_approach(approach).uses_angles
-        if not uses_angles:  # the same cell whatever the robot's accuracy
-            robot = noise.robot.sigma_mgon
-        settings = {
-            "sensor_sigma_mps2": (sensor, noise.sensor.sigma_mps2),
-            "robot_sigma_mgon": (robot, noise.robot.sigma_mgon),
-            "gravity_sigma_mps2": (gravity, noise.gravity.sigma_mps2),
-            "gravity_error_mps2": (error, noise.gravity.error_mps2),
-        }
-        changed = [
-            f"{key}={_shown(value)}" for key, (value, usual) in settings.items() if value != usual
-        ]
-        effects = tuple(e.spec for e in get_model(model, study.models).effects)
-        simulated = (
-            effects
-            if study.simulated_effects == ["model"]
-            else tuple(get_effect(e).spec for e in study.simulated_effects)
-        )
-        yield Cell(
-            name="/".join([model, scheme, approach, *changed]),
-            model=model,
-            effects=effects,
-            simulated_effects=simulated,
-            scheme=scheme,
-            approach=approach,
-            replicates=grid.replicates,
-            noise=Noise(
-                study.position_sigma(sensor),
-                robot * MGON if uses_angles else 0.0,
-                gravity,
-                error,
-                tuple(get_noise_effect(spec).spec for spec in noise.effects),
-            ),
-            gravity=study.gravity_mps2,
-            truth=study.truth(dict.fromkeys([*effects, *simulated])),
-            holds=study.hold_plan,
-            directions=_rows((held(scheme) or {}).get("directions")),
-        )
-
-
-def _shown(value: float) -> str:
-    """Show a number briefly, but never two numbers alike."""
-    short = f"{value:g}"
-    return short if float(short) == value else repr(value)

@@ -17,7 +17,6 @@ from collections import Counter
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
 from importlib.util import find_spec
-from typing import TYPE_CHECKING
 
 from accelstudy.adjustment.block import Block
 from accelstudy.adjustment.calibration import calibrate
@@ -25,9 +24,7 @@ from accelstudy.adjustment.observations import Observations
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
 from accelstudy.sensors.sensor import SensorModel
-
-if TYPE_CHECKING:
-    from accelstudy.study.cells.cell import Cell
+from accelstudy.study.cells.cell import Cell
 
 POSITIONS_PER_PARAMETER = 50_000
 """Positions of all calibrations together, per parameter, from which on compilation saves time.
@@ -50,7 +47,9 @@ def with_compiled(cells: Sequence[Cell]) -> list[Cell]:
     for cell in cells:
         positions[_code(cell)] += cell.replicates * cell.positions.n_positions
     return [
-        replace(cell, compiled=positions[_code(cell)] >= POSITIONS_PER_PARAMETER * _unknowns(cell))
+        replace(cell, compiled=True)
+        if positions[_code(cell)] >= POSITIONS_PER_PARAMETER * cell.n_unknowns
+        else cell
         for cell in cells
     ]
 
@@ -74,10 +73,6 @@ def calibrator(cell: Cell) -> Callable[[SensorModel, Approach, Observations], Bl
     from accelstudy.kernel import calibrate as kernel  # loads the compiler
 
     return kernel.calibrate
-
-
-def _unknowns(cell: Cell) -> int:
-    return cell.estimated_model.n_parameters + (cell.noise.sigma_gravity > 0)
 
 
 def _code(cell: Cell) -> Hashable:

@@ -115,7 +115,7 @@ def _seconds(study: StudyConfig, cell: Cell) -> float:
     rate = SECONDS_WITH_ROBOT if cell.conditions.uses_angles else SECONDS_BY_GRAVITY
     if cell.compiled:
         rate = SECONDS_COMPILED
-    terms = cell.positions.n_positions * _parameters(cell)
+    terms = cell.positions.n_positions * cell.n_unknowns
     around = SECONDS_TO_KEEP if _keeps(study) else SECONDS_TO_SUM
     return cell.replicates * (around + rate * terms)
 
@@ -123,7 +123,7 @@ def _seconds(study: StudyConfig, cell: Cell) -> float:
 def _memory(study: StudyConfig, cell: Cell) -> float:
     memory = BYTES_IN_MEMORY + BLOCK * cell.positions.n_positions * BYTES_PER_POSITION
     if _keeps(study):
-        values = 3 * _parameters(cell) + 2  # errors, sds, those of effects, tilt errors
+        values = 3 * cell.n_unknowns + 2  # errors, sds, those of effects, tilt errors
         memory += min(cell.replicates, EXACT) * values * BYTES_PER_VALUE
     return memory
 
@@ -131,13 +131,9 @@ def _memory(study: StudyConfig, cell: Cell) -> float:
 def _disk(study: StudyConfig, cells: Sequence[Cell]) -> float:
     """Of the calibrations that are kept; of sketches, which hardly grow with the calibrations."""
     if _keeps(study):
-        return sum(BYTES_ON_DISK * cell.replicates * _parameters(cell) for cell in cells)
+        return sum(BYTES_ON_DISK * cell.replicates * cell.n_unknowns for cell in cells)
     jobs = sum(len(batch.jobs) for batch in batches(cells))
     return BYTES_OF_SKETCHES * (len(cells) + jobs)
-
-
-def _parameters(cell: Cell) -> int:
-    return cell.estimated_model.n_parameters + (cell.noise.sigma_gravity > 0)
 
 
 def _seconds_of_sensitivity(study: StudyConfig) -> float:

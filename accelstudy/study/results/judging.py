@@ -8,7 +8,7 @@ from typing import Any
 
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.tables import read_table, write_table
-from accelstudy.study.cells.cell import study_cells
+from accelstudy.study.cells.of_study import study_cells
 from accelstudy.study.claims import evidence_from, judge
 from accelstudy.study.claims.page import claims_page
 from accelstudy.study.config import StudyConfig
