@@ -23,7 +23,7 @@ from accelstudy.commands.options import (
 
 if TYPE_CHECKING:
     from accelstudy.campaign.files.session import Campaign
-    from accelstudy.sequential.estimation.prior import Prior
+    from accelstudy.sequential.information import Prior
 
 POLL = 1.0
 """Seconds between two looks at a growing table."""
@@ -102,12 +102,11 @@ def advise_command(
     """
     from accelstudy.approaches import get_approach
     from accelstudy.sensors.models import get_model
-    from accelstudy.sequential.advising.advisor import Advisor
-    from accelstudy.sequential.advising.running import read_as_it_is
-    from accelstudy.sequential.advising.watching import Watch
-    from accelstudy.sequential.advising.wording import finished, heading, lines
-    from accelstudy.sequential.choice.attitudes import DEFAULTS, candidates
-    from accelstudy.sequential.choice.promise import Promise
+    from accelstudy.sequential.advisor import Advisor
+    from accelstudy.sequential.choice import DEFAULTS, candidates
+    from accelstudy.sequential.promise import Promise
+    from accelstudy.sequential.running import Watch, read_as_it_is
+    from accelstudy.sequential.wording import finished, heading, lines
 
     session, promise = Watch(campaign), Promise(tilt_accuracy, tilt_range)
     if watch:
@@ -164,7 +163,7 @@ def _prior(path: Path | None, model: str) -> tuple[Prior, ...]:
     from accelstudy.basics.errors import InputError
     from accelstudy.campaign.use.applying import read_calibration
     from accelstudy.sensors.models import get_model
-    from accelstudy.sequential.estimation.prior import Prior
+    from accelstudy.sequential.information import Prior
 
     earlier, wanted = read_calibration(path), get_model(model)
     if earlier.model.parameter_names != wanted.parameter_names:

@@ -24,7 +24,7 @@ from accelstudy.commands.options import (
     quiet_option,
     seed_option,
 )
-from accelstudy.pole.instrument.setup import (
+from accelstudy.pole.setup import (
     HOLD,
     KINDS,
     LINEAR,
@@ -138,14 +138,14 @@ def pole_command(
     """
     from accelstudy.data_sheets import get_data_sheet
     from accelstudy.files.outputs import POLE, result_folder
-    from accelstudy.pole.instrument.sensor import (
+    from accelstudy.pole.output import write_pole
+    from accelstudy.pole.sensor import (
         from_calibration,
         from_linear_theory,
         from_tilt_sigma,
     )
-    from accelstudy.pole.instrument.setup import Setup
-    from accelstudy.pole.report.output import write_pole
-    from accelstudy.pole.report.statement import budget_text
+    from accelstudy.pole.setup import Setup
+    from accelstudy.pole.statement import budget_text
     from accelstudy.sensors.frames import parse_frame
 
     setup, frame, sheet = Setup(**given), parse_frame(mounting), get_data_sheet(sensor)
@@ -168,6 +168,6 @@ def pole_command(
     say(f"sensor {sheet.name}; {calibrated.origin}\n")
     click.echo(budget_text(result.shown))
     say("")
-    for sentence in result.said:
+    for sentence in result.sentences:
         click.echo(sentence)
     say(f"figure: {out / 'budget.png'}")

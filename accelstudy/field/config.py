@@ -15,10 +15,12 @@ from accelstudy.field.shares import Use, field_shares
 from accelstudy.files.tables import write_table
 from accelstudy.files.types import Angle, Number, OneOrMore, PathName
 from accelstudy.files.validation import Block
-from accelstudy.pole.instrument.case import SensorCase
-from accelstudy.pole.instrument.setup import quantities
+from accelstudy.pole.config import SensorCase
+from accelstudy.pole.setup import quantities
 
 USUAL = quantities()
+QUANTITIES = ("averaging", "age", "temperature_change")
+"""Quantities of `Use` that have a unit."""
 
 Pitch = Annotated[float, Field(ge=-80, le=80), Number]
 """Pitch in gon, far enough from ±100 gon that leveling is linear."""
@@ -39,21 +41,14 @@ class FieldCase(SensorCase):
     @property
     def checks(self) -> Mapping[str, tuple[Callable[[Any], Any], Any]]:
         """See `SensorCase.checks`."""
-        names = ("averaging", "age", "temperature_change")
-        return {
-            **super().checks,
-            **{name: (USUAL[name].read, getattr(self, name)) for name in names},
-        }
+        reading = {name: (USUAL[name].read, getattr(self, name)) for name in QUANTITIES}
+        return {**super().checks, **reading}
 
     @property
     def use(self) -> Use:
         """How the sensor is used."""
-        return Use(
-            USUAL["averaging"].read(self.averaging),
-            USUAL["age"].read(self.age),
-            USUAL["temperature_change"].read(self.temperature_change),
-            self.restarted,
-        )
+        values = {name: USUAL[name].read(getattr(self, name)) for name in QUANTITIES}
+        return Use(**values, restarted=self.restarted)
 
     def write(self, folder: Path, provenance: Mapping[str, Any]) -> None:
         """Write `shares.parquet` and the figure `shares` into a folder."""

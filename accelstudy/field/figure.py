@@ -16,7 +16,7 @@ from accelstudy.basics.units import MGON, display_unit, to_display
 from accelstudy.data_sheets import DataSheet
 from accelstudy.drawing.style import FULL, INK, STYLE, legend_columns, log_ticks, new_figure
 from accelstudy.field.shares import RESTART, Use, parts_of_variance
-from accelstudy.pole.errors.sources import sources
+from accelstudy.pole.sources import sources
 
 Array = NDArray[np.float64]
 
@@ -45,10 +45,10 @@ class Look:
 
 def looks() -> dict[str, Look]:
     """All sources by name, in order; sources of a pole look as in the figure of a pole."""
-    found = {each.name: Look(each.title, each.colour, each.hatch) for each in sources()}
+    of_pole = {each.name: Look(each.title, each.colour, each.hatch) for each in sources()}
     restart = Look("switching off and on", "#882255", "xxxx")
     names = ("calibration", "noise", "drift", RESTART, "temperature")
-    return {name: found.get(name, restart) for name in names}
+    return {name: of_pole.get(name, restart) for name in names}
 
 
 def field_figure(table: pd.DataFrame, sheet: DataSheet, use: Use) -> Figure:

@@ -21,7 +21,7 @@ from accelstudy.leveling.angles import specific_force
 from accelstudy.leveling.sensitivity import FORCES, OUTPUTS
 from accelstudy.leveling.shapley import linear_shapley
 from accelstudy.leveling.shares import leveling_slope
-from accelstudy.pole.instrument.sensor import CalibratedSensor
+from accelstudy.pole.sensor import CalibratedSensor
 
 Array = NDArray[np.float64]
 

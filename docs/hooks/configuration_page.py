@@ -9,9 +9,9 @@ from accelstudy.field.config import FieldConfig
 from accelstudy.hidden.study.config import HiddenConfig
 from accelstudy.plan.batch.config import PlanConfig
 from accelstudy.plan.batch.example import Example
-from accelstudy.pole.report.config import PoleConfig
+from accelstudy.pole.config import PoleConfig
 from accelstudy.proposal.config import DesignsConfig
-from accelstudy.sequential.simulated.config import SequentialConfig
+from accelstudy.sequential.config import SequentialConfig
 from accelstudy.study.config import config_schema
 
 SECTIONS = {

@@ -15,9 +15,9 @@ from accelstudy.drawing.style import ANGLE_COLOURS, FULL, INK, STYLE, new_figure
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.frames import Frame
 from accelstudy.sensors.models import get_model
-from accelstudy.sequential.advising.advisor import Advisor
-from accelstudy.sequential.choice.attitudes import DEFAULTS, candidates
-from accelstudy.sequential.choice.promise import Promise
+from accelstudy.sequential.advisor import Advisor
+from accelstudy.sequential.choice import DEFAULTS, candidates
+from accelstudy.sequential.promise import Promise
 
 COLOURS = {"x": "#0072B2", "y": "#D55E00", "z": "#009E73"}
 PALE = "#999999"

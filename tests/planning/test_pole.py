@@ -11,17 +11,13 @@ from scipy.stats import ncx2
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
 from accelstudy.data_sheets import DataSheet
 from accelstudy.leveling.angles import roll_pitch
-from accelstudy.pole.errors import closed_forms
-from accelstudy.pole.errors.budget import TOTAL, budget, contribution, situation_at
-from accelstudy.pole.errors.radius import radius
-from accelstudy.pole.errors.simulation import draw, simulate
-from accelstudy.pole.errors.sources import sources
-from accelstudy.pole.instrument.bending import flexibility
-from accelstudy.pole.instrument.geometry import INPUTS, foot, jacobian, leaning
-from accelstudy.pole.instrument.sensor import CalibratedSensor, from_linear_theory, from_tilt_sigma
-from accelstudy.pole.instrument.setup import Setup, setup_of
-from accelstudy.pole.instrument.situation import Situation
-from accelstudy.pole.report.statement import agreement, remarks, sentences
+from accelstudy.pole.budget import TOTAL, budget, contribution, radius, situation_at
+from accelstudy.pole.geometry import INPUTS, Situation, foot, jacobian, leaning
+from accelstudy.pole.sensor import CalibratedSensor, from_linear_theory, from_tilt_sigma
+from accelstudy.pole.setup import Setup, setup_of
+from accelstudy.pole.simulation import draw, simulate
+from accelstudy.pole.sources import flexibility, sources
+from accelstudy.pole.statement import agreement, limits, remarks
 from accelstudy.sensors.frames import parse_frame
 from accelstudy.sensors.models import get_model
 
@@ -146,6 +142,46 @@ def test_a_pole_that_is_clamped_at_its_foot_is_a_cantilever():
 
 # --- sources -------------------------------------------------------------------------------------
 
+# Closed forms for a sensor whose axes are those of the pole (frd), an antenna on the pole's axis,
+# and small errors: horizontal and vertical, m. A pole of length L leans by τ in the direction α,
+# counted from forward towards right.
+
+
+def force_error(length, tilt, direction, sigma, g):
+    """Errors of a force, equal on all axes (noise, drift): horizontal and vertical, m.
+
+    The horizontal variance is (L σ/g)² {cos²τ + [cos²τ + sin⁴τ sin²α cos²α] / (1 − sin²τ cos²α)²}
+    and the vertical one (L σ/g)² sin²τ. The expression in braces is 2 at level, cos²τ + 1/cos²τ for
+    a pole that leans forward, and 2 cos²τ for one that leans to the side. They differ since the
+    heading is that of the forward axis: if this axis points up or down, an error of roll turns the
+    lean about the vertical.
+    """
+    s, c = np.sin(tilt), np.cos(tilt)
+    across = s**2 * np.sin(direction) * np.cos(direction)
+    level = 1 - s**2 * np.cos(direction) ** 2
+    size = length * sigma / g
+    return size * np.sqrt(c**2 + (c**2 + across**2) / level**2), size * s
+
+
+def mounting_error(length, tilt, sigma):
+    """Angles between sensor and pole: L σ √(1 + cos²τ) horizontally, L σ sin τ in height, m."""
+    return length * sigma * np.sqrt(1 + np.cos(tilt) ** 2), length * sigma * np.sin(tilt)
+
+
+def heading_error(length, tilt, sigma):
+    """Error of the heading: L sin τ σ horizontally, nothing in height, m."""
+    return length * np.sin(tilt) * sigma, 0.0
+
+
+def length_error(tilt, sigma):
+    """Error of the length: σ sin τ horizontally, σ cos τ in height, m."""
+    return sigma * np.sin(tilt), sigma * np.cos(tilt)
+
+
+def bending_error(flexibility, tilt):
+    """Bending of a pole: f sin τ cos τ horizontally, f sin²τ in height, m."""
+    return abs(flexibility) * np.sin(tilt) * np.cos(tilt), abs(flexibility) * np.sin(tilt) ** 2
+
 
 def test_each_source_has_its_closed_form(sensor):
     setup = Setup()
@@ -153,12 +189,12 @@ def test_each_source_has_its_closed_form(sensor):
     noise, drift = SHEET.sigma_mean(setup.averaging), SHEET.bias_change(setup.age, restarted=True)
     for i, tilt in enumerate(TILTS):
         expected = {
-            "noise": [closed_forms.of_force(2.0, tilt, a, noise, g) for a in around],
-            "drift": [closed_forms.of_force(2.0, tilt, a, drift, g) for a in around],
-            "mounting": closed_forms.of_mounting(2.0, tilt, setup.mounting_sigma),
-            "heading": closed_forms.of_heading(2.0, tilt, setup.heading_sigma),
-            "length": closed_forms.of_length(tilt, setup.length_sigma),
-            "bending": closed_forms.of_bending(flexibility(setup, g), tilt),
+            "noise": [force_error(2.0, tilt, a, noise, g) for a in around],
+            "drift": [force_error(2.0, tilt, a, drift, g) for a in around],
+            "mounting": mounting_error(2.0, tilt, setup.mounting_sigma),
+            "heading": heading_error(2.0, tilt, setup.heading_sigma),
+            "length": length_error(tilt, setup.length_sigma),
+            "bending": bending_error(flexibility(setup, g), tilt),
             "top": (setup.top_sigma, setup.top_sigma_vertical),
         }
         for name, pair in expected.items():
@@ -210,8 +246,8 @@ def test_a_calibration_that_knows_the_temperature_corrects_it(sensor):
     expected = 2.0 * np.sqrt(2) * 1e-4 * 10.0 / STANDARD_GRAVITY
     np.testing.assert_allclose(left, expected, rtol=1e-9)
     assert any(
-        "the change of the bias with temperature; it is" in said
-        for said in remarks(budget(Setup(), thermal, TILTS))
+        "the change of the bias with temperature; it is" in remark
+        for remark in remarks(budget(Setup(), thermal, TILTS))
     )
 
 
@@ -320,18 +356,18 @@ def test_errors_of_nothing_are_zero(sensor):
 
 
 def test_the_source_that_limits_is_named(sensor):
-    def told(words, **setup):
-        """Millimetres that stand after some words."""
-        said = " ".join(sentences(budget(Setup(**setup), sensor, TILTS)))
-        return float(re.search(rf"{words}: ([\d.]+) mm", said)[1])
+    def millimetres(words, **setup):
+        """Number that stands after some words."""
+        text = " ".join(limits(budget(Setup(**setup), sensor, TILTS)))
+        return float(re.search(rf"{words}: ([\d.]+) mm", text)[1])
 
     top, heading = "The position of the top limits it", "most of it the heading"
-    assert told(top) == pytest.approx(8.0, abs=0.11)
-    assert told(top, top_sigma=7e-3) == pytest.approx(7.0, abs=0.11)
-    assert told(heading, top_sigma=7e-3) == pytest.approx(6.7, abs=0.11)
-    assert told("The heading limits it", top_sigma=1e-4) == pytest.approx(6.7, abs=0.11)
-    known = {"top_sigma": 0.0, "heading_sigma": 0.0, "head_mass": 0.0, "pole_mass": 0.0}
-    assert told("The temperature limits it", **known) == pytest.approx(1.3, abs=0.11)
+    assert millimetres(top) == pytest.approx(8.0, abs=0.11)
+    assert millimetres(top, top_sigma=7e-3) == pytest.approx(7.0, abs=0.11)
+    assert millimetres(heading, top_sigma=7e-3) == pytest.approx(6.7, abs=0.11)
+    assert millimetres("The heading limits it", top_sigma=1e-4) == pytest.approx(6.7, abs=0.11)
+    others = {"top_sigma": 0.0, "heading_sigma": 0.0, "head_mass": 0.0, "pole_mass": 0.0}
+    assert millimetres("The temperature limits it", **others) == pytest.approx(1.3, abs=0.11)
 
 
 def test_shares_of_the_table_make_the_whole(sensor):

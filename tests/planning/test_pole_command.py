@@ -10,8 +10,8 @@ from accelstudy.basics.units import MGON
 from accelstudy.campaign.use.applying import read_calibration
 from accelstudy.commands.main import main
 from accelstudy.files.tables import read_origin, read_table
-from accelstudy.pole.instrument.geometry import leaning
-from accelstudy.pole.report import output
+from accelstudy.pole import output
+from accelstudy.pole.geometry import leaning
 
 FILES = {"pole.json", "budget.parquet", "monte-carlo.parquet", "budget.svg", "budget.png"}
 QUICK = ("--sensor", "adxl355", "--replicates", "20")

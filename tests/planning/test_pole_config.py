@@ -10,8 +10,8 @@ from accelstudy.basics.units import MGON
 from accelstudy.files.layers import read_layer
 from accelstudy.files.tables import read_origin
 from accelstudy.plan.batch.example import parse_example, parse_section
-from accelstudy.pole.report import output
-from accelstudy.pole.report.config import PoleConfig
+from accelstudy.pole import output
+from accelstudy.pole.config import PoleConfig
 
 
 def cases(content):
@@ -22,8 +22,8 @@ def cases(content):
 def test_the_example_is_worked_out(tmp_path, monkeypatch):
     monkeypatch.setattr(output, "save", lambda *_: "")
     example = parse_example(read_layer(ROOT / "config/plan-example.yaml"))
-    found = parse_section(example, "pole", PoleConfig).cases
-    case = found["total-station"].model_copy(update={"replicates": 10})
+    case = parse_section(example, "pole", PoleConfig).cases["total-station"]
+    case = case.model_copy(update={"replicates": 10})
     case.write(3, tmp_path, {"config_hash": "abc", "seed": 3})
     assert read_origin(tmp_path / "budget.parquet")["config_hash"] == "abc"
     content = json.loads((tmp_path / "pole.json").read_text(encoding="utf-8"))

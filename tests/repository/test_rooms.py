@@ -20,6 +20,8 @@ REGISTRIES = {
     "study/figures",
 }
 """One idea a file, so that they may grow."""
+FLAT = {"sequential"}
+"""A file more than others, as nobody would look for a part of one session in a folder."""
 
 
 @pytest.fixture(scope="module")
@@ -50,5 +52,7 @@ def test_no_room_is_too_full():
         path.parent.relative_to(package).as_posix() for path in package.rglob("[!_]*.py")
     )
     assert counts.keys() >= REGISTRIES
-    full = {room: n for room, n in counts.items() if n > MOST_FILES and room not in REGISTRIES}
+    full = {
+        room: n for room, n in counts.items() if n > MOST_FILES and room not in REGISTRIES | FLAT
+    }
     assert full == {}

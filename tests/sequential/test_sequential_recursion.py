@@ -12,8 +12,8 @@ from accelstudy.basics.errors import InputError
 from accelstudy.effects import HoldConditions
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
-from accelstudy.sequential.estimation.prior import Prior
-from accelstudy.sequential.estimation.recursion import Recursion
+from accelstudy.sequential.information import Prior
+from accelstudy.sequential.recursion import Recursion
 from accelstudy.simulation.sessions import Noise, session
 
 NINE = "bias-scale-nonorthogonality"

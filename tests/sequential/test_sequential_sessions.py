@@ -13,19 +13,26 @@ from accelstudy.design.optimal.information import position_rows
 from accelstudy.plan.batch.example import parse_example, parse_section
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
-from accelstudy.sequential.choice.attitudes import apart_from, candidates
-from accelstudy.sequential.choice.choosing import (
+from accelstudy.sequential.choice import (
+    apart_from,
     best,
+    candidates,
     gain_of_leveling,
     gain_of_parameters,
     typical_sizes,
 )
-from accelstudy.sequential.choice.promise import Promise, rms_of
-from accelstudy.sequential.choice.stopping import LEAST_REDUNDANCY, LEVEL, bound, get_rule, plain
-from accelstudy.sequential.simulated.config import SequentialConfig
-from accelstudy.sequential.simulated.figure import sequential_figure
-from accelstudy.sequential.simulated.sessions import SetUp, simulate
-from accelstudy.sequential.simulated.tables import sessions_table, summary_table
+from accelstudy.sequential.config import SequentialConfig
+from accelstudy.sequential.figure import sequential_figure
+from accelstudy.sequential.promise import (
+    LEAST_REDUNDANCY,
+    LEVEL,
+    Promise,
+    bound,
+    get_rule,
+    plain,
+    rms_of,
+)
+from accelstudy.sequential.simulation import SetUp, sessions_table, simulate, summary_table
 from accelstudy.simulation.sessions import Noise
 
 NINE = get_model("bias-scale-nonorthogonality")
@@ -50,13 +57,13 @@ def test_the_gain_is_what_the_position_brings(approach):
     before = np.linalg.inv(measured.T @ measured)
     by_leveling = gain_of_leveling(root[None], weight, rows)[0]
     sizes = typical_sizes(NINE, 9)
-    known = measured.T @ measured + np.diag(sizes**-2)
+    information = measured.T @ measured + np.diag(sizes**-2)
     by_parameters = gain_of_parameters(root[None], sizes, rows)[0]
     for row, leveling, parameters in zip(rows, by_leveling, by_parameters, strict=True):
         after = np.linalg.inv(measured.T @ measured + row.T @ row)
         fall = np.mean(error.rms_of_all(before) ** 2 - error.rms_of_all(after) ** 2)
         assert leveling == pytest.approx(fall, rel=1e-6)
-        grown = np.linalg.slogdet(known + row.T @ row)[1] - np.linalg.slogdet(known)[1]
+        grown = np.linalg.slogdet(information + row.T @ row)[1] - np.linalg.slogdet(information)[1]
         assert parameters == pytest.approx(grown, rel=1e-6)
 
 
@@ -181,8 +188,8 @@ def test_sessions_depend_on_the_seed_and_on_nothing_else(sessions):
     set_up = SetUp(CONFIG, "robot", "known", 1.0)
     few = SetUp(CONFIG.model_copy(update={"rules": ["known"]}), "robot", "known", 1.0)
     again, other = simulate(few, 1), simulate(set_up, 2)
-    known = sessions["robot"].query("rule == 'known'")
-    pd.testing.assert_frame_equal(again, known[again.columns].reset_index(drop=True))
+    first = sessions["robot"].query("rule == 'known'")
+    pd.testing.assert_frame_equal(again, first[again.columns].reset_index(drop=True))
     assert not np.array_equal(again["omega"], other["omega"])
 
 

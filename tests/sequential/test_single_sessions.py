@@ -83,24 +83,24 @@ def test_how_many_single_sessions_exceed_the_promise():
         known, bound = None, np.full((SESSIONS, 2), np.nan)
         for n in range(14, MOST + 1):  # r = 5 and more
             covariance = np.linalg.inv(design[:n].T @ design[:n])
-            found = errors[:, :n] @ design[:n] @ covariance
+            estimated = errors[:, :n] @ design[:n] @ covariance
             claimed = rms(covariance).max()
             if known is None and claimed <= promise:
-                known = left(found)
-            omega = np.sum((errors[:, :n] - found @ design[:n].T) ** 2, axis=1)
+                known = left(estimated)
+            omega = np.sum((errors[:, :n] - estimated @ design[:n].T) ** 2, axis=1)
             enough = claimed * np.sqrt(omega / stats.chi2.ppf(0.025, n - 9)) <= promise
             stops = enough & np.isnan(bound[:, 0])
-            bound[stops] = left(found[stops])
+            bound[stops] = left(estimated[stops])
         assert not np.isnan(bound).any()
         shares.append([np.mean((each > promise).any(axis=1)) for each in (known, bound)])
         assert np.mean((known > 2 * promise).any(axis=1)) == pytest.approx(0.05, abs=0.02)
-    found = np.mean(shares, axis=0)
-    print(f"beyond the promise: {100 * found[0]:.1f} % (known), {100 * found[1]:.1f} % (bound)")
-    said = [
+    beyond = np.mean(shares, axis=0)
+    print(f"beyond the promise: {100 * beyond[0]:.1f} % (known), {100 * beyond[1]:.1f} % (bound)")
+    stated = [
         float(re.search(pattern, PAGE)[1]) / 100
         for pattern in (
             r"with known noise, (\d+) % \(gravity\)",
             r"more positions than needed, (\d+) %",
         )
     ]
-    np.testing.assert_allclose(found, said, atol=0.03)
+    np.testing.assert_allclose(beyond, stated, atol=0.03)

@@ -18,7 +18,7 @@ from accelstudy.drawing import style
 from accelstudy.effects import effect_names
 from accelstudy.field.figure import looks
 from accelstudy.files.tables import read_table
-from accelstudy.pole.errors.sources import sources
+from accelstudy.pole.sources import sources
 from accelstudy.sensors.models import MODELS
 from accelstudy.study.config import StudyConfig, parse_study
 from accelstudy.study.figures import (

@@ -1,4 +1,4 @@
-from accelstudy.pole.report.config import PoleConfig
+from accelstudy.pole.config import PoleConfig
 
 POLES = section("pole", PoleConfig).cases
 POLE_FILES = {

@@ -1,4 +1,4 @@
-from accelstudy.sequential.simulated.config import SequentialConfig
+from accelstudy.sequential.config import SequentialConfig
 
 SEQUENTIAL = section("sequential", SequentialConfig)
 SEQUENTIAL_OUTPUTS = [

@@ -1,7 +1,7 @@
 from pathlib import Path
 
 from accelstudy.jobs.job import logged
-from accelstudy.pole.report.config import PoleCase
+from accelstudy.pole.config import PoleCase
 
 with logged(snakemake):
     case = PoleCase.model_validate(snakemake.params.case)

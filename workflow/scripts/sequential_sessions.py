@@ -1,7 +1,7 @@
 from accelstudy.files.tables import write_table
 from accelstudy.jobs.job import logged
-from accelstudy.sequential.simulated.config import SequentialConfig
-from accelstudy.sequential.simulated.tables import sessions_table
+from accelstudy.sequential.config import SequentialConfig
+from accelstudy.sequential.simulation import sessions_table
 
 with logged(snakemake):
     config, provenance = snakemake.params.config, snakemake.params.provenance

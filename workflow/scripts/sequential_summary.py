@@ -2,9 +2,9 @@ from accelstudy.drawing.saving import save
 from accelstudy.drawing.style import DPI
 from accelstudy.files.tables import read_table, write_table
 from accelstudy.jobs.job import logged
-from accelstudy.sequential.simulated.config import SequentialConfig
-from accelstudy.sequential.simulated.figure import sequential_figure
-from accelstudy.sequential.simulated.tables import summary_table
+from accelstudy.sequential.config import SequentialConfig
+from accelstudy.sequential.figure import sequential_figure
+from accelstudy.sequential.simulation import summary_table
 
 with logged(snakemake):
     config, out = SequentialConfig(**snakemake.params.config), snakemake.output

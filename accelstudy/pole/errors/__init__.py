@@ -1,1 +1,0 @@
-"""The error of the foot: its sources, their budget by linear theory, and the Monte Carlo."""

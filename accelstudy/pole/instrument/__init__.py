@@ -1,1 +1,0 @@
-"""The pole and the calibrated sensor on it: quantities, geometry, bending, attitudes."""

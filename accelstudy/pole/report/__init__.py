@@ -1,1 +1,0 @@
-"""The results for a pole: sentences, figure, files, and the configuration that asks for them."""

@@ -1,1 +1,0 @@
-"""Advice while a campaign is being measured."""

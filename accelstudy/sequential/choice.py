@@ -1,0 +1,256 @@
+"""The choice of the next position: the attitudes to choose from, and the gain of each.
+
+The gain is one for leveling or, while some parameters are unknown, for the parameters. A position
+with the whitened rows A turns the covariance Q of the parameters into
+Q − Q Aᵀ (I + A Q Aᵀ)⁻¹ A Q. So the mean variance of roll and pitch, tr(W Q), falls by
+
+    tr[(I + A Q Aᵀ)⁻¹ A Q W Q Aᵀ],
+
+the I criterion (W is the quadratic form of `TiltError`). As long as some parameters are not
+determined there is no Q. Then the log-determinant of the information counts (D criterion), with the
+typical size in a cheap sensor as prior information of each parameter. It grows by
+log det (I + A Q₀ Aᵀ), where Q₀ follows from the positions so far and these sizes.
+
+Both are sequential designs of one step at a time: Fedorov (1972), Theory of optimal experiments,
+chapter 4.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.units import GON
+from accelstudy.design.estimability import rank_of
+from accelstudy.design.optimal.constraints import (
+    Constraint,
+    Constraints,
+    OffPole,
+    PitchRange,
+    RollRange,
+)
+from accelstudy.design.optimal.spaces import by_eye, cube, listed_in
+from accelstudy.leveling.error import TiltError
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.sequential.promise import Promise, get_rule, rms_of
+
+Array = NDArray[np.float64]
+
+ALIKE = 0.99
+"""Candidates whose gain is above this fraction of the largest are equally good, and the first is
+taken. So neither rounding nor noise decides, and simple attitudes can come first."""
+MOST = 500
+"""Largest number of further positions that is forecast."""
+STEP = 25 * GON
+"""Step of roll and pitch in the grid."""
+SETS = {"cube": "faces, edges and corners of a cube", "grid": "roll and pitch in steps of 25 gon"}
+DEFAULTS = {"gravity": "cube", "robot": "grid"}
+"""Default set of attitudes of an approach: a block on a table, a grid for a robot."""
+SAME = 5 * GON
+"""A position within this angle of another counts as the same attitude."""
+
+
+def candidates(
+    name: str,
+    pole_distance: float | None = None,
+    max_roll: float | None = None,
+    max_pitch: float | None = None,
+) -> Array:
+    """Directions of gravity in the body frame, (k, 3), of the attitudes to choose from.
+
+    Parameters
+    ----------
+    name : str
+        One of `SETS`, or the path of a CSV file with the columns x, y, z or roll and pitch.
+    pole_distance : float, rad, optional, least angle between the x axis and the vertical
+    max_roll, max_pitch : float, rad, optional, largest roll and pitch either way
+
+    Raises
+    ------
+    InputError
+        If there is no such set, the file cannot be read, or nothing is left.
+    """
+    if name == "cube":
+        directions = cube().directions(0)
+    elif name == "grid":
+        directions = by_eye(STEP).directions(0)
+    elif name.endswith(".csv"):
+        directions = listed_in(Path(name)).directions(0)
+    else:
+        raise UnknownNameError("set of attitudes", name, (*SETS, "FILE.csv"))
+    limits: list[Constraint] = []
+    if pole_distance is not None:
+        limits.append(OffPole(pole_distance))
+    if max_roll is not None:
+        limits.append(RollRange(-max_roll, max_roll))
+    if max_pitch is not None:
+        limits.append(PitchRange(-max_pitch, max_pitch))
+    left = Constraints(tuple(limits)).keep(directions)
+    if not len(left):
+        raise InputError(f"attitudes: none of {name} is within the limits that are given")
+    # Simple attitudes first: with vertical axes, then with horizontal ones.
+    axes = np.count_nonzero(np.abs(left) > 1e-9, axis=1)
+    return left[np.argsort(axes, kind="stable")]
+
+
+def apart_from(directions: Array, last: Array) -> NDArray[np.bool_]:
+    """Whether directions (k, 3) are other attitudes than the last of each session (R, 3); (R, k).
+
+    To repeat an attitude at once would repeat its errors too.
+    """
+    return np.asarray(last @ directions.T < np.cos(SAME))
+
+
+def typical_sizes(model: SensorModel, unknowns: int) -> Array:
+    """Sizes of the parameters in cheap equipment, (u',), SI; infinite for observed gravity."""
+    sizes = [effect.typical[1] for effect in model.effects for _ in effect.parameters]
+    return np.array([*sizes, *[np.inf] * (unknowns - len(sizes))])
+
+
+def gain_of_parameters(root_information: Array, sizes: Array, rows: Array) -> Array:
+    """Growth of the log-determinant of the information by each candidate.
+
+    Parameters
+    ----------
+    root_information : (R, u, u) array, R with Q⁻¹ = RᵀR; it may be singular
+    sizes : (u,) array, of the parameters in a cheap sensor
+    rows : (k, c, u) array, of k candidates
+
+    Returns
+    -------
+    (R, k) array
+    """
+    prior = np.broadcast_to(np.diag(1 / sizes), root_information.shape)
+    triangle = np.linalg.qr(np.concatenate([root_information, prior], axis=1), mode="r")
+    spread = _spread(np.linalg.inv(triangle), rows)
+    return np.asarray(np.linalg.slogdet(_with_noise(spread))[1])
+
+
+def gain_of_leveling(root_information: Array, weight: Array, rows: Array) -> Array:
+    """Fall of the mean variance of roll and pitch by each candidate, at unit weight.
+
+    Parameters
+    ----------
+    root_information : (R, u', u') array, R with Q⁻¹ = RᵀR, of full rank
+    weight : (R, u, u) array, W; without gravity, even where that is estimated
+    rows : (k, c, u) array, of k candidates
+
+    Returns
+    -------
+    (R, k) array, rad²
+    """
+    root = np.linalg.inv(root_information)
+    spread = _spread(root, rows)
+    parameters = root[:, : weight.shape[-1]]  # without gravity
+    weighted = np.swapaxes(parameters, 1, 2) @ weight @ parameters
+    part = spread @ weighted[:, None] @ np.swapaxes(spread, -1, -2)
+    return np.trace(np.linalg.solve(_with_noise(spread), part), axis1=-2, axis2=-1)
+
+
+def best(gains: Array) -> NDArray[np.int_]:
+    """First candidate of each session (R,) whose gain, of (R, k), is as good as the best."""
+    return np.asarray(np.argmax(gains >= ALIKE * gains.max(axis=1, keepdims=True), axis=1))
+
+
+def _spread(root: NDArray[np.floating], rows: Array) -> Array:
+    """A R⁻¹, (R, k, c, u): A Q Aᵀ is its product with its transpose."""
+    k, c, u = rows.shape
+    return (rows.reshape(k * c, u) @ root).reshape(len(root), k, c, u)
+
+
+def _with_noise(spread: Array) -> Array:
+    """I + A Q Aᵀ, (R, k, c, c)."""
+    return np.eye(spread.shape[2]) + spread @ np.swapaxes(spread, -1, -2)
+
+
+@dataclass(frozen=True)
+class Chooser:
+    """Chooses positions until a promise is kept.
+
+    Attributes
+    ----------
+    directions : (k, 3) array, attitudes to choose from
+    rows : (k, c, u') array, their rows of the design matrix, at unit weight
+    error : TiltError
+    promise : Promise
+    rule : str, what the variance of unit weight is taken for
+    sizes : (u',) array, of the parameters in a cheap sensor
+    """
+
+    directions: Array
+    rows: Array
+    error: TiltError
+    promise: Promise
+    rule: str
+    sizes: Array
+
+    def rms(self, root_information: Array, omega: Array, redundancy: int) -> Array:
+        """Rms of roll and of pitch so far, (R, 2), rad; infinite where it is not known."""
+        root = np.asarray(np.linalg.inv(root_information), dtype=float)
+        variance = get_rule(self.rule)(omega, redundancy)
+        finite = np.isfinite(variance)
+        rms = rms_of(self.error, root @ np.swapaxes(root, 1, 2), np.where(finite, variance, 1.0))
+        return np.where(finite[:, None], rms, np.inf)
+
+    def choose(
+        self, root_information: Array, solved: NDArray[np.bool_], rms: Array, last: Array | None
+    ) -> NDArray[np.int_]:
+        """Choose the next position of each session, (R,), an index of `directions`.
+
+        Parameters
+        ----------
+        root_information : (R, u', u') array
+        solved : (R,) bool array, whether all parameters are determined
+        rms : (R, 2) array, so far; ignored where they are not
+        last : (R, 3) array, directions of the last positions; None before the first
+        """
+        gains = np.empty((len(solved), len(self.directions)))
+        if not solved.all():
+            open_ = root_information[~solved]
+            gains[~solved] = gain_of_parameters(open_, self.sizes, self.rows)
+        if solved.any():
+            weight = self.promise.weight(self.error, rms[solved])
+            gains[solved] = gain_of_leveling(root_information[solved], weight, self.rows)
+        if last is not None and len(self.directions) > 1:
+            gains = np.where(apart_from(self.directions, last), gains, 0.0)
+        return best(gains)
+
+    def positions_to_go(
+        self,
+        root_information: Array,
+        variance: float,
+        redundancy: int,
+        rms: Array,
+        last: Array | None,
+    ) -> int | None:
+        """Positions, each the best next one, until the promise is kept; None beyond `MOST`.
+
+        Parameters
+        ----------
+        root_information : (u', u') array, of the positions so far
+        variance : float, of unit weight, assumed to stay as it is
+        redundancy : int, so far
+        rms : (2,) array, so far, rad
+        last : (3,) array, direction of the last position; None before the first
+        """
+        root, rms = root_information[None], rms[None]
+        u, c = root.shape[-1], self.rows.shape[1]
+        last = None if last is None else last[None]
+        solved = np.array([rank_of(root[0])[0] == u])
+        for n in range(1, MOST + 1):
+            chosen = self.choose(root, solved, rms, last)
+            last = self.directions[chosen]
+            more = np.concatenate([root, self.rows[chosen]], axis=1)
+            root = np.asarray(np.linalg.qr(more, mode="r"))
+            redundancy += c
+            if not solved[0]:
+                solved = np.array([rank_of(root[0])[0] == u])
+            if solved[0]:
+                rms = self.rms(root, np.array([variance * max(redundancy, 0)]), redundancy)
+                if self.promise.reached(rms)[0]:
+                    return n
+        return None

@@ -1,1 +1,0 @@
-"""Which position comes next, and when the accuracy is reached."""

@@ -1,1 +1,0 @@
-"""Estimates from the positions so far, updated with one position at a time."""

@@ -1,0 +1,139 @@
+"""The tilt accuracy that is promised, and when it counts as reached.
+
+The positions are chosen by the design, which hardly depends on the readings. So with a **known**
+noise the time of stopping is not random, and the accuracy is the one that the covariance states.
+
+With an **unknown** noise the time of stopping is random. Ω grows from position to position by the
+squares of the recursive residuals. These are independent N(0, σ0²), and independent of the estimate
+(Brown, Durbin & Evans 1975, J. R. Stat. Soc. B 37, 149-192). So stopping by them does not bias the
+estimate, but it does bias Ω/r: a person who stops when the accuracy seems good stops when Ω/r
+happens to be small. Here an upper confidence bound of the variance is used, from a least redundancy
+on. It is looked at again and again, so its level is higher than that of the promise. In simulations
+the promise then holds in about 95 % of the sessions or more, whatever is promised
+(docs/guides/sequential.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import special
+
+from accelstudy.basics.errors import UnknownNameError
+from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.effects import HoldConditions
+from accelstudy.leveling.error import ATTITUDES, TiltError, cap_forces, holds_in_use, tilt_error
+from accelstudy.sensors.sensor import SensorModel
+
+Array = NDArray[np.float64]
+
+LEVEL = 0.975
+"""Level of the upper confidence bound of the variance at each look, for 0.95 over all looks."""
+LEAST_REDUNDANCY = 5
+"""Least redundancy with which the residuals may state the noise."""
+
+
+@dataclass(frozen=True)
+class Promise:
+    """Rms of roll and of pitch, each, that a calibration may leave.
+
+    The rms is over all tilts up to `tilt_range` and over all possible outcomes of the calibration,
+    without the noise of the leveled reading.
+
+    Attributes
+    ----------
+    accuracy : float, rad
+    tilt_range : float, rad
+    """
+
+    accuracy: float
+    tilt_range: float
+
+    def tilt_error(
+        self,
+        model: SensorModel,
+        parameters: Array | None = None,
+        gravity: float = STANDARD_GRAVITY,
+        hold: HoldConditions | None = None,
+    ) -> TiltError:
+        """Tilt error of a calibration as a function of the errors of its parameters.
+
+        Parameters
+        ----------
+        model : SensorModel
+        parameters : (u,) array, SI; those of an ideal sensor by default
+        gravity : float, m/s²
+        hold : HoldConditions, optional
+            Conditions of the positions, where effects depend on them; use is in like conditions.
+        """
+        at = np.zeros(model.n_parameters) if parameters is None else parameters
+        f_b = cap_forces(self.tilt_range, ATTITUDES, gravity)
+        if hold is not None and hold.order is not None:
+            hold = holds_in_use(hold, len(hold.order), f_b)
+        return tilt_error(model, at, model, at, f_b, gravity, hold)
+
+    def reached(self, rms: Array) -> NDArray[np.bool_]:
+        """Whether the rms of roll and of pitch, (..., 2), both keep the promise."""
+        return np.asarray(np.all(rms <= self.accuracy, axis=-1))
+
+    def weight(self, error: TiltError, rms: Array) -> Array:
+        """W of the next choice, (R, u, u): mean variance of the angles that miss the promise.
+
+        rms : (R, 2) array, of roll and pitch so far
+        """
+        missing = (rms > self.accuracy) | self.reached(rms)[..., None]
+        share = missing / missing.sum(axis=-1, keepdims=True)
+        return np.einsum("ra,auw->ruw", share, error.quadratic)
+
+
+def rms_of(error: TiltError, cofactors: Array, variance: Array | float = 1.0) -> Array:
+    """Rms of roll and of pitch, (R, 2), rad, by cofactors (R, u', u') and variances of unit weight.
+
+    Gravity, where it is estimated, does not count.
+    """
+    u = len(error.reference)
+    covariance = cofactors[:, :u, :u] * np.reshape(variance, (-1, 1, 1))
+    return np.array([error.rms_of_all(each) for each in covariance]).reshape(-1, 2)
+
+
+def known(omega: ArrayLike, redundancy: int) -> Array:
+    """Variance of unit weight where the noise is known: 1."""
+    return np.ones(np.shape(omega))
+
+
+def bound(omega: ArrayLike, redundancy: int) -> Array:
+    """Upper confidence bound of the variance of unit weight; infinite with too few residuals."""
+    if redundancy < LEAST_REDUNDANCY:
+        return np.full(np.shape(omega), np.inf)
+    return np.asarray(omega) / special.chdtri(redundancy, LEVEL)
+
+
+def plain(omega: ArrayLike, redundancy: int) -> Array:
+    """Ω/r. Nobody should stop by it; it is here to show the consequences."""
+    if redundancy < 1:
+        return np.full(np.shape(omega), np.inf)
+    return np.asarray(omega) / redundancy
+
+
+RULES: dict[str, Callable[[ArrayLike, int], Array]] = {
+    "known": known,
+    "bound": bound,
+    "plain": plain,
+}
+"""What the variance of unit weight is taken for, by name."""
+
+
+def get_rule(name: str) -> Callable[[ArrayLike, int], Array]:
+    """Return a rule by its name.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such rule.
+    """
+    if name not in RULES:
+        raise UnknownNameError("rule", name, RULES)
+    return RULES[name]

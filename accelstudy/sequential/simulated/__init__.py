@@ -1,1 +1,0 @@
-"""Simulated sessions that follow the advice, and their results."""
