@@ -63,7 +63,7 @@ def read_running(folder: str | Path, settled: str = "") -> Running:
         )
     header, path = read_header(folder), table_of(folder)
     if path is None:
-        return Running(_without_positions(header, folder), "")
+        return Running(_without_positions(header), "")
     if path.suffix != ".csv":
         return Running(read_campaign(folder), "")
     try:
@@ -74,13 +74,13 @@ def read_running(folder: str | Path, settled: str = "") -> Running:
     if unfinished and unfinished == settled:
         whole, unfinished = text, ""
     if not whole.strip():
-        return Running(_without_positions(header, folder), unfinished)
+        return Running(_without_positions(header), unfinished)
     columns = columns_of(whole, path)
     if not any(map(len, columns.values())):
-        return Running(_without_positions(header, folder), unfinished)
+        return Running(_without_positions(header), unfinished)
     campaign = parse_table(columns, header, path)
     warnings = tuple(ignored_in(columns, path))
-    return Running(replace(campaign, warnings=warnings, source=folder), unfinished)
+    return Running(replace(campaign, warnings=warnings), unfinished)
 
 
 def read_as_it_is(folder: str | Path) -> Running:
@@ -105,11 +105,11 @@ def _split(text: str) -> tuple[str, str]:
     return text[:end], text[end:]
 
 
-def _without_positions(header: Header, folder: Path) -> Campaign:
+def _without_positions(header: Header) -> Campaign:
     values = {"positions": np.zeros(0, dtype=np.int64), "forces": np.zeros((0, 3))}
     if header.robot is not None:
         values["angles"] = np.zeros((0, 2))
-    return replace(campaign_of(header, values), source=folder)
+    return campaign_of(header, values)
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,11 @@ import subprocess
 import numpy as np
 import pytest
 import yaml
+from accelstudy.sequential.advising.advisor import Advisor
+from accelstudy.sequential.advising.running import read_running
+from accelstudy.sequential.advising.wording import attitude
+from accelstudy.sequential.choice.attitudes import candidates
+from accelstudy.sequential.choice.promise import Promise
 from click.testing import CliRunner
 from page_helpers import assert_told_alike
 from places import ROOT
@@ -21,11 +26,6 @@ from accelstudy.commands.main import main
 from accelstudy.leveling.angles import specific_force
 from accelstudy.sensors.frames import parse_frame
 from accelstudy.sensors.models import get_model
-from accelstudy.sequential.advising.advisor import Advisor
-from accelstudy.sequential.advising.running import read_running
-from accelstudy.sequential.advising.wording import attitude
-from accelstudy.sequential.choice.attitudes import candidates
-from accelstudy.sequential.choice.promise import Promise
 
 MODEL = "bias-scale-nonorthogonality"
 WANTED = ("--tilt-accuracy", "10mgon", "--tilt-range", "30gon")
