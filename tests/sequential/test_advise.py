@@ -7,11 +7,6 @@ import subprocess
 import numpy as np
 import pytest
 import yaml
-from accelstudy.sequential.advising.advisor import Advisor
-from accelstudy.sequential.advising.running import read_running
-from accelstudy.sequential.advising.wording import attitude
-from accelstudy.sequential.choice.attitudes import candidates
-from accelstudy.sequential.choice.promise import Promise
 from click.testing import CliRunner
 from page_helpers import assert_told_alike
 from places import ROOT
@@ -26,6 +21,11 @@ from accelstudy.commands.main import main
 from accelstudy.leveling.angles import specific_force
 from accelstudy.sensors.frames import parse_frame
 from accelstudy.sensors.models import get_model
+from accelstudy.sequential.advisor import Advisor
+from accelstudy.sequential.choice import candidates
+from accelstudy.sequential.promise import Promise
+from accelstudy.sequential.running import read_running
+from accelstudy.sequential.wording import attitude
 
 MODEL = "bias-scale-nonorthogonality"
 WANTED = ("--tilt-accuracy", "10mgon", "--tilt-range", "30gon")
@@ -390,7 +390,7 @@ def test_the_page_can_be_followed_word_by_word(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     blocks = re.findall(r"(?:^ {4}.*\n)+", page.partition("## To try it")[2], re.MULTILINE)
     commands, answer, watch, arrive, last = (
-        [line[4:] for line in block.replace("\\\n     ", "").splitlines()] for block in blocks[:5]
+        [line[4:] for line in block.replace("\\\n", " ").splitlines()] for block in blocks[:5]
     )
 
     def follow(line):
@@ -409,9 +409,9 @@ def test_the_page_can_be_followed_word_by_word(tmp_path, monkeypatch):
         follow(arriving.pop(0))
 
     monkeypatch.setattr(command.time, "sleep", sleep)
-    told = follow(watch[0])
-    assert len(re.findall("so far", told)) == 1 + 26
-    blocks = told.split("\n\n")
+    advices = follow(watch[0])
+    assert len(re.findall("so far", advices)) == 1 + 26
+    blocks = advices.split("\n\n")
     # The edges so far leave one angle open, though there are more positions than parameters.
     assert "not determined yet: nonorthogonality (alpha_yz)" in next(
         block for block in blocks if block.startswith("whole: 14 positions so far")
