@@ -165,6 +165,11 @@ def unit_label(unit: str) -> str:
     return unit.replace("^2", "²").replace("ug", "µg")
 
 
+def shown_unit(unit: str) -> str:
+    """Return `display_unit` as it is printed."""
+    return unit_label(display_unit(unit))
+
+
 def to_display(value: ArrayLike, unit: str) -> NDArray[np.float64]:
     """Convert `value` from the SI `unit` into the unit shown to people."""
     return _converted(value, unit, display_unit(unit))
@@ -186,13 +191,6 @@ def to_si(value: ArrayLike, given: str, unit: str) -> NDArray[np.float64]:
     if given not in known:
         raise UnknownNameError(f"unit of a quantity in {unit}", given, known)
     return _numbers(value) * known[given]
-
-
-def quantity_text(value: float, unit: str) -> str:
-    """Write a quantity of the SI `unit` for people, with its unit: ``10 mgon``, ``30 gon``."""
-    if unit == "rad" and abs(to_attitude(value)) >= 1:
-        return f"{float(to_attitude(value)):.4g} {attitude_unit()}"
-    return f"{float(to_display(value, unit)):.4g} {display_unit(unit)}".removesuffix(" 1")
 
 
 _SPELLINGS = {"µ": "u", "μ": "u", "²": "^2", "°C": "degC", "°": "deg", "√Hz": "sqrt(Hz)"}

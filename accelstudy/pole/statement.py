@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from accelstudy.basics.units import GON, attitude_unit, quantity_text, to_attitude
-from accelstudy.basics.wording import comma_list, words
+from accelstudy.basics.units import GON, attitude_unit, to_attitude
+from accelstudy.basics.wording import comma_list, quantity_text, words
 from accelstudy.pole.budget import Budget
 from accelstudy.pole.sensor import COEFFICIENTS
 from accelstudy.pole.sources import sources

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.suggested import calibrate
-from accelstudy.basics.units import attitude_unit, quantity_text, to_attitude
-from accelstudy.basics.wording import comma_list, counted, p_value, words
+from accelstudy.basics.units import attitude_unit, to_attitude
+from accelstudy.basics.wording import comma_list, counted, p_value, quantity_text, words
 from accelstudy.campaign.files.session import Campaign
 from accelstudy.effects import Effect
 from accelstudy.leveling.angles import roll_pitch

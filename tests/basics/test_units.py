@@ -19,7 +19,6 @@ from accelstudy.basics.units import (
     attitude_unit,
     display_unit,
     parse_quantity,
-    quantity_text,
     recorded_unit,
     to_attitude,
     to_display,
@@ -152,11 +151,3 @@ def test_a_number_with_its_unit_is_read(text, unit, expected):
 def test_what_is_no_such_quantity_is_refused(text, why):
     with pytest.raises(InputError, match=re.escape(why)):
         parse_quantity(text, "m", 0.1, 3.0)
-
-
-def test_a_quantity_is_written_with_its_unit():
-    assert quantity_text(10 * MGON, "rad") == "10 mgon"
-    assert quantity_text(30 * GON, "rad") == "30 gon"
-    with angles_in("deg"):
-        assert quantity_text(math.radians(0.01), "rad") == "10 mdeg"
-    assert quantity_text(0.002, "m/s^2") == "2 mm/s^2"

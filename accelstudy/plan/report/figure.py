@@ -7,7 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from accelstudy.basics.units import display_unit, quantity_text, to_display
+from accelstudy.basics.units import display_unit, to_display
+from accelstudy.basics.wording import quantity_text
 from accelstudy.drawing.style import (
     FULL,
     INK,

@@ -13,10 +13,9 @@ from accelstudy.basics.units import (
     MGON,
     angle_note,
     display_unit,
-    quantity_text,
     to_display,
 )
-from accelstudy.basics.wording import comma_list, number, words
+from accelstudy.basics.wording import comma_list, number, quantity_text, words
 from accelstudy.effects import get_effect
 from accelstudy.plan.report.advice import (
     PLAIN,
