@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from accelstudy.basics.errors import InputError, UnknownNameError, shown
@@ -232,6 +233,36 @@ def parse_quantity(text: str, unit: str, least: float = -math.inf, most: float =
         ends += [f"at most {most / known[given]:.6g}"] if most < math.inf else []
         raise InputError(f"{shown(text)}: must be {' and '.join(ends)} {given}")
     return value
+
+
+@dataclass(frozen=True)
+class Given:
+    """A quantity that the user may give, by an option of a command or a key of a configuration.
+
+    Attributes
+    ----------
+    unit : str, SI
+    usual : str, with its unit; empty if there is none
+    help : str
+    least, most : float, SI, both allowed
+    section : str, of the help text
+    """
+
+    unit: str
+    usual: str
+    help: str
+    least: float = 0.0
+    most: float = math.inf
+    section: str = ""
+
+    def read(self, text: str) -> float:
+        """Value of a text with its unit, SI; raises `InputError` if it is not one."""
+        return parse_quantity(text, self.unit, self.least, self.most)
+
+    @property
+    def value(self) -> float:
+        """Usual value, SI."""
+        return self.read(self.usual)
 
 
 def _numbers(value: ArrayLike) -> NDArray[np.float64]:

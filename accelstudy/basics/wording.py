@@ -16,7 +16,7 @@ DIGITS = 3
 """Significant digits of a number."""
 GIVEN = 4
 """Significant digits up to which a quantity is round: given rather than computed."""
-HUGE = 6
+HUGE = 9
 """Exponent from which a number is written with a power of ten."""
 
 

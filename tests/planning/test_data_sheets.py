@@ -19,7 +19,7 @@ from accelstudy.data_sheets import (
     read_data_sheet,
 )
 from accelstudy.data_sheets.flicker import FLICKER, flicker_change
-from accelstudy.plan.search.sensors import get_sensor
+from accelstudy.plan.question import get_sensor
 
 
 @pytest.mark.parametrize("name", data_sheet_names())

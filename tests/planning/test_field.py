@@ -18,7 +18,7 @@ from accelstudy.files.layers import read_layer
 from accelstudy.files.tables import read_table
 from accelstudy.leveling.angles import specific_force
 from accelstudy.leveling.sensitivity import leveled
-from accelstudy.plan.batch.example import parse_example, parse_section
+from accelstudy.plan.config import parse_example, parse_section
 from accelstudy.pole.sensor import CalibratedSensor, from_linear_theory
 from accelstudy.sensors.models import get_model
 

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from accelstudy.plan.search import candidates as planned
 from click.testing import CliRunner
 from places import ROOT
 
@@ -19,20 +20,19 @@ from accelstudy.design.closed_forms import gravity_sigma
 from accelstudy.design.estimability import estimability
 from accelstudy.files.tables import read_origin, read_table
 from accelstudy.leveling.error import cap_forces, leveling_error, tilt_error
-from accelstudy.plan.report.advice import in_use, limits, needs, spoilers
-from accelstudy.plan.report.wording import (
+from accelstudy.plan.answer import answer
+from accelstudy.plan.candidates import NINE, candidates
+from accelstudy.plan.question import BY_HAND, ROBOT, Question
+from accelstudy.plan.reasons import in_use, limits, needs, spoilers
+from accelstudy.plan.simulated import simulate, study_of
+from accelstudy.plan.theory import theory_of
+from accelstudy.plan.wording import (
     answer_lines,
     effort,
     reason_lines,
     table_lines,
     unreachable,
 )
-from accelstudy.plan.search import candidates as planned
-from accelstudy.plan.search.answer import answer
-from accelstudy.plan.search.candidates import NINE, candidates
-from accelstudy.plan.search.question import BY_HAND, ROBOT, Question
-from accelstudy.plan.search.simulated import simulate, study_of
-from accelstudy.plan.search.theory import theory_of
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise

@@ -14,11 +14,11 @@ from accelstudy.data_sheets import get_data_sheet, of_sigma
 from accelstudy.design.optimal.constraints import Constraints
 from accelstudy.design.optimal.continuous import continuous_optimum
 from accelstudy.design.optimal.spaces import Sphere
-from accelstudy.plan.report.advice import in_use
-from accelstudy.plan.report.wording import answer_lines, positions_command
-from accelstudy.plan.search.answer import answer
-from accelstudy.plan.search.optimised import Sought
-from accelstudy.plan.search.question import BY_HAND, ROBOT, Question
+from accelstudy.plan.answer import answer
+from accelstudy.plan.optimised import Sought
+from accelstudy.plan.question import BY_HAND, ROBOT, Question
+from accelstudy.plan.reasons import in_use
+from accelstudy.plan.wording import answer_lines, positions_command
 
 G = 9.80665
 SIGMA = 0.002

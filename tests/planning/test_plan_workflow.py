@@ -7,8 +7,7 @@ from snakemake_helpers import one_line, snakemake
 
 from accelstudy.basics.errors import InputError
 from accelstudy.files.layers import read_layer
-from accelstudy.plan.batch.config import PlanConfig
-from accelstudy.plan.batch.example import parse_example, parse_section
+from accelstudy.plan.config import PlanConfig, parse_example, parse_section
 
 
 def run(folder, config):

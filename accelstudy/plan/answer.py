@@ -6,10 +6,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from accelstudy.basics.progress import track
-from accelstudy.plan.search.candidates import Candidate, candidates
-from accelstudy.plan.search.optimised import Sought, cheapest
-from accelstudy.plan.search.question import ROBOT, Equipment, Question
-from accelstudy.plan.search.simulated import Simulated, simulate, study_of
+from accelstudy.plan.candidates import Candidate, candidates
+from accelstudy.plan.optimised import Sought, cheapest
+from accelstudy.plan.question import ROBOT, Equipment, Question
+from accelstudy.plan.simulated import Simulated, simulate, study_of
 
 SHOWN = 8
 """Candidates in the table."""
@@ -70,13 +70,11 @@ class Answer:
         by_hand = [r for r in checked if r.candidate.equipment.name == "gravity"]
         return (by_hand or checked)[0]
 
-    @property
-    def best(self) -> Candidate | None:
-        """The most accurate candidate, however long it takes."""
-        return min(self.compared, key=self._accuracy, default=None)
-
-    def _accuracy(self, candidate: Candidate) -> float:
-        return candidate.accuracy(self.question.confidence)
+    def best(self, equipment: str = "") -> Candidate | None:
+        """The most accurate candidate, of all or with one equipment, however long it takes."""
+        chosen = [c for c in self.compared if equipment in ("", c.equipment.name)]
+        confidence = self.question.confidence
+        return min(chosen, key=lambda c: c.accuracy(confidence), default=None)
 
     @property
     def study(self) -> dict[str, object]:

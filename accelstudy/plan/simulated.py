@@ -14,9 +14,9 @@ from accelstudy.adjustment.block import Block
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY, recorded_unit, to_recorded
 from accelstudy.effects import get_effect
 from accelstudy.leveling.error import ATTITUDES
-from accelstudy.plan.search.candidates import Candidate
-from accelstudy.plan.search.optimised import is_best
-from accelstudy.plan.search.question import Question
+from accelstudy.plan.candidates import Candidate
+from accelstudy.plan.optimised import is_best
+from accelstudy.plan.question import Question
 from accelstudy.schemes.files import held
 from accelstudy.study.cells.cell import Cell
 from accelstudy.study.cells.of_study import study_cells

@@ -17,8 +17,8 @@ from accelstudy.drawing.style import (
     log_ticks,
     new_figure,
 )
-from accelstudy.plan.search.answer import Answer, Ranked, by_time
-from accelstudy.plan.search.candidates import Candidate
+from accelstudy.plan.answer import Answer, Ranked, by_time
+from accelstudy.plan.candidates import Candidate
 
 LABELS = {"gravity": "by hand, gravity alone", "robot": "with a robot"}
 

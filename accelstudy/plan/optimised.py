@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 from accelstudy.basics.units import GON, MGON
-from accelstudy.design.optimal.search import optimal_design, rounded
-from accelstudy.plan.search.candidates import LEAST_REDUNDANCY, Candidate, of_scheme, sigma_of
-from accelstudy.plan.search.question import Equipment, Question
+from accelstudy.plan.candidates import LEAST_REDUNDANCY, Candidate, of_scheme, sigma_of
+from accelstudy.plan.question import Equipment, Question
 from accelstudy.proposal.request import Request
 from accelstudy.proposal.worse_angle import WorseAngle
 from accelstudy.schemes import Scheme
@@ -141,24 +140,9 @@ def request_of(question: Question, candidate: Candidate) -> Request:
 @cache
 def best_positions(request: Request) -> Scheme:
     """The best positions, as a scheme that a study can have."""
-    any_number = _any_number(replace(request, positions=1))
-    found = optimal_design(
-        any_number.task,
-        any_number.chosen,
-        request.positions,
-        seed=request.seed,
-        starts=request.starts,
-        bounded=False,
-    )
-    directions = rounded(found.directions).tolist()
+    directions = request.find(bounded=False).directions.tolist()
     source = "accelstudy design"
     return remember(
         {"title": "minimax", "source": source, "directions": directions},
         f"{CRITERION}-{request.positions}",
     )
-
-
-@cache
-def _any_number(request: Request) -> Request:
-    """The same object for the same request, so that its task is worked out once."""
-    return request
