@@ -16,8 +16,7 @@ from accelstudy.campaign.files.format import read_campaign
 from accelstudy.campaign.holds.allan import RELIABLE, AllanDeviation
 from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.settings import ImportSettings
-from accelstudy.data_sheets.flicker import FLICKER
-from accelstudy.data_sheets.sheet import QUANTITIES, DataSheet
+from accelstudy.data_sheets.sheet import FLICKER, QUANTITIES, DataSheet
 
 SEEN = 0.02
 """A kind of noise must make up this part of the Allan variance at some averaging time."""

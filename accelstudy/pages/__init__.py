@@ -79,7 +79,7 @@ def render(template: str, **content: Any) -> str:
         "angle_note": angle_note(),
     }
     page = explained(_environment(True).get_template(template).render({**units, **content}))
-    return _CONTROLS.sub(lambda found: found[0].encode("unicode_escape").decode("ascii"), page)
+    return _CONTROLS.sub(lambda control: control[0].encode("unicode_escape").decode("ascii"), page)
 
 
 def write_page(path: Path, template: str, fallback: str, **content: Any) -> None:
@@ -94,10 +94,10 @@ def write_page(path: Path, template: str, fallback: str, **content: Any) -> None
     try:
         page = render(template, **content)
     except Exception as error:
-        said = failure("The page could not be made", error)
+        reason = failure("The page could not be made", error)
         page = (
             '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>Report</title>'
-            f"</head>\n<body><p>{escape(fallback)}</p>\n<p>{escape(said)}</p></body></html>\n"
+            f"</head>\n<body><p>{escape(fallback)}</p>\n<p>{escape(reason)}</p></body></html>\n"
         )
     with whole_file(path) as part:
         part.write_text(page, encoding="utf-8")

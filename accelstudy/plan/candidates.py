@@ -94,10 +94,8 @@ def schemes_for(most_positions: int, more: Sequence[str] = ()) -> list[Scheme]:
 
 def candidates(question: Question) -> list[Candidate]:
     """All calibrations in known schemes whose positions determine their model and check it."""
-    found: list[Candidate] = []
-    for scheme in track(schemes_for(question.most_positions, question.schemes), "calibrations"):
-        found += _with_scheme(question, scheme)
-    return found
+    schemes = schemes_for(question.most_positions, question.schemes)
+    return [c for scheme in track(schemes, "calibrations") for c in _with_scheme(question, scheme)]
 
 
 def shortest(question: Question) -> Candidate | None:

@@ -140,7 +140,7 @@ def needs(question: Question, candidate: Candidate) -> list[Need]:
     theory = theory_of(question.tilt_range)
     rows = _rows(question, theory, candidate)
     effects = [effect.name for effect in candidate.model.effects]
-    found = []
+    judged = []
     for effect, size in question.sizes.items():
         if size.value == 0:
             continue
@@ -163,8 +163,8 @@ def needs(question: Question, candidate: Candidate) -> list[Need]:
             verdict = "needed" if fails else "worth it" if left > cost else "of no use"
         else:
             verdict = "worth it" if left > cost else "not needed"
-        found.append(Need(effect, size.value, unit, size.source, inside, left, cost, verdict))
-    return found
+        judged.append(Need(effect, size.value, unit, size.source, inside, left, cost, verdict))
+    return judged
 
 
 def spoilers(question: Question, candidate: Candidate) -> list[Spoiler]:
@@ -179,7 +179,7 @@ def spoilers(question: Question, candidate: Candidate) -> list[Spoiler]:
         effects += OF_RIG
     else:
         effects.append("gravity_error")
-    found = []
+    sizes = []
     for name in effects:
         effect = get_effect(name)
         each = float(theory.neglecting(rows, candidate.model, name).max())
@@ -190,8 +190,8 @@ def spoilers(question: Question, candidate: Candidate) -> list[Spoiler]:
         if size > low:
             verdict = "may spoil it" if size <= high else "does not matter"
         unit = effect.parameters[0].unit
-        found.append(Spoiler(name, unit, size, (low, high), verdict))
-    return found
+        sizes.append(Spoiler(name, unit, size, (low, high), verdict))
+    return sizes
 
 
 def in_use(

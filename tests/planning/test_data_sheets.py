@@ -4,11 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from calling import call
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.commands.main import main
 from accelstudy.data_sheets import (
     QUANTITIES,
     DataSheet,
@@ -18,7 +17,7 @@ from accelstudy.data_sheets import (
     parse_data_sheet,
     read_data_sheet,
 )
-from accelstudy.data_sheets.flicker import FLICKER, flicker_change
+from accelstudy.data_sheets.sheet import FLICKER, flicker_change
 from accelstudy.plan.question import get_sensor
 
 
@@ -152,10 +151,6 @@ def still_log(tmp_path_factory):
 
 
 READ = ("--rate", "20", "--columns", "fx=0,fy=1,fz=2")
-
-
-def call(*words):
-    return CliRunner().invoke(main, [str(word) for word in words])
 
 
 def test_a_log_at_rest_makes_a_data_sheet_that_can_be_read(still_log, tmp_path):

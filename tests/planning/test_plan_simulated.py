@@ -6,10 +6,9 @@ import shlex
 import numpy as np
 import pytest
 import yaml
-from click.testing import CliRunner
+from calling import call
 
 from accelstudy.basics.units import GON, MGON
-from accelstudy.commands.main import main
 from accelstudy.data_sheets import get_data_sheet, of_sigma
 from accelstudy.design.optimal.constraints import Constraints
 from accelstudy.design.optimal.continuous import continuous_optimum
@@ -82,18 +81,13 @@ def rms(left):
 
 
 @pytest.fixture(scope="module")
-def plan():
-    question = Question(10 * MGON, 30 * GON, of_sigma(SIGMA), equipment=(BY_HAND,))
-    return answer(question, replicates=4000)
-
-
-@pytest.fixture(scope="module")
 def positions(plan, tmp_path_factory):
     """Positions by the command that the plan tells."""
     folder = tmp_path_factory.mktemp("positions")
     command = positions_command(plan.question, plan.first.candidate)
-    words = shlex.split(command.replace("positions.yaml", str(folder / "positions.yaml")))[1:]
-    result = CliRunner().invoke(main, words)
+    result = call(
+        *shlex.split(command.replace("positions.yaml", str(folder / "positions.yaml")))[1:]
+    )
     assert result.exit_code == 0, result.output
     return yaml.safe_load((folder / "positions.yaml").read_text(encoding="utf-8"))["directions"]
 

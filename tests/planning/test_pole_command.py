@@ -4,21 +4,16 @@ import json
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from calling import call
 
 from accelstudy.basics.units import MGON
 from accelstudy.campaign.use.applying import read_calibration
-from accelstudy.commands.main import main
 from accelstudy.files.tables import read_origin, read_table
 from accelstudy.pole import output
 from accelstudy.pole.geometry import leaning
 
 FILES = {"pole.json", "budget.parquet", "monte-carlo.parquet", "budget.svg", "budget.png"}
 QUICK = ("--sensor", "adxl355", "--replicates", "20")
-
-
-def call(*arguments):
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
 
 
 @pytest.fixture(scope="module")
