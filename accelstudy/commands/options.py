@@ -90,12 +90,12 @@ def quantity_option(
     name: str, given: Given, *names: str, **options: Any
 ) -> Callable[[Command], Command]:
     """Add the option of a quantity; further names and options are those of `click.option`."""
+    if given.usual:
+        options |= {"default": given.usual, "show_default": True}
     return click.option(
         f"--{name.replace('_', '-')}",
         *names,
         type=Quantity(given.unit, given.least, given.most),
-        default=given.usual or None,
-        show_default=bool(given.usual),
         help=given.help,
         **options,
     )

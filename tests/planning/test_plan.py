@@ -18,7 +18,6 @@ from accelstudy.design.closed_forms import gravity_sigma
 from accelstudy.design.estimability import estimability
 from accelstudy.files.tables import read_origin, read_table
 from accelstudy.leveling.error import cap_forces, leveling_error, tilt_error
-from accelstudy.plan import candidates as planned
 from accelstudy.plan.answer import answer
 from accelstudy.plan.candidates import NINE, candidates
 from accelstudy.plan.question import BY_HAND, ROBOT, Question
@@ -172,12 +171,12 @@ def test_the_study_of_a_plan_makes_its_numbers_again(plan, tmp_path):
     told = {r.simulated.cell: r.simulated for r in plan.ranked if r.simulated}
     assert set(cells) == set(told)
     cell = cells[plan.first.simulated.cell]
-    (one, two) = blocks(cell, study.seed, 0, 2)
+    simulated = blocks(cell, study.seed, 0, cell.n_blocks)
     error = leveling_error(
         cell.simulated_model,
         cell.simulated_model.vector(cell.truth),
         cell.estimated_model,
-        np.concatenate([one.estimates, two.estimates]),
+        np.concatenate([block.estimates for block in simulated]),
         cap_forces(30 * GON, 200),
     )
     np.testing.assert_allclose(error.rms, plan.first.simulated.rms, rtol=1e-12)
@@ -295,9 +294,9 @@ def test_what_cannot_be_reached_is_one_line_with_what_can(options, parts):
     assert "\n" not in line
 
 
-def test_by_hand_alone_it_is_said_that_a_robot_would_do(monkeypatch):
-    monkeypatch.setattr(planned, "SIZES", (9, 40, 200))
-    question = Question(2.5 * MGON, 30 * GON, of_sigma(0.002), equipment=(BY_HAND,))
+def test_by_hand_alone_it_is_said_that_a_robot_would_do():
+    few = {"equipment": (BY_HAND,), "most_positions": 20}
+    question = Question(7 * MGON, 30 * GON, of_sigma(0.002), **few)
     (line,) = answer_lines(answer(question, replicates=200))
     assert re.search(r"A robot reaches it: \d+ positions with a robot, 10 s each", line)
 

@@ -7,7 +7,7 @@ import subprocess
 import numpy as np
 import pytest
 import yaml
-from calling import call
+from calling import call, refusal
 from page_helpers import assert_told_alike
 from places import ROOT
 
@@ -37,11 +37,7 @@ def advise(folder, *options):
 
 
 def error(folder, *options):
-    result = call("advise", folder, *options)
-    assert result.exit_code == 2, result.output
-    assert result.stdout == ""
-    assert result.stderr.count("\n") == 1
-    return result.stderr
+    return refusal("advise", folder, *options)
 
 
 @pytest.fixture(scope="module")
