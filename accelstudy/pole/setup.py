@@ -6,7 +6,7 @@ Commands and configurations take the unit, usual value and bounds of each quanti
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from accelstudy.basics.errors import InputError, UnknownNameError
@@ -19,7 +19,7 @@ HAND = 0.6
 
 
 def _given(section: str, *arguments: Any) -> Any:
-    given = Given(*arguments, section=section)
+    given = replace(Given(*arguments), section=section)
     return field(default=given.value if given.usual else None, metadata={"given": given})
 
 
