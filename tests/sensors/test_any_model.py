@@ -362,11 +362,18 @@ def test_apply_mends_readings_as_the_data_were(tmp_path):
         np.testing.assert_allclose(leveled[columns], expected, atol=1e-5)
 
 
-def test_the_rig_stays_where_it_was():
+def test_the_rig_stays_where_it_was(tmp_path):
     """What belongs to the rig is exported with a note, and is in no matrix."""
     campaign, _ = simulate_campaign(CampaignSettings(scheme="fibonacci-30", order="random"))
-    model = get_model(f"{NINE}+encoder_scale")
-    content = calibration_document(fit_campaign(campaign, model, get_approach("robot")))
+    model = get_model("bias+encoder_scale+scale+nonorthogonality")
+    fit = fit_campaign(campaign, model, get_approach("robot"))
+    content = calibration_document(fit)
+    path = tmp_path / "calibration.json"
+    path.write_text(json.dumps(content), encoding="utf-8")
+    sensor = np.delete(np.arange(11), [3, 4])
+    np.testing.assert_allclose(
+        read_calibration(path).covariance, fit.covariance[np.ix_(sensor, sensor)], rtol=1e-12
+    )
     assert content["affine"] is not None
     effects = json.loads(export(content, "json"))["effects"]
     assert [effect["spec"] for effect in effects if "note" in effect] == ["encoder_scale"]
