@@ -27,6 +27,7 @@ from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.document.calibration import diagnosed_calibration
 from accelstudy.diagnosis.report.document.model_file import study_overlay
 from accelstudy.diagnosis.round_trip import parse_round_trip
+from accelstudy.drawing import saving
 from accelstudy.drawing.style import model_title
 from accelstudy.effects import HoldConditions
 from accelstudy.sensors.frames import parse_frame
@@ -166,7 +167,9 @@ def test_batches_and_the_round_trip_take_a_composition():
 @pytest.fixture(scope="module")
 def diagnosed(made):
     """Folder of the diagnosis of the campaign, which lacks both effects."""
-    run("diagnose", made / "c", "--out", made / "d", "--replicates", "100")
+    with pytest.MonkeyPatch.context() as patch:  # to draw its figures would take most of the time
+        patch.setattr(saving, "save", lambda *_: "<svg></svg>")
+        run("diagnose", made / "c", "--out", made / "d", "--replicates", "100")
     return made / "d"
 
 
