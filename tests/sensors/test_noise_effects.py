@@ -53,13 +53,9 @@ def test_nothing_changes_without_effects_and_nothing_but_the_forces_with_them():
 
 
 @pytest.mark.parametrize("name", noise_effect_names())
-def test_a_seed_gives_the_same_noise(name):
+def test_a_noise_effect_has_a_spec_and_follows_from_the_seed(name):
     np.testing.assert_array_equal(errors(name), errors(name))
     assert not np.all(errors(name) == errors(name, seed=2))
-
-
-@pytest.mark.parametrize("name", noise_effect_names())
-def test_the_spec_can_be_read_back(name):
     effect = get_noise_effect(name)
     again = get_noise_effect(effect.spec)
     assert type(again) is type(effect)
