@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from accelstudy.diagnosis.evidence.chance import Chance
+from accelstudy.diagnosis.evidence.detection import Chance
 from accelstudy.diagnosis.space.residuals import Residuals, SlopeRows
 
 

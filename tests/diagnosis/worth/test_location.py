@@ -7,6 +7,7 @@ from diagnosis_helpers import NINE
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.words.summary import GROUPS
+from accelstudy.diagnosis.space.examined import examine
 from accelstudy.diagnosis.space.groups import LACK_OF_FIT, all_groups
 from accelstudy.diagnosis.worth import location
 
@@ -76,9 +77,10 @@ def test_a_share_is_told_where_chance_seldom_gives_nearly_all(diagnoses, name):
 def test_a_share_is_that_of_the_excess(diagnoses):
     """What a group has beyond the one that noise leaves in each of its conditions."""
     full = diagnoses["all columns"]
-    residuals = full.examined.frame.residuals
+    examined = examine(full.base)
+    residuals = examined.frame.residuals
     excess = residuals.z @ residuals.z - residuals.redundancy
-    for group, space in all_groups(full.examined).items():
+    for group, space in all_groups(examined).items():
         if group in full.location:
             share = (space.parts(residuals.z)[0] - space.dims[0]) / excess
             assert full.location[group] == pytest.approx(np.clip(share, 0, 1)), group
