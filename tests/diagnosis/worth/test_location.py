@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-from diagnosis_helpers import NINE
+from diagnosis_helpers import NINE, examine
 
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.words.summary import GROUPS
-from accelstudy.diagnosis.space.examined import examine
 from accelstudy.diagnosis.space.groups import LACK_OF_FIT, all_groups
 from accelstudy.diagnosis.worth import location
 
