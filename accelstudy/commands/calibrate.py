@@ -38,7 +38,7 @@ def calibrate_command(campaign: Path, model: str, approach: str, out: Path, forc
     from accelstudy.campaign.calibration.fit import fit_campaign
     from accelstudy.campaign.calibration.output import write_calibration
     from accelstudy.campaign.calibration.wording import interval_words, next_steps
-    from accelstudy.campaign.files.format import read_campaign
+    from accelstudy.campaign.format import read_campaign
     from accelstudy.files.outputs import CALIBRATION, result_folder
     from accelstudy.sensors.frames import axes_note
     from accelstudy.sensors.models import get_model

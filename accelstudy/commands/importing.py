@@ -20,8 +20,8 @@ from accelstudy.commands.options import (
 )
 
 if TYPE_CHECKING:
-    from accelstudy.campaign.files.session import Campaign
     from accelstudy.campaign.importing.logs import ImportReport
+    from accelstudy.campaign.session import Campaign
 
 
 _SECTIONS = {

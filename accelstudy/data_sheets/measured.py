@@ -12,8 +12,8 @@ from scipy.optimize import nnls
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import recorded_unit, to_recorded
-from accelstudy.campaign.files.format import read_campaign
-from accelstudy.campaign.holds.allan import RELIABLE, AllanDeviation
+from accelstudy.campaign.format import read_campaign
+from accelstudy.campaign.importing.allan import RELIABLE, AllanDeviation
 from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.data_sheets.flicker import FLICKER

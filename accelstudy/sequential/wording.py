@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from accelstudy.basics.suggested import calibrate
 from accelstudy.basics.units import attitude_unit, quantity_text, to_attitude
 from accelstudy.basics.wording import comma_list, counted, p_value, words
-from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.session import Campaign
 from accelstudy.effects import Effect
 from accelstudy.leveling.angles import roll_pitch
 from accelstudy.sensors.frames import FRD, Frame

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.logs.sources import open_source
-from accelstudy.campaign.use.applying import read_calibration
+from accelstudy.campaign.calibration.applying import read_calibration
+from accelstudy.campaign.importing.sources import open_source
 from accelstudy.files import reading
 from accelstudy.files.layers import read_layer
 from accelstudy.files.parquet import read_parquet

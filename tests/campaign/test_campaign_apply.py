@@ -14,12 +14,12 @@ from scipy.io import savemat
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON
+from accelstudy.campaign.calibration.applying import read_calibration
 from accelstudy.campaign.calibration.document import calibration_document
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.files.header import LogLayout
-from accelstudy.campaign.files.session import Campaign
-from accelstudy.campaign.use.applying import read_calibration
-from accelstudy.campaign.use.leveling import level_log
+from accelstudy.campaign.calibration.leveling import level_log
+from accelstudy.campaign.header import LogLayout
+from accelstudy.campaign.session import Campaign
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import specific_force
 from accelstudy.schemes import get_scheme

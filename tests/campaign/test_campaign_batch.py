@@ -26,7 +26,7 @@ from accelstudy.campaign.batch.overview import (
     summarise_campaigns,
 )
 from accelstudy.campaign.batch.run import run_task
-from accelstudy.campaign.files.format import write_campaign
+from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.importing import public
 from accelstudy.campaign.importing.public import public_data, record_public
 from accelstudy.files.tables import read_origin, read_table

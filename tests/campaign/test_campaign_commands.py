@@ -14,9 +14,9 @@ from page_helpers import assert_sound, text_of
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.wording import verdict_lines
-from accelstudy.campaign.files.format import read_campaign, write_campaign
-from accelstudy.campaign.files.header import LogLayout
-from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.format import read_campaign, write_campaign
+from accelstudy.campaign.header import LogLayout
+from accelstudy.campaign.session import Campaign
 from accelstudy.commands.main import main
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.words.summary import verdict_lines as diagnosis_lines

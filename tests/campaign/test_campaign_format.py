@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
-from accelstudy.campaign.files.format import read_campaign, write_campaign
-from accelstudy.campaign.files.header import LogLayout
-from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.format import read_campaign, write_campaign
+from accelstudy.campaign.header import LogLayout
+from accelstudy.campaign.session import Campaign
 from accelstudy.leveling.angles import specific_force
 from accelstudy.sensors.conversion import Conversion
 

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from places import DATA
 
 from accelstudy.basics.errors import InputError, UnknownNameError
-from accelstudy.campaign.files.format import read_campaign
+from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.importing import public
 from accelstudy.campaign.importing.logs import import_file
 from accelstudy.campaign.importing.public import (

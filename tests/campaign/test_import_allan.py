@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from test_import_holds import shared
 
-from accelstudy.campaign.holds.allan import (
+from accelstudy.campaign.importing.allan import (
     AllanSums,
     accuracy_of_mean,
     allan_deviation,

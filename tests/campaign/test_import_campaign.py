@@ -12,7 +12,7 @@ from test_import_holds import G, session, shared, write
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY, angles_in
-from accelstudy.campaign.files.format import read_campaign
+from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.importing import segmentation_figure
 from accelstudy.campaign.importing.logs import (
     ImportSettings,

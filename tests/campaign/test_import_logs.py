@@ -15,8 +15,8 @@ from scipy.io import loadmat, savemat
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.campaign.holds.detection import find_holds
-from accelstudy.campaign.logs.recording import open_log
+from accelstudy.campaign.importing.detection import find_holds
+from accelstudy.campaign.importing.recording import open_log
 
 N = 50
 TIME = 0.25 * np.arange(N)
@@ -248,7 +248,7 @@ def test_a_matlab_file_that_does_not_fit(tmp_path, monkeypatch):
         raise MemoryError
 
     savemat(tmp_path / "log.mat", {"log": TABLE})
-    monkeypatch.setattr("accelstudy.campaign.logs.sources.loadmat", full)
+    monkeypatch.setattr("accelstudy.campaign.importing.sources.loadmat", full)
     with pytest.raises(InputError, match="too large, as a MATLAB file is held in memory"):
         open_log(tmp_path / "log.mat", **BY_PLACE)
 
@@ -265,7 +265,7 @@ def test_only_the_chosen_array_is_read(tmp_path, monkeypatch):
         read.extend(variable_names)
         return loadmat(path, variable_names=variable_names)
 
-    monkeypatch.setattr("accelstudy.campaign.logs.sources.loadmat", load)
+    monkeypatch.setattr("accelstudy.campaign.importing.sources.loadmat", load)
     _, forces = everything(open_log(tmp_path / "log.mat", variable="log", **BY_PLACE))
     np.testing.assert_array_equal(forces, FORCES)
     assert read == ["log"]

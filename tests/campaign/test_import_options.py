@@ -8,12 +8,11 @@ from test_import_holds import RATE, G, session, shared, write
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON
-from accelstudy.campaign.files.format import read_campaign
-from accelstudy.campaign.files.header import LogLayout
-from accelstudy.campaign.holds.allan import allan_moments
-from accelstudy.campaign.holds.detected import slope_sigmas
-from accelstudy.campaign.holds.segments import Moments, Segment
+from accelstudy.campaign.format import read_campaign
+from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing import segmentation_figure
+from accelstudy.campaign.importing.allan import allan_moments
+from accelstudy.campaign.importing.detection import slope_sigmas
 from accelstudy.campaign.importing.logs import (
     ImportSettings,
     import_log,
@@ -22,7 +21,8 @@ from accelstudy.campaign.importing.logs import (
     import_to,
     parse_settings,
 )
-from accelstudy.campaign.logs.recording import open_log
+from accelstudy.campaign.importing.recording import open_log
+from accelstudy.campaign.importing.segments import Moments, Segment
 from accelstudy.commands.import_options import files_of
 from accelstudy.leveling.angles import specific_force
 from accelstudy.sensors.frames import parse_frame

@@ -6,7 +6,7 @@ import pytest
 from click.testing import CliRunner
 from places import DATA
 
-from accelstudy.campaign.files.format import read_campaign
+from accelstudy.campaign.format import read_campaign
 from accelstudy.commands.main import main
 
 NINE = "bias-scale-nonorthogonality"

@@ -3,7 +3,7 @@
 import numpy as np
 
 from accelstudy.approaches import get_approach
-from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.session import Campaign
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise, session

@@ -15,7 +15,7 @@ from pydantic import Field, model_validator
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.names import check_path_name
-from accelstudy.campaign.files.header import HEADER, TABLES
+from accelstudy.campaign.header import HEADER, TABLES
 from accelstudy.campaign.importing.public import import_settings
 from accelstudy.campaign.importing.settings import GravitySettings, ImportSettings
 from accelstudy.config_names import ModelName

@@ -12,11 +12,13 @@ from accelstudy.basics.units import MGON, recorded_unit, to_recorded
 from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.fit import CampaignFit
 from accelstudy.campaign.calibration.gauges import GAUGES, affine_form, in_gauge
-from accelstudy.campaign.calibration.ranges import ranges_of
 from accelstudy.campaign.calibration.wording import verdict_lines
-from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.session import Campaign
 from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.sensors.frames import FRD
+
+FORCES = {"fx_mps2": "forward", "fy_mps2": "right", "fz_mps2": "down"}
+"""Ranges of the calibrated forces, and where they point."""
 
 
 def calibration_document(fit: CampaignFit) -> dict[str, Any]:
@@ -75,7 +77,7 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
         "mended": None,
         "excluded": campaign.exclusions,
         "range_mps2": campaign.full_range,
-        "ranges": ranges_of(fit),
+        "ranges": _ranges(fit),
         "log": None if campaign.log is None else campaign.log.model_dump(exclude_none=True),
         "warnings": list(campaign.warnings),
     }
@@ -165,6 +167,29 @@ def assessed_positions(assessment: Assessment) -> pd.DataFrame:
     suspects = {s.position for s in assessment.suspects}
     table["suspect"] = [i in suspects for i in range(len(table))]
     return table
+
+
+def _ranges(fit: CampaignFit) -> dict[str, list[float]]:
+    """Smallest and largest value over the holds of a calibration.
+
+    Returns
+    -------
+    dict
+        Ranges of `time_s` since the start of the session, `temperature_degC`, `vibration_mps2` as
+        far as they are known, and of the calibrated forces.
+    """
+    campaign = fit.campaign
+    columns = {
+        "time_s": campaign.time,
+        "temperature_degC": campaign.temperature,
+        "vibration_mps2": campaign.vibration,
+        **dict(zip(FORCES, fit.corrected.T, strict=True)),
+    }
+    return {
+        name: [float(np.min(values)), float(np.max(values))]
+        for name, values in columns.items()
+        if values is not None
+    }
 
 
 def _sigma_reading(campaign: Campaign) -> float | None:

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.registry import RegistryWithSettings, WithSettings
-from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.gross_errors.real_sensor import RealSensor
+from accelstudy.campaign.session import Campaign
 
 Array = NDArray[np.float64]
 

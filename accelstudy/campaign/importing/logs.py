@@ -11,28 +11,24 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import display_unit, to_display
-from accelstudy.campaign.files.format import write_campaign
-from accelstudy.campaign.files.session import Campaign
-from accelstudy.campaign.holds.allan import MeanAccuracy, accuracy_of_mean
-from accelstudy.campaign.holds.detected import DetectedHolds
-from accelstudy.campaign.holds.detection import find_joint_holds
-from accelstudy.campaign.importing.imported import (
+from accelstudy.campaign.format import write_campaign
+from accelstudy.campaign.importing.allan import MeanAccuracy, accuracy_of_mean
+from accelstudy.campaign.importing.detection import DetectedHolds, find_joint_holds
+from accelstudy.campaign.importing.means import import_means
+from accelstudy.campaign.importing.recording import AXES, Log, LogSeries, Recording, open_log
+from accelstudy.campaign.importing.settings import (
+    GravitySettings,
     ImportReport,
+    ImportSettings,
     default_name,
     far_from_gravity,
     imported_campaign,
     layout_of,
-    shown,
-)
-from accelstudy.campaign.importing.means import import_means
-from accelstudy.campaign.importing.settings import (
-    GravitySettings,
-    ImportSettings,
     parse_settings,
     read_settings,
+    shown,
 )
-from accelstudy.campaign.logs.columns import AXES
-from accelstudy.campaign.logs.recording import Log, LogSeries, Recording, open_log
+from accelstudy.campaign.session import Campaign
 from accelstudy.sensors.conversion import conversion_of
 
 __all__ = [

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, Field, model_validator
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.files.header import LogLayout, Nominal, PerAxis
+from accelstudy.campaign.header import LogLayout, Nominal, PerAxis
 from accelstudy.effects import HoldConditions
 from accelstudy.files.reading import read_json
 from accelstudy.files.types import Finite, NotNegative, Number, Positive
