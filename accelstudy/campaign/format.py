@@ -29,10 +29,9 @@ from accelstudy.campaign.checks import (
 )
 from accelstudy.campaign.header import COLUMNS, COUNTING, HEADER, KNOWN, TABLES, Header
 from accelstudy.campaign.session import Campaign
-from accelstudy.files.layers import overlay, read_layer
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.parquet import whole_parquet, write_parquet
-from accelstudy.files.reading import read_text
+from accelstudy.files.reading import overlay, read_layer, read_text
 from accelstudy.files.validation import checked
 
 Array = NDArray[np.float64]

@@ -18,8 +18,7 @@ from accelstudy.basics.names import check_path_name
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign, write_truth
 from accelstudy.config_names import ModelName
-from accelstudy.files.types import Seed, Sessions
-from accelstudy.files.validation import Block, checked
+from accelstudy.files.validation import Block, Seed, Sessions, checked
 from accelstudy.sensors.models import get_model
 
 

@@ -166,6 +166,25 @@ def whole_file(path: str | Path) -> Iterator[Path]:
             (stage / path.name).replace(path)
 
 
+def check_writable(folder: str | Path) -> None:
+    """Check that a folder and those in it can be written to, or that it can be made.
+
+    Raises
+    ------
+    InputError
+        If it, a folder in it, or the nearest folder above it that exists, is not writable, or is no
+        folder.
+    """
+    folder = Path(folder)
+    nearest = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    if not nearest.is_dir():
+        raise InputError(f"{folder}: cannot hold results: {nearest} is not a folder")
+    inside = (Path(path) for path, _, _ in os.walk(folder))  # of the folder itself, if it is there
+    for path in (nearest, *inside):
+        if not os.access(path, os.W_OK | os.X_OK):
+            raise InputError(f"{folder}: cannot hold results: {path} is not writable")
+
+
 def cannot_write(error: OSError, out: Path) -> str:
     """Say that `out` cannot be written and why; name the place of the error if it is another."""
     where = Path(str(error.filename)) if error.filename is not None else out

@@ -16,7 +16,7 @@ from typing import Any
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.effects import Effect, effect_names, get_effect
-from accelstudy.files.layers import read_layer
+from accelstudy.files.reading import read_layer
 from accelstudy.sensors.sensor import SensorModel
 
 MODEL_FILE = "model.yaml"

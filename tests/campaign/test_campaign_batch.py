@@ -287,7 +287,7 @@ def test_code_on_which_it_depends(tmp_path, monkeypatch):
         "campaign/calibration/fit.py": {"calibrate"},
         "campaign/batch/overview.html.j2": {"calibrate", "overview"},
         "adjustment/quality/positions.py": {"calibrate"},
-        "campaign/calibration/states.py": {"calibrate", "overview"},
+        "basics/levels.py": {"calibrate", "overview"},
         "effects/bias.py": {*stages},
         "study/monte_carlo/simulate.py": {"simulate"},
         "commands/main.py": set(),

@@ -14,7 +14,7 @@ from accelstudy.field import config
 from accelstudy.field.config import FieldCase, FieldConfig
 from accelstudy.field.figure import field_figure
 from accelstudy.field.shares import Use, field_shares, parts_of_variance, shares_in_use
-from accelstudy.files.layers import read_layer
+from accelstudy.files.reading import read_layer
 from accelstudy.files.tables import read_table
 from accelstudy.leveling.angles import specific_force
 from accelstudy.leveling.sensitivity import leveled

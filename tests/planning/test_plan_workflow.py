@@ -6,7 +6,7 @@ from places import ROOT
 from snakemake_helpers import one_line, snakemake
 
 from accelstudy.basics.errors import InputError
-from accelstudy.files.layers import read_layer
+from accelstudy.files.reading import read_layer
 from accelstudy.plan.batch.config import PlanConfig
 from accelstudy.plan.batch.example import parse_example, parse_section
 

@@ -7,7 +7,7 @@ from places import ROOT
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
-from accelstudy.files.layers import read_layer
+from accelstudy.files.reading import read_layer
 from accelstudy.files.tables import read_origin
 from accelstudy.plan.batch.example import parse_example, parse_section
 from accelstudy.pole import output

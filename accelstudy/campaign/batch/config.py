@@ -19,10 +19,8 @@ from accelstudy.campaign.header import HEADER, TABLES
 from accelstudy.campaign.importing.public import import_settings
 from accelstudy.campaign.importing.settings import GravitySettings, ImportSettings
 from accelstudy.config_names import ModelName
-from accelstudy.files.layers import overlay, read_layer
-from accelstudy.files.provenance import config_hash
-from accelstudy.files.types import PathName
-from accelstudy.files.validation import Block, checked
+from accelstudy.files.reading import config_hash, overlay, read_layer
+from accelstudy.files.validation import Block, PathName, checked
 from accelstudy.sensors.models import get_model
 
 KINDS = ("campaign", "log", "public")

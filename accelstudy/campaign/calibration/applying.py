@@ -16,8 +16,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.campaign.header import LogLayout, Nominal, PerAxis
 from accelstudy.effects import HoldConditions
 from accelstudy.files.reading import read_json
-from accelstudy.files.types import Finite, NotNegative, Number, Positive
-from accelstudy.files.validation import checked
+from accelstudy.files.validation import Finite, NotNegative, Number, Positive, checked
 from accelstudy.leveling.angles import angles_of, jacobian, tilt_slope
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
@@ -40,7 +39,7 @@ class Calibration:
     gravity : float, m/s²
     content : mapping, what is used of the file
     log : LogLayout, layout of the log from which the campaign was made; None if there was none
-    ranges : mapping, of the calibration, see `accelstudy.campaign.calibration.ranges`
+    ranges : mapping, of the calibration, see `calibration_document`
     """
 
     model: SensorModel

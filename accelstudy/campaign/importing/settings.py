@@ -21,16 +21,16 @@ from accelstudy.campaign.importing.detection import DetectedHolds
 from accelstudy.campaign.importing.segments import Selection, parse_selection
 from accelstudy.campaign.importing.sources import Source
 from accelstudy.campaign.session import Campaign
-from accelstudy.files.layers import overlay, read_layer
-from accelstudy.files.types import (
+from accelstudy.files.reading import overlay, read_layer
+from accelstudy.files.validation import (
     Gravity,
     NotNegative,
     PathName,
     Positive,
     SigmaAngle,
     SigmaGravity,
+    checked,
 )
-from accelstudy.files.validation import checked
 from accelstudy.leveling.angles import usual_norm
 from accelstudy.sensors.conversion import Conversion, conversion_of
 from accelstudy.sensors.plausibility import LARGEST

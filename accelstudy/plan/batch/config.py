@@ -10,8 +10,7 @@ from pydantic import Field, model_validator
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON, parse_quantity
 from accelstudy.data_sheets import data_sheet_names, of_sigma
-from accelstudy.files.types import OneOrMore, PathName, Replicates
-from accelstudy.files.validation import Block
+from accelstudy.files.validation import Block, OneOrMore, PathName, Replicates
 from accelstudy.plan.search.question import BY_HAND, ROBOT, Question
 from accelstudy.plan.search.sensors import get_sensor
 

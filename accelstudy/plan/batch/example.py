@@ -7,9 +7,8 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, Field
 
-from accelstudy.files.provenance import config_hash
-from accelstudy.files.types import PathName, Seed
-from accelstudy.files.validation import Block, checked
+from accelstudy.files.reading import config_hash
+from accelstudy.files.validation import Block, PathName, Seed, checked
 
 Section = TypeVar("Section", bound=BaseModel)
 
