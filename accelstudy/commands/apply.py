@@ -64,7 +64,7 @@ def apply_command(
     """
     from accelstudy.campaign.calibration.applying import read_calibration
     from accelstudy.campaign.calibration.leveling import level_log
-    from accelstudy.commands.import_options import parse_columns
+    from accelstudy.commands.importing import parse_columns
     from accelstudy.files.outputs import new_file
 
     layout = {

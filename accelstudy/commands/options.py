@@ -167,6 +167,21 @@ def quiet_option(command: Command) -> Command:
     return within  # type: ignore[return-value]
 
 
+def log_options(command: Command) -> Command:
+    """Add the options that say how the numbers of a log are read, in the order of the help."""
+    for name, help_text in {
+        "--scale": "For counts: m/s² per count, one number or three.",
+        "--unit": "Unit of the readings: m/s^2, g or counts.  [default: m/s^2]",
+        "--rate": "Samples per second, where there is no time.",
+        "--time-unit": "Unit of the time: s, ms, us or ns.  [default: s]",
+        "--time": "Column of the time, by name or number.",
+        "--columns": "Columns by name, or by number from 0: fx=1,fy=2,fz=3.",
+    }.items():
+        of_type = float if name == "--rate" else str
+        command = click.option(name, type=of_type, help=help_text)(command)
+    return command
+
+
 seed_option = click.option(
     "--seed",
     default=1,

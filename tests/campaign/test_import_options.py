@@ -23,7 +23,7 @@ from accelstudy.campaign.importing.logs import (
 )
 from accelstudy.campaign.importing.recording import open_log
 from accelstudy.campaign.importing.segments import Moments, Segment
-from accelstudy.commands.import_options import files_of
+from accelstudy.commands.importing import files_of
 from accelstudy.leveling.angles import specific_force
 from accelstudy.sensors.frames import parse_frame
 
