@@ -52,8 +52,9 @@ def calibrate_command(campaign: Path, model: str, approach: str, out: Path, forc
         warn(warning)
     for entry in content["parameters"]:
         unit = entry["unit"]
-        known = entry["sigma"] is not None
-        sigma = f"{to_display(entry['sigma'], unit):.4f}" if known else "unknown"
+        sigma = (
+            f"{to_display(entry['sigma'], unit):.4f}" if entry["sigma"] is not None else "unknown"
+        )
         value = f"{to_display(entry['value'], unit):12.4f}"
         say(f"{entry['name']:>9} = {value} ± {sigma} {display_unit(unit)}")
     if content["sigmas_95"] is not None:

@@ -41,8 +41,8 @@ class Name(click.ParamType):  # type: ignore[type-arg]  # generic from click 8.5
     ) -> list[CompletionItem]:
         """Names that begin with what was typed."""
         names = getattr(import_module(self.module), self.names)
-        known = names() if callable(names) else names
-        return [CompletionItem(name) for name in known if name.startswith(incomplete)]
+        choices = names() if callable(names) else names
+        return [CompletionItem(name) for name in choices if name.startswith(incomplete)]
 
 
 class ModelName(Name):
@@ -53,10 +53,10 @@ class ModelName(Name):
     ) -> list[CompletionItem]:
         """Models and, after a +, effects; files if no name begins with what was typed."""
         before, plus, last = incomplete.rpartition("+")
-        found = super().shell_complete(ctx, param, last)
+        completions = super().shell_complete(ctx, param, last)
         if plus:
-            found += EFFECT.shell_complete(ctx, param, last)
-        items = [CompletionItem(f"{before}{plus}{item.value}") for item in found]
+            completions += EFFECT.shell_complete(ctx, param, last)
+        items = [CompletionItem(f"{before}{plus}{item.value}") for item in completions]
         return items or [CompletionItem(incomplete, type="file")]
 
 
@@ -93,8 +93,8 @@ class SchemeName(Name):
         self, ctx: click.Context, param: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
         """Schemes, or files if no name begins with what was typed."""
-        found = super().shell_complete(ctx, param, incomplete)
-        return found or [CompletionItem(incomplete, type="file")]
+        completions = super().shell_complete(ctx, param, incomplete)
+        return completions or [CompletionItem(incomplete, type="file")]
 
 
 ANGLE_UNIT = Name("angle_unit", "accelstudy.basics.units", "ANGLE_UNITS")

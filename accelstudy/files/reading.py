@@ -161,10 +161,10 @@ def _check_size(root: yaml.Node) -> None:
 
     def size(node: yaml.Node) -> int:
         if id(node) in sizes:
-            known = sizes[id(node)]
-            if known is None:
+            counted = sizes[id(node)]
+            if counted is None:
                 raise yaml.YAMLError(f"line {node.start_mark.line + 1}: a value holds itself")
-            return known
+            return counted
         sizes[id(node)] = None
         parts: list[yaml.Node] = []
         if isinstance(node, yaml.CollectionNode):

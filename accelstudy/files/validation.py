@@ -178,8 +178,8 @@ def _first_error(
         text = mark.join(filter(None, [key, str(first["ctx"]["error"])]))
     else:
         # Where several kinds of values are right, there is an error for each of them.
-        said = [_said(e) for e, p in zip(errors, places, strict=True) if p == place]
-        wanted = " or ".join([said[0], *(text.removeprefix("must be ") for text in said[1:])])
+        wants = [_wanted(e) for e, p in zip(errors, places, strict=True) if p == place]
+        wanted = " or ".join([wants[0], *(text.removeprefix("must be ") for text in wants[1:])])
         value = "" if first["type"] == "missing" else f", not {shown(first['input'])}"
         text = ": ".join(filter(None, [key, f"{wanted}{value}"]))
     others = len({*places} - {place})
@@ -205,7 +205,7 @@ def _has(content: object, part: str | int) -> bool:
     return isinstance(content, Mapping) and part in content
 
 
-def _said(error: ErrorDetails) -> str:
+def _wanted(error: ErrorDetails) -> str:
     """Say what would be right, in plain words."""
     if error["type"] not in WORDS:
         return error["msg"][0].lower() + error["msg"][1:]

@@ -58,6 +58,11 @@ class NoiseEffect(WithSettings):
 
 
 _registry: RegistryWithSettings[NoiseEffect] = RegistryWithSettings(NoiseEffect.kind)
-get_noise_effect = cache(_registry.get)
 noise_effect_names = _registry.names
 register = _registry.register
+
+
+@cache
+def get_noise_effect(spec: str) -> NoiseEffect:
+    """Return a noise effect by its name, with settings or not: ``heavy_tails(nu=3)``."""
+    return _registry.get(spec)

@@ -13,7 +13,7 @@ from places import DATA
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.importing import public
-from accelstudy.campaign.importing.logs import import_file
+from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.public import (
     PublicData,
     fetch,
@@ -124,7 +124,7 @@ N_POSITIONS = {
 @needs_data
 @pytest.mark.parametrize("name", [name for name in public_data() if public_data()[name].settings])
 def test_the_registry_imports_the_files(name):
-    campaign, _ = import_file(public_file(name, DATA), import_settings(name))
+    campaign, _ = import_log(public_file(name, DATA), import_settings(name))
     assert campaign.name == name
     assert campaign.n_positions == N_POSITIONS.get(name, campaign.n_positions)
 

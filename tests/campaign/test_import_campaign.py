@@ -14,13 +14,9 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY, angles_in
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.importing import segmentation_figure
-from accelstudy.campaign.importing.logs import (
-    ImportSettings,
-    import_log,
-    import_means,
-    parse_settings,
-    read_settings,
-)
+from accelstudy.campaign.importing.logs import import_log
+from accelstudy.campaign.importing.means import import_means
+from accelstudy.campaign.importing.settings import ImportSettings, parse_settings, read_settings
 from accelstudy.commands.importing import import_command
 from accelstudy.commands.main import Commands
 

@@ -13,16 +13,11 @@ from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing import segmentation_figure
 from accelstudy.campaign.importing.allan import allan_moments
 from accelstudy.campaign.importing.detection import slope_sigmas
-from accelstudy.campaign.importing.logs import (
-    ImportSettings,
-    import_log,
-    import_means,
-    import_sensors,
-    import_to,
-    parse_settings,
-)
+from accelstudy.campaign.importing.logs import import_log, import_sensors, import_to
+from accelstudy.campaign.importing.means import import_means
 from accelstudy.campaign.importing.recording import open_log
 from accelstudy.campaign.importing.segments import Moments, Segment
+from accelstudy.campaign.importing.settings import ImportSettings, parse_settings
 from accelstudy.commands.importing import files_of
 from accelstudy.leveling.angles import specific_force
 from accelstudy.sensors.frames import parse_frame

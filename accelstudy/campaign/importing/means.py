@@ -121,13 +121,13 @@ def _columns(source: Source, settings: ImportSettings) -> tuple[dict[str, Array]
         if key not in MEANS:
             raise UnknownNameError("column", key, MEANS)
 
-    def found(keys: tuple[str, ...], needed: bool = False) -> dict[str, int]:
+    def places_of(keys: tuple[str, ...], needed: bool = False) -> dict[str, int]:
         return locate(source, {k: given[k] for k in keys if k in given}, keys, needed)
 
-    places = found(AXES, needed=True)
-    places |= found(("n_samples", *SDS, "temperature", "vibration"))
+    places = places_of(AXES, needed=True)
+    places |= places_of(("n_samples", *SDS, "temperature", "vibration"))
     warnings = []
-    angles = found((*ANGLES, "yaw"))
+    angles = places_of((*ANGLES, "yaw"))
     if settings.robot is not None:
         missing = [key for key in ANGLES if key not in angles]
         if missing:
