@@ -11,8 +11,7 @@ from accelstudy.basics.units import GON
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing import segmentation_figure
-from accelstudy.campaign.importing.allan import allan_moments
-from accelstudy.campaign.importing.detection import slope_sigmas
+from accelstudy.campaign.importing.allan import allan_moments, slope_sigmas
 from accelstudy.campaign.importing.logs import import_log, import_sensors, import_to
 from accelstudy.campaign.importing.means import import_means
 from accelstudy.campaign.importing.recording import open_log

@@ -27,7 +27,7 @@ from accelstudy.campaign.calibration.document import FORCES
 from accelstudy.campaign.calibration.readings import Readings, readings_of
 from accelstudy.campaign.calibration.tables import chunk_writer, column_names, is_parquet, numbers
 from accelstudy.campaign.checks import likely_fault
-from accelstudy.campaign.importing.recording import AXES
+from accelstudy.campaign.importing.columns import AXES
 from accelstudy.campaign.importing.sources import CHUNK
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import near_pole

@@ -13,9 +13,10 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import display_unit, to_display
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.importing.allan import MeanAccuracy, accuracy_of_mean
+from accelstudy.campaign.importing.columns import AXES
 from accelstudy.campaign.importing.detection import DetectedHolds, find_joint_holds
 from accelstudy.campaign.importing.means import import_means
-from accelstudy.campaign.importing.recording import AXES, Log, LogSeries, Recording, open_log
+from accelstudy.campaign.importing.recording import Log, LogSeries, Recording, open_log
 from accelstudy.campaign.importing.settings import (
     ImportReport,
     ImportSettings,

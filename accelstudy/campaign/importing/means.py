@@ -12,7 +12,7 @@ from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import MGON, ROBOT_UNITS, UNITS
 from accelstudy.campaign.checks import clearly_worse, misfit_of_angles
 from accelstudy.campaign.header import LogLayout
-from accelstudy.campaign.importing.recording import AXES, locate, read_columns
+from accelstudy.campaign.importing.columns import AXES, locate, read_columns
 from accelstudy.campaign.importing.settings import (
     ImportReport,
     ImportSettings,
