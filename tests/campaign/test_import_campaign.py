@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from click.testing import CliRunner
+from campaign_helpers import refusal, succeed
 from scipy.io import savemat
 from test_import_holds import G, session, shared, write
 
@@ -17,8 +17,6 @@ from accelstudy.campaign.importing import segmentation_figure
 from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.means import import_means
 from accelstudy.campaign.importing.settings import ImportSettings, parse_settings, read_settings
-from accelstudy.commands.importing import import_command
-from accelstudy.commands.main import Commands
 
 XSENS = {
     "columns": {"fx": 1, "fy": 2, "fz": 3},
@@ -28,12 +26,6 @@ XSENS = {
     "offset": [33124, 33275, 32365],
     "gravity": {"value_mps2": 9.81744},
 }
-
-
-def call(*arguments):
-    # `main` registers the command; a group of its own keeps this test apart from it.
-    group = Commands(commands=[import_command])
-    return CliRunner().invoke(group, ["import", *map(str, arguments)])
 
 
 @pytest.fixture
@@ -154,8 +146,7 @@ def test_settings_are_overlaid(tmp_path):
 
 def test_command(log, tmp_path, monkeypatch):
     out = tmp_path / "campaign"
-    result = call(log, "--out", out, "--rate", 100, "--name", "mine", "--gravity", G)
-    assert result.exit_code == 0, result.output
+    result = succeed("import", log, "--out", out, "--rate", 100, "--name", "mine", "--gravity", G)
     assert "holds: 8, of 2.6 to 2.6 s" in result.stdout
     assert "times the noise floor" in result.stdout
     campaign = read_campaign(out)
@@ -165,12 +156,11 @@ def test_command(log, tmp_path, monkeypatch):
     assert campaign.sigma_force == pytest.approx(expected.sigma_force)
     svg = (out / "segmentation.svg").read_bytes()
     assert (out / "segmentation.png").stat().st_size > 1e4
-    assert call(log, "--out", out, "--rate", 100, "--force").exit_code == 0
+    succeed("import", log, "--out", out, "--rate", 100, "--force")
     assert (out / "segmentation.svg").read_bytes() == svg
     # A figure that fails takes the campaign not with it, and leaves no older one behind.
     monkeypatch.setattr(segmentation_figure, "draw_segmentation", lambda *_: 1 / 0)
-    result = call(log, "--out", out, "--rate", 100, "--force")
-    assert result.exit_code == 0
+    result = succeed("import", log, "--out", out, "--rate", 100, "--force")
     assert "The figure 'segmentation' could not be drawn (ZeroDivisionError: div" in result.stderr
     assert not list(out.glob("segmentation.*"))
     np.testing.assert_array_equal(read_campaign(out).forces, campaign.forces)
@@ -191,12 +181,12 @@ def test_command_with_everything(tmp_path):
     np.savetxt(tmp_path / "log.txt", table, "%.1f")
     content = {"time_unit": "ms", "columns": {"fx": 1, "fy": 2}, "sensor": "A-1"}
     (tmp_path / "settings.yaml").write_text(yaml.safe_dump(content))
-    result = call(
+    result = succeed(
+        "import",
         *(tmp_path / "log.txt", "--out", tmp_path / "out", "--settings"),
         *(tmp_path / "settings.yaml", "--columns", "fz=3", "--time", "0", "--unit", "counts"),
         *("--scale", "0.001", "--offset", "1,2,3", "--threshold", "0.1", "--no-figure"),
     )
-    assert result.exit_code == 0, result.output
     assert "threshold: 0.1 m/s², as given" in result.stdout
     campaign = read_campaign(tmp_path / "out")
     assert campaign.n_positions == 4
@@ -217,11 +207,8 @@ def test_command_with_everything(tmp_path):
     ],
 )
 def test_command_says_what_is_wrong(log, tmp_path, options, message):
-    result = call(log, "--out", tmp_path / "out", *options)
-    assert result.exit_code == 2
-    assert result.stderr.startswith("error: ")
-    assert message in result.stderr
-    assert result.stderr.count("\n") == 1
+    line = refusal("import", log, "--out", tmp_path / "out", *options)
+    assert message in line
     assert not (tmp_path / "out" / "campaign.yaml").exists()
 
 
@@ -247,8 +234,7 @@ def test_mpu9150_is_as_noisy_as_its_residuals(i):
 
 def test_ctu_means(tmp_path):
     path = shared("ctu_innalabs/CalibrationOfLowCostTriaxialInertialSensors.mat")
-    result = call(path, "--out", tmp_path, "--means", "--unit", "g")
-    assert result.exit_code == 0, result.output
+    result = succeed("import", path, "--out", tmp_path, "--means", "--unit", "g")
     assert result.stdout.startswith("24 positions; sigma of a mean: unknown")
     campaign = read_campaign(tmp_path)
     np.testing.assert_allclose(np.linalg.norm(campaign.forces, axis=1), STANDARD_GRAVITY, rtol=0.08)
