@@ -42,9 +42,9 @@ def test_a_white_log(log):
     np.testing.assert_array_equal(campaign.n_samples, report.holds.n_samples)
     np.testing.assert_allclose(campaign.sd, 0.02, rtol=0.2)
     assert np.all(np.diff(campaign.time) == pytest.approx(6, abs=0.1))
-    assert campaign.sigma_force == report.sigma_allan
+    assert campaign.sigma_force == report.accuracy.allan
     assert report.sigma_white == pytest.approx(0.02 / np.sqrt(260), rel=0.05)
-    assert report.ratio == pytest.approx(1, abs=0.35)
+    assert report.accuracy.ratio == pytest.approx(1, abs=0.35)
 
 
 def test_turning_is_not_noise(tmp_path):
@@ -89,7 +89,7 @@ def test_means(tmp_path):
     expected = 0.02 * STANDARD_GRAVITY * np.sqrt((1 / 400 + 1 / 100) / 2)
     assert campaign.sigma_force == pytest.approx(expected)
     assert "white" in report.warnings[0]
-    assert (report.holds, report.ratio, report.sigma_allan) == (None, None, None)
+    assert (report.holds, report.accuracy) == (None, None)
 
 
 @pytest.mark.parametrize(
@@ -219,8 +219,8 @@ def test_xsens(tmp_path):
     path = shared("imu_tk_xsens/xsens_acc.mat")
     campaign, report = import_log(path, parse_settings(XSENS))
     assert report.sigma_white == pytest.approx(0.29e-3, rel=0.05)
-    assert 0.5e-3 < report.sigma_allan < 1.6e-3
-    assert 2 < report.ratio < 6
+    assert 0.5e-3 < report.accuracy.allan < 1.6e-3
+    assert 2 < report.accuracy.ratio < 6
     np.testing.assert_allclose(np.linalg.norm(campaign.forces, axis=1), 9.817, atol=0.3)
 
 

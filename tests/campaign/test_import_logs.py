@@ -15,7 +15,7 @@ from scipy.io import loadmat, savemat
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.campaign.importing.detection import find_holds
+from accelstudy.campaign.importing.detection import find_joint_holds
 from accelstudy.campaign.importing.recording import open_log
 
 N = 50
@@ -372,7 +372,7 @@ def test_whatever_the_text(tmp_path, rows, separator, timing, columns, chunk_siz
         time, forces = everything(log)
         assert len(time) == len(forces)
         assert np.isfinite(forces).all()
-        find_holds(log, shortest=0.1, window=0.5)
+        find_joint_holds([log], shortest=0.1, window=0.5)
 
 
 @settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])

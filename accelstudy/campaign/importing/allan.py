@@ -136,14 +136,6 @@ def averaging_factors(largest: int) -> list[int]:
     return [int(m) for m in np.unique(np.round(2.0 ** (steps / 4)).astype(int)) if m <= largest]
 
 
-def allan_deviation(samples: ArrayLike, step: float) -> AllanDeviation:
-    """Overlapping Allan deviation of one record, (n,) or (n, channels); `step` in s."""
-    values = np.asarray(samples, dtype=float).reshape(len(np.asarray(samples)), -1)
-    sums = AllanSums(values.shape[1])
-    sums.add(allan_moments(values))
-    return sums.deviation(step)
-
-
 @dataclass(frozen=True)
 class MeanAccuracy:
     """How well the mean over a hold is known.

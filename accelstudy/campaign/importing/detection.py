@@ -152,11 +152,6 @@ class DetectedHolds:
         return slope_sigmas(list(self.segments.values()), self.step)
 
 
-def find_holds(log: Recording, **options: Any) -> DetectedHolds:
-    """Find the static holds of one log; see `find_joint_holds`."""
-    return find_joint_holds([log], **options)[0]
-
-
 def find_joint_holds(
     logs: Sequence[Recording],
     *,

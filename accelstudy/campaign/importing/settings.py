@@ -219,16 +219,6 @@ class ImportReport:
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
 
-    @property
-    def sigma_allan(self) -> float | None:
-        """Standard deviation of a mean from the Allan deviation, m/s²; None without a log."""
-        return None if self.accuracy is None else self.accuracy.allan
-
-    @property
-    def ratio(self) -> float | None:
-        """Factor by which the assumption of white noise is too optimistic."""
-        return None if self.accuracy is None else self.accuracy.ratio
-
     def lines(self) -> list[str]:
         """Return the report as lines of text."""
         if self.holds is None or self.accuracy is None:
