@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY, recorded_unit, to_recorded
+from accelstudy.campaign.calibration.applying import FORCES
 from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.fit import CampaignFit
 from accelstudy.campaign.calibration.wording import verdict_lines
@@ -24,8 +25,6 @@ Gauge = Literal["upper", "lower", "symmetric"]
 GAUGES: tuple[Gauge, ...] = ("upper", "lower", "symmetric")
 """Ways to fix the rotation from the left up to which the norm of gravity determines K in
 f_b = K (f_s − b); all have the same KᵀK and the same residuals."""
-FORCES = {"fx_mps2": "forward", "fy_mps2": "right", "fz_mps2": "down"}
-"""Ranges of the calibrated forces, and where they point."""
 
 
 def calibration_document(fit: CampaignFit) -> dict[str, Any]:

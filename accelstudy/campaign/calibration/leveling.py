@@ -22,8 +22,7 @@ from accelstudy.basics.units import (
     to_display,
 )
 from accelstudy.basics.wording import counted, short_list
-from accelstudy.campaign.calibration.applying import Calibration
-from accelstudy.campaign.calibration.document import FORCES
+from accelstudy.campaign.calibration.applying import MARGIN, Calibration, Watch
 from accelstudy.campaign.calibration.readings import Readings, readings_of
 from accelstudy.campaign.calibration.tables import chunk_writer, column_names, is_parquet, numbers
 from accelstudy.campaign.checks import likely_fault
@@ -44,9 +43,6 @@ NEAR_POLE = "near_pole"
 
 RAGGED = "ragged"
 """Key of an unusable line that has more or fewer cells than the others."""
-
-MARGIN = 0.1
-"""A log may leave a range by this part of its width without a warning."""
 
 DECIMALS = 9
 """Decimals of the added columns: far below any noise, and half the digits of a double."""
@@ -355,58 +351,3 @@ class Account:
                 f"{gravity:.3g} m/s²; give the --unit or the --columns of this log"
             )
         )
-
-
-class Watch:
-    """Counts the rows of a log that lie beyond the ranges of a calibration.
-
-    Parameters
-    ----------
-    ranges : mapping, as `ranges_of` returns it
-    """
-
-    def __init__(self, ranges: Mapping[str, list[float]]) -> None:
-        groups = [
-            ("temperature", "°C", {"temperature_degC": ""}),
-            ("vibration", "m/s²", {"vibration_mps2": ""}),
-            ("specific force", "m/s²", {name: f" {way}" for name, way in FORCES.items()}),
-        ]
-        self._ranges = ranges
-        self._groups = [group for group in groups if set(group[2]) <= set(ranges)]
-        self._rows = dict.fromkeys((what for what, _, _ in groups), 0)
-        self._worst: dict[str, tuple[float, str, float]] = {}
-
-    def look_at(self, corrected: Array, hold: HoldConditions) -> None:
-        """Count calibrated forces (n, 3), m/s², and their conditions."""
-        columns = {
-            "temperature_degC": hold.temperature,
-            "vibration_mps2": hold.vibration,
-            **dict(zip(FORCES, corrected.T, strict=True)),
-        }
-        for what, _, names in self._groups:
-            beyond = np.zeros(len(corrected), dtype=bool)
-            for name in names:
-                values = columns[name]
-                if values is None:
-                    continue
-                low, high = self._ranges[name]
-                # In parts of the width, so that axes can be compared; NaN does not count.
-                excess = np.fmax(low - values, values - high) / max(high - low, 1e-9)
-                beyond |= excess > MARGIN
-                if (excess > MARGIN).any():
-                    i = int(np.nanargmax(excess))
-                    farthest = (float(excess[i]), name, float(values[i]))
-                    self._worst[what] = max(farthest, self._worst.get(what, farthest))
-            self._rows[what] += int(beyond.sum())
-
-    def warnings(self, rows: int) -> Iterator[str]:
-        """Say what lay beyond a range in a log of so many rows."""
-        for what, unit, names in self._groups:
-            if what in self._worst:
-                _, name, value = self._worst[what]
-                low, high = self._ranges[name]
-                yield (
-                    f"{what} outside the range of the calibration in {self._rows[what]} of "
-                    f"{counted(rows, 'row')}: up to {value:.4g} {unit}{names[name]}, while the "
-                    f"calibration had {low:.4g} to {high:.4g}; it is extrapolated there"
-                )
