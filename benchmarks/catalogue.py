@@ -13,7 +13,7 @@ from zlib import crc32
 import numpy as np
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.effects import effect_names, effects_without
 from accelstudy.hidden.physics.case import Case

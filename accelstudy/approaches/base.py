@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar
 
 from accelstudy.basics.registry import Registry
 from accelstudy.effects.components import Number, Vector
@@ -39,13 +39,6 @@ class Approach:
 
 
 _registry: Registry[Approach] = Registry("approach")
-ApproachClass = TypeVar("ApproachClass", bound=type[Approach])
-
 get_approach = _registry.get
 approach_names = _registry.names
-
-
-def register(approach: ApproachClass) -> ApproachClass:
-    """Class decorator: enter an approach into the registry under its name."""
-    _registry.add(approach.name, approach())
-    return approach
+register = _registry.register

@@ -22,7 +22,7 @@ from accelstudy.commands.options import (
 )
 
 if TYPE_CHECKING:
-    from accelstudy.campaign.files.session import Campaign
+    from accelstudy.campaign.session import Campaign
     from accelstudy.sequential.information import Prior
 
 POLL = 1.0
@@ -162,7 +162,7 @@ def _prior(path: Path | None, model: str) -> tuple[Prior, ...]:
     import numpy as np
 
     from accelstudy.basics.errors import InputError
-    from accelstudy.campaign.use.applying import read_calibration
+    from accelstudy.campaign.calibration.applying import read_calibration
     from accelstudy.sensors.models import get_model
     from accelstudy.sequential.information import Prior
 

@@ -12,9 +12,9 @@ from scipy.optimize import nnls
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import recorded_unit, to_recorded
-from accelstudy.campaign.files.format import read_campaign
-from accelstudy.campaign.holds.allan import RELIABLE, AllanDeviation
-from accelstudy.campaign.importing.logs import import_log
+from accelstudy.campaign.format import read_campaign
+from accelstudy.campaign.importing.allan import RELIABLE, AllanDeviation
+from accelstudy.campaign.importing.logs import import_sensors
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.data_sheets.sheet import FLICKER, QUANTITIES, DataSheet
 
@@ -30,7 +30,7 @@ def sheet_of_log(path: str | Path, settings: ImportSettings) -> DataSheet:
     InputError
         If the log cannot be read, has no static hold, or is too short for an Allan deviation.
     """
-    _, report = import_log(path, settings)
+    ((_, report),) = import_sensors([path], settings).values()
     assert report.holds is not None
     noise = report.holds.noise
     curve = noise.allan.channels(noise.of_sensor)

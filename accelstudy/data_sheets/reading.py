@@ -13,7 +13,7 @@ from typing import Any
 from accelstudy.basics.errors import InputError, UnknownNameError, shown
 from accelstudy.basics.units import parse_quantity
 from accelstudy.data_sheets.sheet import LEAST_FULL_SCALE, MOST, QUANTITIES, DataSheet
-from accelstudy.files.layers import read_layer
+from accelstudy.files.reading import read_layer
 
 TEXTS = ("name", "title", "source")
 DENSITY = "noise_density"

@@ -10,9 +10,8 @@ from pydantic import BaseModel, Field, model_validator
 
 from accelstudy.basics.errors import InputError
 from accelstudy.data_sheets import data_sheet_names, of_sigma
-from accelstudy.files.provenance import config_hash
-from accelstudy.files.types import OneOrMore, PathName, Replicates, Seed
-from accelstudy.files.validation import Block, checked
+from accelstudy.files.reading import config_hash
+from accelstudy.files.validation import Block, OneOrMore, PathName, Replicates, Seed, checked
 from accelstudy.plan.quantities import QUANTITIES
 from accelstudy.plan.question import Question, equipment_of, get_sensor
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from accelstudy import pages
 from accelstudy.basics.units import attitude_unit, to_attitude
 from accelstudy.basics.wording import comma_list, words
-from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.session import Campaign
 from accelstudy.effects import Effect
 from accelstudy.leveling.angles import roll_pitch
 from accelstudy.sensors.frames import FRD, Frame

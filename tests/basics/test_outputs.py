@@ -13,7 +13,7 @@ from campaign_helpers import simulated_campaign
 from click.testing import CliRunner
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.files.format import write_campaign
+from accelstudy.campaign.format import write_campaign
 from accelstudy.commands.main import main
 from accelstudy.files.outputs import (
     CALIBRATION,

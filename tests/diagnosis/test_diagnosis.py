@@ -9,10 +9,10 @@ from diagnosis_helpers import ROTATIONS, most
 
 from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
+from accelstudy.basics.levels import ACCEPTED, REJECTED
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.calibration.states import ACCEPTED, REJECTED
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.held_out import gap
 from accelstudy.diagnosis.pipeline import diagnose

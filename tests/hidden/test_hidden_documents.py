@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from places import ROOT
 
-from accelstudy.files.layers import read_layer
+from accelstudy.files.reading import read_layer
 from accelstudy.files.tables import read_table
 from accelstudy.hidden.page.figures import figures
 from accelstudy.hidden.page.markdown import sample_table

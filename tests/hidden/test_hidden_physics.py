@@ -10,8 +10,8 @@ import pytest
 import accelstudy.hidden.physics as physics
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.files.format import read_campaign, write_campaign
-from accelstudy.campaign.files.header import COLUMNS
+from accelstudy.campaign.format import read_campaign, write_campaign
+from accelstudy.campaign.header import COLUMNS
 from accelstudy.diagnosis.space.signatures import signature
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.hidden.physics import (
@@ -58,8 +58,8 @@ def imports(folder):
 
 def test_the_generator_knows_nothing_of_what_it_judges():
     allowed = (
-        "accelstudy.campaign.files.session",
-        "accelstudy.campaign.files.format",
+        "accelstudy.campaign.session",
+        "accelstudy.campaign.format",
         "accelstudy.basics.errors",
         "accelstudy.basics.units",
         "accelstudy.hidden.physics",

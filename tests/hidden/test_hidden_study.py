@@ -12,7 +12,7 @@ from snakemake_helpers import one_line, snakemake
 import accelstudy
 from accelstudy.basics.errors import InputError
 from accelstudy.effects import effect_names, effects_without
-from accelstudy.files.layers import overlay, read_layer
+from accelstudy.files.reading import overlay, read_layer
 from accelstudy.files.tables import read_table, write_table
 from accelstudy.hidden.physics import Case
 from accelstudy.hidden.study import diagnosing, making

@@ -7,7 +7,7 @@ import pytest
 from calling import call, refusal
 
 from accelstudy.basics.units import MGON
-from accelstudy.campaign.use.applying import read_calibration
+from accelstudy.campaign.calibration.applying import read_calibration
 from accelstudy.files.tables import read_origin, read_table
 from accelstudy.pole import output
 from accelstudy.pole.geometry import leaning

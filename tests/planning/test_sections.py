@@ -10,7 +10,7 @@ from snakemake_helpers import one_line, snakemake
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
 from accelstudy.field import config as field
-from accelstudy.files.layers import read_layer
+from accelstudy.files.reading import read_layer
 from accelstudy.files.tables import read_origin, read_table
 from accelstudy.plan.config import PlanConfig, parse_example, parse_section
 from accelstudy.pole import output as pole

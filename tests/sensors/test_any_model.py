@@ -15,13 +15,13 @@ from accelstudy.adjustment.quality.redundancy import _leveling_slope
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.batch.config import parse_batch
+from accelstudy.campaign.calibration.applying import read_calibration
 from accelstudy.campaign.calibration.document import calibration_document
+from accelstudy.campaign.calibration.export import export
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.files.format import read_campaign
+from accelstudy.campaign.calibration.readings import readings_of
+from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.campaign.use.applying import read_calibration
-from accelstudy.campaign.use.export import export
-from accelstudy.campaign.use.readings import readings_of
 from accelstudy.commands.main import main
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.document.calibration import diagnosed_calibration

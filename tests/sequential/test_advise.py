@@ -15,7 +15,7 @@ from accelstudy.adjustment import calibrate
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import GON, MGON, angles_in
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.files.format import read_campaign
+from accelstudy.campaign.format import read_campaign
 from accelstudy.commands import advise as command
 from accelstudy.leveling.angles import specific_force
 from accelstudy.sensors.frames import parse_frame

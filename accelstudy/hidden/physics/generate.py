@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.session import Campaign
 from accelstudy.hidden.physics.case import Case, HiddenEffect, Truth, plain
 from accelstudy.hidden.physics.drawing import drawn
 from accelstudy.hidden.physics.forward.measuring import Cause, Sensor, observe

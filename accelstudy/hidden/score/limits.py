@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from accelstudy.adjustment.quality import noncentrality
-from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.worth.limits import POWER, visibilities
 from accelstudy.diagnosis.worth.visibility import examine_campaign
 from accelstudy.hidden.physics import generate

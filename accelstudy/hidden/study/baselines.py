@@ -17,7 +17,7 @@ from scipy import stats
 from accelstudy.adjustment.quality import solve
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.fit import fit_campaign, usual_approach
-from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.space.examined import examine
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis
 from accelstudy.sensors.sensor import SensorModel

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.session import Campaign
 from accelstudy.effects import effects_without
 from accelstudy.files.tables import write_table
 from accelstudy.hidden.study.baselines import METHODS, answers

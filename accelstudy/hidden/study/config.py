@@ -11,9 +11,16 @@ from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.config_names import ModelName
 from accelstudy.effects import effect_names
-from accelstudy.files.provenance import config_hash
-from accelstudy.files.types import OneOrMore, PathName, Positive, Replicates, Seed
-from accelstudy.files.validation import Block, checked
+from accelstudy.files.reading import config_hash
+from accelstudy.files.validation import (
+    Block,
+    OneOrMore,
+    PathName,
+    Positive,
+    Replicates,
+    Seed,
+    checked,
+)
 from accelstudy.hidden.physics import APPROACHES, DESIGNS, EFFECTS, GROSS, NOISES, OUTSIDE
 from accelstudy.sensors.models import get_model
 

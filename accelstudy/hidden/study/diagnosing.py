@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.effects import effects_without

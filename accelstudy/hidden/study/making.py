@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.session import Campaign
 from accelstudy.hidden.physics import Truth, generate
 from accelstudy.hidden.study.cells import Cell
 from accelstudy.hidden.study.tables import SCHEMA

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from accelstudy.basics.errors import InputError
-from accelstudy.files.layers import overlay, read_layer
+from accelstudy.files.reading import overlay, read_layer
 from accelstudy.files.validation import checked
 from accelstudy.study.config.formulas import check_formulas
 from accelstudy.study.config.schema import StudyConfig

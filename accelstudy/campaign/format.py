@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
 from accelstudy.basics.wording import one_line
-from accelstudy.campaign.files.checks import (
+from accelstudy.campaign.checks import (
     check_angles,
     check_column,
     check_names,
@@ -27,12 +27,11 @@ from accelstudy.campaign.files.checks import (
     check_robot,
     check_size,
 )
-from accelstudy.campaign.files.header import COLUMNS, COUNTING, HEADER, KNOWN, TABLES, Header
-from accelstudy.campaign.files.session import Campaign
-from accelstudy.files.layers import overlay, read_layer
+from accelstudy.campaign.header import COLUMNS, COUNTING, HEADER, KNOWN, TABLES, Header
+from accelstudy.campaign.session import Campaign
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.parquet import whole_parquet, write_parquet
-from accelstudy.files.reading import read_text
+from accelstudy.files.reading import overlay, read_layer, read_text
 from accelstudy.files.validation import checked
 
 Array = NDArray[np.float64]

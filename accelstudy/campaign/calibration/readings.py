@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import UNITS
-from accelstudy.campaign.files.header import LogLayout
-from accelstudy.campaign.logs.columns import AXES, locate
-from accelstudy.campaign.logs.sources import CHUNK, Source, open_source
-from accelstudy.campaign.logs.tables import column_names, numbers, read_chunks
-from accelstudy.campaign.use.applying import Calibration
-from accelstudy.campaign.use.export import campaign_conversion, mending
+from accelstudy.campaign.calibration.applying import Calibration
+from accelstudy.campaign.calibration.export import campaign_conversion, mending
+from accelstudy.campaign.calibration.tables import column_names, numbers, read_chunks
+from accelstudy.campaign.header import LogLayout
+from accelstudy.campaign.importing.columns import AXES, locate
+from accelstudy.campaign.importing.sources import CHUNK, Source, open_source
 from accelstudy.effects import Course, HoldConditions
 from accelstudy.files.validation import checked
 from accelstudy.sensors.conversion import Conversion, conversion_of

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.wording import short_list
-from accelstudy.campaign.logs.sources import CHUNK, Source
+from accelstudy.campaign.importing.sources import CHUNK, Source
 from accelstudy.sensors.conversion import LARGEST
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.files.header import COLUMNS, LogLayout
+from accelstudy.campaign.header import COLUMNS, LogLayout
 from accelstudy.effects import HoldConditions
 from accelstudy.sensors.conversion import Conversion
 

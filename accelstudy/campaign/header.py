@@ -19,7 +19,8 @@ from pydantic import (
 from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.units import GON
-from accelstudy.files.types import (
+from accelstudy.files.validation import (
+    Block,
     Finite,
     Gravity,
     Number,
@@ -30,7 +31,6 @@ from accelstudy.files.types import (
     SigmaForce,
     SigmaGravity,
 )
-from accelstudy.files.validation import Block
 from accelstudy.sensors.conversion import Conversion, conversion_of
 from accelstudy.sensors.frames import Frame, parse_frame
 

@@ -8,7 +8,8 @@ chunk of it is in memory at a time.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,22 +19,30 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import stage
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.basics.wording import counted
-from accelstudy.campaign.holds.allan import RELIABLE
-from accelstudy.campaign.holds.detected import DetectedHolds, collected
-from accelstudy.campaign.holds.segments import Segment, runs_at_rest
-from accelstudy.campaign.holds.selection import Selection
-from accelstudy.campaign.holds.threshold import (
+from accelstudy.campaign.importing.allan import (
+    RELIABLE,
+    AllanDeviation,
+    AllanSums,
+    slope_sigmas,
+)
+from accelstudy.campaign.importing.recording import Recording
+from accelstudy.campaign.importing.segments import Segment, Selection, runs_at_rest
+from accelstudy.campaign.importing.windows import (
+    Envelope,
     Survey,
     Threshold,
     choose_threshold,
     given_threshold,
+    samples_in,
     survey_log,
+    windows,
 )
-from accelstudy.campaign.holds.windows import Envelope, samples_in, windows
-from accelstudy.campaign.logs.recording import Recording
+from accelstudy.leveling.angles import usual_norm
 
 Array = NDArray[np.float64]
 
+_ALIKE = 1.5  # largest over smallest norm of the means of one sensor in gravity
+_SPREAD = 0.25  # rms of the means along their thinnest direction, over gravity; of a sphere 0.58
 WANDERING = 2.0
 """A hold whose standard deviation is more than this many thresholds of a window is none."""
 RESTLESS = 0.02
@@ -45,9 +54,102 @@ SHORTEST = 0.2
 """Seconds; quicker motions are vibrations, which do not harm a mean."""
 
 
-def find_holds(log: Recording, **options: Any) -> DetectedHolds:
-    """Find the static holds of one log; see `find_joint_holds`."""
-    return find_joint_holds([log], **options)[0]
+@dataclass(frozen=True)
+class HoldNoise:
+    """Noise of the samples within all holds of a log together, in three channels.
+
+    The first channel is along the mean specific force of a hold, the other two are across it.
+
+    Attributes
+    ----------
+    allan : AllanDeviation, of the channels
+    sd : (3,) array, m/s², root mean square sd of the samples within holds in the channels
+    center : (3,) array, m/s², zero point of the specific forces; zero if the holds determine none
+    directed : bool, whether the means are close enough to forces for "along" to have a meaning
+    """
+
+    allan: AllanDeviation
+    sd: Array
+    center: Array
+    directed: bool
+
+    @property
+    def of_sensor(self) -> slice:
+        """Channels with the noise of the sensor: those without what moves it, if there are any."""
+        return slice(0, 1) if self.directed else slice(0, 3)
+
+
+@dataclass(frozen=True)
+class DetectedHolds:
+    """Static holds of a log, n of them, in order of time.
+
+    Attributes
+    ----------
+    segments : mapping of int to Segment, by the numbers that figures and options use
+    left_out : mapping of int to str, numbers of holds that are left out, with the reason
+    conditions : mapping of "temperature" and "vibration" to (n,) arrays, °C (mean) and m/s² (rms);
+        NaN where nothing is known
+    noise : HoldNoise, of the holds that are not left out
+    threshold : Threshold
+    step : float, s, usual time between samples
+    envelope : Envelope, of the log, for its figure
+    warnings : tuple of str
+    """
+
+    segments: Mapping[int, Segment]
+    left_out: Mapping[int, str]
+    conditions: Mapping[str, Array]
+    noise: HoldNoise
+    threshold: Threshold
+    step: float
+    envelope: Envelope
+    warnings: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.segments)
+
+    def of_each(self, attribute: str) -> NDArray[Any]:
+        """Attribute of `Segment` for each hold, (n,) or (n, 3)."""
+        return np.array([getattr(segment, attribute) for segment in self.segments.values()])
+
+    @property
+    def number(self) -> NDArray[np.int_]:
+        """Numbers of the holds, (n,)."""
+        return np.array(list(self.segments))
+
+    @property
+    def used(self) -> NDArray[np.bool_]:
+        """Which holds are not left out, (n,)."""
+        return ~np.isin(self.number, list(self.left_out))
+
+    @property
+    def t0(self) -> Array:
+        """Times of the first samples since the first of the log, (n,), s."""
+        return self.of_each("t0")
+
+    @property
+    def t1(self) -> Array:
+        """Times of the last samples, (n,), s."""
+        return self.of_each("t1")
+
+    @property
+    def n_samples(self) -> NDArray[np.int_]:
+        """Numbers of samples, (n,)."""
+        return self.of_each("n")
+
+    @property
+    def mean(self) -> Array:
+        """Mean specific forces, (n, 3), m/s²."""
+        return self.of_each("mean")
+
+    @property
+    def radius(self) -> float:
+        """Usual distance of the means from the zero point of the specific forces, m/s²."""
+        return usual_norm(self.mean - self.noise.center)
+
+    def slope_sigmas(self) -> Array:
+        """Standard deviations of the slopes of the samples, (n, 3), m/s²/s."""
+        return slope_sigmas(list(self.segments.values()), self.step)
 
 
 def find_joint_holds(
@@ -206,3 +308,101 @@ def _never_still(log: Recording, survey: Survey, window: float, why: str) -> Inp
         f"of {window:g} s varies by {survey.quietest():.3g} m/s². Lay it down for some seconds in "
         "each of ten or more attitudes, on a table or in a fixture"
     )
+
+
+def collected(
+    segments: Mapping[int, Segment],
+    left_out: Mapping[int, str],
+    log: Recording,
+    threshold: Threshold,
+    envelope: Envelope,
+    warnings: Sequence[str],
+) -> DetectedHolds:
+    """Collect the segments of a sensor.
+
+    Raises
+    ------
+    InputError
+        If all holds are left out.
+    """
+    used = [segment for number, segment in segments.items() if number not in left_out]
+    if not used:
+        raise InputError(f"{log.path}: exclude: no hold is left")
+    return DetectedHolds(
+        segments=segments,
+        left_out=left_out,
+        conditions=_conditions(list(segments.values()), log.conditions),
+        noise=_noise(used, log.step),
+        threshold=threshold,
+        step=log.step,
+        envelope=envelope,
+        warnings=tuple(warnings),
+    )
+
+
+def _noise(segments: Sequence[Segment], step: float) -> HoldNoise:
+    """Turn the samples of each hold to its channels, and add them up."""
+    center, directed = _center(np.array([segment.mean for segment in segments]))
+    sums, variances = AllanSums(), []
+    for segment in segments:
+        frame = _frame(segment.mean - center)
+        for record in segment.noise:
+            sums.add(record, frame)
+        variances.append(np.diag(frame.T @ segment.covariance @ frame))
+    sd = np.sqrt(np.mean(variances, axis=0))
+    return HoldNoise(sums.deviation(step), sd, center, directed)
+
+
+def _conditions(segments: Sequence[Segment], names: Sequence[str]) -> dict[str, Array]:
+    """Mean temperature and rms vibration of holds."""
+    count, total, squares = np.array([s.conditions for s in segments]).transpose(1, 0, 2)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        values = {"temperature": total / count, "vibration": np.sqrt(squares / count)}
+    return {name: values[name][:, i] for i, name in enumerate(names)}
+
+
+def _center(means: Array) -> tuple[Array, bool]:
+    """Point from which all means of holds are equally far, and whether there is one.
+
+    The offset of counts may be unknown; with a large one no mean points along gravity. If the
+    attitudes differ enough, the sphere through the means shows it.
+    """
+    centers = [np.zeros(3)]
+    if len(means) > 5 and (sphere := fit_sphere(means)) is not None:
+        center, radius = sphere
+        thinnest = np.linalg.svd(means - means.mean(axis=0), compute_uv=False)[-1]
+        if thinnest > _SPREAD * radius * np.sqrt(len(means)):
+            centers.insert(0, center)
+    for center in centers:
+        norms = np.linalg.norm(means - center, axis=1)
+        if norms.max() <= _ALIKE * norms.min():
+            return center, True
+    return np.zeros(3), False
+
+
+def _frame(force: Array) -> Array:
+    """Orthonormal columns, the first of them along `force`.
+
+    A sensor that settles or is nudged turns a little. That moves the force across its mean, and
+    along it in the second order only. So the scatter along the mean is the sensor's own noise.
+    """
+    size = float(np.linalg.norm(force))
+    if size == 0:
+        return np.eye(3)
+    return np.linalg.svd(force[:, None] / size)[0]
+
+
+def fit_sphere(forces: Array) -> tuple[Array, float] | None:
+    """Centre (3,) and radius of the sphere that fits points (n, 3) best; None if there is none.
+
+    |f − c|² = r² is linear in c and in r² − |c|².
+    """
+    # Relative to their mean, so that a large offset costs no digits.
+    middle = forces.mean(axis=0)
+    points = forces - middle
+    design = np.column_stack([2 * points, np.ones(len(points))])
+    solution, _, rank, _ = np.linalg.lstsq(design, np.sum(points**2, axis=1), rcond=1e-6)
+    square = solution[3] + solution[:3] @ solution[:3]
+    if rank < 4 or square <= 0:
+        return None
+    return middle + solution[:3], float(np.sqrt(square))

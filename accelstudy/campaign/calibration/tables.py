@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.wording import one_line
-from accelstudy.campaign.logs.sources import (
+from accelstudy.campaign.importing.sources import (
     CHUNK,
     MatlabSource,
     ParquetSource,

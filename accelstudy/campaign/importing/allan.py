@@ -1,4 +1,4 @@
-"""The Allan deviation, and how well it says the mean of a hold is known.
+"""The Allan deviation, and how well it says the mean and the slope of a hold are known.
 
 Samples of a real sensor are not independent, so the mean of n samples is less certain than their
 standard deviation over √n. The Allan deviation at an averaging time τ measures the scatter of means
@@ -7,13 +7,20 @@ over τ for noise of any colour. For white noise both agree.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+if TYPE_CHECKING:
+    from accelstudy.campaign.importing.segments import Segment
+
 Array = NDArray[np.float64]
 
+SHARE = 8.0
+"""Length of a hold over the longest averaging time that its residuals about a line are used for."""
 RELIABLE = 10
 """Independent differences of neighbouring means that a trusted value needs (it is right to about
 20 %)."""
@@ -129,14 +136,6 @@ def averaging_factors(largest: int) -> list[int]:
     return [int(m) for m in np.unique(np.round(2.0 ** (steps / 4)).astype(int)) if m <= largest]
 
 
-def allan_deviation(samples: ArrayLike, step: float) -> AllanDeviation:
-    """Overlapping Allan deviation of one record, (n,) or (n, channels); `step` in s."""
-    values = np.asarray(samples, dtype=float).reshape(len(np.asarray(samples)), -1)
-    sums = AllanSums(values.shape[1])
-    sums.add(allan_moments(values))
-    return sums.deviation(step)
-
-
 @dataclass(frozen=True)
 class MeanAccuracy:
     """How well the mean over a hold is known.
@@ -196,3 +195,39 @@ def accuracy_of_mean(curve: AllanDeviation, duration: float, sd: float, n: int) 
     return MeanAccuracy(
         duration, white, float(np.exp(level + slope * np.log(duration))), tau, slope
     )
+
+
+def slope_sigmas(segments: Sequence[Segment], step: float) -> Array:
+    """Standard deviations of the slopes of the axes in holds, (n, 3), m/s²/s.
+
+    The slope over a time T depends on the difference between its two halves. For white noise the
+    least-squares slope has σ = √6 σ_A(T/2) / T with the Allan deviation σ_A; for flicker noise and
+    a random walk this is right within some 10 %.
+
+    σ_A is that of the residuals about the line of each hold, over all holds together, so that
+    slopes do not count as noise. Since the line also absorbs the slowest noise, a hold contributes
+    only averaging times up to an eighth of its length. Longer ones come from longer holds, or are
+    extrapolated.
+
+    Parameters
+    ----------
+    segments : sequence of Segment
+    step : float, s, between samples
+    """
+    sums = AllanSums()
+    for segment in segments:
+        for record in segment.wobble:
+            sums.add(record.up_to(segment.n / SHARE))
+    curve = sums.deviation(step)
+    variances = np.mean([np.diag(segment.covariance) for segment in segments], axis=0)
+    sigma = np.empty((len(segments), 3))
+    for i, segment in enumerate(segments):
+        for axis in range(3):
+            half = accuracy_of_mean(
+                curve.channels(slice(axis, axis + 1)),
+                segment.n * step / 2,
+                float(np.sqrt(variances[axis])),
+                max(1, segment.n // 2),
+            )
+            sigma[i, axis] = np.sqrt(6.0) * half.allan / (segment.n * step)
+    return sigma

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import ROBOT_UNITS, STANDARD_GRAVITY, UNITS
-from accelstudy.campaign.files.header import ANY, COLUMNS, COUNTING, HEADER, MOST, RANGES, Header
+from accelstudy.campaign.header import ANY, COLUMNS, COUNTING, HEADER, MOST, RANGES, Header
 from accelstudy.leveling.angles import specific_force, usual_norm
 
 Array = NDArray[np.float64]

@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import CLOCK_UNITS, UNITS
-from accelstudy.campaign.logs.columns import AXES, Column, check_numbers, locate
-from accelstudy.campaign.logs.sources import CHUNK, Source, open_source
+from accelstudy.campaign.importing.columns import AXES, Column, check_numbers, locate
+from accelstudy.campaign.importing.sources import CHUNK, Source, open_source
 from accelstudy.sensors.conversion import Conversion, conversion_of
 from accelstudy.sensors.frames import FRD, Frame
 

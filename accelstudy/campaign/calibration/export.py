@@ -12,13 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.wording import comma_list
-from accelstudy.campaign.calibration.gauges import not_affine
 from accelstudy.effects import Effect
 from accelstudy.effects.base import formulas
 from accelstudy.sensors.conversion import Conversion, conversion_of
 from accelstudy.sensors.frames import FRD, Frame, parse_frame
 from accelstudy.sensors.models import compose
-from accelstudy.sensors.sensor import SensorModel
+from accelstudy.sensors.sensor import SensorModel, not_affine
 
 Array = NDArray[np.float64]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, Field, model_validator
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.files.header import LogLayout, Nominal, PerAxis
+from accelstudy.basics.wording import counted
+from accelstudy.campaign.header import LogLayout, Nominal, PerAxis
 from accelstudy.effects import HoldConditions
 from accelstudy.files.reading import read_json
-from accelstudy.files.types import Finite, NotNegative, Number, Positive
-from accelstudy.files.validation import checked
+from accelstudy.files.validation import Finite, NotNegative, Number, Positive, checked
 from accelstudy.leveling.angles import angles_of, jacobian, tilt_slope
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
@@ -26,6 +26,10 @@ Array = NDArray[np.float64]
 
 
 NO_CALIBRATION = "not a calibration.json of accelstudy"
+MARGIN = 0.1
+"""A log may leave a range by this part of its width without a warning."""
+FORCES = {"fx_mps2": "forward", "fy_mps2": "right", "fz_mps2": "down"}
+"""Ranges of the calibrated forces, and where they point."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +44,7 @@ class Calibration:
     gravity : float, m/s²
     content : mapping, what is used of the file
     log : LogLayout, layout of the log from which the campaign was made; None if there was none
-    ranges : mapping, of the calibration, see `accelstudy.campaign.calibration.ranges`
+    ranges : mapping, of the calibration, see `calibration_document`
     """
 
     model: SensorModel
@@ -238,3 +242,58 @@ def _calibration(document: _Document) -> Calibration:
         log=document.log,
         ranges=document.ranges,
     )
+
+
+class Watch:
+    """Counts the rows of a log that lie beyond the ranges of a calibration.
+
+    Parameters
+    ----------
+    ranges : mapping, as `ranges_of` returns it
+    """
+
+    def __init__(self, ranges: Mapping[str, list[float]]) -> None:
+        groups = [
+            ("temperature", "°C", {"temperature_degC": ""}),
+            ("vibration", "m/s²", {"vibration_mps2": ""}),
+            ("specific force", "m/s²", {name: f" {way}" for name, way in FORCES.items()}),
+        ]
+        self._ranges = ranges
+        self._groups = [group for group in groups if set(group[2]) <= set(ranges)]
+        self._rows = dict.fromkeys((what for what, _, _ in groups), 0)
+        self._worst: dict[str, tuple[float, str, float]] = {}
+
+    def look_at(self, corrected: Array, hold: HoldConditions) -> None:
+        """Count calibrated forces (n, 3), m/s², and their conditions."""
+        columns = {
+            "temperature_degC": hold.temperature,
+            "vibration_mps2": hold.vibration,
+            **dict(zip(FORCES, corrected.T, strict=True)),
+        }
+        for what, _, names in self._groups:
+            beyond = np.zeros(len(corrected), dtype=bool)
+            for name in names:
+                values = columns[name]
+                if values is None:
+                    continue
+                low, high = self._ranges[name]
+                # In parts of the width, so that axes can be compared; NaN does not count.
+                excess = np.fmax(low - values, values - high) / max(high - low, 1e-9)
+                beyond |= excess > MARGIN
+                if (excess > MARGIN).any():
+                    i = int(np.nanargmax(excess))
+                    farthest = (float(excess[i]), name, float(values[i]))
+                    self._worst[what] = max(farthest, self._worst.get(what, farthest))
+            self._rows[what] += int(beyond.sum())
+
+    def warnings(self, rows: int) -> Iterator[str]:
+        """Say what lay beyond a range in a log of so many rows."""
+        for what, unit, names in self._groups:
+            if what in self._worst:
+                _, name, value = self._worst[what]
+                low, high = self._ranges[name]
+                yield (
+                    f"{what} outside the range of the calibration in {self._rows[what]} of "
+                    f"{counted(rows, 'row')}: up to {value:.4g} {unit}{names[name]}, while the "
+                    f"calibration had {low:.4g} to {high:.4g}; it is extrapolated there"
+                )
