@@ -2,22 +2,103 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.basics.errors import InputError
 from accelstudy.campaign.files.session import Campaign
-from accelstudy.hidden.physics.case import Case, HiddenEffect, Truth, plain
-from accelstudy.hidden.physics.drawing import drawn
-from accelstudy.hidden.physics.forward.measuring import Cause, Sensor, observe
-from accelstudy.hidden.physics.forward.noise import NOISES, Noise
-from accelstudy.hidden.physics.forward.session import GRAVITY, Session
+from accelstudy.hidden.physics.atlas import Atlas, Conditions, Shape
+from accelstudy.hidden.physics.designs import GRAVITY, Session
+from accelstudy.hidden.physics.effects import EFFECTS, OUTSIDE, Effect
 from accelstudy.hidden.physics.gross import GROSS
-from accelstudy.hidden.physics.seen.atlas import Atlas
-from accelstudy.hidden.physics.seen.conditions import Conditions
-from accelstudy.hidden.physics.seen.oracle import oracle
+from accelstudy.hidden.physics.measuring import NOISES, Cause, Noise, Sensor, observe
+from accelstudy.hidden.physics.oracle import Oracle, oracle
+
+SETS = ("null", "noise", "one", "two", "removed", "outside", "gross", "invisible")
+
+
+@dataclass(frozen=True)
+class Case:
+    """One kind of campaign.
+
+    Attributes
+    ----------
+    set : str, of `SETS`
+    design : str
+    approach : str, "gravity" or "robot"
+    sigma_known : bool, whether the campaign states its sigma
+    effect : tuple of str, what is hidden
+    lam : tuple of float, the noncentralities that they shall have; empty for effects that cannot be
+        seen, which have usual sizes
+    noise : str, kind of wrong noise; None where it is right
+    gross : str, gross error; None for none
+    """
+
+    set: str
+    design: str
+    approach: str
+    sigma_known: bool
+    effect: tuple[str, ...] = ()
+    lam: tuple[float, ...] = ()
+    noise: str | None = None
+    gross: str | None = None
+
+
+@dataclass(frozen=True)
+class HiddenEffect:
+    """An effect in a campaign: with which settings and parameters, and how much of it shows."""
+
+    name: str
+    settings: dict[str, float]
+    parameters: tuple[float, ...]
+    lam: float
+
+
+@dataclass(frozen=True)
+class Truth:
+    """All that is true of a campaign.
+
+    Attributes
+    ----------
+    set, design, approach, sigma_known : as in the case
+    seed : tuple of int, entropy and spawn key
+    effects : tuple of HiddenEffect
+    classes : tuple of tuple of str, for each effect the names that mean the same in this campaign
+    noise : dict with kind, name (in the catalogue) and settings
+    gross : dict with name (empty for none) and settings
+    sensor : dict with the parameters of the sensor
+    oracle : dict with detected, best, told and alternatives
+    left : tuple of float, for the set "outside": how much of the noncentrality the best effect of
+        the catalogue leaves, and the best two
+    """
+
+    set: str
+    design: str
+    approach: str
+    sigma_known: bool
+    seed: tuple[int, ...]
+    effects: tuple[HiddenEffect, ...]
+    classes: tuple[tuple[str, ...], ...]
+    noise: dict[str, Any]
+    gross: dict[str, Any]
+    sensor: dict[str, Any]
+    oracle: dict[str, Any]
+    left: tuple[float, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain values."""
+        return plain(asdict(self))
+
+
+def plain(value: Any) -> Any:
+    """Turn tuples into lists, all the way down."""
+    if isinstance(value, dict):
+        return {key: plain(part) for key, part in value.items()}
+    return [plain(part) for part in value] if isinstance(value, (list, tuple)) else value
+
 
 Array = NDArray[np.float64]
 
@@ -152,3 +233,78 @@ def _numbers(seed: np.random.SeedSequence) -> tuple[int, ...]:
     entropy = seed.entropy
     words = () if entropy is None else (entropy,) if isinstance(entropy, int) else tuple(entropy)
     return (*(int(word) for word in words), *(int(key) for key in seed.spawn_key))
+
+
+DRAWS = 200
+"""Draws of an effect until one is as it should be."""
+
+
+def drawn(
+    name: str,
+    lam: float,
+    session: Session,
+    conditions: Conditions,
+    knowing: Oracle,
+    rng: np.random.Generator,
+) -> tuple[Cause, tuple[str, ...]]:
+    """Draw an effect, and say what means the same.
+
+    Parameters
+    ----------
+    name : str, of an effect of the catalogue or outside it
+    lam : float, its noncentrality; 0 for an effect of usual size, however little of it shows
+    session : Session, in which the joints stand where they really do
+    conditions : Conditions, of this session with the sensor that has the effect
+    knowing : Oracle, of the design
+
+    Returns
+    -------
+    cause : Cause
+    same : tuple of str, names of the catalogue
+
+    Raises
+    ------
+    InputError
+        If the design cannot see the effect.
+    """
+    own = knowing.atlas
+    effect = EFFECTS[name] if name in EFFECTS else OUTSIDE[name]
+    if not lam:
+        return _of_usual_size(effect, session, rng), (name,)
+    if effect.shows(own.session):
+        for _ in range(DRAWS):
+            shape = own.shape(effect, effect.draw(own.session, rng))
+            if shape is None:
+                continue
+            cause, change = _scaled(shape, lam, session, conditions, rng)
+            if name in EFFECTS or knowing.is_outside(change):
+                return cause, own.same_as(shape)
+    approach = "robot" if conditions.robot else "gravity"
+    raise InputError(
+        f"{own.session.name}, {approach}: cannot see {name} as such; "
+        f"it sees {', '.join(own.visible)}"
+    )
+
+
+def _of_usual_size(effect: Effect, session: Session, rng: np.random.Generator) -> Cause:
+    parameters = effect.typical * rng.standard_normal((1, effect.k))
+    return Cause(effect, effect.draw(session, rng), parameters)
+
+
+def _scaled(
+    shape: Shape, lam: float, session: Session, conditions: Conditions, rng: np.random.Generator
+) -> tuple[Cause, Array]:
+    """Draw parameters with a given noncentrality; return the effect and what it leaves, (m,)."""
+    parameters = rng.standard_normal(shape.effect.k)
+    if shape.effect.loses:
+        parameters = abs(parameters)
+    # Directions that cannot be seen have no size.
+    parameters = shape.directions @ (shape.directions.T @ parameters)
+    cause = Cause(shape.effect, dict(shape.settings), shape.effect.typical * parameters[None])
+    without = conditions.misclosures(*observe(session, conditions.sensor, ()))
+    for _ in range(2):  # an effect is almost, but not quite, proportional to its parameters
+        with_it = conditions.misclosures(*observe(session, conditions.sensor, (cause,)))
+        change = conditions.left(with_it - without)[0]
+        factor = np.sqrt(lam / float(change @ change))
+        cause = replace(cause, parameters=cause.parameters * factor)
+    return cause, change * factor

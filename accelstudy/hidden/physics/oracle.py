@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc, logsumexp, softmax
 
-from accelstudy.hidden.physics.forward.outside import OUTSIDE
-from accelstudy.hidden.physics.seen.atlas import Atlas, Shape, atlas
+from accelstudy.hidden.physics.atlas import Atlas, Shape, atlas
+from accelstudy.hidden.physics.effects import OUTSIDE
 
 Array = NDArray[np.float64]
 Class = tuple[str, ...]

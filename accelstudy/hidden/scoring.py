@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -12,11 +13,10 @@ import pandas as pd
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.wording import words
 from accelstudy.effects import get_effect
-from accelstudy.hidden.score.judging import all_true, judge, same_effects
-from accelstudy.hidden.score.limits import limit_table
-from accelstudy.hidden.score.rates import shares, with_intervals
-from accelstudy.hidden.score.targets import targets
-from accelstudy.hidden.study.tables import KEY
+from accelstudy.hidden.campaigns import KEY
+from accelstudy.hidden.judging import all_true, judge, same_effects, shares, with_intervals
+from accelstudy.hidden.limits import limit_table
+from accelstudy.hidden.targets import targets
 
 BINS = (0.0, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 1.0)
 """Bounds of the classes of stated probabilities."""
@@ -25,13 +25,13 @@ BINS = (0.0, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 1.0)
 def score_tables(
     truths: pd.DataFrame, outcomes: pd.DataFrame, answers: pd.DataFrame, limits: pd.DataFrame
 ) -> dict[str, pd.DataFrame]:
-    """All tables of a score, by the names in `accelstudy.hidden.study.tables.TABLES`.
+    """All tables of a score, by the names in `accelstudy.hidden.cells.TABLES`.
 
     Parameters
     ----------
     truths, outcomes : DataFrame, of all chunks
     answers : DataFrame, of the simpler methods
-    limits : DataFrame, of `accelstudy.hidden.score.limits.study_limits`
+    limits : DataFrame, of `accelstudy.hidden.limits.study_limits`
     """
     judged = judge(joined(truths, outcomes))
     return {
@@ -201,3 +201,37 @@ def _reference_rows(row: Mapping[Any, Any]) -> list[dict[str, Any]]:
             }
         )
     return rows
+
+
+BY_KIND = ("noise", "one", "gross", "outside")
+"""Sets of which each kind has its campaign; of the others each size has one."""
+
+
+def sample(campaigns: pd.DataFrame) -> pd.DataFrame:
+    """Choose a campaign of each kind or size, as good as at random, whatever others there are.
+
+    Parameters
+    ----------
+    campaigns : DataFrame, truths and outcomes side by side
+
+    Returns
+    -------
+    DataFrame
+        cell, campaign; verdict, whether it is confirmed, the most probable explanation with its
+        posterior, and the variance of unit weight before
+    """
+    kind = campaigns["what"].where(campaigns["set"].isin(BY_KIND), campaigns["size"])
+    keys = campaigns["cell"] + " " + campaigns["campaign"].astype(str)
+    digest = keys.map(lambda key: hashlib.sha256(key.encode()).hexdigest())
+    chosen = (
+        campaigns.assign(kind=kind, digest=digest)
+        .sort_values("digest")
+        .drop_duplicates(["set", "kind"])
+        .sort_values("cell", kind="stable")
+    )
+    first = [(json.loads(one) if one else []) for one in chosen["credible_set"].fillna("")]
+    return chosen[[*KEY, "verdict", "confirmed"]].assign(
+        explanation=["+".join(one[0]["names"]) if one else "" for one in first],
+        posterior=[one[0]["posterior"] if one else float("nan") for one in first],
+        sigma0_before=chosen["sigma0_before"],
+    )

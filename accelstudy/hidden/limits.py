@@ -9,10 +9,10 @@ from accelstudy.adjustment.quality import noncentrality
 from accelstudy.campaign.files.session import Campaign
 from accelstudy.diagnosis.worth.limits import POWER, visibilities
 from accelstudy.diagnosis.worth.visibility import examine_campaign
+from accelstudy.hidden.cells import limit_cells
+from accelstudy.hidden.config import HiddenConfig
+from accelstudy.hidden.judging import with_intervals
 from accelstudy.hidden.physics import generate
-from accelstudy.hidden.score.rates import with_intervals
-from accelstudy.hidden.study.cells import limit_cells
-from accelstudy.hidden.study.config import HiddenConfig
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
 
@@ -58,7 +58,7 @@ def with_limits(judged: pd.DataFrame, limits: pd.DataFrame) -> pd.DataFrame:
 
     Parameters
     ----------
-    judged : DataFrame, of `accelstudy.hidden.score.judging.judge`
+    judged : DataFrame, of `accelstudy.hidden.judging.judge`
     limits : DataFrame, of `study_limits`
 
     Returns
@@ -117,7 +117,7 @@ def power_over(
 
     Parameters
     ----------
-    judged : DataFrame, of `accelstudy.hidden.score.judging.judge`
+    judged : DataFrame, of `accelstudy.hidden.judging.judge`
     limits : DataFrame, of `limit_table`
     column : str, "by_mdb" or "by_mib"
     answer : str, a column of `judged`

@@ -6,9 +6,12 @@ which a shape of an effect lies in the space of an orthonormal basis Q (d column
 
 from __future__ import annotations
 
+import json
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +23,12 @@ from accelstudy.campaign.calibration.fit import fit_campaign, usual_approach
 from accelstudy.campaign.files.session import Campaign
 from accelstudy.diagnosis.space.examined import examine
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis
+from accelstudy.effects import effects_without
+from accelstudy.files.tables import write_table
+from accelstudy.hidden.campaigns import Row, made, rows_table, tried
+from accelstudy.hidden.cells import Cell
+from accelstudy.hidden.config import HiddenConfig
+from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -29,6 +38,39 @@ LEVEL = 0.05
 MOST = 2
 """Effects that a forward selection adds, as many as a diagnosis names."""
 FOLDS = 5
+
+Answer = tuple[bool, list[str]]
+"""Whether something is missing, and the names that are given, strongest first."""
+
+
+def run_baselines(
+    config: HiddenConfig,
+    campaigns: Iterable[tuple[Cell, int]],
+    output: str | Path,
+    provenance: Mapping[str, Any],
+) -> None:
+    """Let the simpler methods judge some of the campaigns.
+
+    Parameters are those of `accelstudy.hidden.diagnosing.run_chunk`. Where the
+    model cannot be fitted, no method can work: each finds nothing, and the row has the error.
+    """
+    model, rows = get_model(config.model), []
+
+    def answer(campaign: Campaign) -> list[Row]:
+        return [
+            {"method": method, "detected": detected, "found": json.dumps(names), "error": ""}
+            for method, (detected, names) in answers(campaign, model)
+        ]
+
+    for cell, k in campaigns:
+        if cell.one_in(config.baselines_every, k):
+            campaign, truth = made(cell, k, config.seed)
+            with effects_without(cell.removed):
+                answered, error = tried(answer, campaign, f"{cell.name} {k}")
+            nothing = {"detected": False, "found": "[]", "error": error or truth["failed"]}
+            answered = answered or [{"method": method, **nothing} for method in METHODS]
+            rows += [{"cell": cell.name, "campaign": k, **row} for row in answered]
+    write_table(output, rows_table("baselines", rows), provenance)
 
 
 @dataclass(frozen=True)
@@ -69,10 +111,6 @@ class Problem:
             return self.z
         basis = np.linalg.qr(np.concatenate([h.basis for h in chosen], axis=1))[0]
         return np.asarray(self.z - basis @ (basis.T @ self.z))
-
-
-Answer = tuple[bool, list[str]]
-"""Whether something is missing, and the names that are given, strongest first."""
 
 
 def omnibus(problem: Problem) -> Answer | None:

@@ -15,9 +15,9 @@ from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.effects import effects_without
 from accelstudy.files.tables import write_table
-from accelstudy.hidden.study.cells import Cell
-from accelstudy.hidden.study.config import HiddenConfig
-from accelstudy.hidden.study.making import Row, made, rows_table, tried
+from accelstudy.hidden.campaigns import Row, made, rows_table, tried
+from accelstudy.hidden.cells import Cell
+from accelstudy.hidden.config import HiddenConfig
 from accelstudy.sensors.models import get_model
 
 

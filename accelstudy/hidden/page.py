@@ -1,17 +1,60 @@
-"""The score as a page in Markdown."""
+"""The score of a study: its tables, its figures, and its page in Markdown."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from accelstudy.basics.wording import number, words
-from accelstudy.hidden.score.further import further
-from accelstudy.hidden.score.rates import ALL, share_of
-from accelstudy.hidden.score.sample import sample
+from accelstudy.drawing.saving import save_all
+from accelstudy.files.outputs import whole_file
+from accelstudy.files.tables import origin, read_table, write_table
+from accelstudy.hidden.campaigns import TABLES
+from accelstudy.hidden.config import HiddenConfig
+from accelstudy.hidden.figures import figures
+from accelstudy.hidden.judging import ALL, share_of
+from accelstudy.hidden.limits import study_limits
+from accelstudy.hidden.scoring import sample, score_tables
+from accelstudy.hidden.targets import further
+
+PARTS = ("truths", "outcomes", "baselines", "seconds")
+"""Tables that the chunks write."""
+
+
+def write_score(
+    config: HiddenConfig,
+    inputs: Mapping[str, Sequence[str]],
+    outputs: Mapping[str, str],
+    provenance: Mapping[str, Any],
+) -> str:
+    """Score a study; returns the page.
+
+    Parameters
+    ----------
+    config : HiddenConfig
+    inputs : paths of all chunks of each of `PARTS`
+    outputs : paths of each of `accelstudy.hidden.cells.TABLES`, of the page, and of the
+        folder of the figures
+    provenance : see `accelstudy.files.tables.origin`
+    """
+    parts = {name: read_table([*inputs[name]]) for name in PARTS}
+    tables = score_tables(
+        parts["truths"], parts["outcomes"], parts["baselines"], study_limits(config)
+    )
+    for name in TABLES:
+        write_table(outputs[name], tables[name], provenance)
+    folder = Path(outputs["figures"])
+    folder.mkdir(parents=True, exist_ok=True)
+    save_all(figures(tables), folder)
+    page = score_page(tables, parts["seconds"], origin(provenance))
+    with whole_file(outputs["page"]) as path:
+        path.write_text(page, encoding="utf-8")
+    return page
+
 
 Tables = Mapping[str, pd.DataFrame]
 
@@ -21,7 +64,7 @@ def score_page(tables: Tables, seconds: pd.DataFrame, origin: Mapping[str, Any])
 
     Parameters
     ----------
-    tables : those of `accelstudy.hidden.study.tables.TABLES`
+    tables : those of `accelstudy.hidden.cells.TABLES`
     seconds : DataFrame, processor time of each diagnosis
     origin : see `accelstudy.files.tables.origin`
     """
@@ -210,7 +253,7 @@ def sample_table(chosen: pd.DataFrame) -> str:
 
     Parameters
     ----------
-    chosen : DataFrame, of `accelstudy.hidden.score.sample.sample`
+    chosen : DataFrame, of `accelstudy.hidden.scoring.sample`
     """
     rows = [
         (

@@ -17,6 +17,7 @@ import numpy as np
 from accelstudy.basics.errors import InputError
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.files.outputs import whole_file
+from accelstudy.hidden.config import HiddenConfig
 from accelstudy.hidden.physics import (
     NOISES,
     Case,
@@ -25,8 +26,7 @@ from accelstudy.hidden.physics import (
     visible_gross,
     visible_outside,
 )
-from accelstudy.hidden.physics.seen.atlas import atlas
-from accelstudy.hidden.study.config import HiddenConfig
+from accelstudy.hidden.physics.atlas import atlas
 
 CHUNK = 800
 """Campaigns in one job: minutes of work, so that starting Python does not matter."""
@@ -86,6 +86,16 @@ def _digest(case: Case, *numbers: int) -> bytes:
     """Hash of a case and of further numbers."""
     text = json.dumps([asdict(case), *numbers], sort_keys=True)
     return hashlib.sha256(text.encode()).digest()
+
+
+def cell_of(name: str) -> Cell:
+    """Return the cell of a name, with one campaign; the reverse of `Cell.name`."""
+    set_, *hidden, design, approach, sigma = name.split("/")
+    what, size = [*hidden, "", ""][:2]
+    kinds = {set_: what} if set_ in ("noise", "gross") else {}
+    effects = () if kinds or not what else tuple(what.split("+"))
+    lam = (float(size),) * len(effects) if size else ()
+    return Cell(Case(set_, design, approach, sigma == "sigma given", effects, lam, **kinds), 1)
 
 
 @cache

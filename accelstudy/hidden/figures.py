@@ -23,10 +23,10 @@ from accelstudy.drawing.style import (
     say_empty,
     spread,
 )
-from accelstudy.hidden.score.limits import EDGES, power_over
-from accelstudy.hidden.score.rates import ALL
-from accelstudy.hidden.score.scoring import VERDICTS
-from accelstudy.hidden.score.targets import LARGE, MOST_NAMES
+from accelstudy.hidden.judging import ALL
+from accelstudy.hidden.limits import EDGES, power_over
+from accelstudy.hidden.scoring import VERDICTS
+from accelstudy.hidden.targets import LARGE, MOST_NAMES
 
 Tables = Mapping[str, pd.DataFrame]
 
