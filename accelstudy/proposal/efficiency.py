@@ -7,12 +7,11 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 import pandas as pd
 
-from accelstudy.design.optimal.constraints import Constraints
-from accelstudy.design.optimal.continuous import continuous_optimum
-from accelstudy.design.optimal.criteria import get_criterion
-from accelstudy.design.optimal.search import optimal_design
-from accelstudy.design.optimal.spaces import Sphere
-from accelstudy.design.optimal.task import Task
+from accelstudy.design.continuous import continuous_optimum
+from accelstudy.design.criteria import get_criterion
+from accelstudy.design.search import optimal_design
+from accelstudy.design.spaces import Constraints, Sphere
+from accelstudy.design.task import Task
 from accelstudy.schemes import Scheme
 
 CRITERIA = ("D", "A", "I")

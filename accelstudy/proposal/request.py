@@ -12,21 +12,25 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import GON, STANDARD_GRAVITY, parse_quantity
-from accelstudy.design.optimal.constraints import (
+from accelstudy.design.criteria import Criterion, WorseAngle, get_criterion, rivals, worse_angle
+from accelstudy.design.search import STARTS, Design, optimal_design
+from accelstudy.design.spaces import (
     Constraint,
     Constraints,
     LeastAngle,
+    Mountings,
     OffPole,
     PitchRange,
     RollRange,
+    Space,
+    Sphere,
+    by_eye,
+    cube,
+    listed_in,
 )
-from accelstudy.design.optimal.criteria import Criterion, get_criterion, rivals
-from accelstudy.design.optimal.search import STARTS, Design, optimal_design
-from accelstudy.design.optimal.spaces import Mountings, Space, Sphere, by_eye, cube, listed_in
-from accelstudy.design.optimal.task import Task
+from accelstudy.design.task import Task
 from accelstudy.effects import get_effect
 from accelstudy.leveling.error import MAX_TILT_GON
-from accelstudy.proposal.worse_angle import WorseAngle, worse_angle
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise

@@ -7,7 +7,7 @@ import pytest
 from study_helpers import grid, make_cells, simulated
 
 from accelstudy import adjustment
-from accelstudy.adjustment.block import Block
+from accelstudy.adjustment.calibration import Block
 from accelstudy.adjustment.equations import equations_of
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError

@@ -286,7 +286,7 @@ def test_code_on_which_it_depends(tmp_path, monkeypatch):
     expected = {
         "campaign/calibration/fit.py": {"calibrate"},
         "campaign/batch/overview.html.j2": {"calibrate", "overview"},
-        "adjustment/quality/positions.py": {"calibrate"},
+        "adjustment/quality/tests.py": {"calibrate"},
         "campaign/calibration/states.py": {"calibrate", "overview"},
         "effects/bias.py": {*stages},
         "study/monte_carlo/simulate.py": {"simulate"},

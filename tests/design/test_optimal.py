@@ -9,29 +9,25 @@ from accelstudy.adjustment import calibrate, whitened_jacobian
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON
+from accelstudy.design.continuous import continuous_optimum
+from accelstudy.design.criteria import get_criterion, rivals
 from accelstudy.design.estimability import estimability
-from accelstudy.design.optimal.constraints import (
+from accelstudy.design.search import optimal_design, with_repeats
+from accelstudy.design.spaces import (
     Constraints,
     LeastAngle,
+    Listed,
+    Mountings,
     OffPole,
     PitchRange,
     RollRange,
-)
-from accelstudy.design.optimal.continuous import continuous_optimum
-from accelstudy.design.optimal.criteria import get_criterion, rivals
-from accelstudy.design.optimal.information import information, position_rows
-from accelstudy.design.optimal.repeats import with_repeats
-from accelstudy.design.optimal.search import optimal_design
-from accelstudy.design.optimal.spaces import (
-    Listed,
-    Mountings,
     Sphere,
     attitudes,
     by_eye,
     cube,
     listed_in,
 )
-from accelstudy.design.optimal.task import Task
+from accelstudy.design.task import Task, information, position_rows
 from accelstudy.leveling.error import cap_forces, tilt_error
 from accelstudy.proposal.separation import Explained, Separation
 from accelstudy.schemes import get_scheme

@@ -11,9 +11,8 @@ from click.testing import CliRunner
 from accelstudy.basics.units import GON, MGON
 from accelstudy.commands.main import main
 from accelstudy.data_sheets import get_data_sheet, of_sigma
-from accelstudy.design.optimal.constraints import Constraints
-from accelstudy.design.optimal.continuous import continuous_optimum
-from accelstudy.design.optimal.spaces import Sphere
+from accelstudy.design.continuous import continuous_optimum
+from accelstudy.design.spaces import Constraints, Sphere
 from accelstudy.plan.report.advice import in_use
 from accelstudy.plan.report.wording import answer_lines, positions_command
 from accelstudy.plan.search.answer import answer

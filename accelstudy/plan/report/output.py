@@ -26,8 +26,7 @@ from accelstudy.plan.report.wording import (
 from accelstudy.plan.search.answer import Answer
 from accelstudy.plan.search.candidates import Candidate
 from accelstudy.plan.search.optimised import is_best, request_of
-from accelstudy.proposal.design_file import write_design
-from accelstudy.proposal.order import field_order
+from accelstudy.proposal.proposal import field_order, write_design
 
 STUDY_HEAD = """\
 # The simulated candidates of a plan as a study, made by `accelstudy plan`. It reproduces their

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 from accelstudy.basics.units import GON, MGON
-from accelstudy.design.optimal.search import optimal_design, rounded
+from accelstudy.design.criteria import WorseAngle
+from accelstudy.design.search import optimal_design, rounded
 from accelstudy.plan.search.candidates import LEAST_REDUNDANCY, Candidate, of_scheme, sigma_of
 from accelstudy.plan.search.question import Equipment, Question
 from accelstudy.proposal.request import Request
-from accelstudy.proposal.worse_angle import WorseAngle
 from accelstudy.schemes import Scheme
 from accelstudy.schemes.files import remember
 from accelstudy.sensors.models import get_model

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.design.optimal.constraints import Constraints
-from accelstudy.design.optimal.criteria import Criterion
+from accelstudy.design.criteria import Criterion
+from accelstudy.design.spaces import Constraints
 from accelstudy.positions.choice import TIED, first_best, in_order
 
 Array = NDArray[np.float64]

@@ -14,10 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.design.optimal.constraints import Constraints
-from accelstudy.design.optimal.criteria import Criterion
-from accelstudy.design.optimal.spaces import Space
-from accelstudy.design.optimal.task import Task
+from accelstudy.design.criteria import Criterion
+from accelstudy.design.spaces import Constraints, Space
+from accelstudy.design.task import Task
 
 Array = NDArray[np.float64]
 

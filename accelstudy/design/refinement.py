@@ -12,10 +12,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.design.optimal.constraints import TOLERANCE, Constraints
-from accelstudy.design.optimal.criteria import Criterion
-from accelstudy.design.optimal.spaces import Space
-from accelstudy.design.optimal.task import Task
+from accelstudy.design.criteria import Criterion
+from accelstudy.design.spaces import TOLERANCE, Constraints, Space
+from accelstudy.design.task import Task
 from accelstudy.positions.choice import first_best
 
 Array = NDArray[np.float64]
