@@ -157,7 +157,7 @@ class CalibrationProblem:
     def linearised(self, parameters: Array, adjusted: Array) -> Linearisation:
         """Linearise one session at parameters (u',) and observations (n, o)."""
         forces, latent = adjusted[:, :3], adjusted[:, :3]
-        if self.conditions.equations.told is None:
+        if self.conditions.equations.known_force is None:
             p = parameters[: self.model.n_parameters]
             g = parameters[-1] if self.weights.any() else self.conditions.gravity
             latent = self.model.sensitive_force(forces, p, g, self.conditions.hold)

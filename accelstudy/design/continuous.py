@@ -90,10 +90,10 @@ def continuous_optimum(
 
 def allowed(space: Space, constraints: Constraints, count: int) -> Array:
     """About `count` allowed attitudes, evenly spread; all of a finite set."""
-    found = constraints.keep(space.directions(count))
-    if 0 < len(found) < count / 2 and space.tangents(found[:1]).shape[2]:
-        found = constraints.keep(space.directions(min(9999, count * count // len(found))))
-    return found
+    attitudes = constraints.keep(space.directions(count))
+    if 0 < len(attitudes) < count / 2 and space.tangents(attitudes[:1]).shape[2]:
+        attitudes = constraints.keep(space.directions(min(9999, count * count // len(attitudes))))
+    return attitudes
 
 
 def _flat(task: Task, directions: Array) -> Array:

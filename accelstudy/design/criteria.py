@@ -169,9 +169,11 @@ class NeglectedEffect(Criterion):
             self.weight[np.ix_(i, j)] for i, j in ((kept, kept), (kept, left), (left,) * 2)
         )
         square = np.sum(w * cofactors, axis=(-2, -1)) + np.sum(np.diag(w22) * self.variance)
-        own = np.einsum("...ik,ij,...jk->...k", shift, w, shift, optimize=True)
+        square_of_shift = np.einsum("...ik,ij,...jk->...k", shift, w, shift, optimize=True)
         cross = np.einsum("...ik,ik->...k", shift, w12)
-        return np.asarray(np.log(square + np.sum((own - 2 * cross) * self.variance, axis=-1)))
+        return np.asarray(
+            np.log(square + np.sum((square_of_shift - 2 * cross) * self.variance, axis=-1))
+        )
 
     @property
     def convex(self) -> Criterion:
@@ -193,9 +195,9 @@ class NeglectedEffect(Criterion):
         shift = cofactors @ normal[np.ix_(kept, left)]
         w, w12 = self.weight[np.ix_(kept, kept)], self.weight[np.ix_(kept, left)]
         by_shift = cofactors @ ((w @ shift - w12) * self.variance)
-        own = by_shift @ shift.T
+        part = by_shift @ shift.T
         result = np.zeros_like(normal)
-        result[np.ix_(kept, kept)] = -cofactors @ w @ cofactors - own - own.T
+        result[np.ix_(kept, kept)] = -cofactors @ w @ cofactors - part - part.T
         result[np.ix_(kept, left)] = by_shift
         result[np.ix_(left, kept)] = by_shift.T
         return np.asarray(result / np.exp(self.value(normal)))
@@ -223,13 +225,13 @@ class Rivals(Criterion):
 
     def left(self, normal: Array) -> Array:
         """Part l of each parameter of the first effect, then of the second, (..., q)."""
-        found = []
-        for own, rest in self._parts():
-            cross = normal[..., rest[:, None], own]
+        remainders = []
+        for part, rest in self._parts():
+            cross = normal[..., rest[:, None], part]
             inside = np.linalg.inv(_ridged(normal[..., rest[:, None], rest]))
             imitated = np.einsum("...ik,...ij,...jk->...k", cross, inside, cross, optimize=True)
-            found.append(np.einsum("...kk->...k", normal[..., own[:, None], own]) - imitated)
-        return np.maximum(np.concatenate(found, axis=-1), RIDGE)
+            remainders.append(np.einsum("...kk->...k", normal[..., part[:, None], part]) - imitated)
+        return np.maximum(np.concatenate(remainders, axis=-1), RIDGE)
 
     def value(self, normal: Array) -> Array:
         """Logarithm of the mean of 1/l."""
@@ -239,11 +241,11 @@ class Rivals(Criterion):
         """− Σ v vᵀ / l² / Σ 1/l, where l = vᵀ N v."""
         weights = self.left(normal) ** -2
         vectors = []
-        for own, rest in self._parts():
-            v = np.zeros((len(normal), len(own)))
-            v[own, np.arange(len(own))] = 1.0
+        for part, rest in self._parts():
+            v = np.zeros((len(normal), len(part)))
+            v[part, np.arange(len(part))] = 1.0
             inside = _ridged(normal[np.ix_(rest, rest)])
-            v[rest] -= np.linalg.solve(inside, normal[np.ix_(rest, own)])
+            v[rest] -= np.linalg.solve(inside, normal[np.ix_(rest, part)])
             vectors.append(v)
         v = np.concatenate(vectors, axis=1)
         return np.asarray(-(v * weights) @ v.T / np.sum(np.sqrt(weights)))
@@ -268,15 +270,15 @@ def get_criterion(name: str, task: Task) -> Criterion:
     """Return a criterion by its name, D, A, I or robust, for a task."""
     estimated = task.estimated
     weight = task.tilt_weights.mean(axis=0)
-    known: dict[str, Criterion] = {
+    criteria: dict[str, Criterion] = {
         "D": Determinant(estimated),
         "A": MeanVariance(estimated, np.diag(estimated * 1.0)),
         "I": Leveling(estimated, weight),
         "robust": NeglectedEffect(estimated, weight, task.neglected_variance),
     }
-    if name not in known:
-        raise UnknownNameError("criterion", name, known)
-    return known[name]
+    if name not in criteria:
+        raise UnknownNameError("criterion", name, criteria)
+    return criteria[name]
 
 
 def rivals(task: Task, first: str, second: str) -> Rivals:

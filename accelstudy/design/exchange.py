@@ -57,8 +57,8 @@ class Candidates:
 
     def normal(self, chosen: list[int]) -> Array:
         """Normal matrix of a choice."""
-        known = self.prior + KNOWN * np.eye(len(self.prior))
-        return np.asarray(known + self.informations[chosen].sum(axis=0))
+        before = self.prior + KNOWN * np.eye(len(self.prior))
+        return np.asarray(before + self.informations[chosen].sum(axis=0))
 
     def random(self, n: int, rng: np.random.Generator) -> list[int]:
         """Draw n candidates that may stand together.

@@ -118,10 +118,10 @@ class _Grid:
     def _further(self, t: Array, moved: Array) -> Array:
         """Repeat the last moves of all positions as often as is best."""
         tried = t + np.concatenate([[0.0], FURTHER])[:, None, None] * moved
-        found = self.directions(tried)
-        each = self.task.informations(found.reshape(-1, 3)).reshape(*found.shape[:2], -1)
+        directions = self.directions(tried)
+        each = self.task.informations(directions.reshape(-1, 3)).reshape(*directions.shape[:2], -1)
         normals = self.task.prior + each.sum(axis=1).reshape(-1, *self.task.prior.shape)
         values = self.criterion.value(normals)
-        values[[not self.constraints.kept(u) for u in found]] = np.inf
+        values[[not self.constraints.kept(u) for u in directions]] = np.inf
         best = first_best(values)
         return np.asarray(tried[best if values[best] < values[0] - self.gain else 0])

@@ -119,23 +119,23 @@ def _best(
         return np.zeros((n, 3)), np.inf
     informations = task.informations(directions)
     candidates = Candidates(directions, informations, task.prior, constraints)
-    found = []
+    designs = []
     for start in range(1, starts + 1):
         rng = np.random.default_rng(np.random.SeedSequence([seed, start]))
         chosen = directions[exchange(candidates, candidates.random(n, rng), criterion)]
-        found.append((chosen, float(criterion.value(task.normal(chosen)))))
+        designs.append((chosen, float(criterion.value(task.normal(chosen)))))
     if moved:
-        order = in_order([value for _, value in found], TIED)
+        order = in_order([value for _, value in designs], TIED)
         refined = [
-            refine(task, criterion, space, constraints, found[i][0]) for i in order[:REFINED]
+            refine(task, criterion, space, constraints, designs[i][0]) for i in order[:REFINED]
         ]
-        found = [(u, float(criterion.value(task.normal(u)))) for u in refined]
-    return _first_best(found)
+        designs = [(u, float(criterion.value(task.normal(u)))) for u in refined]
+    return _first_best(designs)
 
 
-def _first_best(found: list[tuple[Array, float]]) -> tuple[Array, float]:
+def _first_best(designs: list[tuple[Array, float]]) -> tuple[Array, float]:
     """First of the designs that are equally good, so that rounding does not choose."""
-    return found[first_best([value for _, value in found], TIED)]
+    return designs[first_best([value for _, value in designs], TIED)]
 
 
 def rounded(directions: Array) -> Array:
@@ -146,8 +146,8 @@ def rounded(directions: Array) -> Array:
 def _check_determined(task: Task, criterion: Criterion, directions: Array, n: int) -> None:
     if reason := undetermined(task, criterion, directions):
         raise InputError(f"the allowed attitudes do not suffice: {reason}")
-    known = int(np.linalg.matrix_rank(task.prior))
-    least = -(-(criterion.unknowns - known) // task.approach.n_conditions)
+    rank_before = int(np.linalg.matrix_rank(task.prior))
+    least = -(-(criterion.unknowns - rank_before) // task.approach.n_conditions)
     if n < least:
         raise InputError(
             f"{n} positions do not determine {criterion.unknowns} parameters; "

@@ -175,18 +175,18 @@ def listed_in(path: Path) -> Listed:
         raise InputError(f"{path}: is no CSV table") from None
     units = (*ANGLE_UNITS, "rad")
     pairs = [("x", "y", "z"), *((f"roll_{u}", f"pitch_{u}") for u in units)]
-    found = next((names for names in pairs if set(names) <= set(table.columns)), None)
-    if found is None:
+    columns = next((names for names in pairs if set(names) <= set(table.columns)), None)
+    if columns is None:
         wanted = "; ".join(", ".join(names) for names in pairs)
         raise InputError(
             f"{path}: has the columns {short_list([*map(str, table.columns)])}; expected {wanted}"
         )
-    values = table[list(found)].apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
+    values = table[list(columns)].apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
     bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
     if len(bad):
-        raise InputError(f"{path}: row {bad[0] + 1}: {', '.join(found)} must be numbers")
-    if len(found) == 2:
-        roll, pitch = to_si(values, found[0].rpartition("_")[2], "rad").T
+        raise InputError(f"{path}: row {bad[0] + 1}: {', '.join(columns)} must be numbers")
+    if len(columns) == 2:
+        roll, pitch = to_si(values, columns[0].rpartition("_")[2], "rad").T
         values = -np.stack(specific_force(roll, pitch, 1.0, np), axis=-1)
     if not len(values) or not np.all(np.linalg.norm(values, axis=1) > 0):
         raise InputError(f"{path}: no attitudes in it, or a direction of length zero")
@@ -311,8 +311,8 @@ class Constraints:
 
     def margins(self, directions: Array) -> Array:
         """Margins of all constraints of single attitudes, (n, m)."""
-        found: Sequence[Array] = [c.margins(directions) for c in self.single]
-        return np.concatenate([np.zeros((len(directions), 0)), *found], axis=1)
+        each: Sequence[Array] = [c.margins(directions) for c in self.single]
+        return np.concatenate([np.zeros((len(directions), 0)), *each], axis=1)
 
     def keep(self, directions: Array) -> Array:
         """Return those of directions (k, 3) that are allowed."""

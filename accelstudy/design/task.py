@@ -96,8 +96,8 @@ class Task:
     @cached_property
     def estimated(self) -> NDArray[np.bool_]:
         """Which of all parameters are estimated, (u,)."""
-        own = self.model.parameter_names
-        return np.array([name in own or name == "g" for name in self.names])
+        of_model = self.model.parameter_names
+        return np.array([name in of_model or name == "g" for name in self.names])
 
     @cached_property
     def scale(self) -> Array:
@@ -125,10 +125,10 @@ class Task:
             weights[self.names.index(name)] = sigma**-2
         if self.noise.sigma_gravity > 0:
             weights[-1] = self.noise.sigma_gravity**-2
-        known = np.diag(weights / self.scale**2)
+        information_before = np.diag(weights / self.scale**2)
         if self.measured is not None:
-            known = known + self.informations(self.measured).sum(axis=0)
-        return known
+            information_before = information_before + self.informations(self.measured).sum(axis=0)
+        return information_before
 
     def normal(self, directions: ArrayLike) -> Array:
         """Scaled normal matrix of positions and of what was known before, (u, u)."""
@@ -190,10 +190,10 @@ class Task:
             return ""
         scheme = Scheme("allowed", "allowed", directions, "generated", "")
         hold = HoldPlan().hold(len(directions))
-        found = estimability(
+        determined = estimability(
             scheme, self.model, self.approach, self.noise, None, self.gravity, hold
         )
-        return found.reason or "they hardly determine the model"
+        return determined.reason or "they hardly determine the model"
 
 
 def extended_model(model: SensorModel, effects: list[str]) -> SensorModel:

@@ -93,17 +93,20 @@ class Problem:
     def of(cls, campaign: Campaign, model: SensorModel) -> Problem:
         """Problem of a campaign; an unknown sigma is that of the residuals."""
         approach = usual_approach(campaign)
-        known = campaign.sigma_force is not None
+        sigma_known = campaign.sigma_force is not None
         fit = fit_campaign(campaign, model, approach)
-        for _ in range(0 if known else 2):
+        for _ in range(0 if sigma_known else 2):
             fit = fit_campaign(replace(campaign, sigma_force=fit.sigma_position_posteriori),
                                model, approach)  # fmt: skip
         examined = examine(solve(fit.model, fit.approach, fit.observed, fit.adjustment))
         shapes = [
-            h for name, found in examined.candidates.items() if name != OUTLIER for h in found
+            h
+            for name, hypotheses in examined.candidates.items()
+            if name != OUTLIER
+            for h in hypotheses
         ]
         residuals = examined.frame.residuals
-        return cls(residuals.z, residuals.redundancy, shapes, known)
+        return cls(residuals.z, residuals.redundancy, shapes, sigma_known)
 
     def left(self, chosen: list[Hypothesis]) -> Array:
         """Residuals that effects leave."""

@@ -61,7 +61,9 @@ def rows_table(name: str, rows: list[Row]) -> pd.DataFrame:
 def made(cell: Cell, k: int, seed: int) -> tuple[Campaign | None, Row]:
     """Make a campaign and the row of its truth; None if it could not be made."""
     campaign_and_truth, error = tried(
-        lambda own: generate(cell.case, own), cell.seed(seed, k), f"{cell.name} {k}: not made"
+        lambda seed_of_campaign: generate(cell.case, seed_of_campaign),
+        cell.seed(seed, k),
+        f"{cell.name} {k}: not made",
     )
     campaign, truth = campaign_and_truth or (None, None)
     return campaign, _truth(cell, truth, error)
@@ -86,11 +88,11 @@ def tried(work: Callable[[Any], Any], given: Any, what: str) -> tuple[Any, str]:
 def _truth(cell: Cell, truth: Truth | None, error: str) -> Row:
     """Row of the table of truths; of a campaign that could not be made what was wanted."""
     case = cell.case
-    known = {} if truth is None else truth.to_dict()
-    oracle = known.get("oracle") or {}
-    gross = known.get("gross") or {}
+    content = {} if truth is None else truth.to_dict()
+    oracle = content.get("oracle") or {}
+    gross = content.get("gross") or {}
     # No name is right for what a session cannot show or the catalogue lacks.
-    classes = [] if case.set in ("invisible", "outside") else known.get("classes", [])
+    classes = [] if case.set in ("invisible", "outside") else content.get("classes", [])
     left = [[name for name in one if name not in cell.removed] for one in classes]
     return {
         "set": case.set,
@@ -100,16 +102,16 @@ def _truth(cell: Cell, truth: Truth | None, error: str) -> Row:
         "approach": case.approach,
         "sigma": "given" if case.sigma_known else "not given",
         "classes": json.dumps([one for one in left if one]),
-        "effects": json.dumps(known.get("effects", [])),
-        "noise": json.dumps(known.get("noise")),
+        "effects": json.dumps(content.get("effects", [])),
+        "noise": json.dumps(content.get("noise")),
         "gross": json.dumps(gross),
         "gross_name": gross.get("name", ""),
         "oracle_detected": oracle.get("detected"),
         "oracle_best": json.dumps(oracle.get("best", [])),
         "oracle_told": json.dumps(oracle.get("told", [])),
         "oracle_alternatives": oracle.get("alternatives"),
-        "left": json.dumps(known.get("left", [])),
-        "sensor": json.dumps(known.get("sensor")),
-        "seed": json.dumps(known.get("seed")),
+        "left": json.dumps(content.get("left", [])),
+        "sensor": json.dumps(content.get("sensor")),
+        "seed": json.dumps(content.get("seed")),
         "failed": error,
     }

@@ -215,11 +215,11 @@ def _kinds(config: HiddenConfig) -> Iterator[tuple[list[Case], int]]:
 @cache
 def _pairs(design: str, approach: str) -> tuple[tuple[str, str], ...]:
     """All two effects that a session can show, and that do not mean the same in it."""
-    own = atlas(design, approach)
-    alike: dict[str, set[str]] = {name: set() for name in own.visible}
-    for shape in own.shapes:
-        alike[shape.effect.name].update(own.same_as(shape))
-    return tuple(pair for pair in combinations(own.visible, 2) if pair[1] not in alike[pair[0]])
+    seen = atlas(design, approach)
+    alike: dict[str, set[str]] = {name: set() for name in seen.visible}
+    for shape in seen.shapes:
+        alike[shape.effect.name].update(seen.same_as(shape))
+    return tuple(pair for pair in combinations(seen.visible, 2) if pair[1] not in alike[pair[0]])
 
 
 def _spread(cases: Sequence[Case], count: int) -> Iterator[Cell]:

@@ -99,10 +99,10 @@ class HiddenConfig(Block):
                 raise InputError(f"model: {error}") from None
             _known("designs", "design", self.designs, DESIGNS)
             _known("approaches", "approach", self.approaches, APPROACHES)
-            for name, known in KNOWN.items():
+            for name, kinds in KNOWN.items():
                 block = getattr(self, name)
                 if block is not None:
-                    _known(f"{name}.kinds", "kind", block.kinds, known)
+                    _known(f"{name}.kinds", "kind", block.kinds, kinds)
             if not self.campaigns:
                 raise InputError(f"no campaigns; give at least one of {', '.join(SETS)}")
             CAMPAIGNS.check_key("campaigns in all", self.campaigns)
@@ -158,8 +158,8 @@ def parse_hidden(content: Mapping[str, Any], source: str = "config") -> HiddenCo
     return checked(HiddenConfig, content, source)
 
 
-def _known(key: str, kind: str, names: Sequence[str], known: Sequence[str]) -> None:
+def _known(key: str, kind: str, names: Sequence[str], names_known: Sequence[str]) -> None:
     """Check that names are known, or the one word all."""
     for name in names:
-        if list(names) != ["all"] and name not in known:
-            raise InputError(f"{key}: {UnknownNameError(kind, name, ('all', *known))}")
+        if list(names) != ["all"] and name not in names_known:
+            raise InputError(f"{key}: {UnknownNameError(kind, name, ('all', *names_known))}")

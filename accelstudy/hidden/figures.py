@@ -93,11 +93,11 @@ def alarms(tables: Tables) -> Figure:
 def naming(tables: Tables) -> Figure:
     """Found and named rightly over λ, beside the oracle; one effect, and two."""
     fig = new_figure(FULL, 72)
-    found, one, two = axes = fig.subplots(1, 3, sharey=True)
+    detected, one, two = axes = fig.subplots(1, 3, sharey=True)
     table = tables["shares"]
-    _curve(found, table, "one", "alarm", label="found, or right", **OURS)
-    _curve(found, table, "one", "oracle found", label="oracle", **ORACLE)
-    found.set_title("one effect: something found")
+    _curve(detected, table, "one", "alarm", label="found, or right", **OURS)
+    _curve(detected, table, "one", "oracle found", label="oracle", **ORACLE)
+    detected.set_title("one effect: something found")
     _curve(one, table, "one", "right", **OURS)
     _curve(one, table, "one", "named", label="named, right or wrong", **OTHERS["known sigma"])
     _curve(one, table, "one", "wrong", label="wrong", **OTHERS["BIC forward"])
@@ -114,7 +114,7 @@ def naming(tables: Tables) -> Figure:
     two.set_title("two effects: both right")
     for ax in axes:
         _over_size(ax)
-    _shares(found)
+    _shares(detected)
     _legend(fig, 3)
     return fig
 

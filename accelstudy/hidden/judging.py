@@ -65,10 +65,10 @@ def judge(campaigns: pd.DataFrame) -> pd.DataFrame:
 def _judged(row: dict[Any, Any]) -> dict[str, Any]:
     true = json.loads(row["classes"])
     ok = not row["error"]
-    found = [[name] for name in json.loads(row["found"])] if ok else []
+    names = [[name] for name in json.loads(row["found"])] if ok else []
     answered = ok and row["verdict"] in EFFECTS_GIVEN
-    right = answered and same_effects(found, true)
-    correct = answered and all_true(found, true)
+    right = answered and same_effects(names, true)
+    correct = answered and all_true(names, true)
     judged_set = _judged_set(json.loads(row["credible_set"]) if ok else [], true)
     # A narrowed answer only says that it is one of the set.
     held = row["verdict"] == "narrowed" and bool(judged_set.get("set_holds"))
@@ -207,9 +207,9 @@ def shares(judged: pd.DataFrame, splits: Sequence[Sequence[str]] = SPLITS) -> pd
     asked = []
     for quantity, answers in QUESTIONS.items():
         yes = answers(judged)
-        known = yes.notna()
-        part = judged.loc[known, list(COLUMNS)]
-        asked.append(part.assign(quantity=quantity, yes=yes[known].astype(bool)))
+        answered = yes.notna()
+        part = judged.loc[answered, list(COLUMNS)]
+        asked.append(part.assign(quantity=quantity, yes=yes[answered].astype(bool)))
     table = pd.concat(asked, ignore_index=True)
     return with_intervals(
         pd.concat([_counted(table, [*split]) for split in splits], ignore_index=True)
@@ -238,10 +238,10 @@ def share_of(
     set_ : str
     division : values of those of `COLUMNS` by which the share is divided
     """
-    found = (table["quantity"] == quantity) & (table["set"] == set_)
+    chosen = (table["quantity"] == quantity) & (table["set"] == set_)
     for name in COLUMNS[1:]:
         if name in division:
-            found &= table[name] == division[name]
+            chosen &= table[name] == division[name]
         else:
-            found &= table[name].isna() if name == "size" else table[name] == ALL
-    return table[found].iloc[0] if found.any() else None
+            chosen &= table[name].isna() if name == "size" else table[name] == ALL
+    return table[chosen].iloc[0] if chosen.any() else None

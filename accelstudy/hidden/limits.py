@@ -128,8 +128,8 @@ def power_over(
     DataFrame
         beside (geometric mean), count, n, share, ci95_low, ci95_high
     """
-    known = limits[["what", "design", "approach", "lambda_mdb", "lambda_mib"]].drop_duplicates()
-    table = with_limits(judged[judged["sigma"] == sigma], known)
+    of_places = limits[["what", "design", "approach", "lambda_mdb", "lambda_mib"]].drop_duplicates()
+    table = with_limits(judged[judged["sigma"] == sigma], of_places)
     place = pd.cut(table[column], EDGES, labels=False)
     groups = table.assign(yes=table[answer].astype(bool), log=np.log(table[column])).groupby(place)
     made = groups.agg(log=("log", "mean"), count=("yes", "sum"), n=("yes", "size"))

@@ -186,8 +186,8 @@ def _reference_rows(row: Mapping[Any, Any]) -> list[dict[str, Any]]:
     place = {name: row[name] for name in ("set", "size")}
     true = json.loads(row["classes"])
     names = json.loads(row["found"]) if row["answered"] else []
-    found = {"method": "diagnosis", "detected": row["alarm"], **_judged_names(names, true)}
-    rows = [{**place, **found}]
+    diagnosis = {"method": "diagnosis", "detected": row["alarm"], **_judged_names(names, true)}
+    rows = [{**place, **diagnosis}]
     if not pd.isna(row["oracle_detected"]):
         best = [[*one] for one in json.loads(row["oracle_best"])]
         rows.append(

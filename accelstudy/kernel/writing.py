@@ -341,8 +341,8 @@ class _Kept:
             *zip(self.pivots, step.pivots, strict=True),
             *zip(self.unit, step.unit, strict=True),
         ]
-        for own, row in zip(self.lower, step.lower, strict=True):
-            pairs += zip(own, row, strict=True)
+        for variables, row in zip(self.lower, step.lower, strict=True):
+            pairs += zip(variables, row, strict=True)
         for variable, value in pairs:
             variable.set(ended.select(value, variable.get()))
 

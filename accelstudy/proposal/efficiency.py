@@ -51,7 +51,7 @@ def _of_task(
         name: continuous_optimum(task, criterion, Sphere(), Constraints(), 1).bound
         for name, criterion in criteria.items()
     }
-    found = [
+    designs = [
         Scheme(
             f"I-optimal {n}",
             f"{n} I-optimal",
@@ -62,7 +62,7 @@ def _of_task(
         for n in positions
     ]
     rows: list[Mapping[str, object]] = []
-    for scheme in [*schemes, *found]:
+    for scheme in [*schemes, *designs]:
         n, reason = scheme.n_positions, task.missing(scheme.directions)
         roll, pitch = (np.nan, np.nan) if reason else task.rms_tilt(scheme.directions)
         for name, criterion in criteria.items():

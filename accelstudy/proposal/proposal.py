@@ -49,9 +49,9 @@ class Proposal:
     directions: Array
 
     @classmethod
-    def of(cls, request: Request, found: Design | None = None) -> Proposal:
-        """Find the positions, unless they are given, and order them; errors as `Request.find`."""
-        design = request.find() if found is None else found
+    def of(cls, request: Request) -> Proposal:
+        """Find the positions, and order them; errors as `Request.find`."""
+        design = request.find()
         space, groups = request.space, None
         if isinstance(space, Mountings):
             groups = _fewest_axes(space, design.directions)
@@ -115,7 +115,7 @@ class Proposal:
         request, noise = self.request, self.request.noise
         with angles_in("gon"):
             constraints = request.constraints.texts
-        known = {
+        content = {
             "version": __version__,
             "criterion": f"{request.chosen.name}: {request.chosen.text}",
             "model": request.task.model.name,
@@ -136,7 +136,7 @@ class Proposal:
             "rms_roll_mgon": _brief(self.rms[0] / MGON),
             "rms_pitch_mgon": _brief(self.rms[1] / MGON),
         }
-        return {k: v for k, v in known.items() if v not in (None, [], 0.0) and v == v}
+        return {k: v for k, v in content.items() if v not in (None, [], 0.0) and v == v}
 
 
 def _fewest_axes(space: Mountings, directions: Array) -> NDArray[np.int_]:
@@ -187,7 +187,7 @@ def field_order(task: Task, directions: Array, groups: Order | None = None) -> O
     rng = np.random.default_rng(np.random.SeedSequence(len(directions)))
     tours: list[tuple[float, Order]] = []
     for _ in range(TOURS):
-        parts = [_round_trip(angles, rng.permutation(own)) for own in members]
+        parts = [_round_trip(angles, rng.permutation(group)) for group in members]
         tours.append((sum(_length(angles, part) for part in parts), np.concatenate(parts)))
         if len(members) == 1:
             turned = [np.roll(tours[-1][1], shift) for shift in range(1, len(directions))]
@@ -231,13 +231,13 @@ def _drift_shown(task: Task, directions: Array) -> float:
     model = compose("drifting", (*effects, "bias_drift"))
     n, u = len(directions), task.model.n_parameters
     hold = replace(HoldPlan().hold(n), time=np.linspace(-1.0, 1.0, n))
-    known = replace(task.noise, sigma_gravity=0.0)
-    rows = position_rows(model, task.approach, known, directions, None, task.gravity, hold)
+    fixed_gravity = replace(task.noise, sigma_gravity=0.0)
+    rows = position_rows(model, task.approach, fixed_gravity, directions, None, task.gravity, hold)
     normal = information(rows).sum(axis=0)
     normal = normal / np.sqrt(np.outer(np.diag(normal), np.diag(normal)))
-    own, cross = normal[u:, u:], normal[:u, u:]
+    of_drift, cross = normal[u:, u:], normal[:u, u:]
     inside = np.linalg.solve(normal[:u, :u] + RIDGE * np.eye(u), cross)
-    return float(np.diag(own - cross.T @ inside).min())
+    return float(np.diag(of_drift - cross.T @ inside).min())
 
 
 def write_design(

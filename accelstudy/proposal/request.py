@@ -120,9 +120,9 @@ class Request:
             neglected[effect.spec] = (
                 _positive(text, size, unit, "neglect") if size else effect.typical[1]
             )
-        own = {effect.spec for effect in model.effects}
+        in_model = {effect.spec for effect in model.effects}
         for spec in neglected:
-            if spec in own:
+            if spec in in_model:
                 raise InputError(f"the effect {spec!r} is in the model; it is not neglected")
         return Task(
             model,
@@ -137,10 +137,10 @@ class Request:
 
     @cached_property
     def _rivals(self) -> tuple[str, ...]:
-        found = tuple(get_effect(name).spec for name in self.discriminate or ())
-        if len(set(found)) < len(found):
-            raise InputError(f"discriminate: {found[0]!r} twice; give two effects")
-        return found
+        specs = tuple(get_effect(name).spec for name in self.discriminate or ())
+        if len(set(specs)) < len(specs):
+            raise InputError(f"discriminate: {specs[0]!r} twice; give two effects")
+        return specs
 
     @cached_property
     def chosen(self) -> Criterion:

@@ -78,7 +78,7 @@ class _Text:
         self.equations = equations
         self.u, self.o = len(equations.parameters), len(equations.observations)
         self.c = equations.linear.expressions.shape[0]
-        self.latent = 3 if equations.told is None else 0
+        self.latent = 3 if equations.known_force is None else 0
         self.work = 2 * self.o + self.latent + self.c * (self.u + 1 + self.o)
         self.lines, self.indent, self.count = [], "", 0
         with self.block("def fit(observed, cofactors, g, work, results):"):

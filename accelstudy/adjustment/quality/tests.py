@@ -180,8 +180,8 @@ def suspects(
     tuple of Suspect, in the order of their removal
     """
     kept = np.arange(observed.forces.shape[1])
-    found: list[Suspect] = []
-    while len(found) < most:
+    removed: list[Suspect] = []
+    while len(removed) < most:
         tests = position_tests(solve(model, approach, observed.take(kept)))
         worst = tests.worst(sigma_known)
         if worst is None:
@@ -189,6 +189,6 @@ def suspects(
         p_value = float(tests.p_adjusted(sigma_known)[worst])
         if p_value >= alpha:
             break
-        found.append(Suspect(int(kept[worst]), p_value, tests.gross_errors[worst]))
+        removed.append(Suspect(int(kept[worst]), p_value, tests.gross_errors[worst]))
         kept = np.delete(kept, worst)
-    return tuple(found)
+    return tuple(removed)

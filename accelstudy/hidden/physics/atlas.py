@@ -156,13 +156,13 @@ class Atlas:
     @cached_property
     def shapes(self) -> tuple[Shape, ...]:
         """Shapes of all effects, in settings that cover all their values."""
-        found = (
+        candidates = (
             self.shape(effect, settings)
             for effect in EFFECTS.values()
             if effect.shows(self.session)
             for settings in effect.grid(self.session)
         )
-        return tuple(shape for shape in found if shape is not None)
+        return tuple(shape for shape in candidates if shape is not None)
 
     @cached_property
     def visible(self) -> tuple[str, ...]:
@@ -204,8 +204,8 @@ class Atlas:
 @cache
 def atlas(design: str, approach: str) -> Atlas:
     """The atlas of a design by an approach."""
-    own = session(design)
-    return Atlas(own, Conditions.of(own, approach, Sensor()))
+    ideal = session(design)
+    return Atlas(ideal, Conditions.of(ideal, approach, Sensor()))
 
 
 def visible_effects(design: str, approach: str) -> tuple[str, ...]:
@@ -215,9 +215,9 @@ def visible_effects(design: str, approach: str) -> tuple[str, ...]:
 
 def invisible_effects(design: str, approach: str) -> tuple[str, ...]:
     """Names of the effects that a design has, but cannot see."""
-    own = atlas(design, approach)
+    of_design = atlas(design, approach)
     return tuple(
         name
         for name, effect in EFFECTS.items()
-        if effect.shows(own.session) and name not in own.visible
+        if effect.shows(of_design.session) and name not in of_design.visible
     )

@@ -135,13 +135,13 @@ def _snub_cube() -> Array:
     """The 24 corners of a snub cube: even permutations with even signs, and odd ones with odd."""
     t = (1 + np.cbrt(19 + 3 * np.sqrt(33)) + np.cbrt(19 - 3 * np.sqrt(33))) / 3
     corner = np.array([1.0, 1 / t, t]) / np.sqrt(1 + 1 / t**2 + t**2)
-    found = []
+    corners = []
     for order in permutations(range(3)):
         parity = np.linalg.det(np.eye(3)[list(order)])
         for signs in product((1.0, -1.0), repeat=3):
             if np.prod(signs) == parity:
-                found.append(np.array(signs) * corner[list(order)])
-    return np.array(found)
+                corners.append(np.array(signs) * corner[list(order)])
+    return np.array(corners)
 
 
 def _faces_and_edges() -> Array:

@@ -122,10 +122,12 @@ def generate(case: Case, seed: np.random.SeedSequence) -> tuple[Campaign, Truth]
     """
     rng = np.random.default_rng(seed)
     knowing = oracle(case.design, case.approach)
-    own = knowing.atlas
+    of_design = knowing.atlas
     # No joint comes to rest exactly where it was sent.
-    arrived = own.session.joints + ARRIVAL * rng.standard_normal(own.session.joints.shape)
-    session = replace(own.session, joints=arrived)
+    arrived = of_design.session.joints + ARRIVAL * rng.standard_normal(
+        of_design.session.joints.shape
+    )
+    session = replace(of_design.session, joints=arrived)
     sensor = Sensor.drawn(rng)
     conditions = Conditions.of(session, case.approach, sensor)
     causes, hidden, classes = [], [], []
@@ -145,8 +147,8 @@ def generate(case: Case, seed: np.random.SeedSequence) -> tuple[Campaign, Truth]
     if case.gross is not None:
         campaign, gross["settings"] = GROSS[case.gross](campaign, session, conditions, rng)
         gross["name"] = case.gross
-    verdict = knowing.judge(_left(own, sensor, forces, reading), case.lam)
-    left = knowing.left(_left(own, sensor, output, encoders)) if case.set == "outside" else ()
+    verdict = knowing.judge(_left(of_design, sensor, forces, reading), case.lam)
+    left = knowing.left(_left(of_design, sensor, output, encoders)) if case.set == "outside" else ()
     truth = Truth(
         set=case.set,
         design=case.design,
@@ -177,10 +179,10 @@ def generate(case: Case, seed: np.random.SeedSequence) -> tuple[Campaign, Truth]
     return campaign, truth
 
 
-def _left(own: Atlas, sensor: Sensor, output: Array, reading: Array) -> Array:
+def _left(of_design: Atlas, sensor: Sensor, output: Array, reading: Array) -> Array:
     """What a calibration leaves of the misclosures, (m,), whatever the sensor is."""
     corrected = (output - sensor.bias) @ sensor.correction.T
-    return own.conditions.seen(corrected[None], reading[None])[0]
+    return of_design.conditions.seen(corrected[None], reading[None])[0]
 
 
 def _campaign(case: Case, session: Session, forces: Array, reading: Array) -> Campaign:
@@ -267,22 +269,22 @@ def drawn(
     InputError
         If the design cannot see the effect.
     """
-    own = knowing.atlas
+    of_design = knowing.atlas
     effect = EFFECTS[name] if name in EFFECTS else OUTSIDE[name]
     if not lam:
         return _of_usual_size(effect, session, rng), (name,)
-    if effect.shows(own.session):
+    if effect.shows(of_design.session):
         for _ in range(DRAWS):
-            shape = own.shape(effect, effect.draw(own.session, rng))
+            shape = of_design.shape(effect, effect.draw(of_design.session, rng))
             if shape is None:
                 continue
             cause, change = _scaled(shape, lam, session, conditions, rng)
             if name in EFFECTS or knowing.is_outside(change):
-                return cause, own.same_as(shape)
+                return cause, of_design.same_as(shape)
     approach = "robot" if conditions.robot else "gravity"
     raise InputError(
-        f"{own.session.name}, {approach}: cannot see {name} as such; "
-        f"it sees {', '.join(own.visible)}"
+        f"{of_design.session.name}, {approach}: cannot see {name} as such; "
+        f"it sees {', '.join(of_design.visible)}"
     )
 
 

@@ -194,8 +194,8 @@ class Noise:
     def sds(self, session: Session, rng: np.random.Generator) -> Array:
         """Sds of the samples within the holds, as they are found, (n, 3), m/s²."""
         freedom = session.n_samples - 1
-        found = np.sqrt(rng.chisquare(freedom, (session.n, 3)) / freedom)
-        sds = self.samples_sd(session) * found
+        ratio = np.sqrt(rng.chisquare(freedom, (session.n, 3)) / freedom)
+        sds = self.samples_sd(session) * ratio
         if self.kind == "coarse":
             sds = np.hypot(sds, self.settings["step"] / np.sqrt(12))
         return np.asarray(sds)

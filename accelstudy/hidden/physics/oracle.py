@@ -113,15 +113,15 @@ class Oracle:
         for i, name in enumerate(names):
             by_name.setdefault(name, []).append(i)
         logs = {
-            name: logsumexp(evidence[own]) - float(np.log(len(own)))
-            for name, own in by_name.items()
+            name: logsumexp(evidence[indices]) - float(np.log(len(indices)))
+            for name, indices in by_name.items()
         }
         best = by_name[max(logs, key=lambda name: logs[name])]
         told = self.classes[max(best, key=lambda i: evidence[i])]
         by_class: dict[Class, float] = {}
         for name, log in logs.items():
-            own = self.classes[by_name[name][0]]
-            by_class[own] = float(np.logaddexp(by_class.get(own, -np.inf), log))
+            alike = self.classes[by_name[name][0]]
+            by_class[alike] = float(np.logaddexp(by_class.get(alike, -np.inf), log))
         p = np.sort(softmax([*by_class.values()]))[::-1]
         return (told,), int(np.searchsorted(np.cumsum(p), CREDIBLE)) + 1
 
@@ -224,16 +224,16 @@ def oracle(design: str, approach: str) -> Oracle:
 def visible_outside(design: str, approach: str) -> tuple[str, ...]:
     """Names of effects outside the catalogue that show, and that no two effects of it imitate."""
     knowing, rng = oracle(design, approach), np.random.default_rng(0)
-    own, found = knowing.atlas, []
+    of_design, visible = knowing.atlas, []
     for name, effect in OUTSIDE.items():
-        if not effect.shows(own.session):
+        if not effect.shows(of_design.session):
             continue
         outside = 0
         for _ in range(DRAWS):
-            shape = own.shape(effect, effect.draw(own.session, rng))
+            shape = of_design.shape(effect, effect.draw(of_design.session, rng))
             if shape is not None:
                 direction = rng.standard_normal(shape.dim)
                 outside += knowing.is_outside(shape.basis @ direction)
         if outside > DRAWS / 2:
-            found.append(name)
-    return tuple(found)
+            visible.append(name)
+    return tuple(visible)
