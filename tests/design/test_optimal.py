@@ -141,8 +141,8 @@ def test_no_positions_are_below_the_bound_of_a_neglected_effect():
     assert 0.9 < found.efficiency < 1
     others = [random_directions(24, seed) for seed in range(50)]
     assert min(criterion.value(task.normal(each)) for each in others) > found.value
-    plain = optimal_design(task, get_criterion("I", task), 24, starts=1, bounded=False)
-    assert np.all(task.rms_tilt(found.directions) < 0.5 * task.rms_tilt(plain.directions))
+    plain = task.rms_tilt(get_scheme("i-optimal-24").directions)
+    assert np.all(task.rms_tilt(found.directions) < 0.5 * plain)
 
 
 # Known optima
@@ -241,7 +241,7 @@ def test_other_numbers_of_optimal_positions_are_refused_with_what_there_is():
 def test_the_same_arguments_give_the_same_positions():
     task = BY_GRAVITY
     one, two = (
-        optimal_design(task, get_criterion("I", task), 10, starts=2, bounded=False)
+        optimal_design(task, get_criterion("I", task), 10, starts=1, bounded=False)
         for _ in range(2)
     )
     np.testing.assert_array_equal(one.directions, two.directions)
