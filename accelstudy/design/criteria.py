@@ -305,8 +305,8 @@ def _placed(block: Array, chosen: NDArray[np.bool_]) -> Array:
 
 
 POWER = 16
-"""Of the mean that stands for the larger of the two: it has a derivative also where both are equal,
-and where one is larger, it is below that one by ln 2 / 16, 4 %, at most."""
+"""Exponent of the power mean that stands for the larger of the two. The mean has a derivative also
+where both are equal; where one is larger, it is below that one by ln 2 / 16, 4 %, at most."""
 
 
 @dataclass(frozen=True)

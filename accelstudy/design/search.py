@@ -41,7 +41,7 @@ class Design:
     directions : (n, 3) array of unit vectors, gravity in the body frame, to 9 decimals
     value : float, of the criterion
     bound : float, lower bound of the criterion; NaN if it is not wanted
-    efficiency : float, against the bound; NaN likewise
+    efficiency : float, against the bound; NaN without a bound
     """
 
     directions: Array

@@ -34,7 +34,7 @@ from accelstudy.sensors.sensor import SensorModel
 Array = NDArray[np.float64]
 
 LEVEL = 0.05
-"""Of all tests, with Bonferroni's correction for the number of shapes."""
+"""Level of all tests together, with Bonferroni's correction for the number of shapes."""
 MOST = 2
 """Effects that a forward selection adds, as many as a diagnosis names."""
 FOLDS = 5

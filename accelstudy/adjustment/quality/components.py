@@ -30,7 +30,7 @@ MAX_FITS = 10
 STEP = 1e-6
 """Convergence with given derivatives: a step below this fraction of a standard deviation."""
 REFIT = 1e-3
-"""Convergence with adjustments repeated, likewise."""
+"""Convergence with adjustments repeated: changes of a factor below this fraction of sigma."""
 
 
 @dataclass(frozen=True)

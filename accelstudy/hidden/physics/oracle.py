@@ -41,7 +41,7 @@ class Verdict:
     ----------
     detected : bool, something is missing, at a level of 5 %
     best : tuple of classes of names, what is missing; empty if nothing is detected
-    told : tuple of classes of names, likewise if it is told that something is missing
+    told : tuple of classes of names, what is missing, if it is told that something is
     alternatives : int, how many effects it needs, if told, to hold the truth with `CREDIBLE`;
         of one effect only, 0 else
     """
