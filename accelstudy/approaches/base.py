@@ -32,10 +32,10 @@ class Approach:
         self, f: Vector, angles: tuple[Number, Number], g: Number, xp: Any
     ) -> tuple[Number, ...]:
         """Return ψ for the specific force `f` in the body frame; zero when all is consistent."""
-        told = self.force(angles, g, xp)
-        if told is None:
+        force = self.force(angles, g, xp)
+        if force is None:
             raise NotImplementedError
-        return tuple(a - b for a, b in zip(f, told, strict=True))
+        return tuple(a - b for a, b in zip(f, force, strict=True))
 
 
 _registry: Registry[Approach] = Registry("approach")

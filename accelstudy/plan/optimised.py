@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 from accelstudy.basics.units import GON, MGON
+from accelstudy.design.criteria import WorseAngle
 from accelstudy.plan.candidates import LEAST_REDUNDANCY, Candidate, of_scheme, sigma_of
 from accelstudy.plan.question import Equipment, Question
 from accelstudy.proposal.request import Request
-from accelstudy.proposal.worse_angle import WorseAngle
 from accelstudy.schemes import Scheme
 from accelstudy.schemes.files import remember
 from accelstudy.sensors.models import get_model

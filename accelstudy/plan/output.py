@@ -29,8 +29,7 @@ from accelstudy.plan.wording import (
     table_lines,
     unreachable,
 )
-from accelstudy.proposal.design_file import write_design
-from accelstudy.proposal.order import field_order
+from accelstudy.proposal.proposal import field_order, write_design
 
 STUDY_HEAD = """\
 # The simulated candidates of a plan as a study, made by `accelstudy plan`. It reproduces their

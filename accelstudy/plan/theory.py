@@ -22,7 +22,7 @@ from scipy.special import gammainc, gammaincinv
 
 from accelstudy.approaches import get_approach
 from accelstudy.design.estimability import SINGULAR
-from accelstudy.design.optimal.information import position_rows
+from accelstudy.design.task import position_rows
 from accelstudy.effects import HoldConditions, get_effect
 from accelstudy.leveling.error import ATTITUDES, cap_forces, tilt_error
 from accelstudy.sensors.models import get_model

@@ -6,7 +6,7 @@ from schemas import blocks
 from accelstudy.campaign.batch.config import BatchConfig
 from accelstudy.diagnosis.round_trip import RoundTrip
 from accelstudy.field.config import FieldConfig
-from accelstudy.hidden.study.config import HiddenConfig
+from accelstudy.hidden.config import HiddenConfig
 from accelstudy.plan.config import Example, PlanConfig
 from accelstudy.pole.config import PoleConfig
 from accelstudy.proposal.config import DesignsConfig

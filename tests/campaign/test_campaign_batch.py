@@ -298,7 +298,7 @@ def test_code_on_which_it_depends(tmp_path, monkeypatch):
     expected = {
         "campaign/calibration/fit.py": {"calibrate"},
         "campaign/batch/overview.html.j2": {"calibrate", "overview"},
-        "adjustment/quality/positions.py": {"calibrate"},
+        "adjustment/quality/tests.py": {"calibrate"},
         "basics/levels.py": {"calibrate", "overview"},
         "effects/bias.py": {*stages},
         "study/monte_carlo/simulate.py": {"simulate"},

@@ -24,14 +24,11 @@ from accelstudy.hidden.physics import (
     visible_gross,
     visible_outside,
 )
-from accelstudy.hidden.physics.forward.designs import session
-from accelstudy.hidden.physics.forward.effects import EFFECTS
-from accelstudy.hidden.physics.forward.measuring import Cause, Sensor, observe
-from accelstudy.hidden.physics.forward.noise import Noise
-from accelstudy.hidden.physics.forward.rotations import in_turned_frame, rotated
-from accelstudy.hidden.physics.forward.session import GRAVITY
-from accelstudy.hidden.physics.seen.atlas import atlas
-from accelstudy.hidden.physics.seen.oracle import oracle
+from accelstudy.hidden.physics.atlas import atlas
+from accelstudy.hidden.physics.designs import GRAVITY, in_turned_frame, rotated, session
+from accelstudy.hidden.physics.effects import EFFECTS
+from accelstudy.hidden.physics.measuring import Cause, Noise, Sensor, observe
+from accelstudy.hidden.physics.oracle import oracle
 from accelstudy.sensors.models import get_model
 
 NINE = get_model("bias-scale-nonorthogonality")

@@ -10,9 +10,8 @@ from calling import call
 
 from accelstudy.basics.units import GON, MGON
 from accelstudy.data_sheets import get_data_sheet, of_sigma
-from accelstudy.design.optimal.constraints import Constraints
-from accelstudy.design.optimal.continuous import continuous_optimum
-from accelstudy.design.optimal.spaces import Sphere
+from accelstudy.design.continuous import continuous_optimum
+from accelstudy.design.spaces import Constraints, Sphere
 from accelstudy.plan.answer import answer
 from accelstudy.plan.optimised import Sought
 from accelstudy.plan.question import BY_HAND, ROBOT, Question

@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from accelstudy.adjustment.block import Block
+from accelstudy.adjustment.calibration import Block
 from accelstudy.files.parquet import whole_parquet
 from accelstudy.files.tables import REMEDY
 from accelstudy.study.cells.cell import Cell
