@@ -9,14 +9,14 @@ from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, design, shuffled, some_ho
 from accelstudy.adjustment.quality import solve
 from accelstudy.basics.wording import words
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.diagnosis.decision.search import Search
+from accelstudy.diagnosis.problem import Search
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.held_out import confirmation as held_out
 from accelstudy.diagnosis.held_out import given_a_name
-from accelstudy.diagnosis.held_out.gap import SIGNIFICANT, held_out_gap, split_positions
-from accelstudy.diagnosis.held_out.linear import LinearSplit
+from accelstudy.diagnosis.prediction import SIGNIFICANT, held_out_gap, split_positions
+from accelstudy.diagnosis.prediction import LinearSplit
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.report.words.summary import confirmation
+from accelstudy.diagnosis.report.words import confirmation
 from accelstudy.diagnosis.result import LEVEL_EFFECTS
 from accelstudy.simulation.sessions import Noise, session
 

@@ -17,7 +17,7 @@ from accelstudy.campaign.files.format import write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.commands.main import main
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.report.document.diagnosis import diagnosis_document
+from accelstudy.diagnosis.report.document import diagnosis_document
 from accelstudy.effects import effect_names
 from accelstudy.leveling.angles import specific_force
 from accelstudy.sensors.conversion import Conversion

@@ -10,8 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.diagnosis.evidence.size import Evidence, log_mean
-from accelstudy.diagnosis.space.hypotheses import BumpedPositions, EffectShapes, Shapes
-from accelstudy.diagnosis.space.spaces import Bases, Spaces
+from accelstudy.diagnosis.space.hypotheses import (
+    Bases,
+    BumpedPositions,
+    EffectShapes,
+    Shapes,
+    Spaces,
+)
 
 Array = NDArray[np.float64]
 

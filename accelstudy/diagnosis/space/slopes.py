@@ -23,9 +23,8 @@ from scipy.special import chdtr, chdtri
 
 from accelstudy.adjustment import Observations
 from accelstudy.adjustment.quality import column_basis
-from accelstudy.diagnosis.space.residuals import Residuals, SlopeRows
+from accelstudy.diagnosis.space.residuals import VISIBLE, Residuals, SlopeRows, span
 from accelstudy.diagnosis.space.signatures import Signature
-from accelstudy.diagnosis.space.spaces import VISIBLE, span
 
 Array = NDArray[np.float64]
 

@@ -10,11 +10,11 @@ from scipy import stats
 
 from accelstudy.adjustment.quality import solve
 from accelstudy.diagnosis.decision import noise
-from accelstudy.diagnosis.decision.noise import NoiseJudge
+from accelstudy.diagnosis.decision.verdict import NoiseJudge
 from accelstudy.diagnosis.decision.posterior import Posterior, Weighed
-from accelstudy.diagnosis.decision.search import Search
+from accelstudy.diagnosis.problem import Search
 from accelstudy.diagnosis.decision.verdict import lack_of_fit
-from accelstudy.diagnosis.evidence.noise.kinds import AXES, COLOUR, LEVEL, STEPS, TAILS, NoiseTest
+from accelstudy.diagnosis.evidence.noise_tests import AXES, COLOUR, LEVEL, STEPS, TAILS, NoiseTest
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.simulation.sessions import Noise, session
 

@@ -8,14 +8,14 @@ from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, design, shuffled
 from scipy import stats
 
 from accelstudy.adjustment.quality import solve
-from accelstudy.diagnosis.decision.explanations import Explanation, credible_set
+from accelstudy.diagnosis.decision.posterior import Explanation, credible_set
 from accelstudy.diagnosis.decision.posterior import Posterior, Weighed
-from accelstudy.diagnosis.decision.search import Search
+from accelstudy.diagnosis.problem import Search
 from accelstudy.diagnosis.decision.verdict import _misfit
 from accelstudy.diagnosis.evidence.field import Field
-from accelstudy.diagnosis.evidence.noise.axes import UnequalAxes
-from accelstudy.diagnosis.evidence.noise.kinds import NOISES
-from accelstudy.diagnosis.evidence.noise.residual_tests import most_evidence
+from accelstudy.diagnosis.evidence.noise_models import UnequalAxes
+from accelstudy.diagnosis.evidence.noise_tests import NOISES
+from accelstudy.diagnosis.evidence.noise_tests import most_evidence
 from accelstudy.diagnosis.evidence.size import SIZE_WEIGHTS, SIZES, Evidence, Level
 from accelstudy.schemes import get_scheme
 from accelstudy.simulation.sessions import Noise, session

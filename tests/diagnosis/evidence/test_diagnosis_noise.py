@@ -9,8 +9,8 @@ from quality_helpers import BOTH, SIGMA, STANDARD_ERRORS, draw, one, solutions
 from scipy import stats
 
 from accelstudy.adjustment.quality import solve
-from accelstudy.diagnosis.evidence.chance import Chance
-from accelstudy.diagnosis.evidence.noise.residual_tests import (
+from accelstudy.diagnosis.evidence.detection import Chance
+from accelstudy.diagnosis.evidence.noise_tests import (
     axis_factors,
     axis_test,
     colour_test,
@@ -18,7 +18,7 @@ from accelstudy.diagnosis.evidence.noise.residual_tests import (
     tail_test,
     within_hold_test,
 )
-from accelstudy.diagnosis.evidence.noise.resolution import resolution_test
+from accelstudy.diagnosis.evidence.noise_tests import resolution_test
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.simulation.sessions import Noise
 

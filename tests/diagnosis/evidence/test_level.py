@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from diagnosis_helpers import GRAVITY, NINE, ROBOT, campaign, design, shuffled
 
-from accelstudy.diagnosis.decision.search import Search
-from accelstudy.diagnosis.evidence.chance import Chance
+from accelstudy.diagnosis.problem import Search
+from accelstudy.diagnosis.evidence.detection import Chance
 from accelstudy.diagnosis.evidence.detection import detect, tail, total_odds
 from accelstudy.diagnosis.evidence.field import Field
 from accelstudy.diagnosis.evidence.size import Evidence, Level

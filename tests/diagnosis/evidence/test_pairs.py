@@ -7,7 +7,7 @@ import pytest
 from diagnosis_helpers import GRAVITY, ROBOT, design, shuffled, some_holds
 
 from accelstudy.diagnosis.evidence import pairs
-from accelstudy.diagnosis.evidence.pairs import all_pairs
+from accelstudy.diagnosis.evidence.hypotheses import all_pairs
 from accelstudy.diagnosis.evidence.size import Evidence, Level
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
 

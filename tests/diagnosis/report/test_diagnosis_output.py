@@ -28,17 +28,17 @@ from accelstudy.campaign.calibration.output import write_calibration
 from accelstudy.campaign.files.format import write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.commands.main import main
-from accelstudy.diagnosis.decision.explanations import Explanation
+from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.decision.posterior import Posterior, Weighed
 from accelstudy.diagnosis.decision.priors import SURE
 from accelstudy.diagnosis.decision.verdict import Finding
 from accelstudy.diagnosis.loop import CASES as CASES_OF_LOOP
 from accelstudy.diagnosis.loop import Loop, close_loop
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.report.figures.gap import gap_figure, loop_figure
+from accelstudy.diagnosis.report.figures import gap_figure, loop_figure
 from accelstudy.diagnosis.report.output import diagnose_folder, write_diagnosis
-from accelstudy.diagnosis.report.words.missing import question
-from accelstudy.diagnosis.report.words.summary import headline, verdict_lines
+from accelstudy.diagnosis.report.words import question
+from accelstudy.diagnosis.report.words import headline, verdict_lines
 from accelstudy.diagnosis.result import Gap
 from accelstudy.diagnosis.round_trip import parse_round_trip
 from accelstudy.drawing import saving

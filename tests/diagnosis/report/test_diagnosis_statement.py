@@ -2,14 +2,9 @@
 
 import pytest
 
-from accelstudy.diagnosis.decision.explanations import Explanation
-from accelstudy.diagnosis.report.words.missing import (
-    missing,
-    most_probable,
-    not_told_apart,
-    without_a_name,
-)
-from accelstudy.diagnosis.report.words.statement import statement
+from accelstudy.diagnosis.decision.posterior import Explanation
+from accelstudy.diagnosis.report.words import missing, most_probable, not_told_apart, without_a_name
+from accelstudy.diagnosis.decision.statement import statement
 
 SLOW, EVEN = "slow change in time", "even nonlinearity"
 FAMILIES = {

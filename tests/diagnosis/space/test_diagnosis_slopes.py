@@ -11,7 +11,7 @@ from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.space.examined import examine
-from accelstudy.diagnosis.space.frame import Frame
+from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.signatures import signature, temperature_rate
 from accelstudy.diagnosis.space.slopes import Slopes, trimmed_mean_square
 from accelstudy.effects import HoldConditions, effect_names, get_effect

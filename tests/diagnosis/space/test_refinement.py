@@ -7,7 +7,7 @@ import pytest
 from diagnosis_helpers import GRAVITY, ROBOT, design, shuffled, some_holds
 
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
-from accelstudy.diagnosis.space.refinement import refined, shaped, strongest
+from accelstudy.diagnosis.evidence.hypotheses import refined, shaped, strongest
 
 SIZE = 8.0
 """Of what is hidden, in standard deviations of a position."""

@@ -6,7 +6,7 @@ from diagnosis_helpers import NINE
 
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.report.words.summary import GROUPS
+from accelstudy.diagnosis.report.words import GROUPS
 from accelstudy.diagnosis.space.groups import LACK_OF_FIT, all_groups
 from accelstudy.diagnosis.worth import location
 

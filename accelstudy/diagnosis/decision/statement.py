@@ -2,7 +2,8 @@
 
 Explanations of near rivals share the posterior, so that each has little of it. Together they may
 leave no doubt that a slow change in time is missing, say, and with it an even nonlinearity, while
-none of the four pairs that could be meant has 0.4.
+none of the four pairs that could be meant has 0.4. What rivals have in common is their family in
+the catalogue, such as drifts and jumps of the bias.
 """
 
 from __future__ import annotations
@@ -12,15 +13,36 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, product
 
-from accelstudy.diagnosis.decision.explanations import CREDIBLE, Explanation
-from accelstudy.diagnosis.report.words.families import family_of
+from accelstudy.campaign.gross_errors import get_gross_error, gross_error_names
+from accelstudy.diagnosis.decision.posterior import CREDIBLE, Explanation
+from accelstudy.diagnosis.decision.priors import MANY, SURE
 from accelstudy.diagnosis.space.examined import ExaminedFit
 from accelstudy.diagnosis.space.hypotheses import cosines
+from accelstudy.effects import effect_names, get_effect
+from accelstudy.noise_effects import get_noise_effect, noise_effect_names
 
 Names = tuple[str, ...]
 
 DIGITS = 9
 """Decimals to which sums of the same probabilities agree."""
+
+
+def family_of(*names: str) -> str:
+    """Return the family that effects, noise effects or gross errors have in common, or nothing.
+
+    Names that stand for none of these, such as "unknown", belong to no family.
+    """
+    families = {_family(name) for name in names}
+    return families.pop() if len(families) == 1 else ""
+
+
+def _family(name: str) -> str:
+    """Family of a name of the catalogue; empty if it is none."""
+    if name in effect_names():
+        return get_effect(name).family
+    if name in noise_effect_names():
+        return get_noise_effect(name).family
+    return get_gross_error(name).family if name in gross_error_names() else ""
 
 
 @dataclass(frozen=True)
@@ -98,8 +120,8 @@ def statement(
         left = [_without(one, [name.name for name in part.names]) for one in left]
     rest: dict[Names, Explanation] = {}
     for one in left:
-        known = rest.get(one.names)
-        p = one.posterior + (0.0 if known is None else known.posterior)
+        same = rest.get(one.names)
+        p = one.posterior + (0.0 if same is None else same.posterior)
         rest[one.names] = replace(one, posterior=p)
     beside = sorted(rest.values(), key=lambda one: -one.posterior)
     return Statement(tuple(certain), tuple(beside) if any(rest) else ())
@@ -123,16 +145,16 @@ def _certain(
             families[common] += one.posterior
     families.pop("", None)
     if (surest := _surest(names, probability)) is not None:
-        found, p = [surest], names[surest]
+        chosen, p = [surest], names[surest]
     elif (kind := _surest(families, probability)) is not None:
-        found = [name for name, alike in members.items() if family(*alike) == kind]
-        found, p = sorted(found, key=lambda name: -names[name]), families[kind]
+        chosen = [name for name, alike in members.items() if family(*alike) == kind]
+        chosen, p = sorted(chosen, key=lambda name: -names[name]), families[kind]
     else:
         return None
-    pairs = combinations(found, 2)
+    pairs = combinations(chosen, 2)
     return Part(
-        family=family(*members[found[0]]),
-        names=tuple(Name(name, members[name], names[name]) for name in found),
+        family=family(*members[chosen[0]]),
+        names=tuple(Name(name, members[name], names[name]) for name in chosen),
         posterior=p,
         purity=None if cosine is None else min((cosine(*pair) for pair in pairs), default=None),
     )
@@ -165,3 +187,32 @@ def cosine_in(examined: ExaminedFit) -> Callable[[str, str], float]:
         return max((float(cosines(a.ideal, b.ideal)[0]) for a, b in product(*shapes)), default=0.0)
 
     return cosine
+
+
+def certain_of(
+    verdict: str, credible_set: Sequence[Explanation], examined: ExaminedFit
+) -> tuple[Part, ...]:
+    """What a verdict leaves no doubt of, with the purity of each part in a campaign."""
+    if verdict == "unknown" and refuted(credible_set):
+        return ()
+    return statement(credible_set, cosine=cosine_in(examined)).certain
+
+
+def refuted(credible_set: Sequence[Explanation]) -> bool:
+    """Whether a set would have been an answer if no test had refuted it.
+
+    Added to the model, it left a misfit, say. It may imitate what is missing; nothing is certain.
+    """
+    effects, _ = effects_and_others(credible_set)
+    named = any(one.posterior >= SURE for one in effects)
+    narrowed = len(credible_set) <= MANY and sum(one.posterior for one in effects) >= SURE
+    return named or narrowed
+
+
+def effects_and_others(
+    explanations: Sequence[Explanation],
+) -> tuple[list[Explanation], list[Explanation]]:
+    """Explanations by effects alone, and the others."""
+    catalogue = effect_names()
+    effects = [one for one in explanations if all(name in catalogue for name in one.names)]
+    return effects, [one for one in explanations if one not in effects]

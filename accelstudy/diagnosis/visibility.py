@@ -1,4 +1,4 @@
-"""What a campaign can and cannot show of each effect: limits, detectable and nameable sizes."""
+"""What a campaign or a scheme can and cannot show of each effect: limits, detectable sizes."""
 
 from __future__ import annotations
 
@@ -6,16 +6,26 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
-from accelstudy.adjustment.quality import noncentrality
+from accelstudy.adjustment.quality import noncentrality, solve
+from accelstudy.approaches import Approach
 from accelstudy.basics.shares import sigmas_95
-from accelstudy.diagnosis.space.examined import ExaminedFit
-from accelstudy.diagnosis.space.frame import Frame
+from accelstudy.basics.units import display_unit, to_display
+from accelstudy.basics.wording import number
+from accelstudy.campaign.calibration.fit import fit_campaign, usual_approach
+from accelstudy.campaign.files.session import Campaign
+from accelstudy.diagnosis.space.examined import ExaminedFit, Frame, examine
 from accelstudy.diagnosis.space.hypotheses import ALIKE, OUTLIER, Hypothesis, cosines
 from accelstudy.effects import Effect, get_effect
+from accelstudy.schemes import Scheme
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.simulation.hold_plan import check_needs_no_plan
+from accelstudy.simulation.sessions import Noise, session
 
 Array = NDArray[np.float64]
+
 
 POWER = 0.8
 
@@ -169,3 +179,70 @@ def visibilities(
 def _size(root: float, signature_norms: Array) -> float:
     smallest = float(np.min(signature_norms))
     return root / smallest if smallest > 1e-9 * np.max(signature_norms, initial=1e-300) else np.inf
+
+
+def examine_campaign(
+    campaign: Campaign, model: SensorModel, approach: Approach | None = None
+) -> ExaminedFit:
+    """Return what a campaign can show beside a model, with its own noise.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    model : SensorModel
+    approach : Approach; by default robot-aided if the campaign has the robot's angles
+    """
+    fit = fit_campaign(campaign, model, approach or usual_approach(campaign))
+    return examine(solve(fit.model, fit.approach, fit.observed, fit.adjustment))
+
+
+def examine_scheme(
+    scheme: Scheme, model: SensorModel, approach: Approach, noise: Noise | None = None
+) -> ExaminedFit:
+    """Return what a scheme can show beside a model; nothing is known of times and temperatures.
+
+    Raises
+    ------
+    InputError
+        If the positions do not determine the model, or it needs to know more of them.
+    """
+    check_needs_no_plan(model)
+    ideal = session(model, np.zeros(model.n_parameters), scheme.directions)
+    observed = ideal.observations(noise or Noise())
+    return examine(solve(model, approach, observed))
+
+
+def visibility_table(examined: ExaminedFit) -> pd.DataFrame:
+    """Table for people: one row per effect that is not in the model, in the units shown."""
+    rows = []
+    for row in visibilities(examined):
+
+        def shown(size: float, unit: str = row.unit, seen: bool = row.status == "visible") -> str:
+            return number(float(to_display(size, unit))) if seen else "–"
+
+        worst = _settings(row.hardest)
+        rows.append(
+            {
+                "effect": row.name,
+                "part": get_effect(row.name).part,
+                "status": row.status,
+                "MDB": shown(row.mdb),
+                "MIB": shown(row.mib),
+                "unit": display_unit(row.unit) if row.status == "visible" else "",
+                "with": _settings(row.easiest),
+                "worst MDB": f"{shown(row.hardest_mdb)} with {worst}" if worst else "",
+                "confused with": row.reason
+                or ", ".join(f"{name} {cosine:.2f}" for name, cosine in row.confused),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _settings(effect: Effect | None) -> str:
+    """Settings of an effect as it is written, with their units: ``t=290 s``."""
+    if effect is None:
+        return ""
+    units = {
+        setting.name: "" if setting.unit == "1" else f" {setting.unit}" for setting in effect.takes
+    }
+    return ", ".join(f"{name}={value:.4g}{units[name]}" for name, value in effect.settings.items())

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.diagnosis.space.frame import Frame
+from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.diagnosis.space.signatures import signature
 from accelstudy.effects import HoldConditions
