@@ -41,9 +41,11 @@ from accelstudy.diagnosis.decision.verdict import (
     probabilities,
     sigma_holds,
     tests_of_noise,
+    unit_variance,
     worst_of,
 )
 from accelstudy.diagnosis.evidence.detection import SIMULATIONS, Chance, detect
+from accelstudy.diagnosis.evidence.noise_tests import NoiseTest
 from accelstudy.diagnosis.held_out import measured_gap, predicted_gap
 from accelstudy.diagnosis.problem import Problem, fit_base, is_exact, pose
 from accelstudy.diagnosis.result import Diagnosis, Verdict, level_of_effects
@@ -135,7 +137,8 @@ def _judged(
 
     known, frame = base.level.known, problem.frame
     level = level_of_effects(known)
-    finding, tests, weighing = Finding("no_effect", frame), (), None
+    finding, weighing = Finding("no_effect", frame), None
+    tests: tuple[NoiseTest, ...] = ()
     if is_exact(base.solution):
         reason = "the campaign is its own model: what is left are rounding errors"
         finding = Finding("no_effect", frame, reason)
@@ -150,8 +153,7 @@ def _judged(
             weighing = weigh(problem, detection, chance)
             finding = judge_noise(problem, weighing.posterior, worst)
 
-    holds = sigma_holds(problem, finding.frame)
-    variance = 1.0 if holds else finding.frame.residuals.positions.variance
+    variance = unit_variance(problem, finding.frame)
     found = describe(problem, detection, finding, tests, campaign.positions, variance)
     gap = measured_gap(finding, base.solution)
     if weighing is not None and finding.verdict in ("named", "narrowed"):
@@ -186,7 +188,7 @@ def _judged(
             invisible=problem.examined.invisible,
             untestable=problem.examined.untestable,
             sigma_known=known,
-            sigma_holds=holds,
+            sigma_holds=sigma_holds(problem, finding.frame),
             unit_variance=variance,
             noise_tests=tests,
             screening=detection,

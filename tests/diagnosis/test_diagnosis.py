@@ -14,7 +14,7 @@ from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.states import ACCEPTED, REJECTED
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.diagnosis.held_out import gap
+from accelstudy.diagnosis import prediction
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.effects import HoldConditions
 from accelstudy.schemes import get_scheme
@@ -74,12 +74,12 @@ def test_held_out_z_is_standard_normal_if_nothing_is_missing():
     extended = compose("extended", (*(e.spec for e in NINE.effects), "quadratic_scale"))
     directions = get_scheme("mclaren-24").directions
     ideal = session(NINE, np.zeros(NINE.n_parameters), directions, STANDARD_GRAVITY)
-    fitted, held = gap.split_positions(-directions, HoldConditions(), 8, rng)
+    fitted, held = prediction.split_positions(-directions, HoldConditions(), 8, rng)
     for _ in range(120):
         observed = ideal.draw(Noise(), 1, rng)
         part, rest = observed.take(fitted), observed.take(held)
         base, more = (solve(model, robot, part) for model in (NINE, extended))
-        z.append(gap.held_out_gap(base, more, rest, held, 1.0, rng).z)
+        z.append(prediction.held_out_gap(base, more, rest, held, 1.0, rng).z)
     assert abs(np.mean(z)) < 4 / math.sqrt(len(z))
     assert abs(np.std(z) - 1) < 4 / math.sqrt(2 * len(z))
 
@@ -171,7 +171,7 @@ def test_what_an_effect_does_to_the_other_parameters_is_predicted(approach):
         assert abs(change.predicted - change.estimated) < second_order
 
     true = [p["value"] for effect in truth["sensor"] for p in effect["parameters"]]
-    sigma = np.sqrt(np.diag(found.final.frame.solution.cofactors)[:9])
+    sigma = np.sqrt(np.diag(found.final.solution.cofactors)[:9])
     before, after = ([getattr(c, when) for c in found.changes] for when in ("before", "after"))
     assert np.max(np.abs(np.subtract(after, true) / sigma)) < 4
     assert np.max(np.abs(np.subtract(before, true) / sigma)) > 10
@@ -181,19 +181,19 @@ def test_gravity_alone_is_blind_and_says_so():
     measured, _ = campaign(3, approach="gravity", effects=("mounting_rotation",))
     found = diagnose(measured, NINE)
     assert found.verdict == "no_effect"
-    assert set(found.examined.invisible) == {"gravity_error", *ROTATIONS}
+    assert set(found.invisible) == {"gravity_error", *ROTATIONS}
 
 
 def test_a_wrong_gravity_is_never_seen():
     measured, _ = campaign(3, effects=("gravity_error",))
     found = diagnose(measured, NINE)
     assert found.verdict == "no_effect"
-    assert found.examined.invisible == ("gravity_error",)
+    assert found.invisible == ("gravity_error",)
 
 
 def test_columns_that_are_missing_are_named():
     measured = replace(campaign(3)[0], temperature=None, vibration=None)
-    untestable = diagnose(measured, NINE).examined.untestable
+    untestable = diagnose(measured, NINE).untestable
     thermal = {"thermal_bias", "thermal_curve", "thermal_scale"}
     assert set(untestable) == {*thermal, "vibration_rectification"}
     assert "'temperature'" in untestable["thermal_bias"]

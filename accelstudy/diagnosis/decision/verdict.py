@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import special
 
 from accelstudy.adjustment.quality import Solution
@@ -365,6 +366,11 @@ def sigma_holds(problem: Problem, frame: Frame) -> bool:
     return known and level_test_of(problem, frame).p_value >= REFUTED
 
 
+def unit_variance(problem: Problem, frame: Frame) -> float:
+    """Variance of unit weight: 1 where the given sigma holds, else a posteriori."""
+    return 1.0 if sigma_holds(problem, frame) else frame.residuals.positions.variance
+
+
 def worst_of(tests: Sequence[NoiseTest]) -> NoiseTest | None:
     """Return what is wrong with the noise, the most specific finding first."""
     level = next((t for t in tests if t.name == LEVEL), None)
@@ -410,7 +416,7 @@ def describe(
     detection: Detection,
     finding: Finding,
     tests: Sequence[NoiseTest],
-    labels: Sequence[int],
+    labels: NDArray[np.int_],
     variance: float,
 ) -> tuple[Named, ...]:
     """Describe what was found.
@@ -421,7 +427,7 @@ def describe(
     detection : Detection, of the same
     finding : Finding
     tests : of the noise
-    labels : of the positions
+    labels : (n,) int array, of the positions
     variance : float, of unit weight
     """
     if finding.verdict == "noise_model":

@@ -22,8 +22,9 @@ from accelstudy.campaign.calibration.document import (
 )
 from accelstudy.campaign.calibration.fit import CampaignFit, JudgedNoise, campaign_estimability
 from accelstudy.campaign.files.session import Campaign
+from accelstudy.diagnosis.decision.verdict import Named
 from accelstudy.diagnosis.report.words import explanation_words, keep_base, missing
-from accelstudy.diagnosis.result import Diagnosis, Named
+from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.sensors.frames import FRD
 from accelstudy.sensors.models import MODELS, composition_name
 from accelstudy.sensors.sensor import SensorModel
@@ -225,7 +226,13 @@ def diagnosed_calibration(diagnosis: Diagnosis) -> dict[str, Any]:
         If the fit cannot be assessed.
     """
     fit = diagnosed_fit(diagnosis)
-    content = {**calibration_document(fit), "quality": quality_document(assess(fit))}
+    # The diagnosis has looked at these data, unless it changed them or left out their angles.
+    unchanged = diagnosis.recognised is None and bool(diagnosis.kept.all())
+    as_recognised = unchanged and (fit.approach.uses_angles or fit.campaign.angles is None)
+    content = {
+        **calibration_document(fit),
+        "quality": quality_document(assess(fit, without_gross_error=as_recognised)),
+    }
     warnings = list(fit.campaign.warnings)
     if diagnosis.verdict == "narrowed":
         warnings.append(

@@ -19,8 +19,9 @@ from accelstudy.diagnosis.decision.statement import (
     refuted,
     statement,
 )
+from accelstudy.diagnosis.decision.verdict import Named
 from accelstudy.diagnosis.next_positions import NextPosition
-from accelstudy.diagnosis.result import Diagnosis, Named
+from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.diagnosis.space.groups import REPEAT
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.sensors.plausibility import USUAL_CAUSE

@@ -7,8 +7,7 @@ import pandas as pd
 
 from accelstudy.adjustment.quality import noncentrality
 from accelstudy.campaign.files.session import Campaign
-from accelstudy.diagnosis.visibility import POWER, visibilities
-from accelstudy.diagnosis.visibility import examine_campaign
+from accelstudy.diagnosis.visibility import POWER, examine_campaign, visibilities
 from accelstudy.hidden.physics import generate
 from accelstudy.hidden.score.rates import with_intervals
 from accelstudy.hidden.study.cells import limit_cells

@@ -5,10 +5,11 @@ import pytest
 from diagnosis_helpers import NINE
 
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
+from accelstudy.diagnosis import consequences as location
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.words import GROUPS
+from accelstudy.diagnosis.space.examined import examine
 from accelstudy.diagnosis.space.groups import LACK_OF_FIT, all_groups
-from accelstudy.diagnosis.worth import location
 
 CAMPAIGNS = {
     "few, by gravity": {"scheme": "fibonacci-15", "approach": "gravity", "effects": ("settling",)},
@@ -56,7 +57,7 @@ def test_six_redundant_conditions_locate_nothing(diagnoses):
 @pytest.mark.parametrize("name", CAMPAIGNS)
 def test_a_share_is_told_where_chance_seldom_gives_nearly_all(diagnoses, name):
     """Of white noise, in which every direction of the residual space is as likely."""
-    examined = diagnoses[name].examined
+    examined = examine(diagnoses[name].frame.solution)
     residuals, rng = examined.frame.residuals, np.random.default_rng(8)
     noise = residuals.project(rng.standard_normal((len(residuals.design), 4000))).T
     total = np.sum(noise**2, axis=1)
@@ -68,6 +69,6 @@ def test_a_share_is_told_where_chance_seldom_gives_nearly_all(diagnoses, name):
         if abs(often - location.SELDOM) > error:
             assert (group in diagnoses[name].location) == (often < location.SELDOM)
         if group in diagnoses[name].location:
-            share = diagnoses[name].beside.location.by_chance[group]
+            share = diagnoses[name].location_by_chance[group]
             shares = space.parts(noise)[:, 0] / total
             assert share == pytest.approx(shares.mean(), abs=4 * shares.std() / len(noise) ** 0.5)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from diagnosis_helpers import GRAVITY, ROBOT, design, shuffled, some_holds
 
-from accelstudy.diagnosis.evidence import pairs
+from accelstudy.diagnosis.evidence import hypotheses
 from accelstudy.diagnosis.evidence.hypotheses import all_pairs
 from accelstudy.diagnosis.evidence.size import Evidence, Level
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
@@ -90,7 +90,7 @@ def test_all_pairs_are_those_of_all_shapes_together(problem):
 def test_of_many_positions_those_that_explain_most_are_paired(problem, monkeypatch):
     """The others keep their share of the prior, as if they explained nothing."""
     shapes, residuals, evidence = problem
-    monkeypatch.setattr(pairs, "POSITIONS", 4)
+    monkeypatch.setattr(hypotheses, "POSITIONS", 4)
     alone = [np.sum((h.basis.T @ residuals.z) ** 2) for h in shapes[OUTLIER]]
     places = sorted(np.argsort(alone)[-4:].tolist())
     assert_same(all_pairs(*problem), one_by_one(shapes, residuals, evidence, places))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from diagnosis_helpers import GRAVITY, ROBOT, design, shuffled, some_holds
 
-from accelstudy.diagnosis.space.hypotheses import OUTLIER
 from accelstudy.diagnosis.evidence.hypotheses import refined, shaped, strongest
+from accelstudy.diagnosis.space.hypotheses import OUTLIER
 
 SIZE = 8.0
 """Of what is hidden, in standard deviations of a position."""

@@ -11,8 +11,8 @@ from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.diagnosis.space.examined import examine
 from accelstudy.diagnosis.next_positions import GRID, next_positions
+from accelstudy.diagnosis.space.examined import examine
 from accelstudy.leveling.angles import specific_force
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import compose

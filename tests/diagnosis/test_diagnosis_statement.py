@@ -3,8 +3,8 @@
 import pytest
 
 from accelstudy.diagnosis.decision.posterior import Explanation
-from accelstudy.diagnosis.report.words import missing, most_probable, not_told_apart, without_a_name
 from accelstudy.diagnosis.decision.statement import statement
+from accelstudy.diagnosis.report.words import missing, most_probable, not_told_apart, without_a_name
 
 SLOW, EVEN = "slow change in time", "even nonlinearity"
 FAMILIES = {

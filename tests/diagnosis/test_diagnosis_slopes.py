@@ -10,8 +10,7 @@ from accelstudy.adjustment.quality import solve
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.space.examined import examine
-from accelstudy.diagnosis.space.examined import Frame
+from accelstudy.diagnosis.space.examined import Frame, examine
 from accelstudy.diagnosis.space.signatures import signature, temperature_rate
 from accelstudy.diagnosis.space.slopes import Slopes, trimmed_mean_square
 from accelstudy.effects import HoldConditions, effect_names, get_effect
@@ -212,4 +211,4 @@ def test_a_sensor_that_settles_is_no_noise():
 
 def test_without_sigma_the_slopes_are_left_out():
     campaign = replace(settling(1), sigma_force=None)
-    assert diagnose(campaign, NINE).examined.frame.residuals.slopes == 0
+    assert diagnose(campaign, NINE).frame.residuals.slopes == 0

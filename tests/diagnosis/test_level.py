@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from diagnosis_helpers import GRAVITY, NINE, ROBOT, campaign, design, shuffled
 
-from accelstudy.diagnosis.problem import Search
-from accelstudy.diagnosis.evidence.detection import Chance
-from accelstudy.diagnosis.evidence.detection import detect, tail, total_odds
+from accelstudy.diagnosis import pipeline
+from accelstudy.diagnosis.evidence.detection import Chance, detect, tail, total_odds
 from accelstudy.diagnosis.evidence.field import Field
 from accelstudy.diagnosis.evidence.size import Evidence, Level
 from accelstudy.diagnosis.pipeline import diagnose
@@ -71,9 +70,8 @@ def test_noise_alone_counts_as_often_as_the_level_says(designs, approach, level,
 @pytest.mark.parametrize("side", [-1, 1])
 def test_a_diagnosis_decides_at_this_level(monkeypatch, known, level, side):
     """Noise alone, of which the test says that it is just below or just above the level."""
-    told = Search.detection.func
     monkeypatch.setattr(
-        Search, "detection", property(lambda s: replace(told(s), p_value=level + side * 1e-6))
+        pipeline, "detect", lambda *given: replace(detect(*given), p_value=level + side * 1e-6)
     )
     found = diagnose(campaign(1, scheme="mclaren-24", sigma_known=known)[0], NINE)
     assert (found.verdict == "no_effect") == (side > 0)

@@ -4,18 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, design, shuffled
+from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, design, posed, shuffled
 from scipy import stats
 
-from accelstudy.adjustment.quality import solve
-from accelstudy.diagnosis.decision.posterior import Explanation, credible_set
-from accelstudy.diagnosis.decision.posterior import Posterior, Weighed
-from accelstudy.diagnosis.problem import Search
+from accelstudy.diagnosis.decision.posterior import Explanation, Posterior, Weighed, credible_set
 from accelstudy.diagnosis.decision.verdict import _misfit
 from accelstudy.diagnosis.evidence.field import Field
 from accelstudy.diagnosis.evidence.noise_models import UnequalAxes
-from accelstudy.diagnosis.evidence.noise_tests import NOISES
-from accelstudy.diagnosis.evidence.noise_tests import most_evidence
+from accelstudy.diagnosis.evidence.noise_tests import NOISES, most_evidence
 from accelstudy.diagnosis.evidence.size import SIZE_WEIGHTS, SIZES, Evidence, Level
 from accelstudy.schemes import get_scheme
 from accelstudy.simulation.sessions import Noise, session
@@ -183,7 +179,7 @@ def test_a_fit_that_misses_more_than_the_noise_is_no_explanation(level, spread, 
     # Each attitude misses by an amount of its own, which its repeat has, too.
     missed = np.tile(spread * rng.standard_normal((24, 3)), (2, 1))
     observed = replace(observed, forces=observed.forces + missed)
-    search = Search(solve(NINE, GRAVITY, observed), np.random.SeedSequence(9), level)
-    found = _misfit(search, search.first)
+    problem = posed(GRAVITY, observed, level)
+    found = _misfit(problem, problem.base.solution)
     assert found.endswith(said)
     assert bool(found) == bool(said)

@@ -11,8 +11,12 @@ from accelstudy.adjustment.quality import solve
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.signatures import signature
-from accelstudy.diagnosis.visibility import signature_columns, upper_limits, visibilities
-from accelstudy.diagnosis.visibility import examine_campaign
+from accelstudy.diagnosis.visibility import (
+    examine_campaign,
+    signature_columns,
+    upper_limits,
+    visibilities,
+)
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise, session

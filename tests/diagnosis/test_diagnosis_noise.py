@@ -15,10 +15,10 @@ from accelstudy.diagnosis.evidence.noise_tests import (
     axis_test,
     colour_test,
     level_test,
+    resolution_test,
     tail_test,
     within_hold_test,
 )
-from accelstudy.diagnosis.evidence.noise_tests import resolution_test
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.simulation.sessions import Noise
 

@@ -28,19 +28,20 @@ from accelstudy.campaign.calibration.output import write_calibration
 from accelstudy.campaign.files.format import write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.commands.main import main
-from accelstudy.diagnosis.decision.posterior import Explanation
-from accelstudy.diagnosis.decision.posterior import Posterior, Weighed
+from accelstudy.diagnosis.consequences import separating_positions
+from accelstudy.diagnosis.decision.posterior import Explanation, Posterior, Weighed
 from accelstudy.diagnosis.decision.priors import SURE
+from accelstudy.diagnosis.decision.statement import certain_of
 from accelstudy.diagnosis.decision.verdict import Finding
+from accelstudy.diagnosis.held_out import Gap
 from accelstudy.diagnosis.loop import CASES as CASES_OF_LOOP
 from accelstudy.diagnosis.loop import Loop, close_loop
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.figures import gap_figure, loop_figure
 from accelstudy.diagnosis.report.output import diagnose_folder, write_diagnosis
-from accelstudy.diagnosis.report.words import question
-from accelstudy.diagnosis.report.words import headline, verdict_lines
-from accelstudy.diagnosis.result import Gap
+from accelstudy.diagnosis.report.words import headline, question, verdict_lines
 from accelstudy.diagnosis.round_trip import parse_round_trip
+from accelstudy.diagnosis.space.examined import examine
 from accelstudy.drawing import saving
 from accelstudy.drawing.style import STYLE
 from accelstudy.sensors.models import get_model
@@ -191,7 +192,8 @@ def explained(*explanations):
 
 @pytest.mark.usefixtures("not_rendered")
 def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
-    shapes = named.examined.candidates
+    examined = examine(named.frame.solution)
+    shapes = examined.candidates
     thermal, drift = (shapes[name][0] for name in ("thermal_bias", "thermal_scale"))
     weighed = [
         Weighed((name,), ((name,),), np.log(p), best)
@@ -201,13 +203,14 @@ def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
             ("unknown", 0.05, ()),
         )
     ]
-    finding = replace(named.beside.finding, verdict="narrowed", posterior=Posterior.of(weighed))
+    finding = Finding("narrowed", named.final, posterior=Posterior.of(weighed))
     diagnosis = replace(
         named,
         verdict="narrowed",
         credible_set=finding.credible_set,
+        certain=certain_of("narrowed", finding.credible_set, examined),
         gap=replace(named.gap, names=()),
-        beside=replace(named.beside, finding=finding),
+        next_positions=separating_positions(named.frame, finding),
     )
     content = write_diagnosis(diagnosis, tmp_path)
     assert [error.message for error in SCHEMA.iter_errors(content)] == []
@@ -236,12 +239,13 @@ def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
 @pytest.mark.usefixtures("not_rendered")
 def test_what_is_certain_of_the_unknown_is_its_headline(named, tmp_path):
     others = ("hysteresis", "settling", "saturation", "cubic_scale", "quadratic_scale")
+    known = explained(*(("thermal_bias", name, 0.19) for name in others))
     diagnosis = replace(
         named,
-        **{"verdict": "unknown", "found": (), "gap": Gap(named.gap.before)},
-        beside=replace(named.beside, finding=Finding("unknown", named.examined)),
-        **{"extended": named.model, "final": named.examined, "reason": "too much is open"},
-        credible_set=explained(*(("thermal_bias", name, 0.19) for name in others)),
+        **{"verdict": "unknown", "found": (), "gap": Gap(named.gap.before), "leveling": None},
+        **{"extended": named.model, "final": named.frame, "reason": "too much is open"},
+        **{"credible_set": known, "changes": (), "next_positions": ()},
+        certain=certain_of("unknown", known, examine(named.frame.solution)),
     )
     content = write_diagnosis(diagnosis, tmp_path)
     assert [error.message for error in SCHEMA.iter_errors(content)] == []
@@ -254,12 +258,10 @@ def test_what_is_certain_of_the_unknown_is_its_headline(named, tmp_path):
 @pytest.mark.parametrize(("after", "better"), [(98.0, "base"), (82.5, "extended")])
 def test_a_model_that_levels_worse_is_not_advised(named, tmp_path, after, better):
     """On the page and its commands, in the terminal, and in both files for programs."""
-    beside = replace(named.beside)
-    beside.__dict__["leveling"] = (82.0 * MGON, after * MGON)
-    content = write_diagnosis(replace(named, beside=beside), tmp_path)
+    diagnosis = replace(named, leveling=(82.0 * MGON, after * MGON))
+    content = write_diagnosis(diagnosis, tmp_path)
     assert [error.message for error in SCHEMA.iter_errors(content)] == []
     assert content["gap"]["better_for_leveling"] == better
-    diagnosis = replace(named, beside=beside)
     page = text_of((tmp_path / "report.html").read_text(encoding="utf-8"))
     calibration = json.loads((tmp_path / "calibration.json").read_text(encoding="utf-8"))
     advised = "keep the base model"
@@ -509,9 +511,7 @@ def test_bad_input_is_one_line(arguments, words, tmp_path, monkeypatch):
 def test_a_figure_that_fails_takes_nothing_with_it(tmp_path, monkeypatch, capsys):
     campaign = simulated("no_effect", tmp_path / "c")
     diagnosis = diagnose(campaign, NINE)
-    monkeypatch.setattr(
-        "accelstudy.diagnosis.report.figures.choice.evidence_figure", lambda *_: 1 / 0
-    )
+    monkeypatch.setattr("accelstudy.diagnosis.report.figures.evidence_figure", lambda *_: 1 / 0)
     write_diagnosis(diagnosis, tmp_path / "out")
     said = "The figure 'evidence' could not be drawn (ZeroDivisionError: division by zero)."
     assert capsys.readouterr().err == f"warning: {said}\n"
@@ -558,7 +558,7 @@ def test_numbers_of_many_positions_do_not_meet():
     ).assign(predicted_after_mps2=0.01)
     solution = SimpleNamespace(whitening=np.eye(3)[None])
     gap = SimpleNamespace(held_out=SimpleNamespace(before=2.0, after=1.0, floor=1.0))
-    final = SimpleNamespace(frame=SimpleNamespace(solution=solution))
+    final = SimpleNamespace(solution=solution)
     diagnosis = SimpleNamespace(gap=gap, final=final, unit_variance=1e-6)
     with mpl.rc_context(STYLE):
         figure = gap_figure(diagnosis, positions)

@@ -6,8 +6,7 @@ from diagnosis_helpers import GRAVITY, NINE, G
 from norm_model import SHOWN, left_of, nine
 from scipy import stats
 
-from accelstudy.diagnosis.visibility import visibilities
-from accelstudy.diagnosis.visibility import examine_scheme, visibility_table
+from accelstudy.diagnosis.visibility import examine_scheme, visibilities, visibility_table
 from accelstudy.effects import effect_names, effects_without
 from accelstudy.schemes import get_scheme
 from accelstudy.simulation.sessions import Noise

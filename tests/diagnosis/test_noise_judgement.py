@@ -5,15 +5,18 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from diagnosis_helpers import GRAVITY, NINE, G, shuffled
+from diagnosis_helpers import GRAVITY, NINE, G, posed, shuffled
 from scipy import stats
 
-from accelstudy.adjustment.quality import solve
-from accelstudy.diagnosis.decision import noise
-from accelstudy.diagnosis.decision.verdict import NoiseJudge
+from accelstudy.diagnosis.decision import verdict
 from accelstudy.diagnosis.decision.posterior import Posterior, Weighed
-from accelstudy.diagnosis.problem import Search
-from accelstudy.diagnosis.decision.verdict import lack_of_fit
+from accelstudy.diagnosis.decision.verdict import (
+    judge_noise,
+    lack_of_fit,
+    sigma_holds,
+    unit_variance,
+    worst_of,
+)
 from accelstudy.diagnosis.evidence.noise_tests import AXES, COLOUR, LEVEL, STEPS, TAILS, NoiseTest
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.simulation.sessions import Noise, session
@@ -23,10 +26,9 @@ OF_LEVEL, OF_ALL_OTHERS = 0.01, 0.01
 OTHERS = (AXES, COLOUR, TAILS, STEPS)
 
 
-def judge(tests=(), **p):
-    """A judgement of tests with p-values; what is not named has 0.5."""
-    made = [NoiseTest(name, 1.0, p.get(name, 0.5), (1.5,), name) for name in tests]
-    return NoiseJudge(SimpleNamespace(), None), made
+def made(tests=(), **p):
+    """Tests with p-values; what is not named has 0.5."""
+    return [NoiseTest(name, 1.0, p.get(name, 0.5), (1.5,), name) for name in tests]
 
 
 def by_holds(p):
@@ -35,9 +37,8 @@ def by_holds(p):
 
 
 def worst(tests, **p):
-    own, made = judge(tests, **p)
-    found = own.worst(made)
-    return None if found is None else found.name
+    test = worst_of(made(tests, **p))
+    return None if test is None else test.name
 
 
 # --- which test counts ---------------------------------------------------------------------------
@@ -69,19 +70,17 @@ def test_the_most_specific_finding_comes_first():
 @pytest.mark.parametrize(("sigma", "counts"), [(0.5, False), (0.5 * OF_LEVEL, True)])
 def test_where_sigma_holds_the_noise_within_the_holds_accuses_nothing(sigma, counts):
     """A sigma that the residuals confirm knows of what varies from hold to hold."""
-    own, tests = judge((LEVEL, *OTHERS), **{LEVEL: sigma})
-    found = own.worst([*tests, by_holds(1e-9)])
-    assert (found is not None and found.by_holds) == counts
+    tests = made((LEVEL, *OTHERS), **{LEVEL: sigma})
+    test = worst_of([*tests, by_holds(1e-9)])
+    assert (test is not None and test.by_holds) == counts
     # Without it the others have a quarter each, with it a fifth.
-    own, tests = judge((LEVEL, *OTHERS), **{LEVEL: sigma, TAILS: 0.9 * OF_ALL_OTHERS / 4})
-    found = own.worst([*tests, by_holds(0.5)])
-    assert found.name == (LEVEL if counts else TAILS)
+    tests = made((LEVEL, *OTHERS), **{LEVEL: sigma, TAILS: 0.9 * OF_ALL_OTHERS / 4})
+    assert worst_of([*tests, by_holds(0.5)]).name == (LEVEL if counts else TAILS)
 
 
 def test_where_sigma_is_not_given_the_holds_say_how_large_the_noise_is():
-    own, tests = judge(OTHERS)
-    assert own.worst([*tests, by_holds(0.99 * OF_ALL_OTHERS / 5)]).by_holds
-    assert own.worst([*tests, by_holds(1.01 * OF_ALL_OTHERS / 5)]) is None
+    assert worst_of([*made(OTHERS), by_holds(0.99 * OF_ALL_OTHERS / 5)]).by_holds
+    assert worst_of([*made(OTHERS), by_holds(1.01 * OF_ALL_OTHERS / 5)]) is None
 
 
 # --- what follows --------------------------------------------------------------------------------
@@ -93,13 +92,13 @@ def judged(monkeypatch, name, factor=1.5, of_noise=0.5, fit=0.5):
         Weighed((LEVEL,), ((LEVEL,),), np.log(of_noise)),
         Weighed(("hysteresis",), (("hysteresis",),), np.log1p(-of_noise)),
     ]
-    search = SimpleNamespace(examined="fit", posterior=Posterior.of(weighed))
-    monkeypatch.setattr(noise, "lack_of_fit", lambda one: fit)
-    return NoiseJudge(search, None).judged(NoiseTest(name, 1.0, 1e-6, (factor,), "what it says"))
+    monkeypatch.setattr(verdict, "lack_of_fit", lambda one: fit)
+    test = NoiseTest(name, 1.0, 1e-6, (factor,), "what it says")
+    return judge_noise(SimpleNamespace(frame="fit"), Posterior.of(weighed), test)
 
 
 @pytest.mark.parametrize(
-    ("case", "verdict", "says_the_level"),
+    ("case", "said", "says_the_level"),
     [
         ({"name": AXES, "of_noise": 0.1}, "noise_model", False),
         ({"name": LEVEL, "of_noise": 0.51}, "noise_model", True),
@@ -111,12 +110,12 @@ def judged(monkeypatch, name, factor=1.5, of_noise=0.5, fit=0.5):
         ({"name": STEPS, "fit": 0.009}, "noise_model", False),
     ],
 )
-def test_what_a_significant_test_means(monkeypatch, case, verdict, says_the_level):
+def test_what_a_significant_test_means(monkeypatch, case, said, says_the_level):
     """Larger residuals may be an effect; a misfit that repeats share is no noise, but steps are."""
     found = judged(monkeypatch, **case)
-    assert (found.verdict, found.says_the_level) == (verdict, says_the_level)
+    assert (found.verdict, found.says_the_level) == (said, says_the_level)
     assert found.posterior is not None
-    if verdict == "noise_model":
+    if said == "noise_model":
         assert found.reason == "what it says"
 
 
@@ -130,7 +129,7 @@ def test_an_effect_that_is_not_excluded_is_named(monkeypatch):
 
 
 def repeated(level, scatter=1.0, missed=0.0, seed=4):
-    """A search in a session of 18 attitudes, each twice, without a robot.
+    """The problem of a session of 18 attitudes, each twice, without a robot.
 
     The noise has `scatter` times its sigma, and each attitude misses by an amount of its own.
     """
@@ -139,17 +138,17 @@ def repeated(level, scatter=1.0, missed=0.0, seed=4):
     observed = ideal.draw(Noise(sigma_force=scatter * 0.002), 1, rng)
     forces = observed.forces + missed * np.tile(rng.standard_normal((18, 3)), (2, 1))
     observed = replace(observed, forces=forces, sigma_force=0.002)
-    return Search(solve(NINE, GRAVITY, observed), np.random.SeedSequence(1), level)
+    return posed(GRAVITY, observed, level)
 
 
 @pytest.mark.parametrize("missed", [0.0, 0.003])
 def test_lack_of_fit_is_the_analysis_of_variance(missed):
     """The mean of two repeats against the model, by what they differ: F with 9 and 18."""
-    search = repeated(Level.given(), missed=missed)
-    e = search.first.misclosures[:, 0]
+    problem = repeated(Level.given(), missed=missed)
+    e = problem.base.solution.misclosures[:, 0]
     pure = np.sum((e[:18] - e[18:]) ** 2) / 2
     f = (np.sum(e**2) - pure) / 9 / (pure / 18)
-    assert lack_of_fit(search) == pytest.approx(stats.f.sf(f, 9, 18), rel=0.02)
+    assert lack_of_fit(problem) == pytest.approx(stats.f.sf(f, 9, 18), rel=0.02)
 
 
 @pytest.mark.parametrize(
@@ -162,8 +161,8 @@ def test_lack_of_fit_is_the_analysis_of_variance(missed):
     ],
 )
 def test_sigma_is_taken_where_it_is_given_and_not_refuted(level, scatter, holds):
-    search = repeated(level, scatter)
-    own, fit = NoiseJudge(search, None), search.equal
-    e = search.first.misclosures[:, 0] / 0.002
-    assert own.sigma_holds(fit) == holds
-    assert own.unit_variance(fit) == pytest.approx(1.0 if holds else np.sum(e**2) / 27, rel=1e-3)
+    problem = repeated(level, scatter)
+    e = problem.base.solution.misclosures[:, 0] / 0.002
+    assert sigma_holds(problem, problem.frame) == holds
+    variance = 1.0 if holds else np.sum(e**2) / 27
+    assert unit_variance(problem, problem.frame) == pytest.approx(variance, rel=1e-3)
