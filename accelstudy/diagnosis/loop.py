@@ -148,8 +148,8 @@ def close_loop(diagnosis: Diagnosis, replicates: int = REPLICATES, seed: int = 1
                 table = _session_table(simulated, fits[calibration], drawn, hold)
                 if table is None:
                     return None
-                known = {"simulation": simulation, "calibration": calibration}
-                tables.append(table.assign(**known, replicate=numbers)[COLUMNS])
+                table = table.assign(simulation=simulation, calibration=calibration)
+                tables.append(table.assign(replicate=numbers)[COLUMNS])
     loop = Loop(pd.concat(tables, ignore_index=True), measured)
     return loop if all(len(loop.case(*case)) for case in CASES) else None
 

@@ -76,8 +76,8 @@ def next_positions(frame: Frame, first: Explanation, second: Explanation) -> lis
     effects = [one.effect for one in (*first, *second) if one.effect is not None]
     needed = {c for e in effects for c in compose(e.spec, (e.spec,)).hold_columns}
     g = frame.solution.gravity
-    own = frame.forces[_apart(frame.forces, range(len(frame.forces)), g)]
-    attitudes = np.concatenate([own, -g * get_scheme(GRID).directions])
+    repeated = frame.forces[_apart(frame.forces, range(len(frame.forces)), g)]
+    attitudes = np.concatenate([repeated, -g * get_scheme(GRID).directions])
     forces, hold, later = _grid(frame, attitudes, needed, frame.forces[-1])
     rivals = _Rivals.of(frame, first, second)
     gain = np.sqrt(rivals.separation.gains(rivals.columns(forces, hold)))
@@ -86,7 +86,7 @@ def next_positions(frame: Frame, first: Explanation, second: Explanation) -> lis
     there = gain[start : start + len(attitudes)]  # at the best temperature and time
     anywhere = bool(there.min() >= ANYWHERE * there.max())
     if anywhere:
-        chosen = [start + i for i in range(len(own))]
+        chosen = [start + i for i in range(len(repeated))]
     else:
         chosen = _one_after_the_other(rivals, attitudes, needed)
     roll, pitch = roll_pitch(tuple(forces.T))

@@ -135,8 +135,8 @@ def _judged(
     chance = Chance(seeds[0], len(base.solution.design))
     detection = detect(problem.field, problem.evidence, problem.residuals, chance)
 
-    known, frame = base.level.known, problem.frame
-    level = level_of_effects(known)
+    stated, frame = base.level.known, problem.frame
+    level = level_of_effects(stated)
     finding, weighing = Finding("no_effect", frame), None
     tests: tuple[NoiseTest, ...] = ()
     if is_exact(base.solution):
@@ -154,12 +154,12 @@ def _judged(
             finding = judge_noise(problem, weighing.posterior, worst)
 
     variance = unit_variance(problem, finding.frame)
-    found = describe(problem, detection, finding, tests, campaign.positions, variance)
+    named = describe(problem, detection, finding, tests, campaign.positions, variance)
     gap = measured_gap(finding, base.solution)
     if weighing is not None and finding.verdict in ("named", "narrowed"):
         with stage("held-out positions"):
             beyond = detection.by_chance.beyond(level)
-            given = variance if known else None
+            given = variance if stated else None
             gap = predicted_gap(
                 gap, problem, weighing, finding, beyond, given, [seeds[k] for k in (1, 2, 4)]
             )
@@ -170,7 +170,7 @@ def _judged(
             Named(name, name, (name,), None, None, position=position)
             for name, position in recognised.named
         )
-        found = (*gross, *found)
+        named = (*gross, *named)
     return _Judged(
         Verdict(
             campaign=campaign,
@@ -181,13 +181,13 @@ def _judged(
             reason=reason,
             says_the_level=finding.says_the_level,
             credible_set=finding.credible_set,
-            found=found,
+            found=named,
             base=base.solution,
             frame=frame,
             final=finding.frame,
             invisible=problem.examined.invisible,
             untestable=problem.examined.untestable,
-            sigma_known=known,
+            sigma_known=stated,
             sigma_holds=sigma_holds(problem, finding.frame),
             unit_variance=variance,
             noise_tests=tests,

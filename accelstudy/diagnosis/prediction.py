@@ -247,9 +247,9 @@ class LinearSplit:
         """
         effects = [one.effect for one in hypotheses if one.effect is not None]
         shown = self.frame.residuals.positions.whitened(self.frame.signatures(effects))
-        found = []
+        matrices = []
         columns = np.split(shown, len(effects), axis=1)
-        for one, own in zip(hypotheses, columns, strict=True):
-            fitted, rest = self.beside((own @ one.directions).T)
-            found.append((np.asarray(np.linalg.pinv(fitted), dtype=float), rest))
-        return found
+        for one, column in zip(hypotheses, columns, strict=True):
+            fitted, rest = self.beside((column @ one.directions).T)
+            matrices.append((np.asarray(np.linalg.pinv(fitted), dtype=float), rest))
+        return matrices

@@ -55,9 +55,9 @@ def fit_base(campaign: Campaign, model: SensorModel, approach: Approach) -> Base
     InputError
         If the positions do not determine the model, or leave no redundancy to test anything.
     """
-    known, measured = campaign.sigma_force is not None, campaign
+    stated, measured = campaign.sigma_force is not None, campaign
     # Without a sigma the weights of forces and angles need one: that of the residuals.
-    for _ in range(1 if known else 3):
+    for _ in range(1 if stated else 3):
         fit = fit_campaign(measured, model, approach)
         if fit.adjustment.redundancy <= 0:
             raise InputError(
@@ -65,7 +65,7 @@ def fit_base(campaign: Campaign, model: SensorModel, approach: Approach) -> Base
                 f"the {model.n_parameters} parameters of {model.name!r}: nothing can "
                 "be tested; more positions are needed"
             )
-        if not known:
+        if not stated:
             least = max(1e-9, least_sigma(campaign, approach))
             sigma = max(fit.sigma_position, least)
             measured = replace(measured, sigma_force=sigma, slope=None, sd_slope=None)
@@ -73,7 +73,7 @@ def fit_base(campaign: Campaign, model: SensorModel, approach: Approach) -> Base
     sd, n, within = campaign.sd, campaign.n_samples, None
     if sd is not None and n is not None and np.all(sd > 0):
         within = np.asarray(np.mean(sd**2 / n[:, None], axis=0))
-    if known:
+    if stated:
         return BaseFit(solution, Level.given(), within)
     if within is None or np.mean(within) <= least_sigma(campaign, approach) ** 2:
         return BaseFit(solution, Level.unknown(), within)

@@ -143,8 +143,8 @@ class Posterior:
                 into = min((single[c] for c in one.classes if c in single), default=None)
             if into is not None and into < i:
                 counted[into] = float(np.logaddexp(counted[into], counted.pop(i)))
-        told = [replace(self.all[i], log_weight=log) for i, log in counted.items()]
-        return tuple(sorted(told, key=lambda one: -one.log_weight))
+        merged = [replace(self.all[i], log_weight=log) for i, log in counted.items()]
+        return tuple(sorted(merged, key=lambda one: -one.log_weight))
 
     @cached_property
     def probabilities(self) -> tuple[float, ...]:

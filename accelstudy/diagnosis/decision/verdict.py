@@ -281,17 +281,17 @@ def _misfit(problem: Problem, solution: Solution) -> str:
     The noise is the given sigma. Where none is given, or where repeated positions refute it even
     after the refit, it is the difference of repeated positions.
     """
-    known = problem.evidence.level.known
-    if known and 2 * float(special.chdtrc(solution.redundancy, solution.omega)) >= REFUTED:
+    stated = problem.evidence.level.known
+    if stated and 2 * float(special.chdtrc(solution.redundancy, solution.omega)) >= REFUTED:
         return ""
     ratio = float(np.sqrt(solution.omega / solution.redundancy))
-    than_stated = f"{ratio:.2g} times the stated noise" if known else ""
+    than_stated = f"{ratio:.2g} times the stated noise" if stated else ""
     left = Residuals.of(solution)
     labels = clusters(problem.frame.forces)
     if len(labels) != len(solution.misclosures) or len(np.unique(labels)) == len(labels):
         return than_stated
     square, freedom = _of_repeats(left, LackOfFit.of(left, labels))
-    if not freedom or (known and special.chdtrc(freedom, square) >= REFUTED / 2):
+    if not freedom or (stated and special.chdtrc(freedom, square) >= REFUTED / 2):
         return than_stated
     if _of_fit(left, square, freedom) >= REFUTED:
         return ""
@@ -362,8 +362,8 @@ def level_test_of(problem: Problem, frame: Frame) -> NoiseTest:
 
 def sigma_holds(problem: Problem, frame: Frame) -> bool:
     """Whether sigma is given, and the residuals of a fit do not refute it."""
-    known = problem.evidence.level.known
-    return known and level_test_of(problem, frame).p_value >= REFUTED
+    stated = problem.evidence.level.known
+    return stated and level_test_of(problem, frame).p_value >= REFUTED
 
 
 def unit_variance(problem: Problem, frame: Frame) -> float:

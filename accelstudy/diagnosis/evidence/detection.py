@@ -172,14 +172,14 @@ def detect(field: Field, evidence: Evidence, residuals: Residuals, chance: Chanc
     total = total_odds(each)
     statistic = float(np.logaddexp.reduce(densities) - np.log(k) - nothing)
     strongest = each.max(axis=1)
-    own = densities - nothing
+    observed = densities - nothing
     return Detection(
         statistic=statistic,
         p_value=tail(total, w, statistic),
         densities=dict(zip(field.names, densities.tolist(), strict=True)),
         noise=noise,
-        p_candidate={n: tail(each[:, i], w, own[i]) for i, n in enumerate(field.names)},
-        p_family={n: tail(strongest, w, own[i], k) for i, n in enumerate(field.names)},
+        p_candidate={n: tail(each[:, i], w, observed[i]) for i, n in enumerate(field.names)},
+        p_family={n: tail(strongest, w, observed[i], k) for i, n in enumerate(field.names)},
         by_chance=Simulated(total, w),
     )
 

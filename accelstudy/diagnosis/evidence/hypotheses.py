@@ -180,8 +180,8 @@ def _completed(examined: ExaminedFit, shapes: EffectShapes) -> EffectShapes:
                 assert other is not None
                 between = effect.between(other, hold)
                 tried = examined.frame.hypotheses(between) if between else []
-                found = [h for h in tried if h is not None and h.dim == shapes[best].dim]
-                fine[max(best, near) : max(best, near)] = found
+                fitting = [h for h in tried if h is not None and h.dim == shapes[best].dim]
+                fine[max(best, near) : max(best, near)] = fitting
         if len(fine) == len(shapes):
             return shapes
         shapes = EffectShapes.of(fine)

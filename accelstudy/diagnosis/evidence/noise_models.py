@@ -109,16 +109,16 @@ def _restricted(residuals: Residuals, ratios: Array) -> tuple[Array, Array]:
     """
     n, c = residuals.whitening.shape[:2]
     columns = np.column_stack([residuals.absorbed, residuals.z])
-    own = columns[: n * c].reshape(n, c, -1)
+    blocks = columns[: n * c].reshape(n, c, -1)
     rest = columns[n * c :]
     beside = rest.T @ rest
     f = residuals.force_noise
     outer = np.einsum("nca,nda->nacd", f, f)
     determinants, squares = [], []
-    for some in np.array_split(ratios, 1 + len(ratios) * own.size // AT_ONCE):
+    for some in np.array_split(ratios, 1 + len(ratios) * blocks.size // AT_ONCE):
         covariance = np.eye(c) + np.einsum("ga,nacd->gncd", some - 1, outer)
-        weighted = (np.linalg.inv(covariance) @ own).reshape(len(some), n * c, -1)
-        normal = own.reshape(n * c, -1).T @ weighted + beside
+        weighted = (np.linalg.inv(covariance) @ blocks).reshape(len(some), n * c, -1)
+        normal = blocks.reshape(n * c, -1).T @ weighted + beside
         whole = np.sum(np.linalg.slogdet(covariance)[1], axis=1)
         determinant, square = restricted_to_residuals(whole, normal)
         determinants.append(determinant)

@@ -108,10 +108,10 @@ def axis_factors(residuals: Residuals) -> Array:
     n, c = residuals.whitening.shape[:2]
     f = residuals.force_noise
     t = np.einsum("ncu,nca->nau", residuals.absorbed[: n * c].reshape(n, c, -1), f)
-    own, taken = np.einsum("nca,ncb->nab", f, f), np.einsum("nau,nbu->nab", t, t)
+    shown, taken = np.einsum("nca,ncb->nab", f, f), np.einsum("nau,nbu->nab", t, t)
     normal = np.einsum("nau,nav->auv", t, t)
-    left = np.sum(own**2 - 2 * own * taken, axis=0) + np.einsum("auv,buv->ab", normal, normal)
-    angles = np.einsum("naa->a", own - taken) - left.sum(axis=1)
+    left = np.sum(shown**2 - 2 * shown * taken, axis=0) + np.einsum("auv,buv->ab", normal, normal)
+    angles = np.einsum("naa->a", shown - taken) - left.sum(axis=1)
     right = np.sum(force_residuals(residuals, residuals.z) ** 2, axis=0) - angles
     return np.maximum(np.linalg.lstsq(left, right, rcond=1e-9)[0], 0.0)
 

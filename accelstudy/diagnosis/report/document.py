@@ -250,15 +250,15 @@ def diagnosed_calibration(diagnosis: Diagnosis) -> dict[str, Any]:
             f"The axes are weighted by their noise, {x}, {y} and {z} mm/s² in x, y and z; "
             "`accelstudy calibrate` takes them as equal, and differs by that."
         )
-    if (found := diagnosis.recognised) is not None:
-        warning = f"The calibration is of mended data: {found.reason}."
-        if found.matrix is not None:
+    if (recognised := diagnosis.recognised) is not None:
+        warning = f"The calibration is of mended data: {recognised.reason}."
+        if recognised.matrix is not None:
             warning += " Readings need the same mending; `accelstudy apply` and `export` do it."
         warnings.append(warning)
         content["mended"] = {
-            "error": found.name,
-            "reason": found.reason,
-            "matrix": None if found.matrix is None else found.matrix.tolist(),
+            "error": recognised.name,
+            "reason": recognised.reason,
+            "matrix": None if recognised.matrix is None else recognised.matrix.tolist(),
         }
     return {**content, "warnings": warnings}
 
@@ -346,12 +346,12 @@ def study_overlay(diagnosis: Diagnosis) -> dict[str, Any]:
     extended = d.extended
     effects = [effect.spec for effect in extended.effects]
     models = [composition_name(d.model.effects)]
-    own: dict[str, list[str]] = {}
+    composed: dict[str, list[str]] = {}
     if extended is not d.model:
         # The one model of the file's own is the one that the file stands for.
         added = [e.name for e in extended.effects[len(d.model.effects) :]]
         name = "-".join([study_name(models[0]), *added])
-        own = {"extended" if name in MODELS or len(name) > LONGEST else name: list(effects)}
+        composed = {"extended" if name in MODELS or len(name) > LONGEST else name: list(effects)}
     noise: dict[str, Any] = {
         "sensor": {"sigma_mps2": d.sigma_position, "per": "position"},
         "gravity": {"sigma_mps2": d.campaign.sigma_gravity, "error_mps2": 0.0},
@@ -364,10 +364,10 @@ def study_overlay(diagnosis: Diagnosis) -> dict[str, Any]:
         "noise": noise,
         "simulated_effects": effects,
         "sensor": _truth(extended, solution.parameters.tolist()),
-        "models": own,
+        "models": composed,
         "grids": [
             {
-                "models": [*models, *own],
+                "models": [*models, *composed],
                 "schemes": [f"fibonacci-{d.campaign.n_positions}"],
                 "approaches": [d.approach.name],
                 "replicates": REPLICATES,

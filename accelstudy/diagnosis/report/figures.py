@@ -168,8 +168,8 @@ def evidence_figure(diagnosis: Diagnosis) -> Figure:
     shown += [
         n for n in names if n not in shown and (probabilities.get(n, 0) > 0.05 or n == UNKNOWN)
     ]
-    found = {name for f in diagnosis.found for name in (f.name, *f.equivalence_class)}
-    colours = [AFTER if name in found else OTHER for name in shown]
+    named = {name for f in diagnosis.found for name in (f.name, *f.equivalence_class)}
+    colours = [AFTER if name in named else OTHER for name in shown]
     place = np.arange(len(shown))[::-1]
 
     figure = new_figure(FULL, 22 + 4.4 * len(shown))

@@ -191,20 +191,20 @@ def confirmation(diagnosis: Diagnosis) -> str:
         is_one = f"that it is {comma_list([words(name) for name in gap.names], 'or')}"
         not_which = "; not which, as each could leave what was found" * (len(gap.names) > 1)
         return f"Confirmed {tested}: {is_one}{not_which}."
-    found = [_title(named, {named.name}) for named in diagnosis.found if _is_effect(named)]
-    if len(found) > 1:
-        said = f"that such effects are missing; not that they are {comma_list(found)}"
-        return f"Confirmed {tested}: {said} rather than rivals."
-    said = f"that such an effect is missing; not that it is {found[0]}"
-    return f"Confirmed {tested}: {said} rather than a rival."
+    effects = [_title(named, {named.name}) for named in diagnosis.found if _is_effect(named)]
+    if len(effects) > 1:
+        claim = f"that such effects are missing; not that they are {comma_list(effects)}"
+        return f"Confirmed {tested}: {claim} rather than rivals."
+    claim = f"that such an effect is missing; not that it is {effects[0]}"
+    return f"Confirmed {tested}: {claim} rather than a rival."
 
 
 def changed(diagnosis: Diagnosis) -> str:
     """Say how the final fit differs: with what was added, and without what was left out."""
     added = [words(named.name) for named in diagnosis.found if _is_effect(named)]
     out = [str(named.position) for named in diagnosis.found if named.position is not None]
-    said = [f"with {comma_list(added)}"] if added else []
-    return comma_list([*said, *([f"without position {comma_list(out)}"] if out else [])])
+    changes = [f"with {comma_list(added)}"] if added else []
+    return comma_list([*changes, *([f"without position {comma_list(out)}"] if out else [])])
 
 
 def _is_effect(named: Named) -> bool:
@@ -247,17 +247,20 @@ def _narrowed(d: Diagnosis) -> list[str]:
     """Say what cannot be told apart, what could do it, and what all else refers to."""
     if d.verdict != "narrowed":
         return []
-    said = not_told_apart(d.credible_set)
+    not_apart = not_told_apart(d.credible_set)
     further = "; further positions would, and the report says which" if d.next_positions else ""
     taken = explanation_words(d.credible_set[0])
-    return [f"{said}{further}.", f"All else is said of the most probable explanation: {taken}."]
+    return [
+        f"{not_apart}{further}.",
+        f"All else is said of the most probable explanation: {taken}.",
+    ]
 
 
 def _refuted(d: Diagnosis) -> list[str]:
     """Say by how much the stated noise is refuted, as the calibration does."""
     test = d.global_test
-    said = d.recognised is None and d.says_the_level
-    if test is None or test.accepted or said:
+    in_reason = d.recognised is None and d.says_the_level
+    if test is None or test.accepted or in_reason:
         return []
     ratio = math.sqrt(test.statistic / test.dof)
     much = f"{ratio:.1f} times as large as" if ratio > 1 else f"only {ratio:.2g} times"
@@ -277,18 +280,16 @@ def _weights(d: Diagnosis) -> list[str]:
 
 def _suspects(d: Diagnosis) -> list[str]:
     """Say which positions a calibration marks, where the verdict is not about them."""
-    found = {named.position for named in d.found}
-    labels = [
-        str(label) for label in sorted(label for label, _ in d.suspects) if label not in found
-    ]
+    bumped = {named.position for named in d.found}
+    labels = [str(label) for label, _ in sorted(d.suspects) if label not in bumped]
     if not labels:
         return []
     what = f"position{'' if len(labels) == 1 else 's'} {comma_list(labels)}"
-    said = f"A calibration with the base model marks {what} as in conflict with the others"
+    marked = f"A calibration with the base model marks {what} as in conflict with the others"
     if d.verdict in ("no_effect", "noise_model"):
-        smallest = min(p for label, p in d.suspects if label not in found)
-        return [f"{said} ({p_value(smallest)}); among all that is tested here it is no finding."]
-    return [f"{said}."]
+        smallest = min(p for label, p in d.suspects if label not in bumped)
+        return [f"{marked} ({p_value(smallest)}); among all that is tested here it is no finding."]
+    return [f"{marked}."]
 
 
 def _where(d: Diagnosis) -> str:
@@ -356,15 +357,15 @@ def missing(credible_set: Sequence[Explanation]) -> str:
 
 def without_a_name(credible_set: Sequence[Explanation]) -> str:
     """Say in a sentence what is certain of something that has no name as a whole."""
-    known = statement(credible_set)
-    said = comma_list([_part(part) for part in known.certain if _part_is_effect(part)])
-    if not said:
+    set_says = statement(credible_set)
+    parts = comma_list([_part(part) for part in set_says.certain if _part_is_effect(part)])
+    if not parts:
         return "Something is missing from the model, and it has no name here."
     if refuted(credible_set):
-        return f"What is missing from the model is much like {said}, and yet it has no name here."
-    if _surely_more(known, CREDIBLE):
-        return f"The model lacks {said}; what is missing beside it has no name here."
-    return f"The model lacks {said}; whether more is missing, and what, is open."
+        return f"What is missing from the model is much like {parts}, and yet it has no name here."
+    if _surely_more(set_says, CREDIBLE):
+        return f"The model lacks {parts}; what is missing beside it has no name here."
+    return f"The model lacks {parts}; whether more is missing, and what, is open."
 
 
 def most_probable(credible_set: Sequence[Explanation]) -> str:
@@ -372,10 +373,10 @@ def most_probable(credible_set: Sequence[Explanation]) -> str:
 
     If something is certain, it is said of what is beside it.
     """
-    known = statement(credible_set)
-    certain = bool(known.certain) and not refuted(credible_set)
+    set_says = statement(credible_set)
+    certain = bool(set_says.certain) and not refuted(credible_set)
     kinds: dict[str, float] = defaultdict(float)
-    for one in known.open if certain else credible_set:
+    for one in set_says.open if certain else credible_set:
         named = zip(one.names, one.classes, strict=True)
         for kind in dict.fromkeys(_kind(name, members) for name, members in named):
             kinds[kind] += one.posterior
@@ -391,21 +392,21 @@ def _kind(name: str, members: tuple[str, ...]) -> str:
 def not_told_apart(credible_set: Sequence[Explanation]) -> str:
     """Say what a campaign cannot tell apart; nothing if it tells everything apart."""
     effects, others = effects_and_others(credible_set)
-    known = _if_it_is_an_effect(effects)
+    set_says = _if_it_is_an_effect(effects)
     alike = [
         [(_names([name]), name.posterior) for name in part.names]
-        for part in known.certain
+        for part in set_says.certain
         if len(part.names) > 1
     ]
-    beside = known.open if alike or not others else credible_set
+    beside = set_says.open if alike or not others else credible_set
     more = [(explanation_words(o), o.posterior) for o in beside if o.names and o.posterior >= WORTH]
     perhaps = any(not one.names for one in beside)
     if len(more) > 1 and not perhaps:
         alike.append(more)
-    said = [f"{', nor '.join(map(_listed, alike))} apart"] if alike else []
+    open_questions = [f"{', nor '.join(map(_listed, alike))} apart"] if alike else []
     if more and perhaps:
-        said.append(f"whether {_listed(more, 'or')} is missing as well")
-    return f"This campaign cannot tell {', nor '.join(said)}" if said else ""
+        open_questions.append(f"whether {_listed(more, 'or')} is missing as well")
+    return f"This campaign cannot tell {', nor '.join(open_questions)}" if open_questions else ""
 
 
 def _listed(alternatives: Sequence[tuple[str, float]], last: str = "and") -> str:
@@ -422,17 +423,17 @@ def question(positions: Sequence[NextPosition]) -> str:
     return f"whether {first or second} is missing as well"
 
 
-def _missing(known: Statement) -> str:
-    if not known.certain:
-        return _or(known.open)
-    more = _or([one for one in known.open if one.names and one.posterior >= WORTH])
-    if not more and len(known.certain) == 1:
-        return _part(known.certain[0], "{family}: {names}")
-    said = comma_list([_part(part) for part in known.certain])
+def _missing(set_says: Statement) -> str:
+    if not set_says.certain:
+        return _or(set_says.open)
+    more = _or([one for one in set_says.open if one.names and one.posterior >= WORTH])
+    if not more and len(set_says.certain) == 1:
+        return _part(set_says.certain[0], "{family}: {names}")
+    parts = comma_list([_part(part) for part in set_says.certain])
     if not more:
-        return said
-    surely = _surely_more(known, CREDIBLE * sum(one.posterior for one in known.open))
-    return f"{said}, and {more}" if surely else f"{said}, and perhaps {more}"
+        return parts
+    surely = _surely_more(set_says, CREDIBLE * sum(one.posterior for one in set_says.open))
+    return f"{parts}, and {more}" if surely else f"{parts}, and perhaps {more}"
 
 
 def _part(part: Part, pattern: str = "{family} ({names})") -> str:
@@ -445,14 +446,14 @@ def _part(part: Part, pattern: str = "{family} ({names})") -> str:
 
 def _names(names: Sequence[Name]) -> str:
     """All names, with those that mean the same."""
-    said = [other for name in names for other in (name.name, *name.members)]
-    return comma_list(list(dict.fromkeys(map(name_words, said))), "or")
+    same = [other for name in names for other in (name.name, *name.members)]
+    return comma_list(list(dict.fromkeys(map(name_words, same))), "or")
 
 
 def _or(explanations: Sequence[Explanation]) -> str:
-    said = [explanation_words(one) for one in explanations]
+    alternatives = [explanation_words(one) for one in explanations]
     pairs = any(len(one.names) > 1 for one in explanations)
-    return ", or ".join(said) if pairs else comma_list(said, "or")
+    return ", or ".join(alternatives) if pairs else comma_list(alternatives, "or")
 
 
 def _if_it_is_an_effect(effects: Sequence[Explanation]) -> Statement:
@@ -460,9 +461,9 @@ def _if_it_is_an_effect(effects: Sequence[Explanation]) -> Statement:
     return statement(effects, probability=CREDIBLE * sum(one.posterior for one in effects))
 
 
-def _surely_more(known: Statement, probability: float) -> bool:
+def _surely_more(set_says: Statement, probability: float) -> bool:
     """Whether something is missing beside what is certain."""
-    return sum(one.posterior for one in known.open if one.names) >= probability
+    return sum(one.posterior for one in set_says.open if one.names) >= probability
 
 
 def _part_is_effect(part: Part) -> bool:

@@ -99,8 +99,8 @@ class Frame:
         slopes = Slopes.of(self.solution.observed, self.forces)
         if slopes is None:
             return without
-        own = [self.signature(effect) for effect in self.solution.model.effects]
-        rows = slopes.beside(self.residuals, self.solution.parameters, own, self.of_time())
+        modelled = [self.signature(effect) for effect in self.solution.model.effects]
+        rows = slopes.beside(self.residuals, self.solution.parameters, modelled, self.of_time())
         if rows is None:
             return without
         return replace(
@@ -111,9 +111,9 @@ class Frame:
 
     def of_time(self) -> Iterator[Signature]:
         """Signatures of the effects beside the model that change the output within a hold."""
-        known = {effect.name for effect in self.solution.model.effects}
+        modelled = {effect.name for effect in self.solution.model.effects}
         for name in effect_names():
-            if name in known:
+            if name in modelled:
                 continue
             try:
                 shapes = get_effect(name).candidates(self.hold, self.forces, self.solution.gravity)

@@ -35,15 +35,15 @@ def groups(examined: ExaminedFit) -> dict[str, Spaces]:
 
     They leave something of the residuals, and the model does something of them.
     """
-    r, found = examined.frame.residuals.redundancy, all_groups(examined)
-    shown = {name for name, space in found.items() if 0 < space.dims[0] < r}
-    return {n: q for n, q in found.items() if (REPEAT if n == LACK_OF_FIT else n) in shown}
+    r, spaces = examined.frame.residuals.redundancy, all_groups(examined)
+    shown = {name for name, space in spaces.items() if 0 < space.dims[0] < r}
+    return {n: q for n, q in spaces.items() if (REPEAT if n == LACK_OF_FIT else n) in shown}
 
 
 def all_groups(examined: ExaminedFit) -> dict[str, Spaces]:
     """Groups whose columns are there, those as well of which nothing shows or in which all does."""
     residuals, hold, n = examined.frame.residuals, examined.frame.hold, len(examined.frame.forces)
-    found: dict[str, Spaces] = {}
+    spaces: dict[str, Spaces] = {}
 
     def add(name: str, course: Callable[[Moment], Array]) -> None:
         """Enter a group given by changes of the sensor's output, (n, 3, k), in some holds."""
@@ -54,7 +54,7 @@ def all_groups(examined: ExaminedFit) -> dict[str, Spaces]:
     def add_rows(name: str, rows: Array) -> None:
         projected = residuals.project(rows)
         basis = span(projected, np.linalg.norm(rows, axis=0), ABSORBED)[1]
-        found[name] = Bases(basis, np.array([basis.shape[1]]))
+        spaces[name] = Bases(basis, np.array([basis.shape[1]]))
 
     for name, signatures in _signatures(examined.frame).items():
         rows = [residuals.whitened(s) for s in signatures]
@@ -69,8 +69,8 @@ def all_groups(examined: ExaminedFit) -> dict[str, Spaces]:
     labels = clusters(examined.frame.forces)
     if len(np.unique(labels)) < n:
         same = LackOfFit.of(residuals, labels)
-        found |= {REPEAT: Repeats(same, residuals.redundancy), LACK_OF_FIT: same}
-    return found
+        spaces |= {REPEAT: Repeats(same, residuals.redundancy), LACK_OF_FIT: same}
+    return spaces
 
 
 def _of_yaw(yaw: Array) -> Array:
@@ -121,7 +121,7 @@ def _signatures(frame: Frame) -> dict[str, list[Signature]]:
     Effects whose settings are searched finely are left out: they have no single space. The groups
     of `COURSES` hold any smooth course, which is more than their effects.
     """
-    found: dict[str, list[Signature]] = {}
+    by_group: dict[str, list[Signature]] = {}
     for effect in map(get_effect, effect_names()):
         if not effect.group or effect.group in COURSES or any(h.smooth for h in effect.takes):
             continue
@@ -132,8 +132,8 @@ def _signatures(frame: Frame) -> dict[str, list[Signature]]:
             shown = frame.signatures(shapes, ideal=True)
         except InputError:  # a column is absent
             continue
-        found.setdefault(effect.group, []).append(shown)
-    return found
+        by_group.setdefault(effect.group, []).append(shown)
+    return by_group
 
 
 @dataclass(frozen=True)

@@ -144,9 +144,9 @@ class EffectShapes(Bases, Sequence[Hypothesis]):
     @classmethod
     def of(cls, hypotheses: Sequence[Hypothesis]) -> EffectShapes:
         """Gather shapes."""
-        own = Bases.beside_each_other([h.basis for h in hypotheses])
-        shared = zip(hypotheses, own.split(), strict=True)
-        return cls(own.together, own.dims, tuple(replace(h, basis=q) for h, q in shared))
+        bases = Bases.beside_each_other([h.basis for h in hypotheses])
+        shared = zip(hypotheses, bases.split(), strict=True)
+        return cls(bases.together, bases.dims, tuple(replace(h, basis=q) for h, q in shared))
 
     def drawn(self, places: NDArray[np.int_], amounts: Array) -> Array:
         """Sum the columns of some bases, (b, m), with weights (Σ l,), one basis after the other."""
