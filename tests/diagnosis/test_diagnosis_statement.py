@@ -7,10 +7,6 @@ from accelstudy.diagnosis.decision.statement import statement
 from accelstudy.diagnosis.report.words import missing, most_probable, not_told_apart, without_a_name
 
 SLOW, EVEN = "slow change in time", "even nonlinearity"
-FAMILIES = {
-    **dict.fromkeys(["bias_drift", "warm_up"], SLOW),
-    **dict.fromkeys(["quadratic_scale", "scale_asymmetry"], EVEN),
-}
 COSINES = {
     frozenset({"bias_drift", "warm_up"}): 0.93,
     frozenset({"quadratic_scale", "scale_asymmetry"}): 0.96,
@@ -25,11 +21,6 @@ FOUR_PAIRS = (
 )
 
 
-def family(*members):
-    found = {FAMILIES.get(name, "") for name in members}
-    return found.pop() if len(found) == 1 else ""
-
-
 def made(*explanations):
     """Explanations, each "one+two" with its posterior; = joins names that mean the same."""
     found = []
@@ -39,88 +30,85 @@ def made(*explanations):
     return tuple(found)
 
 
-def said(*explanations):
-    """Statement about explanations."""
+@pytest.mark.parametrize(
+    ("explanations", "certain", "beside"),
+    [
+        # one name
+        ([("thermal_bias", 0.97)], [("", {"thermal_bias": 0.97}, None)], []),
+        # near rivals are one family
+        (
+            [("bias_drift", 0.51), ("warm_up", 0.44)],
+            [(SLOW, {"bias_drift": 0.51, "warm_up": 0.44}, 0.93)],
+            [],
+        ),
+        # four pairs are a set for each part
+        (
+            FOUR_PAIRS,
+            [
+                (SLOW, {"bias_drift": 0.56, "warm_up": 0.43}, 0.93),
+                (EVEN, {"quadratic_scale": 0.64, "scale_asymmetry": 0.35}, 0.96),
+            ],
+            [],
+        ),
+        # what one name leaves is open
+        (
+            [
+                ("hysteresis+quadratic_scale", 0.4),
+                ("hysteresis", 0.3),
+                ("hysteresis+warm_up", 0.25),
+            ],
+            [("", {"hysteresis": 0.95}, None)],
+            [(("quadratic_scale",), 0.4), ((), 0.3), (("warm_up",), 0.25)],
+        ),
+        # a family beside which more may be missing
+        (
+            [("bias_drift", 0.5), ("warm_up+hysteresis", 0.42)],
+            [(SLOW, {"bias_drift": 0.5, "warm_up": 0.42}, 0.93)],
+            [((), 0.5), (("hysteresis",), 0.42)],
+        ),
+        # strangers leave nothing certain
+        (
+            [("bias_drift+hysteresis", 0.5), ("saturation", 0.45)],
+            [],
+            [(("bias_drift", "hysteresis"), 0.5), (("saturation",), 0.45)],
+        ),
+        # a class with a name of another family is of no family
+        (
+            [("bias_drift=thermal_bias", 0.5), ("warm_up", 0.45)],
+            [],
+            [(("bias_drift",), 0.5), (("warm_up",), 0.45)],
+        ),
+        # two of a family are two things
+        (
+            [("bias_drift+warm_up", 0.6), ("bias_drift+quadratic_scale", 0.35)],
+            [("", {"bias_drift": 0.95}, None)],
+            [(("warm_up",), 0.6), (("quadratic_scale",), 0.35)],
+        ),
+        # two bumped positions count once
+        (
+            [("outlier_position+outlier_position", 0.6), ("outlier_position", 0.35)],
+            [("", {"outlier_position": 0.95}, None)],
+            [],
+        ),
+        # too little is not certain
+        (
+            [("bias_drift", 0.5), ("warm_up", 0.3)],
+            [],
+            [(("bias_drift",), 0.5), (("warm_up",), 0.3)],
+        ),
+        ([], [], []),
+    ],
+)
+def test_what_is_certain_of_a_set_and_what_is_open(explanations, certain, beside):
+    """Parts by their family, unless they have one name, with the posteriors and the purity."""
     cosine = lambda a, b: COSINES.get(frozenset({a, b}), 0.2)  # noqa: E731
-    return statement(made(*explanations), family, cosine)
-
-
-def parts(found):
-    return [(part.family, [name.name for name in part.names]) for part in found.certain]
-
-
-def beside(found):
-    return [(one.names, pytest.approx(one.posterior)) for one in found.open]
-
-
-def test_one_name_is_certain():
-    found = said(("thermal_bias", 0.97))
-    assert parts(found) == [("", ["thermal_bias"])]
-    assert found.certain[0].purity is None
-    assert not found.open
-
-
-def test_near_rivals_are_one_family():
-    found = said(("bias_drift", 0.51), ("warm_up", 0.44))
-    assert parts(found) == [(SLOW, ["bias_drift", "warm_up"])]
-    (part,) = found.certain
-    assert part.posterior == pytest.approx(0.95)
-    assert part.purity == 0.93
-    assert not found.open
-
-
-def test_four_pairs_are_a_set_for_each_part():
-    found = said(*FOUR_PAIRS)
-    assert parts(found) == [
-        (SLOW, ["bias_drift", "warm_up"]),
-        (EVEN, ["quadratic_scale", "scale_asymmetry"]),
-    ]
-    assert [name.posterior for name in found.certain[0].names] == pytest.approx([0.56, 0.43])
-    assert [part.purity for part in found.certain] == [0.93, 0.96]
-    assert not found.open
-
-
-def test_what_one_name_leaves_is_open():
-    found = said(
-        ("hysteresis+quadratic_scale", 0.4), ("hysteresis", 0.3), ("hysteresis+warm_up", 0.25)
-    )
-    assert parts(found) == [("", ["hysteresis"])]
-    assert beside(found) == [(("quadratic_scale",), 0.4), ((), 0.3), (("warm_up",), 0.25)]
-
-
-def test_a_family_beside_which_more_may_be_missing():
-    found = said(("bias_drift", 0.5), ("warm_up+hysteresis", 0.42))
-    assert parts(found) == [(SLOW, ["bias_drift", "warm_up"])]
-    assert beside(found) == [((), 0.5), (("hysteresis",), 0.42)]
-
-
-def test_strangers_leave_nothing_certain():
-    found = said(("bias_drift+hysteresis", 0.5), ("saturation", 0.45))
-    assert not found.certain
-    assert beside(found) == [(("bias_drift", "hysteresis"), 0.5), (("saturation",), 0.45)]
-
-
-def test_a_class_with_another_family_in_it_is_no_family():
-    found = said(("bias_drift=thermal_bias", 0.5), ("warm_up", 0.45))
-    assert not found.certain
-
-
-def test_two_of_a_family_are_two_things():
-    found = said(("bias_drift+warm_up", 0.6), ("bias_drift+quadratic_scale", 0.35))
-    assert parts(found) == [(SLOW, ["bias_drift"])]
-    assert beside(found) == [(("warm_up",), 0.6), (("quadratic_scale",), 0.35)]
-
-
-def test_two_bumped_positions_count_once():
-    found = said(("outlier_position+outlier_position", 0.6), ("outlier_position", 0.35))
-    assert [part.posterior for part in found.certain] == [pytest.approx(0.95)]
-
-
-def test_too_little_is_not_certain():
-    assert not said(("bias_drift", 0.5), ("warm_up", 0.3)).certain
-    assert said() == said()
-    assert not said().certain
-    assert not said().open
+    found = statement(made(*explanations), cosine)
+    for part, (family, names, purity) in zip(found.certain, certain, strict=True):
+        assert len(part.names) == 1 or part.family == family
+        assert {name.name: name.posterior for name in part.names} == pytest.approx(names)
+        assert part.posterior == pytest.approx(sum(names.values()))
+        assert part.purity == purity
+    assert [(one.names, pytest.approx(one.posterior)) for one in found.open] == beside
 
 
 @pytest.mark.parametrize(

@@ -97,7 +97,6 @@ class Statement:
 
 def statement(
     credible_set: Iterable[Explanation],
-    family: Callable[..., str] = family_of,
     cosine: Callable[[str, str], float] | None = None,
     probability: float = CREDIBLE,
 ) -> Statement:
@@ -110,12 +109,11 @@ def statement(
     Parameters
     ----------
     credible_set : explanations that exclude each other
-    family : what names that mean the same in this campaign have in common, "" if nothing
     cosine : largest canonical cosine of two effects in this campaign, optional
     probability : float, that is enough to be certain
     """
     left, certain = list(credible_set), []
-    while (part := _certain(left, family, cosine, probability)) is not None:
+    while (part := _certain(left, cosine, probability)) is not None:
         certain.append(part)
         left = [_without(one, [name.name for name in part.names]) for one in left]
     rest: dict[Names, Explanation] = {}
@@ -129,7 +127,6 @@ def statement(
 
 def _certain(
     explanations: Sequence[Explanation],
-    family: Callable[..., str],
     cosine: Callable[[str, str], float] | None,
     probability: float,
 ) -> Part | None:
@@ -141,19 +138,19 @@ def _certain(
         members.update(zip(one.names, one.classes, strict=True))
         for name in dict.fromkeys(one.names):
             names[name] += one.posterior
-        for common in dict.fromkeys(family(*alike) for alike in one.classes):
+        for common in dict.fromkeys(family_of(*alike) for alike in one.classes):
             families[common] += one.posterior
     families.pop("", None)
     if (surest := _surest(names, probability)) is not None:
         chosen, p = [surest], names[surest]
     elif (kind := _surest(families, probability)) is not None:
-        chosen = [name for name, alike in members.items() if family(*alike) == kind]
+        chosen = [name for name, alike in members.items() if family_of(*alike) == kind]
         chosen, p = sorted(chosen, key=lambda name: -names[name]), families[kind]
     else:
         return None
     pairs = combinations(chosen, 2)
     return Part(
-        family=family(*members[chosen[0]]),
+        family=family_of(*members[chosen[0]]),
         names=tuple(Name(name, members[name], names[name]) for name in chosen),
         posterior=p,
         purity=None if cosine is None else min((cosine(*pair) for pair in pairs), default=None),

@@ -50,7 +50,7 @@ def restricted_to_residuals(determinant: Array, normal: Array) -> tuple[Array, A
 SPREAD = 0.7
 """Prior standard deviation of log κ about equal axes: a factor of two in variance is usual."""
 AS_WITHIN = 0.35
-"""Likewise about the ratios within the holds."""
+"""Prior standard deviation of log κ about the ratios within the holds."""
 AT_ONCE = 10_000_000
 """Numbers in one block of work, about."""
 GRID = np.linspace(-2.5, 2.5, 9)

@@ -245,7 +245,7 @@ def _rayleigh(values: Array, frequencies: Array) -> Array:
 
 
 def _rayleigh_of_grid(values: Array, frequencies: Array) -> Array:
-    """Likewise at equally spaced frequencies: phases of a coarse grid times those of a fine one."""
+    """Rayleigh power at equally spaced frequencies: phases of a coarse grid times a fine one's."""
     width = int(np.ceil(np.sqrt(len(frequencies))))
     fine = frequencies[:width] - frequencies[0]
     total = np.zeros((len(frequencies[::width]), width), dtype=complex)

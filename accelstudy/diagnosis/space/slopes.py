@@ -101,7 +101,7 @@ class Slopes:
         modelled: Sequence[Signature],
         others: Iterable[Signature],
     ) -> SlopeRows | None:
-        """Combinations of slopes that add to what the means say; None if there is none.
+        """Slope combinations independent of the means; None if there is none.
 
         Parameters
         ----------
@@ -159,7 +159,7 @@ def trimmed_mean_square(squares: Array) -> float:
 
 
 def telling(seen: Sequence[tuple[Array, Array, Array]], most: int) -> Array:
-    """Combinations of slopes that add to what the means say of effects, (n, q), orthonormal.
+    """Slope combinations independent of what the means say of effects, (n, q), orthonormal.
 
     Parameters
     ----------
