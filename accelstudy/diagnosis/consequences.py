@@ -26,10 +26,10 @@ from accelstudy.basics.progress import stage
 from accelstudy.basics.units import GON
 from accelstudy.campaign.calibration.assessment import SUSPECT
 from accelstudy.diagnosis.decision.posterior import of_effects
+from accelstudy.diagnosis.decision.problem import Problem, is_exact
 from accelstudy.diagnosis.decision.verdict import Finding
 from accelstudy.diagnosis.evidence.detection import Chance
 from accelstudy.diagnosis.next_positions import NextPosition, next_positions
-from accelstudy.diagnosis.problem import Problem, is_exact
 from accelstudy.diagnosis.space.examined import ExaminedFit, Frame
 from accelstudy.diagnosis.space.groups import LACK_OF_FIT, REPEAT, ROBOT, all_groups
 from accelstudy.diagnosis.space.hypotheses import OUTLIER

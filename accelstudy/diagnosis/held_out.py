@@ -22,6 +22,7 @@ from accelstudy.adjustment.quality import Solution, solve
 from accelstudy.basics.errors import InputError
 from accelstudy.diagnosis.decision.posterior import CREDIBLE, Weighing, weigh_pairs
 from accelstudy.diagnosis.decision.priors import MANY, SURE
+from accelstudy.diagnosis.decision.problem import Problem, pose
 from accelstudy.diagnosis.decision.refits import best_refit
 from accelstudy.diagnosis.decision.verdict import Choice, Finding
 from accelstudy.diagnosis.evidence.detection import total_odds
@@ -41,7 +42,6 @@ from accelstudy.diagnosis.prediction import (
     held_out_gap,
     split_positions,
 )
-from accelstudy.diagnosis.problem import Problem, pose
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
 
 Array = NDArray[np.float64]

@@ -31,6 +31,7 @@ from accelstudy.diagnosis.consequences import (
     separating_positions,
 )
 from accelstudy.diagnosis.decision.posterior import weigh
+from accelstudy.diagnosis.decision.problem import Problem, fit_base, is_exact, pose
 from accelstudy.diagnosis.decision.statement import certain_of
 from accelstudy.diagnosis.decision.verdict import (
     Finding,
@@ -47,7 +48,6 @@ from accelstudy.diagnosis.decision.verdict import (
 from accelstudy.diagnosis.evidence.detection import SIMULATIONS, Chance, detect
 from accelstudy.diagnosis.evidence.noise_tests import NoiseTest
 from accelstudy.diagnosis.held_out import measured_gap, predicted_gap
-from accelstudy.diagnosis.problem import Problem, fit_base, is_exact, pose
 from accelstudy.diagnosis.result import Diagnosis, Verdict, level_of_effects
 from accelstudy.sensors.plausibility import implausible_parameters
 from accelstudy.sensors.sensor import SensorModel

@@ -117,20 +117,18 @@ def upper_limits(examined: ExaminedFit, known: bool, named: Sequence[str]) -> li
     return limits
 
 
-def visibilities(
-    examined: ExaminedFit, alpha: float = 0.001, power: float = POWER
-) -> list[Visibility]:
+def visibilities(examined: ExaminedFit, alpha: float = 0.001) -> list[Visibility]:
     """What a campaign can show of each effect that is not in its model.
 
     The minimal detectable bias (MDB) is the size √(λ0 / dᵀd) of a single parameter at which its
-    test of level `alpha` has `power`. For the minimal identifiable bias (MIB) only the part of d
-    counts that the nearest rival cannot imitate.
+    test of level `alpha` has the power `POWER`. For the minimal identifiable bias (MIB) only the
+    part of d counts that the nearest rival cannot imitate.
 
     Of the shapes of an effect that a diagnosis tries, the one that shows best is judged, and of
     those in which all parameters show if there are any. The shape that shows worst is given as
     well, since a jump may happen at any time.
     """
-    root = np.sqrt(noncentrality(1, alpha, power))
+    root = np.sqrt(noncentrality(1, alpha, POWER))
     rows = []
     for name, shapes in examined.candidates.items():
         if name == OUTLIER:

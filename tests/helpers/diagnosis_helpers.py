@@ -7,8 +7,8 @@ from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
+from accelstudy.diagnosis.decision.problem import BaseFit, pose
 from accelstudy.diagnosis.evidence.size import Level
-from accelstudy.diagnosis.problem import BaseFit, pose
 from accelstudy.diagnosis.space.examined import examine
 from accelstudy.effects import HoldConditions
 from accelstudy.schemes import get_scheme

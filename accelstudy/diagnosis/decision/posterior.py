@@ -16,6 +16,7 @@ import numpy as np
 from scipy.special import softmax
 
 from accelstudy.diagnosis.decision import priors
+from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.evidence.detection import Chance, Detection
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.hypotheses import (
@@ -37,7 +38,6 @@ from accelstudy.diagnosis.evidence.noise_tests import (
     most_evidence,
     tail_test,
 )
-from accelstudy.diagnosis.problem import Problem
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.effects import effect_names
 
@@ -63,20 +63,12 @@ class Explanation:
     posterior: float
 
 
-def credible_set(
-    explanations: Iterable[Explanation], probability: float = CREDIBLE
-) -> tuple[Explanation, ...]:
-    """Most probable explanations, until they hold a probability together.
-
-    Parameters
-    ----------
-    explanations : that exclude each other
-    probability : float
-    """
+def credible_set(explanations: Iterable[Explanation]) -> tuple[Explanation, ...]:
+    """Most probable of explanations that exclude each other, until they hold 0.9 together."""
     chosen: list[Explanation] = []
     for explanation in sorted(explanations, key=lambda one: -one.posterior):
         chosen.append(explanation)
-        if sum(one.posterior for one in chosen) >= probability:
+        if sum(one.posterior for one in chosen) >= CREDIBLE:
             break
     return tuple(chosen)
 

@@ -22,6 +22,7 @@ from accelstudy.diagnosis.decision.posterior import (
     Weighing,
     of_effects,
 )
+from accelstudy.diagnosis.decision.problem import Problem, pose
 from accelstudy.diagnosis.decision.refits import best_refit
 from accelstudy.diagnosis.evidence.detection import Chance, Detection
 from accelstudy.diagnosis.evidence.field import UNKNOWN
@@ -41,7 +42,6 @@ from accelstudy.diagnosis.evidence.noise_tests import (
     tail_test,
     within_hold_test,
 )
-from accelstudy.diagnosis.problem import Problem, pose
 from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.groups import LACK_OF_FIT, LackOfFit, clusters
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis, Spaces

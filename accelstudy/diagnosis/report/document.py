@@ -163,26 +163,25 @@ def _effect(named: Named) -> dict[str, Any]:
 
 def _gap(d: Diagnosis) -> dict[str, Any]:
     gap, held = d.gap, d.gap.held_out
-    roll_pitch = None if d.leveling is None else [value / MGON for value in d.leveling]
+    tilt = (None, None) if d.leveling is None else [value / MGON for value in d.leveling]
+
+    def of_held_out(name: str) -> float | None:
+        return None if held is None else json_number(getattr(held, name))
+
     return {
         "sigma0_squared": {"before": json_number(gap.before), "after": json_number(gap.after)},
         "held_out_mse": {
-            "before": None if held is None else json_number(held.before),
-            "after": None if held is None else json_number(held.after),
-            "floor": None if held is None else json_number(held.floor),
+            **{name: of_held_out(name) for name in ("before", "after", "floor")},
             "reduction_ci95": (
                 None if held is None else [json_number(value) for value in held.reduction_ci95]
             ),
         },
-        "held_out_z": None if held is None else json_number(held.z),
-        "held_out_z_needed": None if held is None else json_number(held.needed),
+        "held_out_z": of_held_out("z"),
+        "held_out_z_needed": of_held_out("needed"),
         "held_out_positions": []
         if held is None
         else [int(d.campaign.positions[i]) for i in held.held],
-        "leveling_rms_mgon": {
-            "before": None if roll_pitch is None else json_number(roll_pitch[0]),
-            "after": None if roll_pitch is None else json_number(roll_pitch[1]),
-        },
+        "leveling_rms_mgon": {"before": json_number(tilt[0]), "after": json_number(tilt[1])},
         "better_for_leveling": d.better_for_leveling,
         "confirmed": gap.confirmed,
         "confirmed_statement": gap.statement,
@@ -299,17 +298,12 @@ def positions_table(diagnosis: Diagnosis) -> pd.DataFrame:
         "temperature_degC": column(campaign.temperature),
         "split": np.where(held, "held-out", np.where(kept, "fit", "left out")),
     }
-    for when, fitted, rows in (
-        ("before", d.base, np.ones(n, dtype=bool)),
-        ("after", solution, kept),
-    ):
+    fits = (("before", d.base, np.ones(n, dtype=bool)), ("after", solution, kept))
+    for when, fitted, rows in fits:
         names = ("norm",) if fitted.misclosures.shape[1] == 1 else ("x", "y", "z")
         for name, values in zip(names, fitted.misclosures.T, strict=True):
             table[f"residual_{name}_{when}_mps2"] = _placed(values, rows)
-    for when, fitted, rows in (
-        ("before", d.base, np.ones(n, dtype=bool)),
-        ("after", solution, kept),
-    ):
+    for when, fitted, rows in fits:
         tests = position_tests(fitted)
         table[f"test_{when}"] = _placed(tests.w / np.sqrt(d.unit_variance), rows)
         table[f"p_{when}"] = _placed(tests.p_known if d.sigma_holds else tests.p_unknown, rows)

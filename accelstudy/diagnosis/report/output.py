@@ -81,7 +81,6 @@ def diagnose_folder(
 def write_diagnosis(
     diagnosis: Diagnosis,
     folder: str | Path,
-    report: bool = True,
     loop: Loop | None = None,
     source: str | Path = "CAMPAIGN",
     place: str | Path = "",
@@ -92,7 +91,6 @@ def write_diagnosis(
     ----------
     diagnosis : Diagnosis
     folder : path, made if it is not there
-    report : bool, whether to write figures/ and report.html beside the files for programs
     loop : Loop, optional, simulations with the old and with the new model
     source, place : paths of the campaign and of the results, for the commands that the page gives
 
@@ -115,8 +113,7 @@ def write_diagnosis(
     with whole_file(folder / "model.yaml") as path:
         text = yaml.safe_dump(study_overlay(diagnosis), sort_keys=False, allow_unicode=True)
         path.write_text(MODEL_HEADER + text, encoding="utf-8")
-    if report:
-        write_report(diagnosis, document, positions, loop, folder, calibration, source, place)
+    _write_report(diagnosis, document, positions, loop, folder, calibration, source, place)
     with whole_file(folder / "diagnosis.json") as path:
         path.write_text(json_text(document), encoding="utf-8")
     return document
@@ -139,15 +136,15 @@ MODEL_HEADER = """\
 """
 
 
-def write_report(
+def _write_report(
     diagnosis: Diagnosis,
     document: dict[str, Any],
     positions: pd.DataFrame,
     loop: Loop | None,
     folder: Path,
-    calibration: dict[str, Any] | None = None,
-    source: str | Path = "CAMPAIGN",
-    place: str | Path = "",
+    calibration: dict[str, Any] | None,
+    source: str | Path,
+    place: str | Path,
 ) -> None:
     """Write figures/ and report.html.
 
