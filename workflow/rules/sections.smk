@@ -1,7 +1,7 @@
 from snakemake.exceptions import WorkflowError
 
 from accelstudy.basics.errors import InputError
-from accelstudy.plan.batch.example import parse_example, parse_section
+from accelstudy.plan.config import parse_example, parse_section
 from accelstudy.files.layers import read_layer
 from accelstudy.files.provenance import check_writable
 from accelstudy.jobs.code import code_hash
