@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 import yaml
 from places import ROOT
-from snakemake_helpers import one_line, remains, snakemake
+from snakemake_helpers import ENVIRONMENT, one_line, remains, snakemake
 
 from accelstudy.study.config import read_study
 
@@ -77,6 +77,13 @@ def test_a_second_run_does_nothing(made):
     assert result.returncode == 0, result.stdout
     assert "Nothing to be done" in result.stdout
     assert {path: path.stat().st_mtime_ns for path in (made / "results").rglob("*")} == before
+
+
+def test_another_unit_of_angles_makes_the_page_again(made, monkeypatch):
+    monkeypatch.setitem(ENVIRONMENT, "ACCELSTUDY_ANGLE_UNIT", "deg")
+    text = run(made, TINY, "--dry-run").stdout
+    assert "Diagnose the campaign" in text
+    assert "Simulate the campaign" not in text
 
 
 def test_what_was_damaged_since_is_refused(made, tmp_path):

@@ -20,6 +20,7 @@ from study_helpers import NINE, grid
 import accelstudy
 from accelstudy.basics.errors import InputError
 from accelstudy.files import provenance
+from accelstudy.files.layers import overlay, read_layer
 from accelstudy.files.provenance import check_writable
 from accelstudy.files.tables import read_origin, read_table
 from accelstudy.jobs.code import code_hash
@@ -59,6 +60,41 @@ rule study:
         rules.all.input,
 """
 """The workflow with two batches of four cells."""
+
+MODULE = f"""\
+configfile: "study.yaml"
+
+
+module inner:
+    snakefile:
+        "{ROOT}/workflow/Snakefile"
+    config:
+        config
+    prefix:
+        "inner"
+
+
+use rule * from inner as inner_*
+
+
+rule study:
+    default_target: True
+    input:
+        rules.inner_all.input,
+"""
+
+RETRIED = f"""\
+include: "{ROOT}/workflow/rules/start.smk"
+
+
+rule retried:
+    output:
+        "done",
+    resources:
+        mem_mb=megabytes(100),
+    shell:
+        "test {{resources.mem_mb}} = 200 && printf 200 > {{output}}"
+"""
 
 
 def words(folder, *arguments, snakefile=ROOT / "Snakefile", cores=2, config=TINY):
@@ -202,6 +238,11 @@ def test_other_attitudes_do_not_simulate_again(finished):
     plan = planned(finished, config={**TINY, "leveling": {"attitudes": 30}})
     assert "summarise" in plan
     assert "simulate" not in plan
+
+
+def test_another_unit_of_angles_draws_again(finished, monkeypatch):
+    monkeypatch.setitem(ENVIRONMENT, "ACCELSTUDY_ANGLE_UNIT", "deg")
+    assert planned(finished).keys() == {"explorer", "figures"}
 
 
 @pytest.fixture(scope="module")
@@ -366,18 +407,35 @@ def test_truncated_estimates(finished):
     ],
 )
 def test_lint(snakefile, config, tmp_path):
+    """Jobs run where Snakemake does, with the package: no container has it."""
     given = ["--snakefile", ROOT / snakefile, "--configfile", ROOT / f"config/{config}.yaml"]
-    assert "Congratulations" in snakemake(tmp_path, "--lint", *given).stdout
+    text = snakemake(tmp_path, "--lint", *given).stdout
+    said = re.findall(r"^    \* (.*):$", text, re.MULTILINE)
+    assert set(said) == {"Specify a conda environment or container for each rule."}
 
 
-def test_report(finished):
-    succeed(finished, "--report", "report.zip")
-    with zipfile.ZipFile(finished / "report.zip") as archive:
+def test_every_rule_has_a_name_of_its_own():
+    files = [ROOT / "workflow" / "Snakefile", *(ROOT / "workflow").rglob("*.smk")]
+    text = "\n".join(path.read_text(encoding="utf-8") for path in files)
+    names = re.findall(r"^(?:use rule \w+ as|rule) (\w+)", text, re.MULTILINE)
+    assert sorted(names) == sorted({*names})
+
+
+def test_another_attempt_gets_more_memory(tmp_path):
+    (tmp_path / "Snakefile").write_text(RETRIED)
+    result = snakemake(tmp_path, "--cores", 1, "--retries", 1)
+    assert result.returncode == 0, result.stdout
+    assert (tmp_path / "done").read_text() == "200"
+
+
+def check_report(folder, results="results"):
+    """Check that a report has all figures with titles and captions."""
+    with zipfile.ZipFile(folder / "report.zip") as archive:
         assert archive.testzip() is None
         names = archive.namelist()
         (page,) = (name for name in names if name.endswith("report.html"))
         text = archive.read(page).decode()
-    figures = [*(finished / "results" / "tiny" / "figures").glob("*.svg")]
+    figures = [*(folder / results / "tiny" / "figures").glob("*.svg")]
     for figure in figures:
         assert figure.name in text
         assert get_figure(figure.stem).title in text
@@ -385,3 +443,24 @@ def test_report(finished):
     assert "closed-forms" in {figure.stem for figure in figures}
     assert "Empirical standard deviation of each parameter" in text  # its caption
     assert "1 mgon = 0.0009" in text  # what a caption says of the study
+
+
+def test_report(finished):
+    succeed(finished, "--report", "report.zip")
+    check_report(finished)
+
+
+def test_a_module_with_a_prefix(single, tmp_path):
+    """All is in the folder of the prefix; a job finds its tables and figures there."""
+    shutil.copytree(single / "results", tmp_path / "inner" / "results")
+    page = tmp_path / "inner" / "results" / "tiny" / "explorer.html"
+    made = page.read_bytes()
+    page.unlink()
+    (tmp_path / "Snakefile").write_text(MODULE)
+    (tmp_path / "study.yaml").write_text(yaml.safe_dump(overlay(read_layer(CONFIG), TINY)))
+    for words in ([], ["--report", "report.zip"]):
+        result = snakemake(tmp_path, "--cores", 1, *words)
+        assert result.returncode == 0, result.stdout
+    assert page.read_bytes() == made
+    assert not (tmp_path / "results").exists()
+    check_report(tmp_path, "inner/results")

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Self, TypeVar
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, model_validator
 
-from accelstudy.files.provenance import config_hash
 from accelstudy.files.types import PathName, Seed
 from accelstudy.files.validation import Block, checked
 
 Section = TypeVar("Section", bound=BaseModel)
 
+SECTIONS = ("plan", "designs", "sequential", "pole", "field")
+"""Each has rules in `workflow/rules/` under its name."""
+
 
 class Example(Block):
-    """All parts of a run; results go to ``results/<study>``."""
+    """The sections of a run; results go to ``results/<study>``."""
 
     study: PathName = Field(description="name; results go to results/<study>/")
     seed: Annotated[Seed, Field(description="of all random numbers")] = 1
@@ -25,10 +27,16 @@ class Example(Block):
     pole: dict[str, Any] = Field(default_factory=dict, description="tilt of a pole")
     field: dict[str, Any] = Field(default_factory=dict, description="what limits a sensor in use")
 
+    @model_validator(mode="after")
+    def _has_a_section(self) -> Self:
+        if not self.sections:
+            raise ValueError(f"nothing to do; give at least one of {', '.join(SECTIONS)}")
+        return self
+
     @property
-    def provenance(self) -> dict[str, Any]:
-        """Provenance that tables record."""
-        return {"config_hash": config_hash(self.model_dump(mode="json")), "seed": self.seed}
+    def sections(self) -> list[str]:
+        """Names of the sections that are given."""
+        return [name for name in SECTIONS if name in self.model_fields_set]
 
 
 def parse_example(content: Mapping[str, Any], source: str = "config") -> Example:
