@@ -33,18 +33,20 @@ wildcard_constraints:
     public=r"[^/]+",
 
 
-def measured_files(wildcards):
-    """Files of a campaign that exist. The job reports those that are missing."""
-    task = TASKS[wildcards.campaign]
-    if task.kind == "public":
-        return {"record": f"{RESULTS}/public/{task.source}.json"}
-    return {"files": [given(path) for path in task.files() if "{" not in path]}
-
-
-def braced_files(wildcards):
-    """Times of files with a brace in their names. As inputs, Snakemake would see wildcards in them."""
-    paths = TASKS[wildcards.campaign].files()
-    return {path: Path(path).stat().st_mtime_ns for path in paths if "{" in path}
+# Files of campaigns that exist. The job reports those that are missing.
+MEASURED = {
+    name: (
+        {"record": f"{RESULTS}/public/{task.source}.json"}
+        if task.kind == "public"
+        else {"files": [given(path) for path in task.files() if "{" not in path]}
+    )
+    for name, task in TASKS.items()
+}
+# Times of files with a brace in their names. As inputs, Snakemake would see wildcards in them.
+BRACED = {
+    name: {path: Path(path).stat().st_mtime_ns for path in task.files() if "{" in path}
+    for name, task in TASKS.items()
+}
 
 
 rule campaigns:
@@ -71,7 +73,7 @@ rule public:
 
 rule calibrate:
     input:
-        unpack(measured_files),
+        unpack(lambda wildcards: MEASURED[wildcards.campaign]),
     output:
         directory(f"{RESULTS}/campaigns/{{campaign}}"),
     log:
@@ -83,7 +85,7 @@ rule calibrate:
         mem_mb=megabytes(2000),
     params:
         task=lambda wildcards: TASKS[wildcards.campaign].model_dump(mode="json"),
-        braced=braced_files,
+        braced=lambda wildcards: BRACED[wildcards.campaign],
         angle_unit=angle_unit(),
         code=code_of("calibrate"),
     message:

@@ -15,16 +15,12 @@ include: "rules/start.smk"
 STUDY, RESULTS = configured(parse_hidden, "study")
 # Jobs get the checked configuration, with all defaults.
 config.update(STUDY.model_dump(mode="json"))
-
-
-def without(*keys):
-    """The configuration without its name and what a job does not use, as plain data."""
-    return STUDY.model_dump(mode="json", exclude={"study", *keys})
-
-
-PLANNED = without("model", "seed", "diagnosis_seed", "baselines_every")
-DIAGNOSED = without("baselines_every")
-COMPARED = without("diagnosis_seed")
+# What the jobs use of it.
+PLANNED = STUDY.model_dump(
+    mode="json", exclude={"study", "model", "seed", "diagnosis_seed", "baselines_every"}
+)
+DIAGNOSED = STUDY.model_dump(mode="json", exclude={"study", "baselines_every"})
+COMPARED = STUDY.model_dump(mode="json", exclude={"study", "diagnosis_seed"})
 CHUNKS = number_of_chunks(STUDY)
 NUMBERS = [f"{i:04d}" for i in range(CHUNKS)]
 # Digest of what each table of a chunk depends on. It tells those of another configuration.

@@ -11,13 +11,7 @@ EXAMPLE, RESULTS = configured(
 )
 config["seed"] = EXAMPLE.seed  # for the jobs, if it is the default
 OUTPUTS = []
-
-
-def section(name, block):
-    """A section of the configuration, checked by the class of its part."""
-    with in_a_line():
-        return parse_section(EXAMPLE, name, block, SOURCE)
-
+section = in_a_line()(parse_section)
 
 # The rules of a section add their files to OUTPUTS.
 for name in EXAMPLE.sections:

@@ -1,6 +1,6 @@
 from accelstudy.proposal.config import DesignsConfig
 
-DESIGNS = section("designs", DesignsConfig)
+DESIGNS = section(EXAMPLE, "designs", DesignsConfig, SOURCE)
 DESIGNS_FILES = {kind: f"{RESULTS}/designs/efficiency.{kind}" for kind in ("parquet", "svg", "png")}
 OUTPUTS += DESIGNS_FILES.values()
 

@@ -1,6 +1,6 @@
 from accelstudy.field.config import FieldConfig
 
-FIELD = section("field", FieldConfig).cases
+FIELD = section(EXAMPLE, "field", FieldConfig, SOURCE).cases
 FIELD_FILES = [f"shares.{kind}" for kind in ("parquet", "svg", "png")]
 OUTPUTS += [f"{RESULTS}/field/{name}/{path}" for name in FIELD for path in FIELD_FILES]
 

@@ -1,6 +1,6 @@
 from accelstudy.plan.batch.config import PlanConfig
 
-PLAN = section("plan", PlanConfig)
+PLAN = section(EXAMPLE, "plan", PlanConfig, SOURCE)
 PLAN_FILES = ["plan.parquet", "plan.md", "plan.svg", "plan.png", "positions.yaml", "study.yaml"]
 OUTPUTS += [
     *[f"{RESULTS}/plan/cases/{name}/{path}" for name in PLAN.cases for path in PLAN_FILES],

@@ -1,6 +1,6 @@
 from accelstudy.pole.config import PoleConfig
 
-POLES = section("pole", PoleConfig).cases
+POLES = section(EXAMPLE, "pole", PoleConfig, SOURCE).cases
 POLE_FILES = {
     "summary": "pole.json",
     "budget": "budget.parquet",

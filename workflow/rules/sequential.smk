@@ -1,6 +1,6 @@
 from accelstudy.sequential.config import SequentialConfig
 
-SEQUENTIAL = section("sequential", SequentialConfig)
+SEQUENTIAL = section(EXAMPLE, "sequential", SequentialConfig, SOURCE)
 OUTPUTS += [
     f"{RESULTS}/sequential/{name}" for name in ("summary.parquet", "positions.svg", "positions.png")
 ]

@@ -34,22 +34,27 @@ def in_a_line():
         raise WorkflowError(str(error)) from None
 
 
+# Unit of angles on pages, where the configuration names none.
+angle_unit = in_a_line()(user_angle_unit)
+
+
+@in_a_line()
 def configured(parse, name, without=None):
     """The checked configuration, and the folder of the results, which has the name at a key of it.
 
     `without` is what to say if there is no configuration.
     """
-    with in_a_line():
-        if without and not config:
-            raise InputError(without)
-        for path in workflow.configfiles:
-            read_layer(path)  # Snakemake's own reading is less strict
-        checked = parse(config, SOURCE)
-        results = f"results/{attrgetter(name)(checked)}"
-        check_writable(placed(results))
+    if without and not config:
+        raise InputError(without)
+    for path in workflow.configfiles:
+        read_layer(path)  # Snakemake's own reading is less strict
+    checked = parse(config, SOURCE)
+    results = f"results/{attrgetter(name)(checked)}"
+    check_writable(placed(results))
     return checked, results
 
 
+@in_a_line()
 def look_at_earlier(outputs, setups={}, seed=None, folders={}):
     """Check earlier results before Snakemake decides what to make.
 
@@ -58,9 +63,8 @@ def look_at_earlier(outputs, setups={}, seed=None, folders={}):
     if workflow.is_main_process:
         outputs = [placed(path) for path in outputs]
         setups, folders = ({placed(path): of[path] for path in of} for of in (setups, folders))
-        with in_a_line():
-            for line in earlier_run(placed(RESULTS), outputs, setups, seed, folders):
-                logger.warning(line)
+        for line in earlier_run(placed(RESULTS), outputs, setups, seed, folders):
+            logger.warning(line)
 
 
 def placed(path):
@@ -71,12 +75,6 @@ def placed(path):
 def given(path):
     """A file of the user as an input, which no prefix moves."""
     return path if placed(path) == path else os.path.abspath(path)
-
-
-def angle_unit():
-    """Unit of angles on pages, where the configuration names none."""
-    with in_a_line():
-        return user_angle_unit()
 
 
 def code_of(script):
