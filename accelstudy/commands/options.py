@@ -14,7 +14,7 @@ from click.shell_completion import CompletionItem
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import feedback
-from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, angles_in, parse_quantity
+from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, Given, angles_in, parse_quantity
 
 PATH = click.Path(path_type=Path)
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -84,6 +84,21 @@ class Quantity(click.ParamType):  # type: ignore[type-arg]
             return parse_quantity(value, self.unit, self.least, self.most)
         except InputError as error:
             raise InputError(f"{param.opts[0]}: {error}" if param else str(error)) from None
+
+
+def quantity_option(
+    name: str, given: Given, *names: str, **options: Any
+) -> Callable[[Command], Command]:
+    """Add the option of a quantity; further names and options are those of `click.option`."""
+    if given.usual:
+        options |= {"default": given.usual, "show_default": True}
+    return click.option(
+        f"--{name.replace('_', '-')}",
+        *names,
+        type=Quantity(given.unit, given.least, given.most),
+        help=given.help,
+        **options,
+    )
 
 
 class SchemeName(Name):

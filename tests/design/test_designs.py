@@ -13,7 +13,7 @@ from accelstudy.design.estimability import estimability
 from accelstudy.design.optimal.information import position_rows
 from accelstudy.design.optimal.task import Task
 from accelstudy.leveling.error import cap_forces, tilt_error
-from accelstudy.plan.batch.example import parse_example, parse_section
+from accelstudy.plan.config import parse_example, parse_section
 from accelstudy.proposal.config import DesignsConfig
 from accelstudy.proposal.efficiency import efficiency_table
 from accelstudy.proposal.figure import efficiency_figure

@@ -9,8 +9,8 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import display_unit, quantity_text, to_display
-from accelstudy.basics.wording import counted, short_list
+from accelstudy.basics.units import display_unit, to_display
+from accelstudy.basics.wording import counted, quantity_text, short_list
 from accelstudy.campaign.calibration.ranges import MARGIN, Watch
 from accelstudy.campaign.files.checks import likely_fault
 from accelstudy.campaign.logs.tables import column_names, numbers

@@ -11,21 +11,24 @@ import numpy as np
 import pandas as pd
 import yaml
 
+from accelstudy.basics.errors import InputError
 from accelstudy.basics.suggested import study_again
 from accelstudy.basics.units import MGON
 from accelstudy.files.outputs import PLAN, result_folder
-from accelstudy.plan.report.advice import limits
-from accelstudy.plan.report.wording import (
+from accelstudy.plan.answer import Answer, answer
+from accelstudy.plan.candidates import Candidate
+from accelstudy.plan.config import PlanCase
+from accelstudy.plan.optimised import is_best, request_of
+from accelstudy.plan.reasons import limits
+from accelstudy.plan.wording import (
     answer_lines,
     assumption_lines,
     how_to,
     positions_command,
     reason_lines,
     table_lines,
+    unreachable,
 )
-from accelstudy.plan.search.answer import Answer
-from accelstudy.plan.search.candidates import Candidate
-from accelstudy.plan.search.optimised import is_best, request_of
 from accelstudy.proposal.design_file import write_design
 from accelstudy.proposal.order import field_order
 
@@ -54,6 +57,26 @@ def write_plan(
         plan_files(answer, folder, provenance, shown=Path(out))
 
 
+def make_plan(
+    name: str,
+    case: Mapping[str, Any],
+    replicates: int,
+    folder: str | Path,
+    provenance: Mapping[str, Any],
+) -> None:
+    """Make one plan.
+
+    Raises
+    ------
+    InputError
+        If no calibration reaches the target; the message says what is reachable.
+    """
+    plan = answer(PlanCase(**case).question, int(provenance["seed"]), replicates)
+    if not plan.ranked:
+        raise InputError(f"plan.cases.{name}: {unreachable(plan)}")
+    plan_files(plan, Path(folder), provenance, Path(folder), f"plan-{name}")
+
+
 def plan_files(
     answer: Answer,
     folder: Path,
@@ -74,7 +97,7 @@ def plan_files(
     from accelstudy.drawing.saving import save
     from accelstudy.drawing.style import DPI, STYLE
     from accelstudy.files.tables import write_table
-    from accelstudy.plan.report.figure import plan_figure
+    from accelstudy.plan.figure import plan_figure
 
     write_table(folder / "plan.parquet", plan_table(answer), provenance)
     head = STUDY_HEAD.format(command=study_again(shown / "study.yaml"))

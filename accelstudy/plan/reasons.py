@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.effects import get_effect
-from accelstudy.plan.search.candidates import PLANNED_MODELS, Candidate
-from accelstudy.plan.search.question import Question
-from accelstudy.plan.search.theory import OF_RIG, Theory, theory_of
+from accelstudy.plan.candidates import PLANNED_MODELS, Candidate
+from accelstudy.plan.question import Question
+from accelstudy.plan.theory import OF_RIG, Theory, theory_of
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise
@@ -40,6 +40,7 @@ class Need:
     ----------
     effect : str
     size : float, SI
+    unit : str, SI
     source : str, where the size comes from
     in_model : bool
     left : float, rad, rms that neglecting the effect adds; NaN if the positions cannot show it
@@ -49,11 +50,17 @@ class Need:
 
     effect: str
     size: float
+    unit: str
     source: str
     in_model: bool
     left: float
     cost: float
     verdict: str
+
+    @property
+    def title(self) -> str:
+        """The effect in plain words."""
+        return PLAIN[self.effect]
 
 
 @dataclass(frozen=True)
@@ -74,6 +81,11 @@ class Spoiler:
     size: float
     usual: tuple[float, float]
     verdict: str
+
+    @property
+    def title(self) -> str:
+        """The effect in plain words."""
+        return PLAIN[self.effect]
 
 
 @dataclass(frozen=True)
@@ -128,10 +140,11 @@ def needs(question: Question, candidate: Candidate) -> list[Need]:
     theory = theory_of(question.tilt_range)
     rows = _rows(question, theory, candidate)
     effects = [effect.name for effect in candidate.model.effects]
-    found = []
+    judged = []
     for effect, size in question.sizes.items():
         if size.value == 0:
             continue
+        unit = get_effect(effect).parameters[0].unit
         inside = effect in effects
         without = _model_with(effects, effect, False)
         including = _model_with(effects, effect, True)
@@ -150,8 +163,8 @@ def needs(question: Question, candidate: Candidate) -> list[Need]:
             verdict = "needed" if fails else "worth it" if left > cost else "of no use"
         else:
             verdict = "worth it" if left > cost else "not needed"
-        found.append(Need(effect, size.value, size.source, inside, left, cost, verdict))
-    return found
+        judged.append(Need(effect, size.value, unit, size.source, inside, left, cost, verdict))
+    return judged
 
 
 def spoilers(question: Question, candidate: Candidate) -> list[Spoiler]:
@@ -166,7 +179,7 @@ def spoilers(question: Question, candidate: Candidate) -> list[Spoiler]:
         effects += OF_RIG
     else:
         effects.append("gravity_error")
-    found = []
+    sizes = []
     for name in effects:
         effect = get_effect(name)
         each = float(theory.neglecting(rows, candidate.model, name).max())
@@ -177,8 +190,8 @@ def spoilers(question: Question, candidate: Candidate) -> list[Spoiler]:
         if size > low:
             verdict = "may spoil it" if size <= high else "does not matter"
         unit = effect.parameters[0].unit
-        found.append(Spoiler(name, unit, size, (low, high), verdict))
-    return found
+        sizes.append(Spoiler(name, unit, size, (low, high), verdict))
+    return sizes
 
 
 def in_use(

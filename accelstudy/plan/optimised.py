@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 from accelstudy.basics.units import GON, MGON
-from accelstudy.design.optimal.search import optimal_design, rounded
-from accelstudy.plan.search.candidates import LEAST_REDUNDANCY, Candidate, of_scheme, sigma_of
-from accelstudy.plan.search.question import Equipment, Question
+from accelstudy.plan.candidates import LEAST_REDUNDANCY, Candidate, of_scheme, sigma_of
+from accelstudy.plan.question import Equipment, Question
 from accelstudy.proposal.request import Request
 from accelstudy.proposal.worse_angle import WorseAngle
 from accelstudy.schemes import Scheme
@@ -85,11 +84,11 @@ class Sought:
         The search begins near a number of positions, and goes on as if each gave the same
         information. It ends where one position less is known to miss the target.
         """
-        target, known = self.question.target, {}
+        target, tried = self.question.target, {}
         low, high = self.least - 1, self.most + 1
         while high - low > 1:
             n = min(max(near, low + 1), high - 1)
-            known[n] = candidate = self.candidate(n)
+            tried[n] = candidate = self.candidate(n)
             if candidate is None:
                 low = n
                 continue
@@ -101,7 +100,7 @@ class Sought:
                 high = n
                 if n > 1 and SURE * share * math.sqrt(n / (n - 1)) > 1:
                     break
-        return known.get(high)
+        return tried.get(high)
 
 
 def cheapest(question: Question, good: Sequence[Candidate], confidence: float | None) -> Candidate:
@@ -115,15 +114,15 @@ def cheapest(question: Question, good: Sequence[Candidate], confidence: float | 
     """
     best, hopes = good[0], []
     for model, hold in dict.fromkeys((c.model.name, c.hold) for c in good):
-        known = next(c for c in good if (c.model.name, c.hold) == (model, hold))
-        sought = Sought(question, known.equipment, model, hold)
-        n = known.scheme.n_positions * (known.accuracy(confidence) / question.target) ** 2
+        first = next(c for c in good if (c.model.name, c.hold) == (model, hold))
+        sought = Sought(question, first.equipment, model, hold)
+        n = first.scheme.n_positions * (first.accuracy(confidence) / question.target) ** 2
         likely, least = (max(sought.least, math.ceil(part * n)) for part in (USUALLY, AT_LEAST))
-        hopes.append((known.equipment.seconds(likely, hold), least, likely, sought))
+        hopes.append((first.equipment.seconds(likely, hold), least, likely, sought))
     for _, least, likely, sought in sorted(hopes, key=lambda hope: hope[0]):
         if sought.equipment.seconds(least, sought.hold) <= best.seconds:
-            found = sought.fewest(confidence, likely)
-            best = min(best, *filter(None, [found]), key=lambda c: (c.seconds, c.rms))
+            fewest = sought.fewest(confidence, likely)
+            best = min(best, *filter(None, [fewest]), key=lambda c: (c.seconds, c.rms))
     return best
 
 
@@ -141,24 +140,9 @@ def request_of(question: Question, candidate: Candidate) -> Request:
 @cache
 def best_positions(request: Request) -> Scheme:
     """The best positions, as a scheme that a study can have."""
-    any_number = _any_number(replace(request, positions=1))
-    found = optimal_design(
-        any_number.task,
-        any_number.chosen,
-        request.positions,
-        seed=request.seed,
-        starts=request.starts,
-        bounded=False,
-    )
-    directions = rounded(found.directions).tolist()
+    directions = request.find(bounded=False).directions.tolist()
     source = "accelstudy design"
     return remember(
         {"title": "minimax", "source": source, "directions": directions},
         f"{CRITERION}-{request.positions}",
     )
-
-
-@cache
-def _any_number(request: Request) -> Request:
-    """The same object for the same request, so that its task is worked out once."""
-    return request

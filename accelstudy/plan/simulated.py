@@ -14,9 +14,9 @@ from accelstudy.adjustment.block import Block
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY, recorded_unit, to_recorded
 from accelstudy.effects import get_effect
 from accelstudy.leveling.error import ATTITUDES
-from accelstudy.plan.search.candidates import Candidate
-from accelstudy.plan.search.optimised import is_best
-from accelstudy.plan.search.question import Question
+from accelstudy.plan.candidates import Candidate
+from accelstudy.plan.optimised import is_best
+from accelstudy.plan.question import Question
 from accelstudy.schemes.files import held
 from accelstudy.study.cells.cell import Cell
 from accelstudy.study.cells.of_study import study_cells
@@ -126,14 +126,14 @@ def simulate(config: dict[str, Any]) -> list[Simulated]:
     """
     study = parse_study(config)
     leveling = study.leveling.model_dump()
-    found: dict[str, Simulated] = {}
+    by_cell: dict[str, Simulated] = {}
     order = []
     for grid in config["grids"]:
         (cell,) = study_cells(parse_study({**config, "grids": [grid]}))
         order.append(cell.name)
-        if cell.name not in found:
-            found[cell.name] = _simulated(cell, study.seed, leveling)
-    return [found[name] for name in order]
+        if cell.name not in by_cell:
+            by_cell[cell.name] = _simulated(cell, study.seed, leveling)
+    return [by_cell[name] for name in order]
 
 
 def _simulated(cell: Cell, seed: int, leveling: dict[str, Any]) -> Simulated:

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
 from accelstudy.basics.units import GON, MGON, display_unit, to_display
-from accelstudy.drawing.style import FULL, approach_colour, log_ticks, new_figure
-from accelstudy.plan.report.wording import model_words
-from accelstudy.plan.search.answer import by_time
-from accelstudy.plan.search.candidates import candidates
-from accelstudy.plan.search.question import Question
-from accelstudy.plan.search.sensors import get_sensor
+from accelstudy.drawing.saving import save
+from accelstudy.drawing.style import DPI, FULL, STYLE, approach_colour, log_ticks, new_figure
+from accelstudy.files.tables import write_table
+from accelstudy.plan.answer import by_time
+from accelstudy.plan.candidates import candidates
+from accelstudy.plan.question import Question, get_sensor
+from accelstudy.plan.wording import model_words
 from accelstudy.schemes.optimal import stored_designs
 
 TILT_RANGE = 30 * GON
@@ -22,6 +25,17 @@ HOLDS = (1.0, 10.0, 60.0)
 """Durations of a hold that are compared, s."""
 COLUMNS = 3
 """Panels side by side."""
+
+
+def compare_sensors(
+    sensors: Sequence[str], outputs: Mapping[str, str], provenance: Mapping[str, Any]
+) -> None:
+    """Compare sensors; `outputs` has the paths of `table`, `svg` and `png`."""
+    table = front_table(sensors)
+    write_table(outputs["table"], table, provenance)
+    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
+        figure = front_figure(table)
+    save(figure, outputs["svg"], outputs["png"], "Sensors", DPI)
 
 
 def front_table(sensors: Sequence[str], tilt_range: float = TILT_RANGE) -> pd.DataFrame:

@@ -7,7 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from accelstudy.basics.units import display_unit, quantity_text, to_display
+from accelstudy.basics.units import display_unit, to_display
+from accelstudy.basics.wording import quantity_text
 from accelstudy.drawing.style import (
     FULL,
     INK,
@@ -16,8 +17,8 @@ from accelstudy.drawing.style import (
     log_ticks,
     new_figure,
 )
-from accelstudy.plan.search.answer import Answer, Ranked, by_time
-from accelstudy.plan.search.candidates import Candidate
+from accelstudy.plan.answer import Answer, Ranked, by_time
+from accelstudy.plan.candidates import Candidate
 
 LABELS = {"gravity": "by hand, gravity alone", "robot": "with a robot"}
 
@@ -28,9 +29,9 @@ def plan_figure(answer: Answer) -> Figure:
     figure = new_figure(FULL, 95)
     ax = figure.subplots()
     for equipment in question.equipment:
-        mine = [c for c in answer.compared if c.equipment == equipment]
-        if mine:
-            _draw_equipment(ax, mine, question.confidence)
+        compared = [c for c in answer.compared if c.equipment == equipment]
+        if compared:
+            _draw_equipment(ax, compared, question.confidence)
     target = float(to_display(question.target, "rad"))
     ax.axhline(target, color=INK, linewidth=0.8, linestyle="--", zorder=1)
     ax.set_xscale("log")
@@ -65,13 +66,13 @@ def plan_figure(answer: Answer) -> Figure:
     return figure
 
 
-def _draw_equipment(ax: Axes, mine: list[Candidate], confidence: float | None) -> None:
-    colour = approach_colour(mine[0].equipment.name)
-    times = np.array([c.seconds / 60 for c in mine])
-    values = np.array([_shown(c, confidence) for c in mine])
+def _draw_equipment(ax: Axes, compared: list[Candidate], confidence: float | None) -> None:
+    colour = approach_colour(compared[0].equipment.name)
+    times = np.array([c.seconds / 60 for c in compared])
+    values = np.array([_shown(c, confidence) for c in compared])
     ax.scatter(times, values, s=3, color=colour, alpha=0.18, linewidth=0, rasterized=True, zorder=2)
     front_times, front, best = [], [], np.inf
-    for candidate in by_time(mine):
+    for candidate in by_time(compared):
         value = _shown(candidate, confidence)
         if value < best:
             best = value

@@ -8,15 +8,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from accelstudy.basics.units import MGON
-from accelstudy.data_sheets import DataSheet
+from accelstudy.basics.errors import InputError
+from accelstudy.data_sheets import DataSheet, get_data_sheet, read_data_sheet
 from accelstudy.effects import get_effect
+from accelstudy.plan.quantities import QUANTITIES
 from accelstudy.schemes import Scheme, get_scheme, is_scheme_file
 
 HOLDS = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0)
 """Durations of a hold that are tried, s."""
 USUAL_HOLD = 10.0
 """s, for a sensor of which only the noise of a position is known."""
+LOGS = (".csv", ".txt", ".gz", ".mat", ".parquet", ".log", ".dat")
+"""Endings of files that are no data sheets, though one can be made of them."""
 
 
 @dataclass(frozen=True)
@@ -34,13 +37,27 @@ class Equipment:
     moving: float
     setup: float
 
+    @property
+    def how(self) -> str:
+        """The equipment in words."""
+        return "by hand" if self.name == "gravity" else "with a robot"
+
     def seconds(self, positions: int, hold: float) -> float:
         """Time in the field, s."""
         return self.setup + positions * (hold + self.moving)
 
 
-BY_HAND = Equipment("gravity", moving=20.0, setup=0.0)
-ROBOT = Equipment("robot", moving=10.0, setup=1800.0)
+BY_HAND = Equipment("gravity", QUANTITIES["moving_time"].value, 0.0)
+ROBOT = Equipment(
+    "robot", QUANTITIES["robot_moving_time"].value, QUANTITIES["robot_setup_time"].value
+)
+
+
+def equipment_of(
+    name: str, by_hand: Equipment = BY_HAND, robot: Equipment = ROBOT
+) -> tuple[Equipment, ...]:
+    """Equipment that is compared: gravity, robot or both."""
+    return {"gravity": (by_hand,), "robot": (robot,), "both": (by_hand, robot)}[name]
 
 
 @dataclass(frozen=True)
@@ -81,7 +98,7 @@ class Question:
     equipment: tuple[Equipment, ...] = (BY_HAND, ROBOT)
     confidence: float | None = None
     holds: tuple[float, ...] = ()
-    sigma_angle: float = 3.2 * MGON
+    sigma_angle: float = QUANTITIES["robot_accuracy"].value
     most_seconds: float = math.inf
     most_positions: int = 200
     schemes: tuple[str, ...] = ()
@@ -97,6 +114,11 @@ class Question:
     def neglectable(self) -> dict[str, float]:
         """Sizes of the effects that cause errors if a model lacks them."""
         return {name: size.value for name, size in self.sizes.items()}
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether the sensor is assumed to be linear."""
+        return any(size.source == "assumed" for size in self.sizes.values())
 
     def written(self, scheme: Scheme) -> str:
         """Name of a scheme in commands and configurations: a name, or the path of its file."""
@@ -131,3 +153,24 @@ def sizes_of(sheet: DataSheet) -> dict[str, Size]:
 
 def _times(value: float | None, factor: float) -> float | None:
     return None if value is None else value * factor
+
+
+def get_sensor(text: str) -> DataSheet:
+    """Return a sensor by its name, from a YAML file, or from the folder of a campaign.
+
+    Raises
+    ------
+    InputError
+        If there is no such sensor; for a log the message says how to make a data sheet of it.
+    """
+    path = Path(text)
+    if path.is_dir():
+        from accelstudy.data_sheets.measured import sheet_of_campaign
+
+        return sheet_of_campaign(path)
+    if path.suffix in LOGS:
+        raise InputError(
+            f"{text}: a log, not a data sheet; make one of it: accelstudy data-sheet {text} --out "
+            f"{path.stem}.yaml, with the options by which import reads it"
+        )
+    return read_data_sheet(path) if path.is_file() else get_data_sheet(text)

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from accelstudy.basics.progress import track
-from accelstudy.plan.search.candidates import Candidate, candidates
-from accelstudy.plan.search.optimised import Sought, cheapest
-from accelstudy.plan.search.question import ROBOT, Equipment, Question
-from accelstudy.plan.search.simulated import Simulated, simulate, study_of
+from accelstudy.plan.candidates import Candidate, candidates
+from accelstudy.plan.optimised import Sought, cheapest
+from accelstudy.plan.question import ROBOT, Equipment, Question
+from accelstudy.plan.simulated import Simulated, simulate, study_of
 
 SHOWN = 8
 """Candidates in the table."""
@@ -70,13 +70,11 @@ class Answer:
         by_hand = [r for r in checked if r.candidate.equipment.name == "gravity"]
         return (by_hand or checked)[0]
 
-    @property
-    def best(self) -> Candidate | None:
-        """The most accurate candidate, however long it takes."""
-        return min(self.compared, key=self._accuracy, default=None)
-
-    def _accuracy(self, candidate: Candidate) -> float:
-        return candidate.accuracy(self.question.confidence)
+    def best(self, equipment: str = "") -> Candidate | None:
+        """The most accurate candidate, of all or with one equipment, however long it takes."""
+        chosen = [c for c in self.compared if equipment in ("", c.equipment.name)]
+        confidence = self.question.confidence
+        return min(chosen, key=lambda c: c.accuracy(confidence), default=None)
 
     @property
     def study(self) -> dict[str, object]:
@@ -106,15 +104,15 @@ def answer(question: Question, seed: int = 1, replicates: int = 10_000) -> Answe
         instead = _with_a_robot(question)
         return Answer(question, compared, [], None, instead, seed, replicates)
     compared += [r.candidate for r in ranked if r.candidate not in compared]
-    found = Answer(question, compared, _shown(ranked), None, None, seed, replicates)
-    mine = replace(question, equipment=(found.first.candidate.equipment,))
+    plan = Answer(question, compared, _shown(ranked), None, None, seed, replicates)
+    same = replace(question, equipment=(plan.first.candidate.equipment,))
     other = OTHER_CONFIDENCE if question.confidence is None else None
-    stricter = [c for c in compared if c.equipment in mine.equipment]
-    stricter += _largest(mine, mine.equipment[0], stricter, other)
-    reaching = _good(mine, stricter, other)
-    simulation = Simulation(mine, other, seed, replicates)
-    confirmed = simulation.confirmed(cheapest(mine, reaching, other)) if reaching else None
-    return replace(found, stricter=confirmed)
+    stricter = [c for c in compared if c.equipment in same.equipment]
+    stricter += _largest(same, same.equipment[0], stricter, other)
+    reaching = _good(same, stricter, other)
+    simulation = Simulation(same, other, seed, replicates)
+    confirmed = simulation.confirmed(cheapest(same, reaching, other)) if reaching else None
+    return replace(plan, stricter=confirmed)
 
 
 def _good(
@@ -131,10 +129,10 @@ def _largest(
     confidence: float | None,
 ) -> list[Candidate]:
     """Calibration in as many of the best positions as are allowed, if no known scheme suffices."""
-    mine = [c for c in compared if c.equipment == equipment]
-    if not mine or any(c.reaches(question.target, confidence) for c in mine):
+    possible = [c for c in compared if c.equipment == equipment]
+    if not possible or any(c.reaches(question.target, confidence) for c in possible):
         return []
-    best = min(mine, key=lambda c: c.accuracy(confidence))
+    best = min(possible, key=lambda c: c.accuracy(confidence))
     sought = Sought(question, equipment, best.model.name, best.hold)
     return list(filter(None, [sought.candidate(sought.most)]))
 
@@ -156,9 +154,9 @@ def _with_a_robot(question: Question) -> Candidate | None:
     return cheapest(robot, good, question.confidence) if good else None
 
 
-def by_time(found: Iterable[Candidate]) -> list[Candidate]:
+def by_time(unsorted: Iterable[Candidate]) -> list[Candidate]:
     """Candidates by the time they take."""
-    return sorted(found, key=_effort)
+    return sorted(unsorted, key=_effort)
 
 
 def _effort(candidate: Candidate) -> tuple[float, float, int]:
