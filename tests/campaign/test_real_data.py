@@ -9,11 +9,12 @@ import pytest
 from places import DATA, ROOT
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.wording import number, probability, words
+from accelstudy.basics.units import shown_unit
+from accelstudy.basics.wording import amount, number, probability, words
 from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.public import import_settings, public_data, public_file
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.report.words import GROUPS, amount, shown_unit, verdict_lines
+from accelstudy.diagnosis.report.words import GROUPS, verdict_lines
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.effects import get_effect
 from accelstudy.sensors.models import get_model

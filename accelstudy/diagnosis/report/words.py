@@ -6,8 +6,7 @@ import math
 from collections import defaultdict
 from collections.abc import Sequence
 
-from accelstudy.basics.units import display_unit, to_display, unit_label
-from accelstudy.basics.wording import comma_list, number, p_value, probability, words
+from accelstudy.basics.wording import comma_list, probability, words
 from accelstudy.diagnosis.decision.posterior import CREDIBLE, Explanation
 from accelstudy.diagnosis.decision.priors import SURE
 from accelstudy.diagnosis.decision.statement import (
@@ -24,7 +23,10 @@ from accelstudy.diagnosis.next_positions import NextPosition
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.diagnosis.space.groups import REPEAT
 from accelstudy.effects import effect_names, get_effect
+from accelstudy.pages import lines
 from accelstudy.sensors.plausibility import USUAL_CAUSE
+
+TEMPLATE = "diagnosis/report/words.txt.j2"
 
 GROUPS = {
     "direction": "with the direction of gravity",
@@ -37,32 +39,6 @@ GROUPS = {
 }
 """How a residual of each group of regressors varies."""
 
-HEADLINES = {
-    "no_effect": "Nothing that these data can show is missing from the model.",
-    "named": "The model lacks {names}.",
-    "narrowed": "The model lacks {names}.",
-    "noise_model": "The sensor model is adequate, its noise is not: {names}.",
-    "noise or effect": "No effect shows, but the residuals fail a test of the noise: {names}.",
-    "gross_error": "The data have a gross error: {names}.",
-}
-
-
-def amount(value: float, unit: str) -> str:
-    """Show an SI value in the unit that people use, without the unit."""
-    return number(float(to_display(value, unit)))
-
-
-def estimate(value: float, sigma: float, unit: str) -> list[str]:
-    """Show an estimate and its sigma in the unit that people use, to two digits of the sigma."""
-    shown, spread = float(to_display(value, unit)), float(to_display(sigma, unit))
-    digits = max(0, 1 - math.floor(math.log10(spread))) if spread > 0 else 6
-    return [f"{x:.{digits}f}".replace("-", "−") for x in (shown, spread)]
-
-
-def shown_unit(unit: str) -> str:
-    """Return the unit that people use for an SI unit, as it is printed."""
-    return unit_label(display_unit(unit))
-
 
 def too_few(diagnosis: Diagnosis) -> bool:
     """Whether nothing was found since nothing could be tested."""
@@ -71,18 +47,20 @@ def too_few(diagnosis: Diagnosis) -> bool:
 
 def headline(diagnosis: Diagnosis) -> str:
     """Say the verdict in one sentence."""
-    if too_few(diagnosis):
-        return "Too few positions to show whether anything is missing from the model."
-    found = diagnosis.found
-    if diagnosis.verdict == "narrowed":
-        return HEADLINES["narrowed"].format(names=missing(diagnosis.credible_set))
-    if diagnosis.verdict == "unknown":
-        return without_a_name(diagnosis.credible_set)
-    if diagnosis.verdict == "gross_error":
-        found = tuple(f for f in found if not _is_effect(f))
-    names = {named.name for named in found}
-    kind = "noise or effect" if _may_be_an_effect(diagnosis) else diagnosis.verdict
-    return HEADLINES[kind].format(names=comma_list([_title(f, names) for f in found]))
+    d, kind = diagnosis, diagnosis.verdict
+    if kind == "unknown":
+        return without_a_name(d.credible_set)
+    if kind == "narrowed":
+        names = missing(d.credible_set)
+    else:
+        # Effects beside a gross error are not its names.
+        found = [f for f in d.found if kind != "gross_error" or not _is_effect(f)]
+        names = comma_list([_title(f, {named.name for named in found}) for f in found])
+    if too_few(d):
+        kind = "too few"
+    elif _may_be_an_effect(d):
+        kind = "noise or effect"
+    return lines(TEMPLATE, "headline", kind, names)[0]
 
 
 def _may_be_an_effect(diagnosis: Diagnosis) -> bool:
@@ -93,82 +71,53 @@ def _may_be_an_effect(diagnosis: Diagnosis) -> bool:
     return posterior is not None and posterior < SURE
 
 
-def _title(named: Named, known: set[str]) -> str:
+def _title(named: Named, titled: set[str]) -> str:
     """Name what was found, with all that would be the same, or with its position."""
     if named.position is not None:
         return f"{words(named.name)} {named.position}"
-    same = [name for name in named.equivalence_class if name not in known]
+    same = [name for name in named.equivalence_class if name not in titled]
     return " or ".join(words(name) for name in (named.name, *same))
 
 
 def verdict_lines(diagnosis: Diagnosis) -> list[str]:
     """Say in a few sentences what was found; the first is the verdict."""
     d = diagnosis
-    lines = [headline(d), *_narrowed(d)]
-    if d.reason:
-        lines.append(sentence(d.reason))
-    if _may_be_an_effect(d):
-        p = probability(d.found[0].posterior)
-        lines.append(f"That only the noise is wrong has a probability of {p}; it may be an effect.")
-    if d.recognised is not None:
-        lines.append("All else is said of the data as they would be without this error.")
-    if d.implausible:
-        lines.append(f"No sensor is like this: {comma_list(list(d.implausible))}. {USUAL_CAUSE}")
-    if d.verdict == "no_effect":
-        lines.append(_agreement(d))
-    else:
-        lines += _refuted(d)
-    lines += _weights(d)
-    lines += _suspects(d)
-    if d.verdict == "unknown":
-        lines += [line for line in (most_probable(d.credible_set), _where(d)) if line]
-    for named in filter(_is_effect, d.found):
-        lines.append(_effect_line(named))
-    if d.verdict == "gross_error" and any(f.position is not None for f in d.found):
-        lines.append(
-            "A position that disagrees with all others was moved, or the sensor had not settled. "
-            f"The final parameters are those {changed(d)}."
-        )
-    if d.leveling is not None:
-        before, after = (amount(value, "rad") for value in d.leveling)
-        unit = display_unit("rad")
-        lines.append(
-            f"Tilt error of the calibrated sensor: {before} {unit} as it is, {after} {unit} "
-            f"{changed(d)}."
-        )
-        lines += keep_base(d)
-    if judged(d):
-        lines.append(confirmation(d))
-    if d.invisible:
-        lines.append(
-            f"This campaign cannot see {comma_list([words(n) for n in d.invisible])}, "
-            "however large."
-        )
-    return lines
+    bumped = [named.position for named in d.found if named.position is not None]
+    told = {
+        "headline": headline(d),
+        "not_told_apart": not_told_apart(d.credible_set),
+        "explanation": explanation_words(d.credible_set[0]) if d.credible_set else "",
+        "reason": sentence(d.reason) if d.reason else "",
+        "noise_only": d.found[0].posterior if _may_be_an_effect(d) else None,
+        "usual_cause": USUAL_CAUSE,
+        "residuals_over_noise": _residuals_over_noise(d),
+        "weights": _weights(d),
+        "suspects": {label: p for label, p in sorted(d.suspects) if label not in bumped},
+        "most_probable": most_probable(d.credible_set),
+        "location": _location(d),
+        "effects": [(f, get_effect(f.spec).equation) for f in d.found if _is_effect(f)],
+        "positions": bumped,
+        "changed": changed(d),
+        "keep_base": keep_base(d),
+        "confirmation": confirmation(d) if judged(d) else "",
+    }
+    return lines(TEMPLATE, "verdict", d, told)
 
 
 def advice(diagnosis: Diagnosis) -> list[str]:
     """Say what would show more, apart from further positions."""
     d = diagnosis
-    hidden = [words(name) for name in d.invisible if name != "gravity_error"]
-    lines = []
-    if hidden and not d.approach.uses_angles:
-        lines.append(f"The angles of a robot in each position could show {comma_list(hidden)}.")
-    if "gravity_error" in d.invisible:
-        lines.append("No position shows an error of g; it takes another measurement of gravity.")
-    if REPEAT not in d.groups and (d.verdict == "noise_model" or not d.sigma_known):
-        lines.append("Repeated attitudes would show the noise from hold to hold without any model.")
-    return lines
+    hidden = [name for name in d.invisible if name != "gravity_error"]
+    may_repeat = REPEAT not in d.groups and (d.verdict == "noise_model" or not d.sigma_known)
+    content = ([] if d.approach.uses_angles else hidden, "gravity_error" in d.invisible, may_repeat)
+    return lines(TEMPLATE, "advice", *content)
 
 
 def keep_base(diagnosis: Diagnosis) -> list[str]:
     """Advise the base model for leveling where what was added makes the tilt error larger."""
     if diagnosis.better_for_leveling != "base":
         return []
-    return [
-        f"For leveling keep the base model: the tilt error is larger {changed(diagnosis)}, as "
-        "these positions determine what was added too weakly."
-    ]
+    return lines(TEMPLATE, "keep_base", changed(diagnosis))
 
 
 def judged(diagnosis: Diagnosis) -> bool:
@@ -178,25 +127,8 @@ def judged(diagnosis: Diagnosis) -> bool:
 
 def confirmation(diagnosis: Diagnosis) -> str:
     """Say which statement about the added effects held on positions that were not used."""
-    gap = diagnosis.gap
-    if gap.held_out is None:
-        return f"Not confirmed on data that were not used: {gap.reason}."
-    where = f"on {len(gap.held_out.held)} held-out positions"
-    if gap.reason:  # what z would have to be was not asked then
-        return f"Not confirmed {where}: {gap.reason}."
-    tested = f"{where} (z = {number(gap.held_out.z)}, {number(gap.held_out.needed)} needed)"
-    if not gap.confirmed:
-        return f"Not confirmed {tested}."
-    if gap.names:
-        is_one = f"that it is {comma_list([words(name) for name in gap.names], 'or')}"
-        not_which = "; not which, as each could leave what was found" * (len(gap.names) > 1)
-        return f"Confirmed {tested}: {is_one}{not_which}."
     effects = [_title(named, {named.name}) for named in diagnosis.found if _is_effect(named)]
-    if len(effects) > 1:
-        claim = f"that such effects are missing; not that they are {comma_list(effects)}"
-        return f"Confirmed {tested}: {claim} rather than rivals."
-    claim = f"that such an effect is missing; not that it is {effects[0]}"
-    return f"Confirmed {tested}: {claim} rather than a rival."
+    return lines(TEMPLATE, "confirmation", diagnosis.gap, effects)[0]
 
 
 def changed(diagnosis: Diagnosis) -> str:
@@ -211,97 +143,26 @@ def _is_effect(named: Named) -> bool:
     return bool(named.parameters)
 
 
-def _effect_line(named: Named) -> str:
-    equation = get_effect(named.spec).equation
-    values = ", ".join(
-        f"{name} = {' ± '.join(estimate(value, sigma or 0.0, unit))} {shown_unit(unit)}".rstrip()
-        for name, value, sigma, unit in named.parameters
-    )
-    same = [words(name) for name in named.equivalence_class if name != named.name]
-    more = [words(name) for name in named.imitators]
-    alike = f" In these positions {comma_list(same)} would be the same." if same else ""
-    alike += f" In these positions {comma_list(more)} could leave the same, and more." * bool(more)
-    return f"{words(named.name).capitalize()}, {equation}: {values}.{alike}"
-
-
-def _agreement(d: Diagnosis) -> str:
+def _residuals_over_noise(d: Diagnosis) -> float | None:
+    """Residuals of the base fit over the stated noise, if refuted and not in the reason already."""
     test = d.global_test
-    if d.screening.p_family:
-        pattern = f"no pattern ({p_value(d.screening.p_value)})"
-    else:
-        pattern = f"too little redundancy ({d.base.redundancy}) to show a pattern"
-    if test is None:
-        return (
-            "The campaign does not give its noise, so that only patterns in the residuals could be "
-            f"tested, not their size; they have {pattern}."
-        )
-    if not test.accepted:  # the campaign is its own model
-        return f"The residuals are far smaller than the stated noise, and have {pattern}."
-    return (
-        f"The residuals are as large as the noise says ({p_value(test.p_value)}), and have "
-        f"{pattern}."
-    )
+    if test is None or test.accepted or (d.recognised is None and d.says_the_level):
+        return None
+    return math.sqrt(test.statistic / test.dof)
 
 
-def _narrowed(d: Diagnosis) -> list[str]:
-    """Say what cannot be told apart, what could do it, and what all else refers to."""
-    if d.verdict != "narrowed":
-        return []
-    not_apart = not_told_apart(d.credible_set)
-    further = "; further positions would, and the report says which" if d.next_positions else ""
-    taken = explanation_words(d.credible_set[0])
-    return [
-        f"{not_apart}{further}.",
-        f"All else is said of the most probable explanation: {taken}.",
-    ]
-
-
-def _refuted(d: Diagnosis) -> list[str]:
-    """Say by how much the stated noise is refuted, as the calibration does."""
-    test = d.global_test
-    in_reason = d.recognised is None and d.says_the_level
-    if test is None or test.accepted or in_reason:
-        return []
-    ratio = math.sqrt(test.statistic / test.dof)
-    much = f"{ratio:.1f} times as large as" if ratio > 1 else f"only {ratio:.2g} times"
-    return [
-        f"With the base model the residuals are {much} the stated noise ({p_value(test.p_value)})."
-    ]
-
-
-def _weights(d: Diagnosis) -> list[str]:
-    """Say how unequal axes are weighted."""
-    variances = d.frame.solution.variances[0, :3]
+def _weights(d: Diagnosis) -> list[float]:
+    """Variances of the axes over their mean; empty if they are weighted alike."""
     if d.frame.solution is d.base:
         return []
-    parts = comma_list([number(float(v)) for v in variances / variances.mean()])
-    return [f"The axes are weighted by their noise: x, y and z have {parts} of the mean variance."]
+    variances = d.frame.solution.variances[0, :3]
+    return (variances / variances.mean()).tolist()
 
 
-def _suspects(d: Diagnosis) -> list[str]:
-    """Say which positions a calibration marks, where the verdict is not about them."""
-    bumped = {named.position for named in d.found}
-    labels = [str(label) for label, _ in sorted(d.suspects) if label not in bumped]
-    if not labels:
-        return []
-    what = f"position{'' if len(labels) == 1 else 's'} {comma_list(labels)}"
-    marked = f"A calibration with the base model marks {what} as in conflict with the others"
-    if d.verdict in ("no_effect", "noise_model"):
-        smallest = min(p for label, p in d.suspects if label not in bumped)
-        return [f"{marked} ({p_value(smallest)}); among all that is tested here it is no finding."]
-    return [f"{marked}."]
-
-
-def _where(d: Diagnosis) -> str:
+def _location(d: Diagnosis) -> list[tuple[str, float]]:
+    """Groups with the largest shares of the excess, in words, and these shares."""
     ranked = sorted(d.location.items(), key=lambda item: -item[1])[:3]
-    shares = [
-        f"{100 * share:.0f} % {GROUPS.get(name, words(name))}"
-        for name, share in ranked
-        if share > 0
-    ]
-    if not shares:
-        return "Above the assumed noise level, nothing shows where it lives."
-    return f"Of the excess of the residuals over the noise, {comma_list(shares)} (shares overlap)."
+    return [(GROUPS.get(name, words(name)), share) for name, share in ranked if share > 0]
 
 
 def sentence(text: str) -> str:
