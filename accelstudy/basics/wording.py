@@ -51,13 +51,13 @@ def p_value(value: float | None) -> str:
     return f"p {shown}" if shown[0] in "<>" else f"p = {shown}"
 
 
-def number(value: float) -> str:
+def number(value: float | None) -> str:
     """Show a number with three significant digits; a dash where there is none.
 
     Digits before the point are not rounded away, as counts have them, too; a number with a sigma is
     for `estimate`.
     """
-    if math.isnan(value):
+    if value is None or math.isnan(value):
         return "–"
     if math.isinf(value):
         return "∞" if value > 0 else "−∞"
@@ -69,9 +69,9 @@ def number(value: float) -> str:
     return text.replace("-", "−")
 
 
-def amount(value: float, unit: str) -> str:
+def amount(value: float | None, unit: str) -> str:
     """Show an SI value in the unit that people use, without the unit; angles are small ones."""
-    return number(float(to_display(value, unit)))
+    return number(None if value is None else float(to_display(value, unit)))
 
 
 def quantity_text(value: float, unit: str) -> str:
@@ -89,8 +89,13 @@ def quantity_text(value: float, unit: str) -> str:
     return f"{text} {of}".removesuffix(" 1")
 
 
-def estimate(value: float, sigma: float, unit: str) -> tuple[str, str]:
-    """Show an SI value and its sigma in the unit that people use, to two digits of the sigma."""
+def estimate(value: float, sigma: float | None, unit: str) -> tuple[str, str]:
+    """Show an SI value and its sigma in the unit that people use, to two digits of the sigma.
+
+    Where there is no sigma, a dash stands for it, and the value is a number.
+    """
+    if sigma is None or math.isnan(sigma):
+        return amount(value, unit), number(None)
     both = [float(to_display(v, unit)) for v in (value, sigma)]
     digits = 1 - _rounded(both[1], 2)[1] if both[1] > 0 else 6
     if digits < 0:

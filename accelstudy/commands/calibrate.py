@@ -34,7 +34,8 @@ def calibrate_command(campaign: Path, model: str, approach: str, out: Path, forc
     whatever those of the log are.
     """
     from accelstudy.approaches import get_approach
-    from accelstudy.basics.units import display_unit, to_display
+    from accelstudy.basics.units import display_unit
+    from accelstudy.basics.wording import estimate
     from accelstudy.campaign.calibration.fit import fit_campaign
     from accelstudy.campaign.calibration.output import write_calibration
     from accelstudy.campaign.calibration.wording import interval_words, next_steps
@@ -51,12 +52,8 @@ def calibrate_command(campaign: Path, model: str, approach: str, out: Path, forc
     for warning in measured.warnings:
         warn(warning)
     for entry in content["parameters"]:
-        unit = entry["unit"]
-        sigma = (
-            f"{to_display(entry['sigma'], unit):.4f}" if entry["sigma"] is not None else "unknown"
-        )
-        value = f"{to_display(entry['value'], unit):12.4f}"
-        say(f"{entry['name']:>9} = {value} ± {sigma} {display_unit(unit)}")
+        value, sigma = estimate(entry["value"], entry["sigma"], entry["unit"])
+        say(f"{entry['name']:>9} = {value:>12} ± {sigma} {display_unit(entry['unit'])}")
     if content["sigmas_95"] is not None:
         say(f"±: {interval_words(fit)}")
     quality = content["quality"]

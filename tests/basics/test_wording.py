@@ -63,6 +63,8 @@ def test_a_quantity_is_in_the_unit_that_the_user_chose():
         (-123456, 99.6, ("−123460", "100")),
         (12.5, 1.5, ("12.5", "1.5")),
         (1 / 3, 0.0, ("0.333333", "0.000000")),
+        (1 / 3, None, ("0.333", "–")),
+        (1 / 3, math.nan, ("0.333", "–")),
     ],
 )
 def test_a_value_is_as_exact_as_its_sigma_says(value, sigma, expected):

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from accelstudy.basics import suggested
@@ -19,8 +18,7 @@ from accelstudy.basics.levels import (
     REJECTED,
     UNCHECKED,
 )
-from accelstudy.basics.units import MGON, UNITS, display_unit
-from accelstudy.basics.wording import number
+from accelstudy.basics.units import MGON
 from accelstudy.files.outputs import BATCH_JOB, whole_file
 from accelstudy.files.tables import write_table
 from accelstudy.pages import render
@@ -192,7 +190,6 @@ def _page(batch: str, table: pd.DataFrame, links: list[dict[str, str | None]]) -
     ]
     return render(
         "campaign/batch/overview.html.j2",
-        shown=_shown,
         batch=batch,
         failed=[row for row in rows if row["status"] != "ok"],
         implausible=[row for row in rows if row["state"] == IMPLAUSIBLE],
@@ -200,11 +197,5 @@ def _page(batch: str, table: pd.DataFrame, links: list[dict[str, str | None]]) -
         level=REFUTED,
         robot=table["held_out_roll_rad"].notna().any(),
         blind=BLIND,
-        small_angle=UNITS["rad"][display_unit("rad")],
         next_steps=_next_steps(rows),
     )
-
-
-def _shown(value: float | None, unit: float = 1.0) -> str:
-    """Show an SI value in a unit of that size; a dash where there is none."""
-    return number(np.nan if value is None else value / unit)

@@ -11,8 +11,6 @@ from matplotlib.figure import Figure
 
 from accelstudy.basics.levels import REFUTED
 from accelstudy.basics.suggested import HERE
-from accelstudy.basics.units import display_unit, to_display, unit_label
-from accelstudy.basics.wording import number
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.document import (
     assessed_positions,
@@ -29,6 +27,8 @@ from accelstudy.files.parquet import write_frame
 from accelstudy.pages import write_page
 
 SUSPECT = "#D55E00"
+LISTED = 200
+"""Positions up to which the page lists all of them; of more, those that fit worst."""
 
 
 def write_calibration(
@@ -76,8 +76,6 @@ def write_calibration(
         quality=quality,
         lines=lines,
         positions=_listed(positions).to_dict("records"),
-        shown=_shown,
-        unit=lambda unit: unit_label(display_unit(unit)),
         refuted=REFUTED,
         figures=drawn,
         next_steps=next_steps(fit, assessment.state, source, Path(place) / HERE),
@@ -92,11 +90,6 @@ def _listed(positions: pd.DataFrame) -> pd.DataFrame:
     """Positions that the page lists, in their order: all, or those that fit worst."""
     worst = positions.sort_values(["suspect", "p_value"], ascending=[False, True], kind="stable")
     return worst.head(LISTED).sort_index()
-
-
-def _shown(parameter: dict[str, Any], value: float | None) -> str:
-    """Show an SI value of a parameter in the unit of the page."""
-    return "–" if value is None else number(to_display(value, parameter["unit"]).item())
 
 
 def residual_figure(fit: CampaignFit, positions: pd.DataFrame) -> Figure:
@@ -143,7 +136,3 @@ def correlation_figure(fit: CampaignFit) -> Figure:
                     color=ink_on(image, value))  # fmt: skip
     figure.colorbar(image, label="correlation")
     return figure
-
-
-LISTED = 200
-"""Positions up to which the page lists all of them; of more, those that fit worst."""
