@@ -78,9 +78,9 @@ def score_page(tables: Tables, seconds: pd.DataFrame, origin: Mapping[str, Any])
         f"diagnosis took {number(float(each.median()))} s of processor time (median; 95 % of them "
         f"below {number(float(each.quantile(0.95)))} s).",
         "## Targets",
-        target_table(tables["targets"]),
+        figure_table(tables["targets"]),
         "## Beside the targets",
-        share_table(further(campaigns)),
+        figure_table(further(campaigns)),
         "## One effect, over its size",
         size_table(tables["shares"]),
         "## Verdicts",
@@ -99,37 +99,26 @@ def score_page(tables: Tables, seconds: pd.DataFrame, origin: Mapping[str, Any])
     return "\n\n".join(parts) + "\n"
 
 
-def target_table(targets: pd.DataFrame) -> str:
-    """Each target, what was measured, and whether it is met."""
-    rows = [
-        (
-            row["figure"],
-            row["cases"],
-            row["wanted"],
-            _value(row["measured"]),
-            _interval(row["ci95_low"], row["ci95_high"]) if row["n"] else "",
-            row["n"],
-            row["met"],
-        )
-        for row in targets.to_dict("records")
-    ]
-    heads = ("figure", "campaigns", "target", "measured", "95 % interval", "n", "met")
-    return _table(heads, rows)
+FIGURES = {
+    "figure": "figure",
+    "cases": "campaigns",
+    "wanted": "target",
+    "measured": "measured",
+    "interval": "95 % interval",
+    "n": "n",
+    "met": "met",
+}
+"""Columns of the tables of targets and of further shares, and their heads."""
 
 
-def share_table(table: pd.DataFrame) -> str:
-    """Each share or mean with its interval."""
-    rows = [
-        (
-            row["figure"],
-            row["cases"],
-            _value(row["measured"]),
-            _interval(row["ci95_low"], row["ci95_high"]) if row["n"] else "",
-            row["n"],
-        )
-        for row in table.to_dict("records")
-    ]
-    return _table(("figure", "campaigns", "measured", "95 % interval", "n"), rows)
+def figure_table(table: pd.DataFrame) -> str:
+    """Each share or mean with its interval; targets with what is wanted, and whether it is met."""
+    ends = zip(table["ci95_low"], table["ci95_high"], table["n"], strict=True)
+    shown = table.assign(
+        measured=table["measured"].map(_value),
+        interval=[_interval(low, high) if n else "" for low, high, n in ends],
+    )
+    return _table(shown[[name for name in FIGURES if name in shown]].rename(columns=FIGURES))
 
 
 SHOWN = {
@@ -149,13 +138,12 @@ SHOWN = {
 
 def size_table(shares: pd.DataFrame) -> str:
     """Shares over the size of one effect."""
-    one = shares[(shares["set"] == "one") & shares["size"].notna()]
-    sizes = sorted(one["size"].unique())
+    sizes = shares.loc[(shares["set"] == "one") & shares["size"].notna(), "size"]
     rows = [
         (f"{size:g}", *(_share(shares, quantity, "one", size=size) for quantity in SHOWN.values()))
-        for size in sizes
+        for size in sorted(sizes.unique())
     ]
-    return _table(("λ", *SHOWN), rows)
+    return _table(pd.DataFrame(rows, columns=["λ", *SHOWN]))
 
 
 VERDICTS = ("alarm", "named", "narrowed", "unknown", "noise_model", "gross_error", "confirmed")
@@ -163,12 +151,12 @@ VERDICTS = ("alarm", "named", "narrowed", "unknown", "noise_model", "gross_error
 
 def verdict_table(shares: pd.DataFrame) -> str:
     """Shares of the verdicts in each set."""
-    sets = [name for name in _SETS if share_of(shares, "alarm", name) is not None]
     rows = [
-        (_SETS[name], *(_share(shares, quantity, name) for quantity in VERDICTS)) for name in sets
+        (title, *(_share(shares, quantity, name) for quantity in VERDICTS))
+        for name, title in _SETS.items()
+        if share_of(shares, "alarm", name) is not None
     ]
-    heads = ("campaigns", *(name.replace("_", " ") for name in VERDICTS))
-    return _table(heads, rows)
+    return _table(pd.DataFrame(rows, columns=["campaigns", *map(words, VERDICTS)]))
 
 
 _SETS = {
@@ -200,45 +188,44 @@ def method_table(baselines: pd.DataFrame) -> str:
         (method, *(_value(whole.get((method, *key), np.nan)) for key in columns.values()))
         for method in methods
     ]
-    return _table(("method", *columns), rows)
+    return _table(pd.DataFrame(rows, columns=["method", *columns]))
 
 
 def shrink_table(campaigns: pd.DataFrame) -> str:
     """Variance of unit weight before and after what was confirmed."""
-    rows = []
-    for name in ("one", "two"):
-        part = campaigns[(campaigns["set"] == name) & campaigns["confirmed"].eq(True)]
-        for size, some in part.groupby("size"):
-            before, after = some["sigma0_before"].median(), some["sigma0_after"].median()
-            rows.append(
-                (_SETS[name], f"{size:g}", len(some), number(before), number(after),
-                 number((some["sigma0_after"] / some["sigma0_before"]).median()))
-            )  # fmt: skip
-    heads = ("campaigns", "λ", "confirmed", "σ₀² before", "σ₀² after", "ratio (medians)")
-    return _table(heads, rows)
+    chosen = campaigns[campaigns["set"].isin(["one", "two"]) & campaigns["confirmed"].eq(True)]
+    rows = [
+        (
+            _SETS[str(name)],
+            f"{size:g}",
+            len(part),
+            number(part["sigma0_before"].median()),
+            number(part["sigma0_after"].median()),
+            number((part["sigma0_after"] / part["sigma0_before"]).median()),
+        )
+        for (name, size), part in chosen.groupby(["set", "size"])
+    ]
+    heads = ["campaigns", "λ", "confirmed", "σ₀² before", "σ₀² after", "ratio (medians)"]
+    return _table(pd.DataFrame(rows, columns=heads))
 
 
 def effect_table(shares: pd.DataFrame, limits: pd.DataFrame) -> str:
     """Each effect over all sizes, and from its limits on."""
     one = shares[(shares["set"] == "one") & shares["size"].isna()]
-    names = sorted(set(one["what"]) - {ALL})
+    asked = {"found": "alarm", "name right": "right", "oracle": "oracle right", "wrong": "wrong"}
     rows = []
-    for name in names:
+    for name in sorted(set(one["what"]) - {ALL}):
         part = limits[limits["what"] == name]
         rows.append(
             (
-                name.replace("_", " "),
-                _share(shares, "alarm", "one", what=name),
-                _share(shares, "right", "one", what=name),
-                _share(shares, "oracle right", "one", what=name),
-                _share(shares, "wrong", "one", what=name),
+                words(name),
+                *(_share(shares, quantity, "one", what=name) for quantity in asked.values()),
                 _weighted(part, "detected", "above_mdb"),
                 _weighted(part, "right", "above_mib"),
             )
         )
-    heads = ("effect", "found", "name right", "oracle", "wrong", "found from the MDB on",
-             "right from the MIB on")  # fmt: skip
-    return _table(heads, rows)
+    heads = ["effect", *asked, "found from the MDB on", "right from the MIB on"]
+    return _table(pd.DataFrame(rows, columns=heads))
 
 
 SAMPLE_TEXT = (
@@ -256,25 +243,24 @@ def sample_table(chosen: pd.DataFrame) -> str:
     chosen : DataFrame, of `accelstudy.hidden.scoring.sample`
     """
     rows = [
-        (
-            row["cell"],
-            row["campaign"],
-            words(row["verdict"]) if isinstance(row["verdict"], str) else "no answer",
-            "yes" if row["confirmed"] is True else "no",
-            words(row["explanation"]),
-            number(row["posterior"]),
-            number(row["sigma0_before"]),
-        )
+        {
+            "cell": row["cell"],
+            "campaign": row["campaign"],
+            "verdict": words(row["verdict"]) if isinstance(row["verdict"], str) else "no answer",
+            "confirmed": "yes" if row["confirmed"] is True else "no",
+            "explanation": words(row["explanation"]),
+            "posterior": number(row["posterior"]),
+            "σ₀²": number(row["sigma0_before"]),
+        }
         for row in chosen.to_dict("records")
     ]
-    heads = ("cell", "campaign", "verdict", "confirmed", "explanation", "posterior", "σ₀²")
-    return _table(heads, rows)
+    return _table(pd.DataFrame(rows))
 
 
 def failure_table(failed: pd.DataFrame) -> str:
     """Errors that ended a diagnosis, and how often each did."""
     counts = failed["error"].value_counts()
-    return _table(("error", "campaigns"), [(str(text), n) for text, n in counts.items()])
+    return _table(counts.rename_axis("error").reset_index(name="campaigns"))
 
 
 def _weighted(part: pd.DataFrame, column: str, n: str) -> str:
@@ -297,6 +283,8 @@ def _interval(low: float, high: float) -> str:
     return "–" if np.isnan(low) else f"{_value(low)} … {_value(high)}"
 
 
-def _table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    lines = [heads, ["---"] * len(heads), *rows]
-    return "\n".join("| " + " | ".join(map(str, line)) + " |" for line in lines)
+def _table(table: pd.DataFrame) -> str:
+    """Write a table in Markdown."""
+    rows: list[Iterable[object]] = [table.columns, ["---"] * table.shape[1]]
+    rows += table.itertuples(index=False)
+    return "\n".join("| " + " | ".join(map(str, row)) + " |" for row in rows)

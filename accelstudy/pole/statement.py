@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pandas as pd
 
 from accelstudy.basics.units import GON, attitude_unit, to_attitude
-from accelstudy.basics.wording import comma_list, estimate, quantity_text, words
+from accelstudy.pages import lines
 from accelstudy.pole.budget import Budget
 from accelstudy.pole.sensor import COEFFICIENTS
 from accelstudy.pole.sources import sources
 
+TEMPLATE = "pole/wording.txt.j2"
 BEYOND_CHANCE = 4.0
 """Standard errors of the Monte Carlo; linear theory is called wrong beyond them."""
 TOP = "top"
@@ -51,34 +54,18 @@ def _cells(texts: list[str]) -> str:
 
 def limits(budget: Budget) -> list[str]:
     """Say how wrong the foot is at the last tilt of a budget, and what limits it."""
-    tilt = quantity_text(float(budget.tilts[-1]), "rad")
-    total, up = budget.horizontal()[-1], budget.vertical()[-1]
+    total, height = float(budget.horizontal()[-1]), float(budget.vertical()[-1])
+    part = {each: float(budget.horizontal(each.name)[-1]) for each in sources()}
+    rest = {each: math.sqrt(max(total**2 - error**2, 0.0)) for each, error in part.items()}
+    (top,) = (each for each in part if each.name == TOP)
+    worst = max((each for each in part if each is not top), key=part.__getitem__)
     radius = float(np.max(budget.total.radius[-1]))
-    sentences = [
-        f"At a tilt of {tilt} the foot is wrong by {_mm(total)} horizontally and {_mm(up)} in "
-        f"height (rms); horizontally it is wrong by less than {_mm(radius)} in 95 of 100 cases."
+    inside = {each: error for each, error in part.items() if each.sensor and error > 0}
+    tilt = float(budget.tilts[-1])
+    return [
+        *lines(TEMPLATE, "limits", tilt, total, height, radius, part, rest, top, worst),
+        *lines(TEMPLATE, "sensor", math.hypot(*inside.values()), inside),
     ]
-    part = {each.name: float(budget.horizontal(each.name)[-1]) for each in sources()}
-    rest = np.sqrt(max(total**2 - part[TOP] ** 2, 0.0))
-    worst = max((each for each in sources() if each.name != TOP), key=lambda each: part[each.name])
-    if part[TOP] > part[worst.name]:
-        top = next(each for each in sources() if each.name == TOP)
-        sentences.append(f"The {top.title} limits it: {_mm(part[TOP])}. {top.remedy}")
-        sentences.append(
-            f"All other sources together contribute {_mm(rest)}, most of it the {worst.title}: "
-            f"{_mm(part[worst.name])}. {worst.remedy}"
-        )
-    elif part[worst.name] > 0:
-        without = np.sqrt(max(total**2 - part[worst.name] ** 2, 0.0))
-        sentences.append(
-            f"The {worst.title} limits it: {_mm(part[worst.name])}; without it {_mm(without)} of "
-            f"{_mm(total)} would be left. {worst.remedy}"
-        )
-    inside = [each for each in sources() if each.sensor and part[each.name] > 0]
-    whole = float(np.sqrt(sum(part[each.name] ** 2 for each in inside)))
-    named = comma_list([f"{each.title} {_mm(part[each.name])}" for each in inside])
-    sentences.append(f"The tilt sensor contributes {_mm(whole)}: {named or 'nothing is counted'}.")
-    return sentences
 
 
 def remarks(budget: Budget) -> list[str]:
@@ -89,43 +76,19 @@ def remarks(budget: Budget) -> list[str]:
     )
     if setup.temperature_change:
         wanted |= {f"{name}_per_kelvin" for name in COEFFICIENTS if name not in sensor.corrected}
-    sentences = []
-    if missing := [words(name) for name in sensor.sheet.unknown if name in wanted]:
-        sentences.append(
-            f"The data sheet {sensor.sheet.name!r} lacks {comma_list(missing, 'and')}: counted as "
-            "zero."
-        )
-    if setup.temperature_change and sensor.corrected:
-        what = comma_list([f"the {name}" for name in sensor.corrected])
-        sentences.append(
-            f"The calibration corrects the change of {what} with temperature; it is not counted."
-        )
-    return sentences
+    missing = [name for name in sensor.sheet.unknown if name in wanted]
+    corrected = sensor.corrected if setup.temperature_change else ()
+    return lines(TEMPLATE, "remarks", sensor.sheet, missing, corrected)
 
 
 def agreement(simulated: pd.DataFrame) -> str:
     """Say whether the Monte Carlo agrees with linear theory."""
-    worst, where = 0.0, simulated.iloc[-1]
-    for _, row in simulated.iterrows():
-        for part in ("horizontal", "vertical"):
-            error = row[f"standard_error_{part}_m"]
-            apart = abs(row[f"simulated_{part}_m"] - row[f"linear_{part}_m"])
-            if error > 0 and apart / error > worst:
-                worst, where = apart / error, row
-    last = simulated.iloc[-1]
-    rms = estimate(last["simulated_horizontal_m"], last["standard_error_horizontal_m"], "m")
-    sentence = (
-        f"Monte Carlo with the exact geometry, {int(last['replicates'])} readings: "
-        f"{' ± '.join(rms)} "
-        f"mm horizontally; {100 * last['inside_95']:.1f} % lie within the circles of 95 %."
-    )
-    if worst > BEYOND_CHANCE:
-        tilt = quantity_text(float(where["tilt_gon"]) * GON, "rad")
-        sentence += (
-            f" At {tilt} it differs from linear theory by more than chance: trust the Monte Carlo."
-        )
-    return sentence
-
-
-def _mm(metres: float) -> str:
-    return f"{1e3 * metres:.2g} mm" if metres < 1e-3 else f"{1e3 * metres:.1f} mm"
+    chances = [
+        (abs(row[f"simulated_{part}_m"] - row[f"linear_{part}_m"]) / error, row["tilt_gon"] * GON)
+        for row in simulated.to_dict("records")
+        for part in ("horizontal", "vertical")
+        if (error := row[f"standard_error_{part}_m"]) > 0
+    ]
+    ratio, tilt = max(chances, key=lambda chance: chance[0], default=(0.0, 0.0))
+    last = simulated.iloc[-1].to_dict()
+    return lines(TEMPLATE, "agreement", last, tilt if ratio > BEYOND_CHANCE else None)[0]
