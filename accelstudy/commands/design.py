@@ -253,7 +253,7 @@ def summary(proposal: Proposal) -> list[str]:
         to_attitude,
         to_display,
     )
-    from accelstudy.basics.wording import number
+    from accelstudy.basics.wording import amount
     from accelstudy.proposal.proposal import REFERENCE
     from accelstudy.schemes import get_scheme
 
@@ -287,7 +287,7 @@ def summary(proposal: Proposal) -> list[str]:
         there = proposal.nameable(get_scheme(REFERENCE).directions)
         lines.append("Size from which a parameter is found, and told from the other effect:")
         for name, (size, of) in sizes.items():
-            here, other = (number(float(to_display(s, of))) for s in (size, there[name][0]))
+            here, other = (amount(s, of) for s in (size, there[name][0]))
             lines.append(f"  {name}: {here} {display_unit(of)} ({REFERENCE}: {other})")
     share = 100 * proposal.design.efficiency
     if share == share:

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from accelstudy.adjustment.quality import noncentrality, solve
 from accelstudy.approaches import Approach
 from accelstudy.basics.shares import sigmas_95
-from accelstudy.basics.units import display_unit, to_display
-from accelstudy.basics.wording import number
+from accelstudy.basics.units import display_unit
+from accelstudy.basics.wording import amount
 from accelstudy.campaign.calibration.fit import fit_campaign, usual_approach
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.space.examined import ExaminedFit, Frame, examine
@@ -216,7 +216,7 @@ def visibility_table(examined: ExaminedFit) -> pd.DataFrame:
     for row in visibilities(examined):
 
         def shown(size: float, unit: str = row.unit, seen: bool = row.status == "visible") -> str:
-            return number(float(to_display(size, unit))) if seen else "–"
+            return amount(size, unit) if seen else "–"
 
         worst = _settings(row.hardest)
         rows.append(

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.basics.units import STANDARD_GRAVITY, display_unit, to_display
-from accelstudy.basics.wording import number
+from accelstudy.basics.units import STANDARD_GRAVITY, display_unit
+from accelstudy.basics.wording import amount
 from accelstudy.effects import Effect, get_effect
 
 Array = NDArray[np.float64]
@@ -74,7 +74,7 @@ def implausible_parameters(effects: Sequence[Effect], parameters: Array, sigma: 
         for parameter in effect.parameters:
             value, uncertain = next(values)
             if not abs(value) <= bound + uncertain:
-                shown, most = (number(float(to_display(v, parameter.unit))) for v in (value, bound))
+                shown, most = (amount(float(v), parameter.unit) for v in (value, bound))
                 unit = display_unit(parameter.unit)
                 descriptions.append(
                     f"{parameter.name} = {shown} {unit} (up to ± {most} is believed)"
@@ -86,8 +86,8 @@ def implausible_tilt(roll: float, pitch: float) -> list[str]:
     """Describe a tilt error, rad, that makes a calibration useless; empty for any other."""
     if not np.fmax(roll, pitch) > largest_tilt():
         return []
-    worst, most = to_display([np.fmax(roll, pitch), largest_tilt()], "rad")
+    worst, most = (amount(error, "rad") for error in (np.fmax(roll, pitch), largest_tilt()))
     return [
-        f"a tilt error of {number(float(worst))} {display_unit('rad')} is left, where a cheap "
-        f"sensor without any calibration has {number(float(most))}"
+        f"a tilt error of {worst} {display_unit('rad')} is left, where a cheap "
+        f"sensor without any calibration has {most}"
     ]

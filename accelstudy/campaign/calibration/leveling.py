@@ -302,8 +302,7 @@ class Account:
         values = dict(zip(model.parameter_names, self._calibration.parameters, strict=True))
         (effect,) = (effect for effect in model.effects if effect.name == name)
         return ", ".join(
-            f"{p.name} = {float(to_display(values[p.name], p.unit)):.3g} {display_unit(p.unit)}"
-            for p in effect.parameters
+            f"{p.name} = {quantity_text(float(values[p.name]), p.unit)}" for p in effect.parameters
         )
 
     def _unusable(self, table: pa.Table, row: int) -> str | None:

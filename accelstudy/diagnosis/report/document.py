@@ -14,6 +14,7 @@ from accelstudy.adjustment import calibrate
 from accelstudy.adjustment.quality import Solution, position_tests
 from accelstudy.basics.names import LONGEST
 from accelstudy.basics.units import GON, MGON
+from accelstudy.basics.wording import amount
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.document import (
     calibration_document,
@@ -244,7 +245,7 @@ def diagnosed_calibration(diagnosis: Diagnosis) -> dict[str, Any]:
     if weights.ndim:
         sigmas = np.sqrt(fit.variance_factor) * weights[0]
         content["sigma_position_axes_mps2"] = sigmas.tolist()
-        x, y, z = (f"{1e3 * sigma:.3g}" for sigma in sigmas)
+        x, y, z = (amount(sigma, "m/s^2") for sigma in sigmas)
         warnings.append(
             f"The axes are weighted by their noise, {x}, {y} and {z} mm/s² in x, y and z; "
             "`accelstudy calibrate` takes them as equal, and differs by that."
