@@ -36,7 +36,7 @@ from accelstudy.plan.search.theory import theory_of
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise
-from accelstudy.study.cells.of_study import study_cells
+from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study, read_study
 from accelstudy.study.monte_carlo.simulate import blocks
 

@@ -19,7 +19,7 @@ from accelstudy.study.explorer.content import plain
 from accelstudy.study.explorer.links import figures_of
 from accelstudy.study.explorer.page import explorer_page, write_explorer
 from accelstudy.study.figures import figure_names
-from accelstudy.study.results.estimates import TABLES
+from accelstudy.study.tables import TABLES
 
 CROSS = f"{NINE}-crossaxis"
 KEYS = {

@@ -11,15 +11,15 @@ from accelstudy.study.figures import (
     figure_tables,
     get_figure,
 )
-from accelstudy.study.cells.batches import batches
-from accelstudy.study.cells.of_study import study_cells
+from accelstudy.study.batches import batches
+from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study
 from accelstudy.files.layers import read_layer
-from accelstudy.study.monte_carlo.effort import study_effort
+from accelstudy.study.effort import study_effort
 from accelstudy.jobs.job import setup_digest
 from accelstudy.files.provenance import check_writable
 from accelstudy.jobs.code import code_hash
-from accelstudy.study.results.estimates import TABLES
+from accelstudy.study.tables import TABLES
 
 try:
     for path in workflow.configfiles:

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from accelstudy.study.cells.cell import Cell
+from accelstudy.study.cell import Cell
 from accelstudy.study.monte_carlo.distributions import Distribution
 from accelstudy.study.monte_carlo.statistics import Statistics
 
@@ -70,7 +70,7 @@ class Evidence:
         of the effect's parameters, robot-aided over gravity-based; where both have redundancy
     cells : (scheme, approach) -> Cell
     scheme : str, the default scheme
-    correlations : DataFrame, see `accelstudy.study.results.summary`
+    correlations : DataFrame, see `accelstudy.study.summary`
     sensitivity : DataFrame, see `accelstudy.leveling.sensitivity`, with a column `analysis`
     shapley : DataFrame, see `accelstudy.leveling.shares`, with a column `analysis`
     base_samples, resamples, seed : of the sensitivity analysis

@@ -33,7 +33,7 @@ from accelstudy.study.explorer.library import library
 from accelstudy.study.explorer.links import figures_of
 from accelstudy.study.figures import angle_unit, figure_names, get_figure
 from accelstudy.study.figures.factors import FACTORS, NOISES, POSITIONS, Factor, varies
-from accelstudy.study.results.estimates import TABLES
+from accelstudy.study.tables import TABLES
 
 LIMIT = 1_500_000
 """Bytes of the page."""

@@ -97,7 +97,7 @@ def cell_table(study: StudyConfig) -> pd.DataFrame:
     """One row per cell of a study; the robot's noise is NaN where no robot is used."""
     import pandas as pd  # slow, and not needed by studies that vary nothing
 
-    from accelstudy.study.cells.of_study import study_cells
+    from accelstudy.study.cells import study_cells
 
     rows = [
         {

@@ -15,7 +15,7 @@ from accelstudy.basics.shares import sigmas_95
 from accelstudy.basics.units import GON
 from accelstudy.effects import get_effect
 from accelstudy.leveling.error import TiltError, cap_forces, tilt_error
-from accelstudy.study.cells.cell import Cell
+from accelstudy.study.cell import Cell
 from accelstudy.study.monte_carlo.moments import Moments, moments_of
 from accelstudy.study.monte_carlo.sketch import Key, Sketch
 

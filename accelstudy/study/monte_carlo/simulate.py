@@ -18,9 +18,9 @@ from accelstudy.design.estimability import estimability
 from accelstudy.files.tables import parquet_writer
 from accelstudy.leveling.error import TiltError
 from accelstudy.simulation.sessions import BLOCK, session
-from accelstudy.study.cells.batches import Share
-from accelstudy.study.cells.cell import CHUNK, Cell
-from accelstudy.study.cells.compiling import calibrator
+from accelstudy.study.batches import Share
+from accelstudy.study.cell import CHUNK, Cell
+from accelstudy.study.compiling import calibrator
 from accelstudy.study.monte_carlo.followed import CellSketches, Followed, cell_tilt_error
 from accelstudy.study.monte_carlo.moments import MOMENTS, Node, Tree, moments_table
 from accelstudy.study.monte_carlo.sketch import SKETCHES, sketch_table
@@ -92,7 +92,7 @@ def simulate_batch(
 
     Parameters
     ----------
-    spec : mapping with `seed`, `shares` (plain data of `accelstudy.study.cells.batches.Share`)
+    spec : mapping with `seed`, `shares` (plain data of `accelstudy.study.batches.Share`)
         and, for `sketches`, `leveling` (max_tilt_gon and attitudes)
     outputs : paths of `moments`, and of `estimates`, where replicates are kept, or of `sketches`
     provenance : see `accelstudy.files.tables.origin`

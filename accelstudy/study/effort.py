@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from accelstudy.basics.errors import InputError
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import BLOCK
-from accelstudy.study.cells.batches import batches
-from accelstudy.study.cells.cell import Cell
+from accelstudy.study.batches import batches
+from accelstudy.study.cell import Cell
 from accelstudy.study.config import StudyConfig
 from accelstudy.study.monte_carlo.distributions import EXACT
 

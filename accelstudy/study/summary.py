@@ -18,7 +18,7 @@ from accelstudy.design.estimability import Estimability, estimability
 from accelstudy.effects import get_effect
 from accelstudy.files.tables import parquet_writer, write_table
 from accelstudy.leveling.error import TiltError
-from accelstudy.study.cells.cell import Cell
+from accelstudy.study.cell import Cell
 from accelstudy.study.monte_carlo.distributions import Distribution, cell_distributions
 from accelstudy.study.monte_carlo.followed import (
     ANGLES,
@@ -32,7 +32,7 @@ from accelstudy.study.monte_carlo.followed import (
 from accelstudy.study.monte_carlo.moments import MOMENTS, moments_table
 from accelstudy.study.monte_carlo.sketch import RELATIVE_ERROR, SKETCHES, Key, Sketch, sketch_table
 from accelstudy.study.monte_carlo.statistics import Statistics, read_statistics
-from accelstudy.study.results.estimates import TABLES
+from accelstudy.study.tables import TABLES
 
 Array = NDArray[np.float64]
 

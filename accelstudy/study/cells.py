@@ -14,8 +14,8 @@ from accelstudy.schemes import scheme_names
 from accelstudy.schemes.files import held
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise
-from accelstudy.study.cells.cell import Cell
-from accelstudy.study.cells.compiling import with_compiled
+from accelstudy.study.cell import Cell
+from accelstudy.study.compiling import with_compiled
 
 if TYPE_CHECKING:
     from accelstudy.study.config import Grid, StudyConfig
