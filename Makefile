@@ -26,7 +26,7 @@ export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: help env test coverage test-processors test-processors-part test-cluster test-faults smoke reproduce anew unlock report campaigns diagnose-example plan-example hidden-effects hidden-docs optimal-schemes pictures benchmarks docs wheel lint lock clean
+.PHONY: help env test coverage test-processors test-processors-part test-cluster test-faults test-breaks smoke reproduce anew unlock report campaigns diagnose-example plan-example hidden-effects hidden-docs optimal-schemes pictures benchmarks docs wheel lint lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-18s%s\n", $$1, $$2 }' Makefile
@@ -58,6 +58,9 @@ test-cluster: $(READY) ## run the small configuration by a SLURM on this machine
 
 test-faults: $(READY) ## kill jobs and runs, fill a disk, and compare what comes out in the end
 	pytest tests/study/faults.py
+
+test-breaks: $(READY) ## break a copy of the package on purpose, and see that tests notice
+	python tests/helpers/breaking.py
 
 smoke: $(READY) ## run the whole workflow on a small configuration
 	snakemake --cores $(CORES) --configfile config/smoke.yaml

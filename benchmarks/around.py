@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from accelstudy.approaches import get_approach
-from accelstudy.campaign.files.format import write_campaign
+from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.simulated import simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from diagnosis import settings

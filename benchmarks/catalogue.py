@@ -13,11 +13,10 @@ from zlib import crc32
 import numpy as np
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.effects import effect_names, effects_without
-from accelstudy.hidden.physics.case import Case
-from accelstudy.hidden.physics.generate import generate
+from accelstudy.hidden.physics.generate import Case, generate
 from accelstudy.sensors.models import get_model
 
 DESIGNS = ("spread-24", "yaw-50", "two-warm-36")

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from accelstudy.campaign.files.format import write_campaign
+from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.sensors.models import get_model

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from accelstudy.campaign.files.format import write_campaign
-from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.format import write_campaign
+from accelstudy.campaign.session import Campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from processes import ACCELSTUDY, took
 

@@ -39,7 +39,7 @@ def machine():
     name = next((line.split(": ")[1] for line in names if line.startswith("model name")), "")
     used = ("accelstudy", "numpy", "scipy", "llvmlite")
     packages = [f"{each} {version(each)}" for each in used]
-    packages += [f"jax {version('jax')}"] if not WAYS.get("jax").missing() else []
+    packages += [f"{one} {version(one)}" for one in ("jax", "numba") if not WAYS.get(one).missing()]
     load = ", ".join(f"{each:.1f}" for each in os.getloadavg())
     return (
         f"{name or platform.machine()}, {cores_here()} cores, Python {platform.python_version()}, "

@@ -9,10 +9,10 @@ from accelstudy.diagnosis.round_trip import parse_round_trip
 from accelstudy.basics.errors import InputError
 from accelstudy.files.outputs import CAMPAIGN, DIAGNOSIS
 from accelstudy.schemes import is_scheme_file
-from accelstudy.files.layers import read_layer
+from accelstudy.files.reading import read_layer
 from accelstudy.jobs.earlier import earlier_run
 from accelstudy.jobs.job import killed_notice, prepare_jobs
-from accelstudy.files.provenance import check_writable
+from accelstudy.files.outputs import check_writable
 from accelstudy.jobs.code import code_hash
 
 min_version("9.10")

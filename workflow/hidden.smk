@@ -4,13 +4,13 @@ from snakemake.exceptions import WorkflowError
 from snakemake.utils import min_version
 
 from accelstudy.basics.errors import InputError
-from accelstudy.hidden.study.cells import number_of_chunks
-from accelstudy.hidden.study.config import parse_hidden
-from accelstudy.hidden.study.tables import TABLES
-from accelstudy.files.layers import read_layer
+from accelstudy.hidden.cells import number_of_chunks
+from accelstudy.hidden.config import parse_hidden
+from accelstudy.hidden.campaigns import TABLES
+from accelstudy.files.reading import read_layer
 from accelstudy.jobs.earlier import earlier_run
 from accelstudy.jobs.job import killed_notice, prepare_jobs
-from accelstudy.files.provenance import check_writable
+from accelstudy.files.outputs import check_writable
 from accelstudy.jobs.code import code_hash
 
 min_version("9.10")

@@ -59,7 +59,7 @@ class CalibrationEquations:
         return tuple(a - e for a, e in zip(self.angles, errors, strict=True))
 
     @cached_property
-    def told(self) -> sp.Matrix | None:
+    def known_force(self) -> sp.Matrix | None:
         """Force in the body frame by the approach, as a function of readings; None if unknown."""
         force = self.approach.force(self.attitude, self.trace.g, symbolic) if self.angles else None
         return None if force is None else sp.Matrix(force)
@@ -67,14 +67,16 @@ class CalibrationEquations:
     @cached_property
     def sensitive(self) -> TracedFunction:
         """f_a of the force that the approach knows, generated."""
-        assert self.told is not None
-        f_a = inverse(self.trace.t_matrix) * self.told
+        assert self.known_force is not None
+        f_a = inverse(self.trace.t_matrix) * self.known_force
         return TracedFunction((*self.trace.arguments, *self.angles), f_a)
 
     @cached_property
     def linear(self) -> TracedFunction:
         """[ψ | A | B] as a function of f_a, f_s, x and the robot's readings, generated."""
-        expressions = self._in_body() if self.told is None else self._in_output(self.told)
+        expressions = (
+            self._in_body() if self.known_force is None else self._in_output(self.known_force)
+        )
         return TracedFunction((*self.trace.arguments, *self.angles), expressions)
 
     def _in_body(self) -> sp.Matrix:
@@ -89,13 +91,13 @@ class CalibrationEquations:
         at = dict(zip(force, trace.t_matrix * sp.Matrix(trace.force), strict=True))
         return sp.Matrix.hstack(psi, a, b).xreplace(at)
 
-    def _in_output(self, told: sp.Matrix) -> sp.Matrix:
+    def _in_output(self, known_force: sp.Matrix) -> sp.Matrix:
         trace, h = self.trace, sp.Matrix(self.trace.h)
         by_force = derivative(h, trace.force) * inverse(trace.t_matrix)
         turned = derivative(trace.t_matrix * sp.Matrix(trace.force), self.parameters)
-        by_told = by_force * (derivative(told, self.parameters) - turned)
-        a = -(derivative(h, self.parameters) + by_told)
-        b = sp.Matrix.hstack(sp.eye(3), -by_force * derivative(told, self.angles))
+        by_known = by_force * (derivative(known_force, self.parameters) - turned)
+        a = -(derivative(h, self.parameters) + by_known)
+        b = sp.Matrix.hstack(sp.eye(3), -by_force * derivative(known_force, self.angles))
         return sp.Matrix.hstack(sp.Matrix(trace.output) - h, a, b)
 
     def at(
@@ -121,12 +123,12 @@ class CalibrationConditions:
         if eq.estimates_gravity:
             x, g = parameters[:-1], parameters[-1]
         forces, angles = adjusted[:3], adjusted[3:]
-        known = (x, self.settings, g, self.hold)
-        if eq.told is not None:
-            f_a = trace.evaluate(eq.sensitive, forces, forces, *known, *angles)[:, 0]
+        arguments = (x, self.settings, g, self.hold)
+        if eq.known_force is not None:
+            f_a = trace.evaluate(eq.sensitive, forces, forces, *arguments, *angles)[:, 0]
         else:
-            f_a = latent + trace.evaluate(trace.newton_step, latent, forces, *known)[:, 0]
-        values = trace.evaluate(eq.linear, f_a, forces, *known, *angles)
+            f_a = latent + trace.evaluate(trace.newton_step, latent, forces, *arguments)[:, 0]
+        values = trace.evaluate(eq.linear, f_a, forces, *arguments, *angles)
         u = len(parameters)
         return Linearisation(values[:, 0], values[:, 1 : 1 + u], values[:, 1 + u :], f_a)
 

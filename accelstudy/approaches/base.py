@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar
 
 from accelstudy.basics.registry import Registry
 from accelstudy.effects.components import Number, Vector
@@ -32,20 +32,13 @@ class Approach:
         self, f: Vector, angles: tuple[Number, Number], g: Number, xp: Any
     ) -> tuple[Number, ...]:
         """Return ψ for the specific force `f` in the body frame; zero when all is consistent."""
-        told = self.force(angles, g, xp)
-        if told is None:
+        force = self.force(angles, g, xp)
+        if force is None:
             raise NotImplementedError
-        return tuple(a - b for a, b in zip(f, told, strict=True))
+        return tuple(a - b for a, b in zip(f, force, strict=True))
 
 
 _registry: Registry[Approach] = Registry("approach")
-ApproachClass = TypeVar("ApproachClass", bound=type[Approach])
-
 get_approach = _registry.get
 approach_names = _registry.names
-
-
-def register(approach: ApproachClass) -> ApproachClass:
-    """Class decorator: enter an approach into the registry under its name."""
-    _registry.add(approach.name, approach())
-    return approach
+register = _registry.register

@@ -70,9 +70,9 @@ def warn(text: str) -> None:
 def failure(what: str, error: Exception) -> str:
     """Say what failed and by which error, and warn of it on stderr."""
     reason = " ".join(str(error).split())[:200]
-    said = f"{what} ({type(error).__name__}: {reason})."
-    warn(said)
-    return said
+    text = f"{what} ({type(error).__name__}: {reason})."
+    warn(text)
+    return text
 
 
 @contextmanager

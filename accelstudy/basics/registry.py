@@ -9,11 +9,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from pkgutil import iter_modules
-from typing import ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 
 Item = TypeVar("Item")
+Kind = TypeVar("Kind", bound=type[Any])
 
 
 class Registry(Generic[Item]):
@@ -39,6 +40,11 @@ class Registry(Generic[Item]):
         """Register an item; raise `ValueError` if its name is taken."""
         self.check_free(name)
         self._items[name] = item
+
+    def register(self, kind: Kind) -> Kind:
+        """Class decorator: enter one object of a class into the registry under its name."""
+        self.add(kind.name, kind())
+        return kind
 
     def get(self, name: str) -> Item:
         """Return the item of that name; raise `UnknownNameError` if there is none."""
@@ -104,11 +110,11 @@ class WithSettings:
     takes: ClassVar[tuple[Setting, ...]] = ()
 
     def __init__(self, **settings: float) -> None:
-        known = {setting.name: setting for setting in self.takes}
+        takes = {setting.name: setting for setting in self.takes}
         for name, value in settings.items():
-            if name not in known:
-                raise UnknownNameError(f"setting of the {self.kind} {self.name!r}", name, known)
-            above, below, none = known[name].above, known[name].below, known[name].none
+            if name not in takes:
+                raise UnknownNameError(f"setting of the {self.kind} {self.name!r}", name, takes)
+            above, below, none = takes[name].above, takes[name].below, takes[name].none
             if value != none and not above < value < below:
                 bounds = [f"above {above:g}"] if above > -math.inf else []
                 bounds += [f"below {below:g}"] if below < math.inf else []

@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from accelstudy.basics.errors import InputError, UnknownNameError, shown
@@ -165,6 +166,11 @@ def unit_label(unit: str) -> str:
     return unit.replace("^2", "²").replace("ug", "µg")
 
 
+def shown_unit(unit: str) -> str:
+    """Return `display_unit` as it is printed."""
+    return unit_label(display_unit(unit))
+
+
 def to_display(value: ArrayLike, unit: str) -> NDArray[np.float64]:
     """Convert `value` from the SI `unit` into the unit shown to people."""
     return _converted(value, unit, display_unit(unit))
@@ -186,13 +192,6 @@ def to_si(value: ArrayLike, given: str, unit: str) -> NDArray[np.float64]:
     if given not in known:
         raise UnknownNameError(f"unit of a quantity in {unit}", given, known)
     return _numbers(value) * known[given]
-
-
-def quantity_text(value: float, unit: str) -> str:
-    """Write a quantity of the SI `unit` for people, with its unit: ``10 mgon``, ``30 gon``."""
-    if unit == "rad" and abs(to_attitude(value)) >= 1:
-        return f"{float(to_attitude(value)):.4g} {attitude_unit()}"
-    return f"{float(to_display(value, unit)):.4g} {display_unit(unit)}".removesuffix(" 1")
 
 
 _SPELLINGS = {"µ": "u", "μ": "u", "²": "^2", "°C": "degC", "°": "deg", "√Hz": "sqrt(Hz)"}
@@ -234,6 +233,36 @@ def parse_quantity(text: str, unit: str, least: float = -math.inf, most: float =
         ends += [f"at most {most / known[given]:.6g}"] if most < math.inf else []
         raise InputError(f"{shown(text)}: must be {' and '.join(ends)} {given}")
     return value
+
+
+@dataclass(frozen=True)
+class Given:
+    """A quantity that the user may give, by an option of a command or a key of a configuration.
+
+    Attributes
+    ----------
+    unit : str, SI
+    usual : str, with its unit; empty if there is none
+    help : str
+    least, most : float, SI, both allowed
+    section : str, of the help text
+    """
+
+    unit: str
+    usual: str
+    help: str
+    least: float = 0.0
+    most: float = math.inf
+    section: str = ""
+
+    def read(self, text: str) -> float:
+        """Value of a text with its unit, SI; raises `InputError` if it is not one."""
+        return parse_quantity(text, self.unit, self.least, self.most)
+
+    @property
+    def value(self) -> float:
+        """Usual value, SI."""
+        return self.read(self.usual)
 
 
 def _numbers(value: ArrayLike) -> NDArray[np.float64]:

@@ -1,11 +1,23 @@
-"""How all messages and pages write words and numbers."""
+"""How all messages and pages write words, numbers and quantities: each rule stands once, here.
+
+A number has three significant digits, what has a sigma has two digits of it, and a round quantity
+is written as it was given.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 
+from accelstudy.basics.units import attitude_unit, display_unit, to_attitude, to_display
+
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+DIGITS = 3
+"""Significant digits of a number."""
+GIVEN = 4
+"""Significant digits up to which a quantity is round: given rather than computed."""
+HUGE = 9
+"""Exponent from which a number is written with a power of ten."""
 
 
 def words(name: str) -> str:
@@ -27,8 +39,7 @@ def probability(value: float | None) -> str:
     if value < 1e-12:
         return "< 10⁻¹²"
     if value < 9.5e-4:
-        digits, exponent = f"{value:.1e}".split("e")
-        return f"{digits} · 10{str(int(exponent)).translate(SUPERSCRIPT)}"
+        return _rounded(value, 2)[0]
     if value > 0.9995:
         return "> 0.999"
     return f"{value:.2g}" if value < 0.995 else f"{value:.3g}"
@@ -41,15 +52,57 @@ def p_value(value: float | None) -> str:
 
 
 def number(value: float) -> str:
-    """Show a number with three significant digits; a dash where there is none."""
+    """Show a number with three significant digits; a dash where there is none.
+
+    Digits before the point are not rounded away, as counts have them, too; a number with a sigma is
+    for `estimate`.
+    """
     if math.isnan(value):
         return "–"
     if math.isinf(value):
         return "∞" if value > 0 else "−∞"
     if value == 0:
         return "0"
-    digits = max(0, 2 - math.floor(math.log10(abs(value))))
-    return f"{value:.{digits}f}".replace("-", "−")
+    text, exponent = _rounded(value, DIGITS)
+    if exponent < HUGE:
+        text = f"{value:.{max(0, DIGITS - 1 - exponent)}f}"
+    return text.replace("-", "−")
+
+
+def amount(value: float, unit: str) -> str:
+    """Show an SI value in the unit that people use, without the unit; angles are small ones."""
+    return number(float(to_display(value, unit)))
+
+
+def quantity_text(value: float, unit: str) -> str:
+    """Show an SI value with the unit that people use.
+
+    Angles from 1 gon on are attitudes. A round quantity was given, and no zeros are added: 30 gon,
+    but 30.0 gon if it is 30.04.
+    """
+    shown, of = float(to_display(value, unit)), display_unit(unit)
+    if unit == "rad" and abs(to_attitude(value)) >= 1:
+        shown, of = float(to_attitude(value)), attitude_unit()
+    given = f"{shown:.{GIVEN}g}"
+    is_round = "e" not in given and math.isclose(float(given), shown, rel_tol=1e-9)
+    text = given.replace("-", "−") if is_round else number(shown)
+    return f"{text} {of}".removesuffix(" 1")
+
+
+def estimate(value: float, sigma: float, unit: str) -> tuple[str, str]:
+    """Show an SI value and its sigma in the unit that people use, to two digits of the sigma."""
+    both = [float(to_display(v, unit)) for v in (value, sigma)]
+    digits = 1 - _rounded(both[1], 2)[1] if both[1] > 0 else 6
+    if digits < 0:
+        both, digits = [round(v, digits) for v in both], 0
+    value_text, sigma_text = (f"{v:.{digits}f}".replace("-", "−") for v in both)
+    return value_text, sigma_text
+
+
+def _rounded(value: float, digits: int) -> tuple[str, int]:
+    """Write a number with a power of ten, and return its exponent, too, after rounding."""
+    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+    return f"{mantissa} · 10{str(int(exponent)).translate(SUPERSCRIPT)}", int(exponent)
 
 
 def interval(low: float, high: float) -> str:

@@ -17,8 +17,8 @@ from accelstudy.basics import bounds
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.registry import WithSettings
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY
-from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.gross_errors import GrossError, get_gross_error
+from accelstudy.campaign.session import Campaign
 from accelstudy.effects import Effect, get_effect
 from accelstudy.files.outputs import whole_file
 from accelstudy.noise_effects import NoiseEffect, get_noise_effect

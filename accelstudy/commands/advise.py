@@ -22,7 +22,7 @@ from accelstudy.commands.options import (
 )
 
 if TYPE_CHECKING:
-    from accelstudy.campaign.files.session import Campaign
+    from accelstudy.campaign.session import Campaign
     from accelstudy.sequential.information import Prior
 
 POLL = 1.0
@@ -101,12 +101,13 @@ def advise_command(
     about half of single ones leave more in roll or in pitch.
     """
     from accelstudy.approaches import get_approach
+    from accelstudy.basics.suggested import calibrate
     from accelstudy.sensors.models import get_model
     from accelstudy.sequential.advisor import Advisor
     from accelstudy.sequential.choice import DEFAULTS, candidates
     from accelstudy.sequential.promise import Promise
     from accelstudy.sequential.running import Watch, read_as_it_is
-    from accelstudy.sequential.wording import finished, heading, lines
+    from accelstudy.sequential.wording import heading, lines
 
     session, promise = Watch(campaign), Promise(tilt_accuracy, tilt_range)
     if watch:
@@ -131,7 +132,7 @@ def advise_command(
         for line in lines(advice, now, sensor, promise):
             show(f"  {line}")
         if advice.enough:
-            show(f"  {finished(campaign, model, name)}")
+            show(f"  calibrate: {calibrate(campaign, model, name)}")
 
     for warning in now.warnings:
         warn(warning)
@@ -161,7 +162,7 @@ def _prior(path: Path | None, model: str) -> tuple[Prior, ...]:
     import numpy as np
 
     from accelstudy.basics.errors import InputError
-    from accelstudy.campaign.use.applying import read_calibration
+    from accelstudy.campaign.calibration.applying import read_calibration
     from accelstudy.sensors.models import get_model
     from accelstudy.sequential.information import Prior
 

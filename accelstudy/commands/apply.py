@@ -62,9 +62,9 @@ def apply_command(
     known in its session only; later rows are corrected by what it was at the end. Hysteresis and
     settling depend on the position before, which a log does not tell; they are not corrected.
     """
-    from accelstudy.campaign.use.applying import read_calibration
-    from accelstudy.campaign.use.leveling import level_log
-    from accelstudy.commands.import_options import parse_columns
+    from accelstudy.campaign.calibration.applying import read_calibration
+    from accelstudy.campaign.calibration.leveling import level_log
+    from accelstudy.commands.importing import parse_columns
     from accelstudy.files.outputs import new_file
 
     layout = {

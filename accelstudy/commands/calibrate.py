@@ -38,7 +38,7 @@ def calibrate_command(campaign: Path, model: str, approach: str, out: Path, forc
     from accelstudy.campaign.calibration.fit import fit_campaign
     from accelstudy.campaign.calibration.output import write_calibration
     from accelstudy.campaign.calibration.wording import interval_words, next_steps
-    from accelstudy.campaign.files.format import read_campaign
+    from accelstudy.campaign.format import read_campaign
     from accelstudy.files.outputs import CALIBRATION, result_folder
     from accelstudy.sensors.frames import axes_note
     from accelstudy.sensors.models import get_model
@@ -52,8 +52,9 @@ def calibrate_command(campaign: Path, model: str, approach: str, out: Path, forc
         warn(warning)
     for entry in content["parameters"]:
         unit = entry["unit"]
-        known = entry["sigma"] is not None
-        sigma = f"{to_display(entry['sigma'], unit):.4f}" if known else "unknown"
+        sigma = (
+            f"{to_display(entry['sigma'], unit):.4f}" if entry["sigma"] is not None else "unknown"
+        )
         value = f"{to_display(entry['value'], unit):12.4f}"
         say(f"{entry['name']:>9} = {value} ± {sigma} {display_unit(unit)}")
     if content["sigmas_95"] is not None:

@@ -46,7 +46,7 @@ def check_sigmas_command(
     from accelstudy.approaches import get_approach
     from accelstudy.campaign.calibration.fit import fit_campaign
     from accelstudy.campaign.calibration.sigma_check import check_sigmas, what_it_finds
-    from accelstudy.campaign.files.format import read_campaign
+    from accelstudy.campaign.format import read_campaign
     from accelstudy.sensors.models import get_model
 
     fit = fit_campaign(read_campaign(campaign), get_model(model), get_approach(approach))

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from accelstudy.basics.progress import say, stage
-from accelstudy.commands.options import PATH, example, force_option, quiet_option
+from accelstudy.commands.options import PATH, example, force_option, log_options, quiet_option
 
 UNUSED = ("offset", "full_range", "gravity", "threshold", "robot_sigma", "robot_unit")
 """Options of an import that a data sheet does without; a file of settings may have them."""
@@ -22,12 +22,7 @@ UNUSED = ("offset", "full_range", "gravity", "threshold", "robot_sigma", "robot_
 )
 @click.argument("source", type=PATH)
 @click.option("--out", type=PATH, required=True, help="YAML file to write.")
-@click.option("--columns", help="Columns by name, or by number from 0: fx=1,fy=2,fz=3.")
-@click.option("--time", help="Column of the time, by name or number.")
-@click.option("--time-unit", help="Unit of the time: s, ms, us or ns.  [default: s]")
-@click.option("--rate", type=float, help="Samples per second, where there is no time.")
-@click.option("--unit", help="Unit of the readings: m/s^2, g or counts.  [default: m/s^2]")
-@click.option("--scale", help="For counts: m/s² per count, one number or three.")
+@log_options
 @click.option(
     "--settings",
     "settings_path",
@@ -46,7 +41,7 @@ def data_sheet_command(
     campaign only the noise of its positions is known. What the maker says can be added to the file,
     which `accelstudy plan --sensor` and `accelstudy pole` take.
     """
-    from accelstudy.commands.import_options import settings_of
+    from accelstudy.commands.importing import settings_of
     from accelstudy.data_sheets.measured import sheet_of_campaign, sheet_of_log, yaml_of
     from accelstudy.files.outputs import new_file
 

@@ -178,8 +178,7 @@ def design_command(
     """
     from accelstudy.basics import bounds
     from accelstudy.files.outputs import new_file
-    from accelstudy.proposal.design_file import write_design
-    from accelstudy.proposal.proposal import Proposal
+    from accelstudy.proposal.proposal import Proposal, write_design
     from accelstudy.proposal.request import Request
     from accelstudy.schemes import is_scheme_file
     from accelstudy.simulation.sessions import Noise
@@ -228,7 +227,7 @@ def table(proposal: Proposal) -> str:
     import pandas as pd
 
     from accelstudy.basics.units import attitude_unit, to_attitude
-    from accelstudy.design.optimal.spaces import attitudes
+    from accelstudy.design.spaces import attitudes
 
     unit = attitude_unit()
     roll, pitch = to_attitude(attitudes(proposal.directions)).T

@@ -48,7 +48,7 @@ def effects_command(
     if campaign is not None and scheme is not None:
         raise InputError("effects: --campaign and --scheme exclude each other; give one of them")
     from accelstudy.approaches import get_approach
-    from accelstudy.campaign.files.format import read_campaign
+    from accelstudy.campaign.format import read_campaign
     from accelstudy.diagnosis.worth import visibility
     from accelstudy.schemes import get_scheme
     from accelstudy.sensors.models import get_model

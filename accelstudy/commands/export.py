@@ -24,8 +24,8 @@ def export_command(calibration: Path, form: str) -> None:
     bias, scale and non-orthogonality. They carry no effect of time, temperature, vibration or the
     position before.
     """
-    from accelstudy.campaign.use.applying import read_calibration
-    from accelstudy.campaign.use.export import export
+    from accelstudy.campaign.calibration.applying import read_calibration
+    from accelstudy.campaign.calibration.export import export
 
     content = read_calibration(calibration).content
     text = export(content, form)

@@ -98,7 +98,7 @@ class Commands(click.Group):
             return super().invoke(ctx)
 
 
-@click.group(cls=Commands, commands=[each for its in SECTIONS.values() for each in its])
+@click.group(cls=Commands, commands=[each for commands in SECTIONS.values() for each in commands])
 @click.version_option(package_name="accelstudy")
 @click.option(
     "--angle-unit",

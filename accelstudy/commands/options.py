@@ -14,7 +14,7 @@ from click.shell_completion import CompletionItem
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import feedback
-from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, angles_in, parse_quantity
+from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, Given, angles_in, parse_quantity
 
 PATH = click.Path(path_type=Path)
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -41,8 +41,8 @@ class Name(click.ParamType):  # type: ignore[type-arg]  # generic from click 8.5
     ) -> list[CompletionItem]:
         """Names that begin with what was typed."""
         names = getattr(import_module(self.module), self.names)
-        known = names() if callable(names) else names
-        return [CompletionItem(name) for name in known if name.startswith(incomplete)]
+        choices = names() if callable(names) else names
+        return [CompletionItem(name) for name in choices if name.startswith(incomplete)]
 
 
 class ModelName(Name):
@@ -53,10 +53,10 @@ class ModelName(Name):
     ) -> list[CompletionItem]:
         """Models and, after a +, effects; files if no name begins with what was typed."""
         before, plus, last = incomplete.rpartition("+")
-        found = super().shell_complete(ctx, param, last)
+        completions = super().shell_complete(ctx, param, last)
         if plus:
-            found += EFFECT.shell_complete(ctx, param, last)
-        items = [CompletionItem(f"{before}{plus}{item.value}") for item in found]
+            completions += EFFECT.shell_complete(ctx, param, last)
+        items = [CompletionItem(f"{before}{plus}{item.value}") for item in completions]
         return items or [CompletionItem(incomplete, type="file")]
 
 
@@ -86,6 +86,21 @@ class Quantity(click.ParamType):  # type: ignore[type-arg]
             raise InputError(f"{param.opts[0]}: {error}" if param else str(error)) from None
 
 
+def quantity_option(
+    name: str, given: Given, *names: str, **options: Any
+) -> Callable[[Command], Command]:
+    """Add the option of a quantity; further names and options are those of `click.option`."""
+    if given.usual:
+        options |= {"default": given.usual, "show_default": True}
+    return click.option(
+        f"--{name.replace('_', '-')}",
+        *names,
+        type=Quantity(given.unit, given.least, given.most),
+        help=given.help,
+        **options,
+    )
+
+
 class SchemeName(Name):
     """A scheme: a name, or a file, of which the shell completes paths if no name fits."""
 
@@ -93,8 +108,8 @@ class SchemeName(Name):
         self, ctx: click.Context, param: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
         """Schemes, or files if no name begins with what was typed."""
-        found = super().shell_complete(ctx, param, incomplete)
-        return found or [CompletionItem(incomplete, type="file")]
+        completions = super().shell_complete(ctx, param, incomplete)
+        return completions or [CompletionItem(incomplete, type="file")]
 
 
 ANGLE_UNIT = Name("angle_unit", "accelstudy.basics.units", "ANGLE_UNITS")
@@ -165,6 +180,21 @@ def quiet_option(command: Command) -> Command:
             return command(*args, **kwargs)
 
     return within  # type: ignore[return-value]
+
+
+def log_options(command: Command) -> Command:
+    """Add the options that say how the numbers of a log are read, in the order of the help."""
+    for name, help_text in {
+        "--scale": "For counts: m/s² per count, one number or three.",
+        "--unit": "Unit of the readings: m/s^2, g or counts.  [default: m/s^2]",
+        "--rate": "Samples per second, where there is no time.",
+        "--time-unit": "Unit of the time: s, ms, us or ns.  [default: s]",
+        "--time": "Column of the time, by name or number.",
+        "--columns": "Columns by name, or by number from 0: fx=1,fy=2,fz=3.",
+    }.items():
+        of_type = float if name == "--rate" else str
+        command = click.option(name, type=of_type, help=help_text)(command)
+    return command
 
 
 seed_option = click.option(

@@ -10,23 +10,20 @@ import click
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import begin, say
-from accelstudy.basics.units import GON, MGON
 from accelstudy.commands.options import (
     PATH,
     SCHEME,
     Name,
-    Quantity,
     Sectioned,
     angle_unit_option,
     example,
     force_option,
+    quantity_option,
     quiet_option,
     seed_option,
 )
+from accelstudy.plan.quantities import QUANTITIES
 
-TARGET = Quantity("rad", least=1e-4 * MGON, most=100 * GON)
-RANGE = Quantity("rad", least=0.1 * GON, most=90 * GON)
-SECONDS = Quantity("s", least=0.01, most=86400.0)
 NOT_REACHED = 1
 """Exit status where no calibration reaches the target."""
 
@@ -80,30 +77,15 @@ _SECTIONS = {
     sections=_SECTIONS,
     epilog=example("accelstudy plan --tilt-accuracy 10mgon --tilt-range 30gon --sigma 2mm/s2"),
 )
-@click.option(
-    "--tilt-accuracy",
-    type=TARGET,
-    required=True,
-    help="Accuracy wanted of roll and of pitch, as 10mgon or 0.01deg.",
-)
-@click.option(
-    "--tilt-range",
-    type=RANGE,
-    default="30gon",
-    show_default=True,
-    help="Largest tilt at which the sensor is used.",
-)
+@quantity_option("tilt_accuracy", QUANTITIES["tilt_accuracy"], required=True)
+@quantity_option("tilt_range", QUANTITIES["tilt_range"])
 @click.option(
     "--sensor",
     type=Name("sensor", "accelstudy.data_sheets", "data_sheet_names"),
     help="A data sheet that comes with accelstudy, a YAML file like it, or the folder of a "
     "campaign.",
 )
-@click.option(
-    "--sigma",
-    type=Quantity("m/s^2", least=1e-9, most=10.0),
-    help="Noise of the mean of a position, as 2mm/s2, if no more is known of the sensor.",
-)
+@quantity_option("sigma", QUANTITIES["sigma"])
 @click.option(
     "--equipment",
     type=click.Choice(["gravity", "robot", "both"]),
@@ -118,14 +100,7 @@ _SECTIONS = {
     show_default=True,
     help="What must reach the accuracy: the rms, or both angles in so many calibrations, as 95%.",
 )
-@click.option(
-    "--hold",
-    "holds",
-    type=SECONDS,
-    multiple=True,
-    help="Duration of a position, as 10s; may be repeated.  [default: 1 s to 120 s; 10 s for "
-    "--sigma]",
-)
+@quantity_option("hold", QUANTITIES["hold"], "holds", multiple=True)
 @click.option(
     "--scheme",
     "schemes",
@@ -133,7 +108,7 @@ _SECTIONS = {
     multiple=True,
     help="One more to compare: a name, or a file of `accelstudy design`; may be repeated.",
 )
-@click.option("--max-time", type=SECONDS, help="Longest time in the field, as 20min.")
+@quantity_option("max_time", QUANTITIES["max_time"])
 @click.option(
     "--max-positions",
     type=click.IntRange(4, 400),
@@ -141,34 +116,10 @@ _SECTIONS = {
     show_default=True,
     help="Largest number of positions.",
 )
-@click.option(
-    "--moving-time",
-    type=Quantity("s", most=3600.0),
-    default="20s",
-    show_default=True,
-    help="Time from position to position by hand.",
-)
-@click.option(
-    "--robot-moving-time",
-    type=Quantity("s", most=3600.0),
-    default="10s",
-    show_default=True,
-    help="Time from position to position with the robot.",
-)
-@click.option(
-    "--robot-setup-time",
-    type=Quantity("s", most=86400.0),
-    default="30min",
-    show_default=True,
-    help="Time to mount the sensor on the robot.",
-)
-@click.option(
-    "--robot-accuracy",
-    type=Quantity("rad", least=1e-6 * MGON, most=10 * GON),
-    default="3.2mgon",
-    show_default=True,
-    help="Standard deviation of the robot's roll and pitch.",
-)
+@quantity_option("moving_time", QUANTITIES["moving_time"])
+@quantity_option("robot_moving_time", QUANTITIES["robot_moving_time"])
+@quantity_option("robot_setup_time", QUANTITIES["robot_setup_time"])
+@quantity_option("robot_accuracy", QUANTITIES["robot_accuracy"])
 @click.option(
     "--replicates",
     type=click.IntRange(200, 1_000_000),
@@ -214,7 +165,9 @@ def plan_command(
         )
     begin("comparing calibrations, which takes some seconds ...")
     from accelstudy.data_sheets import of_sigma
-    from accelstudy.plan.report.wording import (
+    from accelstudy.plan.answer import answer
+    from accelstudy.plan.question import Equipment, Question, equipment_of, get_sensor
+    from accelstudy.plan.wording import (
         answer_lines,
         assumption_lines,
         how_to,
@@ -222,9 +175,6 @@ def plan_command(
         table_lines,
         unreachable,
     )
-    from accelstudy.plan.search.answer import answer
-    from accelstudy.plan.search.question import Equipment, Question
-    from accelstudy.plan.search.sensors import get_sensor
 
     by_hand = Equipment("gravity", moving_time, 0.0)
     robot = Equipment("robot", robot_moving_time, robot_setup_time)
@@ -232,7 +182,7 @@ def plan_command(
         tilt_accuracy,
         tilt_range,
         of_sigma(sigma) if sigma is not None else get_sensor(str(sensor)),
-        {"gravity": (by_hand,), "robot": (robot,), "both": (by_hand, robot)}[equipment],
+        equipment_of(equipment, by_hand, robot),
         confidence,
         tuple(sorted(set(holds))),
         robot_accuracy,
@@ -240,22 +190,22 @@ def plan_command(
         max_positions,
         schemes,
     )
-    found = answer(question, seed, replicates)
-    if not found.ranked:
-        click.echo(unreachable(found))
+    plan = answer(question, seed, replicates)
+    if not plan.ranked:
+        click.echo(unreachable(plan))
         raise click.exceptions.Exit(NOT_REACHED)
-    for line in (*answer_lines(found), "", *how_to(found)):
+    for line in (*answer_lines(plan), "", *how_to(plan)):
         click.echo(line)
-    for line in ("", *table_lines(found), "", *reason_lines(found)):
+    for line in ("", *table_lines(plan), "", *reason_lines(plan)):
         say(line)
     for line in ("", *assumption_lines(question)):
         say(line)
     if out is not None:
         from accelstudy.basics.suggested import study_again
-        from accelstudy.plan.report.output import write_plan
+        from accelstudy.plan.output import write_plan
 
         inputs = [Path(sensor)] if sensor is not None and Path(sensor).exists() else []
-        write_plan(found, out, {"config_hash": None, "seed": seed}, inputs, force)
+        write_plan(plan, out, {"config_hash": None, "seed": seed}, inputs, force)
         say(f"\nplan, table and figure: {out}")
         say(f"the same numbers again: {study_again(out / 'study.yaml')}")
     else:

@@ -14,13 +14,13 @@ from accelstudy.commands.options import (
     PATH,
     SCHEME,
     SENSOR,
-    Quantity,
     Sectioned,
     angle_unit_option,
     approach_option,
     example,
     force_option,
     model_option,
+    quantity_option,
     quiet_option,
     seed_option,
 )
@@ -31,7 +31,6 @@ from accelstudy.pole.setup import (
     ROBOT_SIGMA,
     TILT_RANGE,
     TILT_SIGMA,
-    Given,
     check_one_kind,
     quantities,
 )
@@ -47,21 +46,10 @@ for _name, _given in quantities().items():
 _SECTIONS["What is worked out"] = ["tilt_range", "replicates", "seed", "out"]
 
 
-def _option(name: str, given: Given) -> Callable[[Command], Command]:
-    """Add the option of a quantity."""
-    return click.option(
-        f"--{name.replace('_', '-')}",
-        type=Quantity(given.unit, given.least, given.most),
-        default=given.usual or None,
-        show_default=bool(given.usual),
-        help=given.help,
-    )
-
-
 def _setup_options(command: Command) -> Command:
     """Add an option for each quantity of a pole."""
     for name, given in quantities().items():
-        command = _option(name, given)(command)
+        command = quantity_option(name, given)(command)
     return command
 
 
@@ -78,7 +66,7 @@ def _setup_options(command: Command) -> Command:
     "--sensor", type=SENSOR, required=True, help="A data sheet: its name, or a YAML file."
 )
 @click.option("--calibration", type=PATH, help="A calibration.json of the sensor.")
-@_option("tilt_sigma", TILT_SIGMA)
+@quantity_option("tilt_sigma", TILT_SIGMA)
 @click.option(
     "--mounting",
     default="frd",
@@ -95,10 +83,10 @@ def _setup_options(command: Command) -> Command:
     help="Positions; `accelstudy schemes` lists them.",
 )
 @approach_option("gravity")
-@_option("hold", HOLD)
-@_option("robot_sigma", ROBOT_SIGMA)
+@quantity_option("hold", HOLD)
+@quantity_option("robot_sigma", ROBOT_SIGMA)
 @_setup_options
-@_option("tilt_range", TILT_RANGE)
+@quantity_option("tilt_range", TILT_RANGE)
 @click.option(
     "--replicates",
     default=1000,

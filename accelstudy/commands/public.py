@@ -37,8 +37,8 @@ def public_command(name: str | None, out: Path | None, folder: Path, force: bool
     from accelstudy.files.outputs import CAMPAIGN, result_folder
 
     if name is None:
-        for known, entry in public_data().items():
-            click.echo(f"{known}: {entry.description}\n    {entry.licence}, {entry.url}")
+        for key, entry in public_data().items():
+            click.echo(f"{key}: {entry.description}\n    {entry.licence}, {entry.url}")
         return
     settings = import_settings(name)
     if out is None:

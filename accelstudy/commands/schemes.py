@@ -42,18 +42,18 @@ def schemes_command(model: str, approach: str, names: tuple[str, ...]) -> None:
     rows = []
     for name in track(names or scheme_names(), "schemes"):
         scheme = get_scheme(name)
-        found = estimability(scheme, chosen_model, chosen_approach)
+        determined = estimability(scheme, chosen_model, chosen_approach)
         rows.append(
             {
                 "scheme": scheme.name,
                 "n": scheme.n_positions,
                 "status": scheme.status,
-                "rank": f"{found.rank}/{len(found.parameter_names)}",
-                "condition": f"{found.condition:.1f}" if found.estimable else "-",
-                "r": found.redundancy,
-                "m": f"{found.fourth_moment:.4f}",
-                f"pole/{attitude_unit()}": f"{to_attitude(found.pole_distance):.1f}",
-                "not estimable": ", ".join(found.not_estimable),
+                "rank": f"{determined.rank}/{len(determined.parameter_names)}",
+                "condition": f"{determined.condition:.1f}" if determined.estimable else "-",
+                "r": determined.redundancy,
+                "m": f"{determined.fourth_moment:.4f}",
+                f"pole/{attitude_unit()}": f"{to_attitude(determined.pole_distance):.1f}",
+                "not estimable": ", ".join(determined.not_estimable),
             }
         )
     say(f"model {chosen_model.name}, approach {approach}\n")

@@ -136,7 +136,7 @@ def simulate_campaign_command(
     given is drawn at random. The truth goes to --truth and nowhere else.
     """
     from accelstudy.basics.units import MGON
-    from accelstudy.campaign.files.format import write_campaign
+    from accelstudy.campaign.format import write_campaign
     from accelstudy.campaign.simulated import (
         CampaignSettings,
         simulate_campaign,

@@ -12,12 +12,11 @@ from scipy.optimize import nnls
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import recorded_unit, to_recorded
-from accelstudy.campaign.files.format import read_campaign
-from accelstudy.campaign.holds.allan import RELIABLE, AllanDeviation
-from accelstudy.campaign.importing.logs import import_log
+from accelstudy.campaign.format import read_campaign
+from accelstudy.campaign.importing.allan import RELIABLE, AllanDeviation
+from accelstudy.campaign.importing.logs import import_sensors
 from accelstudy.campaign.importing.settings import ImportSettings
-from accelstudy.data_sheets.flicker import FLICKER
-from accelstudy.data_sheets.sheet import QUANTITIES, DataSheet
+from accelstudy.data_sheets.sheet import FLICKER, QUANTITIES, DataSheet
 
 SEEN = 0.02
 """A kind of noise must make up this part of the Allan variance at some averaging time."""
@@ -31,7 +30,7 @@ def sheet_of_log(path: str | Path, settings: ImportSettings) -> DataSheet:
     InputError
         If the log cannot be read, has no static hold, or is too short for an Allan deviation.
     """
-    _, report = import_log(path, settings)
+    ((_, report),) = import_sensors([path], settings).values()
     assert report.holds is not None
     noise = report.holds.noise
     curve = noise.allan.channels(noise.of_sensor)
@@ -55,13 +54,13 @@ def sheet_of_allan(curve: AllanDeviation, name: str, source: str) -> DataSheet:
     tau, variance = curve.tau[usable], curve.pooled[usable] ** 2
     kinds = np.column_stack([1 / tau, np.ones_like(tau), tau])
     weight = np.sqrt(curve.differences[usable] / 2) / variance
-    found, _ = nnls(kinds * weight[:, None], variance * weight)
-    seen = np.max(kinds * found / variance[:, None], axis=0) > SEEN
+    squares, _ = nnls(kinds * weight[:, None], variance * weight)
+    seen = np.max(kinds * squares / variance[:, None], axis=0) > SEEN
     longest = f"Allan deviation of {source} up to {tau[-1]:.3g} s"
     values: dict[str, Any] = {
-        "velocity_random_walk": math.sqrt(found[0]),
-        "bias_instability": math.sqrt(found[1]) / FLICKER if seen[1] else None,
-        "acceleration_random_walk": math.sqrt(3 * found[2]) if seen[2] else None,
+        "velocity_random_walk": math.sqrt(squares[0]),
+        "bias_instability": math.sqrt(squares[1]) / FLICKER if seen[1] else None,
+        "acceleration_random_walk": math.sqrt(3 * squares[2]) if seen[2] else None,
     }
     if not seen[0]:
         raise InputError(f"{source}: no white noise in its Allan deviation; is it filtered?")

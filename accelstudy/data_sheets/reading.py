@@ -13,7 +13,7 @@ from typing import Any
 from accelstudy.basics.errors import InputError, UnknownNameError, shown
 from accelstudy.basics.units import parse_quantity
 from accelstudy.data_sheets.sheet import LEAST_FULL_SCALE, MOST, QUANTITIES, DataSheet
-from accelstudy.files.layers import read_layer
+from accelstudy.files.reading import read_layer
 
 TEXTS = ("name", "title", "source")
 DENSITY = "noise_density"
@@ -68,13 +68,13 @@ def parse_data_sheet(content: Mapping[str, Any], source: str = "data sheet") -> 
     InputError
         See `read_data_sheet`.
     """
-    known = (*TEXTS, DENSITY, *QUANTITIES)
+    keys = (*TEXTS, DENSITY, *QUANTITIES)
     values: dict[str, float] = {}
     sources: dict[str, str] = {}
     try:
         for key, given in content.items():
-            if key not in known:
-                raise UnknownNameError("key", key, known)
+            if key not in keys:
+                raise UnknownNameError("key", key, keys)
             if key not in TEXTS:
                 values[key], sources[key] = _quantity(key, given)
         texts = {key: str(content[key]) for key in TEXTS if content.get(key) is not None}
@@ -86,8 +86,8 @@ def parse_data_sheet(content: Mapping[str, Any], source: str = "data sheet") -> 
                 )
             values["velocity_random_walk"] = values.pop(DENSITY) / math.sqrt(2)
             sources["velocity_random_walk"] = sources.pop(DENSITY)
-        told: dict[str, Any] = {"name": Path(source).stem, **texts, **values}
-        return DataSheet(**told, sources=sources)
+        content_si: dict[str, Any] = {"name": Path(source).stem, **texts, **values}
+        return DataSheet(**content_si, sources=sources)
     except InputError as error:
         raise InputError(f"{source}: {error}") from None
 

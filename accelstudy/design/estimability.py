@@ -11,8 +11,8 @@ from accelstudy.adjustment import whitened_jacobian
 from accelstudy.approaches import Approach
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import HoldConditions
+from accelstudy.positions.points import evenly_spread
 from accelstudy.positions.scheme import Scheme
-from accelstudy.positions.sphere import evenly_spread
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.hold_plan import HoldPlan
 from accelstudy.simulation.sessions import Noise, session

@@ -12,7 +12,7 @@ from accelstudy.adjustment.quality import Solution, solve
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.fit import fit_campaign, least_sigma
-from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.sensors.sensor import SensorModel
 

@@ -14,8 +14,8 @@ from accelstudy.adjustment.quality import Solution
 from accelstudy.approaches import Approach
 from accelstudy.basics.progress import stage
 from accelstudy.campaign.calibration.fit import usual_approach
-from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.gross_errors.recognition import Recognised, recognise
+from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.base_fit import BaseFit
 from accelstudy.diagnosis.beside import Beside
 from accelstudy.diagnosis.decision.noise import NoiseJudge

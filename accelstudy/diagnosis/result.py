@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from accelstudy.adjustment.quality import GlobalTest, Solution, global_test
 from accelstudy.approaches import Approach
 from accelstudy.basics.levels import REFUTED
-from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.gross_errors.recognition import Recognised
+from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.beside import Beside
 from accelstudy.diagnosis.decision.explanations import Explanation
 from accelstudy.diagnosis.evidence.detection import Detection

@@ -15,11 +15,10 @@ from pydantic import BeforeValidator, Field, model_validator
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.names import check_path_name
-from accelstudy.campaign.files.format import write_campaign
+from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign, write_truth
 from accelstudy.config_names import ModelName
-from accelstudy.files.types import Seed, Sessions
-from accelstudy.files.validation import Block, checked
+from accelstudy.files.validation import Block, Seed, Sessions, checked
 from accelstudy.sensors.models import get_model
 
 

@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
-from typing import Any, ClassVar, Literal, TypeVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -181,9 +181,8 @@ def _part(kind: type[Effect], kept: tuple[int, ...]) -> type[Effect]:
 
 
 _registry: RegistryWithSettings[Effect] = RegistryWithSettings("effect")
-EffectClass = TypeVar("EffectClass", bound=type[Effect])
-
 effect_names = _registry.names
+register = _registry.register
 effects_without = _registry.without
 
 
@@ -211,12 +210,6 @@ def get_effect(spec: str) -> Effect:
         if name not in names:
             raise UnknownNameError(f"parameter of the effect {effect.name!r}", name, names)
     return effect.only(tuple(i for i, name in enumerate(names) if name in wanted))
-
-
-def register(effect: EffectClass) -> EffectClass:
-    """Class decorator: enter an effect into the registry under its name."""
-    _registry.add(effect.name, effect())
-    return effect
 
 
 def formulas(effect: Effect) -> dict[str, Texts | list[Texts]]:

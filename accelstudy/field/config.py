@@ -13,8 +13,7 @@ from accelstudy.drawing.style import DPI
 from accelstudy.field.figure import field_figure
 from accelstudy.field.shares import Use, field_shares
 from accelstudy.files.tables import write_table
-from accelstudy.files.types import Angle, Number, OneOrMore, PathName
-from accelstudy.files.validation import Block
+from accelstudy.files.validation import Angle, Block, Number, OneOrMore, PathName
 from accelstudy.pole.config import SensorCase
 from accelstudy.pole.setup import quantities
 

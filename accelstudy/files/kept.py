@@ -20,10 +20,10 @@ def kept_in(kind: str) -> Path:
 def kept(kind: str, key: str) -> bytes | None:
     """Return what was made before, if it is there and whole."""
     try:
-        found = (kept_in(kind) / key).read_bytes()
+        stored = (kept_in(kind) / key).read_bytes()
     except (OSError, RuntimeError):  # there is no home folder
         return None
-    digest, content = found[:_DIGEST], found[_DIGEST:]
+    digest, content = stored[:_DIGEST], stored[_DIGEST:]
     return content if hashlib.sha256(content).digest() == digest else None
 
 

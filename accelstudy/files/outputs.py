@@ -51,10 +51,10 @@ class Kind:
 
     def of_earlier_run(self, folder: Path) -> set[Path]:
         """Files in a folder of this kind that belong to the command, relative to it."""
-        found = {Path(name) for name in (self.marker, *self.files) if (folder / name).is_file()}
+        files = {Path(name) for name in (self.marker, *self.files) if (folder / name).is_file()}
         for name in self.folders:
-            found |= {p.relative_to(folder) for p in (folder / name).rglob("*") if p.is_file()}
-        return found
+            files |= {p.relative_to(folder) for p in (folder / name).rglob("*") if p.is_file()}
+        return files
 
 
 CAMPAIGN = Kind(
@@ -123,13 +123,13 @@ def result_folder(
     out = Path(out)
     with _reported(out) as stages:
         _check_apart(out, inputs)
-        mine = _check_folder(out, kind, force)
+        is_earlier_result = _check_folder(out, kind, force)
         with _staging(out) as stage:
             new = stage / "new"
             stages.append(new)
             new.mkdir()
             yield new
-            _publish(stage, out.resolve(), kind, mine)
+            _publish(stage, out.resolve(), kind, is_earlier_result)
 
 
 @contextmanager
@@ -164,6 +164,25 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         yield stage / path.name
         with _parents(path):
             (stage / path.name).replace(path)
+
+
+def check_writable(folder: str | Path) -> None:
+    """Check that a folder and those in it can be written to, or that it can be made.
+
+    Raises
+    ------
+    InputError
+        If it, a folder in it, or the nearest folder above it that exists, is not writable, or is no
+        folder.
+    """
+    folder = Path(folder)
+    nearest = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    if not nearest.is_dir():
+        raise InputError(f"{folder}: cannot hold results: {nearest} is not a folder")
+    inside = (Path(path) for path, _, _ in os.walk(folder))  # of the folder itself, if it is there
+    for path in (nearest, *inside):
+        if not os.access(path, os.W_OK | os.X_OK):
+            raise InputError(f"{folder}: cannot hold results: {path} is not writable")
 
 
 def cannot_write(error: OSError, out: Path) -> str:
@@ -266,16 +285,16 @@ def _check_apart(out: Path, inputs: Iterable[str | Path]) -> None:
 def _identities(path: Path) -> list[tuple[int, int] | None]:
     """Identity of a path and of the folders above it on the disk; None where one does not exist."""
     resolved = path.resolve()
-    found: list[tuple[int, int] | None] = []
+    identities: list[tuple[int, int] | None] = []
     for each in (resolved, *resolved.parents):
         try:
             status = each.stat()
         except (FileNotFoundError, NotADirectoryError):
             # A path that does not exist equals no other; only the first place of the list counts.
-            found.append(None)
+            identities.append(None)
         else:
-            found.append((status.st_dev, status.st_ino))
-    return found
+            identities.append((status.st_dev, status.st_ino))
+    return identities
 
 
 def _check_folder(out: Path, kind: Kind, force: bool) -> bool:
@@ -292,19 +311,19 @@ def _check_folder(out: Path, kind: Kind, force: bool) -> bool:
     if not there:
         return False
     _check_free(out, map(Path, (kind.marker, *kind.files)), map(Path, kind.folders))
-    found = next((known for known in _KINDS if (out / known.marker).is_file()), None)
-    if found not in (None, kind):
-        raise InputError(f"{out}: is the folder of a {found.name}; give another folder")
-    if not force and (found is None or not kind.replaced):
+    earlier = next((one for one in _KINDS if (out / one.marker).is_file()), None)
+    if earlier not in (None, kind):
+        raise InputError(f"{out}: is the folder of a {earlier.name}; give another folder")
+    if not force and (earlier is None or not kind.replaced):
         shown = ", ".join(there[:3]) + (", …" if len(there) > 3 else "")
         raise InputError(
             f"{out}: is not empty ({shown}); give another folder, or --force to replace the files "
             f"of a {kind.name} in it"
         )
-    return found is kind
+    return earlier is kind
 
 
-def _publish(stage: Path, out: Path, kind: Kind, mine: bool) -> None:
+def _publish(stage: Path, out: Path, kind: Kind, is_earlier_result: bool) -> None:
     """Move new files to `out` and the replaced ones away; on an error, move all of them back."""
     new, old = stage / "new", stage / "old"
     if not out.is_dir():
@@ -315,7 +334,7 @@ def _publish(stage: Path, out: Path, kind: Kind, mine: bool) -> None:
     folders = {parent for file in files for parent in file.parents} - {Path()}
     _check_free(out, files, folders)
     made = [folder for folder in folders if not (out / folder).exists()]
-    stale = kind.of_earlier_run(out) if mine else set()
+    stale = kind.of_earlier_run(out) if is_earlier_result else set()
     moves = [(out / file, old / file) for file in stale | files if (out / file).is_file()]
     # The marker is removed first and put back last: with it, the results are complete.
     moves.sort(key=lambda move: move[0] != out / kind.marker)

@@ -157,7 +157,7 @@ def read_origin(path: str | Path) -> dict[str, Any]:
         If the file is missing, is not whole, or was not written by this package.
     """
     with whole_parquet(path, REMEDY) as file:
-        found = json.loads((file.schema_arrow.metadata or {}).get(METADATA_KEY, b"{}"))
-    if not isinstance(found, dict) or not {"config_hash", "seed"} <= found.keys():
+        origin_of_file = json.loads((file.schema_arrow.metadata or {}).get(METADATA_KEY, b"{}"))
+    if not isinstance(origin_of_file, dict) or not {"config_hash", "seed"} <= origin_of_file.keys():
         raise InputError(f"{path}: does not say where it comes from; it is no table of a study")
-    return found
+    return origin_of_file

@@ -1,17 +1,100 @@
-"""Checks of what was read from a file; an error is one line that names the key."""
+"""Checks of what was read from a file: types of its values, and errors that name the key."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    GetCoreSchemaHandler,
+    ValidationError,
+)
+from pydantic import GetJsonSchemaHandler as JsonHandler
 from pydantic.fields import FieldInfo
-from pydantic_core import ErrorDetails
+from pydantic_core import ErrorDetails, core_schema
 
+from accelstudy.basics import bounds
+from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, shown
+from accelstudy.basics.names import check_path_name
+
+
+def _no_truth_value(value: Any) -> Any:
+    if isinstance(value, bool):
+        raise ValueError(f"must be a number, not {str(value).lower()}")
+    return value
+
+
+def _power_of_two(value: int) -> int:
+    if value & (value - 1):
+        raise ValueError("must be a power of two, as Sobol sequences are balanced only there")
+    return value
+
+
+PathName = Annotated[str, AfterValidator(check_path_name)]
+Number = BeforeValidator(_no_truth_value)
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False), Number]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False), Number]
+Finite = Annotated[float, Field(allow_inf_nan=False), Number]
+Tilt = Annotated[float, Field(gt=0, lt=100), Number]
+Pitch = Annotated[float, Field(gt=-100, lt=100), Number]
+
+
+def _within(range_: Range) -> tuple[Any, ...]:
+    """Annotations that keep a number within a range, in the schema too."""
+    ends = {"minimum": 0 if range_.zero else range_.least, "maximum": range_.most}
+    finite = Field(json_schema_extra=dict(ends))
+    return Number, AfterValidator(range_.check), finite
+
+
+Gravity = Annotated[float, *_within(bounds.GRAVITY)]
+GravityError = Annotated[float, *_within(bounds.GRAVITY_ERROR)]
+SigmaForce = Annotated[float, *_within(bounds.SIGMA_FORCE)]
+SigmaGravity = Annotated[float, *_within(bounds.SIGMA_GRAVITY)]
+SigmaAngle = Annotated[float, *_within(bounds.SIGMA_ANGLE)]
+Angle = Annotated[float, *_within(bounds.ANGLE)]
+Temperature = Annotated[float, *_within(bounds.TEMPERATURE)]
+Vibration = Annotated[float, *_within(bounds.VIBRATION)]
+Interval = Annotated[float, *_within(bounds.INTERVAL)]
+Duration = Annotated[float, *_within(bounds.DURATION)]
+Rate = Annotated[float, *_within(bounds.RATE)]
+Replicates = Annotated[int, *_within(bounds.REPLICATES)]
+Sessions = Annotated[int, *_within(bounds.SESSIONS)]
+Attitudes = Annotated[int, *_within(bounds.ATTITUDES)]
+BaseSamples = Annotated[int, *_within(bounds.BASE_SAMPLES), AfterValidator(_power_of_two)]
+Resamples = Annotated[int, *_within(bounds.RESAMPLES)]
+Seed = Annotated[int, *_within(bounds.SEED)]
+
+
+class _OneOrMore:
+    """Take a single value for a list of one, in the schema too."""
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        return core_schema.no_info_before_validator_function(self._as_list, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: JsonHandler
+    ) -> dict[str, Any]:
+        many = handler(schema)
+        return {"anyOf": [many["items"], many]}
+
+    @staticmethod
+    def _as_list(value: Any) -> Any:
+        return [value] if isinstance(value, str | int | float) else value
+
+
+T = TypeVar("T")
+OneOrMore = Annotated[list[T], Field(min_length=1), _OneOrMore()]
+
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -95,8 +178,8 @@ def _first_error(
         text = mark.join(filter(None, [key, str(first["ctx"]["error"])]))
     else:
         # Where several kinds of values are right, there is an error for each of them.
-        said = [_said(e) for e, p in zip(errors, places, strict=True) if p == place]
-        wanted = " or ".join([said[0], *(text.removeprefix("must be ") for text in said[1:])])
+        wants = [_wanted(e) for e, p in zip(errors, places, strict=True) if p == place]
+        wanted = " or ".join([wants[0], *(text.removeprefix("must be ") for text in wants[1:])])
         value = "" if first["type"] == "missing" else f", not {shown(first['input'])}"
         text = ": ".join(filter(None, [key, f"{wanted}{value}"]))
     others = len({*places} - {place})
@@ -122,7 +205,7 @@ def _has(content: object, part: str | int) -> bool:
     return isinstance(content, Mapping) and part in content
 
 
-def _said(error: ErrorDetails) -> str:
+def _wanted(error: ErrorDetails) -> str:
     """Say what would be right, in plain words."""
     if error["type"] not in WORDS:
         return error["msg"][0].lower() + error["msg"][1:]

@@ -17,7 +17,7 @@ from typing import Any
 
 from accelstudy.basics.errors import InputError
 from accelstudy.files.outputs import cannot_write
-from accelstudy.files.provenance import config_hash
+from accelstudy.files.reading import config_hash
 from accelstudy.files.tables import REMEDY, read_origin
 
 COLLECT_AFTER = 50_000

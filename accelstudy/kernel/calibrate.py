@@ -7,8 +7,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.adjustment.block import Block
-from accelstudy.adjustment.calibration import CalibrationProblem
+from accelstudy.adjustment.calibration import Block, CalibrationProblem
 from accelstudy.adjustment.equations import CalibrationEquations
 from accelstudy.adjustment.gauss_helmert import redundancy_of
 from accelstudy.adjustment.observations import Observations

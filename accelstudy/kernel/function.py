@@ -64,7 +64,7 @@ class KernelFunction:
     @cached_property
     def latent(self) -> tuple[sp.Symbol, ...]:
         """Symbols of f_a of the iteration before; none where the approach knows the force."""
-        return () if self.equations.told is not None else symbols("a_x", "a_y", "a_z")
+        return () if self.equations.known_force is not None else symbols("a_x", "a_y", "a_z")
 
     @cached_property
     def _same(self) -> frozenset[sp.Symbol]:

@@ -51,8 +51,8 @@ def linear_shapley(slope: ArrayLike, covariance: ArrayLike) -> tuple[Array, Arra
     slope, covariance = np.atleast_2d(np.asarray(slope, float)), np.asarray(covariance, float)
     gained = np.zeros_like(slope)
     for group in _groups(covariance):
-        own = covariance[np.ix_(group, group)]
-        gained[:, group] = _divided(own, slope[:, group] @ own)
+        within = covariance[np.ix_(group, group)]
+        gained[:, group] = _divided(within, slope[:, group] @ within)
     variance = np.einsum("ki,ij,kj->k", slope, covariance, slope)
     shares = gained / np.where(variance > 0, variance, np.nan)[:, None]
     return shares, variance
@@ -75,10 +75,10 @@ def _divided(covariance: Array, with_output: Array) -> Array:
     for size, members in _sets(p):
         inside = np.zeros((len(members), p))
         np.put_along_axis(inside, members, 1.0, axis=1)
-        own = g[members]
+        of_members = g[members]
         block = correlation[members[:, :, None], members[:, None, :]]
-        explained = np.linalg.pinv(block, rcond=SINGULAR, hermitian=True) @ own
-        value = np.einsum("spk,spk->sk", own, explained)
+        explained = np.linalg.pinv(block, rcond=SINGULAR, hermitian=True) @ of_members
+        value = np.einsum("spk,spk->sk", of_members, explained)
         joins = factorial(size - 1) * factorial(p - size) / factorial(p)
         misses = factorial(size) * factorial(p - size - 1) / factorial(p) if size < p else 0.0
         gained += (inside * joins - (1 - inside) * misses).T @ value
@@ -137,8 +137,8 @@ def sampled_shapley(
     shares, variance = linear_shapley(slope, covariance)
     expected = np.where(variance > 0, shares.T * variance, 0.0)
     scatter = linear - linear.mean(axis=0)
-    own = np.sum(scatter**2, axis=(0, 1))
-    common = np.sum(scatter * gained, axis=(0, 1)) / np.where(own > 0, own, 1.0)
+    squares = np.sum(scatter**2, axis=(0, 1))
+    common = np.sum(scatter * gained, axis=(0, 1)) / np.where(squares > 0, squares, 1.0)
     gained = gained - common * (linear - expected)
     variance = gained.sum(axis=1).mean(axis=0)
     shares = gained.mean(axis=0) / np.where(variance > 0, variance, np.nan)
@@ -158,10 +158,10 @@ def _gains(
     """Variance that each input adds in each order, (orders, d, k): of the function, and linear."""
     d = len(mean)
     order = rng.permuted(np.tile(np.arange(d), (orders, 1)), axis=1)
-    known, drawn = rng.standard_normal((2, orders, 1, d))
+    fixed, drawn = rng.standard_normal((2, orders, 1, d))
     factor = np.linalg.qr(np.swapaxes(root[order], 1, 2), mode="r")
     is_known = np.arange(d) < np.arange(d + 1)[:, None]
-    in_order = np.where(is_known, known, drawn) @ factor
+    in_order = np.where(is_known, fixed, drawn) @ factor
     inputs = np.empty_like(in_order)
     np.put_along_axis(inputs, order[:, None, :], in_order, axis=2)
 

@@ -163,5 +163,5 @@ def overtaken(table: pd.DataFrame) -> pd.DataFrame:
     factor = 1 + TIED
     now = pairs["shapley_effect"] > factor * pairs["shapley_effect_over"]
     before = factor * pairs["total_effect"] < pairs["total_effect_over"]
-    found = pairs.loc[now & before, [*labels, "input", "input_over"]]
-    return found.rename(columns={"input_over": "over"}).reset_index(drop=True)
+    pairs = pairs.loc[now & before, [*labels, "input", "input_over"]]
+    return pairs.rename(columns={"input_over": "over"}).reset_index(drop=True)

@@ -8,7 +8,7 @@ other. Everything is in m/s², of R sessions of n holds with three axes.
 from __future__ import annotations
 
 from functools import cache
-from typing import ClassVar, TypeVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,18 +58,11 @@ class NoiseEffect(WithSettings):
 
 
 _registry: RegistryWithSettings[NoiseEffect] = RegistryWithSettings(NoiseEffect.kind)
-NoiseEffectClass = TypeVar("NoiseEffectClass", bound=type[NoiseEffect])
-
 noise_effect_names = _registry.names
+register = _registry.register
 
 
 @cache
 def get_noise_effect(spec: str) -> NoiseEffect:
     """Return a noise effect by its name, with settings or not: ``heavy_tails(nu=3)``."""
     return _registry.get(spec)
-
-
-def register(effect: NoiseEffectClass) -> NoiseEffectClass:
-    """Class decorator: enter a noise effect into the registry under its name."""
-    _registry.add(effect.name, effect())
-    return effect

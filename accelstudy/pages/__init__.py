@@ -1,4 +1,7 @@
-"""Pages (HTML, self-contained): one look, one glossary, one badge for each verdict."""
+"""Pages (HTML, self-contained) and texts: one look, one glossary, one badge for each verdict.
+
+Their words stand in templates; numbers are shown as `accelstudy.basics.wording` has it.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, Template
+from jinja2 import Environment, PackageLoader, StrictUndefined, Undefined
 
 from accelstudy.basics.progress import failure
 from accelstudy.basics.units import (
@@ -17,10 +20,21 @@ from accelstudy.basics.units import (
     angle_note,
     attitude_unit,
     display_unit,
+    shown_unit,
     to_attitude,
-    to_display,
 )
-from accelstudy.basics.wording import comma_list, interval, number, p_value, probability, words
+from accelstudy.basics.wording import (
+    amount,
+    comma_list,
+    counted,
+    estimate,
+    interval,
+    number,
+    p_value,
+    probability,
+    quantity_text,
+    words,
+)
 from accelstudy.files.outputs import whole_file
 from accelstudy.pages.glossary import explained
 from accelstudy.sensors.frames import axes_note
@@ -64,8 +78,8 @@ def render(template: str, **content: Any) -> str:
         "attitude_unit": attitude_unit(),
         "angle_note": angle_note(),
     }
-    page = explained(_template(template).render({**units, **content}))
-    return _CONTROLS.sub(lambda found: found[0].encode("unicode_escape").decode("ascii"), page)
+    page = explained(_environment(True).get_template(template).render({**units, **content}))
+    return _CONTROLS.sub(lambda control: control[0].encode("unicode_escape").decode("ascii"), page)
 
 
 def write_page(path: Path, template: str, fallback: str, **content: Any) -> None:
@@ -80,34 +94,61 @@ def write_page(path: Path, template: str, fallback: str, **content: Any) -> None
     try:
         page = render(template, **content)
     except Exception as error:
-        said = failure("The page could not be made", error)
+        reason = failure("The page could not be made", error)
         page = (
             '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>Report</title>'
-            f"</head>\n<body><p>{escape(fallback)}</p>\n<p>{escape(said)}</p></body></html>\n"
+            f"</head>\n<body><p>{escape(fallback)}</p>\n<p>{escape(reason)}</p></body></html>\n"
         )
     with whole_file(path) as part:
         part.write_text(page, encoding="utf-8")
 
 
+def lines(template: str, part: str, *content: Any) -> list[str]:
+    """Say something in plain text, one sentence or row a line.
+
+    Parameters
+    ----------
+    template : str, path of the template within the package; it is made of macros
+    part : str, the macro that says it
+    content : its arguments
+
+    Returns
+    -------
+    list of str, without empty lines
+    """
+    macro = getattr(_environment(False).get_template(template).module, part)
+    return [line for line in map(str.rstrip, macro(*content).splitlines()) if line]
+
+
 @cache
-def _template(name: str) -> Template:
+def _environment(markup: bool) -> Environment:
+    """Environment of the pages or, without markup, of the texts."""
     environment = Environment(
         loader=PackageLoader("accelstudy", ""),
-        autoescape=True,
+        autoescape=markup,
         trim_blocks=True,
         lstrip_blocks=True,
+        undefined=Undefined if markup else StrictUndefined,
     )
     environment.filters.update(
-        angle=lambda mgon: number(to_display(mgon * MGON, "rad").item()),
+        angle=lambda mgon: amount(mgon * MGON, "rad"),
         axes=axes_note,
         attitude=lambda gon: to_attitude(gon * GON).item(),
         badge=lambda verdict: BADGES[verdict][0],
         colour=lambda verdict: BADGES[verdict][1],
-        comma_list=comma_list,
+        amount=amount,
+        comma_list=lambda items: comma_list(list(items)),
+        counted=counted,
         number=number,
         p=probability,
         p_value=p_value,
+        quantity=quantity_text,
         words=words,
     )
-    environment.globals.update(interval=interval)
-    return environment.get_template(name)
+    environment.globals.update(
+        amount=amount,
+        estimate=estimate,
+        interval=interval,
+        unit=shown_unit,
+    )
+    return environment

@@ -69,19 +69,19 @@ def explained(page: str) -> str:
 
     Figures, links and commands stay unchanged. A page without the mark `FOOT` gets no list.
     """
-    found: dict[str, str] = {}
+    used: dict[str, str] = {}
 
     def mark(match: re.Match[str]) -> str:
         term = _KNOWN[match[0].lower()]
-        if term in found:
+        if term in used:
             return match[0]
-        found[term] = escape(TERMS[term])
-        return f'<abbr title="{found[term]}">{match[0]}</abbr>'
+        used[term] = escape(TERMS[term])
+        return f'<abbr title="{used[term]}">{match[0]}</abbr>'
 
     parts, end = [], 0
     for apart in _APART.finditer(page):
         parts += [_WORD.sub(mark, page[end : apart.start()]), apart[0]]
         end = apart.end()
     text = "".join([*parts, _WORD.sub(mark, page[end:])])
-    terms = "".join(f"<dt>{term}</dt><dd>{found[term]}</dd>\n" for term in TERMS if term in found)
-    return text.replace(FOOT, f"<h2>Terms</h2>\n<dl>\n{terms}</dl>" if found else "")
+    terms = "".join(f"<dt>{term}</dt><dd>{used[term]}</dd>\n" for term in TERMS if term in used)
+    return text.replace(FOOT, f"<h2>Terms</h2>\n<dl>\n{terms}</dl>" if used else "")

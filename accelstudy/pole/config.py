@@ -12,8 +12,7 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.config_names import ModelName
 from accelstudy.data_sheets import data_sheet_names, get_data_sheet
-from accelstudy.files.types import PathName, Replicates
-from accelstudy.files.validation import Block
+from accelstudy.files.validation import Block, PathName, Replicates
 from accelstudy.pole.output import PoleResult, write_pole
 from accelstudy.pole.sensor import (
     CalibratedSensor,

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import STANDARD_GRAVITY, quantity_text
-from accelstudy.basics.wording import comma_list
-from accelstudy.campaign.use.applying import read_calibration
+from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.basics.wording import comma_list, quantity_text
+from accelstudy.campaign.calibration.applying import read_calibration
 from accelstudy.data_sheets import DataSheet
 from accelstudy.design.estimability import estimability
 from accelstudy.effects import HoldConditions

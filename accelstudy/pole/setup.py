@@ -5,13 +5,12 @@ Commands and configurations take the unit, usual value and bounds of each quanti
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from accelstudy.basics.errors import InputError, UnknownNameError
-from accelstudy.basics.units import parse_quantity
+from accelstudy.basics.units import Given
 
 POLE, USE, ERRORS = "The pole", "Its use", "How well it is known (standard deviations)"
 """Sections of the quantities."""
@@ -19,42 +18,15 @@ HAND = 0.6
 """Usual height of the hand as a part of the length."""
 
 
-@dataclass(frozen=True)
-class Given:
-    """A quantity that the user may give.
-
-    Attributes
-    ----------
-    section : str
-    unit : str, SI
-    usual : str, with its unit; empty if it follows from another quantity
-    help : str
-    least, most : float, SI, both allowed
-    """
-
-    section: str
-    unit: str
-    usual: str
-    help: str
-    least: float = 0.0
-    most: float = math.inf
-
-    def read(self, text: str) -> float:
-        """Value of a text with its unit, SI; raises `InputError` if it is not one."""
-        return parse_quantity(text, self.unit, self.least, self.most)
+def _given(section: str, *arguments: Any) -> Any:
+    given = replace(Given(*arguments), section=section)
+    return field(default=given.value if given.usual else None, metadata={"given": given})
 
 
-def _given(*arguments: Any, **options: Any) -> Any:
-    given = Given(*arguments, **options)
-    return field(
-        default=given.read(given.usual) if given.usual else None, metadata={"given": given}
-    )
-
-
-HOLD = Given("", "s", "10s", "Time at each position.", 1e-3, 1e6)
-ROBOT_SIGMA = Given("", "rad", "3.2mgon", "Sd of the robot's roll and of its pitch.", 1e-9, 0.1)
-TILT_SIGMA = Given("", "rad", "", "Sd of roll and of pitch, if no more is known.", 1e-9, 0.5)
-TILT_RANGE = Given("", "rad", "50gon", "Largest tilt.", 1e-3, 1.5)
+HOLD = Given("s", "10s", "Time at each position.", 1e-3, 1e6)
+ROBOT_SIGMA = Given("rad", "3.2mgon", "Sd of the robot's roll and of its pitch.", 1e-9, 0.1)
+TILT_SIGMA = Given("rad", "", "Sd of roll and of pitch, if no more is known.", 1e-9, 0.5)
+TILT_RANGE = Given("rad", "50gon", "Largest tilt.", 1e-3, 1.5)
 """Quantities besides those of the pole: of the sensor's calibration, and the largest tilt."""
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from accelstudy.basics.units import GON, attitude_unit, quantity_text, to_attitude
-from accelstudy.basics.wording import comma_list, words
+from accelstudy.basics.units import GON, attitude_unit, to_attitude
+from accelstudy.basics.wording import comma_list, estimate, quantity_text, words
 from accelstudy.pole.budget import Budget
 from accelstudy.pole.sensor import COEFFICIENTS
 from accelstudy.pole.sources import sources
@@ -113,11 +113,10 @@ def agreement(simulated: pd.DataFrame) -> str:
             if error > 0 and apart / error > worst:
                 worst, where = apart / error, row
     last = simulated.iloc[-1]
-    rms, error = (
-        f"{1e3 * last[f'{name}_horizontal_m']:.2f}" for name in ("simulated", "standard_error")
-    )
+    rms = estimate(last["simulated_horizontal_m"], last["standard_error_horizontal_m"], "m")
     sentence = (
-        f"Monte Carlo with the exact geometry, {int(last['replicates'])} readings: {rms} ± {error} "
+        f"Monte Carlo with the exact geometry, {int(last['replicates'])} readings: "
+        f"{' ± '.join(rms)} "
         f"mm horizontally; {100 * last['inside_95']:.1f} % lie within the circles of 95 %."
     )
     if worst > BEYOND_CHANCE:

@@ -10,9 +10,8 @@ from accelstudy.approaches import approach_names, get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON
 from accelstudy.config_names import ModelName, SchemeName
-from accelstudy.design.optimal.task import Task
-from accelstudy.files.types import OneOrMore, SigmaAngle, SigmaForce, Tilt
-from accelstudy.files.validation import Block
+from accelstudy.design.task import Task
+from accelstudy.files.validation import Block, OneOrMore, SigmaAngle, SigmaForce, Tilt
 from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.schemes import get_scheme, scheme_names
 from accelstudy.sensors.models import get_model

@@ -7,12 +7,11 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 import pandas as pd
 
-from accelstudy.design.optimal.constraints import Constraints
-from accelstudy.design.optimal.continuous import continuous_optimum
-from accelstudy.design.optimal.criteria import get_criterion
-from accelstudy.design.optimal.search import optimal_design
-from accelstudy.design.optimal.spaces import Sphere
-from accelstudy.design.optimal.task import Task
+from accelstudy.design.continuous import continuous_optimum
+from accelstudy.design.criteria import get_criterion
+from accelstudy.design.search import optimal_design
+from accelstudy.design.spaces import Constraints, Sphere
+from accelstudy.design.task import Task
 from accelstudy.schemes import Scheme
 
 CRITERIA = ("D", "A", "I")
@@ -52,7 +51,7 @@ def _of_task(
         name: continuous_optimum(task, criterion, Sphere(), Constraints(), 1).bound
         for name, criterion in criteria.items()
     }
-    found = [
+    designs = [
         Scheme(
             f"I-optimal {n}",
             f"{n} I-optimal",
@@ -63,7 +62,7 @@ def _of_task(
         for n in positions
     ]
     rows: list[Mapping[str, object]] = []
-    for scheme in [*schemes, *found]:
+    for scheme in [*schemes, *designs]:
         n, reason = scheme.n_positions, task.missing(scheme.directions)
         roll, pitch = (np.nan, np.nan) if reason else task.rms_tilt(scheme.directions)
         for name, criterion in criteria.items():

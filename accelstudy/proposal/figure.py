@@ -42,9 +42,9 @@ def _efficiencies(
     titles = table.drop_duplicates("scheme").set_index("scheme")["title"]
     for name, (colour, marker) in MARKS.items():
         part = table[table["criterion"] == name].set_index("scheme")
-        known = [s for s in schemes if not part.loc[s, "reason"]]
-        y = [schemes.index(s) for s in known]
-        ax.plot(100 * part.loc[known, "efficiency"], y, marker, color=colour, label=name)
+        determined = [s for s in schemes if not part.loc[s, "reason"]]
+        y = [schemes.index(s) for s in determined]
+        ax.plot(100 * part.loc[determined, "efficiency"], y, marker, color=colour, label=name)
     for place, scheme in enumerate(schemes):
         if table.loc[table["scheme"] == scheme, "reason"].iloc[0]:
             ax.text(2, place, "does not determine the model", va="center", color="#777777", size=7)
@@ -65,11 +65,11 @@ def _over_positions(
     n = np.geomspace(rows["n"].min(), rows["n"].max(), 60)
     one = float((rows["least_rms"] * np.sqrt(rows["n"])).iloc[0])
     ax.plot(n, to_display(one / np.sqrt(n), "rad"), color=INK, label="no positions are below")
-    found = rows["scheme"].str.startswith("I-optimal ")
+    designed = rows["scheme"].str.startswith("I-optimal ")
     style: Style = {"color": approach_colour(approach), "linestyle": ""}
-    ax.plot(rows["n"][~found], to_display(rows["rms"][~found], "rad"), marker="o", **style,
+    ax.plot(rows["n"][~designed], to_display(rows["rms"][~designed], "rad"), marker="o", **style,
             label="schemes")  # fmt: skip
-    ax.plot(rows["n"][found], to_display(rows["rms"][found], "rad"), marker="D", **style,
+    ax.plot(rows["n"][designed], to_display(rows["rms"][designed], "rad"), marker="D", **style,
             markerfacecolor="white", label="I-optimal designs")  # fmt: skip
     least, most = (
         float(to_display(value, "rad")) for value in (rows["least_rms"].min(), rows["rms"].max())

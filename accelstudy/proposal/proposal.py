@@ -1,23 +1,28 @@
-"""A design in the order of measurement, and the accuracy that it gives."""
+"""A design in the order of measurement, the accuracy that it gives, and its file."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
 from numpy.typing import NDArray
 
 from accelstudy import __version__
 from accelstudy.adjustment.quality import noncentrality
-from accelstudy.basics.units import GON, MGON, angles_in
-from accelstudy.design.optimal.criteria import Rivals
-from accelstudy.design.optimal.search import Design
-from accelstudy.design.optimal.spaces import Mountings
-from accelstudy.proposal.order import field_order
+from accelstudy.basics.units import GON, MGON, angles_in, to_recorded
+from accelstudy.design.criteria import RIDGE, Rivals
+from accelstudy.design.search import Design, rounded
+from accelstudy.design.spaces import Mountings, attitudes
+from accelstudy.design.task import Task, information, position_rows
+from accelstudy.positions.choice import first_best
 from accelstudy.proposal.request import Request
 from accelstudy.schemes import get_scheme
+from accelstudy.sensors.models import compose
+from accelstudy.simulation.hold_plan import HoldPlan
 
 Array = NDArray[np.float64]
 
@@ -44,9 +49,9 @@ class Proposal:
     directions: Array
 
     @classmethod
-    def of(cls, request: Request, found: Design | None = None) -> Proposal:
-        """Find the positions, unless they are given, and order them; errors as `Request.find`."""
-        design = request.find() if found is None else found
+    def of(cls, request: Request) -> Proposal:
+        """Find the positions, and order them; errors as `Request.find`."""
+        design = request.find()
         space, groups = request.space, None
         if isinstance(space, Mountings):
             groups = _fewest_axes(space, design.directions)
@@ -110,7 +115,7 @@ class Proposal:
         request, noise = self.request, self.request.noise
         with angles_in("gon"):
             constraints = request.constraints.texts
-        known = {
+        content = {
             "version": __version__,
             "criterion": f"{request.chosen.name}: {request.chosen.text}",
             "model": request.task.model.name,
@@ -131,7 +136,7 @@ class Proposal:
             "rms_roll_mgon": _brief(self.rms[0] / MGON),
             "rms_pitch_mgon": _brief(self.rms[1] / MGON),
         }
-        return {k: v for k, v in known.items() if v not in (None, [], 0.0) and v == v}
+        return {k: v for k, v in content.items() if v not in (None, [], 0.0) and v == v}
 
 
 def _fewest_axes(space: Mountings, directions: Array) -> NDArray[np.int_]:
@@ -151,3 +156,137 @@ def _fewest_axes(space: Mountings, directions: Array) -> NDArray[np.int_]:
 
 def _brief(value: float) -> float:
     return float(f"{value:.6g}")
+
+
+Order = NDArray[np.int_]
+
+TOURS = 12
+LONGER = 1.15
+"""Length, relative to the shortest tour found, up to which a tour that separates drifts better is
+taken."""
+
+
+def field_order(task: Task, directions: Array, groups: Order | None = None) -> Order:
+    """Order positions (n, 3) for the field.
+
+    The order is a round trip of small turns. The last position is near the first, so a steady
+    change with time is not mistaken for an effect of the attitude. Several round trips are tried,
+    each with several first positions. The one is taken in which a linear drift of the biases can be
+    told best from the parameters of the model.
+
+    Parameters
+    ----------
+    task : Task
+    directions : (n, 3) array of unit vectors
+    groups : (n,) array, optional
+        Positions of one group (mounting) stay together.
+    """
+    groups = np.zeros(len(directions), dtype=int) if groups is None else groups
+    angles = np.arccos(np.clip(directions @ directions.T, -1, 1))
+    members = [np.flatnonzero(groups == g) for g in np.unique(groups)]
+    rng = np.random.default_rng(np.random.SeedSequence(len(directions)))
+    tours: list[tuple[float, Order]] = []
+    for _ in range(TOURS):
+        parts = [_round_trip(angles, rng.permutation(group)) for group in members]
+        tours.append((sum(_length(angles, part) for part in parts), np.concatenate(parts)))
+        if len(members) == 1:
+            turned = [np.roll(tours[-1][1], shift) for shift in range(1, len(directions))]
+            tours += [(tours[-1][0], tour) for tour in turned]
+    shortest = min(length for length, _ in tours)
+    near = [tour for length, tour in tours if length <= LONGER * shortest + 1e-9]
+    shown = [_drift_shown(task, directions[tour]) for tour in near]
+    best = max(shown)
+    return next(tour for tour, value in zip(near, shown, strict=True) if value > best - 1e-9)
+
+
+def _length(angles: Array, tour: Order) -> float:
+    return float(angles[tour, np.roll(tour, -1)].sum())
+
+
+def _round_trip(angles: Array, tour: Order) -> Order:
+    """Shorten a round trip by reversing parts of it until no reversal shortens it (2-opt)."""
+    n, shorter = len(tour), True
+    while shorter and n > 3:
+        shorter = False
+        for i in range(n - 1):
+            ahead = np.roll(tour, -1)
+            j = np.arange(i + 1, n)
+            gain = (
+                angles[tour[i], ahead[i]]
+                + angles[tour[j], ahead[j]]
+                - angles[tour[i], tour[j]]
+                - angles[ahead[i], ahead[j]]
+            )
+            best = first_best(-gain)
+            if gain[best] > 1e-9:
+                tour = tour.copy()
+                tour[i + 1 : j[best] + 1] = tour[i + 1 : j[best] + 1][::-1]
+                shorter = True
+    return tour
+
+
+def _drift_shown(task: Task, directions: Array) -> float:
+    """Share of a drift of the biases that the parameters cannot imitate; the smallest axis."""
+    effects = [effect.spec for effect in task.model.effects]
+    model = compose("drifting", (*effects, "bias_drift"))
+    n, u = len(directions), task.model.n_parameters
+    hold = replace(HoldPlan().hold(n), time=np.linspace(-1.0, 1.0, n))
+    fixed_gravity = replace(task.noise, sigma_gravity=0.0)
+    rows = position_rows(model, task.approach, fixed_gravity, directions, None, task.gravity, hold)
+    normal = information(rows).sum(axis=0)
+    normal = normal / np.sqrt(np.outer(np.diag(normal), np.diag(normal)))
+    of_drift, cross = normal[u:, u:], normal[:u, u:]
+    inside = np.linalg.solve(normal[:u, :u] + RIDGE * np.eye(u), cross)
+    return float(np.diag(of_drift - cross.T @ inside).min())
+
+
+def write_design(
+    path: Path,
+    name: str,
+    title: str,
+    source: str,
+    directions: Array,
+    made: Mapping[str, Any],
+    columns: Mapping[str, Sequence[Any]] | None = None,
+) -> None:
+    """Write a scheme that `accelstudy.schemes.get_scheme` reads.
+
+    Parameters
+    ----------
+    path : Path
+    name, title, source : str, of the scheme
+    directions : (n, 3) array of unit vectors
+    made : mapping, plain data: how it was made, and how good it is
+    columns : mapping of name to n values, optional, further columns of the positions
+    """
+    roll, pitch = (to_recorded(attitudes(directions), "rad") / 1000).T
+    positions = [
+        {
+            "position": i + 1,
+            "roll_gon": _gon(roll[i]),
+            "pitch_gon": _gon(pitch[i]),
+            **{key: values[i] for key, values in (columns or {}).items()},
+        }
+        for i in range(len(directions))
+    ]
+    content = {
+        "scheme": name,
+        "title": title,
+        "source": source,
+        "design": dict(made),
+        "positions": positions,
+        "directions": rounded(directions).tolist(),
+    }
+    head = (
+        "# Positions for a calibration, in the order in which to take them. Any configuration and\n"
+        "# command takes this file as a scheme; `directions` is what counts: gravity in the body\n"
+        "# frame.\n"
+    )
+    text = yaml.safe_dump(
+        content, sort_keys=False, allow_unicode=True, default_flow_style=None, width=100
+    )
+    path.write_text(head + text, encoding="utf-8")
+
+
+def _gon(angle: float) -> float:
+    return round(float(angle), 3) + 0.0

@@ -12,21 +12,25 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import GON, STANDARD_GRAVITY, parse_quantity
-from accelstudy.design.optimal.constraints import (
+from accelstudy.design.criteria import Criterion, WorseAngle, get_criterion, rivals, worse_angle
+from accelstudy.design.search import STARTS, Design, optimal_design
+from accelstudy.design.spaces import (
     Constraint,
     Constraints,
     LeastAngle,
+    Mountings,
     OffPole,
     PitchRange,
     RollRange,
+    Space,
+    Sphere,
+    by_eye,
+    cube,
+    listed_in,
 )
-from accelstudy.design.optimal.criteria import Criterion, get_criterion, rivals
-from accelstudy.design.optimal.search import STARTS, Design, optimal_design
-from accelstudy.design.optimal.spaces import Mountings, Space, Sphere, by_eye, cube, listed_in
-from accelstudy.design.optimal.task import Task
+from accelstudy.design.task import Task
 from accelstudy.effects import get_effect
 from accelstudy.leveling.error import MAX_TILT_GON
-from accelstudy.proposal.worse_angle import WorseAngle, worse_angle
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise
@@ -116,9 +120,9 @@ class Request:
             neglected[effect.spec] = (
                 _positive(text, size, unit, "neglect") if size else effect.typical[1]
             )
-        own = {effect.spec for effect in model.effects}
+        in_model = {effect.spec for effect in model.effects}
         for spec in neglected:
-            if spec in own:
+            if spec in in_model:
                 raise InputError(f"the effect {spec!r} is in the model; it is not neglected")
         return Task(
             model,
@@ -133,10 +137,10 @@ class Request:
 
     @cached_property
     def _rivals(self) -> tuple[str, ...]:
-        found = tuple(get_effect(name).spec for name in self.discriminate or ())
-        if len(set(found)) < len(found):
-            raise InputError(f"discriminate: {found[0]!r} twice; give two effects")
-        return found
+        specs = tuple(get_effect(name).spec for name in self.discriminate or ())
+        if len(set(specs)) < len(specs):
+            raise InputError(f"discriminate: {specs[0]!r} twice; give two effects")
+        return specs
 
     @cached_property
     def chosen(self) -> Criterion:

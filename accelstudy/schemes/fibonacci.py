@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from accelstudy.positions.points import GOLDEN_ANGLE, fibonacci, shuffled, spiral
 from accelstudy.positions.scheme import Array
-from accelstudy.positions.sphere import GOLDEN_ANGLE, fibonacci, shuffled, spiral
 from accelstudy.schemes.registry import register
 
 register(

@@ -17,7 +17,7 @@ import numpy as np
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.names import check_path_name, path_name
-from accelstudy.files.layers import read_layer
+from accelstudy.files.reading import read_layer
 from accelstudy.positions.scheme import Scheme
 
 KEYS = ("scheme", "title", "source", "directions", "positions", "design")

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from accelstudy.positions.cube import corners, cyclic_permutations, edges, faces
+from accelstudy.positions.points import corners, cyclic_permutations, edges, faces
 from accelstudy.positions.scheme import Array
 from accelstudy.schemes.registry import register
 

@@ -66,10 +66,10 @@ def conversion_of(
         return Conversion(factor, zero)
     if scale is not None or offset is not None:
         raise InputError(f"a nominal scale or offset goes with unit counts, not {unit}")
-    known = {name: UNITS["m/s^2"][name] for name in ("m/s^2", "g")}
-    if unit not in known:
-        raise UnknownNameError("unit of a log", unit, (*known, "counts"))
-    return Conversion(np.full(3, known[unit]), np.zeros(3))
+    sizes = {name: UNITS["m/s^2"][name] for name in ("m/s^2", "g")}
+    if unit not in sizes:
+        raise UnknownNameError("unit of a log", unit, (*sizes, "counts"))
+    return Conversion(np.full(3, sizes[unit]), np.zeros(3))
 
 
 def _triple(value: ArrayLike, name: str) -> Array:

@@ -16,7 +16,7 @@ from typing import Any
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.effects import Effect, effect_names, get_effect
-from accelstudy.files.layers import read_layer
+from accelstudy.files.reading import read_layer
 from accelstudy.sensors.sensor import SensorModel
 
 MODEL_FILE = "model.yaml"
@@ -70,16 +70,16 @@ def get_model(text: str, extra: Mapping[str, Sequence[str]] | None = None) -> Se
         If an effect occurs twice, a setting cannot be read, or a file has not one model.
     """
     text = text.strip()
-    known = {**MODELS, **(extra or {})}
-    if text in known:
-        return compose(text, tuple(known[text]))
+    named = {**MODELS, **(extra or {})}
+    if text in named:
+        return compose(text, tuple(named[text]))
     if text and os.path.isfile(inside := os.path.join(text, MODEL_FILE)):
         raise InputError(f"{text}: a folder, not a model; take {inside}")
     if path := re.fullmatch(rf"(.*(?:\.ya?ml|[/{re.escape(os.sep)}].*?))(?::([\w-]+))?", text):
         return _model_of_file(path[1], path[2])
     parts = [part.strip() for part in re.split(r"\+(?![^()]*\))", text)]
     if len(parts) == 1 and not _is_effect(text):
-        raise UnknownNameError("model", text, known)
+        raise UnknownNameError("model", text, named)
     specs: list[str] = []
     for part in parts:
         if not part:
@@ -97,7 +97,7 @@ def composition_name(effects: Sequence[Effect]) -> str:
     `get_model` takes.
     """
     specs = tuple(effect.spec for effect in effects)
-    begins = [name for name, own in MODELS.items() if specs[: len(own)] == own]
+    begins = [name for name, effects_of in MODELS.items() if specs[: len(effects_of)] == effects_of]
     base = max(begins, key=lambda name: len(MODELS[name]), default=None)
     if base is None:
         return "+".join(specs)

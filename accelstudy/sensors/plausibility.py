@@ -68,7 +68,7 @@ def implausible_parameters(effects: Sequence[Effect], parameters: Array, sigma: 
     """
     doubt = CLEARLY * np.nan_to_num(np.asarray(sigma, dtype=float), posinf=0.0)
     values = iter(zip(np.asarray(parameters, dtype=float), doubt, strict=True))
-    found = []
+    descriptions = []
     for effect in effects:
         bound = largest(effect)
         for parameter in effect.parameters:
@@ -76,8 +76,10 @@ def implausible_parameters(effects: Sequence[Effect], parameters: Array, sigma: 
             if not abs(value) <= bound + uncertain:
                 shown, most = (number(float(to_display(v, parameter.unit))) for v in (value, bound))
                 unit = display_unit(parameter.unit)
-                found.append(f"{parameter.name} = {shown} {unit} (up to ± {most} is believed)")
-    return found
+                descriptions.append(
+                    f"{parameter.name} = {shown} {unit} (up to ± {most} is believed)"
+                )
+    return descriptions
 
 
 def implausible_tilt(roll: float, pitch: float) -> list[str]:

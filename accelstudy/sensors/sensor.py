@@ -21,7 +21,7 @@ from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import Effect, HoldConditions, Parameter, get_effect
 from accelstudy.sensors.trace import SensorTrace, trace_of
 from accelstudy.symbolic.algebra import sp
-from accelstudy.symbolic.tracing import TracedFunction
+from accelstudy.symbolic.tracing import TracedFunction, derivative
 
 
 @dataclass(frozen=True)
@@ -248,3 +248,24 @@ class SensorModel:
         g = np.asarray(g, dtype=float)
         result = self.trace.evaluate(function, force, output, parameters, self.settings, g, hold)
         return np.moveaxis(result[:, 0], 0, -1)
+
+
+def not_affine(model: SensorModel) -> tuple[str, ...]:
+    """Names of the effects that no matrix can hold.
+
+    Their output is not linear in the force, or depends on more than the force. Effects of the rig
+    do not count.
+    """
+    return tuple(
+        effect.name
+        for effect in model.effects
+        if effect.part == "sensor" and not _is_affine(type(effect))
+    )
+
+
+def _is_affine(kind: type[Effect]) -> bool:
+    trace = trace_of((kind,))
+    slopes = derivative(trace.h, trace.force).free_symbols
+    used = set().union(*(sp.sympify(part).free_symbols for part in trace.h))
+    conditions = {*trace.hold.values(), *trace.lagged.values()}
+    return not (slopes & {*trace.force, trace.g} or used & conditions)

@@ -33,7 +33,7 @@ class SensorTrace:
         effects = [_in_symbols(kind) for kind in kinds]
         parameters = [symbols(*(q.name for q in effect.parameters)) for effect in effects]
         self._effects = list(zip(effects, parameters, strict=True))
-        self.p = tuple(symbol for own in parameters for symbol in own)
+        self.p = tuple(symbol for of_effect in parameters for symbol in of_effect)
         self.settings = tuple(symbol for effect in effects for symbol in effect.settings.values())
 
         self.t_matrix = sp.eye(3)
@@ -69,8 +69,8 @@ class SensorTrace:
     @property
     def arguments(self) -> tuple[sp.Symbol, ...]:
         """Symbols in the order in which generated functions take them."""
-        known = (*self.hold.values(), *self.lagged.values())
-        return (*self.force, *self.output, *self.p, *self.settings, self.g, *known)
+        conditions = (*self.hold.values(), *self.lagged.values())
+        return (*self.force, *self.output, *self.p, *self.settings, self.g, *conditions)
 
     def evaluate(
         self,

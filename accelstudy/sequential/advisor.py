@@ -16,7 +16,7 @@ from accelstudy.campaign.calibration.fit import (
     check_campaign,
     initial_values,
 )
-from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.session import Campaign
 from accelstudy.design.estimability import is_blind
 from accelstudy.effects import HoldConditions
 from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE

@@ -26,14 +26,16 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import GON
 from accelstudy.design.estimability import rank_of
-from accelstudy.design.optimal.constraints import (
+from accelstudy.design.spaces import (
     Constraint,
     Constraints,
     OffPole,
     PitchRange,
     RollRange,
+    by_eye,
+    cube,
+    listed_in,
 )
-from accelstudy.design.optimal.spaces import by_eye, cube, listed_in
 from accelstudy.leveling.error import TiltError
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.sequential.promise import Promise, get_rule, rms_of

@@ -8,8 +8,7 @@ from pydantic import Field, model_validator
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
-from accelstudy.files.types import OneOrMore, Positive
-from accelstudy.files.validation import Block
+from accelstudy.files.validation import Block, OneOrMore, Positive
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.sequential.promise import get_rule

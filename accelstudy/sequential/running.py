@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.files.format import (
+from accelstudy.campaign.format import (
     campaign_of,
     columns_of,
     ignored_in,
@@ -18,8 +18,8 @@ from accelstudy.campaign.files.format import (
     read_header,
     table_of,
 )
-from accelstudy.campaign.files.header import COLUMNS, HEADER, Header
-from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.header import COLUMNS, HEADER, Header
+from accelstudy.campaign.session import Campaign
 from accelstudy.files.reading import read_text
 
 SETTLED = 3
@@ -52,7 +52,7 @@ def read_running(folder: str | Path, settled: str = "") -> Running:
     Raises
     ------
     InputError
-        As `accelstudy.campaign.files.format.read_campaign`, but not for positions that are not
+        As `accelstudy.campaign.format.read_campaign`, but not for positions that are not
         there yet.
     """
     folder = Path(folder)

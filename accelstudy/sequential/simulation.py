@@ -18,7 +18,7 @@ from accelstudy.basics.progress import track
 from accelstudy.basics.shares import clopper_pearson, sigmas_95
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
 from accelstudy.design.estimability import estimability
-from accelstudy.design.optimal.information import position_rows
+from accelstudy.design.task import position_rows
 from accelstudy.leveling.angles import angles_of
 from accelstudy.leveling.error import TiltError, tilt_error
 from accelstudy.schemes import get_scheme

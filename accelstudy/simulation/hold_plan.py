@@ -47,9 +47,9 @@ class HoldPlan:
     seed: int = 1
 
     def __post_init__(self) -> None:
-        for key, known in CHOICES.items():
-            if getattr(self, key) not in known:
-                raise UnknownNameError(key, getattr(self, key), known)
+        for key, choices in CHOICES.items():
+            if getattr(self, key) not in choices:
+                raise UnknownNameError(key, getattr(self, key), choices)
         if self.interval is not None:
             bounds.INTERVAL.check_key("interval", self.interval)
         for key, allowed in RANGES.items():

@@ -157,11 +157,11 @@ def session(
     f_b = -gravity * np.asarray(directions, dtype=float)
     angles = angles_of(f_b)
     roll, pitch = angles.T
-    known = replace(hold or HoldConditions(), roll=roll, pitch=pitch).with_steps(f_b)
+    hold_conditions = replace(hold or HoldConditions(), roll=roll, pitch=pitch).with_steps(f_b)
     return Session(
         f_b=f_b,
-        forces=model.sense(f_b, parameters, gravity, known),
-        angles=angles + model.reading_errors(angles, parameters, known),
+        forces=model.sense(f_b, parameters, gravity, hold_conditions),
+        angles=angles + model.reading_errors(angles, parameters, hold_conditions),
         gravity=gravity,
-        hold=known,
+        hold=hold_conditions,
     )

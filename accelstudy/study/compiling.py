@@ -18,8 +18,7 @@ from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
 from importlib.util import find_spec
 
-from accelstudy.adjustment.block import Block
-from accelstudy.adjustment.calibration import calibrate
+from accelstudy.adjustment.calibration import Block, calibrate
 from accelstudy.adjustment.observations import Observations
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError

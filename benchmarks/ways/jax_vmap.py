@@ -56,7 +56,7 @@ class Vmap(Way):
 
 
 def _inner(equations):
-    return equations.trace.newton_step if equations.told is None else equations.sensitive
+    return equations.trace.newton_step if equations.known_force is None else equations.sensitive
 
 
 def _function(traced):
@@ -82,7 +82,7 @@ def _fit(equations, inner, linear, observed, cofactors, gravity):
         known = {trace.g: gravity, **unused}
         known |= zip((*trace.p, *equations.observations), (*x, *adjusted), strict=True)
         known |= zip(trace.force, f_a, strict=True)
-        f_a = inner(n, known)[:, 0] + (f_a if equations.told is None else 0.0)
+        f_a = inner(n, known)[:, 0] + (f_a if equations.known_force is None else 0.0)
         values = linear(n, known | dict(zip(trace.force, f_a, strict=True)))
         psi, a, b = values[:, 0], values[:, 1 : 1 + u], values[:, 1 + u :]
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from accelstudy.adjustment import calibrate
-from accelstudy.adjustment.block import Block
+from accelstudy.adjustment.calibration import Block
 from accelstudy.kernel import calibrate as kernel
 from problem import MODEL
 from ways.base import Way, register

@@ -6,9 +6,8 @@ from schemas import blocks
 from accelstudy.campaign.batch.config import BatchConfig
 from accelstudy.diagnosis.round_trip import RoundTrip
 from accelstudy.field.config import FieldConfig
-from accelstudy.hidden.study.config import HiddenConfig
-from accelstudy.plan.batch.config import PlanConfig
-from accelstudy.plan.batch.example import Example
+from accelstudy.hidden.config import HiddenConfig
+from accelstudy.plan.config import Example, PlanConfig
 from accelstudy.pole.config import PoleConfig
 from accelstudy.proposal.config import DesignsConfig
 from accelstudy.sequential.config import SequentialConfig

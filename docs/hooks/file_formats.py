@@ -6,7 +6,7 @@ import yaml
 from markdown_text import code, page, table
 from schemas import blocks
 
-from accelstudy.campaign.files.header import COLUMNS, COUNTING, HEADER, RANGES, Header
+from accelstudy.campaign.header import COLUMNS, COUNTING, HEADER, RANGES, Header
 
 HERE = Path(__file__).parent
 UNITS = {

@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from quality_helpers import BOTH, GRAVITY, NINE, ROBOT, STANDARD_ERRORS, one
 from scipy.spatial.transform import Rotation
 from scipy.stats import kstest, norm, t
+from study_helpers import PAPER_TRUTH
 
 from accelstudy.adjustment import CalibrationEquations, FunctionConditions, adjust, calibrate
 from accelstudy.approaches import get_approach
@@ -33,18 +35,13 @@ from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise, session
 
 G = STANDARD_GRAVITY
-NINE = get_model("bias-scale-nonorthogonality")
-GRAVITY, ROBOT = get_approach("gravity"), get_approach("robot")
-BOTH = pytest.mark.parametrize("approach", [GRAVITY, ROBOT], ids=lambda a: a.name)
 # Thalmann & Neuner (2018), section 4; other effects get what is typical of them.
 TRUTH = {
-    **{"b_x": 0.05, "b_y": 0.01, "b_z": 0.03, "s_x": 200e-6, "s_y": 200e-6, "s_z": 200e-6},
-    **{"alpha_yz": 12 * MGON, "alpha_zy": 12 * MGON, "alpha_zx": 44 * MGON},
+    **PAPER_TRUTH,
     **{"alpha_xz": 20 * MGON, "alpha_xy": -15 * MGON, "alpha_yx": 30 * MGON},
     **{"k2_x": 300e-6, "k2_y": -200e-6, "k2_z": 100e-6},
     **{"k3_x": -400e-6, "k3_y": 500e-6, "k3_z": 300e-6},
 }
-STANDARD_ERRORS = 4.5
 
 
 def true_session(scheme="mclaren-24", model=NINE, hold=None, gravity=G, **more):
@@ -631,13 +628,7 @@ def test_a_replicate_does_not_depend_on_its_batch():
     again = calibrate(NINE, ROBOT, observed)
     assert np.array_equal(together.parameters, again.parameters)
     for i in (0, 31, 59):
-        one = replace(
-            observed,
-            forces=observed.forces[i : i + 1],
-            angles=observed.angles[i : i + 1],
-            gravity=observed.gravity[i : i + 1],
-        )
-        alone = calibrate(NINE, ROBOT, one)
+        alone = calibrate(NINE, ROBOT, one(observed, i))
         np.testing.assert_allclose(alone.parameters[0], together.parameters[i], rtol=1e-9)
         np.testing.assert_allclose(alone.omega[0], together.omega[i], rtol=1e-10)
 

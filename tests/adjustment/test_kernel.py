@@ -4,12 +4,12 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from quality_helpers import GRAVITY, NINE, ROBOT
 from study_helpers import grid, make_cells, simulated
 
 from accelstudy import adjustment
-from accelstudy.adjustment.block import Block
+from accelstudy.adjustment.calibration import Block
 from accelstudy.adjustment.equations import equations_of
-from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.effects import HoldConditions, effect_names
 from accelstudy.files.kept import kept_in
@@ -27,8 +27,6 @@ from accelstudy.kernel import calibrate, compiled
 from accelstudy.kernel.formulas import Formulas
 from accelstudy.kernel.lanes import LANES, Code
 
-GRAVITY, ROBOT = get_approach("gravity"), get_approach("robot")
-NINE = get_model("bias-scale-nonorthogonality")
 ODD = get_model("bias+scale+saturation(knee=8)+warm_up(tau=500)")
 
 

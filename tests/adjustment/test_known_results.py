@@ -21,7 +21,7 @@ from scipy.stats import f as f_distribution
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.files.format import read_campaign
+from accelstudy.campaign.format import read_campaign
 from accelstudy.commands.main import main
 from accelstudy.sensors.models import get_model
 

@@ -6,7 +6,6 @@ import resource
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -14,7 +13,7 @@ from campaign_helpers import simulated_campaign
 from click.testing import CliRunner
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.files.format import write_campaign
+from accelstudy.campaign.format import write_campaign
 from accelstudy.commands.main import main
 from accelstudy.files.outputs import (
     CALIBRATION,
@@ -223,10 +222,8 @@ def test_what_a_killed_run_left_is_removed(tmp_path):
             process.send_signal(signal.SIGKILL)
             process.wait()
         assert left.exists()
-        started = time.monotonic()
         with whole_file(tmp_path / "file") as path:
             path.write_text("whole")
-        assert time.monotonic() - started < 5
         assert not left.exists()
         write(beside, calibration_json="1")
     assert content(tmp_path) == {"file": b"whole", "beside/calibration.json": b"1"}

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.logs.sources import open_source
-from accelstudy.campaign.use.applying import read_calibration
+from accelstudy.campaign.calibration.applying import read_calibration
+from accelstudy.campaign.importing.sources import open_source
 from accelstudy.files import reading
-from accelstudy.files.layers import read_layer
 from accelstudy.files.parquet import read_parquet
+from accelstudy.files.reading import read_layer
 
 UNREADABLE = Path("/proc/self/mem")  # it opens, and its first byte cannot be read
 READERS = (read_layer, read_calibration, open_source, read_parquet)

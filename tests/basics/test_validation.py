@@ -8,7 +8,7 @@ from places import ROOT
 from pydantic import BaseModel, Field
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.files.header import LogLayout
+from accelstudy.campaign.header import LogLayout
 from accelstudy.files.validation import WORDS, Block, checked
 
 

@@ -18,7 +18,7 @@ from test_import_holds import session, write
 import accelstudy
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
-from accelstudy.campaign.batch.config import Task, parse_batch, read_batch
+from accelstudy.campaign.batch.config import Task, parse_batch
 from accelstudy.campaign.batch.overview import (
     CAMPAIGN_COLUMNS,
     PARAMETER_COLUMNS,
@@ -26,9 +26,10 @@ from accelstudy.campaign.batch.overview import (
     summarise_campaigns,
 )
 from accelstudy.campaign.batch.run import run_task
-from accelstudy.campaign.files.format import write_campaign
+from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.importing import public
 from accelstudy.campaign.importing.public import public_data, record_public
+from accelstudy.files.reading import read_layer
 from accelstudy.files.tables import read_origin, read_table
 from accelstudy.jobs.code import code_hash
 
@@ -58,6 +59,19 @@ def jobs(text):
 def calibrated(text):
     """Campaigns that a run has calibrated."""
     return set(re.findall(r"^Job \d+: Calibrate (\S+)$", text, re.MULTILINE))
+
+
+def task_of(**entry):
+    """The one campaign of a batch."""
+    (task,) = parse_batch({"batch": "b", "campaigns": [entry]}).tasks()
+    return task
+
+
+def summarised(folder, results, batch="b"):
+    """Tables of campaigns and of parameters, and the page, of results in folders."""
+    paths = [folder / name for name in ("c.parquet", "p.parquet", "overview.html")]
+    summarise_campaigns(batch, results, *paths, {"config_hash": "0", "seed": None})
+    return read_table(paths[0]), read_table(paths[1]), paths[2].read_text(encoding="utf-8")
 
 
 def write_log(folder):
@@ -189,10 +203,8 @@ def test_a_calibration_that_no_sensor_has_is_not_among_the_calibrated(made, tmp_
         content = json.loads(path.read_text(encoding="utf-8"))
         content["quality"] |= {"state": state, "verdict": f"Why it is {state}."}
         path.write_text(json.dumps(content), encoding="utf-8")
-    outputs = [tmp_path / name for name in ("c.parquet", "p.parquet", "overview.html")]
-    table = summarise_campaigns("doubt", folders, *outputs, {"config_hash": "", "seed": None})
+    table, _, page = summarised(tmp_path, folders, "doubt")
     assert counts(table) == "1 of 3 campaigns calibrated, 1 implausible"
-    page = outputs[2].read_text(encoding="utf-8")
     assert "3 campaigns: 1 calibrated, 1 implausible, 1 not calibrated." in text_of(page)
     before, after = page.split("<h2>Calibrated</h2>")
     assert "Why it is implausible." in before
@@ -206,7 +218,7 @@ def test_a_calibration_that_no_sensor_has_is_not_among_the_calibrated(made, tmp_
 def test_origin(made, monkeypatch):
     monkeypatch.chdir(made)  # where the pattern of folders is looked up
     results = made / "results" / "bench"
-    expected = read_batch(made / "batch.yaml").fingerprint
+    expected = parse_batch(read_layer(made / "batch.yaml")).fingerprint
     for name in ("campaigns", "parameters"):
         assert read_origin(results / f"{name}.parquet")["config_hash"] == expected
 
@@ -286,8 +298,8 @@ def test_code_on_which_it_depends(tmp_path, monkeypatch):
     expected = {
         "campaign/calibration/fit.py": {"calibrate"},
         "campaign/batch/overview.html.j2": {"calibrate", "overview"},
-        "adjustment/quality/positions.py": {"calibrate"},
-        "campaign/calibration/states.py": {"calibrate", "overview"},
+        "adjustment/quality/tests.py": {"calibrate"},
+        "basics/levels.py": {"calibrate", "overview"},
         "effects/bias.py": {*stages},
         "study/monte_carlo/simulate.py": {"simulate"},
         "commands/main.py": set(),
@@ -349,11 +361,7 @@ def test_public_data_from_a_folder_that_has_them(tmp_path, monkeypatch):
         record_public(task.source, batch.public_folder, f"{task.name}.json", 1)
     errors = {task.name: run_task(task, task.name, f"{task.name}.json") for task in batch.tasks()}
     assert errors["ferraris-annotated"].startswith("6 positions do not determine the model")
-    paths = [Path(name) for name in ("campaigns.parquet", "parameters.parquet", "overview.html")]
-    summarise_campaigns(
-        "public", [Path(e) for e in errors], *paths, {"config_hash": "0", "seed": None}
-    )
-    table = read_table(paths[0]).set_index("campaign")
+    table = summarised(tmp_path, [tmp_path / name for name in errors])[0].set_index("campaign")
     assert table["status"].tolist() == ["ok", "ok", "failed"]
     assert table.loc["innalabs-24", "rms_norm_residual_mps2"] == pytest.approx(
         0.4256e-3 * 9.80665, rel=1e-3
@@ -367,7 +375,7 @@ def test_public_data_from_a_folder_that_has_them(tmp_path, monkeypatch):
 
 
 def test_the_bundled_batch():
-    batch = read_batch(ROOT / "config" / "campaigns.yaml")
+    batch = parse_batch(read_layer(ROOT / "config" / "campaigns.yaml"))
     sources = [task.source for task in batch.tasks()]
     assert set(sources) <= {*public_data()}
     assert len(set(sources)) >= 5
@@ -378,7 +386,7 @@ def test_the_bundled_batch():
 
 def test_settings_of_public_data_can_be_overlaid():
     entry = {"public": "mpu6050", "name": "slow", "import": {"threshold_mps2": 0.2}}
-    (task,) = parse_batch({"batch": "b", "campaigns": [entry]}).tasks()
+    task = task_of(**entry)
     assert (task.name, task.settings.name, task.settings.unit) == ("slow", "slow", "counts")
     assert task.settings.threshold_mps2 == 0.2
     assert Task.model_validate(task.model_dump(mode="json")) == task
@@ -452,37 +460,28 @@ def test_without_configuration(tmp_path):
 @pytest.mark.parametrize(("gravity", "error"), [(9.80, None), (98.0, "does not fit the forces")])
 def test_a_gravity_of_its_own(tmp_path, gravity, error):
     write_campaign(simulated_campaign(TRUTH), tmp_path / "a")
-    content = {"gravity": {"value_mps2": gravity}, "campaign": str(tmp_path / "a")}
-    (task,) = parse_batch({"batch": "b", "campaigns": [content]}).tasks()
-    found = run_task(task, tmp_path / "out")
+    task = task_of(gravity={"value_mps2": gravity}, campaign=str(tmp_path / "a"))
+    refused = run_task(task, tmp_path / "out")
     if error is not None:
-        assert error in found
+        assert error in refused
     else:
         path = tmp_path / "out" / "calibration.json"
         assert json.loads(path.read_text(encoding="utf-8"))["gravity_mps2"] == gravity
 
 
 def test_all_failed(tmp_path):
-    content = {"batch": "b", "campaigns": [{"campaign": str(tmp_path / "none")}]}
-    (task,) = parse_batch(content).tasks()
-    error = run_task(task, tmp_path / "out")
-    assert "no such folder" in error
-    paths = [tmp_path / name for name in ("c.parquet", "p.parquet", "o.html")]
-    provenance = {"config_hash": "0", "seed": None}
-    summarise_campaigns("b", [tmp_path / "out"], *paths, provenance)
-    assert read_table(paths[0]).dtypes.astype(str).to_dict() == CAMPAIGN_COLUMNS
-    assert read_table(paths[1]).empty
-    assert "Calibrated" not in paths[2].read_text(encoding="utf-8")
+    assert "no such folder" in run_task(task_of(campaign=str(tmp_path / "none")), tmp_path / "out")
+    campaigns, parameters, page = summarised(tmp_path, [tmp_path / "out"])
+    assert campaigns.dtypes.astype(str).to_dict() == CAMPAIGN_COLUMNS
+    assert parameters.empty
+    assert "Calibrated" not in page
 
 
 def test_what_a_page_shows_is_escaped(tmp_path):
-    content = {"batch": "b", "campaigns": [{"campaign": str(tmp_path / "<i>&")}]}
-    (task,) = parse_batch(content).tasks()
+    task = task_of(campaign=str(tmp_path / "<i>&"))
     assert task.name == "i-"
     run_task(task, tmp_path / "out")
-    paths = [tmp_path / name for name in ("c.parquet", "p.parquet", "o.html")]
-    summarise_campaigns("b", [tmp_path / "out"], *paths, {"config_hash": "0", "seed": None})
-    page = paths[2].read_text(encoding="utf-8")
+    page = summarised(tmp_path, [tmp_path / "out"])[2]
     assert "<i>" not in page
     assert "&lt;i&gt;&amp;: no such folder" in page
 
@@ -490,8 +489,7 @@ def test_what_a_page_shows_is_escaped(tmp_path):
 def test_an_error_that_nobody_has_foreseen_stops_no_other(tmp_path, monkeypatch):
     """Nor what was written before it, half a calibration, is left."""
     write_campaign(simulated_campaign({"b_x": 0.05}), tmp_path / "campaign")
-    content = {"batch": "b", "campaigns": [{"campaign": str(tmp_path / "campaign")}]}
-    (task,) = parse_batch(content).tasks()
+    task = task_of(campaign=str(tmp_path / "campaign"))
 
     def broken(fit, folder):
         (folder / "report.html").write_text("half")

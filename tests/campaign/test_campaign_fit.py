@@ -16,13 +16,13 @@ from places import DATA
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
 from accelstudy.campaign.calibration.assessment import assess
+from accelstudy.campaign.calibration.document import GAUGES, affine_form, in_gauge
+from accelstudy.campaign.calibration.export import device_matrix, export
 from accelstudy.campaign.calibration.fit import fit_campaign, initial_values
-from accelstudy.campaign.calibration.gauges import GAUGES, affine_form, in_gauge
 from accelstudy.campaign.calibration.sigma_check import check_sigmas
 from accelstudy.campaign.calibration.wording import verdict_lines
-from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.session import Campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.campaign.use.export import device_matrix, export
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
-from accelstudy.campaign.files.format import read_campaign, write_campaign
-from accelstudy.campaign.files.header import LogLayout
-from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.format import read_campaign, write_campaign
+from accelstudy.campaign.header import LogLayout
+from accelstudy.campaign.session import Campaign
 from accelstudy.leveling.angles import specific_force
 from accelstudy.sensors.conversion import Conversion
 
@@ -254,12 +254,23 @@ def test_tolerated_ways_of_writing_csv(tmp_path):
     assert_same(read_campaign(tmp_path), campaign())
 
 
-# Bad input: the file, what is done to it, and what the message must say.
+# Bad input: what is done to a file, which the message must name, and what else it must say.
+
+
+def in_file(name):
+    """Decorator of a change of one file."""
+
+    def named(change):
+        change.file = name
+        return change
+
+    return named
 
 
 def header(**changes):
     """Change keys of campaign.yaml; None removes one."""
 
+    @in_file("campaign.yaml")
     def change(folder):
         path = folder / "campaign.yaml"
         content = yaml.safe_load(path.read_text()) | changes
@@ -271,6 +282,7 @@ def header(**changes):
 def columns(**changes):
     """Change columns of the table, by a function of the old one; None removes one."""
 
+    @in_file("positions.csv")
     def change(folder):
         path = folder / "positions.csv"
         rows = [line.split(",") for line in path.read_text().splitlines()]
@@ -295,6 +307,7 @@ def times(factor):
 
 
 def text(name, content):
+    @in_file(name)
     def change(folder):
         (folder / name).write_bytes(content if isinstance(content, bytes) else content.encode())
 
@@ -302,6 +315,7 @@ def text(name, content):
 
 
 def cut(name, share):
+    @in_file(name)
     def change(folder):
         content = (folder / name).read_bytes()
         (folder / name).write_bytes(content[: int(share * len(content))])
@@ -314,6 +328,8 @@ def remove(name):
 
 
 def both(*changes):
+    """Several changes, or one of which the message names another file."""
+
     def change(folder):
         for one in changes:
             one(folder)
@@ -321,39 +337,31 @@ def both(*changes):
     return change
 
 
-POSITIONS, YAML = "positions.csv: ", "campaign.yaml: "
 ROBOT_COLUMNS = ("roll_robot_gon", "pitch_robot_gon", "yaw_robot_gon")
 
 BAD = {
     "no header": (remove("campaign.yaml"), "campaign.yaml", "no such file"),
     "no table": (remove("positions.csv"), "no table", "positions.csv or positions.parquet"),
-    "two tables": (text("positions.parquet", ""), "two tables", "either positions.csv or"),
-    "no YAML": (text("campaign.yaml", "a: [1"), YAML, "not valid YAML", "line 1"),
-    "odd tag": (text("campaign.yaml", "a: !!int ''"), YAML, "tag does not fit"),
-    "empty YAML": (text("campaign.yaml", ""), YAML, "not a mapping"),
-    "unknown key": (header(sensr="x"), YAML, "sensr: unknown key", "did you mean 'sensor'"),
+    "two tables": (both(text("positions.parquet", "")), "two tables", "either positions.csv or"),
+    "no YAML": (text("campaign.yaml", "a: [1"), "not valid YAML", "line 1"),
+    "odd tag": (text("campaign.yaml", "a: !!int ''"), "tag does not fit"),
+    "empty YAML": (text("campaign.yaml", ""), "not a mapping"),
+    "unknown key": (header(sensr="x"), "sensr: unknown key", "did you mean 'sensor'"),
     "unknown key below": (
         header(gravity={"value_mps2": 9.8, "sigma": 0}),
-        YAML,
         "gravity.sigma: unknown key",
         "did you mean 'sigma_mps2'",
     ),
-    "version": (
-        header(schema_version=2),
-        YAML,
-        "schema_version",
-        "2 is of a newer version",
-    ),
-    "version true": (header(schema_version=True), YAML, "schema_version", "not true"),
-    "no version": (header(schema_version=None), YAML, "schema_version", "must be given"),
-    "no name": (header(name=None), YAML, "name", "must be given"),
-    "number for a name": (header(name=2014), YAML, "name", "not 2014"),
-    "unit": (header(unit="mg"), YAML, "unit", "'m/s^2', 'g' or 'counts'", "not 'mg'"),
-    "no gravity": (header(gravity={}), YAML, "gravity.value_mps2", "must be given"),
-    "negative gravity": (header(gravity={"value_mps2": -9.81}), YAML, "from 0.001 to 1000"),
+    "version": (header(schema_version=2), "schema_version", "2 is of a newer version"),
+    "version true": (header(schema_version=True), "schema_version", "not true"),
+    "no version": (header(schema_version=None), "schema_version", "must be given"),
+    "no name": (header(name=None), "name", "must be given"),
+    "number for a name": (header(name=2014), "name", "not 2014"),
+    "unit": (header(unit="mg"), "unit", "'m/s^2', 'g' or 'counts'", "not 'mg'"),
+    "no gravity": (header(gravity={}), "gravity.value_mps2", "must be given"),
+    "negative gravity": (header(gravity={"value_mps2": -9.81}), "from 0.001 to 1000"),
     "infinite gravity": (
         header(gravity={"value_mps2": float("inf")}),
-        YAML,
         "from 0.001 to 1000 m/s², not inf",
     ),
     "gravity in g": (header(gravity={"value_mps2": 1}), "gravity.value_mps2: 1", "some 9.8"),
@@ -361,11 +369,10 @@ BAD = {
         header(gravity={"value_mps2": 9.81, "sigma_mps2": -1}),
         "gravity.sigma_mps2",
     ),
-    "no noise at all": (header(sensor_noise={"sigma_mps2": 0}), YAML, "sensor_noise.sigma_mps2"),
-    "counts without nominal": (header(unit="counts"), YAML, "nominal: missing"),
+    "no noise at all": (header(sensor_noise={"sigma_mps2": 0}), "sensor_noise.sigma_mps2"),
+    "counts without nominal": (header(unit="counts"), "nominal: missing"),
     "nominal without counts": (
         header(nominal={"scale": [1, 1, 1], "offset": [0, 0, 0]}),
-        YAML,
         "nominal: goes with unit: counts, not with unit: m/s^2",
     ),
     "two scales": (
@@ -378,41 +385,32 @@ BAD = {
         "nominal.scale.1",
         "zero",
     ),
-    "empty CSV": (text("positions.csv", ""), POSITIONS, "empty", "position, fx, fy, fz"),
-    "names only": (text("positions.csv", "position,fx,fy,fz\n"), POSITIONS, "no positions"),
-    "truncated CSV": (cut("positions.csv", 0.7), POSITIONS, "line", "columns", "whole"),
-    "no text": (text("positions.csv", b"\xff\xfe\x00a"), POSITIONS, "UTF-8"),
-    "open quote": (text("positions.csv", 'position,"fx'), POSITIONS, "not a whole CSV"),
-    "semicolons": (text("positions.csv", "position;fx;fy;fz\n"), POSITIONS, "';'", "comma"),
-    "twice": (text("positions.csv", "position,fx,fx\n1,2,3\n"), POSITIONS, "'fx'", "twice"),
-    "no fy": (columns(fy=None), POSITIONS, "fy: the column is missing", "fx, fz"),
+    "empty CSV": (text("positions.csv", ""), "empty", "position, fx, fy, fz"),
+    "names only": (text("positions.csv", "position,fx,fy,fz\n"), "no positions"),
+    "truncated CSV": (cut("positions.csv", 0.7), "line", "columns", "whole"),
+    "no text": (text("positions.csv", b"\xff\xfe\x00a"), "UTF-8"),
+    "open quote": (text("positions.csv", 'position,"fx'), "not a whole CSV"),
+    "semicolons": (text("positions.csv", "position;fx;fy;fz\n"), "';'", "comma"),
+    "twice": (text("positions.csv", "position,fx,fx\n1,2,3\n"), "'fx'", "twice"),
+    "no fy": (columns(fy=None), "fy: the column is missing", "fx, fz"),
     "other case": (columns(fx=None, Fx=lambda old: [1] * 8), "fx:", "is 'Fx' meant"),
-    "no positions": (columns(position=None), POSITIONS, "position: the column is missing"),
-    "word": (columns(fx=at(3, "abc")), POSITIONS, "fx: position 3: 'abc' is no number"),
+    "no positions": (columns(position=None), "position: the column is missing"),
+    "word": (columns(fx=at(3, "abc")), "fx: position 3: 'abc' is no number"),
     "decimal comma": (columns(fx=at(3, '"9"";8"')), "position 3", "is no number"),
     "underscore": (columns(fx=at(3, "9_8")), "fx: position 3: '9_8' is no number"),
-    "gap": (columns(fz=at(2, "")), POSITIONS, "fz: position 2: empty"),
-    "nan": (columns(fx=at(4, "nan")), POSITIONS, "fx: position 4: nan is not finite"),
-    "inf": (columns(sd_fx=at(4, "-inf")), POSITIONS, "sd_fx: position 4: -inf is not finite"),
-    "overflow": (columns(fx=at(4, "1e999")), POSITIONS, "fx: position 4", "not finite"),
-    "stuck channel": (columns(fy=lambda old: [1.5] * 8), POSITIONS, "fy: 1.5 in all positions"),
-    "same position": (columns(position=at(3, 2)), POSITIONS, "position: position 2: 2 follows"),
-    "unordered": (columns(position=lambda old: old[::-1]), POSITIONS, "position 7", "acquisition"),
-    "position zero": (
-        columns(position=at(1, 0)),
-        POSITIONS,
-        "position 0: must be from 1 to",
-        "not 0",
-    ),
-    "half a position": (columns(position=at(3, 2.5)), POSITIONS, "2.5 is no whole number"),
-    "no samples": (
-        columns(n_samples=at(2, 0)),
-        POSITIONS,
-        "n_samples: position 2: must be from 1 to",
-    ),
+    "gap": (columns(fz=at(2, "")), "fz: position 2: empty"),
+    "nan": (columns(fx=at(4, "nan")), "fx: position 4: nan is not finite"),
+    "inf": (columns(sd_fx=at(4, "-inf")), "sd_fx: position 4: -inf is not finite"),
+    "overflow": (columns(fx=at(4, "1e999")), "fx: position 4", "not finite"),
+    "stuck channel": (columns(fy=lambda old: [1.5] * 8), "fy: 1.5 in all positions"),
+    "same position": (columns(position=at(3, 2)), "position: position 2: 2 follows"),
+    "unordered": (columns(position=lambda old: old[::-1]), "position 7", "acquisition"),
+    "position zero": (columns(position=at(1, 0)), "position 0: must be from 1 to", "not 0"),
+    "half a position": (columns(position=at(3, 2.5)), "2.5 is no whole number"),
+    "no samples": (columns(n_samples=at(2, 0)), "n_samples: position 2: must be from 1 to"),
     "many samples": (columns(n_samples=at(2, 1e300)), "n_samples: position 2", "not 1e+300"),
-    "negative sd": (columns(sd_fy=at(5, -0.1)), POSITIONS, "sd_fy: position 5: must be from 0 to"),
-    "one sd": (columns(sd_fx=None), POSITIONS, "sd_fx: the column is missing", "sd_fy, sd_fz"),
+    "negative sd": (columns(sd_fy=at(5, -0.1)), "sd_fy: position 5: must be from 0 to"),
+    "one sd": (columns(sd_fx=None), "sd_fx: the column is missing", "sd_fy, sd_fz"),
     "too cold": (
         columns(temperature_degC=at(1, -300)),
         "temperature_degC: position 1: ",
@@ -423,51 +421,45 @@ BAD = {
         "vibration_mps2: position 1: ",
         "not -1",
     ),
-    "time runs back": (columns(time_s=at(4, 15)), POSITIONS, "time_s: position 4: 15 is before"),
+    "time runs back": (columns(time_s=at(4, 15)), "time_s: position 4: 15 is before"),
     "roll only": (
         columns(pitch_robot_gon=None),
-        POSITIONS,
         "pitch_robot_gon: the column is missing (it goes with roll_robot_gon)",
     ),
     "yaw only": (
         both(header(robot=None), columns(pitch_robot_gon=None, roll_robot_gon=None)),
-        POSITIONS,
-        "yaw_robot_gon: goes with roll_robot_gon and pitch_robot_gon",
+        "positions.csv: yaw_robot_gon: goes with roll_robot_gon and pitch_robot_gon",
     ),
     "robot without sigma": (header(robot=None), "robot.angle_sigma_mgon: missing"),
     "sigma without robot": (
-        columns(**dict.fromkeys(ROBOT_COLUMNS)),
+        both(columns(**dict.fromkeys(ROBOT_COLUMNS))),
         "robot.angle_sigma_mgon: is given, but positions.csv has no roll_robot_gon",
     ),
     "degrees": (
         columns(roll_robot_gon=times(0.9), pitch_robot_gon=times(0.9)),
-        POSITIONS,
         "roll_robot_gon, pitch_robot_gon: the angles look like degrees, not gon",
     ),
     "radians": (
         columns(roll_robot_gon=times(GON), pitch_robot_gon=times(GON)),
-        POSITIONS,
         "look like radians, not gon",
     ),
     "opposite sign": (
         columns(fx=times(-1), fy=times(-1), fz=times(-1)),
-        POSITIONS,
         "opposite sign",
         "(0, 0, -g)",
     ),
     "g for m/s^2": (
         columns(fx=times(1 / G), fy=times(1 / G), fz=times(1 / G)),
-        POSITIONS,
         "norm is about 1",
         "looks like g, not m/s^2",
     ),
-    "m/s^2 for g": (header(unit="g"), "looks like m/s^2, not g", "`unit` in campaign.yaml"),
+    "m/s^2 for g": (both(header(unit="g")), "looks like m/s^2, not g", "`unit` in campaign.yaml"),
     "counts for m/s^2": (
         columns(fx=times(1e3), fy=times(1e3), fz=times(1e3)),
         "looks like counts, not m/s^2",
     ),
     "m/s^2 for counts": (
-        header(unit="counts", nominal={"scale": [0.01] * 3, "offset": [0, 0, 0]}),
+        both(header(unit="counts", nominal={"scale": [0.01] * 3, "offset": [0, 0, 0]})),
         "looks like m/s^2, not counts",
     ),
     "wrong nominal": (
@@ -475,7 +467,7 @@ BAD = {
             header(unit="counts", nominal={"scale": [0.01] * 3, "offset": [0, 0, 0]}),
             columns(fx=times(400), fy=times(400), fz=times(400)),
         ),
-        POSITIONS,
+        "positions.csv: ",
         "nowhere near gravity",
         "`nominal`",
     ),
@@ -500,6 +492,7 @@ def test_bad_input_ends_with_one_line_that_says_where(tmp_path, change, parts):
     message = str(caught.value)
     assert "\n" not in message
     assert str(tmp_path) in message
+    assert not hasattr(change, "file") or f"{change.file}: " in message
     for part in parts:
         assert part in message
 

@@ -7,13 +7,13 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
+from campaign_helpers import refusal, succeed
 from places import DATA
 
 from accelstudy.basics.errors import InputError, UnknownNameError
-from accelstudy.campaign.files.format import read_campaign
+from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.importing import public
-from accelstudy.campaign.importing.logs import import_file
+from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.public import (
     PublicData,
     fetch,
@@ -24,7 +24,6 @@ from accelstudy.campaign.importing.public import (
     read_record,
     record_public,
 )
-from accelstudy.commands.main import main
 
 CONTENT = bytes(range(256)) * 64
 
@@ -124,24 +123,21 @@ N_POSITIONS = {
 @needs_data
 @pytest.mark.parametrize("name", [name for name in public_data() if public_data()[name].settings])
 def test_the_registry_imports_the_files(name):
-    campaign, _ = import_file(public_file(name, DATA), import_settings(name))
+    campaign, _ = import_log(public_file(name, DATA), import_settings(name))
     assert campaign.name == name
     assert campaign.n_positions == N_POSITIONS.get(name, campaign.n_positions)
 
 
 @needs_data
 def test_command(tmp_path):
-    arguments = ["public", "mpu6050", "--out", tmp_path / "out", "--folder", DATA]
-    result = CliRunner().invoke(main, list(map(str, arguments)))
-    assert result.exit_code == 0, result.output
+    result = succeed("public", "mpu6050", "--out", tmp_path / "out", "--folder", DATA)
     assert "holds: 10" in result.output
     assert read_campaign(tmp_path / "out").sensor == "MPU-6050"
     assert (tmp_path / "out" / "segmentation.png").exists()
 
 
 def test_command_lists():
-    result = CliRunner().invoke(main, ["public"])
-    assert result.exit_code == 0
+    result = succeed("public")
     for name, entry in public_data().items():
         assert f"{name}: {entry.description}\n    {entry.licence}, {entry.url}\n" in result.output
 
@@ -155,10 +151,7 @@ def test_command_lists():
     ],
 )
 def test_command_refuses(arguments, message):
-    result = CliRunner().invoke(main, ["public", *arguments])
-    assert result.exit_code == 2
-    assert result.output.startswith("error: ")
-    assert message in result.output
+    assert message in refusal("public", *arguments)
 
 
 def test_an_unknown_name(tmp_path):

@@ -11,13 +11,13 @@ from campaign_helpers import GRAVITY, NINE, simulated_campaign
 
 from accelstudy.adjustment import Observations, calibrate
 from accelstudy.basics.errors import InputError
+from accelstudy.campaign.calibration.applying import read_calibration
 from accelstudy.campaign.calibration.document import calibration_document
 from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.calibration.leveling import level_log
 from accelstudy.campaign.calibration.sigma_check import check_sigmas, what_it_finds
 from accelstudy.campaign.calibration.wording import interval_words
-from accelstudy.campaign.files.session import Campaign
-from accelstudy.campaign.use.applying import read_calibration
-from accelstudy.campaign.use.leveling import level_log
+from accelstudy.campaign.session import Campaign
 from accelstudy.simulation.sessions import Noise
 
 G, SIGMA, SESSIONS = 9.81, 0.002, 4000

@@ -22,7 +22,7 @@ from test_campaign_format import damages, edits
 
 from accelstudy.campaign.calibration.document import calibration_document
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.files.format import read_campaign, write_campaign
+from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.commands.main import main
 
 LOG = pd.DataFrame(np.random.default_rng(1).normal(0, 5, (30, 3)), columns=["fx", "fy", "fz"])

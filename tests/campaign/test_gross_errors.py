@@ -10,7 +10,7 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.files.format import read_campaign, write_campaign
+from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.gross_errors import get_gross_error, gross_error_names
 from accelstudy.campaign.gross_errors.axis_error import SIGNED_PERMUTATIONS
 from accelstudy.campaign.gross_errors.recognition import recognise

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from test_import_holds import shared
 
-from accelstudy.campaign.holds.allan import (
+from accelstudy.campaign.importing.allan import (
     AllanSums,
     accuracy_of_mean,
-    allan_deviation,
     allan_moments,
     averaging_factors,
 )
@@ -26,6 +25,13 @@ def flicker(seed=1, n=N):
     frequency = np.fft.rfftfreq(n)
     frequency[0] = 1
     return np.fft.irfft(spectrum / np.sqrt(frequency), n)
+
+
+def allan_deviation(values, step):
+    """Allan deviation of one record, (n,) or (n, channels)."""
+    sums = AllanSums(values.reshape(len(values), -1).shape[1])
+    sums.add(allan_moments(values))
+    return sums.deviation(step)
 
 
 def slope(curve, low, high):

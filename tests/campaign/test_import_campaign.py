@@ -6,23 +6,17 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from click.testing import CliRunner
+from campaign_helpers import refusal, succeed
 from scipy.io import savemat
 from test_import_holds import G, session, shared, write
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY, angles_in
-from accelstudy.campaign.files.format import read_campaign
+from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.importing import segmentation_figure
-from accelstudy.campaign.importing.logs import (
-    ImportSettings,
-    import_log,
-    import_means,
-    parse_settings,
-    read_settings,
-)
-from accelstudy.commands.importing import import_command
-from accelstudy.commands.main import Commands
+from accelstudy.campaign.importing.logs import import_log
+from accelstudy.campaign.importing.means import import_means
+from accelstudy.campaign.importing.settings import ImportSettings, parse_settings, read_settings
 
 XSENS = {
     "columns": {"fx": 1, "fy": 2, "fz": 3},
@@ -32,12 +26,6 @@ XSENS = {
     "offset": [33124, 33275, 32365],
     "gravity": {"value_mps2": 9.81744},
 }
-
-
-def call(*arguments):
-    # `main` registers the command; a group of its own keeps this test apart from it.
-    group = Commands(commands=[import_command])
-    return CliRunner().invoke(group, ["import", *map(str, arguments)])
 
 
 @pytest.fixture
@@ -54,9 +42,9 @@ def test_a_white_log(log):
     np.testing.assert_array_equal(campaign.n_samples, report.holds.n_samples)
     np.testing.assert_allclose(campaign.sd, 0.02, rtol=0.2)
     assert np.all(np.diff(campaign.time) == pytest.approx(6, abs=0.1))
-    assert campaign.sigma_force == report.sigma_allan
+    assert campaign.sigma_force == report.accuracy.allan
     assert report.sigma_white == pytest.approx(0.02 / np.sqrt(260), rel=0.05)
-    assert report.ratio == pytest.approx(1, abs=0.35)
+    assert report.accuracy.ratio == pytest.approx(1, abs=0.35)
 
 
 def test_turning_is_not_noise(tmp_path):
@@ -101,7 +89,7 @@ def test_means(tmp_path):
     expected = 0.02 * STANDARD_GRAVITY * np.sqrt((1 / 400 + 1 / 100) / 2)
     assert campaign.sigma_force == pytest.approx(expected)
     assert "white" in report.warnings[0]
-    assert (report.holds, report.ratio, report.sigma_allan) == (None, None, None)
+    assert (report.holds, report.accuracy) == (None, None)
 
 
 @pytest.mark.parametrize(
@@ -158,8 +146,7 @@ def test_settings_are_overlaid(tmp_path):
 
 def test_command(log, tmp_path, monkeypatch):
     out = tmp_path / "campaign"
-    result = call(log, "--out", out, "--rate", 100, "--name", "mine", "--gravity", G)
-    assert result.exit_code == 0, result.output
+    result = succeed("import", log, "--out", out, "--rate", 100, "--name", "mine", "--gravity", G)
     assert "holds: 8, of 2.6 to 2.6 s" in result.stdout
     assert "times the noise floor" in result.stdout
     campaign = read_campaign(out)
@@ -169,12 +156,11 @@ def test_command(log, tmp_path, monkeypatch):
     assert campaign.sigma_force == pytest.approx(expected.sigma_force)
     svg = (out / "segmentation.svg").read_bytes()
     assert (out / "segmentation.png").stat().st_size > 1e4
-    assert call(log, "--out", out, "--rate", 100, "--force").exit_code == 0
+    succeed("import", log, "--out", out, "--rate", 100, "--force")
     assert (out / "segmentation.svg").read_bytes() == svg
     # A figure that fails takes the campaign not with it, and leaves no older one behind.
     monkeypatch.setattr(segmentation_figure, "draw_segmentation", lambda *_: 1 / 0)
-    result = call(log, "--out", out, "--rate", 100, "--force")
-    assert result.exit_code == 0
+    result = succeed("import", log, "--out", out, "--rate", 100, "--force")
     assert "The figure 'segmentation' could not be drawn (ZeroDivisionError: div" in result.stderr
     assert not list(out.glob("segmentation.*"))
     np.testing.assert_array_equal(read_campaign(out).forces, campaign.forces)
@@ -195,12 +181,12 @@ def test_command_with_everything(tmp_path):
     np.savetxt(tmp_path / "log.txt", table, "%.1f")
     content = {"time_unit": "ms", "columns": {"fx": 1, "fy": 2}, "sensor": "A-1"}
     (tmp_path / "settings.yaml").write_text(yaml.safe_dump(content))
-    result = call(
+    result = succeed(
+        "import",
         *(tmp_path / "log.txt", "--out", tmp_path / "out", "--settings"),
         *(tmp_path / "settings.yaml", "--columns", "fz=3", "--time", "0", "--unit", "counts"),
         *("--scale", "0.001", "--offset", "1,2,3", "--threshold", "0.1", "--no-figure"),
     )
-    assert result.exit_code == 0, result.output
     assert "threshold: 0.1 m/s², as given" in result.stdout
     campaign = read_campaign(tmp_path / "out")
     assert campaign.n_positions == 4
@@ -221,11 +207,8 @@ def test_command_with_everything(tmp_path):
     ],
 )
 def test_command_says_what_is_wrong(log, tmp_path, options, message):
-    result = call(log, "--out", tmp_path / "out", *options)
-    assert result.exit_code == 2
-    assert result.stderr.startswith("error: ")
-    assert message in result.stderr
-    assert result.stderr.count("\n") == 1
+    line = refusal("import", log, "--out", tmp_path / "out", *options)
+    assert message in line
     assert not (tmp_path / "out" / "campaign.yaml").exists()
 
 
@@ -236,8 +219,8 @@ def test_xsens(tmp_path):
     path = shared("imu_tk_xsens/xsens_acc.mat")
     campaign, report = import_log(path, parse_settings(XSENS))
     assert report.sigma_white == pytest.approx(0.29e-3, rel=0.05)
-    assert 0.5e-3 < report.sigma_allan < 1.6e-3
-    assert 2 < report.ratio < 6
+    assert 0.5e-3 < report.accuracy.allan < 1.6e-3
+    assert 2 < report.accuracy.ratio < 6
     np.testing.assert_allclose(np.linalg.norm(campaign.forces, axis=1), 9.817, atol=0.3)
 
 
@@ -251,8 +234,7 @@ def test_mpu9150_is_as_noisy_as_its_residuals(i):
 
 def test_ctu_means(tmp_path):
     path = shared("ctu_innalabs/CalibrationOfLowCostTriaxialInertialSensors.mat")
-    result = call(path, "--out", tmp_path, "--means", "--unit", "g")
-    assert result.exit_code == 0, result.output
+    result = succeed("import", path, "--out", tmp_path, "--means", "--unit", "g")
     assert result.stdout.startswith("24 positions; sigma of a mean: unknown")
     campaign = read_campaign(tmp_path)
     np.testing.assert_allclose(np.linalg.norm(campaign.forces, axis=1), STANDARD_GRAVITY, rtol=0.08)

@@ -6,12 +6,16 @@ import pytest
 from places import SHARED
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.holds.detection import find_holds
-from accelstudy.campaign.holds.windows import windows
-from accelstudy.campaign.logs.recording import open_log
+from accelstudy.campaign.importing.detection import find_joint_holds
+from accelstudy.campaign.importing.recording import open_log
+from accelstudy.campaign.importing.windows import windows
 
 RATE = 100.0
 G = 9.81
+
+
+def find_holds(log, **options):
+    return find_joint_holds([log], **options)[0]
 
 
 def shared(name):

@@ -3,27 +3,22 @@
 import numpy as np
 import pandas as pd
 import pytest
-from test_import_campaign import XSENS, call
+from campaign_helpers import refusal, run, succeed
+from test_import_campaign import XSENS
 from test_import_holds import RATE, G, session, shared, write
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON
-from accelstudy.campaign.files.format import read_campaign
-from accelstudy.campaign.files.header import LogLayout
-from accelstudy.campaign.holds.allan import allan_moments
-from accelstudy.campaign.holds.detected import slope_sigmas
-from accelstudy.campaign.holds.segments import Moments, Segment
+from accelstudy.campaign.format import read_campaign
+from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing import segmentation_figure
-from accelstudy.campaign.importing.logs import (
-    ImportSettings,
-    import_log,
-    import_means,
-    import_sensors,
-    import_to,
-    parse_settings,
-)
-from accelstudy.campaign.logs.recording import open_log
-from accelstudy.commands.import_options import files_of
+from accelstudy.campaign.importing.allan import allan_moments, slope_sigmas
+from accelstudy.campaign.importing.logs import import_log, import_sensors, import_to
+from accelstudy.campaign.importing.means import import_means
+from accelstudy.campaign.importing.recording import open_log
+from accelstudy.campaign.importing.segments import Moments, Segment
+from accelstudy.campaign.importing.settings import ImportSettings, parse_settings
+from accelstudy.commands.importing import files_of
 from accelstudy.leveling.angles import specific_force
 from accelstudy.sensors.frames import parse_frame
 
@@ -60,12 +55,10 @@ def test_the_unit_of_time_is_suggested(tmp_path, turned):
     forces, _ = turned
     time = SINCE_1970["us"] + 10_000 * np.arange(len(forces))
     path = write(tmp_path, forces, time)
-    result = call(path, "--out", tmp_path / "out")
-    assert result.exit_code == 2
-    assert "if its times are in us, there are 100 samples per second" in result.stderr
-    assert "give --time-unit us" in result.stderr
-    result = call(path, "--out", tmp_path / "out", "--time-unit", "us", "--no-figure")
-    assert result.exit_code == 0, result.output
+    line = refusal("import", path, "--out", tmp_path / "out")
+    assert "if its times are in us, there are 100 samples per second" in line
+    assert "give --time-unit us" in line
+    succeed("import", path, "--out", tmp_path / "out", "--time-unit", "us", "--no-figure")
     assert read_campaign(tmp_path / "out").log.time_unit == "us"
 
 
@@ -97,11 +90,11 @@ def test_frames(tmp_path, turned, unit):
     if unit == "counts":
         raw = raw / scale + offset
         options = ["--scale", "0.001,0.002,0.003", "--offset", "100,200,300"]
-    result = call(
+    result = succeed(
+        "import",
         *(write(tmp_path, raw), "--out", tmp_path / "out", "--rate", 100, "--frame", "FLU"),
         *("--unit", unit, "--no-figure", *options),
     )
-    assert result.exit_code == 0, result.output
     assert "axes: flu in the log" in result.stdout
     found = read_campaign(tmp_path / "out")
     (tmp_path / "plain").mkdir()
@@ -123,11 +116,11 @@ def test_temperature_vibration_and_range(tmp_path, turned):
     table["shake"] = 0.3
     table.to_parquet(tmp_path / "log.parquet")
     limit = 0.97 * np.abs(forces[edges[0, 0] : edges[0, 1]].mean(axis=0)).max()
-    result = call(
+    result = succeed(
+        "import",
         *(tmp_path / "log.parquet", "--out", tmp_path / "out", "--rate", 100, "--no-figure"),
         *("--columns", "vibration=shake", "--range", f"{limit / 9.80665:.6f}g"),
     )
-    assert result.exit_code == 0, result.output
     assert "left out: the sensor is saturated there" in result.stderr
     campaign = read_campaign(tmp_path / "out")
     assert campaign.full_range == pytest.approx(limit, rel=1e-5)
@@ -183,11 +176,9 @@ def test_sigma_does_not_depend_on_the_offset():
 )
 def test_options_are_named_and_nothing_is_written(tmp_path, turned, factor, options, message):
     path = write(tmp_path, factor * turned[0])
-    result = call(path, "--out", tmp_path / "out", "--rate", 100, *options)
-    assert result.exit_code == 2
-    assert message in result.stderr
-    assert result.stderr.count("\n") == 1
-    assert "campaign.yaml" not in result.stderr
+    line = refusal("import", path, "--out", tmp_path / "out", "--rate", 100, *options)
+    assert message in line
+    assert "campaign.yaml" not in line
     assert not (tmp_path / "out").exists()
 
 
@@ -295,12 +286,12 @@ def test_holds_are_left_out_and_joined(tmp_path, turned, by):
     path = write(tmp_path, bumped)
     span = f"{edges[6, 0] / RATE:.2f}s-{edges[6, 1] / RATE:.2f}s:somebody passed"
     both = "4,5" if by == "number" else "{:.2f}s-{:.2f}s".format(*edges[3] / RATE)
-    result = call(
+    result = succeed(
+        "import",
         *(path, "--out", tmp_path / "out", "--rate", 100, "--join", both),
         *("--exclude", "2:moved", "--exclude", span),
         *("--settings", settings(tmp_path, "shortest_s: 0.2")),
     )
-    assert result.exit_code == 0, result.output
     assert "left out: 2 holds: 2 (moved), 8 (somebody passed)" in result.stdout
     campaign = read_campaign(tmp_path / "out")
     assert campaign.positions.tolist() == [1, 3, 4, 6, 7, 9]
@@ -332,9 +323,10 @@ def settings(folder, text):
     ],
 )
 def test_holds_that_are_not_there(tmp_path, turned, options, message):
-    result = call(write(tmp_path, turned[0]), "--out", tmp_path / "out", "--rate", 100, *options)
-    assert result.exit_code == 2
-    assert message in result.stderr
+    line = refusal(
+        "import", write(tmp_path, turned[0]), "--out", tmp_path / "out", "--rate", 100, *options
+    )
+    assert message in line
 
 
 # --- Several sensors, several files --------------------------------------------------------------
@@ -347,11 +339,11 @@ def test_sensors_of_one_log_share_their_holds(tmp_path, turned):
     other[a + 150 : b - 150] += 3 * np.random.default_rng(1).standard_normal((b - a - 300, 3))
     table = pd.DataFrame(np.column_stack([forces, other]), columns=["a", "b", "c", "d", "e", "f"])
     table.to_csv(tmp_path / "log.csv", index=False)
-    result = call(
+    succeed(
+        "import",
         *(tmp_path / "log.csv", "--out", tmp_path / "out", "--rate", 100, "--no-figure"),
         *("--sensor", "imu0=a,b,c", "--sensor", "imu1=d,e,f"),
     )
-    assert result.exit_code == 0, result.output
     one, two = (read_campaign(tmp_path / "out" / name) for name in ("imu0", "imu1"))
     assert one.positions.tolist() == two.positions.tolist() == list(range(1, 8))
     np.testing.assert_array_equal(one.time, two.time)
@@ -407,10 +399,10 @@ def test_means_with_a_robot(tmp_path, frame, unit):
         table[name] = sign * angle / size
     table.to_csv(tmp_path / "means.csv", index=False)
     arguments = (tmp_path / "means.csv", "--means", "--frame", frame)
-    result = call(
-        *(*arguments, "--out", tmp_path / "out", "--robot-sigma", 3.2, "--robot-unit", unit)
+    succeed(
+        "import",
+        *(*arguments, "--out", tmp_path / "out", "--robot-sigma", 3.2, "--robot-unit", unit),
     )
-    assert result.exit_code == 0, result.output
     campaign = read_campaign(tmp_path / "out")
     np.testing.assert_allclose(campaign.angles, np.column_stack([roll, pitch]), atol=1e-12)
     np.testing.assert_allclose(campaign.yaw, yaw, atol=1e-12)
@@ -418,12 +410,12 @@ def test_means_with_a_robot(tmp_path, frame, unit):
     assert campaign.log == LogLayout(frame=frame)
     np.testing.assert_allclose(campaign.forces, forces, atol=1e-12)
     wrong = "rad" if unit != "rad" else "gon"
-    result = call(
-        *(*arguments, "--out", tmp_path / "new", "--robot-sigma", 3.2, "--robot-unit", wrong)
+    line = refusal(
+        "import",
+        *(*arguments, "--out", tmp_path / "new", "--robot-sigma", 3.2, "--robot-unit", wrong),
     )
-    assert result.exit_code == 2
-    assert f"--robot-unit {unit} would be right" in result.stderr
-    result = call(*arguments, "--out", tmp_path / "new")
+    assert f"--robot-unit {unit} would be right" in line
+    result = run("import", *arguments, "--out", tmp_path / "new")
     assert "--robot-sigma takes them for the robot's" in result.stderr
 
 

@@ -10,7 +10,7 @@ from places import DATA, ROOT
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.wording import number, probability, words
-from accelstudy.campaign.importing.logs import import_file
+from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.public import import_settings, public_data, public_file
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.words.summary import GROUPS, amount, shown_unit, verdict_lines
@@ -39,7 +39,7 @@ TOO_SMALL = ["mpu6050-static", "ferraris", "ferraris-annotated"]
 
 @cache
 def imported(name):
-    return import_file(public_file(name, DATA), import_settings(name))[0]
+    return import_log(public_file(name, DATA), import_settings(name))[0]
 
 
 @cache

@@ -3,11 +3,10 @@
 import numpy as np
 import pandas as pd
 import pytest
-from click.testing import CliRunner
+from campaign_helpers import succeed
 from places import DATA
 
-from accelstudy.campaign.files.format import read_campaign
-from accelstudy.commands.main import main
+from accelstudy.campaign.format import read_campaign
 
 NINE = "bias-scale-nonorthogonality"
 
@@ -43,12 +42,6 @@ RATES = {"xsens": 100, "mpu9150": 100, "phone": 50}
 BOUNDS = {"xsens": (800, 1.5, 2), "mpu9150": (200, 3, 12), "phone": (200, 40, 60)}
 
 
-def run(*arguments):
-    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
-    assert result.exit_code == 0, result.output
-    return result
-
-
 @pytest.mark.parametrize("name", PATHS)
 def test_from_a_raw_log_to_an_applied_model(name, tmp_path, monkeypatch):
     file, options, fit, out = PATHS[name]
@@ -56,9 +49,9 @@ def test_from_a_raw_log_to_an_applied_model(name, tmp_path, monkeypatch):
         pytest.skip("the shared data are not there")
     monkeypatch.chdir(tmp_path)
     log = DATA / file
-    run("import", log, "--out", "c", *options.split(), "--no-figure")
-    run(fit[0], "c", "--out", "k", *fit[1:])
-    applied = run("apply", "k/calibration.json", log, "--out", out)
+    succeed("import", log, "--out", "c", *options.split(), "--no-figure")
+    succeed(fit[0], "c", "--out", "k", *fit[1:])
+    applied = succeed("apply", "k/calibration.json", log, "--out", out)
     assert f"rows leveled: {out}" in applied.stdout
 
     table = pd.read_parquet(out) if out.endswith(".parquet") else pd.read_csv(out)

@@ -10,14 +10,13 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON
 from accelstudy.commands.main import main
 from accelstudy.design.estimability import estimability
-from accelstudy.design.optimal.information import position_rows
-from accelstudy.design.optimal.task import Task
+from accelstudy.design.task import Task, position_rows
 from accelstudy.leveling.error import cap_forces, tilt_error
-from accelstudy.plan.batch.example import parse_example, parse_section
+from accelstudy.plan.config import parse_example, parse_section
 from accelstudy.proposal.config import DesignsConfig
 from accelstudy.proposal.efficiency import efficiency_table
 from accelstudy.proposal.figure import efficiency_figure
-from accelstudy.proposal.order import _drift_shown, field_order
+from accelstudy.proposal.proposal import _drift_shown, field_order
 from accelstudy.proposal.request import Request
 from accelstudy.schemes import files, get_scheme
 from accelstudy.sensors.models import get_model

@@ -12,9 +12,9 @@ from places import ROOT
 from accelstudy.adjustment import calibrate
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import GON
-from accelstudy.design.optimal.criteria import get_criterion
-from accelstudy.design.optimal.search import optimal_design
-from accelstudy.design.optimal.task import Task
+from accelstudy.design.criteria import get_criterion
+from accelstudy.design.search import optimal_design
+from accelstudy.design.task import Task
 from accelstudy.positions.choice import first_best, in_order
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model

@@ -9,10 +9,10 @@ from diagnosis_helpers import ROTATIONS, most
 
 from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
+from accelstudy.basics.levels import ACCEPTED, REJECTED
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.calibration.states import ACCEPTED, REJECTED
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.held_out import gap
 from accelstudy.diagnosis.pipeline import diagnose
@@ -68,17 +68,20 @@ def test_a_wrong_sigma_is_no_effect():
     assert sum(names(d) == ["noise_level"] for d in found) > runs / 2
 
 
-def test_held_out_z_is_standard_normal_if_nothing_is_missing():
-    """Whatever effect was added; a third of the positions is held out, split by where they are."""
-    robot, rng, z = get_approach("robot"), np.random.default_rng(0), []
+@pytest.mark.parametrize(
+    ("name", "scheme", "count"), [("robot", "mclaren-24", 8), ("gravity", "fibonacci-24", 6)]
+)
+def test_held_out_z_is_standard_normal_if_nothing_is_missing(name, scheme, count):
+    """Whatever effect was added, whether the prediction is as certain as a position or not."""
+    approach, rng, z = get_approach(name), np.random.default_rng(0), []
     extended = compose("extended", (*(e.spec for e in NINE.effects), "quadratic_scale"))
-    directions = get_scheme("mclaren-24").directions
+    directions = get_scheme(scheme).directions
     ideal = session(NINE, np.zeros(NINE.n_parameters), directions, STANDARD_GRAVITY)
-    fitted, held = gap.split_positions(-directions, HoldConditions(), 8, rng)
+    fitted, held = gap.split_positions(-directions, HoldConditions(), count, rng)
     for _ in range(120):
         observed = ideal.draw(Noise(), 1, rng)
         part, rest = observed.take(fitted), observed.take(held)
-        base, more = (solve(model, robot, part) for model in (NINE, extended))
+        base, more = (solve(model, approach, part) for model in (NINE, extended))
         z.append(gap.held_out_gap(base, more, rest, held, 1.0, rng).z)
     assert abs(np.mean(z)) < 4 / math.sqrt(len(z))
     assert abs(np.std(z) - 1) < 4 / math.sqrt(2 * len(z))

@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.files.format import write_campaign
+from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.commands.main import main
 from accelstudy.diagnosis.pipeline import diagnose

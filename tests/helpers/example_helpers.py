@@ -24,7 +24,7 @@ from study_helpers import run_study
 
 from accelstudy.commands.main import main
 from accelstudy.effects import base as effects
-from accelstudy.files.layers import overlay, read_layer
+from accelstudy.files.reading import overlay, read_layer
 from accelstudy.schemes import registry as schemes
 
 EXAMPLES = ROOT / "examples"

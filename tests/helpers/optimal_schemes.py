@@ -6,9 +6,9 @@ python tests/helpers/optimal_schemes.py        # searches all of them anew, in m
 import json
 
 from accelstudy.approaches import get_approach
-from accelstudy.design.optimal.criteria import get_criterion
-from accelstudy.design.optimal.search import optimal_design
-from accelstudy.design.optimal.task import Task
+from accelstudy.design.criteria import get_criterion
+from accelstudy.design.search import optimal_design
+from accelstudy.design.task import Task
 from accelstudy.schemes.optimal import TABLE
 from accelstudy.sensors.models import get_model
 

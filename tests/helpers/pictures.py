@@ -4,10 +4,10 @@
     python tests/helpers/pictures.py check         # compare the small study with what stands there
     python tests/helpers/pictures.py drawn NAME    # take note that others of `DRAWN` are made anew
 
-docs/figures/shown.json holds what a reader sees on each picture: the words and numbers of a report,
-the texts of a figure and where its lines are. Figures of a study are compared by those of the small
-study, which CI runs anyway. Of a picture that no test makes, it is a hash of the code that draws
-it, without layout and comments.
+docs/figures/shown.json knows what a reader sees on each picture: the words and numbers of a report,
+the texts of a figure and where its lines are. It has a hash of the words, and the numbers. Figures
+of a study are compared by those of the small study, which CI runs anyway. Of a picture that no test
+makes, it has a hash of the code that draws it, without layout and comments.
 """
 
 import contextlib
@@ -47,8 +47,8 @@ OF_STUDIES = {
 }
 """Pictures of the pages of a study."""
 DRAWN = {
-    "plan": ("make plan-example", "accelstudy/plan/report/figure.py"),
-    "plan-sensors": ("make plan-example", "accelstudy/plan/batch/comparison.py"),
+    "plan": ("make plan-example", "accelstudy/plan/figure.py"),
+    "plan-sensors": ("make plan-example", "accelstudy/plan/comparison.py"),
     "designs-efficiency": ("make plan-example", "accelstudy/proposal/figure.py"),
     "sequential": ("make plan-example", "accelstudy/sequential/figure.py"),
     "pole-gnss": ("make plan-example", "accelstudy/pole/figure.py"),
@@ -59,18 +59,31 @@ DRAWN = {
     "sweeps": ("the studies in config/sweeps", "accelstudy/study/figures/sweep.py",
                *(f"config/sweeps/{name}.yaml" for name in
                  ("gravity_error", "noise_level", "positions", "robot_accuracy"))),
-    "hidden": ("make hidden-docs", "accelstudy/hidden/page/figures.py"),
+    "hidden": ("make hidden-docs", "accelstudy/hidden/figures.py"),
     "speed": ("make benchmarks",
               *sorted(str(path.relative_to(ROOT)) for path in ROOT.glob("benchmarks/**/*.py"))),
 }  # fmt: skip
 """Pictures that no test makes: what makes them, and the code that draws them."""
 
 
-def alike(one, other):
-    """Whether two texts say the same, but for the rounding of their numbers."""
-    if NUMBER.sub("#", one) != NUMBER.sub("#", other):
-        return False
-    return np.allclose(numbers(one), numbers(other), rtol=2e-3, atol=0.011)
+def difference(kept, text):
+    """How a text differs from that of a fingerprint; empty if only the rounding of numbers does."""
+    (words, *before), (others, *after) = kept.split(), fingerprint(text).split()
+    if words != others:
+        return "other words"
+    for one, other in zip(before, after, strict=True):
+        if not np.isclose(float(one), float(other), rtol=2e-3, atol=0.011):
+            return f"{other} instead of {one}"
+    return ""
+
+
+def fingerprint(text):
+    """What is kept of a text: a hash of its words, and its numbers."""
+    return " ".join([hashed(NUMBER.sub("#", text)), *(f"{n:.12g}" for n in numbers(text))])
+
+
+def hashed(text):
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def same_picture(one, other):
@@ -101,12 +114,9 @@ def _drawn(axes):
 
 def code_of(*paths):
     """Hash of files without comments, docstrings and layout."""
-    digest = hashlib.sha256()
-    for path in paths:
-        text = (ROOT / path).read_text(encoding="utf-8")
-        text = re.sub(r'"""(?:.|\n)*?"""|^ *#.*$|  #.*$', "", text, flags=re.MULTILINE)
-        digest.update(re.sub(r"\s", "", text).encode())
-    return digest.hexdigest()[:16]
+    text = "\n".join((ROOT / path).read_text(encoding="utf-8") for path in paths)
+    text = re.sub(r'"""(?:.|\n)*?"""|^ *#.*$|  #.*$', "", text, flags=re.MULTILINE)
+    return hashed(re.sub(r"\s", "", text))
 
 
 def of_code():
@@ -142,18 +152,19 @@ def kept():
     return json.loads(KEPT.read_text(encoding="utf-8"))
 
 
-def keep(texts):
+def keep(fingerprints):
     """Take note of what pictures show that were made anew."""
-    content = {**kept(), **texts}
+    content = {**kept(), **fingerprints}
     KEPT.write_text(
         json.dumps(content, indent=1, sort_keys=True, ensure_ascii=False) + "\n", "utf-8"
     )
 
 
-def stale(found):
-    """Names of pictures that show something else than what is found now."""
+def stale(now):
+    """Pictures that show something else than now, and what: ``report (3.2 instead of 3.1)``."""
     stored = kept()
-    return [name for name, text in found.items() if not alike(stored.get(name, ""), text)]
+    differences = {name: difference(stored.get(name, "-"), text) for name, text in now.items()}
+    return [f"{name} ({said})" for name, said in differences.items() if said]
 
 
 def photograph(browser, page, picture, size):
@@ -192,7 +203,7 @@ def make_anew():
             photograph(browser, PAPER / page, PICTURES / f"{name}.png", size)
     for name in of_study(PAPER).keys() - OF_STUDIES.keys():
         shrink(PAPER / "figures" / f"{name}.png", PICTURES / f"{name}.png")
-    keep(texts | of_study(SMALL))
+    keep({name: fingerprint(text) for name, text in (texts | of_study(SMALL)).items()})
 
 
 def main(*arguments):

@@ -4,11 +4,12 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from study_helpers import PAPER_TRUTH
 
 from accelstudy.adjustment import calibrate
 from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
-from accelstudy.basics.units import MGON, STANDARD_GRAVITY
+from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise, session
@@ -18,15 +19,11 @@ GRAVITY, ROBOT = get_approach("gravity"), get_approach("robot")
 BOTH = pytest.mark.parametrize("approach", [GRAVITY, ROBOT], ids=lambda a: a.name)
 SIGMA = Noise().sigma_force
 STANDARD_ERRORS = 4.5
-TRUTH = {
-    **{"b_x": 0.05, "b_y": 0.01, "b_z": 0.03, "s_x": 200e-6, "s_y": 200e-6, "s_z": 200e-6},
-    **{"alpha_yz": 12 * MGON, "alpha_zy": 12 * MGON, "alpha_zx": 44 * MGON},
-}
 
 
 def ideal_session(scheme="mclaren-24", model=NINE, hold=None):
     directions = get_scheme(scheme).directions
-    return session(model, model.vector(TRUTH), directions, STANDARD_GRAVITY, hold)
+    return session(model, model.vector(PAPER_TRUTH), directions, STANDARD_GRAVITY, hold)
 
 
 def draw(seed, scheme="mclaren-24", model=NINE, noise=None, replicates=1):

@@ -1,6 +1,6 @@
 """A small study without Snakemake: configured, simulated and summarised as the workflow does it."""
 
-from accelstudy.adjustment.block import Block
+from accelstudy.adjustment.calibration import Block
 from accelstudy.basics.units import MGON
 from accelstudy.files.tables import collect, read_table
 from accelstudy.study.batches import Share, batches

@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 from places import ROOT
 
-from accelstudy.files.layers import read_layer
+from accelstudy.files.reading import read_layer
 from accelstudy.files.tables import read_table
-from accelstudy.hidden.page.figures import figures
-from accelstudy.hidden.page.markdown import sample_table
-from accelstudy.hidden.score.sample import cell_of, sample
-from accelstudy.hidden.score.scoring import joined
-from accelstudy.hidden.study.baselines import METHODS
-from accelstudy.hidden.study.config import SETS, parse_hidden
-from accelstudy.hidden.study.diagnosing import run_chunk
-from accelstudy.hidden.study.tables import TABLES
+from accelstudy.hidden.baselines import METHODS
+from accelstudy.hidden.campaigns import TABLES
+from accelstudy.hidden.cells import cell_of
+from accelstudy.hidden.config import SETS, parse_hidden
+from accelstudy.hidden.diagnosing import run_chunk
+from accelstudy.hidden.figures import figures
+from accelstudy.hidden.page import sample_table
+from accelstudy.hidden.scoring import joined, sample
 
 DOCS = ROOT / "docs"
 CONFIG = parse_hidden(read_layer(ROOT / "config/hidden-effects.yaml"))

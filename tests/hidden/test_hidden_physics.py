@@ -10,8 +10,8 @@ import pytest
 import accelstudy.hidden.physics as physics
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.files.format import read_campaign, write_campaign
-from accelstudy.campaign.files.header import COLUMNS
+from accelstudy.campaign.format import read_campaign, write_campaign
+from accelstudy.campaign.header import COLUMNS
 from accelstudy.diagnosis.space.signatures import signature
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.hidden.physics import (
@@ -24,14 +24,11 @@ from accelstudy.hidden.physics import (
     visible_gross,
     visible_outside,
 )
-from accelstudy.hidden.physics.forward.designs import session
-from accelstudy.hidden.physics.forward.effects import EFFECTS
-from accelstudy.hidden.physics.forward.measuring import Cause, Sensor, observe
-from accelstudy.hidden.physics.forward.noise import Noise
-from accelstudy.hidden.physics.forward.rotations import in_turned_frame, rotated
-from accelstudy.hidden.physics.forward.session import GRAVITY
-from accelstudy.hidden.physics.seen.atlas import atlas
-from accelstudy.hidden.physics.seen.oracle import oracle
+from accelstudy.hidden.physics.atlas import atlas
+from accelstudy.hidden.physics.designs import GRAVITY, in_turned_frame, rotated, session
+from accelstudy.hidden.physics.effects import EFFECTS
+from accelstudy.hidden.physics.measuring import Cause, Noise, Sensor, observe
+from accelstudy.hidden.physics.oracle import oracle
 from accelstudy.sensors.models import get_model
 
 NINE = get_model("bias-scale-nonorthogonality")
@@ -58,8 +55,8 @@ def imports(folder):
 
 def test_the_generator_knows_nothing_of_what_it_judges():
     allowed = (
-        "accelstudy.campaign.files.session",
-        "accelstudy.campaign.files.format",
+        "accelstudy.campaign.session",
+        "accelstudy.campaign.format",
         "accelstudy.basics.errors",
         "accelstudy.basics.units",
         "accelstudy.hidden.physics",

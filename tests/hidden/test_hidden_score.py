@@ -9,14 +9,12 @@ import pytest
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.shares import clopper_pearson
 from accelstudy.effects import effect_names
-from accelstudy.hidden.page.figures import figures
-from accelstudy.hidden.page.markdown import score_page
-from accelstudy.hidden.score.further import further
-from accelstudy.hidden.score.judging import all_true, judge, same_effects
-from accelstudy.hidden.score.rates import share_of
-from accelstudy.hidden.score.scoring import family_name, score_tables
-from accelstudy.hidden.score.targets import targets
-from accelstudy.hidden.study.tables import SCHEMA
+from accelstudy.hidden.campaigns import SCHEMA
+from accelstudy.hidden.figures import figures
+from accelstudy.hidden.judging import all_true, judge, same_effects, share_of
+from accelstudy.hidden.page import score_page
+from accelstudy.hidden.scoring import family_name, score_tables
+from accelstudy.hidden.targets import further, targets
 
 DRIFT, WARM, SQUARE, MOUNTED = (
     ["bias_drift"], ["warm_up"], ["quadratic_scale"],

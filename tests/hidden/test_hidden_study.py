@@ -12,12 +12,12 @@ from snakemake_helpers import one_line, snakemake
 import accelstudy
 from accelstudy.basics.errors import InputError
 from accelstudy.effects import effect_names, effects_without
-from accelstudy.files.layers import overlay, read_layer
+from accelstudy.files.reading import overlay, read_layer
 from accelstudy.files.tables import read_table, write_table
-from accelstudy.hidden.physics import Case
-from accelstudy.hidden.study import diagnosing, making
-from accelstudy.hidden.study.baselines import METHODS
-from accelstudy.hidden.study.cells import (
+from accelstudy.hidden import campaigns, diagnosing
+from accelstudy.hidden.baselines import METHODS, run_baselines
+from accelstudy.hidden.campaigns import KEY
+from accelstudy.hidden.cells import (
     Cell,
     chunks,
     number_of_chunks,
@@ -25,10 +25,9 @@ from accelstudy.hidden.study.cells import (
     study_cells,
     write_plan,
 )
-from accelstudy.hidden.study.comparing import run_baselines
-from accelstudy.hidden.study.config import KNOWN, parse_hidden
-from accelstudy.hidden.study.diagnosing import run_chunk
-from accelstudy.hidden.study.tables import KEY
+from accelstudy.hidden.config import KNOWN, parse_hidden
+from accelstudy.hidden.diagnosing import run_chunk
+from accelstudy.hidden.physics import Case
 from accelstudy.jobs.code import code_hash
 
 TINY = {
@@ -212,7 +211,7 @@ def test_the_diagnosis_sees_the_campaign_only(plan, whole, monkeypatch, tmp_path
     for (campaign, _), more in seen:
         assert list(more) == ["seed"]
         for word in ("hysteresis", "bias_drift", "removed"):
-            assert word not in f"{campaign.name} {campaign.sensor} {campaign.source}"
+            assert word not in repr(campaign)
     assert len(seen) == len(truths)
 
 
@@ -232,7 +231,7 @@ def test_what_cannot_be_made_is_a_row_with_its_error(plan, monkeypatch, tmp_path
     def refuse(case, seed):
         raise InputError("cannot see it")
 
-    monkeypatch.setattr(making, "generate", refuse)
+    monkeypatch.setattr(campaigns, "generate", refuse)
     run_chunk(*plan, paths(tmp_path), PROVENANCE)
     run_baselines(*plan, tmp_path / "baselines.parquet", PROVENANCE)
     answers = read_table(tmp_path / "baselines.parquet")
@@ -275,9 +274,9 @@ def test_what_runs_again_after_an_edit(monkeypatch, tmp_path):
     monkeypatch.setattr(accelstudy, "__file__", str(package / "__init__.py"))
     for name, expected in {
         "diagnosis/pipeline.py": {"hidden_diagnose"},
-        "hidden/score/targets.py": {"hidden_score"},
-        "hidden/study/baselines.py": {"hidden_baselines"},
-        "hidden/physics/forward/noise.py": {*stages},
+        "hidden/targets.py": {"hidden_score"},
+        "hidden/baselines.py": {"hidden_baselines"},
+        "hidden/physics/measuring.py": {*stages},
         "effects/bias_drift.py": {*stages},
         "commands/main.py": set(),
         "study/summary.py": set(),

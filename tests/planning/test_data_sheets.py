@@ -4,11 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from calling import call, refusal
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.commands.main import main
 from accelstudy.data_sheets import (
     QUANTITIES,
     DataSheet,
@@ -18,8 +17,8 @@ from accelstudy.data_sheets import (
     parse_data_sheet,
     read_data_sheet,
 )
-from accelstudy.data_sheets.flicker import FLICKER, flicker_change
-from accelstudy.plan.search.sensors import get_sensor
+from accelstudy.data_sheets.sheet import FLICKER, flicker_change
+from accelstudy.plan.question import get_sensor
 
 
 @pytest.mark.parametrize("name", data_sheet_names())
@@ -154,10 +153,6 @@ def still_log(tmp_path_factory):
 READ = ("--rate", "20", "--columns", "fx=0,fy=1,fz=2")
 
 
-def call(*words):
-    return CliRunner().invoke(main, [str(word) for word in words])
-
-
 def test_a_log_at_rest_makes_a_data_sheet_that_can_be_read(still_log, tmp_path):
     out = tmp_path / "mine.yaml"
     result = call("data-sheet", still_log, *READ, "--out", out)
@@ -192,10 +187,7 @@ def test_a_campaign_tells_the_noise_of_its_positions(still_log, tmp_path):
 def test_a_log_that_is_too_short_ends_with_one_line(rows, message, tmp_path):
     path = tmp_path / "short.csv"
     np.savetxt(path, np.random.default_rng(1).standard_normal((rows, 3)), delimiter=",")
-    result = call("data-sheet", path, *READ, "--out", tmp_path / "mine.yaml")
-    assert result.exit_code == 2
-    assert result.stderr.count("\n") == 1
-    assert message in result.stderr
+    assert message in refusal("data-sheet", path, *READ, "--out", tmp_path / "mine.yaml")
     assert not (tmp_path / "mine.yaml").exists()
 
 

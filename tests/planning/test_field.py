@@ -1,24 +1,17 @@
-"""Shares of the variance in use: closed forms, a simulation, and what a configuration may say."""
+"""Shares of the variance in use: closed forms, and a simulation."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from places import ROOT
 from study_helpers import NINE
 
-from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
 from accelstudy.data_sheets import DataSheet, get_data_sheet
-from accelstudy.field import config
-from accelstudy.field.config import FieldCase, FieldConfig
 from accelstudy.field.figure import field_figure
 from accelstudy.field.shares import Use, field_shares, parts_of_variance, shares_in_use
-from accelstudy.files.layers import read_layer
-from accelstudy.files.tables import read_table
 from accelstudy.leveling.angles import specific_force
 from accelstudy.leveling.sensitivity import leveled
-from accelstudy.plan.batch.example import parse_example, parse_section
 from accelstudy.pole.sensor import CalibratedSensor, from_linear_theory
 from accelstudy.sensors.models import get_model
 
@@ -150,47 +143,3 @@ def test_the_figure_says_what_a_data_sheet_does_not(sensor, shares):
     legend, title = texts(nothing, paper)
     assert legend[1:] == ["calibration", "noise of the reading"]
     assert "taken as zero: bias instability, random walk of the bias, repeatability" in title
-
-
-# --- the configuration ---------------------------------------------------------------------------
-
-
-def cases(content):
-    example = parse_example({"study": "x", "field": {"cases": {"mine": content}}}, "file")
-    return parse_section(example, "field", FieldConfig, "file").cases
-
-
-def test_the_example_is_worked_out(tmp_path, monkeypatch):
-    monkeypatch.setattr(config, "save", lambda *_: "")
-    example = parse_example(read_layer(ROOT / "config/plan-example.yaml"))
-    case = parse_section(example, "field", FieldConfig).cases["adxl355"]
-    case.model_copy(update={"roll_gon": [0], "pitch_gon": [0]}).write(
-        tmp_path, {"config_hash": "abc", "seed": 3}
-    )
-    table = read_table(tmp_path / "shares.parquet")
-    use = table[table["over"] == "use"]
-    assert use[["hours", "kelvin"]].drop_duplicates().to_numpy().tolist() == [[8, 10]]
-    # Ten kelvins leave nothing to improve in the calibration.
-    assert by_source(use)["roll", "temperature"] > 0.99
-
-
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        ({"sensor": "adxl35"}, "file: field.cases.mine: sensor: unknown sensor 'adxl35'; did you"),
-        ({"age": "8"}, "mine: age: expected a number with its unit"),
-        ({"temperature_change": "300K"}, "mine: temperature_change: '300K': must be"),
-        ({"pitch_gon": [90]}, "file: field.cases.mine.pitch_gon.0: "),
-        ({"restart": True}, "mine.restart: unknown key; did you mean 'restarted'?"),
-    ],
-)
-def test_what_cannot_be_used_is_said_in_a_line(content, message):
-    with pytest.raises(InputError) as error:
-        cases(content)
-    assert message in str(error.value)
-    assert "\n" not in str(error.value)
-
-
-def test_a_case_is_the_usual_use_unless_it_says_otherwise():
-    assert FieldCase().use == Use()
-    assert FieldCase(age="2h", restarted=False).use == Use(age=7200.0, restarted=False)

@@ -1,5 +1,6 @@
-"""The rooms of the package: their imports go one way."""
+"""The rooms of the package: their imports go one way, and a file is worth opening."""
 
+import ast
 import re
 
 import grimp
@@ -7,6 +8,15 @@ import pytest
 from places import ROOT
 
 PACKAGE = "accelstudy"
+REGISTRIES = (
+    *("approaches", "campaign.gross_errors", "commands", "effects", "noise_effects", "schemes"),
+    *("study.claims", "study.figures"),
+)
+"""Rooms in which each idea has a file, however small."""
+SMALL = 40
+"""Lines of code below which a file with one user in its own room is a fragment of that user."""
+FRAGMENTS = 10
+"""How many there still are; this number may only fall."""
 
 
 @pytest.fixture(scope="module")
@@ -29,3 +39,30 @@ def test_the_table_for_contributors_has_all_rooms_in_the_order_of_imports(graph)
     assert {room for layer in layers for room in layer.module_tails} == folders
     upwards = graph.find_illegal_dependencies_for_layers(layers[::-1], containers={PACKAGE})
     assert upwards == set()
+
+
+def test_a_small_file_with_one_user_belongs_to_its_user(graph):
+    found = [module for module in sorted(graph.modules) if is_fragment(module, graph)]
+    assert len(found) <= FRAGMENTS, (
+        f"{len(found)} files have less than {SMALL} lines of code, and only one module of their "
+        f"room uses them. Move what is new into that module: {', '.join(found)}"
+    )
+
+
+def is_fragment(module, graph):
+    """Whether a module is small, and only one of its room uses it."""
+    path = ROOT / f"{module.replace('.', '/')}.py"
+    folder = module.removeprefix(f"{PACKAGE}.").rpartition(".")[0]
+    users = graph.find_modules_that_directly_import(module)
+    if not path.exists() or folder in REGISTRIES or len(users) != 1:
+        return False
+    (user,) = users
+    return user.split(".")[1:2] == module.split(".")[1:2] and code_lines(path) < SMALL
+
+
+def code_lines(path):
+    """Number of lines on which a statement or an expression begins, without docstrings."""
+    nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+    lines = {node.lineno for node in nodes if isinstance(node, ast.stmt | ast.expr)}
+    texts = (n for n in nodes if isinstance(n, ast.Expr) and isinstance(n.value, ast.Constant))
+    return len(lines - {text.lineno for text in texts})

@@ -18,6 +18,7 @@ from accelstudy.diagnosis.report.words.summary import GROUPS
 from accelstudy.effects import Course, HoldConditions, effect_names, get_effect
 from accelstudy.effects.hold_conditions import STILL
 from accelstudy.leveling.angles import roll_pitch, specific_force
+from accelstudy.noise_effects import get_noise_effect
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise, session
@@ -107,11 +108,13 @@ def test_location_counts_an_effect_in_one_of_the_groups_that_people_read_of():
 @EACH
 def test_what_people_read_of_an_effect(name):
     effect = get_effect(name)
+    assert effect.name == name
     assert effect.equation
     assert effect.__doc__
     low, high = effect.typical
     assert 0 < low < high
     assert len({p.unit for p in effect.parameters}) == 1
+    assert all(p.symbol.startswith("$") and p.symbol.endswith("$") for p in effect.parameters)
 
 
 def test_parameters_have_names_of_their_own():
@@ -370,11 +373,20 @@ def test_candidates_need_the_time(name):
         ("saturation(knee=nan)", "knee=nan must be a number above 0"),
         ("bias_jump(t=inf)", "t=inf must be a number that is finite"),
         ("warm_up(tau=1", "unknown effect"),
+        ("heavy_tail", "unknown noise effect 'heavy_tail'; did you mean 'heavy_tails'?"),
+        ("heavy_tails(mu=3)", "unknown setting of the noise effect 'heavy_tails' 'mu'"),
+        ("heavy_tails(nu=2)", "noise effect 'heavy_tails': nu=2 must be a number above 2"),
+        ("heavy_tails(nu=nan)", "must be a number above 2"),
+        ("heavy_tails(3)", "'3' is no setting; expected name=number, such as nu=300"),
+        ("coloured_noise(share=1)", "share=1 must be a number above 0 and below 1"),
+        ("quantisation(lsb=0)", "lsb=0 must be a number above 0"),
     ],
 )
 def test_what_is_wrong_with_a_spec(spec, expected):
+    """Of an effect, or of a noise effect."""
+    get = get_noise_effect if spec.startswith(("heavy", "coloured", "quant")) else get_effect
     with pytest.raises(InputError) as error:
-        get_effect(spec)
+        get(spec)
     assert expected in str(error.value)
     assert "\n" not in str(error.value)
 

@@ -7,7 +7,7 @@ import subprocess
 import numpy as np
 import pytest
 import yaml
-from click.testing import CliRunner
+from calling import call, refusal
 from page_helpers import assert_told_alike
 from places import ROOT
 
@@ -15,9 +15,8 @@ from accelstudy.adjustment import calibrate
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import GON, MGON, angles_in
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.files.format import read_campaign
+from accelstudy.campaign.format import read_campaign
 from accelstudy.commands import advise as command
-from accelstudy.commands.main import main
 from accelstudy.leveling.angles import specific_force
 from accelstudy.sensors.frames import parse_frame
 from accelstudy.sensors.models import get_model
@@ -31,10 +30,6 @@ MODEL = "bias-scale-nonorthogonality"
 WANTED = ("--tilt-accuracy", "10mgon", "--tilt-range", "30gon")
 
 
-def call(*arguments):
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
-
-
 def advise(folder, *options):
     result = call("advise", folder, *WANTED, *options)
     assert result.exit_code == 0, result.output
@@ -42,11 +37,7 @@ def advise(folder, *options):
 
 
 def error(folder, *options):
-    result = call("advise", folder, *options)
-    assert result.exit_code == 2, result.output
-    assert result.stdout == ""
-    assert result.stderr.count("\n") == 1
-    return result.stderr
+    return refusal("advise", folder, *options)
 
 
 @pytest.fixture(scope="module")

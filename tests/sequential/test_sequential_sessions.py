@@ -9,8 +9,7 @@ from scipy import stats
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import GON, MGON
-from accelstudy.design.optimal.information import position_rows
-from accelstudy.plan.batch.example import parse_example, parse_section
+from accelstudy.design.task import position_rows
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.sequential.choice import (
@@ -206,33 +205,6 @@ def test_the_figure_shows_all_set_ups(summary):
     left, right = figure.axes
     assert len(left.lines) == 3 * 2 + 2  # and the fixed scheme for each approach
     assert len(right.containers) == 3 * 2
-
-
-# --- the configuration ---------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("section", "message"),
-    [
-        ({"approaches": "robots"}, "unknown approach 'robots'; did you mean 'robot'?"),
-        ({"rules": ["bounds"]}, "unknown rule 'bounds'; did you mean 'bound'?"),
-        ({"instead_of": "mclaren"}, "unknown scheme 'mclaren'"),
-        ({"model": "bias-scale+warm_up"}, "needs the time of each position"),
-        ({"session": 3}, "sequential.session: unknown key; did you mean 'sessions'?"),
-        ({"accuracies": 0}, "sequential.accuracies: must be greater"),
-    ],
-)
-def test_what_cannot_be_used_is_said_in_a_line(section, message):
-    example = parse_example({"study": "x", "sequential": section}, "mine")
-    with pytest.raises(InputError) as error:
-        parse_section(example, "sequential", SequentialConfig, "mine")
-    assert message in str(error.value)
-    assert "\n" not in str(error.value)
-
-
-def test_a_fixed_scheme_must_determine_the_model():
-    with pytest.raises(InputError, match=r"sequential\.instead_of: faces-6: rank 6 of 9"):
-        _ = SetUp(SequentialConfig(instead_of="faces-6"), "gravity", "known", 1.0).promise
 
 
 def test_rms_of_many_is_that_of_each():

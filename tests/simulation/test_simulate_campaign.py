@@ -12,7 +12,7 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.files.format import read_campaign
+from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.commands.main import main
 from accelstudy.effects import get_effect

@@ -17,7 +17,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON
 from accelstudy.commands.main import main
 from accelstudy.effects import effect_names
-from accelstudy.files.layers import overlay, read_layer
+from accelstudy.files.reading import overlay, read_layer
 from accelstudy.schemes import scheme_names
 from accelstudy.sensors.models import MODELS
 from accelstudy.study.batches import batches

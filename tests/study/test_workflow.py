@@ -20,7 +20,7 @@ from study_helpers import NINE, grid
 import accelstudy
 from accelstudy.basics.errors import InputError
 from accelstudy.files import provenance
-from accelstudy.files.provenance import check_writable
+from accelstudy.files.outputs import check_writable
 from accelstudy.files.tables import read_origin, read_table
 from accelstudy.jobs.code import code_hash
 from accelstudy.study import batches

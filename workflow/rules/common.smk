@@ -14,10 +14,10 @@ from accelstudy.study.figures import (
 from accelstudy.study.batches import batches
 from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study
-from accelstudy.files.layers import read_layer
+from accelstudy.files.reading import read_layer
 from accelstudy.study.effort import study_effort
 from accelstudy.jobs.job import setup_digest
-from accelstudy.files.provenance import check_writable
+from accelstudy.files.outputs import check_writable
 from accelstudy.jobs.code import code_hash
 from accelstudy.study.tables import TABLES
 

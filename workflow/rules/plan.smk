@@ -1,4 +1,4 @@
-from accelstudy.plan.batch.config import PlanConfig
+from accelstudy.plan.config import PlanConfig
 
 PLAN = section("plan", PlanConfig)
 PLAN_FILES = ["plan.parquet", "plan.md", "plan.svg", "plan.png", "positions.yaml", "study.yaml"]

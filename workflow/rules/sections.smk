@@ -1,9 +1,9 @@
 from snakemake.exceptions import WorkflowError
 
 from accelstudy.basics.errors import InputError
-from accelstudy.plan.batch.example import parse_example, parse_section
-from accelstudy.files.layers import read_layer
-from accelstudy.files.provenance import check_writable
+from accelstudy.plan.config import parse_example, parse_section
+from accelstudy.files.reading import read_layer
+from accelstudy.files.outputs import check_writable
 from accelstudy.jobs.code import code_hash
 
 SOURCE = ", ".join(map(str, workflow.configfiles)) or "config"

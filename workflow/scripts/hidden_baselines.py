@@ -1,6 +1,6 @@
-from accelstudy.hidden.study.cells import planned
-from accelstudy.hidden.study.comparing import run_baselines
-from accelstudy.hidden.study.config import parse_hidden
+from accelstudy.hidden.baselines import run_baselines
+from accelstudy.hidden.cells import planned
+from accelstudy.hidden.config import parse_hidden
 from accelstudy.jobs.job import logged
 
 with logged(snakemake):

@@ -1,6 +1,6 @@
-from accelstudy.hidden.study.cells import planned
-from accelstudy.hidden.study.config import parse_hidden
-from accelstudy.hidden.study.diagnosing import run_chunk
+from accelstudy.hidden.cells import planned
+from accelstudy.hidden.config import parse_hidden
+from accelstudy.hidden.diagnosing import run_chunk
 from accelstudy.jobs.job import logged
 
 with logged(snakemake):

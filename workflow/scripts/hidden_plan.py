@@ -1,5 +1,5 @@
-from accelstudy.hidden.study.cells import write_plan
-from accelstudy.hidden.study.config import parse_hidden
+from accelstudy.hidden.cells import write_plan
+from accelstudy.hidden.config import parse_hidden
 from accelstudy.jobs.job import logged
 
 with logged(snakemake):

@@ -1,5 +1,5 @@
-from accelstudy.hidden.page.writing import write_score
-from accelstudy.hidden.study.config import parse_hidden
+from accelstudy.hidden.config import parse_hidden
+from accelstudy.hidden.page import write_score
 from accelstudy.jobs.job import logged
 
 with logged(snakemake):

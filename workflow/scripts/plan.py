@@ -2,7 +2,7 @@ import os
 
 from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, angles_in
 from accelstudy.jobs.job import logged
-from accelstudy.plan.batch.jobs import make_plan
+from accelstudy.plan.output import make_plan
 
 with logged(snakemake), angles_in(os.environ.get(ANGLE_UNIT_VARIABLE)):
     given = snakemake.params

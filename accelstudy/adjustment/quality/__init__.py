@@ -1,13 +1,6 @@
 """Quality of a calibration: tests, redundancy, reliability, held-out errors, components."""
 
 from accelstudy.adjustment.quality.components import VarianceComponents, variance_components
-from accelstudy.adjustment.quality.positions import (
-    PositionTests,
-    Suspect,
-    holm,
-    position_tests,
-    suspects,
-)
 from accelstudy.adjustment.quality.prediction import HeldOut, held_out
 from accelstudy.adjustment.quality.redundancy import (
     Redundancy,
@@ -24,7 +17,15 @@ from accelstudy.adjustment.quality.solution import (
     solve,
     whitening_of,
 )
-from accelstudy.adjustment.quality.whole_model import GlobalTest, global_test
+from accelstudy.adjustment.quality.tests import (
+    GlobalTest,
+    PositionTests,
+    Suspect,
+    global_test,
+    holm,
+    position_tests,
+    suspects,
+)
 
 __all__ = [
     "GlobalTest",

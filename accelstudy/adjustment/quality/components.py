@@ -30,7 +30,7 @@ MAX_FITS = 10
 STEP = 1e-6
 """Convergence with given derivatives: a step below this fraction of a standard deviation."""
 REFIT = 1e-3
-"""Convergence with adjustments repeated, likewise."""
+"""Convergence with adjustments repeated: changes of a factor below this fraction of sigma."""
 
 
 @dataclass(frozen=True)
@@ -77,24 +77,24 @@ def variance_components(
     groups = np.zeros((2, *variances.shape))
     groups[0, :, :3], groups[1, :, 3:] = variances[:, :3], variances[:, 3:]
 
-    found = _estimate(solution, groups, np.ones(2))
+    estimate = _estimate(solution, groups, np.ones(2))
     for _ in range(MAX_FITS):
-        if found is None:
+        if estimate is None:
             return None
         # The derivatives are taken at adjusted observations, which depend on the weights.
-        force, angle = np.sqrt(found.factors)
+        force, angle = np.sqrt(estimate.factors)
         rescaled = replace(
             observed,
             sigma_force=force * np.asarray(observed.sigma_force),
             sigma_angle=angle * np.asarray(observed.sigma_angle),
         )
-        before = found
-        found = _estimate(solve(model, approach, rescaled), groups, before.factors)
-        if found is not None and np.all(
-            np.abs(found.factors - before.factors) <= REFIT * found.sigma
+        before = estimate
+        estimate = _estimate(solve(model, approach, rescaled), groups, before.factors)
+        if estimate is not None and np.all(
+            np.abs(estimate.factors - before.factors) <= REFIT * estimate.sigma
         ):
-            return found
-    return None if found is None else replace(found, converged=False)
+            return estimate
+    return None if estimate is None else replace(estimate, converged=False)
 
 
 def _estimate(solution: Solution, groups: Array, factors: Array) -> VarianceComponents | None:
@@ -115,12 +115,12 @@ def _estimate(solution: Solution, groups: Array, factors: Array) -> VarianceComp
     length = np.linalg.norm(design, axis=0)
     a, rows = solution.jac_parameters / length, rows / length
     w = solution.misclosures
-    known = rows.T @ rows
+    prior = rows.T @ rows
 
     for _ in range(MAX_STEPS):
         inverse = np.linalg.inv(np.tensordot(factors, m, 1))
         weighted = inverse @ a
-        g = np.linalg.inv(_normal(a, weighted) + known)
+        g = np.linalg.inv(_normal(a, weighted) + prior)
         # W w, by position; the row of observed gravity does not count in the components.
         x = g @ (np.einsum("ncu,nc->u", weighted, w) + rows.T @ errors)
         pw = np.einsum("ncd,nd->nc", inverse, w) - weighted @ x
@@ -141,7 +141,7 @@ def _estimate(solution: Solution, groups: Array, factors: Array) -> VarianceComp
         if not np.all(size > 0) or np.linalg.cond(s / np.outer(size, size)) > 1e10:
             return None
         covariance = 2 * np.linalg.inv(s)
-        target = np.linalg.solve(s, share - np.einsum("iuv,vu->i", gt, g @ known))
+        target = np.linalg.solve(s, share - np.einsum("iuv,vu->i", gt, g @ prior))
         if np.any(target <= 0):
             # Förstner's step alone would creep towards zero where that is the solution.
             target = factors * np.minimum(share / trace, np.where(target <= 0, 0.5, np.inf))

@@ -58,8 +58,8 @@ class HeldOut:
 
 
 def _rms(values: Array) -> float:
-    known = values[~np.isnan(values)]
-    return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
+    predicted = values[~np.isnan(values)]
+    return float(np.sqrt(np.mean(predicted**2))) if len(predicted) else np.nan
 
 
 def held_out(model: SensorModel, approach: Approach, observed: Observations) -> HeldOut | None:

@@ -15,14 +15,12 @@ from pydantic import Field, model_validator
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.names import check_path_name
-from accelstudy.campaign.files.header import HEADER, TABLES
+from accelstudy.campaign.header import HEADER, TABLES
 from accelstudy.campaign.importing.public import import_settings
 from accelstudy.campaign.importing.settings import GravitySettings, ImportSettings
 from accelstudy.config_names import ModelName
-from accelstudy.files.layers import overlay, read_layer
-from accelstudy.files.provenance import config_hash
-from accelstudy.files.types import PathName
-from accelstudy.files.validation import Block, checked
+from accelstudy.files.reading import config_hash, overlay
+from accelstudy.files.validation import Block, PathName, checked
 from accelstudy.sensors.models import get_model
 
 KINDS = ("campaign", "log", "public")
@@ -168,17 +166,6 @@ class BatchConfig(Block):
 def parse_batch(content: Mapping[str, Any], source: str = "config") -> BatchConfig:
     """Check a configuration; raise `InputError` with one line that names the source and the key."""
     return checked(BatchConfig, content, source)
-
-
-def read_batch(path: str | Path) -> BatchConfig:
-    """Read a configuration from a YAML file.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or does not fit the schema.
-    """
-    return parse_batch(read_layer(path), str(path))
 
 
 def _check_names(model: str | None, approach: str | None) -> None:

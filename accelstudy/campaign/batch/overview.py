@@ -11,16 +11,16 @@ import numpy as np
 import pandas as pd
 
 from accelstudy.basics import suggested
-from accelstudy.basics.levels import REFUTED
-from accelstudy.basics.units import MGON, UNITS, display_unit
-from accelstudy.basics.wording import number
-from accelstudy.campaign.calibration.states import (
+from accelstudy.basics.levels import (
     ACCEPTED,
     BLIND,
     IMPLAUSIBLE,
+    REFUTED,
     REJECTED,
     UNCHECKED,
 )
+from accelstudy.basics.units import MGON, UNITS, display_unit
+from accelstudy.basics.wording import number
 from accelstudy.files.outputs import BATCH_JOB, whole_file
 from accelstudy.files.tables import write_table
 from accelstudy.pages import render

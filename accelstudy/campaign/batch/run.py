@@ -14,10 +14,10 @@ from accelstudy.basics.wording import one_line
 from accelstudy.campaign.batch.config import Task
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.output import write_calibration
-from accelstudy.campaign.files.format import read_campaign
-from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.importing.logs import import_to
 from accelstudy.campaign.importing.public import read_record
+from accelstudy.campaign.session import Campaign
 from accelstudy.files.outputs import BATCH_JOB, result_folder
 from accelstudy.sensors.models import get_model
 

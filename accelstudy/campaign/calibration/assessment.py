@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment import quality
 from accelstudy.adjustment.quality import VarianceComponents, variance_components
+from accelstudy.basics.levels import ACCEPTED, IMPLAUSIBLE, REJECTED, UNCHECKED
 from accelstudy.basics.units import GON
 from accelstudy.campaign.calibration.fit import CampaignFit, campaign_noise, usual_approach
-from accelstudy.campaign.calibration.states import ACCEPTED, IMPLAUSIBLE, REJECTED, UNCHECKED
 from accelstudy.campaign.gross_errors.recognition import Recognised, recognise
 from accelstudy.leveling.angles import jacobian, tilt_slope
 from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON, cap_forces, holds_in_use

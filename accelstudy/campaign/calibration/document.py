@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 import json
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike, NDArray
 
-from accelstudy.basics.units import MGON, recorded_unit, to_recorded
+from accelstudy.basics.units import MGON, STANDARD_GRAVITY, recorded_unit, to_recorded
+from accelstudy.campaign.calibration.applying import FORCES
 from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.fit import CampaignFit
-from accelstudy.campaign.calibration.gauges import GAUGES, affine_form, in_gauge
-from accelstudy.campaign.calibration.ranges import ranges_of
 from accelstudy.campaign.calibration.wording import verdict_lines
-from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.session import Campaign
 from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.sensors.frames import FRD
+from accelstudy.sensors.models import compose
+from accelstudy.sensors.sensor import SensorModel, not_affine
+
+Array = NDArray[np.float64]
+Gauge = Literal["upper", "lower", "symmetric"]
+GAUGES: tuple[Gauge, ...] = ("upper", "lower", "symmetric")
+"""Ways to fix the rotation from the left up to which the norm of gravity determines K in
+f_b = K (f_s − b); all have the same KᵀK and the same residuals."""
 
 
 def calibration_document(fit: CampaignFit) -> dict[str, Any]:
@@ -75,7 +83,7 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
         "mended": None,
         "excluded": campaign.exclusions,
         "range_mps2": campaign.full_range,
-        "ranges": ranges_of(fit),
+        "ranges": _ranges(fit),
         "log": None if campaign.log is None else campaign.log.model_dump(exclude_none=True),
         "warnings": list(campaign.warnings),
     }
@@ -165,6 +173,70 @@ def assessed_positions(assessment: Assessment) -> pd.DataFrame:
     suspects = {s.position for s in assessment.suspects}
     table["suspect"] = [i in suspects for i in range(len(table))]
     return table
+
+
+def affine_form(model: SensorModel, parameters: ArrayLike) -> tuple[Array, Array] | None:
+    """K (3, 3) and b (3,) of f_b = K (f_s − b), or None if the model is not affine.
+
+    Effects of the rig are left out: they are no part of the sensor.
+
+    Parameters
+    ----------
+    model : SensorModel
+    parameters : (u,) array, SI
+    """
+    if not_affine(model):
+        return None
+    specs = [effect.spec for effect in model.effects if effect.part == "sensor"]
+    parameters = np.asarray(parameters, dtype=float)[..., model.stays]
+    model = compose(model.name, tuple(specs))
+    g = STANDARD_GRAVITY
+    probes = g * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
+    corrected = model.correct(probes, parameters)
+    if not np.isfinite(corrected).all():
+        return None
+    matrix = ((corrected[1:4] - corrected[4:7]) / (2 * g)).T
+    constant = corrected[0]
+    return matrix, -np.linalg.solve(matrix, constant)
+
+
+def in_gauge(matrix: ArrayLike, gauge: Gauge) -> Array:
+    """Turn K (3, 3) into a gauge: the matrix R K, R a rotation, that is triangular or symmetric.
+
+    The diagonal is positive. "upper" is the gauge of Thalmann & Neuner (2018, eq. 4).
+    """
+    k = np.asarray(matrix, dtype=float)
+    gram = k.T @ k
+    if gauge == "upper":
+        return np.asarray(np.linalg.cholesky(gram).T)
+    if gauge == "lower":
+        # The Cholesky factor with rows and columns in reverse order.
+        return np.asarray(np.linalg.cholesky(gram[::-1, ::-1]).T[::-1, ::-1])
+    values, vectors = np.linalg.eigh(gram)
+    return np.asarray((vectors * np.sqrt(values)) @ vectors.T)
+
+
+def _ranges(fit: CampaignFit) -> dict[str, list[float]]:
+    """Smallest and largest value over the holds of a calibration.
+
+    Returns
+    -------
+    dict
+        Ranges of `time_s` since the start of the session, `temperature_degC`, `vibration_mps2` as
+        far as they are known, and of the calibrated forces.
+    """
+    campaign = fit.campaign
+    columns = {
+        "time_s": campaign.time,
+        "temperature_degC": campaign.temperature,
+        "vibration_mps2": campaign.vibration,
+        **dict(zip(FORCES, fit.corrected.T, strict=True)),
+    }
+    return {
+        name: [float(np.min(values)), float(np.max(values))]
+        for name, values in columns.items()
+        if values is not None
+    }
 
 
 def _sigma_reading(campaign: Campaign) -> float | None:

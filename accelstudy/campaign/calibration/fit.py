@@ -15,15 +15,14 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.shares import sigmas_95
 from accelstudy.basics.units import MGON
 from accelstudy.basics.wording import words
-from accelstudy.campaign.calibration.gauges import not_affine
-from accelstudy.campaign.files.header import COLUMNS
-from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.gross_errors.recognition import recognise
-from accelstudy.campaign.holds.detected import fit_sphere
+from accelstudy.campaign.header import COLUMNS
+from accelstudy.campaign.importing.detection import fit_sphere
+from accelstudy.campaign.session import Campaign
 from accelstudy.design.estimability import Estimability, estimability
 from accelstudy.schemes import Scheme
 from accelstudy.sensors.models import compose
-from accelstudy.sensors.sensor import SensorModel
+from accelstudy.sensors.sensor import SensorModel, not_affine
 from accelstudy.simulation.sessions import Noise
 
 Array = NDArray[np.float64]

@@ -11,8 +11,8 @@ from scipy import special
 from accelstudy.adjustment import calibrate
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import track
-from accelstudy.basics.units import display_unit, quantity_text, to_display
-from accelstudy.basics.wording import p_value
+from accelstudy.basics.units import display_unit, to_display
+from accelstudy.basics.wording import p_value, quantity_text
 from accelstudy.campaign.calibration.fit import CampaignFit, campaign_noise
 from accelstudy.simulation.sessions import BLOCK, session
 

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from accelstudy.basics import suggested
+from accelstudy.basics.levels import BLIND, IMPLAUSIBLE, REJECTED
 from accelstudy.basics.units import GON, attitude_unit, display_unit, to_attitude, to_display
 from accelstudy.basics.wording import comma_list, p_value, words
 from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.fit import CampaignFit
-from accelstudy.campaign.calibration.states import BLIND, IMPLAUSIBLE, REJECTED
 from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.sensors.plausibility import USUAL_CAUSE
 

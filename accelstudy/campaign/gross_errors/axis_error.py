@@ -11,7 +11,6 @@ import numpy as np
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.registry import Setting
-from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.gross_errors.base import (
     EVERYWHERE,
     Array,
@@ -21,6 +20,7 @@ from accelstudy.campaign.gross_errors.base import (
     with_readings,
 )
 from accelstudy.campaign.gross_errors.real_sensor import RealSensor
+from accelstudy.campaign.session import Campaign
 
 SIGNED_PERMUTATIONS = tuple(
     tuple(sign * axis for sign, axis in zip(signs, axes, strict=True))

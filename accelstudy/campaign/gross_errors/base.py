@@ -9,15 +9,15 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any, ClassVar, Self, TypeVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.registry import RegistryWithSettings, WithSettings
-from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.gross_errors.real_sensor import RealSensor
+from accelstudy.campaign.session import Campaign
 
 Array = NDArray[np.float64]
 
@@ -97,21 +97,9 @@ class GrossError(WithSettings):
 
 
 _registry: RegistryWithSettings[GrossError] = RegistryWithSettings(GrossError.kind)
-GrossErrorClass = TypeVar("GrossErrorClass", bound=type[GrossError])
-
+get_gross_error = cache(_registry.get)
 gross_error_names = _registry.names
-
-
-@cache
-def get_gross_error(spec: str) -> GrossError:
-    """Return a gross error by its name, with settings or not: ``row_order(first=3, second=4)``."""
-    return _registry.get(spec)
-
-
-def register(error: GrossErrorClass) -> GrossErrorClass:
-    """Class decorator: enter a gross error into the registry under its name."""
-    _registry.add(error.name, error())
-    return error
+register = _registry.register
 
 
 def with_readings(campaign: Campaign, change: Callable[[Array], Array]) -> Campaign:

@@ -11,9 +11,9 @@ import numpy as np
 
 from accelstudy.basics.registry import Setting
 from accelstudy.basics.wording import comma_list
-from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.gross_errors.base import SINGLE, GrossError, Mending, register
 from accelstudy.campaign.gross_errors.real_sensor import LOST, SHOWS, RealSensor
+from accelstudy.campaign.session import Campaign
 
 SIZE = 0.1
 """m/s², size of an error whose direction is drawn."""

@@ -25,7 +25,7 @@ from accelstudy.leveling.angles import usual_norm
 
 if TYPE_CHECKING:
     from accelstudy.approaches import Approach
-    from accelstudy.campaign.files.session import Campaign
+    from accelstudy.campaign.session import Campaign
 
 Array = NDArray[np.float64]
 

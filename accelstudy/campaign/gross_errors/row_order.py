@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.registry import Setting
-from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.gross_errors.base import (
     SINGLE,
     Array,
@@ -22,6 +21,7 @@ from accelstudy.campaign.gross_errors.base import (
     with_readings,
 )
 from accelstudy.campaign.gross_errors.real_sensor import CLEARLY, LOST, RealSensor
+from accelstudy.campaign.session import Campaign
 
 APART = 1.0
 """m/s², smallest difference between the forces of two positions that are drawn to be exchanged."""

@@ -12,7 +12,6 @@ import numpy as np
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.registry import Setting
 from accelstudy.basics.units import ROBOT_UNITS, SENSOR_UNITS, UNITS
-from accelstudy.campaign.files.session import Campaign
 from accelstudy.campaign.gross_errors.base import (
     EVERYWHERE,
     GrossError,
@@ -21,6 +20,7 @@ from accelstudy.campaign.gross_errors.base import (
     with_readings,
 )
 from accelstudy.campaign.gross_errors.real_sensor import RealSensor
+from accelstudy.campaign.session import Campaign
 from accelstudy.leveling.angles import usual_norm
 from accelstudy.sensors.plausibility import LARGEST
 

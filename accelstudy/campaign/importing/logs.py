@@ -11,44 +11,23 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import display_unit, to_display
-from accelstudy.campaign.files.format import write_campaign
-from accelstudy.campaign.files.session import Campaign
-from accelstudy.campaign.holds.allan import MeanAccuracy, accuracy_of_mean
-from accelstudy.campaign.holds.detected import DetectedHolds
-from accelstudy.campaign.holds.detection import find_joint_holds
-from accelstudy.campaign.importing.imported import (
+from accelstudy.campaign.format import write_campaign
+from accelstudy.campaign.importing.allan import MeanAccuracy, accuracy_of_mean
+from accelstudy.campaign.importing.columns import AXES
+from accelstudy.campaign.importing.detection import DetectedHolds, find_joint_holds
+from accelstudy.campaign.importing.means import import_means
+from accelstudy.campaign.importing.recording import Log, LogSeries, Recording, open_log
+from accelstudy.campaign.importing.settings import (
     ImportReport,
+    ImportSettings,
     default_name,
     far_from_gravity,
     imported_campaign,
     layout_of,
     shown,
 )
-from accelstudy.campaign.importing.means import import_means
-from accelstudy.campaign.importing.settings import (
-    GravitySettings,
-    ImportSettings,
-    parse_settings,
-    read_settings,
-)
-from accelstudy.campaign.logs.columns import AXES
-from accelstudy.campaign.logs.recording import Log, LogSeries, Recording, open_log
+from accelstudy.campaign.session import Campaign
 from accelstudy.sensors.conversion import conversion_of
-
-__all__ = [
-    "GravitySettings",
-    "ImportReport",
-    "ImportSettings",
-    "import_each",
-    "import_file",
-    "import_log",
-    "import_means",
-    "import_sensors",
-    "import_to",
-    "log_of",
-    "parse_settings",
-    "read_settings",
-]
 
 Array = NDArray[np.float64]
 
@@ -76,9 +55,20 @@ def log_of(path: str | Path, settings: ImportSettings) -> Log:
 def import_log(
     path: str | Path, settings: ImportSettings | None = None
 ) -> tuple[Campaign, ImportReport]:
-    """Find the static holds of a log of one sensor; see `import_sensors`."""
-    ((campaign, report),) = import_sensors([path], settings or ImportSettings()).values()
+    """Import a log of one sensor or, if the settings say so, a table of means; see `import_all`."""
+    ((campaign, report),) = import_all([path], settings or ImportSettings()).values()
     return campaign, report
+
+
+def import_all(
+    paths: Sequence[str | Path], settings: ImportSettings
+) -> dict[str, tuple[Campaign, ImportReport]]:
+    """Import a table of means, or find the static holds of logs; see `import_sensors`."""
+    if not settings.means:
+        return import_sensors(paths, settings)
+    if len(paths) > 1 or settings.sensors:
+        raise InputError("a table of means is one file of one sensor")
+    return {"": import_means(paths[0], settings)}
 
 
 def import_sensors(
@@ -123,16 +113,6 @@ def import_sensors(
     }
 
 
-def import_file(
-    path: str | Path, settings: ImportSettings | None = None
-) -> tuple[Campaign, ImportReport]:
-    """Import a log of one sensor or, if the settings say so, a table of means."""
-    settings = settings or ImportSettings()
-    if settings.means:
-        return import_means(path, settings)
-    return import_log(path, settings)
-
-
 def import_to(
     folder: str | Path, path: str | Path, settings: ImportSettings, figure: bool = True
 ) -> tuple[Campaign, ImportReport]:
@@ -163,12 +143,7 @@ def import_each(
     InputError
         If a file cannot be read or makes no campaign, or a folder cannot be written.
     """
-    if settings.means:
-        if len(paths) > 1 or settings.sensors:
-            raise InputError("a table of means is one file of one sensor")
-        campaigns = {"": import_means(paths[0], settings)}
-    else:
-        campaigns = import_sensors(paths, settings)
+    campaigns = import_all(paths, settings)
     for name, (campaign, report) in campaigns.items():
         write_campaign(campaign, folders[name])
         if figure and report.holds is not None:

@@ -10,13 +10,17 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import MGON, ROBOT_UNITS, UNITS
-from accelstudy.campaign.files.checks import clearly_worse, misfit_of_angles
-from accelstudy.campaign.files.header import LogLayout
-from accelstudy.campaign.files.session import Campaign
-from accelstudy.campaign.importing.imported import ImportReport, far_from_gravity, imported_campaign
-from accelstudy.campaign.importing.settings import ImportSettings
-from accelstudy.campaign.logs.columns import AXES, locate, read_columns
-from accelstudy.campaign.logs.sources import Source, open_source
+from accelstudy.campaign.checks import clearly_worse, misfit_of_angles
+from accelstudy.campaign.header import LogLayout
+from accelstudy.campaign.importing.columns import AXES, locate, read_columns
+from accelstudy.campaign.importing.settings import (
+    ImportReport,
+    ImportSettings,
+    far_from_gravity,
+    imported_campaign,
+)
+from accelstudy.campaign.importing.sources import Source, open_source
+from accelstudy.campaign.session import Campaign
 from accelstudy.sensors.conversion import conversion_of
 
 Array = NDArray[np.float64]
@@ -117,13 +121,13 @@ def _columns(source: Source, settings: ImportSettings) -> tuple[dict[str, Array]
         if key not in MEANS:
             raise UnknownNameError("column", key, MEANS)
 
-    def found(keys: tuple[str, ...], needed: bool = False) -> dict[str, int]:
+    def places_of(keys: tuple[str, ...], needed: bool = False) -> dict[str, int]:
         return locate(source, {k: given[k] for k in keys if k in given}, keys, needed)
 
-    places = found(AXES, needed=True)
-    places |= found(("n_samples", *SDS, "temperature", "vibration"))
+    places = places_of(AXES, needed=True)
+    places |= places_of(("n_samples", *SDS, "temperature", "vibration"))
     warnings = []
-    angles = found((*ANGLES, "yaw"))
+    angles = places_of((*ANGLES, "yaw"))
     if settings.robot is not None:
         missing = [key for key in ANGLES if key not in angles]
         if missing:

@@ -19,8 +19,8 @@ from pydantic import Field
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.progress import stage
 from accelstudy.campaign.importing.settings import ImportSettings
-from accelstudy.files.layers import read_layer
 from accelstudy.files.outputs import is_temporary, whole_file
+from accelstudy.files.reading import read_layer
 from accelstudy.files.validation import Block, checked
 
 REGISTRY = Path(__file__).with_name("public_data.yaml")

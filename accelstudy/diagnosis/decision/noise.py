@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from accelstudy.basics.levels import REFUTED
-from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision import priors
 from accelstudy.diagnosis.decision.search import Search
 from accelstudy.diagnosis.decision.verdict import Finding, lack_of_fit

@@ -12,7 +12,7 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import stage
 from accelstudy.campaign.calibration.document import json_text
-from accelstudy.campaign.files.format import read_campaign
+from accelstudy.campaign.format import read_campaign
 from accelstudy.diagnosis.loop import REPLICATES, Loop, close_loop
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.document.calibration import diagnosed_calibration

@@ -10,7 +10,7 @@ from accelstudy.approaches import Approach
 from accelstudy.basics.units import display_unit, to_display
 from accelstudy.basics.wording import number
 from accelstudy.campaign.calibration.fit import fit_campaign, usual_approach
-from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.space.examined import ExaminedFit, examine
 from accelstudy.diagnosis.worth.limits import visibilities
 from accelstudy.effects import Effect, get_effect

@@ -2,22 +2,103 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.campaign.files.session import Campaign
-from accelstudy.hidden.physics.case import Case, HiddenEffect, Truth, plain
-from accelstudy.hidden.physics.drawing import drawn
-from accelstudy.hidden.physics.forward.measuring import Cause, Sensor, observe
-from accelstudy.hidden.physics.forward.noise import NOISES, Noise
-from accelstudy.hidden.physics.forward.session import GRAVITY, Session
+from accelstudy.basics.errors import InputError
+from accelstudy.campaign.session import Campaign
+from accelstudy.hidden.physics.atlas import Atlas, Conditions, Shape
+from accelstudy.hidden.physics.designs import GRAVITY, Session
+from accelstudy.hidden.physics.effects import EFFECTS, OUTSIDE, Effect
 from accelstudy.hidden.physics.gross import GROSS
-from accelstudy.hidden.physics.seen.atlas import Atlas
-from accelstudy.hidden.physics.seen.conditions import Conditions
-from accelstudy.hidden.physics.seen.oracle import oracle
+from accelstudy.hidden.physics.measuring import NOISES, Cause, Noise, Sensor, observe
+from accelstudy.hidden.physics.oracle import Oracle, oracle
+
+SETS = ("null", "noise", "one", "two", "removed", "outside", "gross", "invisible")
+
+
+@dataclass(frozen=True)
+class Case:
+    """One kind of campaign.
+
+    Attributes
+    ----------
+    set : str, of `SETS`
+    design : str
+    approach : str, "gravity" or "robot"
+    sigma_known : bool, whether the campaign states its sigma
+    effect : tuple of str, what is hidden
+    lam : tuple of float, the noncentralities that they shall have; empty for effects that cannot be
+        seen, which have usual sizes
+    noise : str, kind of wrong noise; None where it is right
+    gross : str, gross error; None for none
+    """
+
+    set: str
+    design: str
+    approach: str
+    sigma_known: bool
+    effect: tuple[str, ...] = ()
+    lam: tuple[float, ...] = ()
+    noise: str | None = None
+    gross: str | None = None
+
+
+@dataclass(frozen=True)
+class HiddenEffect:
+    """An effect in a campaign: with which settings and parameters, and how much of it shows."""
+
+    name: str
+    settings: dict[str, float]
+    parameters: tuple[float, ...]
+    lam: float
+
+
+@dataclass(frozen=True)
+class Truth:
+    """All that is true of a campaign.
+
+    Attributes
+    ----------
+    set, design, approach, sigma_known : as in the case
+    seed : tuple of int, entropy and spawn key
+    effects : tuple of HiddenEffect
+    classes : tuple of tuple of str, for each effect the names that mean the same in this campaign
+    noise : dict with kind, name (in the catalogue) and settings
+    gross : dict with name (empty for none) and settings
+    sensor : dict with the parameters of the sensor
+    oracle : dict with detected, best, told and alternatives
+    left : tuple of float, for the set "outside": how much of the noncentrality the best effect of
+        the catalogue leaves, and the best two
+    """
+
+    set: str
+    design: str
+    approach: str
+    sigma_known: bool
+    seed: tuple[int, ...]
+    effects: tuple[HiddenEffect, ...]
+    classes: tuple[tuple[str, ...], ...]
+    noise: dict[str, Any]
+    gross: dict[str, Any]
+    sensor: dict[str, Any]
+    oracle: dict[str, Any]
+    left: tuple[float, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain values."""
+        return plain(asdict(self))
+
+
+def plain(value: Any) -> Any:
+    """Turn tuples into lists, all the way down."""
+    if isinstance(value, dict):
+        return {key: plain(part) for key, part in value.items()}
+    return [plain(part) for part in value] if isinstance(value, (list, tuple)) else value
+
 
 Array = NDArray[np.float64]
 
@@ -41,10 +122,12 @@ def generate(case: Case, seed: np.random.SeedSequence) -> tuple[Campaign, Truth]
     """
     rng = np.random.default_rng(seed)
     knowing = oracle(case.design, case.approach)
-    own = knowing.atlas
+    of_design = knowing.atlas
     # No joint comes to rest exactly where it was sent.
-    arrived = own.session.joints + ARRIVAL * rng.standard_normal(own.session.joints.shape)
-    session = replace(own.session, joints=arrived)
+    arrived = of_design.session.joints + ARRIVAL * rng.standard_normal(
+        of_design.session.joints.shape
+    )
+    session = replace(of_design.session, joints=arrived)
     sensor = Sensor.drawn(rng)
     conditions = Conditions.of(session, case.approach, sensor)
     causes, hidden, classes = [], [], []
@@ -64,8 +147,8 @@ def generate(case: Case, seed: np.random.SeedSequence) -> tuple[Campaign, Truth]
     if case.gross is not None:
         campaign, gross["settings"] = GROSS[case.gross](campaign, session, conditions, rng)
         gross["name"] = case.gross
-    verdict = knowing.judge(_left(own, sensor, forces, reading), case.lam)
-    left = knowing.left(_left(own, sensor, output, encoders)) if case.set == "outside" else ()
+    verdict = knowing.judge(_left(of_design, sensor, forces, reading), case.lam)
+    left = knowing.left(_left(of_design, sensor, output, encoders)) if case.set == "outside" else ()
     truth = Truth(
         set=case.set,
         design=case.design,
@@ -96,10 +179,10 @@ def generate(case: Case, seed: np.random.SeedSequence) -> tuple[Campaign, Truth]
     return campaign, truth
 
 
-def _left(own: Atlas, sensor: Sensor, output: Array, reading: Array) -> Array:
+def _left(of_design: Atlas, sensor: Sensor, output: Array, reading: Array) -> Array:
     """What a calibration leaves of the misclosures, (m,), whatever the sensor is."""
     corrected = (output - sensor.bias) @ sensor.correction.T
-    return own.conditions.seen(corrected[None], reading[None])[0]
+    return of_design.conditions.seen(corrected[None], reading[None])[0]
 
 
 def _campaign(case: Case, session: Session, forces: Array, reading: Array) -> Campaign:
@@ -152,3 +235,78 @@ def _numbers(seed: np.random.SeedSequence) -> tuple[int, ...]:
     entropy = seed.entropy
     words = () if entropy is None else (entropy,) if isinstance(entropy, int) else tuple(entropy)
     return (*(int(word) for word in words), *(int(key) for key in seed.spawn_key))
+
+
+DRAWS = 200
+"""Draws of an effect until one is as it should be."""
+
+
+def drawn(
+    name: str,
+    lam: float,
+    session: Session,
+    conditions: Conditions,
+    knowing: Oracle,
+    rng: np.random.Generator,
+) -> tuple[Cause, tuple[str, ...]]:
+    """Draw an effect, and say what means the same.
+
+    Parameters
+    ----------
+    name : str, of an effect of the catalogue or outside it
+    lam : float, its noncentrality; 0 for an effect of usual size, however little of it shows
+    session : Session, in which the joints stand where they really do
+    conditions : Conditions, of this session with the sensor that has the effect
+    knowing : Oracle, of the design
+
+    Returns
+    -------
+    cause : Cause
+    same : tuple of str, names of the catalogue
+
+    Raises
+    ------
+    InputError
+        If the design cannot see the effect.
+    """
+    of_design = knowing.atlas
+    effect = EFFECTS[name] if name in EFFECTS else OUTSIDE[name]
+    if not lam:
+        return _of_usual_size(effect, session, rng), (name,)
+    if effect.shows(of_design.session):
+        for _ in range(DRAWS):
+            shape = of_design.shape(effect, effect.draw(of_design.session, rng))
+            if shape is None:
+                continue
+            cause, change = _scaled(shape, lam, session, conditions, rng)
+            if name in EFFECTS or knowing.is_outside(change):
+                return cause, of_design.same_as(shape)
+    approach = "robot" if conditions.robot else "gravity"
+    raise InputError(
+        f"{of_design.session.name}, {approach}: cannot see {name} as such; "
+        f"it sees {', '.join(of_design.visible)}"
+    )
+
+
+def _of_usual_size(effect: Effect, session: Session, rng: np.random.Generator) -> Cause:
+    parameters = effect.typical * rng.standard_normal((1, effect.k))
+    return Cause(effect, effect.draw(session, rng), parameters)
+
+
+def _scaled(
+    shape: Shape, lam: float, session: Session, conditions: Conditions, rng: np.random.Generator
+) -> tuple[Cause, Array]:
+    """Draw parameters with a given noncentrality; return the effect and what it leaves, (m,)."""
+    parameters = rng.standard_normal(shape.effect.k)
+    if shape.effect.loses:
+        parameters = abs(parameters)
+    # Directions that cannot be seen have no size.
+    parameters = shape.directions @ (shape.directions.T @ parameters)
+    cause = Cause(shape.effect, dict(shape.settings), shape.effect.typical * parameters[None])
+    without = conditions.misclosures(*observe(session, conditions.sensor, ()))
+    for _ in range(2):  # an effect is almost, but not quite, proportional to its parameters
+        with_it = conditions.misclosures(*observe(session, conditions.sensor, (cause,)))
+        change = conditions.left(with_it - without)[0]
+        factor = np.sqrt(lam / float(change @ change))
+        cause = replace(cause, parameters=cause.parameters * factor)
+    return cause, change * factor

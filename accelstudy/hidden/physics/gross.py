@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.units import GON, STANDARD_GRAVITY
-from accelstudy.campaign.files.session import Campaign
-from accelstudy.hidden.physics.forward.session import GRAVITY, Session
-from accelstudy.hidden.physics.seen.conditions import Conditions
+from accelstudy.campaign.session import Campaign
+from accelstudy.hidden.physics.atlas import Conditions
+from accelstudy.hidden.physics.designs import GRAVITY, Session
 
 Array = NDArray[np.float64]
 Settings = dict[str, float]

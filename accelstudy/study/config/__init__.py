@@ -10,7 +10,7 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.design.estimability import estimability
 from accelstudy.effects import get_effect
-from accelstudy.files.layers import overlay, read_layer
+from accelstudy.files.reading import overlay, read_layer
 from accelstudy.files.validation import checked
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model

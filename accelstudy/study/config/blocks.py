@@ -7,10 +7,11 @@ from typing import Literal
 from pydantic import Field
 
 from accelstudy.config_names import ModelName, SchemeName
-from accelstudy.files.types import (
+from accelstudy.files.validation import (
     Angle,
     Attitudes,
     BaseSamples,
+    Block,
     Duration,
     Finite,
     GravityError,
@@ -27,7 +28,6 @@ from accelstudy.files.types import (
     Tilt,
     Vibration,
 )
-from accelstudy.files.validation import Block
 from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON
 
 Temperatures = tuple[Temperature, Temperature]

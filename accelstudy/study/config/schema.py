@@ -18,13 +18,13 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.names import LONGEST
 from accelstudy.basics.units import STANDARD_GRAVITY, to_si
 from accelstudy.effects import get_effect
-from accelstudy.files.provenance import config_hash
-from accelstudy.files.types import (
+from accelstudy.files.reading import config_hash
+from accelstudy.files.validation import (
+    Block,
     Gravity,
     OneOrMore,
     Seed,
 )
-from accelstudy.files.validation import Block
 from accelstudy.noise_effects import get_noise_effect
 from accelstudy.schemes import get_scheme, scheme_names
 from accelstudy.schemes.files import held, remember

@@ -14,7 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import ArrayLike, NDArray
 
-from accelstudy.adjustment.block import Block
+from accelstudy.adjustment.calibration import Block
 from accelstudy.files.parquet import whole_parquet
 from accelstudy.files.tables import REMEDY
 from accelstudy.leveling.error import TiltError

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.adjustment.block import Block
+from accelstudy.adjustment.calibration import Block
 from accelstudy.basics.shares import sigmas_95
 from accelstudy.basics.units import GON
 from accelstudy.effects import get_effect

@@ -13,7 +13,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from accelstudy.adjustment.block import Block
+from accelstudy.adjustment.calibration import Block
 from accelstudy.design.estimability import estimability
 from accelstudy.files.tables import parquet_writer
 from accelstudy.leveling.error import TiltError

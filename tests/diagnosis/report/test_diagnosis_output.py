@@ -25,7 +25,7 @@ from accelstudy.basics.units import MGON, angles_in
 from accelstudy.basics.wording import number, p_value
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.output import write_calibration
-from accelstudy.campaign.files.format import write_campaign
+from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.commands.main import main
 from accelstudy.diagnosis.decision.explanations import Explanation

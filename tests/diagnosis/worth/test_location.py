@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from diagnosis_helpers import NINE
+from diagnosis_helpers import NINE, examine
 
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
@@ -71,3 +71,15 @@ def test_a_share_is_told_where_chance_seldom_gives_nearly_all(diagnoses, name):
             share = diagnoses[name].beside.location.by_chance[group]
             shares = space.parts(noise)[:, 0] / total
             assert share == pytest.approx(shares.mean(), abs=4 * shares.std() / len(noise) ** 0.5)
+
+
+def test_a_share_is_that_of_the_excess(diagnoses):
+    """What a group has beyond the one that noise leaves in each of its conditions."""
+    full = diagnoses["all columns"]
+    examined = examine(full.base)
+    residuals = examined.frame.residuals
+    excess = residuals.z @ residuals.z - residuals.redundancy
+    for group, space in all_groups(examined).items():
+        if group in full.location:
+            share = (space.parts(residuals.z)[0] - space.dims[0]) / excess
+            assert full.location[group] == pytest.approx(np.clip(share, 0, 1)), group

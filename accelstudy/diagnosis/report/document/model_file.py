@@ -9,7 +9,7 @@ import numpy as np
 
 from accelstudy.basics.names import LONGEST
 from accelstudy.basics.units import MGON
-from accelstudy.campaign.files.session import Campaign
+from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.sensors.models import MODELS, composition_name
 from accelstudy.sensors.sensor import SensorModel

@@ -8,8 +8,8 @@ from typing import Any
 
 from accelstudy.basics import suggested
 from accelstudy.basics.wording import comma_list, words
-from accelstudy.campaign.calibration.gauges import not_affine
 from accelstudy.diagnosis.result import Diagnosis
+from accelstudy.sensors.sensor import not_affine
 
 
 def next_steps(

@@ -1,0 +1,299 @@
+"""Apply a calibration to readings, and level with it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BaseModel, Field, model_validator
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.wording import counted
+from accelstudy.campaign.header import LogLayout, Nominal, PerAxis
+from accelstudy.effects import HoldConditions
+from accelstudy.files.reading import read_json
+from accelstudy.files.validation import Finite, NotNegative, Number, Positive, checked
+from accelstudy.leveling.angles import angles_of, jacobian, tilt_slope
+from accelstudy.sensors.models import compose
+from accelstudy.sensors.sensor import SensorModel
+
+Array = NDArray[np.float64]
+
+
+NO_CALIBRATION = "not a calibration.json of accelstudy"
+MARGIN = 0.1
+"""A log may leave a range by this part of its width without a warning."""
+FORCES = {"fx_mps2": "forward", "fy_mps2": "right", "fz_mps2": "down"}
+"""Ranges of the calibrated forces, and where they point."""
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A calibration as it stays with the sensor, without the effects of the rig.
+
+    Attributes
+    ----------
+    model : SensorModel
+    parameters : (u,) array, SI
+    covariance : (u, u) array, SI
+    gravity : float, m/s²
+    content : mapping, what is used of the file
+    log : LogLayout, layout of the log from which the campaign was made; None if there was none
+    ranges : mapping, of the calibration, see `calibration_document`
+    """
+
+    model: SensorModel
+    parameters: Array
+    covariance: Array
+    gravity: float
+    content: Mapping[str, Any]
+    log: LogLayout | None = None
+    ranges: Mapping[str, list[float]] = field(default_factory=dict)
+
+    @cached_property
+    def needs(self) -> tuple[tuple[str, str], ...]:
+        """Effects that need more than the force, each with a column of `HoldConditions`."""
+        if not self.model.hold_columns:
+            return ()
+        return tuple(
+            (effect.name, column)
+            for effect in self.model.effects
+            for column in compose(effect.spec, (effect.spec,)).hold_columns
+        )
+
+    @property
+    def drifts(self) -> tuple[str, ...]:
+        """Effects that drift during the session; afterwards they keep their value at its end."""
+        return tuple(effect.name for effect in self.model.effects if effect.drifts)
+
+    def correct(self, forces: ArrayLike, hold: HoldConditions | None = None) -> Array:
+        """Calibrated specific force of readings.
+
+        Parameters
+        ----------
+        forces : (n, 3) array, m/s², readings
+        hold : HoldConditions, other columns of the readings that the effects need
+
+        Returns
+        -------
+        (n, 3) array, m/s²; NaN where no force explains the reading
+        """
+        forces, _ = self._as_continued(np.asarray(forces, dtype=float), hold)
+        return self.model.correct(forces, self.parameters, self.gravity, hold)
+
+    def level(
+        self, forces: ArrayLike, sigma_force: float, hold: HoldConditions | None = None
+    ) -> tuple[Array, Array]:
+        """Roll and pitch with standard deviations.
+
+        Parameters
+        ----------
+        forces : (n, 3) array, m/s², readings
+        sigma_force : float, m/s², noise of a reading, per axis
+        hold : HoldConditions, as in `correct`
+
+        Returns
+        -------
+        angles, sigma : (n, 2) arrays, rad; sigma combines the noise of the reading and the
+        uncertainty of the calibration
+        """
+        forces, share = self._as_continued(np.asarray(forces, dtype=float), hold)
+        corrected = self.model.correct(forces, self.parameters, self.gravity, hold)
+        slope = share * tilt_slope(
+            self.model, self.parameters, forces, corrected, self.gravity, hold
+        )
+        variance = np.sum((slope @ self.covariance) * slope, axis=-1)
+        # Noise of a reading propagates by ∂f_b/∂f_s, which is close to I.
+        variance += np.square(sigma_force) * np.sum(jacobian(corrected) ** 2, axis=-1)
+        return angles_of(corrected), np.sqrt(variance)
+
+    def _as_continued(self, forces: Array, hold: HoldConditions | None) -> tuple[Array, Array]:
+        """Change readings as if drifts had gone on, since the model lets them go on.
+
+        A drift is known within its session only. After it the sensor keeps the value at its end.
+
+        Returns
+        -------
+        forces : (n, 3) array, m/s²
+        share : (n, 1, u) array, factors for derivatives by the parameters of such drifts
+        """
+        share = np.ones((len(forces), 1, self.model.n_parameters))
+        if hold is None or "time_s" not in self.ranges or not self.drifts:
+            return forces, share
+        time = hold.column("time")
+        kept = np.clip(time, 0.0, self.ranges["time_s"][1])
+        first = 0
+        for effect in self.model.effects:
+            columns = slice(first, first := first + len(effect.parameters))
+            if effect.drifts:
+                f, p = tuple(forces.T), tuple(self.parameters[columns])
+                then, end = (
+                    np.stack(effect.output(f, p, self.gravity, HoldConditions(time=t), np), axis=-1)
+                    for t in (time, kept)
+                )
+                forces = forces + (then - end)
+                share[:, 0, columns] = np.divide(
+                    kept, time, out=np.ones_like(time), where=time != 0
+                )[:, None]
+        return forces, share
+
+
+class _Shown(BaseModel):
+    value: Finite
+    sigma: NotNegative | None
+    unit: str
+
+
+class _Parameter(BaseModel):
+    name: str
+    value: Finite
+    sigma: NotNegative | None
+    sigma_priori: NotNegative | None
+    sigma_posteriori: NotNegative | None
+    unit: str
+    shown: _Shown
+
+
+Triple = Annotated[list[Finite], PerAxis]
+
+
+class _Affine(BaseModel):
+    matrix: Annotated[list[Triple], PerAxis]
+    bias_mps2: Triple
+
+
+class _Mended(BaseModel):
+    error: str
+    reason: str
+    matrix: Annotated[list[Triple], PerAxis] | None
+
+
+class _Quality(BaseModel):
+    state: str = ""
+    plausible: bool = True
+    warnings: list[str] = []
+
+
+class _Document(BaseModel):
+    """The part of `calibration.json` that is read; the rest is for people and other programs."""
+
+    schema_version: Annotated[Literal[1], Number]
+    campaign: str
+    model: str
+    effects: Annotated[list[str], Field(min_length=1)]
+    unit: Literal["m/s^2", "g", "counts"]
+    nominal: Nominal | None
+    gravity_mps2: Positive
+    sigma_position_mps2: NotNegative | None
+    sigma_reading_mps2: NotNegative | None = None
+    sigmas_95: Positive | None = None
+    parameters: list[_Parameter]
+    covariance: list[list[Finite | None]]
+    affine: _Affine | None
+    log: LogLayout | None = None
+    range_mps2: Positive | None = None
+    mended: _Mended | None = None
+    quality: _Quality = _Quality()
+    ranges: dict[str, Annotated[list[Finite], Field(min_length=2, max_length=2)]] = {}
+
+    @model_validator(mode="after")
+    def _whole(self) -> Self:
+        names = list(compose(self.model, tuple(self.effects)).parameter_names)
+        if [entry.name for entry in self.parameters] != names:
+            raise ValueError(f"parameters: expected {', '.join(names)}, in this order")
+        if {len(row) for row in self.covariance} | {len(self.covariance)} != {len(names)}:
+            raise ValueError(f"covariance: expected {len(names)} rows of {len(names)} numbers")
+        if self.unit == "counts" and self.nominal is None:
+            raise ValueError("nominal: missing; unit: counts needs it")
+        return self
+
+
+def read_calibration(path: str | Path) -> Calibration:
+    """Read `calibration.json`.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it is not a calibration.
+    """
+    if Path(path).is_dir():
+        raise InputError(f"{path}: a folder; give the calibration.json in it")
+    content = read_json(path, NO_CALIBRATION)
+    return _calibration(checked(_Document, content, f"{path}: {NO_CALIBRATION}"))
+
+
+def _calibration(document: _Document) -> Calibration:
+    whole = compose(document.model, tuple(document.effects))
+    # Effects of the rig were estimated together with those of the sensor, but stay with the rig.
+    specs = [effect.spec for effect in whole.effects if effect.part == "sensor"]
+    stays = np.flatnonzero(whole.stays)
+    covariance = np.array(document.covariance, dtype=float)  # None becomes NaN
+    return Calibration(
+        model=compose(document.model, tuple(specs)),
+        parameters=np.array([entry.value for entry in document.parameters])[stays],
+        covariance=covariance[np.ix_(stays, stays)],
+        gravity=document.gravity_mps2,
+        content=document.model_dump(),
+        log=document.log,
+        ranges=document.ranges,
+    )
+
+
+class Watch:
+    """Counts the rows of a log that lie beyond the ranges of a calibration.
+
+    Parameters
+    ----------
+    ranges : mapping, as `ranges_of` returns it
+    """
+
+    def __init__(self, ranges: Mapping[str, list[float]]) -> None:
+        groups = [
+            ("temperature", "°C", {"temperature_degC": ""}),
+            ("vibration", "m/s²", {"vibration_mps2": ""}),
+            ("specific force", "m/s²", {name: f" {way}" for name, way in FORCES.items()}),
+        ]
+        self._ranges = ranges
+        self._groups = [group for group in groups if set(group[2]) <= set(ranges)]
+        self._rows = dict.fromkeys((what for what, _, _ in groups), 0)
+        self._worst: dict[str, tuple[float, str, float]] = {}
+
+    def look_at(self, corrected: Array, hold: HoldConditions) -> None:
+        """Count calibrated forces (n, 3), m/s², and their conditions."""
+        columns = {
+            "temperature_degC": hold.temperature,
+            "vibration_mps2": hold.vibration,
+            **dict(zip(FORCES, corrected.T, strict=True)),
+        }
+        for what, _, names in self._groups:
+            beyond = np.zeros(len(corrected), dtype=bool)
+            for name in names:
+                values = columns[name]
+                if values is None:
+                    continue
+                low, high = self._ranges[name]
+                # In parts of the width, so that axes can be compared; NaN does not count.
+                excess = np.fmax(low - values, values - high) / max(high - low, 1e-9)
+                beyond |= excess > MARGIN
+                if (excess > MARGIN).any():
+                    i = int(np.nanargmax(excess))
+                    farthest = (float(excess[i]), name, float(values[i]))
+                    self._worst[what] = max(farthest, self._worst.get(what, farthest))
+            self._rows[what] += int(beyond.sum())
+
+    def warnings(self, rows: int) -> Iterator[str]:
+        """Say what lay beyond a range in a log of so many rows."""
+        for what, unit, names in self._groups:
+            if what in self._worst:
+                _, name, value = self._worst[what]
+                low, high = self._ranges[name]
+                yield (
+                    f"{what} outside the range of the calibration in {self._rows[what]} of "
+                    f"{counted(rows, 'row')}: up to {value:.4g} {unit}{names[name]}, while the "
+                    f"calibration had {low:.4g} to {high:.4g}; it is extrapolated there"
+                )

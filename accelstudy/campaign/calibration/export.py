@@ -1,0 +1,197 @@
+"""Export of a calibration in forms that devices and other programs can read."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import ArrayLike, NDArray
+
+from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.wording import comma_list
+from accelstudy.effects import Effect
+from accelstudy.effects.base import formulas
+from accelstudy.sensors.conversion import Conversion, conversion_of
+from accelstudy.sensors.frames import FRD, Frame, parse_frame
+from accelstudy.sensors.models import compose
+from accelstudy.sensors.sensor import SensorModel, not_affine
+
+Array = NDArray[np.float64]
+
+FORMS = ("json", "yaml", "c", "matrix")
+
+STEPS = (
+    "f_s = mending · to_frd · ((raw − offset) · scale), m/s²",
+    "f_a from f_s = f_a + Σ output, where output is that at f_a = (f_x, f_y, f_z): repeat "
+    "f_a ← f_s − Σ output, from f_a = f_s on, until it settles",
+    "f_b = (I + Σ axes) · f_a",
+    "result = to_frdᵀ · f_b, m/s², in the axes of the readings",
+)
+"""Steps that calibrate a reading; sums are over the effects of the sensor."""
+SYMBOLS = {
+    "f_x": "m/s², f_a along x; likewise f_y, f_z",
+    "g": "m/s², gravity_mps2",
+    "temperature": "°C",
+    "temperature_lagged": "°C, T with tau dT/dt = temperature − T, tau in s of the spec; at first "
+    "T = temperature",
+    "time": "s since the start of the session",
+    "vibration": "m/s², rms while the sensor stands still",
+    "step_x": "m/s², f_a along x less that of the position before; likewise step_y, step_z",
+    "roll": "rad, attitude of the rig; likewise pitch, yaw",
+}
+
+
+def device_matrix(calibration: Mapping[str, Any]) -> Array:
+    """M (3, 4) with f = M · (raw, 1), from raw readings to m/s², both in the axes of the log.
+
+    Parameters
+    ----------
+    calibration : mapping, content of calibration.json
+
+    Raises
+    ------
+    InputError
+        If the model has effects that no matrix can hold.
+    """
+    if unfit := not_affine(_model(calibration)):
+        raise InputError(
+            f"no matrix can hold {comma_list(list(unfit))} of the model {calibration['model']!r}; "
+            "the forms json and yaml carry all effects"
+        )
+    affine = calibration["affine"]
+    if affine is None:
+        raise InputError(f"the model {calibration['model']!r} with these parameters has no inverse")
+    k, bias = np.array(affine["matrix"]), np.array(affine["bias_mps2"])
+    raw, frame = _readings(calibration)
+    linear = frame.matrix.T @ k @ mending(calibration) @ frame.matrix * raw.scale
+    return np.column_stack([linear, -linear @ raw.offset - frame.matrix.T @ k @ bias])
+
+
+def campaign_conversion(calibration: Mapping[str, Any]) -> Conversion:
+    """Conversion to m/s² of readings in the unit of the campaign, in frd."""
+    if calibration["unit"] != "counts":
+        return conversion_of(calibration["unit"])
+    scale, offset = (
+        np.array(calibration["nominal"][key], dtype=float) for key in ("scale", "offset")
+    )
+    return Conversion(scale, offset)
+
+
+def mending(calibration: Mapping[str, Any]) -> Array:
+    """C (3, 3) that turns forces as they were read into those that were fitted, in frd.
+
+    It differs from I if the data had a gross error that a diagnosis mended.
+    """
+    mended = calibration.get("mended") or {}
+    return np.eye(3) if mended.get("matrix") is None else np.array(mended["matrix"], dtype=float)
+
+
+def export(calibration: Mapping[str, Any], form: str) -> str:
+    """Text of a calibration in one of `FORMS`.
+
+    "json" and "yaml" hold everything: parameters with sigmas, formulas of the effects and, if there
+    is one, the matrix. "c" is a header file with the matrix, "matrix" its plain 3 × 4 numbers.
+    """
+    if form == "matrix":
+        return "\n".join(_row(row, " ") for row in device_matrix(calibration)) + "\n"
+    if form == "c":
+        return _c_header(calibration)
+    if form == "json":
+        return json.dumps(_whole(calibration), indent=2, ensure_ascii=False) + "\n"
+    if form == "yaml":
+        return yaml.safe_dump(_whole(calibration), sort_keys=False, allow_unicode=True)
+    raise UnknownNameError("form", form, FORMS)
+
+
+def _model(calibration: Mapping[str, Any]) -> SensorModel:
+    return compose(calibration["model"], tuple(calibration["effects"]))
+
+
+def _readings(calibration: Mapping[str, Any]) -> tuple[Conversion, Frame]:
+    """Conversion of raw readings, and their axes: those of the log, if there was one."""
+    log = calibration.get("log")
+    if log is None:
+        return campaign_conversion(calibration), FRD
+    raw = conversion_of(log["unit"], log.get("scale"), log.get("offset"))
+    return raw, parse_frame(log["frame"])
+
+
+def _whole(calibration: Mapping[str, Any]) -> dict[str, Any]:
+    """Everything that is needed to implement a calibration elsewhere."""
+    model = _model(calibration)
+    raw, frame = _readings(calibration)
+    values = iter(calibration["parameters"])
+    effects = [
+        _effect(effect, [next(values) for _ in effect.parameters]) for effect in model.effects
+    ]
+    used = " ".join(json.dumps(effect) for effect in effects)
+    matrix = None
+    if not not_affine(model) and calibration["affine"] is not None:
+        matrix = device_matrix(calibration).tolist()
+    return {
+        "campaign": calibration["campaign"],
+        "model": calibration["model"],
+        "unit": _unit(calibration),
+        "gravity_mps2": calibration["gravity_mps2"],
+        "readings": {
+            "frame": frame.name,
+            "scale": raw.scale.tolist(),
+            "offset": raw.offset.tolist(),
+            "to_frd": frame.matrix.tolist(),
+            "mending": mending(calibration).tolist(),
+        },
+        "steps": list(STEPS),
+        "symbols": {name: text for name, text in SYMBOLS.items() if name in used or name == "g"},
+        "effects": effects,
+        "ranges": calibration.get("ranges") or {},
+        "parameters": calibration["parameters"],
+        "matrix_3x4": matrix,
+    }
+
+
+def _effect(effect: Effect, parameters: list[Any]) -> dict[str, Any]:
+    """Formulas of an effect, and its parameters in SI."""
+    notes = []
+    if effect.part == "rig":
+        notes.append("belongs to the rig: do not apply it to readings away from the rig")
+    if effect.drifts:
+        notes.append("known within the session only: limit time to ranges.time_s")
+    return {
+        "spec": effect.spec,
+        "part": effect.part,
+        **({"note": "; ".join(notes)} if notes else {}),
+        **formulas(effect),
+        "parameters": [
+            {key: p[key] for key in ("name", "value", "sigma", "unit")} for p in parameters
+        ],
+    }
+
+
+def _unit(calibration: Mapping[str, Any]) -> str:
+    log = calibration.get("log")
+    return str(calibration["unit"] if log is None else log["unit"])
+
+
+def _row(values: ArrayLike, separator: str) -> str:
+    return separator.join(f"{value: .12e}" for value in np.asarray(values))
+
+
+def _c_header(calibration: Mapping[str, Any]) -> str:
+    rows = ",\n".join(f"    {{{_row(row, ', ')}}}" for row in device_matrix(calibration))
+    _, frame = _readings(calibration)
+    lines = [
+        f"Accelerometer calibration of {calibration['campaign']}.",
+        f"Specific force in m/s^2 = M * (x, y, z, 1), with x, y, z in {_unit(calibration)}.",
+        f"Both are in the axes {frame.description}.",
+    ]
+    if (calibration.get("mended") or {}).get("matrix") is not None:
+        lines.append(f"M mends the readings, too: {calibration['mended']['reason']}.")
+    comment = "\n * ".join(line.replace("*/", "* /") for line in lines)
+    return (
+        f"/* {comment} */\n"
+        "#ifndef ACCELEROMETER_CALIBRATION_H\n#define ACCELEROMETER_CALIBRATION_H\n\n"
+        f"static const double accelerometer_calibration[3][4] = {{\n{rows}\n}};\n\n#endif\n"
+    )

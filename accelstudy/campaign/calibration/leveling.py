@@ -1,0 +1,347 @@
+"""Apply a calibration to a log and level with it, a chunk of rows at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from accelstudy.basics import bounds
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.progress import track
+from accelstudy.basics.units import attitude_unit, display_unit, to_attitude, to_display
+from accelstudy.basics.wording import counted, quantity_text, short_list
+from accelstudy.campaign.calibration.applying import MARGIN, Calibration, Watch
+from accelstudy.campaign.calibration.readings import Readings, readings_of
+from accelstudy.campaign.calibration.tables import chunk_writer, column_names, is_parquet, numbers
+from accelstudy.campaign.checks import likely_fault
+from accelstudy.campaign.importing.columns import AXES
+from accelstudy.campaign.importing.sources import CHUNK
+from accelstudy.effects import HoldConditions
+from accelstudy.leveling.angles import near_pole
+from accelstudy.sensors.frames import Frame
+
+Array = NDArray[np.float64]
+
+CLIPPED = 0.999
+"""A reading beyond this part of the sensor's range is saturated: the last count is often below the
+range."""
+
+NEAR_POLE = "near_pole"
+"""Column that says whether a row is too close to the roll pole for its sigmas."""
+
+RAGGED = "ragged"
+"""Key of an unusable line that has more or fewer cells than the others."""
+
+DECIMALS = 9
+"""Decimals of the added columns: far below any noise, and half the digits of a double."""
+
+
+@dataclass(frozen=True)
+class Leveled:
+    """Summary of a leveled log.
+
+    Attributes
+    ----------
+    rows : int
+    empty : int, rows without a calibrated force
+    warnings : tuple of str
+    """
+
+    rows: int
+    empty: int
+    warnings: tuple[str, ...]
+
+
+def level_log(
+    calibration: Calibration,
+    log: str | Path,
+    out: str | Path,
+    given: Mapping[str, Any] | None = None,
+    sigma: float | None = None,
+    start: float | None = None,
+    chunk_size: int = CHUNK,
+) -> Leveled:
+    """Write a log with calibrated forces, roll and pitch and their standard deviations.
+
+    Forces and angles are in the axes of the log. A row gets empty cells if a reading is missing, or
+    if no force explains it.
+
+    Parameters
+    ----------
+    calibration : Calibration
+    log : file with the raw log; see `readings_of`
+    out : CSV or Parquet file to write; if that fails, there is none
+    given : mapping, optional
+        How to read the log; see `readings_of`.
+    sigma : float, m/s², noise of a reading; see `noise_of_reading` if omitted
+    start : float, s, from the start of the calibration session to the first row; 0 if omitted
+    chunk_size : int, rows held in memory at a time
+
+    Raises
+    ------
+    InputError
+        If the log cannot be read, lacks a column that an effect of the calibration needs, or is so
+        far from gravity in most rows that it must be in another unit.
+    """
+    readings = readings_of(log, calibration, given, start or 0.0)
+    if sigma is not None:
+        bounds.SIGMA_READING.check_key("--sigma", sigma)
+    noise = noise_of_reading(calibration) if sigma is None else sigma
+    account = Account(calibration, readings)
+    with chunk_writer(out) as write:
+        chunks = readings.chunks(chunk_size, typed=is_parquet(out))
+        for table, forces, hold in track(chunks, "leveling"):
+            corrected, near, added = _leveled(calibration, readings.frame, forces, hold, noise)
+            account.add(table, forces, corrected, near, hold)
+            write(_with(table, added))
+        account.close()
+    assumed = account.assumptions() if start is None else ()
+    doubts = (*_implausible(calibration), *_mended(calibration, readings), *_estimated(calibration))
+    warnings = (*doubts, *assumed, *account.warnings())
+    return Leveled(account.rows, account.empty, warnings)
+
+
+def _implausible(calibration: Calibration) -> tuple[str, ...]:
+    """Warn that no sensor can have such a calibration."""
+    quality = calibration.content["quality"]
+    if quality["plausible"]:
+        return ()
+    return (f"do not use this calibration: {'; '.join(quality['warnings'])}",)
+
+
+def _mended(calibration: Calibration, readings: Readings) -> tuple[str, ...]:
+    """Say that the calibration is of mended data, and whether readings were mended, too."""
+    mended = calibration.content.get("mended")
+    if mended is None:
+        return ()
+    warning = f"the calibration is of mended data: {mended['reason']}"
+    if mended["matrix"] is None:
+        return (warning,)
+    if np.array_equal(readings.mending, np.eye(3)):
+        return (f"{warning}; readings are converted by the options only, and are not mended",)
+    return (f"{warning}; readings are mended in the same way",)
+
+
+def _estimated(calibration: Calibration) -> tuple[str, ...]:
+    """Say how many sigmas hold 95 %, if a calibration with few residuals makes that more than 2."""
+    needed = calibration.content["sigmas_95"] or 0.0
+    if needed <= 2:
+        return ()
+    return (
+        "the sigmas of the calibration come from few residuals: to hold 95 % of the errors it "
+        f"takes up to {needed:.2f} sigmas of roll and pitch",
+    )
+
+
+def noise_of_reading(calibration: Calibration) -> float:
+    """Noise of a reading, m/s²: the noise within the holds of the campaign.
+
+    If that is unknown it is the noise of the mean of a hold, which is smaller; 0 if neither is
+    known.
+    """
+    sigmas = (calibration.content.get(f"sigma_{what}_mps2") for what in ("reading", "position"))
+    return next((sigma for sigma in sigmas if sigma is not None), 0.0)
+
+
+def _leveled(
+    calibration: Calibration, frame: Frame, forces: Array, hold: HoldConditions, noise: float
+) -> tuple[Array, NDArray[np.bool_], dict[str, pa.Array]]:
+    """Calibrated forces in frd of readings (k, 3), m/s², and the columns that are added.
+
+    Between them, which rows (k,) are too close to the roll pole for their sigmas.
+    """
+    with np.errstate(all="ignore"):  # forces that are not finite are counted below
+        corrected = calibration.correct(forces, hold)
+        angles, sigmas = calibration.level(forces, noise, hold)
+    lost = ~np.isfinite(corrected + angles[:, :1]).all(axis=1)
+    lost |= clipped(calibration, forces).any(axis=1)
+    corrected[lost] = np.nan
+    shown = frame.from_frd(corrected)
+    added = {f"{axis}_calibrated_mps2": shown[:, i] for i, axis in enumerate(AXES)}
+    for i, angle in enumerate(("roll", "pitch")):
+        added[f"{angle}_{attitude_unit()}"] = frame.signs[i] * to_attitude(angles[:, i])
+        added[f"sigma_{angle}_{display_unit('rad')}"] = to_display(sigmas[:, i], "rad")
+    columns = {
+        name: pa.array(np.round(values, DECIMALS), mask=lost | ~np.isfinite(values))
+        for name, values in added.items()
+    }
+    near = ~lost & near_pole(angles, sigmas)
+    return corrected, near, {**columns, NEAR_POLE: pa.array(near, mask=lost)}
+
+
+def _with(table: pa.Table, added: dict[str, pa.Array]) -> pa.Table:
+    """Table with added columns; existing columns of the same name are replaced."""
+    for name, column in added.items():
+        if name in table.column_names:
+            table = table.set_column(table.column_names.index(name), name, column)
+        else:
+            table = table.append_column(name, column)
+    return table
+
+
+def clipped(calibration: Calibration, forces: Array) -> NDArray[np.bool_]:
+    """Which readings (k, 3), m/s², are at the end of the sensor's range."""
+    full = calibration.content.get("range_mps2")
+    return np.abs(forces) >= CLIPPED * (np.inf if full is None else full)
+
+
+class Account:
+    """Collects what the user should know about a log; chunks are added one after the other.
+
+    Attributes
+    ----------
+    rows : int, so far
+    empty : int, rows without a calibrated force
+    """
+
+    def __init__(self, calibration: Calibration, readings: Readings) -> None:
+        self._calibration, self._readings = calibration, readings
+        self._watch = Watch(calibration.ranges)
+        self._norms = np.empty(0)
+        self._usable = self._far = self._after = self._near = 0
+        self._first_empty: tuple[int, str | None] = (0, None)
+        self.rows = self.empty = 0
+
+    def add(
+        self,
+        table: pa.Table,
+        forces: Array,
+        corrected: Array,
+        near: NDArray[np.bool_],
+        hold: HoldConditions,
+    ) -> None:
+        """Add rows, their readings and calibrated forces (k, 3), m/s² in frd, and conditions.
+
+        `near` says which of them are too close to the roll pole for their sigmas.
+
+        Raises
+        ------
+        InputError
+            If all readings of the first chunk are nowhere near gravity.
+        """
+        lost = np.isnan(corrected[:, 0])
+        if lost.any() and not self.empty:
+            first = int(np.argmax(lost))
+            self._first_empty = self.rows + first, self._unusable(table, first)
+        self.rows += len(lost)
+        self.empty += int(lost.sum())
+        self._near += int(near.sum())
+        norms = np.linalg.norm(forces, axis=1)
+        norms = norms[np.isfinite(norms)]
+        # Even bad sensors are wrong by some tenths only; larger differences come from motion.
+        gravity = self._calibration.gravity
+        self._far += int(np.sum((norms < gravity / 2) | (norms > gravity * 2)))
+        if not self._usable and len(norms):
+            self._norms = norms
+            if self._far == len(norms):
+                raise self._wrong_unit()
+        self._usable += len(norms)
+        if self._calibration.drifts and hold.time is not None:
+            self._after += int(np.sum(hold.time > (1 + MARGIN) * self._session_end))
+        self._watch.look_at(corrected, hold)
+
+    def close(self) -> None:
+        """Raise `InputError` if no row is usable, or most readings are far from gravity."""
+        if not self._usable:
+            path = self._readings.source.path
+            raise InputError(f"{path}: no row has three numbers; the first: {self._reason()}")
+        if 2 * self._far > self._usable:
+            raise self._wrong_unit()
+
+    def assumptions(self) -> Iterator[str]:
+        """Assumptions that are made if the user does not say when the log was started."""
+        needs = self._calibration.needs
+        warmed = {effect for effect, column in needs if column == "temperature"}
+        timed = [e for e, column in needs if column == "time" and e not in warmed]
+        lagging = [e for e, column in needs if column == "time" and e in warmed]
+        if lagging:
+            yield f"{short_list(lagging)}: assumes that the sensor has the temperature of row 1"
+        if timed:
+            yield (
+                f"{short_list(timed)}: assumes that the first row is the start of the calibration "
+                "session; if not, give the seconds between them by --start"
+            )
+
+    def warnings(self) -> Iterator[str]:
+        """Warnings about the log."""
+        of_all = f"of {counted(self.rows, 'row')}"
+        if self.empty:
+            first = self._reason()
+            yield f"{self.empty} {of_all} have no calibrated force and get empty cells; {first}"
+        if self._near:
+            yield (
+                f"{self._near} {of_all} are too close to a pitch of "
+                f"±{quantity_text(np.pi / 2, 'rad')}, where roll has no meaning, for their sigmas "
+                f"of roll and pitch to hold ({NEAR_POLE} is true there); use the calibrated force"
+            )
+        if self._after:
+            yield (
+                f"{short_list(self._calibration.drifts)}: kept constant after the end of the "
+                f"calibration session ({self._session_end:.0f} s), in {self._after} {of_all}"
+            )
+        moved = dict.fromkeys(e for e, c in self._calibration.needs if c.startswith("step_"))
+        for name in moved:
+            yield (
+                f"{name} is not corrected ({self._sizes(name)}): it depends on the position "
+                "before, which a log does not have"
+            )
+        yield from self._watch.warnings(self.rows)
+
+    @property
+    def _session_end(self) -> float:
+        return self._calibration.ranges.get("time_s", [0.0, np.inf])[1]
+
+    def _sizes(self, name: str) -> str:
+        model = self._calibration.model
+        values = dict(zip(model.parameter_names, self._calibration.parameters, strict=True))
+        (effect,) = (effect for effect in model.effects if effect.name == name)
+        return ", ".join(
+            f"{p.name} = {float(to_display(values[p.name], p.unit)):.3g} {display_unit(p.unit)}"
+            for p in effect.parameters
+        )
+
+    def _unusable(self, table: pa.Table, row: int) -> str | None:
+        """Key of the first used column that has no number in a row of a chunk."""
+        names = column_names(self._readings.source)
+        if all(not cell.is_valid for column in table.columns for cell in column.slice(row, 1)):
+            return RAGGED
+        for key, place in self._readings.places.items():
+            if not np.isfinite(numbers(table[names[place]].slice(row, 1))).all():
+                return key
+        return None
+
+    def _reason(self) -> str:
+        """Say why the first empty row is empty, and where it is."""
+        source, places = self._readings.source, self._readings.places
+        row, key = self._first_empty
+        # This reads the file again to find the line.
+        where, cell = source.look_up(row, places.get(key or "", places["fx"]))
+        if key == RAGGED:
+            return f"{where} does not have {len(source.names)} columns like the others"
+        if key is not None:
+            return f"{where}, column {source.names[places[key]]} ({key}): {cell}"
+        full = self._calibration.content.get("range_mps2")
+        end = "" if full is None else f", or it is at the end of the range, ± {full:.4g} m/s²"
+        return f"{where}: the calibration has no force for such a reading{end}"
+
+    def _wrong_unit(self) -> InputError:
+        readings, gravity = self._readings, self._calibration.gravity
+        norm = float(np.median(self._norms))
+        given = norm / abs(float(readings.conversion.scale[0]))
+        fault = likely_fault(given, norm, readings.unit, gravity)
+        looks = f"these look like {fault}; give --unit {fault}"
+        return InputError(
+            f"{readings.source.path}: the readings are about {given:.3g} {readings.unit}: "
+            + (
+                looks
+                if fault in ("m/s^2", "g")
+                else "nowhere near gravity, "
+                f"{gravity:.3g} m/s²; give the --unit or the --columns of this log"
+            )
+        )

@@ -1,0 +1,222 @@
+"""How to read a log to which a calibration is applied, with the conditions that effects need."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import UNITS
+from accelstudy.campaign.calibration.applying import Calibration
+from accelstudy.campaign.calibration.export import campaign_conversion, mending
+from accelstudy.campaign.calibration.tables import column_names, numbers, read_chunks
+from accelstudy.campaign.header import LogLayout
+from accelstudy.campaign.importing.columns import AXES, locate
+from accelstudy.campaign.importing.sources import CHUNK, Source, open_source
+from accelstudy.effects import Course, HoldConditions
+from accelstudy.files.validation import checked
+from accelstudy.sensors.conversion import Conversion, conversion_of
+from accelstudy.sensors.frames import Frame
+
+Array = NDArray[np.float64]
+
+OPTIONS = {
+    "time": "--time or --rate",
+    "temperature": "--columns temperature=NAME",
+    "vibration": "--columns vibration=NAME",
+}
+"""Conditions that a log can hold, and the options that name their columns."""
+
+
+@dataclass(frozen=True)
+class Readings:
+    """A log, prepared for a calibration.
+
+    Attributes
+    ----------
+    source : Source
+    places : mapping of fx, fy, fz, time, temperature and vibration to columns, as far as known
+    rate : float, 1/s, if the time comes from it
+    time_factor : float, s per unit of the column of time
+    start : float, s, from the start of the calibration session to the first row
+    unit : str, of the forces
+    conversion : Conversion, of forces to m/s², in the axes of the log
+    frame : Frame, the axes of the log
+    mending : (3, 3), turns forces in frd as they are read into mended ones
+    """
+
+    source: Source
+    places: Mapping[str, int]
+    rate: float | None
+    time_factor: float
+    start: float
+    unit: str
+    conversion: Conversion
+    frame: Frame
+    mending: Array
+
+    def chunks(
+        self, chunk_size: int = CHUNK, typed: bool = False
+    ) -> Iterator[tuple[pa.Table, Array, HoldConditions]]:
+        """Rows as they are in the file, their forces (k, 3) in m/s² in frd, and their conditions.
+
+        See `read_chunks` for `typed`.
+        """
+        names, places = column_names(self.source), list(self.places.items())
+        row, first = 0, np.nan
+        course = Course(np.empty(0), np.empty(0))
+        for table in read_chunks(self.source, chunk_size, typed):
+            values = {key: self._numbers(table[names[place]], place) for key, place in places}
+            forces = np.column_stack([values[axis] for axis in AXES])
+            time = values.get("time")
+            if self.rate is not None:
+                time = self.start + np.arange(row, row + len(table)) / self.rate
+            elif time is not None:
+                if np.isnan(first):
+                    first = next(iter(time[np.isfinite(time)]), np.nan)
+                time = self.start + (time - first) * self.time_factor
+            temperature = values.get("temperature")
+            if time is not None and temperature is not None:
+                course = course.then(time, temperature)
+            # A log has no position before: effects that depend on it add nothing.
+            still = np.zeros(len(table))
+            hold = HoldConditions(
+                time=time,
+                temperature=temperature,
+                vibration=values.get("vibration"),
+                step_x=still,
+                step_y=still,
+                step_z=still,
+                course=course if len(course.time) else None,
+            )
+            read = self.frame.to_frd(self.conversion.to_si(forces))
+            yield table, read @ self.mending.T, hold
+            row += len(table)
+
+    def _numbers(self, column: pa.ChunkedArray, place: int) -> Array:
+        kind = column.type
+        if not (
+            pa.types.is_string(kind) or pa.types.is_integer(kind) or pa.types.is_floating(kind)
+        ):
+            name = self.source.names[place]
+            raise InputError(f"{self.source.path}: column {name} is {kind}, not numbers")
+        return numbers(column)
+
+
+def readings_of(
+    log: str | Path,
+    calibration: Calibration,
+    given: Mapping[str, Any] | None = None,
+    start: float = 0.0,
+) -> Readings:
+    """Open a log; by default it is read like the log from which the campaign was made.
+
+    Parameters
+    ----------
+    log : file, of any kind that `open_source` reads
+    calibration : Calibration
+    given : mapping, optional
+        Keys of `LogLayout`. Columns overlay those of the campaign's log; if all three columns of
+        the forces are given, they replace all others, since then the log is another one. A column
+        of time replaces a rate, and vice versa.
+    start : float, s, from the start of the calibration session to the first row
+
+    Returns
+    -------
+    Readings
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or lacks a column, perhaps one that an effect needs.
+    """
+    given = dict(given or {})
+    if {"time", "rate_hz"} <= set(given):
+        raise InputError(f"{log}: give the rate or the column of time, not both")
+    layout = _layout(calibration, given)
+    source = open_source(log, layout.variable)
+    try:
+        places = _places(source, layout, calibration, {*given, *given.get("columns", {})})
+    except InputError as error:
+        if calibration.log is None or "columns" in given:
+            raise
+        raise InputError(
+            f"{error}; the columns are those of the log of the campaign, --columns and --time "
+            "change them"
+        ) from None
+    for effect, condition in calibration.needs:
+        is_given = condition in places or (condition == "time" and layout.rate_hz is not None)
+        if condition in OPTIONS and not is_given:
+            raise InputError(
+                f"{log}: the effect {effect} needs the {condition} of each row; "
+                f"give it by {OPTIONS[condition]}"
+            )
+    unit = layout.unit
+    if calibration.log is None and "unit" not in given:
+        unit = calibration.content["unit"]
+    # What the user says of this log is right, whatever was wrong with the campaign.
+    option_of = {"unit_error": "unit", "axis_error": "frame"}
+    mended = calibration.content.get("mended")
+    mends = mended is None or option_of.get(mended["error"]) not in given
+    return Readings(
+        source,
+        places,
+        layout.rate_hz,
+        UNITS["s"][layout.time_unit],
+        start,
+        unit,
+        _conversion(calibration, layout, unit),
+        layout.axes,
+        mending(calibration.content) if mends else np.eye(3),
+    )
+
+
+def _layout(calibration: Calibration, given: Mapping[str, Any]) -> LogLayout:
+    """Layout of the campaign's log, overlaid with `given`."""
+    layout = {} if calibration.log is None else calibration.log.model_dump(exclude_none=True)
+    if given.keys() & {"time", "rate_hz"}:
+        layout = {key: value for key, value in layout.items() if key not in ("time", "rate_hz")}
+    columns = given.get("columns", {})
+    if not set(AXES) <= set(columns):
+        columns = {**layout.get("columns", {}), **columns}
+    return checked(LogLayout, {**layout, **given, "columns": columns}, "options")
+
+
+def _places(
+    source: Source, layout: LogLayout, calibration: Calibration, given: set[str]
+) -> dict[str, int]:
+    """Columns of the log; a column that no effect needs may be missing, unless it was given."""
+    columns = dict(layout.columns)
+    if layout.time is not None:
+        columns["time"] = layout.time
+    needed = {condition for _, condition in calibration.needs}
+    if layout.rate_hz is not None:
+        columns.pop("time", None)
+        needed.discard("time")
+    places = locate(source, {k: v for k, v in columns.items() if k not in OPTIONS}, AXES)
+    for key in OPTIONS:
+        if key in needed or (key in columns and key != "time"):
+            wanted = {key: columns[key]} if key in columns else {}
+            try:
+                places |= locate(source, wanted, (key,), needed=False)
+            except InputError:
+                if key in given:
+                    raise
+    return places
+
+
+def _conversion(calibration: Calibration, layout: LogLayout, unit: str) -> Conversion:
+    """Conversion of readings in a unit, in the axes of the log."""
+    if calibration.log is None and unit == calibration.content["unit"]:
+        return campaign_conversion(calibration.content)
+    if unit != "counts":
+        return conversion_of(unit)
+    if layout.scale is None:
+        raise InputError("--unit counts: the calibration has no nominal scale of counts")
+    return conversion_of("counts", layout.scale, layout.offset)

@@ -1,0 +1,358 @@
+"""A campaign: one calibration session of one sensor, as a folder with two files."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import pyarrow as pa
+import yaml
+from numpy.typing import NDArray
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import MGON
+from accelstudy.basics.wording import one_line
+from accelstudy.campaign.checks import (
+    check_angles,
+    check_column,
+    check_names,
+    check_norm,
+    check_outliers,
+    check_robot,
+    check_size,
+)
+from accelstudy.campaign.header import COLUMNS, COUNTING, HEADER, KNOWN, TABLES, Header
+from accelstudy.campaign.session import Campaign
+from accelstudy.files.outputs import whole_file
+from accelstudy.files.parquet import whole_parquet, write_parquet
+from accelstudy.files.reading import overlay, read_layer, read_text
+from accelstudy.files.validation import checked
+
+Array = NDArray[np.float64]
+Columns = Mapping[str, Sequence[Any]]
+"""The table of positions as it is in its file, by name: text from CSV, values from Parquet."""
+
+MOST_NAMED = 5
+"""Unknown columns of which each has a line."""
+
+
+def read_campaign(
+    folder: str | Path, given: Mapping[str, Any] | None = None, *, plausible: bool = True
+) -> Campaign:
+    """Read a campaign folder: `campaign.yaml` and `positions.csv` or `positions.parquet`.
+
+    With ``unit: g`` forces are multiples of standard gravity, 9.80665 m/s². This unit is the same
+    everywhere, while `gravity` is the local value. If the data are scaled so that local gravity is
+    1, give 9.80665 as the value of gravity.
+
+    With ``unit: counts`` forces are (raw − offset) · scale, and sds are sd · abs(scale).
+
+    Numbers in `position` increase, but some may be missing, as after the removal of a hold. A
+    missing yaw of the robot is 0. Unknown columns are left out and named in `warnings`.
+
+    Parameters
+    ----------
+    folder : path
+    given : mapping, optional
+        Overlays the header key by key.
+    plausible : bool
+        Whether to refuse forces that are not as large as gravity, and angles that fit them better
+        in another unit. False is for callers that look for such errors themselves.
+
+    Raises
+    ------
+    InputError
+        If a file is missing or incomplete, or a value cannot be right; one line says where.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise InputError(
+            f"{folder}: no such folder; a campaign is a folder with {HEADER} and "
+            f"{' or '.join(TABLES)}"
+        )
+    header = read_header(folder, given)
+    path = table_of(folder)
+    if path is None:
+        raise InputError(f"{folder}: no table of positions; expected either {' or '.join(TABLES)}")
+    columns, warnings = read_positions(path)
+    campaign = parse_table(columns, header, path, plausible)
+    return replace(campaign, warnings=tuple(warnings))
+
+
+def read_header(folder: Path, given: Mapping[str, Any] | None = None) -> Header:
+    """Header of a campaign folder, overlaid key by key with `given`; errors as `read_campaign`."""
+    return _parse_header(overlay(read_layer(folder / HEADER), given or {}), folder / HEADER)
+
+
+def table_of(folder: Path) -> Path | None:
+    """Table of positions in a campaign folder; None if there is none, an error if there are two."""
+    tables = [folder / name for name in TABLES if (folder / name).exists()]
+    if len(tables) > 1:
+        raise InputError(
+            f"{folder}: two tables of positions; expected either {' or '.join(TABLES)}"
+        )
+    return tables[0] if tables else None
+
+
+def read_positions(path: Path) -> tuple[Columns, list[str]]:
+    """Read the columns of a table, as text from CSV and as values from Parquet.
+
+    Returns
+    -------
+    columns : mapping of name to values
+    warnings : list of str
+
+    Raises
+    ------
+    InputError
+        If the file is missing or incomplete, or a column occurs twice.
+    """
+    columns, odd = (_read_csv if path.suffix == ".csv" else _read_parquet)(path)
+    return columns, odd + ignored_in(columns, path)
+
+
+def ignored_in(columns: Columns, path: Path) -> list[str]:
+    """Warnings about columns that the format does not know."""
+    unknown = [name for name in columns if name not in KNOWN]
+    if len(unknown) > MOST_NAMED:
+        first = ", ".join(one_line(repr(name), 30) for name in unknown[:MOST_NAMED])
+        return [f"{path}: {len(unknown)} columns are not known and ignored: {first}, …"]
+    return [_ignored(path, name) for name in unknown]
+
+
+def _read_csv(path: Path) -> tuple[Columns, list[str]]:
+    """Columns of text, and warnings."""
+    try:
+        text = read_text(path)
+    except UnicodeDecodeError as error:
+        raise _not_whole(path, error) from None
+    columns = columns_of(text, path)
+    # Half a number is a number, too: if the file was cut there, only the line end is missing.
+    whole = text.endswith(("\n", "\r"))
+    odd = [] if whole else [f"{path}: the last line does not end; check that it is whole"]
+    return columns, odd
+
+
+def columns_of(text: str, path: Path) -> Columns:
+    """Columns of the text of a CSV table; errors name `path`."""
+    try:
+        reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
+        lines = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
+    except csv.Error as error:
+        raise _not_whole(path, error) from None
+    if not lines:
+        raise InputError(f"{path}: empty; expected a line of column names, position, fx, fy, fz …")
+    names = [name.strip() for name in lines[0][1]]
+    if len(names) == 1 and (mark := next((m for m in ";\t" if m in names[0]), None)):
+        raise InputError(f"{path}: columns are separated by {mark!r}; a comma would be right")
+    for line, row in lines[1:]:
+        if len(row) != len(names):
+            raise InputError(
+                f"{path}: line {line}: {len(row)} values for {len(names)} columns; "
+                "is the file whole?"
+            )
+    check_names(names, path)
+    return {name: [row[i] for _, row in lines[1:]] for i, name in enumerate(names)}
+
+
+def _not_whole(path: Path, error: Exception) -> InputError:
+    return InputError(f"{path}: not a whole CSV file in UTF-8 ({one_line(error)})")
+
+
+def _read_parquet(path: Path) -> tuple[Columns, list[str]]:
+    """Columns of Python values, and no warnings; unknown columns are not read."""
+    with whole_parquet(path) as file:
+        names = [str(name) for name in file.schema_arrow.names]
+        check_names(names, path)
+        table = file.read(columns=[name for name in names if name in KNOWN])
+        return {n: table[n].to_pylist() if n in KNOWN else () for n in names}, []
+
+
+def _ignored(path: Path, name: str) -> str:
+    near = get_close_matches(name[:100], KNOWN, n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    return f"{path}: column {one_line(repr(name))} is not known and ignored{hint}"
+
+
+def write_campaign(
+    campaign: Campaign,
+    folder: str | Path,
+    table: Literal["csv", "parquet"] = "csv",
+    plausible: bool = True,
+) -> None:
+    """Write a campaign folder, in the unit that the campaign had.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        Its `warnings` are not written.
+    folder : path
+        Made if it does not exist. A table of positions in it is replaced, be it CSV or Parquet;
+        other files stay.
+    table : "csv" or "parquet"
+    plausible : bool
+        As in `read_campaign`.
+
+    Raises
+    ------
+    InputError
+        If the campaign could not be read again (nothing is written then), or the folder cannot be
+        written.
+    """
+    folder = Path(folder)
+    path = folder / f"positions.{table}"
+    header = _parse_header(_content_of(campaign), folder / HEADER)
+    columns = _columns_of(campaign.whole, header)
+    parse_table(columns, header, path, plausible)
+    try:
+        with whole_file(path) as temporary:
+            if table == "csv":
+                with temporary.open("w", newline="", encoding="utf-8") as file:
+                    writer = csv.writer(file, lineterminator="\n")
+                    writer.writerow(columns)
+                    writer.writerows(zip(*columns.values(), strict=True))
+            else:
+                write_parquet(temporary, pa.table(columns))
+        for name in set(TABLES) - {path.name}:
+            (folder / name).unlink(missing_ok=True)
+        with whole_file(folder / HEADER) as temporary:
+            content = header.model_dump(mode="json", exclude_none=True)
+            text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
+            temporary.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written: {error.strerror or error}") from None
+
+
+def _parse_header(content: dict[str, Any], path: Path) -> Header:
+    return checked(Header, content, path)
+
+
+def parse_table(columns: Columns, header: Header, path: Path, plausible: bool = True) -> Campaign:
+    """Check the columns of the table `path`, and make a campaign of them and the header."""
+    given: dict[str, Array] = {}
+    labels: list[str] = []
+    for attribute, names in COLUMNS.items():
+        if attribute not in ("positions", "forces") and not {*names} & {*columns}:
+            continue
+        parts = [_numbers(columns, name, labels, path) for name in names]
+        if attribute == "positions":
+            labels = [f"position {value:.15g}" for value in parts[0]]
+        for name, part in zip(names, parts, strict=True):
+            check_column(attribute, name, part, labels, path)
+        given[attribute] = np.column_stack(parts) if len(parts) > 1 else parts[0]
+    check_robot(given, header, path)
+    values: dict[str, Any] = {}
+    with np.errstate(all="ignore"):  # the checks below find what overflows
+        for attribute, array in given.items():
+            values[attribute] = header.conversion(attribute).to_si(array)
+        check = check_norm if plausible else check_size
+        check(given["forces"], values["forces"], header, path)
+        if plausible:
+            check_outliers(values["forces"], labels, header.gravity.value_mps2, path)
+        if header.robot is not None:
+            if plausible:
+                check_angles(given["angles"], values["forces"], header.gravity.value_mps2, path)
+            values.setdefault("yaw", np.zeros(len(labels)))
+    for attribute in COUNTING:
+        if attribute in values:
+            values[attribute] = values[attribute].astype(np.int64)
+    campaign = campaign_of(header, values)
+    reasons = {entry.position: entry.reason for entry in header.excluded or ()}
+    try:
+        return campaign.without(reasons)
+    except InputError as error:
+        raise InputError(f"{path.with_name(HEADER)}: {error}") from None
+
+
+def campaign_of(header: Header, values: Mapping[str, Any]) -> Campaign:
+    """Make a campaign of a header and of columns in SI, by attribute."""
+    noise, robot = header.sensor_noise, header.robot
+    return Campaign(
+        name=header.name,
+        sensor=header.sensor,
+        unit=header.unit,
+        gravity=header.gravity.value_mps2,
+        sigma_gravity=header.gravity.sigma_mps2,
+        sigma_force=None if noise is None else noise.sigma_mps2,
+        sigma_angle=None if robot is None else robot.angle_sigma_mgon * MGON,
+        nominal=None if header.nominal is None else header.conversion("forces"),
+        full_range=header.range_mps2,
+        log=header.log,
+        **values,
+    )
+
+
+def _numbers(columns: Columns, name: str, labels: Sequence[str], path: Path) -> Array:
+    """Column of finite numbers; `labels` name its rows in errors."""
+    if name not in columns:
+        lower = {other.lower(): other for other in columns if other not in KNOWN}
+        near = get_close_matches(name.lower(), lower, n=1)
+        hint = f"; is {lower[near[0]]!r} meant?" if near else ""
+        beside = next((names for names in COLUMNS.values() if name in names), ())
+        group = f" (it goes with {', '.join(n for n in beside if n != name)})" if beside[1:] else ""
+        raise InputError(f"{path}: {name}: the column is missing{group}{hint}")
+    values = columns[name]
+    if not len(values):
+        raise InputError(f"{path}: no positions; expected one row per hold")
+    numbers = np.empty(len(values))
+    for i, value in enumerate(values):
+        where = f"{path}: {name}: {labels[i] if labels else f'row {i + 1}'}"
+        if value is None or value == "":
+            raise InputError(f"{where}: empty; expected a number")
+        try:
+            if isinstance(value, bool) or "_" in str(value):
+                raise ValueError
+            numbers[i] = float(value)
+        except (TypeError, ValueError, OverflowError):
+            shown = one_line(repr(value), 60)
+            raise InputError(f"{where}: {shown} is no number, such as -9.81") from None
+        if not np.isfinite(numbers[i]):
+            raise InputError(f"{where}: {value} is not finite; leave out a hold that has no mean")
+    return numbers
+
+
+def _content_of(campaign: Campaign) -> dict[str, Any]:
+    """Content of `campaign.yaml`."""
+    content = {
+        "schema_version": 1,
+        "name": campaign.name,
+        "sensor": campaign.sensor,
+        "unit": campaign.unit,
+        "gravity": {"value_mps2": campaign.gravity, "sigma_mps2": campaign.sigma_gravity},
+    }
+    if campaign.nominal is not None:
+        nominal = {"scale": campaign.nominal.scale, "offset": campaign.nominal.offset}
+        content["nominal"] = {k: np.asarray(v).tolist() for k, v in nominal.items()}
+    if campaign.sigma_force is not None:
+        content["sensor_noise"] = {"sigma_mps2": campaign.sigma_force}
+    if campaign.full_range is not None:
+        content["range_mps2"] = campaign.full_range
+    if campaign.reasons:
+        content["excluded"] = campaign.exclusions
+    if campaign.log is not None:
+        content["log"] = campaign.log.model_dump(exclude_none=True)
+    if campaign.sigma_angle is not None:
+        content["robot"] = {"angle_sigma_mgon": campaign.sigma_angle / MGON}
+    return content
+
+
+def _columns_of(campaign: Campaign, header: Header) -> dict[str, list[Any]]:
+    """Columns of a campaign in the units of the files."""
+    columns: dict[str, list[Any]] = {}
+    for attribute, names in COLUMNS.items():
+        values = getattr(campaign, attribute)
+        if values is None:
+            continue
+        shape = (campaign.n_positions, len(names)) if len(names) > 1 else (campaign.n_positions,)
+        if np.shape(values) != shape:
+            raise InputError(f"{campaign.name}: {attribute}: shape {np.shape(values)}, not {shape}")
+        if attribute not in COUNTING:
+            values = header.conversion(attribute).from_si(np.asarray(values, dtype=float))
+        columns.update(zip(names, np.reshape(values, (-1, len(names))).T.tolist(), strict=True))
+    return columns

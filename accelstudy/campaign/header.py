@@ -1,0 +1,196 @@
+"""The header of a campaign, the layout of its log included, and the columns of its table."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    StrictInt,
+    StrictStr,
+    model_validator,
+)
+
+from accelstudy.basics import bounds
+from accelstudy.basics.bounds import Range
+from accelstudy.basics.units import GON
+from accelstudy.files.validation import (
+    Block,
+    Finite,
+    Gravity,
+    Number,
+    OneOrMore,
+    Positive,
+    Rate,
+    SigmaAngle,
+    SigmaForce,
+    SigmaGravity,
+)
+from accelstudy.sensors.conversion import Conversion, conversion_of
+from accelstudy.sensors.frames import Frame, parse_frame
+
+Array = NDArray[np.float64]
+
+HEADER = "campaign.yaml"
+TABLES = ("positions.csv", "positions.parquet")
+
+COLUMNS = {
+    "positions": ("position",),
+    "time": ("time_s",),
+    "forces": ("fx", "fy", "fz"),
+    "n_samples": ("n_samples",),
+    "sd": ("sd_fx", "sd_fy", "sd_fz"),
+    "slope": ("slope_fx", "slope_fy", "slope_fz"),
+    "sd_slope": ("sd_slope_fx", "sd_slope_fy", "sd_slope_fz"),
+    "temperature": ("temperature_degC",),
+    "angles": ("roll_robot_gon", "pitch_robot_gon"),
+    "yaw": ("yaw_robot_gon",),
+    "vibration": ("vibration_mps2",),
+}
+"""Attributes of a campaign and the columns that make them up, all of them or none."""
+KNOWN = tuple(name for names in COLUMNS.values() for name in names)
+COUNTING = ("positions", "n_samples")
+MOST = 1e12
+"""Larger than any measured value in any unit; squares and cubes of smaller ones stay finite."""
+ANY = Range(-MOST, MOST)
+RANGES = {
+    "positions": Range(1, 2**53),  # beyond which not every integer is a float
+    "n_samples": Range(1, 2**53),
+    "sd": Range(0.0, MOST),
+    "sd_slope": Range(0.0, MOST),
+    "time": bounds.TIME,
+    "temperature": bounds.TEMPERATURE,
+    "vibration": bounds.VIBRATION,
+    "angles": bounds.ANGLE,
+    "yaw": bounds.ANGLE,
+}
+"""Ranges of the columns in the unit of the file; others have `ANY`."""
+
+
+Place = Annotated[StrictInt, Field(ge=0)] | StrictStr
+"""A column by its name in the header, or by its place, counted from 0."""
+
+
+class LogLayout(BaseModel):
+    """How the numbers of a log are read: what `import` was told, and `apply` needs again.
+
+    Scale and offset are in the order of the log's own axes, whatever its frame.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    columns: dict[str, Place] = Field(
+        {},
+        description="columns of fx, fy, fz, temperature and vibration: name, or place counted "
+        "from 0",
+    )
+    time: Place | None = Field(None, description="column of time")
+    time_unit: Literal["s", "ms", "us", "ns"] = Field("s", description="unit of that column")
+    rate_hz: Rate | None = Field(None, description="samples per second, without time")
+    variable: str | None = Field(None, description="which array of a MATLAB file")
+    unit: Literal["m/s^2", "g", "counts"] = Field("m/s^2", description="unit of the forces")
+    scale: OneOrMore[Finite] | None = Field(None, description="with counts: m/s² per count")
+    offset: OneOrMore[Finite] | None = Field(None, description="with counts: reading at 0 m/s²")
+    frame: Annotated[str, AfterValidator(lambda name: parse_frame(name).name)] = Field(
+        "frd", description="where the axes x, y, z of the log point, as frd or flu"
+    )
+
+    @property
+    def axes(self) -> Frame:
+        """The frame."""
+        return parse_frame(self.frame)
+
+
+def _not_zero(value: float) -> float:
+    if value == 0:
+        raise ValueError("must not be zero")
+    return value
+
+
+PerAxis = Field(min_length=3, max_length=3)
+
+
+class Nominal(Block):
+    """Nominal conversion of counts: f = (raw − offset) · scale, m/s², per axis."""
+
+    scale: Annotated[list[Annotated[Finite, AfterValidator(_not_zero)]], PerAxis] = Field(
+        description="m/s² per count, of x, y and z"
+    )
+    offset: Annotated[list[Finite], PerAxis] = Field(description="reading at 0 m/s², of x, y and z")
+
+
+class _Gravity(Block):
+    """Gravity where the sensor was."""
+
+    value_mps2: Gravity = Field(description="local gravity")
+    sigma_mps2: SigmaGravity = Field(
+        0.0, description="its standard deviation; 0 holds it fixed in the adjustment"
+    )
+
+
+class _SensorNoise(Block):
+    """A-priori noise of the sensor; without it, the residuals tell it."""
+
+    sigma_mps2: SigmaForce = Field(description="standard deviation of a position mean, per axis")
+
+
+class _Robot(Block):
+    """The robot; exactly when the table has its angles."""
+
+    angle_sigma_mgon: SigmaAngle = Field(description="standard deviation of roll and of pitch")
+
+
+class Exclusion(Block):
+    """A hold that is left out of every fit."""
+
+    position: Annotated[int, Field(ge=1), Number] = Field(description="number of the hold")
+    reason: Annotated[str, Field(min_length=1)] = Field(description="why it is left out")
+
+
+class Header(Block):
+    """The content of `campaign.yaml`."""
+
+    schema_version: Annotated[Literal[1], Number] = Field(description="of this format")
+    name: Annotated[str, Field(min_length=1)] = Field(description="of the campaign, any text")
+    sensor: str | None = Field(None, description="what was calibrated, any text")
+    unit: Literal["m/s^2", "g", "counts"] = Field(
+        description="of the forces in the table; g is 9.80665 m/s²"
+    )
+    nominal: Nominal | None = None
+    gravity: _Gravity
+    sensor_noise: _SensorNoise | None = None
+    range_mps2: Annotated[Positive, Field(le=MOST)] | None = Field(
+        None, description="the sensor measures ± this; where it can saturate"
+    )
+    excluded: Annotated[list[Exclusion], Field(min_length=1)] | None = None
+    robot: _Robot | None = None
+    log: LogLayout | None = None
+
+    @model_validator(mode="after")
+    def _nominal_with_counts(self) -> Self:
+        if self.unit == "counts" and self.nominal is None:
+            raise ValueError("nominal: missing; unit: counts needs scale and offset of each axis")
+        if self.unit != "counts" and self.nominal is not None:
+            raise ValueError(f"nominal: goes with unit: counts, not with unit: {self.unit}")
+        return self
+
+    def conversion(self, attribute: str) -> Conversion:
+        """Conversion of the columns of an attribute to SI."""
+        if attribute in ("angles", "yaw"):
+            return Conversion(np.array([GON]), np.zeros(1))
+        if attribute not in ("forces", "sd", "slope", "sd_slope"):
+            return Conversion(np.ones(1), np.zeros(1))
+        if self.nominal is None:
+            forces = conversion_of(self.unit)
+        else:
+            forces = Conversion(np.array(self.nominal.scale), np.array(self.nominal.offset))
+        if attribute == "forces":
+            return forces
+        # Differences have no offset, and sds no sign.
+        scale = forces.scale if attribute == "slope" else np.abs(forces.scale)
+        return Conversion(scale, np.zeros(3))

@@ -1,0 +1,233 @@
+"""The Allan deviation, and how well it says the mean and the slope of a hold are known.
+
+Samples of a real sensor are not independent, so the mean of n samples is less certain than their
+standard deviation over √n. The Allan deviation at an averaging time τ measures the scatter of means
+over τ for noise of any colour. For white noise both agree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from accelstudy.campaign.importing.segments import Segment
+
+Array = NDArray[np.float64]
+
+SHARE = 8.0
+"""Length of a hold over the longest averaging time that its residuals about a line are used for."""
+RELIABLE = 10
+"""Independent differences of neighbouring means that a trusted value needs (it is right to about
+20 %)."""
+
+
+@dataclass(frozen=True)
+class AllanDeviation:
+    """Allan deviation over averaging times.
+
+    Attributes
+    ----------
+    tau : (k,) array, s
+    deviation : (k, m) array, one column for each channel
+    differences : (k,) int array, independent differences of neighbouring means behind each value
+    """
+
+    tau: Array
+    deviation: Array
+    differences: NDArray[np.int_]
+
+    @property
+    def pooled(self) -> Array:
+        """Root mean square over the channels, (k,)."""
+        return np.sqrt(np.mean(self.deviation**2, axis=1))
+
+    def channels(self, chosen: slice) -> AllanDeviation:
+        """Curve of some of the channels."""
+        return AllanDeviation(self.tau, self.deviation[:, chosen], self.differences)
+
+    def up_to(self, tau: float) -> AllanDeviation:
+        """Curve without averaging times beyond `tau`, s; the shortest one stays."""
+        kept = self.tau <= max(tau, self.tau[0] if len(self.tau) else 0.0)
+        return AllanDeviation(self.tau[kept], self.deviation[kept], self.differences[kept])
+
+
+@dataclass(frozen=True)
+class AllanMoments:
+    """What one record contributes to the Allan variance, for any direction.
+
+    Attributes
+    ----------
+    factors : tuple of int, numbers of samples averaged
+    squares : (k, c, c) array, sums of products of the channels' differences of neighbouring means
+    terms, independent : (k,) int arrays, differences, and how many of them are independent
+    """
+
+    factors: tuple[int, ...]
+    squares: Array
+    terms: NDArray[np.int_]
+    independent: NDArray[np.int_]
+
+    def up_to(self, factor: float) -> AllanMoments:
+        """Return the contributions of the shorter averages; the shortest one always stays."""
+        k = max(1, int(np.searchsorted(self.factors, factor, side="right")))
+        return AllanMoments(
+            self.factors[:k], self.squares[:k], self.terms[:k], self.independent[:k]
+        )
+
+
+def allan_moments(samples: ArrayLike) -> AllanMoments:
+    """Moments of a record without gaps, (n, c).
+
+    Over m samples: σ²(τ) = ⟨(S[k + 2m] − 2 S[k + m] + S[k])²⟩ / (2 m²), S the running sum, and
+    the mean over all k (overlapping estimate; IEEE Std 1139).
+    """
+    samples = np.asarray(samples, dtype=float).reshape(len(np.asarray(samples)), -1)
+    sums = np.zeros((len(samples) + 1, samples.shape[1]))
+    np.cumsum(samples - samples.mean(axis=0), axis=0, out=sums[1:])
+    factors = averaging_factors(len(samples) // 2)
+    squares = np.zeros((len(factors), samples.shape[1], samples.shape[1]))
+    for i, m in enumerate(factors):
+        second = sums[2 * m :] - 2.0 * sums[m:-m] + sums[: -2 * m]
+        squares[i] = second.T @ second / (2.0 * m * m)
+    averaged = np.array(factors, dtype=int)
+    n = len(samples)
+    return AllanMoments(tuple(factors), squares, n + 1 - 2 * averaged, n // averaged - 1)
+
+
+class AllanSums:
+    """Sums over the records of one sensor for its Allan variance; records may be short."""
+
+    def __init__(self, channels: int = 3) -> None:
+        self._squares: dict[int, Array] = {}
+        self._terms: dict[int, int] = {}
+        self._independent: dict[int, int] = {}
+        self._channels = channels
+
+    def add(self, record: AllanMoments, frame: Array | None = None) -> None:
+        """Add a record; its channels are turned to the columns of `frame`, (c, c), if given."""
+        turned = record.squares if frame is None else frame.T @ record.squares @ frame
+        for i, m in enumerate(record.factors):
+            squares = np.diagonal(turned[i])
+            self._squares[m] = self._squares.get(m, np.zeros(self._channels)) + squares
+            self._terms[m] = self._terms.get(m, 0) + int(record.terms[i])
+            self._independent[m] = self._independent.get(m, 0) + int(record.independent[i])
+
+    def deviation(self, step: float) -> AllanDeviation:
+        """Allan deviation of all records together; `step` is the time between samples, s."""
+        factors = sorted(self._terms)
+        variance = [self._squares[m] / self._terms[m] for m in factors]
+        return AllanDeviation(
+            tau=step * np.array(factors, dtype=float),
+            deviation=np.sqrt(np.array(variance).reshape(len(factors), self._channels)),
+            differences=np.array([self._independent[m] for m in factors], dtype=int),
+        )
+
+
+def averaging_factors(largest: int) -> list[int]:
+    """Numbers of samples averaged, four to the octave, from 1 to `largest`."""
+    if largest < 1:
+        return []
+    steps = np.arange(np.floor(4 * np.log2(largest)) + 1)
+    return [int(m) for m in np.unique(np.round(2.0 ** (steps / 4)).astype(int)) if m <= largest]
+
+
+@dataclass(frozen=True)
+class MeanAccuracy:
+    """How well the mean over a hold is known.
+
+    Attributes
+    ----------
+    duration : float, s, of the hold
+    white : float, standard deviation of the mean for white noise: sd / √n
+    allan : float, the same from the Allan deviation at `duration`
+    tau : float, s, largest averaging time that the data determine
+    slope : float, d log σ / d log τ by which `allan` was extrapolated from `tau` to `duration`;
+        None if that was not necessary
+    """
+
+    duration: float
+    white: float
+    allan: float
+    tau: float
+    slope: float | None
+
+    @property
+    def ratio(self) -> float:
+        """Factor by which the assumption of white noise is too optimistic."""
+        return self.allan / self.white
+
+
+def accuracy_of_mean(curve: AllanDeviation, duration: float, sd: float, n: int) -> MeanAccuracy:
+    """Standard deviation of a mean over `duration`, averaged over the channels.
+
+    Beyond the largest averaging time with at least `RELIABLE` independent differences the curve is
+    extrapolated with the slope of its last two octaves. The slope is kept between that of white
+    noise (−1/2) and that of a random walk (+1/2).
+
+    Parameters
+    ----------
+    curve : AllanDeviation
+    duration : float, s
+    sd : float, of the samples within a hold
+    n : int, samples in `duration`
+    """
+    white = sd / np.sqrt(n)
+    usable = (curve.differences >= RELIABLE) & (curve.pooled > 0)
+    if not usable.any():
+        return MeanAccuracy(duration, white, white, 0.0, None)
+    log_tau, log_sigma = np.log(curve.tau[usable]), np.log(curve.pooled[usable])
+    tau = float(np.exp(log_tau[-1]))
+    if duration <= tau * (1 + 1e-9):
+        allan = np.exp(np.interp(np.log(duration), log_tau, log_sigma))
+        return MeanAccuracy(duration, white, float(allan), tau, None)
+    last = log_tau >= log_tau[-1] - np.log(4.0) - 1e-9
+    x, y, weight = log_tau[last], log_sigma[last], curve.differences[usable][last]
+    slope = -0.5
+    if len(x) > 1:
+        # The variance of log σ is proportional to one over the independent differences.
+        slope = float(np.clip(np.polyfit(x, y, 1, w=np.sqrt(weight))[0], -0.5, 0.5))
+    level = np.average(y - slope * x, weights=weight)
+    return MeanAccuracy(
+        duration, white, float(np.exp(level + slope * np.log(duration))), tau, slope
+    )
+
+
+def slope_sigmas(segments: Sequence[Segment], step: float) -> Array:
+    """Standard deviations of the slopes of the axes in holds, (n, 3), m/s²/s.
+
+    The slope over a time T depends on the difference between its two halves. For white noise the
+    least-squares slope has σ = √6 σ_A(T/2) / T with the Allan deviation σ_A; for flicker noise and
+    a random walk this is right within some 10 %.
+
+    σ_A is that of the residuals about the line of each hold, over all holds together, so that
+    slopes do not count as noise. Since the line also absorbs the slowest noise, a hold contributes
+    only averaging times up to an eighth of its length. Longer ones come from longer holds, or are
+    extrapolated.
+
+    Parameters
+    ----------
+    segments : sequence of Segment
+    step : float, s, between samples
+    """
+    sums = AllanSums()
+    for segment in segments:
+        for record in segment.wobble:
+            sums.add(record.up_to(segment.n / SHARE))
+    curve = sums.deviation(step)
+    variances = np.mean([np.diag(segment.covariance) for segment in segments], axis=0)
+    sigma = np.empty((len(segments), 3))
+    for i, segment in enumerate(segments):
+        for axis in range(3):
+            half = accuracy_of_mean(
+                curve.channels(slice(axis, axis + 1)),
+                segment.n * step / 2,
+                float(np.sqrt(variances[axis])),
+                max(1, segment.n // 2),
+            )
+            sigma[i, axis] = np.sqrt(6.0) * half.allan / (segment.n * step)
+    return sigma

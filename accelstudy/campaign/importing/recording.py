@@ -1,0 +1,340 @@
+"""Raw accelerometer logs, read in chunks, so that their size does not matter.
+
+A log is text (comma, semicolon, tab or blanks between numbers, with or without header and comment
+lines), a MATLAB file or a Parquet file. It gives times in s since its first sample, and specific
+forces in m/s². An error is one line with its place in the file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.units import CLOCK_UNITS, UNITS
+from accelstudy.campaign.importing.columns import AXES, Column, check_numbers, locate
+from accelstudy.campaign.importing.sources import CHUNK, Source, open_source
+from accelstudy.sensors.conversion import Conversion, conversion_of
+from accelstudy.sensors.frames import FRD, Frame
+
+Array = NDArray[np.float64]
+
+CONDITIONS = ("temperature", "vibration")
+"""Columns of a log besides time and forces."""
+GAP = 5.0
+"""A step of time that is this many times the usual one is a gap."""
+_USUAL_RATE = 100.0
+"""1/s; of several units of time the likely one gives the rate nearest to it."""
+
+
+class Rows(NamedTuple):
+    """Neighbouring samples of a log.
+
+    Attributes
+    ----------
+    time : (k,) array, s
+    forces : (k, 3) array, m/s², in forward, right, down
+    conditions : (k, c) array, °C or m/s², NaN where nothing is known
+    anew : bool, whether another recording begins here, so that no hold continues
+    """
+
+    time: Array
+    forces: Array
+    conditions: Array
+    anew: bool = False
+
+
+class Recording(Protocol):
+    """What the detector of holds takes: a log, or several."""
+
+    @property
+    def path(self) -> Path:
+        """The file that messages name."""
+        ...
+
+    @property
+    def step(self) -> float:
+        """Usual time between two samples, s."""
+        ...
+
+    @property
+    def conditions(self) -> tuple[str, ...]:
+        """Which of `CONDITIONS` there are."""
+        ...
+
+    def chunks(self) -> Iterator[Rows]:
+        """Samples from the beginning to the end."""
+        ...
+
+    def likely_unit(self) -> str:
+        """Hint for a message about an odd rate; empty if there is none."""
+        ...
+
+
+def open_log(
+    path: str | Path,
+    *,
+    columns: Mapping[str, Column] | None = None,
+    time: Column | None = None,
+    rate: float | None = None,
+    unit: str = "m/s^2",
+    scale: ArrayLike | None = None,
+    offset: ArrayLike | None = None,
+    time_unit: str = "s",
+    variable: str | None = None,
+    frame: Frame = FRD,
+    chunk_size: int = CHUNK,
+) -> Log:
+    """Find out how a log is laid out.
+
+    Parameters
+    ----------
+    path : file; .parquet, .mat (binary or ASCII), anything else is text, perhaps gzipped
+    columns : mapping of "fx", "fy", "fz", "temperature" and "vibration" to columns; by their names
+        in the header if omitted, or the only three columns there are. The last two may be absent.
+    time : column of time; by its name in the header if omitted
+    rate : float, samples per second, instead of a column of time
+    unit : "m/s^2", "g" or "counts"
+    scale, offset : number or (3,), with counts only: f = (raw − offset) · scale, in m/s²
+    time_unit : "s", "ms", "us" or "ns"
+    variable : str, which array of a MATLAB file
+    frame : Frame, the axes of the log
+    chunk_size : int, rows held in memory at a time
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or lacks a column.
+    """
+    conversion = conversion_of(unit, scale, offset)
+    if time_unit not in CLOCK_UNITS:
+        raise UnknownNameError("unit of time", time_unit, CLOCK_UNITS)
+    if rate is not None and time is not None:
+        raise InputError(f"{path}: give the rate or the column of time, not both")
+    if rate is not None and not (np.isfinite(rate) and rate > 0):
+        raise InputError(f"{path}: the rate must be positive, not {rate:g}")
+    source = open_source(path, variable)
+    given = dict(columns or {})
+    for key in given:
+        if key not in (*AXES, *CONDITIONS):
+            raise UnknownNameError("column", key, (*AXES, *CONDITIONS))
+    places = locate(source, {k: v for k, v in given.items() if k in AXES}, AXES)
+    if rate is None:
+        wanted = {} if time is None else {"time": time}
+        try:
+            places = {**places, **locate(source, wanted, ("time",))}
+        except InputError as error:
+            if time is not None:
+                raise
+            raise InputError(
+                f"{error}; give the column of time (--time), or the rate (--rate)"
+            ) from None
+    for key in CONDITIONS:
+        wanted = {key: given[key]} if key in given else {}
+        place = locate(source, wanted, (key,), needed=False)
+        if key in given or not {*place.values()} & {*places.values()}:
+            places |= place
+    if len(set(places.values())) < len(places):
+        raise InputError(f"{path}: two of {', '.join(places)} name the same column")
+    return Log(
+        path=Path(path),
+        source=source,
+        places=places,
+        rate=rate,
+        time_factor=UNITS["s"][time_unit],
+        conversion=conversion,
+        frame=frame,
+        chunk_size=chunk_size,
+    )
+
+
+@dataclass(frozen=True)
+class Log:
+    """A raw log whose layout is known.
+
+    Attributes
+    ----------
+    path : Path
+    source : Source, what gives the numbers as they stand in the file
+    places : mapping of "fx", "fy", "fz" and perhaps "time" and `CONDITIONS` to columns
+    rate : float, 1/s; None with a column of time
+    time_factor : float, s per unit of that column
+    conversion : Conversion, of forces to m/s², in the axes of the log
+    frame : Frame, the axes of the log
+    chunk_size : int, rows held in memory at a time
+    lively : bool, whether each channel must change; in a single position, one of a coarse sensor
+        may be constant
+    """
+
+    path: Path
+    source: Source
+    places: Mapping[str, int]
+    rate: float | None
+    time_factor: float
+    conversion: Conversion
+    frame: Frame
+    chunk_size: int
+    lively: bool = True
+
+    @property
+    def conditions(self) -> tuple[str, ...]:
+        """Which of `CONDITIONS` the log has."""
+        return tuple(key for key in CONDITIONS if key in self.places)
+
+    @cached_property
+    def step(self) -> float:
+        """Usual time between two samples, s: the mean over the first chunk, without gaps.
+
+        Steps may jitter or be multiples of a clock's tick. So the median may be far from the mean,
+        and only the mean fits the number of samples.
+        """
+        if self.rate is not None:
+            return 1.0 / self.rate
+        rows = next(self.chunks(), None)
+        if rows is None or len(rows.time) < 2:
+            raise InputError(f"{self.path}: too few samples")
+        return usual_step(np.diff(rows.time))
+
+    @cached_property
+    def start(self) -> float:
+        """Time of the first sample as written in the file, s; NaN without a column of time."""
+        if self.rate is not None:
+            return np.nan
+        first = next(self.source.read([self.places["time"]], 1), np.full((1, 1), np.nan))
+        return float(first[0, 0]) * self.time_factor
+
+    def likely_unit(self) -> str:
+        """Hint at the unit of time that would give a usual rate; empty if the rate is usual."""
+        if self.rate is not None:
+            return ""
+        step = self.step / self.time_factor
+        rates = {unit: 1 / (step * UNITS["s"][unit]) for unit in CLOCK_UNITS}
+        unit = min(rates, key=lambda unit: abs(np.log(rates[unit] / _USUAL_RATE)))
+        if UNITS["s"][unit] == self.time_factor:
+            return ""
+        return (
+            f"; if its times are in {unit}, there are {rates[unit]:.4g} samples per second: give "
+            f"--time-unit {unit}"
+        )
+
+    def chunks(self) -> Iterator[Rows]:
+        """Samples from the beginning to the end; times count from the first one.
+
+        Raises
+        ------
+        InputError
+            At a value that is no finite number and where time does not increase; at the end if the
+            log is empty or a channel is constant.
+        """
+        keys = list(self.places)
+        axes = [keys.index(axis) for axis in AXES]
+        others = [keys.index(key) for key in self.conditions]
+        row, last = 0, -np.inf
+        lowest, highest = np.full(3, np.inf), np.full(3, -np.inf)
+        clock = self.places.get("time")
+        for raw in self.source.read(list(self.places.values()), self.chunk_size, clock):
+            if clock is not None:
+                raw[:, keys.index("time")] *= self.time_factor
+            check_numbers(self.source, self.places, raw, row, self.conditions)
+            forces = self.frame.to_frd(self.conversion.to_si(raw[:, axes]))
+            if clock is not None:
+                time = raw[:, keys.index("time")]
+                self._check_order(time, last, row)
+                last = time[-1]
+            else:
+                assert self.rate is not None
+                time = np.arange(row, row + len(raw)) / self.rate
+            lowest = np.minimum(lowest, raw[:, axes].min(axis=0))
+            highest = np.maximum(highest, raw[:, axes].max(axis=0))
+            row += len(raw)
+            yield Rows(time, forces, raw[:, others])
+        if row < 2:
+            raise InputError(f"{self.path}: too few samples ({row})")
+        for axis, constant in zip(AXES, lowest == highest, strict=True):
+            if constant and self.lively:
+                name = self.source.names[self.places[axis]]
+                raise InputError(f"{self.path}: column {name} ({axis}) is constant")
+
+    def _check_order(self, time: Array, last: float, row: int) -> None:
+        backward = np.diff(time, prepend=last) <= 0
+        if backward.any():
+            i = int(np.argmax(backward))
+            where, cell = self.source.look_up(row + i, self.places["time"])
+            raise InputError(
+                f"{self.path}: {where}, column {self.source.names[self.places['time']]} (time): "
+                f"time does not increase ({cell}); give the rate if it does not count"
+            )
+
+
+@dataclass(frozen=True)
+class LogSeries:
+    """Several logs of one sensor, each a recording of its own.
+
+    Attributes
+    ----------
+    parts : tuple of Log, in their order
+    """
+
+    parts: Sequence[Log]
+
+    @property
+    def path(self) -> Path:
+        """First of the files."""
+        return self.parts[0].path
+
+    @property
+    def conditions(self) -> tuple[str, ...]:
+        """Conditions that all parts have."""
+        return tuple(k for k in CONDITIONS if all(k in part.places for part in self.parts))
+
+    @cached_property
+    def step(self) -> float:
+        """Usual time between two samples, s."""
+        steps = [part.step for part in self.parts]
+        odd = [i for i, step in enumerate(steps) if not 0.9 < step / steps[0] < 1.1]
+        if odd:
+            raise InputError(
+                f"{self.parts[odd[0]].path}: {1 / steps[odd[0]]:.6g} samples per second, but "
+                f"{1 / steps[0]:.6g} in {self.parts[0].path}"
+            )
+        return float(np.mean(steps))
+
+    @cached_property
+    def timed(self) -> bool:
+        """Whether the times of the parts count from one zero, so that they follow each other."""
+        starts = np.array([part.start for part in self.parts])
+        return bool(np.all(np.diff(starts) > 0))
+
+    def likely_unit(self) -> str:
+        """See `Recording`."""
+        return self.parts[0].likely_unit()
+
+    def chunks(self) -> Iterator[Rows]:
+        """Samples of all parts; if their times do not tell, each begins where the last one ends."""
+        end = 0.0
+        for part in self.parts:
+            start = part.start - self.parts[0].start if self.timed else end
+            if start < end - self.step / 2:  # a clock rounds
+                raise InputError(f"{part.path}: begins before the recording before it ends")
+            columns = [part.conditions.index(key) for key in self.conditions]
+            anew = True
+            for rows in part.chunks():
+                yield Rows(rows.time + start, rows.forces, rows.conditions[:, columns], anew)
+                anew, end = False, start + rows.time[-1] + self.step
+
+
+def usual_step(steps: Array) -> float:
+    """Mean step of time, without gaps: steps of `GAP` times the mean or more."""
+    kept = steps
+    while True:
+        mean = float(np.mean(kept))
+        without = steps[steps <= GAP * mean]
+        if len(without) == len(kept):
+            return mean
+        kept = without

@@ -1,0 +1,431 @@
+"""Files of numbers in columns: text of any layout, MATLAB and Parquet, read a chunk at a time."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import re
+import warnings
+import zlib
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from io import TextIOWrapper
+from itertools import islice
+from pathlib import Path
+from typing import Any, BinaryIO, Protocol, TextIO, cast
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+from scipy.io import loadmat, whosmat
+
+from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.wording import one_line
+from accelstudy.files.parquet import whole_parquet
+from accelstudy.files.reading import readable
+
+__all__ = ["CHUNK", "MatlabSource", "ParquetSource", "Source", "TextSource", "open_source"]
+
+Array = NDArray[np.float64]
+
+CHUNK = 65536
+"""Rows that are held in memory at a time."""
+
+GZIP = b"\x1f\x8b"
+"""First bytes of a gzipped file."""
+
+_PREVIEW = 65536  # characters of a text from which its layout is told
+_COMMENTS = "#%"
+_LAYOUTS = ((",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), (None, "."), (None, ","))
+_BUFFER = 2**20  # bytes of a Parquet column
+_IS_NUMBER = re.compile("double|single|u?int[0-9]+")  # classes of MATLAB arrays
+
+
+class Source(Protocol):
+    """A file of numbers in columns.
+
+    Attributes
+    ----------
+    path : Path
+    names : list of str, of the columns; their places, counted from 0, where the file has no names
+    named : bool, whether the file has names
+    """
+
+    path: Path
+    names: list[str]
+    named: bool
+
+    def read(
+        self, places: Sequence[int], chunk_size: int, clock: int | None = None
+    ) -> Iterator[Array]:
+        """Rows of the columns at `places`, (k, len(places)), k > 0; NaN where there is no number.
+
+        The column at the place `clock` counts from its first value, since a time in ns since 1970
+        has more digits than a float.
+        """
+        ...
+
+    def look_up(self, row: int, place: int) -> tuple[str, str]:
+        """Describe where a row is in the file, and what its cell in a column says."""
+        ...
+
+
+def open_source(path: str | Path, variable: str | None = None) -> Source:
+    """Open a file of numbers, by its ending and its first bytes."""
+    path = Path(path)
+    with readable(path), path.open("rb") as file:
+        start = file.read(128)
+    if not start:
+        raise InputError(f"{path}: the file is empty")
+    if path.suffix.lower() in (".parquet", ".pq"):
+        return ParquetSource(path)
+    if start.startswith(GZIP):
+        kind = Path(path.stem).suffix.lower()
+        if kind in (".parquet", ".pq", ".mat"):
+            raise InputError(f"{path}: unpack it first; only text is read from gzip")
+        return TextSource(path)
+    # An ASCII .mat has no zero bytes; every binary one has some in its header.
+    if path.suffix.lower() == ".mat" and 0 in start:
+        return MatlabSource(path, variable)
+    if start.startswith(b"\x89HDF"):
+        raise InputError(f"{path}: a MATLAB 7.3 (HDF5) file; save it with -v7")
+    return TextSource(path)
+
+
+class TextSource:
+    """Numbers in lines of text.
+
+    Attributes
+    ----------
+    path : Path
+    names : list of str, from the header, or the places of the columns
+    named : bool, whether there is a header
+    delimiter : str, None for blanks
+    decimal : str, mark between units and tenths
+    comment : str, with which lines begin that are no data
+    quoted : bool, whether numbers stand in quotation marks
+    first : int, lines before the data
+    width : int, number of columns
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        with self._readable(), self._open() as file:
+            text = file.read(_PREVIEW)
+            more = bool(file.read(1))
+        lines = text.split("\n")
+        if more and len(lines) == 1:  # it would be read as a whole
+            raise InputError(f"{path}: no end of a line in {_PREVIEW} characters; is it text?")
+        if more:
+            lines.pop()  # it may be cut
+        rows = [line for line in lines if _is_row(line)]
+        scores = [sum(_count_numbers(row, layout) for row in rows) for layout in _LAYOUTS]
+        if not rows or max(scores) == 0:
+            raise InputError(f"{path}: no line of numbers at the beginning")
+        layout = _LAYOUTS[int(np.argmax(scores))]
+        self.delimiter: str | None = layout[0]
+        self.decimal = layout[1]
+        # Most lines are data; everything before the first such line is the header.
+        usual = _most_frequent(len(split_line(row, self.delimiter)) for row in rows)
+        alike = [row for row in rows if len(split_line(row, self.delimiter)) == usual]
+        # A line may hold text beside its numbers.
+        numbers = max(1, _most_frequent(_count_numbers(row, layout) for row in alike))
+        first = next(
+            (
+                i
+                for i, line in enumerate(lines)
+                if _is_row(line)
+                and _count_numbers(line, layout) >= numbers
+                and len(split_line(line, self.delimiter)) == usual
+            ),
+            None,
+        )
+        if first is None:
+            raise InputError(f"{path}: no line of numbers at the beginning")
+        self.first, self.width = first, usual
+        self.quoted = any('"' in line for line in lines[first:])
+        self.comment = next((c for c in _COMMENTS for line in lines if line.lstrip()[:1] == c), "#")
+        header = self._header(lines[:first])
+        self.named = header is not None
+        self.names = header or [str(i) for i in range(usual)]
+
+    def read(
+        self, places: Sequence[int], chunk_size: int, clock: int | None = None
+    ) -> Iterator[Array]:
+        """Rows of some columns; see `Source`."""
+        origins: list[Any] = []
+        try:
+            with (
+                self._readable(),
+                self._open(self.first) as file,
+                pd.read_csv(
+                    file,
+                    sep=self.delimiter or r"\s+",
+                    decimal=self.decimal,
+                    header=None,
+                    names=range(self.width + 1),
+                    index_col=False,
+                    comment=self.comment,
+                    quoting=csv.QUOTE_MINIMAL if self.quoted else csv.QUOTE_NONE,
+                    skipinitialspace=True,
+                    low_memory=False,
+                    on_bad_lines="error",
+                    chunksize=chunk_size,
+                ) as reader,
+            ):
+                for chunk in _chunks(reader):
+                    if not len(chunk):
+                        continue
+                    # A surplus cell ends up in the column after the last.
+                    if chunk[self.width].notna().any():
+                        raise InputError(f"{self.path}: {self._odd_line()}")
+                    columns = [_numbers_of_text(chunk[place]) for place in places]
+                    origins = origins or [
+                        column[0] if place == clock else None
+                        for column, place in zip(columns, places, strict=True)
+                    ]
+                    yield np.column_stack([since(*c) for c in zip(columns, origins, strict=True)])
+        except InputError:
+            raise
+        except pd.errors.EmptyDataError:
+            return
+        except (pd.errors.ParserError, pd.errors.ParserWarning) as error:
+            if "inside string" in str(error):
+                raise InputError(f"{self.path}: a quotation mark opens and never closes") from None
+            raise InputError(f"{self.path}: {self._odd_line()}") from None
+
+    def look_up(self, row: int, place: int) -> tuple[str, str]:
+        """See `Source`; reads the file again, which only errors need."""
+        number, line = next(islice(self.rows(), row, None), (0, ""))
+        if not number:
+            return f"row {row + 1}", "unreadable"
+        cells = split_line(line.split(self.comment)[0], self.delimiter)
+        if place >= len(cells):
+            return f"line {number}", "the line ends before it"
+        return f"line {number}", repr(cells[place][:40]) if cells[place] else "nothing"
+
+    def rows(self) -> Iterator[tuple[int, str]]:
+        """Lines of data with their numbers, counted from 1."""
+        with self._readable(), self._open() as file:
+            for number, line in enumerate(file, 1):
+                if number > self.first and line.strip() and line.lstrip()[0] != self.comment:
+                    yield number, line.rstrip("\n")
+
+    def _open(self, skipped: int = 0) -> TextIO:
+        """Open the file and skip some lines; quotation marks in a header have no meaning."""
+        with self.path.open("rb") as start:
+            packed = start.read(len(GZIP)) == GZIP
+        if packed:
+            unpacked = cast(BinaryIO, gzip.GzipFile(self.path))
+            file: TextIO = TextIOWrapper(unpacked, encoding="utf-8-sig", errors="replace")
+        else:
+            file = self.path.open(encoding="utf-8-sig", errors="replace")
+        for _ in range(skipped):
+            file.readline()
+        return file
+
+    @contextmanager
+    def _readable(self) -> Iterator[None]:
+        try:
+            with readable(self.path):
+                yield
+        except (gzip.BadGzipFile, EOFError, zlib.error):
+            raise InputError(f"{self.path}: not a whole gzip file") from None
+
+    def _odd_line(self) -> str:
+        for number, line in self.rows():
+            cells = len(split_line(line, self.delimiter))
+            if cells > self.width:
+                return f"line {number}: {cells} columns instead of {self.width}"
+        return "some line has too many columns"
+
+    def _header(self, before: Sequence[str]) -> list[str] | None:
+        """Names from the last line before the data, which may be a comment."""
+        for line in reversed(before):
+            if line.strip():
+                names = split_line(line.strip().lstrip(_COMMENTS).strip(), self.delimiter)
+                names = [" ".join(name.strip("\"'").split()) for name in names]
+                return names if len(names) == self.width else None
+        return None
+
+
+def _chunks(reader: Iterator[pd.DataFrame]) -> Iterator[pd.DataFrame]:
+    """Yield tables of a reader; raise the warning that pandas gives where it loses cells."""
+    while True:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", pd.errors.ParserWarning)
+            chunk = next(reader, None)
+        if chunk is None:
+            return
+        yield chunk
+
+
+def split_line(line: str, delimiter: str | None) -> list[str]:
+    """Cells of a line, without surrounding blanks and quotation marks."""
+    if '"' in line and delimiter is not None:
+        try:
+            row = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
+            return [cell.strip() for cell in row]
+        except csv.Error:
+            pass
+    return [cell.strip() for cell in line.split(delimiter)]
+
+
+def _is_row(line: str) -> bool:
+    return bool(line.strip()) and line.lstrip()[0] not in _COMMENTS
+
+
+def _count_numbers(line: str, layout: tuple[str | None, str]) -> int:
+    delimiter, decimal = layout
+    return sum(_is_number(cell, decimal) for cell in split_line(line, delimiter))
+
+
+def _is_number(cell: str, decimal: str) -> bool:
+    if decimal == "," and "." in cell:
+        return False
+    try:
+        float(cell.replace(decimal, "."))
+    except ValueError:
+        return False
+    return "_" not in cell  # a number to Python, not to anyone else
+
+
+def _most_frequent(counts: Iterator[int]) -> int:
+    """Most frequent of some numbers, the largest of equally frequent ones."""
+    return max(Counter(counts).items(), key=lambda item: item[::-1])[0]
+
+
+def _numbers_of_text(column: pd.Series) -> NDArray[Any]:
+    """Numbers of a column, NaN where there is none; whole numbers stay integers."""
+    if pd.api.types.is_bool_dtype(column):
+        return np.full(len(column), np.nan)
+    numbers = pd.to_numeric(column, errors="coerce")
+    if numbers.dtype.kind in "iu":
+        return numbers.to_numpy()
+    return numbers.to_numpy(dtype=float, na_value=np.nan)
+
+
+class MatlabSource:
+    """An array of a MATLAB file; it is read as a whole, since the format allows 2 GB at most."""
+
+    def __init__(self, path: Path, variable: str | None = None) -> None:
+        self.path = path
+        try:
+            with readable(path):
+                self.values = _matlab_array(path, variable)
+        except InputError:
+            raise
+        except NotImplementedError:
+            raise InputError(f"{path}: a MATLAB 7.3 (HDF5) file; save it with -v7") from None
+        except MemoryError:
+            raise InputError(
+                f"{path}: too large, as a MATLAB file is held in memory; save it as text or Parquet"
+            ) from None
+        except Exception as error:  # SciPy's reader fails in many ways on a damaged file
+            raise InputError(f"{path}: not a whole MATLAB file ({one_line(error)})") from None
+        self.names = [str(i) for i in range(self.values.shape[1])]
+        self.named = False
+
+    def read(
+        self, places: Sequence[int], chunk_size: int, clock: int | None = None
+    ) -> Iterator[Array]:
+        """Rows of some columns; see `Source`."""
+        origins = [self.values[0, place] if place == clock else None for place in places]
+        for first in range(0, len(self.values), chunk_size):
+            rows = self.values[first : first + chunk_size]
+            yield np.column_stack(
+                [since(rows[:, place], zero) for place, zero in zip(places, origins, strict=True)]
+            )
+
+    def look_up(self, row: int, place: int) -> tuple[str, str]:
+        """Where a value stands, and the value; see `Source`."""
+        return f"row {row + 1}", f"{self.values[row, place]:g}"
+
+
+def _matlab_array(path: Path, variable: str | None) -> NDArray[Any]:
+    """Array of a MATLAB file, a row per sample."""
+    arrays = {
+        name: shape
+        for name, shape, kind in whosmat(path)
+        if _IS_NUMBER.fullmatch(kind) and len(shape) == 2 and all(shape)
+    }
+    if variable is not None and variable not in arrays:
+        raise UnknownNameError(f"array of {path}", variable, arrays)
+    if variable is None and len(arrays) != 1:
+        raise InputError(f"{path}: which array? There are {', '.join(arrays) or 'none'}")
+    name = next(iter(arrays)) if variable is None else variable
+    array = loadmat(path, variable_names=[name])[name]
+    if np.iscomplexobj(array):
+        raise InputError(f"{path}: array {name} has complex numbers")
+    # An array with few rows and many columns has the samples in its columns.
+    return array.T if array.shape[0] < array.shape[1] else array
+
+
+def open_parquet(path: Path) -> AbstractContextManager[pq.ParquetFile]:
+    """Open a file to be read page by page, since one group of rows may be the whole file."""
+    return whole_parquet(path, pre_buffer=False, buffer_size=_BUFFER)
+
+
+class ParquetSource:
+    """Columns of a Parquet file."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        with open_parquet(path) as file:
+            schema = file.schema_arrow
+        self._columns, self._types = schema.names, schema.types
+        self.names = [" ".join(name.split()) for name in schema.names]
+        self.named = True
+
+    def read(
+        self, places: Sequence[int], chunk_size: int, clock: int | None = None
+    ) -> Iterator[Array]:
+        """Rows of some columns; see `Source`."""
+        for place in places:
+            kind = self._types[place]
+            if not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
+                raise InputError(f"{self.path}: column {self.names[place]} is {kind}, not numbers")
+            if self._columns.count(self._columns[place]) > 1:
+                raise InputError(f"{self.path}: there are several columns {self.names[place]!r}")
+        names = [self._columns[place] for place in places]
+        with open_parquet(self.path) as file:
+            origins: list[Any] = []
+            for batch in file.iter_batches(chunk_size, columns=names):
+                if not len(batch):
+                    continue
+                columns = [_numbers(batch.column(name)) for name in names]
+                origins = origins or [
+                    column[0] if place == clock else None
+                    for column, place in zip(columns, places, strict=True)
+                ]
+                yield np.column_stack([since(*c) for c in zip(columns, origins, strict=True)])
+
+    def look_up(self, row: int, place: int) -> tuple[str, str]:
+        """Where a value stands, and the value; see `Source`."""
+        for chunk in self.read([place], CHUNK):
+            if row < len(chunk):
+                return f"row {row + 1}", f"{chunk[row, 0]:g}"
+            row -= len(chunk)
+        return f"row {row + 1}", "nothing"
+
+
+def _numbers(column: pa.Array) -> NDArray[Any]:
+    """Numbers of a column, NaN where there is none; whole numbers stay integers."""
+    if column.null_count or not pa.types.is_integer(column.type):
+        column = column.cast(pa.float64(), safe=False)
+    return column.to_numpy(zero_copy_only=False)
+
+
+def since(values: NDArray[Any], zero: Any) -> Array:
+    """Numbers as floats, counted from `zero` unless that is None.
+
+    Whole numbers are subtracted as integers: a time in ns since 1970 has more digits than a float.
+    """
+    if zero is None:
+        return values.astype(float)
+    if values.dtype.kind in "iu" and isinstance(zero, np.integer):
+        return (values.astype(np.int64) - zero.astype(np.int64)).astype(float)
+    return values.astype(float) - float(zero)

@@ -1,0 +1,282 @@
+"""Windows that slide over a log, and the threshold up to which the forces in one are at rest."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from copy import copy
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.progress import track
+from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.basics.wording import counted
+from accelstudy.campaign.importing.recording import GAP, Recording
+
+Array = NDArray[np.float64]
+
+SPANS = 1200
+"""Spans of time of an envelope, about as many as a page can show."""
+_SMALLEST, _LARGEST = 8, 10**6  # samples
+FACTOR = 3.0
+"""Threshold over noise floor; it leaves room for noise that differs between attitudes."""
+QUIET_FACTOR, QUIET = 10.0, 0.003 * STANDARD_GRAVITY
+"""The same for a quiet sensor, and the largest threshold that it may give, m/s²."""
+
+_BINS = np.linspace(-40.0, 40.0, 4001)  # decades of variance
+
+
+def samples_in(log: Recording, window: float) -> int:
+    """Samples in a window of `window` seconds; odd, so that it has a middle.
+
+    Raises
+    ------
+    InputError
+        If they are too few for a variance, or so many that the rate must be wrong.
+    """
+    samples = window / log.step
+    if not _SMALLEST <= samples <= _LARGEST:
+        raise InputError(
+            f"{log.path}: a window of {window:g} s holds {samples:.3g} samples, at "
+            f"{1 / log.step:.6g} per second"
+            f"{log.likely_unit() or '; is the rate (--rate) right?'}"
+        )
+    return round(samples) | 1
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Neighbouring windows, one centred at each of m samples.
+
+    `piece` is the number of gaps so far, `recording` the number of recordings that ended, and
+    `index` the place of the first of these samples in the log.
+    """
+
+    piece: int
+    recording: int
+    index: int
+    time: Array
+    forces: Array
+    conditions: Array
+    variance: Array
+    frozen: NDArray[np.bool_]
+
+
+def windows(log: Recording, width: int) -> Iterator[Windows]:
+    """Windows of `width` samples (odd), sliding by one; none spans a gap."""
+    half, piece, recording, row = width // 2, 0, 0, 0
+    times, values = np.empty(0), np.empty((0, 3 + len(log.conditions)))
+    for rows in log.chunks():
+        before = times[-1:] if len(times) else rows.time[:1]
+        jumps = np.diff(rows.time, prepend=before) > GAP * log.step
+        if rows.anew and row > 0:
+            jumps[0], recording = True, recording + 1
+        chunk = np.column_stack([rows.forces, rows.conditions])
+        edges = sorted({0, *np.flatnonzero(jumps).tolist(), len(chunk)})
+        for first, end in pairwise(edges):
+            if jumps[first]:
+                piece += 1
+                times, values = times[:0], values[:0]
+            times = np.concatenate([times, rows.time[first:end]])
+            values = np.concatenate([values, chunk[first:end]])
+            row += end - first
+            centred = max(0, len(times) - width + 1)
+            empty = np.empty(0), np.empty(0, dtype=bool)
+            variance, frozen = _spread(values[:, :3], width) if centred else empty
+            inside = slice(half, half + centred)
+            yield Windows(
+                piece,
+                recording,
+                row - len(times) + half,
+                times[inside],
+                values[inside, :3],
+                values[inside, 3:],
+                variance,
+                frozen,
+            )
+            times, values = times[centred:], values[centred:]
+
+
+class Envelope:
+    """Least and largest values of a log in spans of time, collected as its windows go by.
+
+    Parameters
+    ----------
+    span : (float, float), s, times of the first and of the last window
+    total : int, windows of the log
+
+    Attributes
+    ----------
+    edges : (k + 1,) array, s, of the spans
+    low, high : (k, 4) arrays, of fx, fy, fz and of the standard deviation of the windows, m/s²;
+        NaN in a gap
+    """
+
+    def __init__(self, span: tuple[float, float], total: int) -> None:
+        count = max(1, min(SPANS, total // 4))
+        self.edges = np.linspace(*span, count + 1)
+        self.low, self.high = np.full((2, count, 4), np.nan)
+
+    def along(self, batches: Iterator[Windows]) -> Iterator[Windows]:
+        """Pass windows on, and widen the envelope to hold them."""
+        for batch in batches:
+            values = np.column_stack([batch.forces, np.sqrt(batch.variance)])
+            span = np.searchsorted(self.edges, batch.time, side="right") - 1
+            span = np.clip(span, 0, len(self.low) - 1)
+            np.fmin.at(self.low, span, values)
+            np.fmax.at(self.high, span, values)
+            yield batch
+
+    def less(self, offset: Array) -> Envelope:
+        """Envelope of the forces less an offset, (3,), m/s²."""
+        shifted = copy(self)
+        shifted.low, shifted.high = (values - [*offset, 0.0] for values in (self.low, self.high))
+        return shifted
+
+
+def _spread(forces: Array, width: int) -> tuple[Array, NDArray[np.bool_]]:
+    """Norm of the variances of the axes in each window, and whether an axis does not change."""
+    # Running sums of large numbers lose digits.
+    offsets = forces - forces.mean(axis=0)
+    sums, squares = (_window_sums(values, width) / width for values in (offsets, offsets**2))
+    variance = np.maximum(squares - sums**2, 0.0)
+    # Rounding may hide a variance of zero, so changes are counted.
+    changes = _window_sums(np.diff(forces, axis=0) != 0, width - 1)
+    return np.sqrt(np.sum(variance**2, axis=1)), np.any(changes == 0, axis=1)
+
+
+def _window_sums(values: NDArray[Any], width: int) -> NDArray[Any]:
+    sums = np.cumsum(values, axis=0)
+    result = sums[width - 1 :].copy()
+    result[1:] -= sums[:-width]
+    return result
+
+
+@dataclass(frozen=True)
+class Threshold:
+    """What separates rest from motion.
+
+    Attributes
+    ----------
+    sd : float, m/s²; a window with at most this standard deviation (the root of the norm of the
+        variances of its axes) is at rest
+    floor : float, m/s², standard deviation of the noise by the same measure; NaN if not needed
+    reason : str, how the threshold was chosen
+    """
+
+    sd: float
+    floor: float
+    reason: str
+
+
+class Survey:
+    """Noise and extremes of a log, collected in a first pass over its windows."""
+
+    def __init__(self) -> None:
+        self.counts = np.zeros(len(_BINS) - 1, dtype=int)
+        self.total = self.frozen = self.gaps = 0
+        self.span = (np.nan, np.nan)
+        # Per axis the lowest and the highest value, and the ones next to them.
+        self.extremes = np.array([[[np.inf] * 3] * 2, [[-np.inf] * 3] * 2])
+
+    def add(self, batch: Windows) -> None:
+        """Add windows, in their order."""
+        self.gaps = batch.piece - batch.recording
+        if not len(batch.time):
+            return
+        self.span = (batch.time[0] if np.isnan(self.span[0]) else self.span[0], batch.time[-1])
+        self.total += len(batch.time)
+        self.frozen += int(batch.frozen.sum())
+        alive = batch.variance[~batch.frozen & (batch.variance > 0)]
+        self.counts += np.histogram(np.log10(alive), _BINS)[0]
+        self.extremes[0] = _two_lowest(self.extremes[0], batch.forces)
+        self.extremes[1] = -_two_lowest(-self.extremes[1], -batch.forces)
+
+    def quietest(self, share: float = 0.01) -> float:
+        """Standard deviation that this share of the windows does not exceed, m/s²."""
+        rank = np.searchsorted(np.cumsum(self.counts), share * self.counts.sum())
+        return float(10.0 ** (_BINS[min(rank, len(_BINS) - 2) + 1] / 2))
+
+    def warnings(self) -> Iterator[str]:
+        """What the user should know about the log."""
+        if self.gaps:
+            yield f"{counted(self.gaps, 'gap')} in time; no hold spans one"
+        if self.frozen:
+            share = 100 * self.frozen / self.total
+            yield f"a channel does not change over a window in {share:.2g} % of the log; left out"
+
+
+def _two_lowest(before: Array, forces: Array) -> Array:
+    """Lowest value of each axis and the one next to it, (2, 3), with those before."""
+    candidates = np.vstack([before, forces])
+    lowest = candidates.min(axis=0)
+    return np.array([lowest, np.where(candidates > lowest, candidates, np.inf).min(axis=0)])
+
+
+def survey_log(log: Recording, width: int) -> Survey:
+    """Read a log once, in windows of `width` samples."""
+    survey = Survey()
+    for batch in track(windows(log, width), f"noise of {log.path.name}"):
+        survey.add(batch)
+    if not survey.total:
+        raise InputError(
+            f"{log.path}: too few samples for a window of {width}, or gaps all over"
+            f"{log.likely_unit()}"
+        )
+    return survey
+
+
+def given_threshold(sd: float) -> Threshold:
+    """Threshold that a person chose, m/s²."""
+    if not (np.isfinite(sd) and sd > 0):
+        raise InputError(f"threshold: must be positive, not {sd:g}")
+    return Threshold(sd, np.nan, "as given")
+
+
+def choose_threshold(survey: Survey, log: Recording) -> Threshold:
+    """Choose a multiple of the noise floor, which is the usual noise of windows at rest.
+
+    Otsu's method finds the valley between rest and motion in the histogram of the logarithmic
+    variances. At rest they crowd around one value, the noise floor; in motion they spread over
+    decades.
+
+    The multiple is 3, since noise differs between attitudes. It is up to 10 as long as the
+    threshold is below 0.003 g: a quiet sensor feels footsteps and pumps, and whatever moves less
+    than that in a second is not being turned.
+    """
+    counts = survey.counts
+    if not counts.any():
+        raise InputError(f"{log.path}: a channel does not change in any window; is it frozen?")
+    middle = (_BINS[:-1] + _BINS[1:]) / 2
+    quiet = np.where(middle <= _otsu(counts, middle), counts, 0)
+    # Smoothed over a tenth of a decade, so that a short log with few windows has a peak, too.
+    mode = middle[np.argmax(np.convolve(quiet, np.ones(5), "same"))]
+    crowd = np.where(np.abs(middle - mode) <= np.log10(2), counts, 0)
+    floor = 10.0 ** middle[np.searchsorted(np.cumsum(crowd), crowd.sum() / 2)]
+    noise = float(np.sqrt(floor))
+    sd = max(FACTOR * noise, min(QUIET_FACTOR * noise, QUIET))
+    return Threshold(
+        sd,
+        noise,
+        f"{sd / noise:.3g} times the noise floor of {noise:.3g} m/s², "
+        "around which windows at rest crowd",
+    )
+
+
+def _otsu(counts: NDArray[np.int_], middle: Array) -> float:
+    """Value that divides a histogram into two classes with the largest variance between them."""
+    below = np.cumsum(counts)[:-1].astype(float)
+    above = counts.sum() - below
+    moment = np.cumsum(counts * middle)
+    # An empty class has no mean, and no weight.
+    low = moment[:-1] / np.maximum(below, 1)
+    high = (moment[-1] - moment[:-1]) / np.maximum(above, 1)
+    between = below * above * (high - low) ** 2
+    if not between.max() > 0:
+        return float(middle[np.argmax(counts)])
+    best = np.flatnonzero(between >= between.max() * (1 - 1e-9))
+    return float(middle[best[len(best) // 2]])

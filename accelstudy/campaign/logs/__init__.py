@@ -1,1 +1,0 @@
-"""Raw logs: text, MATLAB and Parquet files read as rows of numbers, chunk by chunk."""

@@ -1,0 +1,157 @@
+"""One calibration session of one sensor, in SI."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.basics.errors import InputError
+from accelstudy.campaign.header import COLUMNS, LogLayout
+from accelstudy.effects import HoldConditions
+from accelstudy.sensors.conversion import Conversion
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """One calibration session of one sensor, in SI; n static holds in order of acquisition.
+
+    Holds that are left out of every fit are in `excluded` only. So no calculation uses them by
+    mistake, while `hold` and `whole` still know them.
+
+    Attributes
+    ----------
+    name : str
+    positions : (n,) int array, the column `position`
+    forces : (n, 3) array, m/s², mean specific force of the holds in sensor axes
+    gravity, sigma_gravity : float, m/s²
+    unit : str, of the file ("m/s^2", "g" or "counts")
+    sensor : str, optional
+    sigma_force : float, m/s², a-priori sd of a position mean; None if unknown
+    angles : (n, 2) array, rad, robot's roll and pitch; None without a robot
+    sigma_angle : float, rad; None without a robot
+    n_samples : (n,) int array, optional
+    sd : (n, 3) array, m/s², optional, sd of the samples within the holds
+    slope, sd_slope : (n, 3) arrays, m/s²/s, optional, slope of the samples within the holds, and
+        its standard deviation, autocorrelation included
+    time, temperature, vibration, yaw : (n,) arrays in s, °C, m/s², rad, optional
+    nominal : Conversion, of the three axes; with unit "counts" only
+    full_range : float, m/s², optional, the sensor measures ± this
+    log : LogLayout, optional, layout of the log from which the campaign was made
+    excluded : Campaign, optional, the holds that were left out, with the same columns
+    reasons : mapping of int to str, why, by position
+    warnings : tuple of str, what was ignored when the campaign was read
+    """
+
+    name: str
+    positions: NDArray[np.int_]
+    forces: Array
+    gravity: float
+    sigma_gravity: float = 0.0
+    unit: str = "m/s^2"
+    sensor: str | None = None
+    sigma_force: float | None = None
+    angles: Array | None = None
+    sigma_angle: float | None = None
+    n_samples: NDArray[np.int_] | None = None
+    sd: Array | None = None
+    slope: Array | None = None
+    sd_slope: Array | None = None
+    time: Array | None = None
+    temperature: Array | None = None
+    vibration: Array | None = None
+    yaw: Array | None = None
+    nominal: Conversion | None = None
+    full_range: float | None = None
+    log: LogLayout | None = None
+    excluded: Campaign | None = None
+    reasons: Mapping[int, str] = field(default_factory=dict)
+    warnings: tuple[str, ...] = field(default=())
+
+    @property
+    def n_positions(self) -> int:
+        """Number of static holds, without those that were left out."""
+        return len(self.forces)
+
+    @property
+    def hold(self) -> HoldConditions:
+        """What is known of the holds besides the forces, as the effects take it."""
+        # The position before a hold acts on it, whether that position is used or not.
+        whole, used = self._rows()
+        session = HoldConditions(time=whole.get("time"), temperature=whole.get("temperature"))
+        session = session.with_steps(whole["forces"]).take(np.flatnonzero(used))
+        roll, pitch = (None, None) if self.angles is None else self.angles.T
+        return replace(
+            session,
+            vibration=self.vibration,
+            roll=roll,
+            pitch=pitch,
+            yaw=self.yaw,
+            full_range=self.full_range,
+        )
+
+    @property
+    def exclusions(self) -> list[dict[str, Any]]:
+        """Positions that were left out, each with its reason, as the header has them."""
+        return [
+            {"position": int(position), "reason": reason}
+            for position, reason in sorted(self.reasons.items())
+        ]
+
+    @property
+    def whole(self) -> Campaign:
+        """The campaign with all its holds, as its file has them."""
+        if self.excluded is None:
+            return self
+        return replace(self, **self._rows()[0], excluded=None, reasons={})
+
+    def without(self, reasons: Mapping[int, str]) -> Campaign:
+        """Leave out holds.
+
+        Parameters
+        ----------
+        reasons : mapping of int to str
+            Why, by position.
+
+        Raises
+        ------
+        InputError
+            If there is no such hold, or none is left.
+        """
+        if not reasons:
+            return self
+        unknown = [position for position in reasons if position not in self.positions]
+        if unknown:
+            raise InputError(f"{self.name}: excluded: there is no position {unknown[0]}")
+        left_out = np.isin(self.positions, list(reasons))
+        if left_out.all():
+            raise InputError(f"{self.name}: excluded: no position is left")
+        whole, out = self.whole, np.isin(self.whole.positions, [*self.reasons, *reasons])
+        return replace(
+            self,
+            **whole._taken(~out),
+            excluded=replace(whole, **whole._taken(out)),
+            reasons={**self.reasons, **reasons},
+        )
+
+    def _taken(self, chosen: NDArray[np.bool_]) -> dict[str, Any]:
+        """Columns with some of the holds."""
+        return {
+            name: values[chosen] for name in COLUMNS if (values := getattr(self, name)) is not None
+        }
+
+    def _rows(self) -> tuple[dict[str, Any], NDArray[np.bool_]]:
+        """Columns with all the holds, and which of them are used."""
+        used_rows = self._taken(np.ones(self.n_positions, dtype=bool))
+        if self.excluded is None:
+            return used_rows, np.ones(self.n_positions, dtype=bool)
+        out = self.excluded._taken(np.ones(self.excluded.n_positions, dtype=bool))
+        order = np.argsort(np.concatenate([used_rows["positions"], out["positions"]]))
+        used = np.arange(len(order)) < self.n_positions
+        rows = {k: np.concatenate([used_rows[k], out[k]])[order] for k in used_rows if k in out}
+        return rows, used[order]

@@ -1,1 +1,0 @@
-"""The use of a calibration: leveling of logs, and export to devices."""

@@ -1,0 +1,333 @@
+"""The attitudes to choose from: where they lie, how they can move, and what constrains them.
+
+A constraint has margins, which are not negative where it is met. They filter a grid of attitudes,
+and keep positions within the constraints while they are moved.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from io import StringIO
+from itertools import combinations, product
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import ANGLE_UNITS, attitude_unit, to_attitude, to_si
+from accelstudy.basics.wording import short_list
+from accelstudy.files.reading import read_text
+from accelstudy.leveling.angles import angles_of, specific_force
+from accelstudy.positions.points import corners, edges, evenly_spread, faces
+
+Array = NDArray[np.float64]
+
+MOST_MOUNTINGS = 150
+"""Number of choices of mountings that are tried; of more, a random part."""
+
+
+class Space(ABC):
+    """A set of attitudes, as directions of gravity in the body frame.
+
+    Attributes
+    ----------
+    text : str, for people
+    """
+
+    text: str
+
+    @abstractmethod
+    def directions(self, count: int) -> Array:
+        """Attitudes of the set, (k, 3): all of a finite set, else about `count`, evenly spread."""
+
+    def tangents(self, directions: Array) -> Array:
+        """Unit vectors along which positions (n, 3) can move, (n, 3, d); d = 0 of a finite set."""
+        return np.zeros((len(directions), 3, 0))
+
+    def parts(self, rng: np.random.Generator) -> list[Space]:
+        """Parts of the set, of which one is to be chosen; often only the set itself."""
+        return [self]
+
+
+class Sphere(Space):
+    """All attitudes."""
+
+    text = "all attitudes"
+
+    def directions(self, count: int) -> Array:
+        """Points of the Fibonacci lattice."""
+        return evenly_spread(count)
+
+    def tangents(self, directions: Array) -> Array:
+        """Return two directions across gravity."""
+        away = np.eye(3)[np.argmin(np.abs(directions), axis=1)]
+        first = np.cross(directions, away)
+        first /= np.linalg.norm(first, axis=1, keepdims=True)
+        return np.stack([first, np.cross(directions, first)], axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class Listed(Space):
+    """A finite set of attitudes.
+
+    Attributes
+    ----------
+    points : (k, 3) array of unit vectors
+    """
+
+    points: Array
+    text: str
+
+    def directions(self, count: int) -> Array:
+        """All of them."""
+        return self.points
+
+
+def cube() -> Listed:
+    """Attitudes of a cube on a table: on its faces, edges and corners."""
+    points = np.vstack([faces(), edges(), corners()])
+    return Listed(_unit(points), "a cube: 6 faces, 12 edges, 8 corners")
+
+
+def by_eye(step: float) -> Listed:
+    """Attitudes that a person can judge by eye: roll and pitch in whole steps, rad."""
+    turns = max(1, round(np.pi / 2 / step))
+    rolls = np.arange(4 * turns) * np.pi / 2 / turns
+    pitches = np.arange(-turns + 1, turns) * np.pi / 2 / turns
+    points = [-np.array(specific_force(r, p, 1.0, np)) for p in pitches for r in rolls]
+    return Listed(
+        _unit(np.array([*points, [1.0, 0, 0], [-1.0, 0, 0]])),
+        f"a block held by hand: roll and pitch in steps of {np.degrees(np.pi / 2 / turns):g}°",
+    )
+
+
+@dataclass(frozen=True)
+class Mountings(Space):
+    """Turns about one horizontal axis per mounting of the sensor: circles about its axes.
+
+    Attributes
+    ----------
+    count : int, mountings
+    axes : tuple of axes in the sensor to choose from; by default x, y, z and their bisectors
+    """
+
+    count: int
+    axes: tuple[tuple[float, float, float], ...] = tuple(
+        (float(x), float(y), float(z))
+        for x, y, z in product((1, 0, -1), repeat=3)
+        if (x, y, z) > (0, 0, 0) and abs(x) + abs(y) + abs(z) <= 2
+    )
+
+    @property
+    def text(self) -> str:  # type: ignore[override]
+        """How many of them."""
+        one = self.count == 1
+        return f"{self.count} {'mounting' if one else 'mountings, each'} turned about one axis"
+
+    def directions(self, count: int) -> Array:
+        """Even steps about each axis."""
+        steps = max(8, count // len(self.axes))
+        angle = 2 * np.pi * np.arange(steps) / steps
+        circles = []
+        for axis in _unit(np.array(self.axes)):
+            one = Sphere().tangents(axis[None])[0]
+            circles.append(np.cos(angle)[:, None] * one[:, 0] + np.sin(angle)[:, None] * one[:, 1])
+        return np.vstack(circles)
+
+    def mounting(self, directions: Array) -> NDArray[np.int_]:
+        """Index of the axis, (n,), that is horizontal in each position."""
+        return np.asarray(np.argmin(np.abs(directions @ _unit(np.array(self.axes)).T), axis=1))
+
+    def tangents(self, directions: Array) -> Array:
+        """Turn about the axis of the mounting."""
+        axes = _unit(np.array(self.axes))[self.mounting(directions)]
+        return _unit(np.cross(axes, directions))[..., None]
+
+    def parts(self, rng: np.random.Generator) -> list[Space]:
+        """Choices of as many axes as there are mountings."""
+        chosen = list(combinations(self.axes, self.count))
+        if len(chosen) > MOST_MOUNTINGS:
+            keep = rng.choice(len(chosen), MOST_MOUNTINGS, replace=False)
+            chosen = [chosen[i] for i in sorted(keep)]
+        return [Mountings(self.count, axes) for axes in chosen]
+
+
+def listed_in(path: Path) -> Listed:
+    """Read the attitudes of a CSV file.
+
+    It has the columns x, y, z (directions of gravity in the body frame) or roll_U, pitch_U, where U
+    is one of gon, deg and rad.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or has neither.
+    """
+    try:
+        table = pd.read_csv(StringIO(read_text(path)), comment="#", dtype=str)
+    except InputError:
+        raise
+    except ValueError:
+        raise InputError(f"{path}: is no CSV table") from None
+    units = (*ANGLE_UNITS, "rad")
+    pairs = [("x", "y", "z"), *((f"roll_{u}", f"pitch_{u}") for u in units)]
+    columns = next((names for names in pairs if set(names) <= set(table.columns)), None)
+    if columns is None:
+        wanted = "; ".join(", ".join(names) for names in pairs)
+        raise InputError(
+            f"{path}: has the columns {short_list([*map(str, table.columns)])}; expected {wanted}"
+        )
+    values = table[list(columns)].apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
+    bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
+    if len(bad):
+        raise InputError(f"{path}: row {bad[0] + 1}: {', '.join(columns)} must be numbers")
+    if len(columns) == 2:
+        roll, pitch = to_si(values, columns[0].rpartition("_")[2], "rad").T
+        values = -np.stack(specific_force(roll, pitch, 1.0, np), axis=-1)
+    if not len(values) or not np.all(np.linalg.norm(values, axis=1) > 0):
+        raise InputError(f"{path}: no attitudes in it, or a direction of length zero")
+    points = np.unique(_unit(values).round(12), axis=0)
+    return Listed(_unit(points), f"{len(points)} attitudes of {path.name}")
+
+
+def attitudes(directions: Array) -> Array:
+    """Roll and pitch, rad, (n, 2), of directions of gravity."""
+    return angles_of(-np.asarray(directions))
+
+
+def _unit(points: Array) -> Array:
+    return np.asarray(points / np.linalg.norm(points, axis=-1, keepdims=True))
+
+
+TOLERANCE = 1e-7
+"""rad, by which rounding may break a constraint."""
+
+
+class Constraint(ABC):
+    """A constraint on single attitudes.
+
+    Attributes
+    ----------
+    text : str, for people
+    """
+
+    text: str
+
+    @abstractmethod
+    def margins(self, directions: Array) -> Array:
+        """Distances of directions (n, 3) from breaking it, (n, m), rad; negative where they do."""
+
+
+@dataclass(frozen=True)
+class RollRange(Constraint):
+    """Roll between two angles, rad."""
+
+    least: float
+    most: float
+
+    @property
+    def text(self) -> str:  # type: ignore[override]
+        """Ends of the range."""
+        return f"roll from {_shown(self.least)} to {_shown(self.most)}"
+
+    def margins(self, directions: Array) -> Array:
+        """Angles to both ends."""
+        roll = attitudes(directions)[:, 0]
+        return np.stack([roll - self.least, self.most - roll], axis=-1)
+
+
+@dataclass(frozen=True)
+class PitchRange(Constraint):
+    """Pitch between two angles, rad."""
+
+    least: float
+    most: float
+
+    @property
+    def text(self) -> str:  # type: ignore[override]
+        """Ends of the range."""
+        return f"pitch from {_shown(self.least)} to {_shown(self.most)}"
+
+    def margins(self, directions: Array) -> Array:
+        """Angles to both ends."""
+        pitch = attitudes(directions)[:, 1]
+        return np.stack([pitch - self.least, self.most - pitch], axis=-1)
+
+
+@dataclass(frozen=True)
+class OffPole(Constraint):
+    """Least angle, rad, between the x axis and the vertical, where roll is undefined."""
+
+    angle: float
+
+    @property
+    def text(self) -> str:  # type: ignore[override]
+        """Least distance."""
+        return f"at least {_shown(self.angle)} from the roll pole"
+
+    def margins(self, directions: Array) -> Array:
+        """Angle to the nearer pole, beyond the least one."""
+        x, y, z = directions.T
+        return (np.arctan2(np.hypot(y, z), np.abs(x)) - self.angle)[:, None]
+
+
+@dataclass(frozen=True)
+class LeastAngle:
+    """Least angle, rad, between any two positions."""
+
+    angle: float
+
+    @property
+    def text(self) -> str:
+        """The angle."""
+        return f"at least {_shown(self.angle)} between positions"
+
+    def apart(self, directions: Array, others: Array) -> NDArray[np.bool_]:
+        """Which of k directions are far enough from which of the others, (k, j)."""
+        return np.asarray(directions @ others.T <= np.cos(self.angle - TOLERANCE))
+
+
+@dataclass(frozen=True)
+class Constraints:
+    """Constraints that must all be met.
+
+    Attributes
+    ----------
+    single : of attitudes
+    pair : LeastAngle or None
+    """
+
+    single: tuple[Constraint, ...] = ()
+    pair: LeastAngle | None = None
+
+    @property
+    def texts(self) -> list[str]:
+        """All of them, for people."""
+        return [c.text for c in (*self.single, self.pair) if c is not None]
+
+    def margins(self, directions: Array) -> Array:
+        """Margins of all constraints of single attitudes, (n, m)."""
+        each: Sequence[Array] = [c.margins(directions) for c in self.single]
+        return np.concatenate([np.zeros((len(directions), 0)), *each], axis=1)
+
+    def keep(self, directions: Array) -> Array:
+        """Return those of directions (k, 3) that are allowed."""
+        return directions[np.all(self.margins(directions) >= -TOLERANCE, axis=1)]
+
+    def kept(self, directions: Array) -> bool:
+        """Whether a set of positions meets all constraints."""
+        if np.any(self.margins(directions) < -TOLERANCE):
+            return False
+        if self.pair is None or len(directions) < 2:
+            return True
+        near = ~self.pair.apart(directions, directions)
+        np.fill_diagonal(near, False)
+        return not near.any()
+
+
+def _shown(angle: float) -> str:
+    return f"{float(to_attitude(angle)):.6g} {attitude_unit()}"

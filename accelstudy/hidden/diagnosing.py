@@ -1,0 +1,94 @@
+"""One job of the study: campaigns are made and diagnosed, and truths and answers written apart."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from time import process_time
+from typing import Any
+
+import numpy as np
+
+from accelstudy.campaign.session import Campaign
+from accelstudy.diagnosis.pipeline import diagnose
+from accelstudy.diagnosis.result import Diagnosis
+from accelstudy.effects import effects_without
+from accelstudy.files.tables import write_table
+from accelstudy.hidden.campaigns import Row, made, rows_table, tried
+from accelstudy.hidden.cells import Cell
+from accelstudy.hidden.config import HiddenConfig
+from accelstudy.sensors.models import get_model
+
+
+def run_chunk(
+    config: HiddenConfig,
+    campaigns: Iterable[tuple[Cell, int]],
+    outputs: Mapping[str, str | Path],
+    provenance: Mapping[str, Any],
+) -> None:
+    """Diagnose the campaigns of a chunk.
+
+    The diagnosis gets the campaign and nothing else. One that fails is a row with its error. The
+    times stand apart, as they differ in every run.
+
+    Parameters
+    ----------
+    config : HiddenConfig
+    campaigns : of (Cell, number of the campaign)
+    outputs : paths of the tables truths, outcomes and seconds
+    provenance : see `accelstudy.files.tables.origin`
+    """
+    model = get_model(config.model)
+    rows: dict[str, list[Row]] = {name: [] for name in outputs}
+
+    def answer(campaign: Campaign) -> Row:
+        return _outcome(diagnose(campaign, model, seed=config.diagnosis_seed))
+
+    for cell, k in campaigns:
+        campaign, truth = made(cell, k, config.seed)
+        start = process_time()
+        with effects_without(cell.removed):
+            answered, error = tried(answer, campaign, f"{cell.name} {k}")
+        key = {"cell": cell.name, "campaign": k}
+        rows["truths"].append({**key, **truth})
+        rows["outcomes"].append({**key, **(answered or {}), "error": error or truth["failed"]})
+        rows["seconds"].append({**key, "seconds": process_time() - start})
+    for name, path in outputs.items():
+        write_table(path, rows_table(name, rows[name]), provenance)
+
+
+def _outcome(d: Diagnosis) -> Row:
+    """Row of the table of outcomes."""
+    test, held = d.global_test, d.gap.held_out
+    return {
+        "verdict": d.verdict,
+        "found": json.dumps([one.name for one in d.found]),
+        "specs": json.dumps([one.spec for one in d.found]),
+        "found_classes": json.dumps([list(one.equivalence_class) for one in d.found]),
+        "positions": json.dumps([one.position for one in d.found]),
+        "posteriors": json.dumps([_rounded(one.posterior) for one in d.found]),
+        "credible_set": json.dumps(
+            [
+                {
+                    "names": list(one.names),
+                    "classes": [list(names) for names in one.classes],
+                    "posterior": _rounded(one.posterior),
+                }
+                for one in d.credible_set
+            ]
+        ),
+        "confirmed": bool(d.gap.confirmed),
+        "statement": d.gap.statement or "",
+        "held_out_z": np.nan if held is None else float(held.z),
+        "sigma0_before": float(d.gap.before),
+        "sigma0_after": np.nan if d.gap.after is None else float(d.gap.after),
+        "p_size": np.nan if test is None else float(test.p_value),
+        "redundancy": d.base.redundancy,
+        "positions_used": d.campaign.n_positions,
+        "reason": d.reason,
+    }
+
+
+def _rounded(probability: float | None) -> float | None:
+    return None if probability is None else float(f"{probability:.6g}")

@@ -1,0 +1,302 @@
+"""The score of a study: its tables, its figures, and its page in Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from accelstudy.basics.wording import number, words
+from accelstudy.drawing.saving import save_all
+from accelstudy.files.outputs import whole_file
+from accelstudy.files.tables import origin, read_table, write_table
+from accelstudy.hidden.campaigns import TABLES
+from accelstudy.hidden.config import HiddenConfig
+from accelstudy.hidden.figures import figures
+from accelstudy.hidden.judging import ALL, share_of
+from accelstudy.hidden.limits import study_limits
+from accelstudy.hidden.scoring import sample, score_tables
+from accelstudy.hidden.targets import further
+
+PARTS = ("truths", "outcomes", "baselines", "seconds")
+"""Tables that the chunks write."""
+
+
+def write_score(
+    config: HiddenConfig,
+    inputs: Mapping[str, Sequence[str]],
+    outputs: Mapping[str, str],
+    provenance: Mapping[str, Any],
+) -> str:
+    """Score a study; returns the page.
+
+    Parameters
+    ----------
+    config : HiddenConfig
+    inputs : paths of all chunks of each of `PARTS`
+    outputs : paths of each of `accelstudy.hidden.cells.TABLES`, of the page, and of the
+        folder of the figures
+    provenance : see `accelstudy.files.tables.origin`
+    """
+    parts = {name: read_table([*inputs[name]]) for name in PARTS}
+    tables = score_tables(
+        parts["truths"], parts["outcomes"], parts["baselines"], study_limits(config)
+    )
+    for name in TABLES:
+        write_table(outputs[name], tables[name], provenance)
+    folder = Path(outputs["figures"])
+    folder.mkdir(parents=True, exist_ok=True)
+    save_all(figures(tables), folder)
+    page = score_page(tables, parts["seconds"], origin(provenance))
+    with whole_file(outputs["page"]) as path:
+        path.write_text(page, encoding="utf-8")
+    return page
+
+
+Tables = Mapping[str, pd.DataFrame]
+
+
+def score_page(tables: Tables, seconds: pd.DataFrame, origin: Mapping[str, Any]) -> str:
+    """Write the score as tables in Markdown.
+
+    Parameters
+    ----------
+    tables : those of `accelstudy.hidden.cells.TABLES`
+    seconds : DataFrame, processor time of each diagnosis
+    origin : see `accelstudy.files.tables.origin`
+    """
+    campaigns = tables["campaigns"]
+    each = seconds["seconds"]
+    parts = [
+        "# Score of the study of hidden effects",
+        "Written by `make hidden-effects`, not by hand; hidden-effects.md explains it.",
+        f"{len(campaigns)} campaigns, configuration `{origin['config_hash']}`, seed "
+        f"{origin['seed']}, accelstudy {origin['version']}, commit `{origin['commit'][:10]}`. A "
+        f"diagnosis took {number(float(each.median()))} s of processor time (median; 95 % of them "
+        f"below {number(float(each.quantile(0.95)))} s).",
+        "## Targets",
+        target_table(tables["targets"]),
+        "## Beside the targets",
+        share_table(further(campaigns)),
+        "## One effect, over its size",
+        size_table(tables["shares"]),
+        "## Verdicts",
+        verdict_table(tables["shares"]),
+        "## Simpler methods on the same campaigns",
+        method_table(tables["baselines"]),
+        "## Confirmed: how far the residuals shrink",
+        shrink_table(campaigns),
+        "## Each effect",
+        effect_table(tables["shares"], tables["limits"]),
+    ]
+    parts += ["## A sample", SAMPLE_TEXT, sample_table(sample(campaigns))]
+    failed = campaigns[~campaigns["ok"].astype(bool)]
+    if len(failed):
+        parts += ["## Without an answer", failure_table(failed)]
+    return "\n\n".join(parts) + "\n"
+
+
+def target_table(targets: pd.DataFrame) -> str:
+    """Each target, what was measured, and whether it is met."""
+    rows = [
+        (
+            row["figure"],
+            row["cases"],
+            row["wanted"],
+            _value(row["measured"]),
+            _interval(row["ci95_low"], row["ci95_high"]) if row["n"] else "",
+            row["n"],
+            row["met"],
+        )
+        for row in targets.to_dict("records")
+    ]
+    heads = ("figure", "campaigns", "target", "measured", "95 % interval", "n", "met")
+    return _table(heads, rows)
+
+
+def share_table(table: pd.DataFrame) -> str:
+    """Each share or mean with its interval."""
+    rows = [
+        (
+            row["figure"],
+            row["cases"],
+            _value(row["measured"]),
+            _interval(row["ci95_low"], row["ci95_high"]) if row["n"] else "",
+            row["n"],
+        )
+        for row in table.to_dict("records")
+    ]
+    return _table(("figure", "campaigns", "measured", "95 % interval", "n"), rows)
+
+
+SHOWN = {
+    "found": "alarm",
+    "oracle": "oracle found",
+    "named": "named",
+    "narrowed": "narrowed",
+    "unknown": "unknown",
+    "name right": "right",
+    "oracle right": "oracle right",
+    "wrong": "wrong",
+    "explanation right": "explanation right",
+    "set holds the truth": "set holds the truth",
+}
+"""Columns of the table over the size."""
+
+
+def size_table(shares: pd.DataFrame) -> str:
+    """Shares over the size of one effect."""
+    one = shares[(shares["set"] == "one") & shares["size"].notna()]
+    sizes = sorted(one["size"].unique())
+    rows = [
+        (f"{size:g}", *(_share(shares, quantity, "one", size=size) for quantity in SHOWN.values()))
+        for size in sizes
+    ]
+    return _table(("λ", *SHOWN), rows)
+
+
+VERDICTS = ("alarm", "named", "narrowed", "unknown", "noise_model", "gross_error", "confirmed")
+
+
+def verdict_table(shares: pd.DataFrame) -> str:
+    """Shares of the verdicts in each set."""
+    sets = [name for name in _SETS if share_of(shares, "alarm", name) is not None]
+    rows = [
+        (_SETS[name], *(_share(shares, quantity, name) for quantity in VERDICTS)) for name in sets
+    ]
+    heads = ("campaigns", *(name.replace("_", " ") for name in VERDICTS))
+    return _table(heads, rows)
+
+
+_SETS = {
+    "null": "nothing missing",
+    "noise": "wrong noise only",
+    "one": "one effect",
+    "two": "two effects",
+    "removed": "family taken out",
+    "outside": "never in the catalogue",
+    "gross": "gross errors",
+    "invisible": "cannot be seen",
+}
+
+
+def method_table(baselines: pd.DataFrame) -> str:
+    """The simpler methods, the diagnosis and the oracle, over all sizes."""
+    whole = baselines[baselines["size"].isna()].set_index(["method", "set", "quantity"])["share"]
+    columns = {
+        "false alarm": ("null", "detected"),
+        "wrong noise named": ("noise", "wrong"),
+        "one: found": ("one", "detected"),
+        "one: all names right": ("one", "right"),
+        "one: first name right": ("one", "first right"),
+        "one: some name wrong": ("one", "wrong"),
+        "two: both right": ("two", "right"),
+    }
+    methods = dict.fromkeys(["diagnosis", "oracle", *baselines["method"]])
+    rows = [
+        (method, *(_value(whole.get((method, *key), np.nan)) for key in columns.values()))
+        for method in methods
+    ]
+    return _table(("method", *columns), rows)
+
+
+def shrink_table(campaigns: pd.DataFrame) -> str:
+    """Variance of unit weight before and after what was confirmed."""
+    rows = []
+    for name in ("one", "two"):
+        part = campaigns[(campaigns["set"] == name) & campaigns["confirmed"].eq(True)]
+        for size, some in part.groupby("size"):
+            before, after = some["sigma0_before"].median(), some["sigma0_after"].median()
+            rows.append(
+                (_SETS[name], f"{size:g}", len(some), number(before), number(after),
+                 number((some["sigma0_after"] / some["sigma0_before"]).median()))
+            )  # fmt: skip
+    heads = ("campaigns", "λ", "confirmed", "σ₀² before", "σ₀² after", "ratio (medians)")
+    return _table(heads, rows)
+
+
+def effect_table(shares: pd.DataFrame, limits: pd.DataFrame) -> str:
+    """Each effect over all sizes, and from its limits on."""
+    one = shares[(shares["set"] == "one") & shares["size"].isna()]
+    names = sorted(set(one["what"]) - {ALL})
+    rows = []
+    for name in names:
+        part = limits[limits["what"] == name]
+        rows.append(
+            (
+                name.replace("_", " "),
+                _share(shares, "alarm", "one", what=name),
+                _share(shares, "right", "one", what=name),
+                _share(shares, "oracle right", "one", what=name),
+                _share(shares, "wrong", "one", what=name),
+                _weighted(part, "detected", "above_mdb"),
+                _weighted(part, "right", "above_mib"),
+            )
+        )
+    heads = ("effect", "found", "name right", "oracle", "wrong", "found from the MDB on",
+             "right from the MIB on")  # fmt: skip
+    return _table(heads, rows)
+
+
+SAMPLE_TEXT = (
+    "A test diagnoses these campaigns again. Where another answer comes out, the score is older "
+    "than the code. The explanation is the most probable one, with its posterior; σ₀² is that of "
+    "the base fit."
+)
+
+
+def sample_table(chosen: pd.DataFrame) -> str:
+    """Campaigns of a sample, and what was said of each.
+
+    Parameters
+    ----------
+    chosen : DataFrame, of `accelstudy.hidden.scoring.sample`
+    """
+    rows = [
+        (
+            row["cell"],
+            row["campaign"],
+            words(row["verdict"]) if isinstance(row["verdict"], str) else "no answer",
+            "yes" if row["confirmed"] is True else "no",
+            words(row["explanation"]),
+            number(row["posterior"]),
+            number(row["sigma0_before"]),
+        )
+        for row in chosen.to_dict("records")
+    ]
+    heads = ("cell", "campaign", "verdict", "confirmed", "explanation", "posterior", "σ₀²")
+    return _table(heads, rows)
+
+
+def failure_table(failed: pd.DataFrame) -> str:
+    """Errors that ended a diagnosis, and how often each did."""
+    counts = failed["error"].value_counts()
+    return _table(("error", "campaigns"), [(str(text), n) for text, n in counts.items()])
+
+
+def _weighted(part: pd.DataFrame, column: str, n: str) -> str:
+    total = part[n].sum()
+    if not total:
+        return "–"
+    return _value(float((part[column].fillna(0) * part[n]).sum() / total))
+
+
+def _share(shares: pd.DataFrame, quantity: str, set_: str, **division: str | float) -> str:
+    row = share_of(shares, quantity, set_, **division)
+    return "–" if row is None else _value(row["share"])
+
+
+def _value(value: float) -> str:
+    return "–" if np.isnan(value) else f"{value:.3f}" if value < 0.0995 else f"{value:.2f}"
+
+
+def _interval(low: float, high: float) -> str:
+    return "–" if np.isnan(low) else f"{_value(low)} … {_value(high)}"
+
+
+def _table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    lines = [heads, ["---"] * len(heads), *rows]
+    return "\n".join("| " + " | ".join(map(str, line)) + " |" for line in lines)

@@ -1,0 +1,339 @@
+"""The sessions of the study as they really are: attitudes, order, time, temperature, vibration."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+from itertools import permutations, product
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from accelstudy.basics.units import MGON
+
+Array = NDArray[np.float64]
+
+GRAVITY = 9.80665
+"""m/s², at the place of all sessions."""
+
+
+@dataclass(frozen=True)
+class Course:
+    """A temperature that changes linearly between given times; before and after it is constant.
+
+    Attributes
+    ----------
+    times : (k,) array, s
+    values : (k,) array, °C
+    """
+
+    times: Array
+    values: Array
+
+    def at(self, time: Array) -> Array:
+        """Temperature at times, °C."""
+        return np.interp(time, self.times, self.values)
+
+    def lagged(self, time: Array, tau: float) -> Array:
+        """Temperature of a body that follows with a first-order lag of `tau` seconds, °C.
+
+        Before the first time the body and what surrounds it are equally warm.
+        """
+        if tau == 0:
+            return self.at(time)
+        moments = np.union1d(self.times, time)
+        outside = self.at(moments)
+        # Behind a linear change a body lags, in the long run, by tau times the slope. Any other
+        # difference decays.
+        steps = np.diff(moments)
+        back = tau * np.diff(outside) / steps
+        decay = np.exp(-steps / tau)
+        body = [float(outside[0])]
+        for i, kept in enumerate(decay.tolist()):
+            away = body[i] - (outside[i] - back[i])
+            body.append(float(outside[i + 1] - back[i] + kept * away))
+        return np.asarray(body)[np.searchsorted(moments, time)]
+
+
+@dataclass(frozen=True)
+class Session:
+    """The holds of a session as they really are, whatever the sensor does.
+
+    Attributes
+    ----------
+    name : str, of the design
+    joints : (n, 2) array, rad, true angles of the roll and the pitch joint
+    yaw : (n,) array, rad
+    sigma : float, m/s², of a position mean
+    sigma_angle : float, rad, of an encoder's reading
+    n_samples : int, in a hold; 0 if nothing is known of the samples
+    length : float, s, of a hold
+    time : (n,) array, s, middles of the holds; None if they were not written down
+    course : Course, of the temperature; None without a thermometer
+    vibration : (n,) array, m/s²; None if it was not measured
+    slopes : bool, whether the slopes within the holds were kept
+    full_range : float, m/s², the sensor is stated to measure ± this; None if nothing is stated
+    """
+
+    name: str
+    joints: Array
+    yaw: Array
+    sigma: float
+    sigma_angle: float
+    n_samples: int = 0
+    length: float = 20.0
+    time: Array | None = None
+    course: Course | None = None
+    vibration: Array | None = None
+    slopes: bool = False
+    full_range: float | None = None
+
+    @property
+    def n(self) -> int:
+        """Number of holds."""
+        return len(self.joints)
+
+    @cached_property
+    def temperature(self) -> Array | None:
+        """Temperature in the middles of the holds, °C."""
+        if self.course is None or self.time is None:
+            return None
+        return self.course.at(self.time)
+
+    @cached_property
+    def clock(self) -> Array:
+        """Time of each hold, or its number where there is no time."""
+        return np.arange(1.0, self.n + 1) if self.time is None else self.time
+
+    @property
+    def duration(self) -> float:
+        """From the first hold to the last, as the clock has it."""
+        return float(self.clock[-1] - self.clock[0])
+
+    def later(self, seconds: float) -> Session:
+        """The same holds some seconds later."""
+        if self.time is None:
+            raise ValueError(f"{self.name}: has no time")
+        return replace(self, time=self.time + seconds)
+
+
+ANGLE_SIGMA = 3.2 * MGON
+
+
+def _spiral(count: int, rng: np.random.Generator) -> Array:
+    """Directions spread evenly along a spiral from pole to pole, in any attitude."""
+    height = 1 - (2 * np.arange(count) + 1) / count
+    turn = np.pi * (3 - np.sqrt(5)) * np.arange(count)
+    radius = np.sqrt(1 - height**2)
+    directions = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), height])
+    return rotated(directions, rng.uniform(0.3, 1.5, 3))
+
+
+def _snub_cube() -> Array:
+    """The 24 corners of a snub cube: even permutations with even signs, and odd ones with odd."""
+    t = (1 + np.cbrt(19 + 3 * np.sqrt(33)) + np.cbrt(19 - 3 * np.sqrt(33))) / 3
+    corner = np.array([1.0, 1 / t, t]) / np.sqrt(1 + 1 / t**2 + t**2)
+    corners = []
+    for order in permutations(range(3)):
+        parity = np.linalg.det(np.eye(3)[list(order)])
+        for signs in product((1.0, -1.0), repeat=3):
+            if np.prod(signs) == parity:
+                corners.append(np.array(signs) * corner[list(order)])
+    return np.array(corners)
+
+
+def _faces_and_edges() -> Array:
+    """6 faces and 12 edges of a cube."""
+    grid = np.array(list(product((-1.0, 0.0, 1.0), repeat=3)))
+    count = np.sum(grid != 0, axis=1)
+    chosen = grid[(count == 1) | (count == 2)]
+    return np.asarray(chosen / np.linalg.norm(chosen, axis=1, keepdims=True))
+
+
+def _three_circles() -> Array:
+    """Turns about each axis in eight steps of 45°, as a hand or one joint makes them."""
+    angle = np.arange(8) * np.pi / 4
+    circle = np.round(np.column_stack([np.cos(angle), np.sin(angle), np.zeros(8)]), 15)
+    return np.asarray(np.concatenate([np.roll(circle, shift, axis=1) for shift in range(3)]))
+
+
+def _joints(directions: Array) -> Array:
+    """Roll and pitch of directions of the specific force (n, 3), rad."""
+    x, y, z = directions.T + 0.0  # no negative zeros, for which roll would turn by half a turn
+    return np.column_stack([np.arctan2(-y + 0.0, -z + 0.0), np.arctan2(x, np.hypot(y, z))])
+
+
+def _by_hand(directions: Array, rng: np.random.Generator, sigma: float = 0.03) -> Array:
+    """Directions as a hand meets them, some degrees beside."""
+    aside: Array = sigma * rng.standard_normal(directions.shape)
+    return rotated(directions, aside)
+
+
+def _times(n: int, hold: float, pause: float) -> Array:
+    return np.asarray(hold / 2 + (hold + pause) * np.arange(n), dtype=float)
+
+
+def _blocks(time: Array, values: tuple[float, ...]) -> Course:
+    """Equal blocks of holds, each at a temperature of its own, with the change between them."""
+    blocks = np.array_split(time, len(values))
+    edges = [edge for block in blocks for edge in (block[0], block[-1])]
+    return Course(np.array(edges), np.repeat(values, 2))
+
+
+def _smooth(time: Array, course: Callable[[Array], Array]) -> Course:
+    grid = np.linspace(0.0, time[-1] + 60.0, 200)
+    return Course(grid, course(grid))
+
+
+def _spread_24(rng: np.random.Generator) -> Session:
+    directions = rng.permutation(_spiral(24, rng))
+    time = _times(24, 30.0, 20.0)
+    course = _smooth(time, lambda t: 21 + 7 * (1 - np.exp(-t / 500)) + 0.6 * np.sin(t / 170))
+    joints = _joints(directions)
+    return Session(
+        "spread-24", joints, np.zeros(24), 0.002, ANGLE_SIGMA, 3000, 30.0, time, course, slopes=True
+    )
+
+
+def _abba_48(rng: np.random.Generator) -> Session:
+    one = rng.permutation(_spiral(12, rng))
+    joints = _joints(np.concatenate([one, one[::-1], rng.permutation(one), rng.permutation(one)]))
+    time = _times(48, 20.0, 20.0) + 900.0 * np.repeat(np.arange(4), 12)
+    course = _blocks(time, (12.0, 34.0, 34.0, 12.0))
+    yaw = rng.uniform(-np.pi, np.pi, 48)
+    return Session(
+        "abba-48", joints, yaw, 0.001, ANGLE_SIGMA, 2000, 20.0, time, course, slopes=True
+    )
+
+
+def _circles_24(rng: np.random.Generator) -> Session:
+    joints = _joints(_three_circles())
+    return Session(
+        "circles-24", joints, np.zeros(24), 0.002, ANGLE_SIGMA, 500, 10.0, _times(24, 10.0, 15.0)
+    )
+
+
+def _snub_24(rng: np.random.Generator) -> Session:
+    joints = _joints(rng.permutation(_snub_cube()))
+    return Session("snub-24", joints, np.zeros(24), 0.002, ANGLE_SIGMA)
+
+
+def _hand_18(rng: np.random.Generator) -> Session:
+    joints = _joints(_by_hand(_faces_and_edges(), rng))
+    return Session("hand-18", joints, rng.uniform(-0.5, 0.5, 18), 0.003, ANGLE_SIGMA, 400)
+
+
+def _repeats_30(rng: np.random.Generator) -> Session:
+    directions = rng.permutation(np.tile(_spiral(15, rng), (2, 1)))
+    time = _times(30, 60.0, 30.0)
+    course = _smooth(time, lambda t: 24 - 3 * np.cos(2 * np.pi * t / 1900))
+    return Session(
+        "repeats-30",
+        _joints(directions),
+        rng.uniform(-np.pi, np.pi, 30),
+        0.0005,
+        ANGLE_SIGMA,
+        6000,
+        60.0,
+        time,
+        course,
+        vibration=0.1 + 1.4 * rng.random(30) ** 2,
+        slopes=True,
+    )
+
+
+def _yaw_50(rng: np.random.Generator) -> Session:
+    joints = _joints(rng.permutation(_spiral(50, rng)))
+    yaw = rng.uniform(-np.pi, np.pi, 50)
+    return Session(
+        "yaw-50", joints, yaw, 0.003, ANGLE_SIGMA, 1000, 15.0, _times(50, 15.0, 12.0), slopes=True
+    )
+
+
+def _long_60(rng: np.random.Generator) -> Session:
+    directions = rng.permutation(np.tile(_by_hand(_spiral(20, rng), rng), (3, 1)))
+    time = _times(60, 20.0, 25.0)
+    course = _smooth(time, lambda t: 30 - 9 * np.exp(-t / 700) + 2.5 * np.sin(t / 310))
+    return Session(
+        "long-60",
+        _joints(directions),
+        rng.uniform(-np.pi, np.pi, 60),
+        0.005,
+        ANGLE_SIGMA,
+        200,
+        20.0,
+        time,
+        course,
+        vibration=0.2 + 2.0 * rng.random(60),
+        full_range=19.6133,
+    )
+
+
+def _two_warm_36(rng: np.random.Generator) -> Session:
+    one = _spiral(18, rng)
+    joints = _joints(np.concatenate([rng.permutation(one), rng.permutation(one)]))
+    time = _times(36, 25.0, 10.0) + 1200.0 * np.repeat(np.arange(2), 18)
+    course = _blocks(time, (21.0, 38.0))
+    return Session(
+        "two-warm-36", joints, np.zeros(36), 0.002, ANGLE_SIGMA, 2500, 25.0, time, course
+    )
+
+
+_DESIGNS: dict[str, Callable[[np.random.Generator], Session]] = {
+    "spread-24": _spread_24,
+    "abba-48": _abba_48,
+    "circles-24": _circles_24,
+    "snub-24": _snub_24,
+    "hand-18": _hand_18,
+    "repeats-30": _repeats_30,
+    "yaw-50": _yaw_50,
+    "long-60": _long_60,
+    "two-warm-36": _two_warm_36,
+}
+
+DESIGNS = tuple(_DESIGNS)
+"""Names of the designs."""
+APPROACHES = ("gravity", "robot")
+
+
+@cache
+def session(design: str) -> Session:
+    """The session of a design; the same whenever it is asked for."""
+    return _DESIGNS[design](np.random.default_rng(zlib.crc32(design.encode())))
+
+
+def in_turned_frame(vectors: Array, axis: int, angle: ArrayLike) -> Array:
+    """Components of vectors (..., 3) in a frame that is turned about one of its axes.
+
+    Parameters
+    ----------
+    vectors : (..., 3) array
+    axis : int, 0, 1 or 2
+    angle : (...) array, rad, right-handed
+    """
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    cos, sin = np.cos(angle), np.sin(angle)
+    shape = np.broadcast_shapes(vectors.shape[:-1], np.shape(angle))
+    turned = np.empty((*shape, 3))
+    turned[..., axis] = vectors[..., axis]
+    turned[..., i] = cos * vectors[..., i] + sin * vectors[..., j]
+    turned[..., j] = cos * vectors[..., j] - sin * vectors[..., i]
+    return turned
+
+
+def rotated(vectors: Array, rotation: Array) -> Array:
+    """Vectors (..., 3) rotated by rotation vectors (..., 3), rad (Rodrigues)."""
+    vectors, rotation = np.broadcast_arrays(vectors, rotation)
+    half = np.sqrt(np.sum(rotation**2, axis=-1, keepdims=True)) / (2 * np.pi)
+    along = _cross(rotation, vectors)
+    # sin(a)/a and (1 - cos(a))/a², which are regular at 0.
+    return vectors + np.sinc(2 * half) * along + np.sinc(half) ** 2 / 2 * _cross(rotation, along)
+
+
+def _cross(a: Array, b: Array) -> Array:
+    product = np.empty(a.shape)
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        product[..., i] = a[..., j] * b[..., k] - a[..., k] * b[..., j]
+    return product

@@ -1,1 +1,0 @@
-"""Forward physics: sessions, rigs, sensors, effects and noise."""

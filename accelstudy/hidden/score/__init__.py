@@ -1,1 +1,0 @@
-"""The score: answers beside truths, shares, limits and targets."""

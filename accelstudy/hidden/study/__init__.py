@@ -1,1 +1,0 @@
-"""The campaigns of the study, and the jobs that have them diagnosed."""

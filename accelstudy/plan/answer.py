@@ -1,0 +1,221 @@
+"""The answer: the cheapest candidates that reach the target, checked by simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+from accelstudy.basics.progress import track
+from accelstudy.plan.candidates import Candidate, candidates
+from accelstudy.plan.optimised import Sought, cheapest
+from accelstudy.plan.question import ROBOT, Equipment, Question
+from accelstudy.plan.simulated import Simulated, simulate, study_of
+
+SHOWN = 8
+"""Candidates in the table."""
+SIMULATED = 5
+"""Candidates that are simulated."""
+OTHER_CONFIDENCE = 0.95
+"""Share of the calibrations that the plan also quotes if the user asked for the rms."""
+TRIES = 12
+"""Candidates of one kind that are simulated until one reaches the target."""
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """A candidate in the table; those at the top are simulated.
+
+    Attributes
+    ----------
+    candidate : Candidate
+    simulated : Simulated or None
+    fewer : Simulated or None, of the best positions of which there is one less, and which miss the
+        target
+    """
+
+    candidate: Candidate
+    simulated: Simulated | None = None
+    fewer: Simulated | None = None
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The result of a plan.
+
+    Attributes
+    ----------
+    question : Question
+    compared : list of Candidate, all that were compared
+    ranked : list of Ranked, for each equipment and model the cheapest that reaches the target, by
+        the time they take; empty if none does
+    stricter : Ranked, the cheapest with the same equipment as the first that reaches the target
+        by the other measure (95 % of the calibrations, or the rms); None if there is none
+    instead : Candidate, the cheapest with a robot, if only calibrations by hand were asked for and
+        none reaches the target; None if a robot does not reach it either
+    seed, replicates : int, of the simulation
+    """
+
+    question: Question
+    compared: list[Candidate]
+    ranked: list[Ranked]
+    stricter: Ranked | None
+    instead: Candidate | None
+    seed: int
+    replicates: int
+
+    @property
+    def first(self) -> Ranked:
+        """The recommended candidate: by hand if that reaches the target, else with the robot."""
+        checked = [r for r in self.ranked if r.simulated is not None]
+        by_hand = [r for r in checked if r.candidate.equipment.name == "gravity"]
+        return (by_hand or checked)[0]
+
+    def best(self, equipment: str = "") -> Candidate | None:
+        """The most accurate candidate, of all or with one equipment, however long it takes."""
+        chosen = [c for c in self.compared if equipment in ("", c.equipment.name)]
+        confidence = self.question.confidence
+        return min(chosen, key=lambda c: c.accuracy(confidence), default=None)
+
+    @property
+    def study(self) -> dict[str, object]:
+        """Configuration of the study whose cells are the simulated candidates."""
+        chosen = [self.first, *(r for r in self.ranked if r.simulated and r is not self.first)]
+        return study_of(self.question, [r.candidate for r in chosen], self.seed, self.replicates)
+
+
+def answer(question: Question, seed: int = 1, replicates: int = 10_000) -> Answer:
+    """Compare all calibrations, rank those that reach the target, and simulate the first."""
+    compared = candidates(question)
+    for equipment in question.equipment:
+        compared += _largest(question, equipment, compared, question.confidence)
+    simulation = Simulation(question, question.confidence, seed, replicates)
+    kinds: dict[tuple[str, str], list[Candidate]] = {}
+    for c in _good(question, compared, question.confidence):
+        kinds.setdefault(c.kind, []).append(c)
+    best = by_time(cheapest(question, kind, question.confidence) for kind in kinds.values())
+    ranked: list[Ranked] = []
+    for candidate in track(_in_front(best), "simulated calibrations"):
+        checked = [r.candidate.equipment.name for r in ranked if r.simulated]
+        if len(checked) >= SIMULATED and candidate.equipment.name in checked:
+            ranked.append(Ranked(candidate))
+        elif good := simulation.confirmed(candidate, candidate.equipment.name not in checked):
+            ranked.append(good)
+    if not any(r.simulated for r in ranked):
+        instead = _with_a_robot(question)
+        return Answer(question, compared, [], None, instead, seed, replicates)
+    compared += [r.candidate for r in ranked if r.candidate not in compared]
+    plan = Answer(question, compared, _shown(ranked), None, None, seed, replicates)
+    same = replace(question, equipment=(plan.first.candidate.equipment,))
+    other = OTHER_CONFIDENCE if question.confidence is None else None
+    stricter = [c for c in compared if c.equipment in same.equipment]
+    stricter += _largest(same, same.equipment[0], stricter, other)
+    reaching = _good(same, stricter, other)
+    simulation = Simulation(same, other, seed, replicates)
+    confirmed = simulation.confirmed(cheapest(same, reaching, other)) if reaching else None
+    return replace(plan, stricter=confirmed)
+
+
+def _good(
+    question: Question, compared: Iterable[Candidate], confidence: float | None
+) -> list[Candidate]:
+    """Candidates that reach the target by linear theory, by time."""
+    return by_time(c for c in compared if c.reaches(question.target, confidence))
+
+
+def _largest(
+    question: Question,
+    equipment: Equipment,
+    compared: Iterable[Candidate],
+    confidence: float | None,
+) -> list[Candidate]:
+    """Calibration in as many of the best positions as are allowed, if no known scheme suffices."""
+    possible = [c for c in compared if c.equipment == equipment]
+    if not possible or any(c.reaches(question.target, confidence) for c in possible):
+        return []
+    best = min(possible, key=lambda c: c.accuracy(confidence))
+    sought = Sought(question, equipment, best.model.name, best.hold)
+    return list(filter(None, [sought.candidate(sought.most)]))
+
+
+def _shown(ranked: list[Ranked]) -> list[Ranked]:
+    """Rows of the table, by time: the simulated candidates, and the quickest of the others."""
+    ranked = sorted(ranked, key=lambda r: _effort(r.candidate))
+    others = [r for r in ranked if r.simulated is None]
+    left_out = others[max(0, SHOWN - len(ranked) + len(others)) :]
+    return [r for r in ranked if r not in left_out]
+
+
+def _with_a_robot(question: Question) -> Candidate | None:
+    """Cheapest candidate with a robot by linear theory, if only those by hand were compared."""
+    if any(equipment.name != "gravity" for equipment in question.equipment):
+        return None
+    robot = replace(question, equipment=(ROBOT,))
+    good = _good(robot, candidates(robot), question.confidence)
+    return cheapest(robot, good, question.confidence) if good else None
+
+
+def by_time(unsorted: Iterable[Candidate]) -> list[Candidate]:
+    """Candidates by the time they take."""
+    return sorted(unsorted, key=_effort)
+
+
+def _effort(candidate: Candidate) -> tuple[float, float, int]:
+    return candidate.seconds, candidate.rms, candidate.model.n_parameters
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """The check of candidates by simulation.
+
+    Attributes
+    ----------
+    question : Question
+    confidence : float, optional, the measure by which they must reach the target
+    seed, replicates : int
+    """
+
+    question: Question
+    confidence: float | None
+    seed: int
+    replicates: int
+
+    def of(self, candidate: Candidate) -> Simulated:
+        """Simulated calibrations."""
+        study = study_of(self.question, [candidate], self.seed, self.replicates)
+        return simulate(study)[0]
+
+    def confirmed(self, candidate: Candidate, and_no_fewer: bool = True) -> Ranked | None:
+        """The candidate, or one with a few more positions, that reaches the target in simulation.
+
+        Parameters
+        ----------
+        candidate : Candidate, that reaches it by linear theory
+        and_no_fewer : bool, whether one position less is simulated, too, until it does not suffice
+        """
+        n, target = candidate.scheme.n_positions, self.question.target
+        sought = Sought(self.question, candidate.equipment, candidate.model.name, candidate.hold)
+        reached, missed = None, None
+        for _ in range(TRIES):
+            tried = candidate if n == candidate.scheme.n_positions else sought.candidate(n)
+            if tried is None:
+                break
+            simulated = self.of(tried)
+            if simulated.accuracy(self.confidence) <= target:
+                reached = tried, simulated
+                if missed is not None or not and_no_fewer:
+                    break
+                n -= 1
+            else:
+                missed = simulated
+                if reached is not None:
+                    break
+                n += 1
+        return None if reached is None else Ranked(*reached, missed)
+
+
+def _in_front(best: Sequence[Candidate]) -> list[Candidate]:
+    """Reorder candidates: the first of each equipment comes before all others."""
+    first: dict[str, Candidate] = {}
+    for candidate in best:
+        first.setdefault(candidate.equipment.name, candidate)
+    return [*first.values(), *(c for c in best if c not in first.values())]

@@ -1,1 +1,0 @@
-"""Plans by configuration: the sections, the jobs of the workflow, and sensors compared."""

@@ -1,0 +1,155 @@
+"""The candidates: all calibrations that a plan compares, by linear theory."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.basics.progress import track
+from accelstudy.plan.question import Equipment, Question
+from accelstudy.plan.theory import Expected, theory_of
+from accelstudy.schemes import Scheme, get_scheme, scheme_names
+from accelstudy.sensors.models import MODELS, get_model
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.simulation.sessions import Noise
+
+Array = NDArray[np.float64]
+
+NINE = "bias-scale-nonorthogonality"
+PLANNED_MODELS = (
+    *MODELS,
+    f"{NINE}-crossaxis+quadratic_scale",
+    f"{NINE}-crossaxis+quadratic_scale+cubic_scale",
+)
+FAMILY = "fibonacci"
+SIZES = (*range(4, 25), 27, *range(30, 61, 5), *range(70, 101, 10), *range(120, 401, 40))
+"""Family of evenly spread positions, and the sizes of it that are tried. They show about how many
+positions are needed; `accelstudy.plan.optimised` seeks the fewest."""
+LEAST_REDUNDANCY = 0.25
+"""Least share of redundant conditions; with fewer a wrong position would not be noticed."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One calibration.
+
+    Attributes
+    ----------
+    equipment : Equipment
+    model : SensorModel
+    scheme : Scheme
+    hold : float, s
+    sigma : float, m/s², of the mean of a position
+    expected : Expected
+    """
+
+    equipment: Equipment
+    model: SensorModel
+    scheme: Scheme
+    hold: float
+    sigma: float
+    expected: Expected
+
+    @property
+    def seconds(self) -> float:
+        """Time in the field, s."""
+        return self.equipment.seconds(self.scheme.n_positions, self.hold)
+
+    @property
+    def kind(self) -> tuple[str, str]:
+        """Equipment and model; the cheapest candidate of each kind is sought."""
+        return self.equipment.name, self.model.name
+
+    @cached_property
+    def rms(self) -> float:
+        """Larger rms of roll and pitch, rad."""
+        return float(self.expected.rms.max())
+
+    def accuracy(self, confidence: float | None) -> float:
+        """Tilt accuracy by the measure that is asked for, rad."""
+        if confidence is None:
+            return self.rms
+        return self.expected.of_both(confidence)
+
+    def reaches(self, target: float, confidence: float | None) -> bool:
+        """Whether the tilt accuracy is reached."""
+        # Such a quantile is not much below the rms, which is faster to compute.
+        if confidence is not None and confidence >= 0.7 and self.rms > target:
+            return False
+        return self.accuracy(confidence) <= target
+
+
+def schemes_for(most_positions: int, more: Sequence[str] = ()) -> list[Scheme]:
+    """Schemes of the literature, evenly spread ones, and more, in the order of their size."""
+    names = {*scheme_names(), *(f"{FAMILY}-{n}" for n in SIZES), *more}
+    schemes = [get_scheme(name) for name in sorted(names)]
+    fitting = [scheme for scheme in schemes if scheme.n_positions <= most_positions]
+    return sorted(fitting, key=lambda scheme: (scheme.n_positions, scheme.name))
+
+
+def candidates(question: Question) -> list[Candidate]:
+    """All calibrations in known schemes whose positions determine their model and check it."""
+    schemes = schemes_for(question.most_positions, question.schemes)
+    return [c for scheme in track(schemes, "calibrations") for c in _with_scheme(question, scheme)]
+
+
+def shortest(question: Question) -> Candidate | None:
+    """Quickest calibration without limits of time and positions; None if there is none."""
+    free = replace(question, most_seconds=math.inf, most_positions=SIZES[-1])
+    first: dict[str, Candidate] = {}
+    for scheme in schemes_for(free.most_positions, free.schemes):
+        for candidate in sorted(_with_scheme(free, scheme), key=lambda c: c.seconds):
+            first.setdefault(candidate.equipment.name, candidate)
+        if len(first) == len(question.equipment):
+            break
+    return min(first.values(), key=lambda c: c.seconds, default=None)
+
+
+def _with_scheme(question: Question, scheme: Scheme) -> list[Candidate]:
+    """Candidates in one scheme, with each equipment."""
+    models = [get_model(name) for name in PLANNED_MODELS]
+    return [
+        candidate
+        for equipment in question.equipment
+        for candidate in of_scheme(question, equipment, scheme, models)
+    ]
+
+
+def of_scheme(
+    question: Question, equipment: Equipment, scheme: Scheme, models: list[SensorModel]
+) -> Iterator[Candidate]:
+    """Candidates in one scheme with one equipment."""
+    theory = theory_of(question.tilt_range)
+    directions, n = scheme.directions, scheme.n_positions
+    at_unit: dict[str, Expected | None] = {}
+    for hold in question.holds:
+        if equipment.seconds(n, hold) > question.most_seconds:
+            continue
+        sigma = sigma_of(question, equipment, n, hold)
+        rows: Array | None = None
+        for model in models:
+            if equipment.name == "gravity":  # with a single noise the result scales with it
+                if model.name not in at_unit:
+                    if rows is None:
+                        rows = theory.rows(directions, "gravity", Noise(sigma_force=1.0))
+                    at_unit[model.name] = theory.expected(rows, model, question.neglectable)
+                unit = at_unit[model.name]
+                expected = None if unit is None else unit.with_noise(sigma)
+            else:
+                if rows is None:
+                    noise = Noise(sigma, question.sigma_angle)
+                    rows = theory.rows(directions, equipment.name, noise)
+                expected = theory.expected(rows, model, question.neglectable)
+            if expected is None or expected.redundancy < LEAST_REDUNDANCY * expected.conditions:
+                continue
+            yield Candidate(equipment, model, scheme, hold, sigma, expected)
+
+
+def sigma_of(question: Question, equipment: Equipment, n: int, hold: float) -> float:
+    """Noise of the mean of a position, m/s², with four digits: so names of cells stay short."""
+    return float(f"{question.sheet.sigma_mean(hold, n * (hold + equipment.moving)):.4g}")

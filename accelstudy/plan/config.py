@@ -1,0 +1,125 @@
+"""The configuration of `workflow/plan.smk`: its sections, and that of plans."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self, TypeVar, cast
+
+from pydantic import BaseModel, Field, model_validator
+
+from accelstudy.basics.errors import InputError
+from accelstudy.data_sheets import data_sheet_names, of_sigma
+from accelstudy.files.reading import config_hash
+from accelstudy.files.validation import Block, OneOrMore, PathName, Replicates, Seed, checked
+from accelstudy.plan.quantities import QUANTITIES
+from accelstudy.plan.question import Question, equipment_of, get_sensor
+
+
+class PlanCase(Block):
+    """One question, with options of `accelstudy plan`."""
+
+    tilt_accuracy: str = Field(description="target for roll and for pitch, as 10mgon")
+    tilt_range: str = Field(
+        QUANTITIES["tilt_range"].usual, description="largest tilt at which the sensor is used"
+    )
+    sensor: str | None = Field(None, description="data sheet: a name, or the path of a file")
+    sigma: str | None = Field(None, description="noise of a position's mean, as 2mm/s2, instead")
+    equipment: Literal["gravity", "robot", "both"] = Field("both", description="what is available")
+    confidence: float | None = Field(
+        None, ge=0.5, le=0.999, description="share of the calibrations that must reach it; or rms"
+    )
+    max_time: str | None = Field(None, description="time in the field at most, as 20min")
+
+    @property
+    def question(self) -> Question:
+        """The question in SI."""
+        if (self.sensor is None) == (self.sigma is None):
+            raise InputError("give sensor or sigma, one of them")
+        sigma = self._si("sigma")
+        longest = self._si("max_time")
+        return Question(
+            cast(float, self._si("tilt_accuracy")),
+            cast(float, self._si("tilt_range")),
+            get_sensor(str(self.sensor)) if sigma is None else of_sigma(sigma),
+            equipment_of(self.equipment),
+            self.confidence,
+            most_seconds=math.inf if longest is None else longest,
+        )
+
+    def _si(self, key: str) -> float | None:
+        text = getattr(self, key)
+        try:
+            return None if text is None else QUANTITIES[key].read(text)
+        except InputError as error:
+            raise InputError(f"{key}: {error}") from None
+
+    @model_validator(mode="after")
+    def _can_be_asked(self) -> Self:
+        try:
+            _ = self.question
+        except InputError as error:
+            raise ValueError(str(error)) from None
+        return self
+
+
+class PlanConfig(Block):
+    """The plans, and the sensors that are compared."""
+
+    cases: dict[PathName, PlanCase] = Field(default_factory=dict, description="name: question")
+    sensors: OneOrMore[str] = Field(
+        default=["all"], description="data sheets that are compared: names, files, or all"
+    )
+    replicates: Replicates = Field(10_000, description="simulated calibrations of each at the top")
+
+    @model_validator(mode="after")
+    def _sensors_exist(self) -> Self:
+        try:
+            for name in self.chosen_sensors:
+                get_sensor(name)
+        except InputError as error:
+            raise ValueError(f"sensors: {error}") from None
+        return self
+
+    @property
+    def chosen_sensors(self) -> list[str]:
+        """Names and paths of the data sheets."""
+        return list(data_sheet_names()) if self.sensors == ["all"] else list(self.sensors)
+
+
+Section = TypeVar("Section", bound=BaseModel)
+
+
+class Example(Block):
+    """All parts of a run; results go to ``results/<study>``."""
+
+    study: PathName = Field(description="name; results go to results/<study>/")
+    seed: Annotated[Seed, Field(description="of all random numbers")] = 1
+    plan: dict[str, Any] = Field(default_factory=dict, description="the cheapest calibration")
+    designs: dict[str, Any] = Field(default_factory=dict, description="optimal schemes")
+    sequential: dict[str, Any] = Field(default_factory=dict, description="one position at a time")
+    pole: dict[str, Any] = Field(default_factory=dict, description="tilt of a pole")
+    field: dict[str, Any] = Field(default_factory=dict, description="what limits a sensor in use")
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Provenance that tables record."""
+        return {"config_hash": config_hash(self.model_dump(mode="json")), "seed": self.seed}
+
+
+def parse_example(content: Mapping[str, Any], source: str = "config") -> Example:
+    """Check the configuration, except its sections.
+
+    Raises
+    ------
+    InputError
+        One line that names the source, the key, what is wrong and what would be right.
+    """
+    return checked(Example, content, source)
+
+
+def parse_section(
+    example: Example, name: str, block: type[Section], source: str = "config"
+) -> Section:
+    """Check one section against the class of its part; raises errors like `parse_example`."""
+    return checked(block, getattr(example, name), source, name)

@@ -1,0 +1,182 @@
+"""A plan as files: table, page, figure, and the study that reproduces its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+import yaml
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.suggested import study_again
+from accelstudy.basics.units import MGON
+from accelstudy.files.outputs import PLAN, result_folder
+from accelstudy.plan.answer import Answer, answer
+from accelstudy.plan.candidates import Candidate
+from accelstudy.plan.config import PlanCase
+from accelstudy.plan.optimised import is_best, request_of
+from accelstudy.plan.reasons import limits
+from accelstudy.plan.wording import (
+    answer_lines,
+    assumption_lines,
+    how_to,
+    positions_command,
+    reason_lines,
+    table_lines,
+    unreachable,
+)
+from accelstudy.proposal.proposal import field_order, write_design
+
+STUDY_HEAD = """\
+# The simulated candidates of a plan as a study, made by `accelstudy plan`. It reproduces their
+# numbers: {command}
+"""
+ANGLES = ("roll", "pitch")
+
+
+def write_plan(
+    answer: Answer,
+    out: str | Path,
+    provenance: Mapping[str, Any],
+    inputs: Iterable[str | Path] = (),
+    force: bool = False,
+) -> None:
+    """Write the files of a plan that reaches its target into a folder.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written, or holds files that must not be overwritten.
+    """
+    with result_folder(out, PLAN, inputs, force) as folder:
+        plan_files(answer, folder, provenance, shown=Path(out))
+
+
+def make_plan(
+    name: str,
+    case: Mapping[str, Any],
+    replicates: int,
+    folder: str | Path,
+    provenance: Mapping[str, Any],
+) -> None:
+    """Make one plan.
+
+    Raises
+    ------
+    InputError
+        If no calibration reaches the target; the message says what is reachable.
+    """
+    plan = answer(PlanCase(**case).question, int(provenance["seed"]), replicates)
+    if not plan.ranked:
+        raise InputError(f"plan.cases.{name}: {unreachable(plan)}")
+    plan_files(plan, Path(folder), provenance, Path(folder), f"plan-{name}")
+
+
+def plan_files(
+    answer: Answer,
+    folder: Path,
+    provenance: Mapping[str, Any],
+    shown: Path,
+    study: str = "plan",
+) -> None:
+    """Write the files of a plan into an existing folder.
+
+    Parameters
+    ----------
+    answer : Answer, that reaches its target
+    folder : Path
+    provenance : see `accelstudy.files.tables.origin`
+    shown : Path, name of the folder in the files
+    study : str, name of the study that reproduces the numbers
+    """
+    from accelstudy.drawing.saving import save
+    from accelstudy.drawing.style import DPI, STYLE
+    from accelstudy.files.tables import write_table
+    from accelstudy.plan.figure import plan_figure
+
+    write_table(folder / "plan.parquet", plan_table(answer), provenance)
+    head = STUDY_HEAD.format(command=study_again(shown / "study.yaml"))
+    content = yaml.safe_dump({**answer.study, "study": study}, sort_keys=False, allow_unicode=True)
+    (folder / "study.yaml").write_text(head + content, encoding="utf-8")
+    (folder / "plan.md").write_text(plan_page(answer), encoding="utf-8")
+    write_positions(answer, folder / "positions.yaml", study)
+    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
+        figure = plan_figure(answer)
+    save(figure, folder / "plan.svg", folder / "plan.png", "Plan", DPI)
+
+
+def write_positions(answer: Answer, path: Path, name: str) -> None:
+    """Write the recommended positions as a scheme, in the order in which to take them."""
+    question, first = answer.question, answer.first.candidate
+    directions, command = first.scheme.directions, positions_command(question, first)
+    if is_best(first.scheme):
+        order = field_order(request_of(question, first).task, directions)
+        directions = directions[order]
+    write_design(path, name, f"of {name}", command, directions, {"made_by": "accelstudy plan"})
+
+
+def plan_page(answer: Answer) -> str:
+    """The plan as a page in Markdown."""
+    parts = [
+        "# " + answer_lines(answer)[0],
+        "\n".join(answer_lines(answer)[1:]),
+        "\n".join(how_to(answer)),
+        "```\n" + "\n".join(table_lines(answer)) + "\n```",
+        "![Tilt accuracy over effort](plan.svg)",
+        "```\n" + "\n".join(reason_lines(answer)) + "\n```",
+        "\n".join(f"* {line}" for line in assumption_lines(answer.question)),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def plan_table(answer: Answer) -> pd.DataFrame:
+    """All candidates that were compared, and the rank of those in the table of the plan.
+
+    Angles are in mgon, whatever unit the user chose.
+    """
+    ranks = {id(r.candidate): (i, r) for i, r in enumerate(answer.ranked, 1)}
+    rows = []
+    for candidate in answer.compared:
+        rank, ranked = ranks.get(id(candidate), (0, None))
+        row = _row(candidate)
+        row["reaches"] = candidate.reaches(answer.question.target, answer.question.confidence)
+        row["rank"] = rank or None
+        row["limited_by"] = limits(answer.question, candidate) if rank else None
+        simulated = None if ranked is None else ranked.simulated
+        row["cell"] = None if simulated is None else simulated.cell
+        empty = np.full(2, np.nan)
+        of_cell = {
+            "rms": empty if simulated is None else simulated.rms,
+            "rms_error": empty if simulated is None else simulated.error,
+            "rms_q95": empty if simulated is None else simulated.quantile(0.95),
+        }
+        for key, values in of_cell.items():
+            for angle, value in zip(ANGLES, values, strict=True):
+                row[f"{angle}_{key}_simulated_mgon"] = float(value) / MGON
+        both = np.nan if simulated is None else simulated.of_both(0.95)
+        row["both_rms_q95_simulated_mgon"] = both / MGON
+        rows.append(row)
+    table = pd.DataFrame(rows)
+    return table.astype({"rank": "Int64"})
+
+
+def _row(candidate: Candidate) -> dict[str, Any]:
+    row: dict[str, Any] = {
+        "equipment": candidate.equipment.name,
+        "model": candidate.model.name,
+        "n_parameters": candidate.model.n_parameters,
+        "scheme": candidate.scheme.name,
+        "n_positions": candidate.scheme.n_positions,
+        "hold_s": candidate.hold,
+        "sensor_sigma_mps2": candidate.sigma,
+        "minutes": candidate.seconds / 60,
+        "redundancy": candidate.expected.redundancy,
+    }
+    for i, angle in enumerate(ANGLES):
+        row[f"{angle}_rms_mgon"] = float(candidate.expected.rms[i]) / MGON
+        row[f"{angle}_noise_mgon"] = float(np.sqrt(candidate.expected.noise[i])) / MGON
+    return row

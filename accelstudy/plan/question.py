@@ -1,0 +1,176 @@
+"""The question that a plan answers, and its assumptions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from accelstudy.basics.errors import InputError
+from accelstudy.data_sheets import DataSheet, get_data_sheet, read_data_sheet
+from accelstudy.effects import get_effect
+from accelstudy.plan.quantities import QUANTITIES
+from accelstudy.schemes import Scheme, get_scheme, is_scheme_file
+
+HOLDS = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0)
+"""Durations of a hold that are tried, s."""
+USUAL_HOLD = 10.0
+"""s, for a sensor of which only the noise of a position is known."""
+LOGS = (".csv", ".txt", ".gz", ".mat", ".parquet", ".log", ".dat")
+"""Endings of files that are no data sheets, though one can be made of them."""
+
+
+@dataclass(frozen=True)
+class Equipment:
+    """The equipment that makes positions, and the time it takes.
+
+    Attributes
+    ----------
+    name : "gravity" or "robot", which is also the approach
+    moving : float, s, from the end of a hold to the beginning of the next
+    setup : float, s, before the first hold
+    """
+
+    name: str
+    moving: float
+    setup: float
+
+    @property
+    def how(self) -> str:
+        """The equipment in words."""
+        return "by hand" if self.name == "gravity" else "with a robot"
+
+    def seconds(self, positions: int, hold: float) -> float:
+        """Time in the field, s."""
+        return self.setup + positions * (hold + self.moving)
+
+
+BY_HAND = Equipment("gravity", QUANTITIES["moving_time"].value, 0.0)
+ROBOT = Equipment(
+    "robot", QUANTITIES["robot_moving_time"].value, QUANTITIES["robot_setup_time"].value
+)
+
+
+def equipment_of(
+    name: str, by_hand: Equipment = BY_HAND, robot: Equipment = ROBOT
+) -> tuple[Equipment, ...]:
+    """Equipment that is compared: gravity, robot or both."""
+    return {"gravity": (by_hand,), "robot": (robot,), "both": (by_hand, robot)}[name]
+
+
+@dataclass(frozen=True)
+class Size:
+    """Usual size of the parameters of an effect: their standard deviation over sensors, SI.
+
+    Attributes
+    ----------
+    value : float
+    source : "data sheet", "assumed" or "typical"
+    """
+
+    value: float
+    source: Literal["data sheet", "assumed", "typical"]
+
+
+@dataclass(frozen=True)
+class Question:
+    """The question that a plan answers, in SI.
+
+    Attributes
+    ----------
+    target : float, rad, tilt accuracy, of roll and of pitch
+    tilt_range : float, rad
+    sheet : DataSheet
+    equipment : tuple of Equipment
+    confidence : float, share of the calibrations that must reach the target; None for the rms
+    holds : tuple of float, s, durations that are tried
+    sigma_angle : float, rad, of the robot's roll and pitch
+    most_seconds : float, s in the field
+    most_positions : int
+    schemes : tuple of str, names or files of schemes besides those that are always compared
+    """
+
+    target: float
+    tilt_range: float
+    sheet: DataSheet
+    equipment: tuple[Equipment, ...] = (BY_HAND, ROBOT)
+    confidence: float | None = None
+    holds: tuple[float, ...] = ()
+    sigma_angle: float = QUANTITIES["robot_accuracy"].value
+    most_seconds: float = math.inf
+    most_positions: int = 200
+    schemes: tuple[str, ...] = ()
+    sizes: Mapping[str, Size] = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "sizes", sizes_of(self.sheet))
+        if not self.holds:
+            fixed = self.sheet.position_sigma is not None
+            object.__setattr__(self, "holds", (USUAL_HOLD,) if fixed else HOLDS)
+
+    @property
+    def neglectable(self) -> dict[str, float]:
+        """Sizes of the effects that cause errors if a model lacks them."""
+        return {name: size.value for name, size in self.sizes.items()}
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether the sensor is assumed to be linear."""
+        return any(size.source == "assumed" for size in self.sizes.values())
+
+    def written(self, scheme: Scheme) -> str:
+        """Name of a scheme in commands and configurations: a name, or the path of its file."""
+        for text in self.schemes:
+            if is_scheme_file(text) and get_scheme(text).name == scheme.name:
+                return str(Path(text).resolve())
+        return scheme.name
+
+
+def sizes_of(sheet: DataSheet) -> dict[str, Size]:
+    """Sizes of the effects of a sensor: from its data sheet, else typical ones.
+
+    A nonlinearity is divided equally into a quadratic and a cubic part. The rotation of the axes
+    against the housing is left out, since it does not change the sensor's own tilt.
+    """
+    shared = math.sqrt(0.5)
+    stated = {
+        "nonorthogonality": sheet.nonorthogonality,
+        "quadratic_scale": _times(sheet.quadratic_scale, shared),
+        "cubic_scale": _times(sheet.cubic_scale, shared),
+    }
+    sizes = {}
+    for effect, value in stated.items():
+        if value is None:
+            low, high = get_effect(effect).typical
+            sizes[effect] = Size(math.sqrt(low * high), "typical")
+            continue
+        quantity = "nonorthogonality" if effect == "nonorthogonality" else "nonlinearity"
+        sizes[effect] = Size(value, "assumed" if quantity in sheet.assumed else "data sheet")
+    return sizes
+
+
+def _times(value: float | None, factor: float) -> float | None:
+    return None if value is None else value * factor
+
+
+def get_sensor(text: str) -> DataSheet:
+    """Return a sensor by its name, from a YAML file, or from the folder of a campaign.
+
+    Raises
+    ------
+    InputError
+        If there is no such sensor; for a log the message says how to make a data sheet of it.
+    """
+    path = Path(text)
+    if path.is_dir():
+        from accelstudy.data_sheets.measured import sheet_of_campaign
+
+        return sheet_of_campaign(path)
+    if path.suffix in LOGS:
+        raise InputError(
+            f"{text}: a log, not a data sheet; make one of it: accelstudy data-sheet {text} --out "
+            f"{path.stem}.yaml, with the options by which import reads it"
+        )
+    return read_data_sheet(path) if path.is_file() else get_data_sheet(text)

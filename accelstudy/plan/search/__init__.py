@@ -1,1 +1,0 @@
-"""The search: what is asked, all calibrations by linear theory, and the best ones simulated."""

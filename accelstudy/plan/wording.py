@@ -1,0 +1,153 @@
+"""A plan in words: first the answer in plain sentences, then its table and reasons.
+
+The sentences stand in `wording.txt.j2`.
+"""
+
+from __future__ import annotations
+
+import shlex
+
+from accelstudy.basics.units import GON, MGON, angle_note, display_unit, to_display
+from accelstudy.basics.wording import amount, interval, number, words
+from accelstudy.pages import lines
+from accelstudy.plan.answer import OTHER_CONFIDENCE, Answer, Ranked
+from accelstudy.plan.candidates import NINE, Candidate, shortest
+from accelstudy.plan.optimised import is_best, request_of
+from accelstudy.plan.question import Question
+from accelstudy.plan.reasons import PLAIN, in_use, limits, needs, spoilers
+from accelstudy.sensors.sensor import SensorModel
+
+SENTENCES = "plan/wording.txt.j2"
+
+
+def answer_lines(answer: Answer) -> list[str]:
+    """Say what to do, in sentences."""
+    if not answer.ranked:
+        return [unreachable(answer)]
+    question, candidate = answer.question, answer.first.candidate
+    bent = spoilers(question, candidate) if question.is_linear else []
+    quadratic = [s for s in bent if s.effect == "quadratic_scale"]
+    return lines(SENTENCES, "answer", answer, in_use(question), quadratic, OTHER_CONFIDENCE)
+
+
+def unreachable(answer: Answer) -> str:
+    """Say in one line that nothing reaches the target, and what is reachable."""
+    question, best = answer.question, answer.best()
+    if best is None:
+        (line,) = lines(SENTENCES, "nothing_fits", question, shortest(question))
+    else:
+        (line,) = lines(SENTENCES, "out_of_reach", answer, best, limits(question, best))
+    return line
+
+
+def effort(candidate: Candidate) -> str:
+    """Positions and time of a candidate: ``28 positions by hand, 10 s each, about 14 minutes``."""
+    (line,) = lines(SENTENCES, "effort", candidate)
+    return line
+
+
+def how_to(answer: Answer) -> list[str]:
+    """Say how to get the positions, and how exactly to measure them."""
+    candidate = answer.first.candidate
+    command = positions_command(answer.question, candidate)
+    return lines(SENTENCES, "how_to", candidate, command)
+
+
+def reason_lines(answer: Answer) -> list[str]:
+    """What the model of the first candidate needs, what would spoil it, and what use adds."""
+    question, candidate = answer.question, answer.first.candidate
+    return lines(
+        SENTENCES,
+        "reasons",
+        answer,
+        angle_note(),
+        needs(question, candidate),
+        spoilers(question, candidate),
+        in_use(question),
+    )
+
+
+def assumption_lines(question: Question) -> list[str]:
+    """Assumptions of the plan."""
+    typical = [PLAIN[e] for e, size in question.sizes.items() if size.source == "typical"]
+    return lines(SENTENCES, "assumptions", question, typical)
+
+
+def table_lines(answer: Answer) -> list[str]:
+    """The ranked candidates as a table, and what its columns mean."""
+    unit = display_unit("rad")
+    head = [
+        "", "equipment", "model", "scheme", "positions", "s each", "minutes",
+        f"roll/{unit}", f"pitch/{unit}", f"both/{unit}", "limited by",
+    ]  # fmt: skip
+    rows = [head, *(_row(answer, i, r) for i, r in enumerate(answer.ranked, 1))]
+    widths = [max(len(row[i]) for row in rows) for i in range(len(head))]
+    right = {4, 5, 6, 7, 8, 9}
+    lines = [
+        "  ".join(
+            text.rjust(width) if i in right else text.ljust(width)
+            for i, (text, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in rows
+    ]
+    return [
+        *lines,
+        "model: number of parameters, and effects besides bias, scale and angles between axes;",
+        "roll, pitch: rms, and interval with 95 of 100 calibrations of each angle by itself, from",
+        f"{answer.replicates} simulated ones each; ~ by linear theory;",
+        "both: what roll and pitch both stay below in 95 of 100 calibrations",
+    ]
+
+
+def _row(answer: Answer, rank: int, ranked: Ranked) -> list[str]:
+    candidate = ranked.candidate
+    source = ranked.simulated or candidate.expected
+    about = "" if ranked.simulated else "~"
+    ends = (source.rms, source.quantile(0.025), source.quantile(0.975))
+    cells = [
+        f"{about}{number(rms)} ({interval(low, high)})"
+        for rms, low, high in zip(*(to_display(v, "rad") for v in ends), strict=True)
+    ]
+    return [
+        f"{rank}.",
+        candidate.equipment.how,
+        model_words(candidate.model),
+        candidate.scheme.name.partition("@")[0],
+        str(candidate.scheme.n_positions),
+        f"{candidate.hold:g}",
+        f"{candidate.seconds / 60:.1f}",
+        *cells,
+        f"{about}{amount(source.of_both(OTHER_CONFIDENCE), 'rad')}",
+        limits(answer.question, candidate),
+    ]
+
+
+def model_words(model: SensorModel) -> str:
+    """A model by its number of parameters and its effects besides the usual nine parameters."""
+    nine = {"bias", "scale", "nonorthogonality"}
+    effects = [effect.name for effect in model.effects]
+    more = [words(name.removesuffix("_scale")) for name in effects if name not in nine]
+    less = [] if nine <= set(effects) else ["no angles between axes"]
+    short = [name.replace("cross axis misalignment", "cross-axis") for name in (*more, *less)]
+    return " + ".join([str(model.n_parameters), *short])
+
+
+def positions_command(question: Question, candidate: Candidate) -> str:
+    """The command that shows, or finds again, the positions of a candidate."""
+    if not is_best(candidate.scheme):
+        return f"accelstudy scheme {shlex.quote(question.written(candidate.scheme))}"
+    request = request_of(question, candidate)
+    options = {
+        "positions": str(request.positions),
+        "approach": request.approach,
+        "model": request.model,
+        "criterion": request.criterion,
+        "tilt-range": f"{request.tilt_range / GON:.6g}gon",
+        "sigma": f"{request.noise.sigma_force:.4g}m/s2",
+        "robot-sigma": f"{request.noise.sigma_angle / MGON:.6g}mgon",
+        "starts": str(request.starts),
+        "out": "positions.yaml",
+    }
+    usual = {"model": NINE, "sigma": "0.002m/s2", "robot-sigma": "3.2mgon", "approach": "robot"}
+    given = (f"--{name} {text}" for name, text in options.items() if text != usual.get(name))
+    return " ".join(["accelstudy design", *given])

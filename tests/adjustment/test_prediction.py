@@ -1,0 +1,214 @@
+"""What a calibration says of the data: held-out errors and variance components."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from quality_helpers import (
+    BOTH,
+    GRAVITY,
+    NINE,
+    ROBOT,
+    SIGMA,
+    STANDARD_ERRORS,
+    draw,
+    ideal_session,
+    one,
+)
+
+from accelstudy.adjustment import Observations, calibrate
+from accelstudy.adjustment.quality import (
+    held_out,
+    position_tests,
+    redundancy_numbers,
+    reliability,
+    solve,
+    variance_components,
+)
+from accelstudy.basics.units import MGON
+from accelstudy.effects import Effect, HoldConditions
+from accelstudy.effects.base import per_axis
+from accelstudy.leveling.angles import roll_pitch, specific_force
+from accelstudy.schemes import get_scheme
+from accelstudy.sensors.models import get_model
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.simulation.sessions import Noise, session
+
+
+class ThermalBias(Effect):
+    """A bias that follows the temperature."""
+
+    name = "thermal_bias_of_the_quality_test"
+    parameters = per_axis("b_T", "m/s^2/K", "b_{T%}")
+
+    def output(self, f, p, g, hold, xp):
+        return tuple(b_t * hold.temperature for b_t in p)
+
+
+def thermal_session(seed=2):
+    model = SensorModel("nine + temperature", (*NINE.effects, ThermalBias()))
+    hold = HoldConditions(temperature=15 * np.sin(np.arange(24.0)))
+    ideal = ideal_session("mclaren-24", model, hold)
+    observed = ideal.draw(Noise(sigma_gravity=1e-5), 1, np.random.default_rng(seed))
+    # A standard deviation of its own for each position and axis.
+    sigma = SIGMA * np.linspace(0.5, 1.5, 72).reshape(24, 3)
+    return model, replace(observed, sigma_force=sigma)
+
+
+@BOTH
+def test_leaving_out_is_a_calibration_without_the_position(approach):
+    """With columns, standard deviations that differ, and observed gravity."""
+    model, observed = thermal_session()
+    found = held_out(model, approach, observed)
+    assert found.n_predicted == 24
+    for position in (0, 10, 23):
+        rest = observed.take(np.delete(np.arange(24), position))
+        x = calibrate(model, approach, rest).parameters[0]
+        alone = observed.take(np.array([position]))
+        f_b = model.correct(alone.forces[0], x[:-1], x[-1], alone.hold)
+        psi = np.linalg.norm(f_b) - x[-1]
+        if approach is ROBOT:
+            told = np.array(specific_force(*alone.angles[0].T, x[-1])).T
+            psi = alone.forces[0] - model.sense(told, x[:-1], x[-1], alone.hold)
+        np.testing.assert_allclose(
+            found.misclosures[position], np.ravel(psi), rtol=0, atol=1e-5 * SIGMA
+        )
+        if approach is ROBOT:
+            expected = np.ravel(roll_pitch(tuple(f_b.T))) - alone.angles[0, 0]
+            expected[0] = (expected[0] + np.pi) % (2 * np.pi) - np.pi
+            np.testing.assert_allclose(found.angles[position], expected, atol=1e-8)
+
+
+@BOTH
+def test_a_held_out_error_is_the_residual_over_its_redundancy(approach):
+    """L R_ii⁻¹ e_i, which for one condition is w_i / r_i; linear, so of first order."""
+    solution = solve(NINE, approach, observed := draw(4))
+    found = held_out(NINE, approach, observed)
+    expected = position_tests(solution).gross_errors
+    np.testing.assert_allclose(found.misclosures, expected, rtol=0, atol=2e-3 * SIGMA)
+    if approach is GRAVITY:
+        w = solution.misclosures[:, 0]
+        np.testing.assert_allclose(expected[:, 0], w / redundancy_numbers(solution).positions)
+    root = solution.whitening @ solution.root[0]
+    cofactors = root @ np.swapaxes(root, 1, 2)
+    np.testing.assert_allclose(found.cofactors, cofactors, rtol=0, atol=2e-3 * SIGMA**2)
+
+
+@BOTH
+def test_held_out_errors_scatter_as_they_should(approach):
+    observed = draw(6, replicates=60)
+    squares = []
+    for i in range(60):
+        found = held_out(NINE, approach, one(observed, i))
+        standard = np.linalg.solve(found.cofactors, found.misclosures[..., None])[..., 0]
+        squares.append(np.mean(found.misclosures * standard))
+    limit = STANDARD_ERRORS * np.std(squares) / math.sqrt(60)
+    assert np.mean(squares) == pytest.approx(1, abs=limit)
+    assert found.rms == pytest.approx(np.sqrt(np.mean(np.sum(found.misclosures**2, axis=1))))
+
+
+def test_held_out_attitudes_at_the_poles():
+    """Two of the faces have the x axis vertical, where roll has no meaning."""
+    observed = draw(1, "faces-edges-18")
+    found = held_out(NINE, ROBOT, observed)
+    vertical = np.abs(get_scheme("faces-edges-18").directions[:, 0]) > 0.999
+    assert np.count_nonzero(vertical) == 2
+    np.testing.assert_array_equal(np.isnan(found.angles[:, 0]), vertical)
+    assert not np.isnan(found.angles[:, 1]).any()
+    assert not np.isnan(found.misclosures).any()
+    assert np.all(found.rms_angles < 30 * MGON)
+    assert held_out(NINE, GRAVITY, observed).rms_angles is None
+
+
+def test_a_position_that_the_others_need_is_not_predicted():
+    """Without the only position that has z up or down, nothing tells the scale of z."""
+    model = get_model("bias-scale")
+    level = np.linspace(0, 2 * np.pi, 12, endpoint=False)
+    ring = np.stack([np.cos(level), np.sin(level), 0 * level], axis=-1)
+    directions = np.concatenate([ring, [[0, 0, 1.0]]])
+    observed = session(model, np.zeros(6), directions).observations(Noise())
+    found = held_out(model, ROBOT, observed)
+    assert found.n_predicted == 12
+    assert np.isnan(found.misclosures[-1]).all()
+    assert found.rms < 1e-6
+    tests = position_tests(solve(model, ROBOT, observed))
+    assert tests.dof[-1] == 2
+    assert np.isinf(reliability(solve(model, ROBOT, observed)).mdb[-1]).all()
+
+
+def test_quality_of_a_model_with_columns():
+    model, observed = thermal_session()
+    found = reliability(solve(model, ROBOT, observed))
+    assert found.parameters.shape == (24, 13)
+    assert np.isfinite(found.leveling).all()
+
+
+def test_selecting_all_positions_changes_nothing():
+    model, observed = thermal_session()
+    chosen = observed.take(np.arange(24))
+    assert isinstance(chosen, Observations)
+    np.testing.assert_array_equal(chosen.hold.temperature, observed.hold.temperature)
+    np.testing.assert_array_equal(
+        calibrate(model, ROBOT, chosen).parameters, calibrate(model, ROBOT, observed).parameters
+    )
+
+
+# At 3.2 mgon the robot is so much better than the sensor that no session can tell how good it is.
+COARSE = Noise(sigma_angle=20 * MGON)
+
+
+@pytest.mark.parametrize("factors", [(1, 1), (1, 4), (2.25, 0.8)])
+def test_variance_components_are_recovered(factors):
+    """Their mean over sessions is right, and so is the standard deviation given for them."""
+    force, angle = np.sqrt(factors)
+    truth = Noise(COARSE.sigma_force * force, COARSE.sigma_angle * angle)
+    replicates = 100
+    drawn = draw(21, "fibonacci-36", noise=truth, replicates=replicates)
+    assumed = replace(drawn, sigma_force=COARSE.sigma_force, sigma_angle=COARSE.sigma_angle)
+    found = [variance_components(NINE, ROBOT, one(assumed, i)) for i in range(replicates)]
+    assert all(f.converged for f in found)
+    values = np.array([f.factors for f in found])
+    assert values.min() > 0
+    spread = values.std(axis=0)
+    limit = STANDARD_ERRORS * spread / math.sqrt(replicates)
+    assert np.all(np.abs(values.mean(axis=0) - factors) < limit)
+    claimed = np.sqrt(np.mean([f.sigma**2 for f in found], axis=0))
+    np.testing.assert_allclose(spread, claimed, rtol=0.35)
+
+
+def test_variance_components_are_the_fixed_point():
+    """With both variances scaled, vᵀ Q⁻¹ v of each group is its redundancy (Förstner 1979)."""
+    observed = draw(22, "fibonacci-36", noise=replace(COARSE, sigma_gravity=1e-5))
+    found = variance_components(NINE, ROBOT, observed)
+    force, angle = np.sqrt(found.factors)
+    scaled = replace(
+        observed,
+        sigma_force=force * observed.sigma_force,
+        sigma_angle=angle * observed.sigma_angle,
+    )
+    solution = solve(NINE, ROBOT, scaled)
+    shares = redundancy_numbers(solution).observations
+    squares = solution.residuals**2 / solution.variances
+    for part, expected in zip((slice(0, 3), slice(3, 5)), found.redundancy, strict=True):
+        assert shares[:, part].sum() == pytest.approx(expected, rel=1e-4)
+        assert squares[:, part].sum() == pytest.approx(expected, rel=1e-3)
+    again = variance_components(NINE, ROBOT, scaled)
+    np.testing.assert_allclose(again.factors, 1, atol=1e-3)
+
+
+def test_a_component_that_is_not_there_goes_to_zero_and_not_below():
+    """A perfect robot, believed to have 20 mgon."""
+    drawn = draw(23, noise=Noise(sigma_angle=0.0), replicates=30)
+    assumed = replace(drawn, sigma_angle=COARSE.sigma_angle)
+    found = [variance_components(NINE, ROBOT, one(assumed, i)) for i in range(30)]
+    assert all(f.converged for f in found)
+    robot = np.array([f.factors[1] for f in found])
+    assert robot.min() >= 0
+    assert 0.2 < np.mean(robot < 1e-3) < 0.8
+    assert all(0.3 < f.factors[0] < 2 for f in found)
+
+
+def test_there_are_no_components_without_two_groups():
+    assert variance_components(NINE, GRAVITY, draw(1)) is None
+    assert variance_components(NINE, ROBOT, draw(1, noise=Noise(sigma_angle=0.0))) is None

@@ -1,0 +1,150 @@
+"""The configuration of plans: the example can be used, and what cannot be is said in a line."""
+
+import json
+
+import pytest
+import yaml
+from places import ROOT
+from snakemake_helpers import one_line, snakemake
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import MGON
+from accelstudy.field import config as field
+from accelstudy.files.reading import read_layer
+from accelstudy.files.tables import read_origin, read_table
+from accelstudy.plan.config import PlanConfig, parse_example, parse_section
+from accelstudy.pole import output as pole
+from accelstudy.pole.config import PoleConfig
+from accelstudy.sequential.config import SequentialConfig
+from accelstudy.sequential.simulation import SetUp
+
+CLASSES = {
+    "plan": PlanConfig,
+    "pole": PoleConfig,
+    "field": field.FieldConfig,
+    "sequential": SequentialConfig,
+}
+
+
+def of_example(section):
+    example = parse_example(read_layer(ROOT / "config/plan-example.yaml"))
+    return parse_section(example, section, CLASSES[section])
+
+
+def case(section, content):
+    """A single case of a section."""
+    example = parse_example({"study": "x", section: {"cases": {"mine": content}}}, "file")
+    return parse_section(example, section, CLASSES[section], "file").cases["mine"]
+
+
+@pytest.mark.parametrize(
+    ("section", "content", "message"),
+    [
+        ("plam", {}, "file: plam: unknown key; did you mean 'plan'?"),
+        ("study", "a/b", "file: study: "),
+        ("plan", {"sensor": "paper"}, "file: plan.sensor: unknown key; did you"),
+        ("plan", {"sensors": "adxl35"}, "did you mean 'adxl355'?"),
+        ("plan", 5, "file: plan: "),
+        (
+            "sequential",
+            {"approaches": "robots"},
+            "unknown approach 'robots'; did you mean 'robot'?",
+        ),
+        ("sequential", {"rules": ["bounds"]}, "unknown rule 'bounds'; did you mean 'bound'?"),
+        ("sequential", {"instead_of": "mclaren"}, "unknown scheme 'mclaren'"),
+        ("sequential", {"model": "bias-scale+warm_up"}, "needs the time of each position"),
+        ("sequential", {"session": 3}, "sequential.session: unknown key; did you mean 'sessions'?"),
+        ("sequential", {"accuracies": 0}, "sequential.accuracies: must be greater"),
+    ],
+)
+def test_a_section_that_cannot_be_used_is_said_in_a_line(section, content, message):
+    with pytest.raises(InputError) as error:
+        parse_section(
+            parse_example({"study": "x", section: content}, "file"),
+            section,
+            CLASSES.get(section, PlanConfig),
+            "file",
+        )
+    assert message in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("section", "content", "message"),
+    [
+        ("plan", {"tilt_accuracy": "9", "sigma": "1mg"}, "tilt_accuracy: expected a number with"),
+        ("plan", {"tilt_accuracy": "9mgon", "sigma": "0mm/s2"}, "sigma: '0mm/s2': must be at"),
+        ("plan", {"tilt_accuracy": "9mgon"}, "give sensor or sigma, one of them"),
+        ("pole", {"sensr": "paper"}, "file: pole.cases.mine.sensr: unknown key"),
+        ("pole", {"sensor": "papr"}, "file: pole.cases.mine: sensor: unknown sensor 'papr'; did"),
+        ("pole", {"setup": {"length": "2"}}, "mine: setup: length: expected a number with its"),
+        ("pole", {"setup": {"long": "2m"}}, "mine: setup: unknown quantity of a pole 'long'"),
+        ("pole", {"hold": "2m"}, "mine: hold: '2m': the unit must be one of"),
+        ("pole", {"calibration": "c.json", "hold": "2s"}, "calibration and hold exclude each"),
+        ("pole", {"tilt_sigma": "10"}, "mine: tilt_sigma: expected a number with its unit"),
+        ("field", {"sensor": "adxl35"}, "file: field.cases.mine: sensor: unknown sensor 'adxl35'"),
+        ("field", {"age": "8"}, "mine: age: expected a number with its unit"),
+        ("field", {"temperature_change": "300K"}, "mine: temperature_change: '300K': must be"),
+        ("field", {"pitch_gon": [90]}, "file: field.cases.mine.pitch_gon.0: "),
+        ("field", {"restart": True}, "mine.restart: unknown key; did you mean 'restarted'?"),
+    ],
+)
+def test_a_case_that_cannot_be_used_is_said_in_a_line(section, content, message):
+    with pytest.raises(InputError) as error:
+        case(section, content)
+    assert message in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_the_workflow_says_it_too(tmp_path):
+    config = {"study": "tiny", "plan": {"sensors": ["adxl35"]}}
+    (tmp_path / "tiny.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")
+    fixed = ["--snakefile", ROOT / "workflow" / "plan.smk", "--cores", 1]
+    result = snakemake(tmp_path, *fixed, "--configfile", "tiny.yaml")
+    assert result.returncode == 1
+    one_line(result.stdout, "tiny.yaml: plan.sensors: unknown sensor 'adxl35'")
+    assert not (tmp_path / "results").exists()
+
+
+def test_a_fixed_scheme_must_determine_the_model():
+    with pytest.raises(InputError, match=r"sequential\.instead_of: faces-6: rank 6 of 9"):
+        _ = SetUp(SequentialConfig(instead_of="faces-6"), "gravity", "known", 1.0).promise
+
+
+def test_the_sensors_of_the_example_can_be_used():
+    assert of_example("plan").chosen_sensors
+
+
+def test_the_pole_of_the_example_is_worked_out(tmp_path, monkeypatch):
+    monkeypatch.setattr(pole, "save", lambda *_: "")
+    station = of_example("pole").cases["total-station"].model_copy(update={"replicates": 10})
+    station.write(3, tmp_path, {"config_hash": "abc", "seed": 3})
+    assert read_origin(tmp_path / "budget.parquet")["config_hash"] == "abc"
+    content = json.loads((tmp_path / "pole.json").read_text(encoding="utf-8"))
+    assert content["setup_si"]["length"] == 1.5
+    assert content["seed"] == 3
+    assert station.files == []
+
+
+def test_a_pole_takes_sigmas_of_roll_and_pitch_and_files_of_ones_own():
+    sensor = case("pole", {"tilt_sigma": "10mgon"}).calibrated_sensor()
+    assert sensor.tilt_sigma == pytest.approx(10 * MGON)
+    assert case("pole", {"calibration": "c.json"}).files == ["c.json"]
+
+
+def test_the_field_of_the_example_is_worked_out(tmp_path, monkeypatch):
+    monkeypatch.setattr(field, "save", lambda *_: "")
+    sensor = of_example("field").cases["adxl355"]
+    level = sensor.model_copy(update={"roll_gon": [0], "pitch_gon": [0]})
+    level.write(tmp_path, {"config_hash": "abc", "seed": 3})
+    use = read_table(tmp_path / "shares.parquet").query("over == 'use'")
+    assert use[["hours", "kelvin"]].drop_duplicates().to_numpy().tolist() == [[8, 10]]
+    # Ten kelvins leave nothing to improve in the calibration.
+    shares = use.groupby(["output", "source"])["shapley_effect"].sum()
+    assert shares["roll", "temperature"] > 0.99
+
+
+def test_a_field_is_the_usual_use_unless_it_says_otherwise():
+    assert field.FieldCase().use == field.Use()
+    said = field.FieldCase(age="2h", restarted=False)
+    assert said.use == field.Use(age=7200.0, restarted=False)
