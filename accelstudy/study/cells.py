@@ -30,8 +30,8 @@ def study_cells(study: StudyConfig) -> list[Cell]:
     cells: dict[str, Cell] = {}
     for grid in study.all_grids:
         for cell in _grid_cells(study, grid):
-            known = cells.get(cell.name)
-            if known is None or cell.replicates > known.replicates:
+            earlier = cells.get(cell.name)
+            if earlier is None or cell.replicates > earlier.replicates:
                 cells[cell.name] = cell
     return with_compiled(list(cells.values()))
 

@@ -129,7 +129,7 @@ def _memory(study: StudyConfig, cell: Cell) -> float:
 
 
 def _disk(study: StudyConfig, cells: Sequence[Cell]) -> float:
-    """Of the calibrations that are kept; of sketches, which hardly grow with the calibrations."""
+    """Bytes on disk: of kept calibrations, or of sketches, which hardly grow with their number."""
     if _keeps(study):
         return sum(BYTES_ON_DISK * cell.replicates * cell.n_unknowns for cell in cells)
     jobs = sum(len(batch.jobs) for batch in batches(cells))

@@ -89,13 +89,13 @@ def evidence_from(
     **rest : as in `Evidence`
     """
     by_name = {cell.name: cell for cell in cells}
-    found = read_statistics(parts["moments"], by_name.values())
-    by_key = {(by_name[name].scheme, by_name[name].approach): by_name[name] for name in found}
-    statistics = {key: found[cell.name][0] for key, cell in by_key.items()}
+    merged = read_statistics(parts["moments"], by_name.values())
+    by_key = {(by_name[name].scheme, by_name[name].approach): by_name[name] for name in merged}
+    statistics = {key: merged[cell.name][0] for key, cell in by_key.items()}
     ratios: dict[tuple[str, str], Distribution] = {}
     for scheme in schemes_with_both(by_key):
         pair = [(by_key[scheme, a], statistics[scheme, a]) for a in ("gravity", "robot")]
-        if all(its.moments.redundancy > 0 and its.converged for _, its in pair):
+        if all(summed.moments.redundancy > 0 and summed.converged for _, summed in pair):
             for effect, ratio in _ratios(pair, parts).items():
                 ratios[scheme, effect] = ratio
     return Evidence(statistics=statistics, ratios=ratios, cells=by_key, **rest)
@@ -109,9 +109,9 @@ def _ratios(
     Kept calibrations are paired by their number; with sketches, each is paired with each.
     """
     keys = [(EFFECT, effect) for effect in pair[0][1].followed.effects]
-    if parts.get("estimates") and all(its.converged <= EXACT for _, its in pair):
+    if parts.get("estimates") and all(summed.converged <= EXACT for _, summed in pair):
         gravity, robot = (
-            kept_values(parts["estimates"], cell, its.converged, keys) for cell, its in pair
+            kept_values(parts["estimates"], cell, summed.converged, keys) for cell, summed in pair
         )
         n = min(gravity.shape[1], robot.shape[1])
         values = robot[:, :n] / gravity[:, :n]

@@ -106,8 +106,8 @@ def _check_sensitivity(study: StudyConfig, name: str, scheme: str) -> None:
     noise = Noise(sigma_gravity=study.noise.gravity.sigma_mps2)
     for approach in ("gravity", "robot"):
         cell = f"sensitivity: {name}/{scheme}/{approach}"
-        found = estimability(get_scheme(scheme), model, get_approach(approach), noise)
-        if not found.estimable:
-            raise InputError(f"{cell} cannot be estimated: {found.reason}")
-        if study.paper and found.redundancy == 0:
+        design = estimability(get_scheme(scheme), model, get_approach(approach), noise)
+        if not design.estimable:
+            raise InputError(f"{cell} cannot be estimated: {design.reason}")
+        if study.paper and design.redundancy == 0:
             raise InputError(f"{cell} has no redundancy, which paper: true needs")

@@ -58,8 +58,8 @@ def angle_unit(study: StudyConfig) -> str | None:
     """
     unit = study.angle_unit or os.environ.get(ANGLE_UNIT_VARIABLE) or None
     if unit not in (None, *ANGLE_UNITS):
-        known = " or ".join(ANGLE_UNITS)
-        raise InputError(f"{ANGLE_UNIT_VARIABLE}: {unit!r} is no unit of angles; choose {known}")
+        units = " or ".join(ANGLE_UNITS)
+        raise InputError(f"{ANGLE_UNIT_VARIABLE}: {unit!r} is no unit of angles; choose {units}")
     return unit
 
 

@@ -111,8 +111,8 @@ def _effects_over_roll(table: pd.DataFrame, output: str) -> Figure:
     for group, row in zip(groups, axes, strict=True):
         for pitch, ax in zip(pitches, row, strict=True):
             _share_axis(ax)
-            its = {name: style for name, style in drawn.items() if group_of(name) == group}
-            _draw_shares(ax, table[table["pitch_gon"] == pitch], its)
+            members = {name: style for name, style in drawn.items() if group_of(name) == group}
+            _draw_shares(ax, table[table["pitch_gon"] == pitch], members)
     small = ", ".join(symbol(name) for name in highest.index if name not in drawn)
     title = f"total effect on {output} / %" + (f"\nbelow 1 % everywhere: {small}" if small else "")
     fig.suptitle(title, fontsize=STYLE["axes.titlesize"])
@@ -217,9 +217,9 @@ def label_lines(ax: Axes, lines: Mapping[str, tuple[Array, Array]]) -> None:
         _, height = ax.transAxes.inverted().transform(ax.transData.transform((x[at], y[at])))
         side = -1 if y[at] < 0 else 1
         labels[side].append((side * height, float(x[at]), WIDE * float(np.ptp(x)), name))
-    for side, its in labels.items():
+    for side, places in labels.items():
         taken: list[tuple[float, float]] = []
-        for out, at_x, wide, name in sorted(its):
+        for out, at_x, wide, name in sorted(places):
             place = out + 0.6 * HIGH
             for other_x, other in taken:
                 if abs(other_x - at_x) < wide:
@@ -271,8 +271,8 @@ def shapley(tables: Tables, study: StudyConfig) -> Figure:
             pd.MultiIndex.from_frame(overtaken(table)[PLACE])
         ),
     )
-    its = table.groupby(["output", "group"])
-    drawn = (its["change"].agg(lambda x: x.abs().max()) >= SEEN) | its["overtakes"].any()
+    groups = table.groupby(["output", "group"])
+    drawn = (groups["change"].agg(lambda x: x.abs().max()) >= SEEN) | groups["overtakes"].any()
     rows = [(o, g) for o in OUTPUTS for g in in_order(table["group"]) if drawn.get((o, g), False)]
     pitches = sorted(table["pitch_gon"].unique())
     labels = [(f"{group_label(group)}\non {output}", group_colour(group)) for output, group in rows]

@@ -74,7 +74,7 @@ def cell_distributions(
         sketches = CellSketches(statistics.followed, tilt)
         for block in kept_blocks(parts["estimates"], cell):
             sketches.add(block, statistics.followed.values(block))
-        return sketches.found
+        return sketches.by_key
     keys = statistics.followed.sketched(statistics.moments.redundancy)
     angles = [(TILT, name) for name in TILTS]
     values = kept_values(parts["estimates"], cell, statistics.converged, keys, tilt)
@@ -91,16 +91,16 @@ def kept_values(
     """Quantities of the kept calibrations of a cell that converged, (k, count), and tilt errors."""
     followed = Followed.of(cell)
     columns = [followed.keys.index(key) for key in keys]
-    found = np.empty((len(keys) + (0 if tilt is None else len(TILTS)), count))
+    quantities = np.empty((len(keys) + (0 if tilt is None else len(TILTS)), count))
     end = 0
     for block in kept_blocks(estimates, cell):
         values = followed.values(block)
         start, end = end, end + len(values)
-        found[: len(keys), start:end] = values[:, columns].T
+        quantities[: len(keys), start:end] = values[:, columns].T
         if tilt is not None:
             chosen = block.estimates[block.converged][:, : len(tilt.reference)]
-            found[len(keys) :, start:end] = tilts(tilt, chosen)
-    return found
+            quantities[len(keys) :, start:end] = tilts(tilt, chosen)
+    return quantities
 
 
 def kept_blocks(paths: Iterable[str | Path], cell: Cell) -> Iterator[Block]:

@@ -111,7 +111,7 @@ def simulate_batch(
         write_estimates = opened("estimates", ESTIMATES, measured=measured)
         for number, share in enumerate(shares, 1):
             cell = share.cell
-            found = estimability(
+            design = estimability(
                 cell.positions,
                 cell.estimated_model,
                 cell.conditions,
@@ -119,8 +119,8 @@ def simulate_batch(
                 gravity=cell.gravity,
                 hold=cell.hold,
             )
-            if not found.estimable:
-                log.info("%d/%d %s: %s", number, len(shares), cell.name, found.reason)
+            if not design.estimable:
+                log.info("%d/%d %s: %s", number, len(shares), cell.name, design.reason)
                 continue
             followed, tree = Followed.of(cell), Tree()
             sketches = None
@@ -135,7 +135,7 @@ def simulate_batch(
                     write_estimates(_estimates_table(cell, chunk, index * CHUNK * BLOCK))
             write_moments(moments_table(cell.name, tree))
             if sketches is not None:
-                write_sketches(sketch_table(cell.name, sketches.found))
+                write_sketches(sketch_table(cell.name, sketches.by_key))
             counts = tree.nodes
             log.info(
                 "%d/%d %s: %d replicates, %d not converged",
