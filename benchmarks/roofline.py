@@ -8,9 +8,8 @@ from accelstudy.adjustment.equations import equations_of
 from accelstudy.approaches import get_approach
 from accelstudy.kernel import calibrate as kernel
 from accelstudy.kernel.compiled import Compiled
-from accelstudy.kernel.function import KernelFunction
 from accelstudy.kernel.lanes import LANES, Code, Variable, fma
-from accelstudy.kernel.writing import text_of
+from accelstudy.kernel.writing import KernelFunction, text_of
 from problem import APPROACHES, BLOCK, MODEL, NOISE, drawn, ideal_session
 from timing import in_turns, table
 

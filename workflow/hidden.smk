@@ -1,71 +1,47 @@
 # Simulate campaigns with hidden effects, diagnose each, and score the diagnoses:
 # snakemake --cores 2 --snakefile workflow/hidden.smk
-from snakemake.exceptions import WorkflowError
-from snakemake.utils import min_version
-
-from accelstudy.basics.errors import InputError
 from accelstudy.hidden.cells import number_of_chunks
 from accelstudy.hidden.config import parse_hidden
 from accelstudy.hidden.campaigns import TABLES
-from accelstudy.files.reading import read_layer
-from accelstudy.jobs.earlier import earlier_run
-from accelstudy.jobs.job import killed_notice, prepare_jobs
-from accelstudy.files.outputs import check_writable
-from accelstudy.jobs.code import code_hash
-
-min_version("9.10")
-prepare_jobs()
+from accelstudy.jobs.job import setup_digest
 
 
 configfile: "config/hidden-effects.yaml"
 
 
-# Jobs run in the environment of the Makefile. This is for executors that need a container.
-container: "docker://python:3.13-slim"
+include: "rules/start.smk"
 
 
-try:
-    for path in workflow.configfiles:
-        read_layer(path)  # Snakemake's own reading is less strict
-    STUDY = parse_hidden(config, ", ".join(map(str, workflow.configfiles)) or "config")
-    RESULTS = f"results/{STUDY.study}"
-    check_writable(RESULTS)
-except InputError as error:
-    raise WorkflowError(str(error)) from None
-
-CONTENT = STUDY.model_dump(mode="json")
-ORIGIN = {"config_hash": STUDY.fingerprint, "seed": STUDY.seed}
+STUDY, RESULTS = configured(parse_hidden, "study")
+# Jobs get the checked configuration, with all defaults.
+config.update(STUDY.model_dump(mode="json"))
+# What the jobs use of it.
+PLANNED = STUDY.model_dump(
+    mode="json", exclude={"study", "model", "seed", "diagnosis_seed", "baselines_every"}
+)
+DIAGNOSED = STUDY.model_dump(mode="json", exclude={"study", "baselines_every"})
+COMPARED = STUDY.model_dump(mode="json", exclude={"study", "diagnosis_seed"})
 CHUNKS = number_of_chunks(STUDY)
 NUMBERS = [f"{i:04d}" for i in range(CHUNKS)]
-BY_CHUNK = expand(
-    f"{RESULTS}/{{table}}/{{chunk}}.parquet",
-    table=["truths", "outcomes", "seconds", "baselines"],
-    chunk=NUMBERS,
-)
+# Digest of what each table of a chunk depends on. It tells those of another configuration.
+SETUPS = {
+    f"{RESULTS}/{table}/{chunk}.parquet": setup_digest(
+        COMPARED if table == "baselines" else DIAGNOSED
+    )
+    for table in ("truths", "outcomes", "seconds", "baselines")
+    for chunk in NUMBERS
+}
 OUTPUTS = [
     f"{RESULTS}/plan.json",
-    *BY_CHUNK,
+    *SETUPS,
     *expand(f"{RESULTS}/{{table}}.parquet", table=TABLES),
 ]
 
-# Check earlier results before Snakemake decides what to make. On a cluster, jobs read this file
-# again; they skip the check.
-if workflow.is_main_process:
-    try:
-        of_this = dict.fromkeys(BY_CHUNK, STUDY.fingerprint)
-        for line in earlier_run(RESULTS, OUTPUTS, of_this, STUDY.seed):
-            logger.warning(line)
-    except InputError as error:
-        raise WorkflowError(str(error)) from None
+look_at_earlier(OUTPUTS, SETUPS, STUDY.seed)
 
 
 onstart:
     logger.info(f"{STUDY.study}: {STUDY.campaigns} campaigns at most, in {CHUNKS} jobs")
-
-
-onerror:
-    if notice := killed_notice(log):
-        logger.error(notice)
 
 
 wildcard_constraints:
@@ -78,7 +54,7 @@ rule hidden_effects:
         f"{RESULTS}/score.md",
 
 
-rule plan:
+rule hidden_plan:
     output:
         f"{RESULTS}/plan.json",
     log:
@@ -87,19 +63,19 @@ rule plan:
         f"{RESULTS}/benchmarks/plan.tsv"
     threads: 1
     resources:
-        mem_mb=4000,
+        mem_mb=megabytes(4000),
     params:
-        config=CONTENT,
-        code=code_hash(workflow.source_path("scripts/hidden_plan.py")),
+        cells=PLANNED,
+        code=code_of("hidden_plan"),
     message:
         "Choose the campaigns to simulate"
     script:
         "scripts/hidden_plan.py"
 
 
-rule diagnose:
+rule hidden_diagnose:
     input:
-        rules.plan.output,
+        rules.hidden_plan.output,
     output:
         truths=f"{RESULTS}/truths/{{chunk}}.parquet",
         outcomes=f"{RESULTS}/outcomes/{{chunk}}.parquet",
@@ -110,20 +86,19 @@ rule diagnose:
         f"{RESULTS}/benchmarks/diagnose/{{chunk}}.tsv"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=megabytes(2000),
     params:
-        config=CONTENT,
-        provenance=ORIGIN,
-        code=code_hash(workflow.source_path("scripts/hidden_diagnose.py")),
+        spec=DIAGNOSED,
+        code=code_of("hidden_diagnose"),
     message:
         "Simulate and diagnose the campaigns of chunk {wildcards.chunk}"
     script:
         "scripts/hidden_diagnose.py"
 
 
-rule baselines:
+rule hidden_baselines:
     input:
-        rules.plan.output,
+        rules.hidden_plan.output,
     output:
         f"{RESULTS}/baselines/{{chunk}}.parquet",
     log:
@@ -132,18 +107,17 @@ rule baselines:
         f"{RESULTS}/benchmarks/baselines/{{chunk}}.tsv"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=megabytes(2000),
     params:
-        config=CONTENT,
-        provenance=ORIGIN,
-        code=code_hash(workflow.source_path("scripts/hidden_baselines.py")),
+        spec=COMPARED,
+        code=code_of("hidden_baselines"),
     message:
         "Diagnose the campaigns of chunk {wildcards.chunk} by simpler methods"
     script:
         "scripts/hidden_baselines.py"
 
 
-rule score:
+rule hidden_score:
     input:
         truths=expand(f"{RESULTS}/truths/{{chunk}}.parquet", chunk=NUMBERS),
         outcomes=expand(f"{RESULTS}/outcomes/{{chunk}}.parquet", chunk=NUMBERS),
@@ -159,11 +133,11 @@ rule score:
         f"{RESULTS}/benchmarks/score.tsv"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=megabytes(2000),
     params:
-        config=CONTENT,
-        provenance=ORIGIN,
-        code=code_hash(workflow.source_path("scripts/hidden_score.py")),
+        # What the tables of the chunks do not have: sessions in which nothing is hidden.
+        limits=STUDY.model_dump(mode="json", include={"model", "seed", "designs", "approaches"}),
+        code=code_of("hidden_score"),
     message:
         "Score the diagnoses of all campaigns"
     script:

@@ -1,30 +1,28 @@
 # Plan calibrations for a required tilt accuracy: sensor, positions and time:
 # snakemake --cores 2 --snakefile workflow/plan.smk --configfile config/plan-example.yaml
-from snakemake.utils import min_version
-
-from accelstudy.jobs.job import prepare_jobs
-
-min_version("9.10")
-prepare_jobs()
+from accelstudy.plan.config import parse_example, parse_section
 
 
-# Jobs run in the environment of the Makefile. This is for executors that need a container.
-container: "docker://python:3.13-slim"
+include: "rules/start.smk"
 
 
-include: "rules/sections.smk"
-include: "rules/plan.smk"
-include: "rules/designs.smk"
-include: "rules/sequential.smk"
-include: "rules/pole.smk"
-include: "rules/field.smk"
+EXAMPLE, RESULTS = configured(
+    parse_example, "study", "nothing to plan; name it with --configfile config/plan-example.yaml"
+)
+config["seed"] = EXAMPLE.seed  # for the jobs, if it is the default
+OUTPUTS = []
+section = in_a_line()(parse_section)
+
+# The rules of a section add their files to OUTPUTS.
+for name in EXAMPLE.sections:
+
+    include: f"rules/{name}.smk"
+
+
+look_at_earlier(OUTPUTS, seed=EXAMPLE.seed)
 
 
 rule plan_example:
     default_target: True
     input:
-        PLAN_OUTPUTS,
-        DESIGNS_OUTPUTS,
-        SEQUENTIAL_OUTPUTS,
-        POLE_OUTPUTS,
-        FIELD_OUTPUTS,
+        OUTPUTS,

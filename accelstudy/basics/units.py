@@ -6,6 +6,7 @@ This is the only place where conversion factors stand.
 from __future__ import annotations
 
 import math
+import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -127,6 +128,21 @@ def angles_in(unit: str | None) -> Iterator[None]:
         yield
     finally:
         _angle_unit.reset(token)
+
+
+def user_angle_unit() -> str:
+    """Unit of angles that the user's environment names, else the one in which they are shown.
+
+    Raises
+    ------
+    InputError
+        If it names no such unit.
+    """
+    unit = os.environ.get(ANGLE_UNIT_VARIABLE) or attitude_unit()
+    if unit not in ANGLE_UNITS:
+        known = " or ".join(ANGLE_UNITS)
+        raise InputError(f"{ANGLE_UNIT_VARIABLE}: {unit!r} is no unit of angles; choose {known}")
+    return unit
 
 
 def attitude_unit() -> str:

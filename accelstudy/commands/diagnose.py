@@ -53,9 +53,8 @@ def diagnose_command(
     # Nothing that is imported is ever garbage, and to look for it there takes a tenth of the time.
     gc.disable()
     try:
-        import accelstudy.diagnosis.report.page.report  # noqa: F401, draws at the end
         from accelstudy.diagnosis.report.output import diagnose_folder
-        from accelstudy.diagnosis.report.words.summary import verdict_lines
+        from accelstudy.diagnosis.report.words import verdict_lines
         from accelstudy.sensors.frames import FRD, axes_note
     finally:
         gc.freeze()

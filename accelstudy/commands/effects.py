@@ -49,7 +49,7 @@ def effects_command(
         raise InputError("effects: --campaign and --scheme exclude each other; give one of them")
     from accelstudy.approaches import get_approach
     from accelstudy.campaign.format import read_campaign
-    from accelstudy.diagnosis.worth import visibility
+    from accelstudy.diagnosis import visibility
     from accelstudy.schemes import get_scheme
     from accelstudy.sensors.models import get_model
 

@@ -18,8 +18,8 @@ from accelstudy.adjustment import Adjustment, Observations, calibrate
 from accelstudy.adjustment.quality import Solution
 from accelstudy.basics.progress import track
 from accelstudy.basics.units import MGON
+from accelstudy.diagnosis.consequences import in_use
 from accelstudy.diagnosis.result import Diagnosis
-from accelstudy.diagnosis.worth.tilt import in_use
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.error import leveling_error
 from accelstudy.sensors.sensor import SensorModel
@@ -114,7 +114,7 @@ def close_loop(diagnosis: Diagnosis, replicates: int = REPLICATES, seed: int = 1
     d = diagnosis
     if d.extended is d.model or d.leveling is None:
         return None
-    fits, hold = {"base": d.base, "extended": d.final.frame.solution}, d.examined.frame.hold
+    fits, hold = {"base": d.base, "extended": d.final.solution}, d.frame.hold
     kept = np.flatnonzero(d.kept)
     noise = Noise(
         sigma_force=d.sigma_position,
@@ -148,8 +148,8 @@ def close_loop(diagnosis: Diagnosis, replicates: int = REPLICATES, seed: int = 1
                 table = _session_table(simulated, fits[calibration], drawn, hold)
                 if table is None:
                     return None
-                known = {"simulation": simulation, "calibration": calibration}
-                tables.append(table.assign(**known, replicate=numbers)[COLUMNS])
+                table = table.assign(simulation=simulation, calibration=calibration)
+                tables.append(table.assign(replicate=numbers)[COLUMNS])
     loop = Loop(pd.concat(tables, ignore_index=True), measured)
     return loop if all(len(loop.case(*case)) for case in CASES) else None
 

@@ -1,35 +1,56 @@
-"""The diagnosis of a campaign, stage after stage."""
+"""The diagnosis of a campaign, stage after stage: each takes what those before it found.
+
+1. Gross errors are recognised by their size, and mended (`recognise`).
+2. The base model is fitted, and all that it may lack set beside it (`fit_base`, `pose`).
+3. The total evidence that anything is missing is compared with noise alone (`detect`).
+4. If anything is, every hypothesis and every pair is weighed, which gives the verdict (`weigh`,
+   `find`). If not, the tests of the noise decide (`tests_of_noise`, `judge_noise`).
+5. Positions that were not used confirm an effect, or do not (`predicted_gap`).
+
+That is all that `judge` does. `diagnose` adds what follows from the verdict: where the disagreement
+lives, what it changed and is worth, what is excluded, and where to measure next.
+"""
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from accelstudy.adjustment.quality import Solution
 from accelstudy.approaches import Approach
 from accelstudy.basics.progress import stage
 from accelstudy.campaign.calibration.fit import usual_approach
-from accelstudy.campaign.gross_errors.recognition import Recognised, recognise
+from accelstudy.campaign.gross_errors.recognition import recognise
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.base_fit import BaseFit
-from accelstudy.diagnosis.beside import Beside
-from accelstudy.diagnosis.decision.noise import NoiseJudge
-from accelstudy.diagnosis.decision.search import Search
-from accelstudy.diagnosis.decision.verdict import Finding, find
-from accelstudy.diagnosis.evidence.chance import SIMULATIONS
-from accelstudy.diagnosis.evidence.noise import kinds
-from accelstudy.diagnosis.evidence.noise.kinds import NoiseTest
-from accelstudy.diagnosis.held_out.confirmation import held_out
-from accelstudy.diagnosis.result import Diagnosis, Gap, Named, level_of_effects
-from accelstudy.diagnosis.space.hypotheses import OUTLIER
+from accelstudy.diagnosis.consequences import (
+    leveling_rms,
+    limits_of_others,
+    locate,
+    marked_positions,
+    parameter_changes,
+    separating_positions,
+)
+from accelstudy.diagnosis.decision.posterior import weigh
+from accelstudy.diagnosis.decision.problem import Problem, fit_base, is_exact, pose
+from accelstudy.diagnosis.decision.statement import certain_of
+from accelstudy.diagnosis.decision.verdict import (
+    Finding,
+    Named,
+    describe,
+    find,
+    judge_noise,
+    probabilities,
+    sigma_holds,
+    tests_of_noise,
+    unit_variance,
+    worst_of,
+)
+from accelstudy.diagnosis.evidence.detection import SIMULATIONS, Chance, detect
+from accelstudy.diagnosis.evidence.noise_tests import NoiseTest
+from accelstudy.diagnosis.held_out import measured_gap, predicted_gap
+from accelstudy.diagnosis.result import Diagnosis, Verdict, level_of_effects
+from accelstudy.sensors.plausibility import implausible_parameters
 from accelstudy.sensors.sensor import SensorModel
-
-Array = NDArray[np.float64]
 
 
 def diagnose(
@@ -38,7 +59,7 @@ def diagnose(
     approach: Approach | None = None,
     seed: int = 1,
 ) -> Diagnosis:
-    """Find whether, where and why a campaign disagrees with a sensor model.
+    """Find whether, where and why a campaign disagrees with a sensor model, and what follows.
 
     Parameters
     ----------
@@ -52,182 +73,131 @@ def diagnose(
     InputError
         If the positions do not determine the model, or leave no redundancy to test anything.
     """
+    judged = _judged(campaign, model, approach, seed)
+    verdict, problem, finding = judged.verdict, judged.problem, judged.finding
+    base, final, variance = verdict.base, finding.frame.solution, verdict.unit_variance
+    location = locate(problem, judged.chance, finding, variance)
+    leveling = None
+    if finding.chosen:
+        leveling = leveling_rms(base, final, problem.frame.hold, variance)
+    marked = marked_positions(problem, sigma_holds(problem, problem.frame))
+    u = verdict.extended.n_parameters
+    sigma = np.sqrt(np.diag(final.cofactors)[:u] * variance)
+    effects = verdict.extended.effects
+    return Diagnosis(
+        **vars(verdict),
+        certain=certain_of(verdict.verdict, verdict.credible_set, problem.examined),
+        groups=tuple(problem.groups),
+        location=location.shares,
+        location_by_chance=location.by_chance,
+        not_located=location.untestable,
+        leveling=leveling,
+        changes=parameter_changes(problem, finding, variance),
+        upper_limits=limits_of_others(problem, finding, verdict.sigma_holds),
+        next_positions=separating_positions(problem.frame, finding),
+        suspects=tuple((int(verdict.campaign.positions[i]), p) for i, p in marked),
+        implausible=tuple(implausible_parameters(effects, final.parameters[:u], sigma)),
+    )
+
+
+def judge(
+    campaign: Campaign,
+    model: SensorModel,
+    approach: Approach | None = None,
+    seed: int = 1,
+) -> Verdict:
+    """Find what `diagnose` does, without what follows from it, which takes as long again."""
+    return _judged(campaign, model, approach, seed).verdict
+
+
+@dataclass(frozen=True)
+class _Judged:
+    """A verdict, and what it was found by."""
+
+    verdict: Verdict
+    problem: Problem
+    chance: Chance
+    finding: Finding
+
+
+def _judged(
+    campaign: Campaign, model: SensorModel, approach: Approach | None, seed: int
+) -> _Judged:
     approach = approach or usual_approach(campaign)
     recognised = recognise(campaign, approach)
     if recognised is not None:
         campaign = recognised.mended
-    return _Run(campaign, model, approach, seed, recognised).diagnosis()
+    # No stage changes what another one draws.
+    seeds = [np.random.SeedSequence(seed, spawn_key=(number,)) for number in range(5)]
 
+    base = fit_base(campaign, model, approach)
+    problem = pose(base)
+    chance = Chance(seeds[0], len(base.solution.design))
+    detection = detect(problem.field, problem.evidence, problem.residuals, chance)
 
-@dataclass(frozen=True)
-class _Run:
-    """One diagnosis in progress; every stage is computed once, at first use."""
+    stated, frame = base.level.known, problem.frame
+    level = level_of_effects(stated)
+    finding, weighing = Finding("no_effect", frame), None
+    tests: tuple[NoiseTest, ...] = ()
+    if is_exact(base.solution):
+        reason = "the campaign is its own model: what is left are rounding errors"
+        finding = Finding("no_effect", frame, reason)
+    elif detection.p_value < level:
+        weighing = weigh(problem, detection, chance)
+        finding = find(problem, weighing)
+        tests = tests_of_noise(problem, finding.frame, campaign, chance)
+    else:
+        tests = tests_of_noise(problem, frame, campaign, chance)
+        worst = worst_of(tests)
+        if worst is not None:
+            weighing = weigh(problem, detection, chance)
+            finding = judge_noise(problem, weighing.posterior, worst)
 
-    campaign: Campaign
-    model: SensorModel
-    approach: Approach
-    seed: int
-    recognised: Recognised | None
-
-    def stage(self, number: int) -> np.random.SeedSequence:
-        """Seed of a stage; no other stage changes it."""
-        return np.random.SeedSequence(self.seed, spawn_key=(number,))
-
-    @cached_property
-    def fit(self) -> BaseFit:
-        """The base fit, with equal axes."""
-        return BaseFit(self.campaign, self.model, self.approach)
-
-    @property
-    def first(self) -> Solution:
-        """The base fit at its solution."""
-        return self.fit.solution
-
-    @cached_property
-    def search(self) -> Search:
-        """The search for what the base fit lacks."""
-        return Search(self.first, self.stage(0), self.fit.level, self.fit.white)
-
-    @cached_property
-    def noise(self) -> NoiseJudge:
-        """What is said of the noise."""
-        return NoiseJudge(self.search, self.campaign)
-
-    # --- the decision ---------------------------------------------------------------------------
-
-    def diagnosis(self) -> Diagnosis:
-        """Decide, stage by stage."""
-        search = self.search
-        finding, tests = self.finding()
-        found = self.described(finding, tests)
-        verdict, reason = finding.verdict, finding.reason
-        if self.recognised is not None:
-            verdict, reason = "gross_error", self.recognised.reason
-            gross = (
-                Named(name, name, (name,), None, None, position=position)
-                for name, position in self.recognised.named
-            )
-            found = (*gross, *found)
-        final, variance = finding.examined, self.noise.unit_variance(finding.examined)
-        known = self.fit.sigma_known
-        trusted, holds = (self.noise.sigma_holds(fit) for fit in (search.examined, final))
+    variance = unit_variance(problem, finding.frame)
+    named = describe(problem, detection, finding, tests, campaign.positions, variance)
+    gap = measured_gap(finding, base.solution)
+    if weighing is not None and finding.verdict in ("named", "narrowed"):
         with stage("held-out positions"):
-            gap = self.gap(finding, variance)
-        return Diagnosis(
-            campaign=self.campaign,
-            approach=self.approach,
-            model=self.model,
-            extended=final.frame.solution.model,
+            beyond = detection.by_chance.beyond(level)
+            given = variance if stated else None
+            gap = predicted_gap(
+                gap, problem, weighing, finding, beyond, given, [seeds[k] for k in (1, 2, 4)]
+            )
+    reason, verdict = finding.reason, finding.verdict
+    if recognised is not None:
+        verdict, reason = "gross_error", recognised.reason
+        gross = (
+            Named(name, name, (name,), None, None, position=position)
+            for name, position in recognised.named
+        )
+        named = (*gross, *named)
+    return _Judged(
+        Verdict(
+            campaign=campaign,
+            approach=approach,
+            model=model,
+            extended=finding.frame.solution.model,
             verdict=verdict,
+            reason=reason,
+            says_the_level=finding.says_the_level,
             credible_set=finding.credible_set,
-            found=found,
-            base=self.first,
-            examined=search.examined,
-            final=final,
-            sigma_known=known,
-            sigma_holds=holds,
+            found=named,
+            base=base.solution,
+            frame=frame,
+            final=finding.frame,
+            invisible=problem.examined.invisible,
+            untestable=problem.examined.untestable,
+            sigma_known=stated,
+            sigma_holds=sigma_holds(problem, finding.frame),
             unit_variance=variance,
             noise_tests=tests,
-            screening=search.detection,
-            probabilities=self.probabilities(finding),
-            gap=gap,
-            beside=Beside(search, finding, variance, known, trusted, holds),
+            screening=detection,
             simulations=SIMULATIONS,
-            recognised=self.recognised,
-            reason=reason,
-        )
-
-    def probabilities(self, finding: Finding) -> dict[str, float]:
-        """Posterior of each name, alone or with another; a class stands under its first name.
-
-        Where nothing is missing, they only show which name would come first, each by itself.
-        """
-        if finding.posterior is None:
-            return self.search.probabilities
-        first: dict[tuple[str, ...], str] = {}
-        found: dict[str, float] = defaultdict(float)
-        for one, p in zip(finding.posterior.all, finding.posterior.probabilities, strict=True):
-            # Two bumped positions have one name.
-            named = zip(one.classes, one.names, strict=True)
-            for name in {first.setdefault(members, name): None for members, name in named}:
-                found[name] += p
-        return dict(sorted(found.items(), key=lambda item: -item[1]))
-
-    def finding(self) -> tuple[Finding, tuple[NoiseTest, ...]]:
-        """Find what is missing: effects first, then the noise, by the tests of it."""
-        search = self.search
-        if search.exact:
-            reason = "the campaign is its own model: what is left are rounding errors"
-            return Finding("no_effect", search.examined, reason), ()
-        if search.detection.p_value < level_of_effects(self.fit.sigma_known):
-            finding = find(search)
-            return finding, self.noise.tests(finding.examined)
-        tests = self.noise.tests(search.examined)
-        worst = self.noise.worst(tests)
-        if worst is None:
-            return Finding("no_effect", search.examined), tests
-        return self.noise.judged(worst), tests
-
-    # --- what else is said ----------------------------------------------------------------------
-
-    def described(self, finding: Finding, tests: Sequence[NoiseTest]) -> tuple[Named, ...]:
-        """Describe what was found."""
-        search = self.search
-        if finding.verdict == "noise_model":
-            worst = self.noise.worst(tests)
-            posterior = finding.posterior or search.posterior
-            top = next(e.names[0] for e in posterior.explanations if e.names[0] in kinds.NOISES)
-            name = top if worst is None else worst.name
-            p = search.detection.p_value if worst is None else worst.p_value
-            return (Named(name, name, (name,), p, posterior.of_noise),)
-        solution = finding.examined.frame.solution
-        sigma = np.sqrt(np.diag(solution.cofactors) * self.noise.unit_variance(finding.examined))
-        columns = {name: i for i, name in enumerate(solution.model.parameter_names)}
-        found = []
-        for choice in finding.chosen:
-            best, p = choice.best, search.detection.p_family[choice.best.name]
-            if best.place is not None:
-                label = int(self.campaign.positions[best.place])
-                found.append(
-                    Named(OUTLIER, OUTLIER, (OUTLIER,), p, choice.probability, position=label)
-                )
-                continue
-            assert best.effect is not None
-            assert best.shown is not None
-            parameters = tuple(
-                (
-                    q.name,
-                    float(solution.parameters[columns[q.name]]),
-                    float(sigma[columns[q.name]]),
-                    q.unit,
-                )
-                for q in best.shown.parameters
-            )
-            found.append(
-                Named(
-                    name=best.name,
-                    spec=best.effect.spec,
-                    equivalence_class=choice.members,
-                    p_value=p,
-                    posterior=choice.probability,
-                    rivals=search.rivals(best, choice.members),
-                    imitators=search.imitators(best, choice.members),
-                    parameters=parameters,
-                )
-            )
-        return tuple(found)
-
-    def gap(self, finding: Finding, variance: float) -> Gap:
-        """Compare the models on positions that were used neither for choosing nor for fitting."""
-        before = self.first.omega / self.first.redundancy
-        if not finding.chosen:
-            return Gap(before)
-        final = finding.examined.frame.solution
-        after = final.omega / final.redundancy
-        if finding.verdict not in ("named", "narrowed"):
-            return Gap(before, after)
-        known = variance if self.fit.sigma_known else None
-        level = level_of_effects(self.fit.sigma_known)
-        seeds = [self.stage(number) for number in (1, 2, 3, 4)]
-        held = held_out(self.search, finding, known, level, seeds)
-        return Gap(before, after, held.gap, held.confirmed, held.reason, held.names)
+            probabilities=probabilities(finding, detection),
+            gap=gap,
+            recognised=recognised,
+        ),
+        problem,
+        chance,
+        finding,
+    )

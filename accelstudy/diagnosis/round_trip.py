@@ -23,10 +23,10 @@ from accelstudy.sensors.models import get_model
 
 
 def _known_settings(value: Any) -> Any:
-    known = [field.name for field in fields(CampaignSettings)]
+    names = [field.name for field in fields(CampaignSettings)]
     for name in value if isinstance(value, Mapping) else ():
-        if name not in known:
-            raise UnknownNameError("setting", name, known)
+        if name not in names:
+            raise UnknownNameError("setting", name, names)
     return value
 
 
@@ -61,6 +61,6 @@ def parse_round_trip(content: Mapping[str, Any], source: str = "config") -> Roun
 
 def write_simulated(settings: CampaignSettings, folder: str | Path, truth: str | Path) -> None:
     """Simulate a campaign and write it, and its truth apart from it."""
-    campaign, known = simulate_campaign(settings)
+    campaign, hidden = simulate_campaign(settings)
     write_campaign(campaign, folder, plausible=not settings.gross_errors)
-    write_truth(known, truth)
+    write_truth(hidden, truth)

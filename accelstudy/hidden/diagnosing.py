@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.result import Diagnosis
+from accelstudy.diagnosis.pipeline import judge
+from accelstudy.diagnosis.result import Verdict
 from accelstudy.effects import effects_without
 from accelstudy.files.tables import write_table
 from accelstudy.hidden.campaigns import Row, made, rows_table, tried
@@ -43,7 +43,7 @@ def run_chunk(
     rows: dict[str, list[Row]] = {name: [] for name in outputs}
 
     def answer(campaign: Campaign) -> Row:
-        return _outcome(diagnose(campaign, model, seed=config.diagnosis_seed))
+        return _outcome(judge(campaign, model, seed=config.diagnosis_seed))
 
     for cell, k in campaigns:
         campaign, truth = made(cell, k, config.seed)
@@ -58,7 +58,7 @@ def run_chunk(
         write_table(path, rows_table(name, rows[name]), provenance)
 
 
-def _outcome(d: Diagnosis) -> Row:
+def _outcome(d: Verdict) -> Row:
     """Row of the table of outcomes."""
     test, held = d.global_test, d.gap.held_out
     return {

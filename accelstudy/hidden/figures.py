@@ -11,7 +11,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from accelstudy.diagnosis.decision.explanations import CREDIBLE
+from accelstudy.diagnosis.decision.posterior import CREDIBLE
 from accelstudy.drawing.style import (
     COLUMN,
     FULL,

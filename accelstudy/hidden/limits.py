@@ -7,8 +7,7 @@ import pandas as pd
 
 from accelstudy.adjustment.quality import noncentrality
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.worth.limits import POWER, visibilities
-from accelstudy.diagnosis.worth.visibility import examine_campaign
+from accelstudy.diagnosis.visibility import POWER, examine_campaign, visibilities
 from accelstudy.hidden.cells import limit_cells
 from accelstudy.hidden.config import HiddenConfig
 from accelstudy.hidden.judging import with_intervals

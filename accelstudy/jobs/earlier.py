@@ -44,8 +44,7 @@ def earlier_run(
     ----------
     results : folder of the results
     outputs : paths of all files that a run makes; they need not be there
-    setups : digest by path, of those that any change of it makes anew: the `setup` of estimates
-        (`accelstudy.jobs.job.setup_digest`), or the `config_hash`
+    setups : digest by path, of tables that have one: their `setup` (`accelstudy.jobs.job.job`)
     seed : int; None where nothing is drawn
     folders : kind of each folder that a run makes as a whole; they need not be there
 
@@ -71,7 +70,7 @@ def earlier_run(
     other = [
         path
         for path, made in origins.items()
-        if made["seed"] != seed or not _of_setup(made, setups.get(path))
+        if made["seed"] != seed or made.get("setup") != setups.get(path)
     ]
     if other:
         yield (
@@ -88,10 +87,6 @@ def _locked(results: str) -> bool:
         for path in LOCKS.glob("*.lock")
         for line in path.read_text(encoding="utf-8", errors="replace").splitlines()
     )
-
-
-def _of_setup(made: Mapping[str, Any], digest: str | None) -> bool:
-    return made.get("setup") == digest or made["config_hash"] == digest
 
 
 def _other_software(origins: Iterable[Mapping[str, Any]]) -> list[str]:

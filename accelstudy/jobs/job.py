@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import angles_in
 from accelstudy.files.outputs import cannot_write
 from accelstudy.files.reading import config_hash
 from accelstudy.files.tables import REMEDY, read_origin
@@ -96,7 +97,7 @@ def _check_origin(path: str, seed: int, setups: Container[str] | None) -> None:
 
 @contextmanager
 def logged(snakemake: Any) -> Iterator[None]:
-    """Run the body of a script of any workflow."""
+    """Run the body of a script of any workflow, with angles in the unit of its rule, if any."""
     # A job ends soon and makes few cycles. The collector would look at all modules again and again.
     gc.freeze()
     gc.set_threshold(COLLECT_AFTER)
@@ -109,7 +110,8 @@ def logged(snakemake: Any) -> Iterator[None]:
             level=logging.INFO,
             format="%(asctime)s %(levelname)s %(message)s",
         )
-        yield
+        with angles_in(snakemake.params.get("angle_unit")):
+            yield
     except InputError as error:
         _end(str(error))
     except MemoryError:

@@ -13,9 +13,8 @@ from accelstudy.adjustment.gauss_helmert import redundancy_of
 from accelstudy.adjustment.observations import Observations
 from accelstudy.approaches import Approach
 from accelstudy.kernel.compiled import Compiled
-from accelstudy.kernel.function import INTEGERS, NAME, POINTERS, KernelFunction
 from accelstudy.kernel.lanes import LANES
-from accelstudy.kernel.writing import text_of
+from accelstudy.kernel.writing import INTEGERS, NAME, POINTERS, KernelFunction, text_of
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]

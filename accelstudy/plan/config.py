@@ -10,7 +10,6 @@ from pydantic import BaseModel, Field, model_validator
 
 from accelstudy.basics.errors import InputError
 from accelstudy.data_sheets import data_sheet_names, of_sigma
-from accelstudy.files.reading import config_hash
 from accelstudy.files.validation import Block, OneOrMore, PathName, Replicates, Seed, checked
 from accelstudy.plan.quantities import QUANTITIES
 from accelstudy.plan.question import Question, equipment_of, get_sensor
@@ -88,10 +87,12 @@ class PlanConfig(Block):
 
 
 Section = TypeVar("Section", bound=BaseModel)
+SECTIONS = ("plan", "designs", "sequential", "pole", "field")
+"""Each has rules in `workflow/rules/` under its name."""
 
 
 class Example(Block):
-    """All parts of a run; results go to ``results/<study>``."""
+    """The sections of a run; results go to ``results/<study>``."""
 
     study: PathName = Field(description="name; results go to results/<study>/")
     seed: Annotated[Seed, Field(description="of all random numbers")] = 1
@@ -101,10 +102,16 @@ class Example(Block):
     pole: dict[str, Any] = Field(default_factory=dict, description="tilt of a pole")
     field: dict[str, Any] = Field(default_factory=dict, description="what limits a sensor in use")
 
+    @model_validator(mode="after")
+    def _has_a_section(self) -> Self:
+        if not self.sections:
+            raise ValueError(f"nothing to do; give at least one of {', '.join(SECTIONS)}")
+        return self
+
     @property
-    def provenance(self) -> dict[str, Any]:
-        """Provenance that tables record."""
-        return {"config_hash": config_hash(self.model_dump(mode="json")), "seed": self.seed}
+    def sections(self) -> list[str]:
+        """Names of the sections that are given."""
+        return [name for name in SECTIONS if name in self.model_fields_set]
 
 
 def parse_example(content: Mapping[str, Any], source: str = "config") -> Example:

@@ -7,7 +7,7 @@ from accelstudy.approaches import get_approach
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.report.words.summary import verdict_lines
+from accelstudy.diagnosis.report.words import verdict_lines
 from accelstudy.effects import get_effect
 from accelstudy.sensors.models import get_model
 

@@ -23,14 +23,13 @@ from accelstudy.approaches import get_approach
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.output import write_calibration
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.diagnosis.decision import search
-from accelstudy.diagnosis.evidence import chance
-from accelstudy.diagnosis.evidence.noise.colour import LENGTHS, quadratic_forms, restricted
-from accelstudy.diagnosis.evidence.noise.residual_tests import axis_factors
+from accelstudy.diagnosis import pipeline
+from accelstudy.diagnosis.evidence import detection
+from accelstudy.diagnosis.evidence.noise_models import LENGTHS, quadratic_forms, restricted
+from accelstudy.diagnosis.evidence.noise_tests import axis_factors
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.space.examined import examine
-from accelstudy.diagnosis.space.groups import groups
-from accelstudy.diagnosis.space.repeats import clusters
+from accelstudy.diagnosis.space.groups import clusters, groups
 from accelstudy.effects import HoldConditions, get_effect
 from accelstudy.simulation.sessions import Noise
 
@@ -281,9 +280,9 @@ def test_a_jump_among_many_holds_is_found_where_it_is():
 
 def test_memory_of_a_diagnosis_is_linear_in_the_positions(monkeypatch):
     # What is drawn at once has a size of its own, whatever the positions.
-    monkeypatch.setattr(chance, "AT_ONCE", 10_000)
-    monkeypatch.setattr(chance, "KEPT", 0)
-    monkeypatch.setattr(search, "Chance", partial(chance.Chance, simulations=20))
+    monkeypatch.setattr(detection, "AT_ONCE", 10_000)
+    monkeypatch.setattr(detection, "KEPT", 0)
+    monkeypatch.setattr(pipeline, "Chance", partial(detection.Chance, simulations=20))
 
     def run(n):
         campaign, _ = simulate_campaign(

@@ -17,7 +17,7 @@ from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.report.words.summary import verdict_lines as diagnosis_lines
+from accelstudy.diagnosis.report.words import verdict_lines as diagnosis_lines
 from accelstudy.simulation.sessions import Noise
 
 TRUTH = {"b_x": 0.05, "b_y": 0.01, "b_z": 0.03, "s_x": 2e-4, "alpha_zx": 7e-4}

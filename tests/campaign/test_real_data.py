@@ -13,7 +13,7 @@ from accelstudy.basics.wording import number, probability, words
 from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.public import import_settings, public_data, public_file
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.report.words.summary import GROUPS, amount, shown_unit, verdict_lines
+from accelstudy.diagnosis.report.words import GROUPS, amount, shown_unit, verdict_lines
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.effects import get_effect
 from accelstudy.sensors.models import get_model
@@ -103,7 +103,7 @@ def test_where_the_residuals_of_white_noise_live():
 
 def variances_taken(d):
     """Variances of the axes, beside their mean."""
-    variances = d.examined.frame.solution.variances[0, :3]
+    variances = d.frame.solution.variances[0, :3]
     return variances / variances.mean()
 
 
@@ -129,7 +129,7 @@ def test_what_cannot_be_diagnosed_is_said(name):
 
 
 def test_what_is_invisible_to_all():
-    hidden = {diagnosed(name, variant).examined.invisible for name, variant in DIAGNOSED}
+    hidden = {diagnosed(name, variant).invisible for name, variant in DIAGNOSED}
     (names,) = hidden
     assert all(words(name) in PAGE for name in names)
 

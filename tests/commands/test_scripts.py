@@ -183,7 +183,7 @@ def test_all_that_is_suggested_runs_from_the_log_to_the_last_page(monkeypatch):
     reading = ("--columns", "fx=0,fy=1,fz=2", "--rate", "50")
     (diagnose, apply) = suggestions(printed)
     call(*apply, *reading)
-    monkeypatch.setattr("accelstudy.diagnosis.report.page.report.diagnosis_figures", lambda *_: {})
+    monkeypatch.setattr("accelstudy.diagnosis.report.output.diagnosis_figures", lambda *_: {})
     done = call(*diagnose, "--replicates", "100", "--quiet")
     assert done.stdout == "The model lacks quadratic scale.\n"
     page = Path("imu-left-diagnosis/report.html").read_text(encoding="utf-8")

@@ -29,8 +29,8 @@ from accelstudy.design.spaces import (
     listed_in,
 )
 from accelstudy.design.task import Task, information, position_rows
+from accelstudy.diagnosis.next_positions import Explained, Separation
 from accelstudy.leveling.error import cap_forces, tilt_error
-from accelstudy.proposal.separation import Explained, Separation
 from accelstudy.schemes import get_scheme
 from accelstudy.schemes.optimal import stored_designs
 from accelstudy.sensors.models import get_model

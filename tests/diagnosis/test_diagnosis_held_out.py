@@ -4,19 +4,23 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, design, shuffled, some_holds
+from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, design, posed, shuffled, some_holds
 
-from accelstudy.adjustment.quality import solve
 from accelstudy.basics.wording import words
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.diagnosis.decision.search import Search
+from accelstudy.diagnosis import held_out
+from accelstudy.diagnosis.decision.refits import refit
+from accelstudy.diagnosis.evidence.detection import Chance, detect
+from accelstudy.diagnosis.evidence.hypotheses import (
+    Singles,
+    classes_of,
+    equivalents,
+    weigh_singles,
+)
 from accelstudy.diagnosis.evidence.size import Level
-from accelstudy.diagnosis.held_out import confirmation as held_out
-from accelstudy.diagnosis.held_out import given_a_name
-from accelstudy.diagnosis.held_out.gap import SIGNIFICANT, held_out_gap, split_positions
-from accelstudy.diagnosis.held_out.linear import LinearSplit
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.report.words.summary import confirmation
+from accelstudy.diagnosis.prediction import SIGNIFICANT, LinearSplit, held_out_gap, split_positions
+from accelstudy.diagnosis.report.words import confirmation
 from accelstudy.diagnosis.result import LEVEL_EFFECTS
 from accelstudy.simulation.sessions import Noise, session
 
@@ -25,34 +29,44 @@ SETS = 25_000
 
 @pytest.fixture(scope="module", params=[Level.given(), Level.unknown()], ids=["given", "not given"])
 def parts(request):
-    """Searches of all positions and of two thirds, and the split, with nothing missing."""
+    """Problems of all positions and of two thirds, and the split, with nothing missing."""
     ideal = session(NINE, np.zeros(NINE.n_parameters), shuffled("fibonacci-30"), G)
     observed = ideal.draw(Noise(), 1, np.random.default_rng(5))
-    seed = np.random.SeedSequence(1)
-    search = Search(solve(NINE, ROBOT, observed), seed, request.param)
-    frame = search.examined.frame
+    problem = posed(ROBOT, observed, request.param)
+    frame = problem.frame
     fitted, held = split_positions(frame.forces, frame.hold, 10, np.random.default_rng(2))
-    part = Search(solve(NINE, ROBOT, observed.take(fitted)), seed, request.param)
-    return search, part, LinearSplit(frame, fitted, held)
+    part = posed(ROBOT, observed.take(fitted), request.param)
+    return problem, part, LinearSplit(frame, fitted, held)
+
+
+def weighed(problem):
+    """The evidence for each candidate by itself."""
+    return weigh_singles(problem.examined, problem.field, problem.evidence)
 
 
 def test_a_name_that_noise_made_is_confirmed_in_5_percent(parts):
     """In plain noise, of which few sets are given a name, instead of by importance sampling."""
-    search, part, split = parts
-    needed = given_a_name.needed_z(search, part, split, LEVEL_EFFECTS, np.random.default_rng(3))
+    problem, part, split = parts
+    residuals, field, evidence = problem.residuals, problem.field, problem.evidence
+    chance = Chance(np.random.SeedSequence(1), len(residuals.design))
+    beyond = detect(field, evidence, residuals, chance).by_chance.beyond(LEVEL_EFFECTS)
+    singles = weighed(problem)
+    classes = classes_of(singles, equivalents(problem.examined, singles))
+    rng = np.random.default_rng(3)
+    needed = held_out.threshold(problem, classes, beyond, part, split, rng)
     assert needed > SIGNIFICANT + 0.3
-    residuals, field, rng = search.residuals, search.field, np.random.default_rng(4)
+    rng = np.random.default_rng(4)
     noise = rng.standard_normal((SETS, len(residuals.design)))
     z = residuals.project(noise.T).T
-    logs = field.densities(search.evidence, z)
-    nothing = np.logaddexp.reduce(search.evidence.of_noise(np.sum(z**2, axis=1)), axis=-1)
+    logs = field.densities(evidence, z)
+    nothing = np.logaddexp.reduce(evidence.of_noise(np.sum(z**2, axis=1)), axis=-1)
     odds = np.logaddexp.reduce(logs, axis=1) - np.log(len(field.names)) - nothing
-    label = given_a_name._labels(search)
-    named, top = given_a_name._named(logs, [label[name] for name in field.names])
-    found = np.flatnonzero(named & (odds > search.detection.by_chance.beyond(LEVEL_EFFECTS)))
-    chosen, values = given_a_name._on_the_part(part, split, noise[found], rng)
-    same = np.array([label.get(name, -2) for name in chosen]) == top[found]
-    n = len(found)
+    label = held_out._labels(classes)
+    named, top = held_out._named(logs, [label[name] for name in field.names])
+    sets = np.flatnonzero(named & (odds > beyond))
+    chosen, values = held_out._on_the_part(part, split, noise[sets], rng)
+    same = np.array([label.get(name, -2) for name in chosen]) == top[sets]
+    n = len(sets)
     assert n > 150
     rate = np.mean(same & (values > needed))
     # Both the simulation of the bound and that of the rate err.
@@ -63,13 +77,13 @@ def test_a_name_that_noise_made_is_confirmed_in_5_percent(parts):
 
 def test_prediction_to_first_order_is_that_of_refits(parts):
     """Of an effect that the fitted positions show; what either leaves of the held-out ones."""
-    search, part, split = parts
-    best = part.best_shape("quadratic_scale")
-    fit = part.refits.refit([best])
-    rest = search.first.observed.take(split.held)
-    gap = held_out_gap(part.first, fit, rest, split.held, 1.0, np.random.default_rng(1))
-    left, missed = split.beside(search.residuals.positions.errors[None])
-    change = split.corrections(search.best_shape("quadratic_scale"), left)
+    problem, part, split = parts
+    first, base = problem.base.solution, part.base.solution
+    fit = refit(part.frame.solution, [weighed(part).best["quadratic_scale"]])
+    rest = first.observed.take(split.held)
+    gap = held_out_gap(base, fit, rest, split.held, 1.0, np.random.default_rng(1))
+    left, missed = split.beside(problem.residuals.positions.errors[None])
+    change = split.corrections(weighed(problem).best["quadratic_scale"], left)
     assert np.mean(missed**2) == pytest.approx(gap.before, rel=0.02)
     assert np.mean((missed - change) ** 2) == pytest.approx(gap.after, rel=0.02)
 
@@ -119,6 +133,6 @@ def test_an_imitator_leaves_nothing_of_what_it_imitates():
 
 def test_a_part_that_can_show_no_pair_chooses_none():
     """Positions that are too few for two effects at once would not have chosen these two."""
-    part = SimpleNamespace(pairs=[])
+    part, none = SimpleNamespace(examined=None), Singles({}, {}, {}, {})
     finding = SimpleNamespace(chosen=("one", "other"), credible_set=())
-    assert held_out._chosen_alike(part, finding) == (("one", "other"), True)
+    assert held_out._chosen_alike(part, none, finding) == (("one", "other"), True)

@@ -19,7 +19,7 @@ from accelstudy.diagnosis.decision.priors import SURE
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.space.examined import examine
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, same_space
-from accelstudy.diagnosis.worth.limits import signature_columns
+from accelstudy.diagnosis.visibility import signature_columns
 from accelstudy.effects import get_effect
 
 RARE = 1e-3

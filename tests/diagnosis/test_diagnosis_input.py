@@ -17,7 +17,7 @@ from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.commands.main import main
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.report.document.diagnosis import diagnosis_document
+from accelstudy.diagnosis.report.document import diagnosis_document
 from accelstudy.effects import effect_names
 from accelstudy.leveling.angles import specific_force
 from accelstudy.sensors.conversion import Conversion
@@ -29,7 +29,7 @@ VERDICTS = {"no_effect", "named", "unknown", "noise_model", "gross_error"}
 @pytest.fixture(autouse=True)
 def not_drawn(monkeypatch):
     """Pages have no figures here: no test looks at one, and to compose them takes longest."""
-    place = "accelstudy.diagnosis.report.page.report.save_all"
+    place = "accelstudy.diagnosis.report.output.save_all"
     monkeypatch.setattr(place, lambda figures, _: dict.fromkeys(figures, "<svg></svg>"))
 
 
@@ -258,7 +258,7 @@ def test_an_observed_gravity_does_not_change_the_verdict(approach):
     fixed, free = (diagnose(replace(measured, sigma_gravity=s), NINE) for s in (0.0, 1e-3))
     assert [f.name for f in fixed.found] == [f.name for f in free.found] == ["hysteresis"]
     assert fixed.gap.before == pytest.approx(free.gap.before, rel=1e-3)
-    assert fixed.examined.invisible == free.examined.invisible
+    assert fixed.invisible == free.invisible
 
 
 @pytest.mark.parametrize("repeat_first", [0, 1])

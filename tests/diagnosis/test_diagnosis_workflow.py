@@ -4,12 +4,13 @@ import json
 import os
 import re
 import shutil
+from functools import partial
 from pathlib import Path
 
 import pytest
 import yaml
 from places import ROOT
-from snakemake_helpers import one_line, remains, snakemake
+from snakemake_helpers import ENVIRONMENT, jobs, one_line, remains, run_workflow
 
 from accelstudy.study.config import read_study
 
@@ -27,10 +28,7 @@ TINY = {
 }
 
 
-def run(folder, config, *words):
-    (folder / "tiny.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")
-    fixed = ["--snakefile", ROOT / "workflow" / "diagnose.smk", "--cores", 2]
-    return snakemake(folder, *fixed, "--configfile", "tiny.yaml", *words)
+run = partial(run_workflow, "diagnose")
 
 
 @pytest.fixture(scope="module")
@@ -79,6 +77,11 @@ def test_a_second_run_does_nothing(made):
     assert {path: path.stat().st_mtime_ns for path in (made / "results").rglob("*")} == before
 
 
+def test_another_unit_of_angles_makes_the_page_again(made, monkeypatch):
+    monkeypatch.setitem(ENVIRONMENT, "ACCELSTUDY_ANGLE_UNIT", "deg")
+    assert jobs(run(made, TINY, "--dry-run").stdout) == {"diagnose": 1}
+
+
 def test_what_was_damaged_since_is_refused(made, tmp_path):
     folder = Path(shutil.copytree(made, tmp_path / "copy"))
     page = folder / "results/tiny/diagnosis/report.html"
@@ -89,7 +92,7 @@ def test_what_was_damaged_since_is_refused(made, tmp_path):
     assert result.returncode != 0
     one_line(result.stdout, "results/tiny/diagnosis: report.html is damaged; delete it and run")
     shutil.rmtree(page.parent)
-    assert "Diagnose the campaign" in run(folder, TINY, "--dry-run").stdout
+    assert jobs(run(folder, TINY, "--dry-run").stdout) == {"diagnose": 1}
 
 
 def test_a_campaign_that_is_too_small(made, tmp_path):

@@ -7,6 +7,8 @@ from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
+from accelstudy.diagnosis.decision.problem import BaseFit, pose
+from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.space.examined import examine
 from accelstudy.effects import HoldConditions
 from accelstudy.schemes import get_scheme
@@ -63,6 +65,11 @@ def design(directions, approach=ROBOT, hold=None, model=NINE, noise=None, seed=N
     else:
         observed = ideal.draw(noise, 1, np.random.default_rng(seed))
     return examine(solve(model, approach, observed))
+
+
+def posed(approach, observed, level=None):
+    """The problem of a session, whose sigma is known or of a given level of knowledge."""
+    return pose(BaseFit(solve(NINE, approach, observed), level or Level.given(), None))
 
 
 def most(count, level, error=1e-4):

@@ -53,7 +53,7 @@ DRAWN = {
     "sequential": ("make plan-example", "accelstudy/sequential/figure.py"),
     "pole-gnss": ("make plan-example", "accelstudy/pole/figure.py"),
     "field-adxl355": ("make plan-example", "accelstudy/field/figure.py"),
-    "residuals": ("make campaigns", "accelstudy/campaign/calibration/figures.py"),
+    "residuals": ("make campaigns", "accelstudy/campaign/calibration/output.py"),
     "rare-events": ("the study config/sweeps/rare_events.yaml",
                     "accelstudy/study/figures/rare_events.py", "config/sweeps/rare_events.yaml"),
     "sweeps": ("the studies in config/sweeps", "accelstudy/study/figures/sweep.py",

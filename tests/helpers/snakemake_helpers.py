@@ -2,6 +2,7 @@
 
 import gc
 import os
+import re
 import subprocess
 import sys
 import warnings
@@ -10,6 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 
 import pytest
+import yaml
 from places import ROOT
 from snakemake.cli import main
 
@@ -21,6 +23,8 @@ ENVIRONMENT = {
     "NO_COLOR": "1",
 }
 ENVIRONMENT.pop("SNAKEMAKE_PROFILE", None)
+TARGETS = ("study", "campaigns", "round_trip", "plan_example", "total")
+"""Lines of Snakemake's list of jobs that are no jobs."""
 
 
 def snakemake(folder, *words, environment=ENVIRONMENT):
@@ -67,6 +71,19 @@ def _output_to(file):
         for number, copy in zip((1, 2), kept, strict=True):
             os.dup2(copy, number)
             os.close(copy)
+
+
+def run_workflow(name, folder, config, *words, **options):
+    """Run a workflow in a folder, with a configuration that is written there."""
+    (folder / "tiny.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")
+    fixed = ["--snakefile", ROOT / "workflow" / f"{name}.smk", "--cores", 2]
+    return snakemake(folder, *fixed, "--configfile", "tiny.yaml", *words, **options)
+
+
+def jobs(text):
+    """Rules with a script that a run has run, or would run, with the number of jobs."""
+    counts = re.findall(r"^(\w+) +(\d+)$", text, re.MULTILINE)
+    return {rule: int(count) for rule, count in counts if rule not in TARGETS}
 
 
 def remains(folder):

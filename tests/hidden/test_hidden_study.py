@@ -205,7 +205,7 @@ def test_a_second_run_gives_the_same_bytes(plan, whole, tmp_path):
 
 def test_the_diagnosis_sees_the_campaign_only(plan, whole, monkeypatch, tmp_path):
     seen = []
-    monkeypatch.setattr(diagnosing, "diagnose", lambda *given, **more: seen.append((given, more)))
+    monkeypatch.setattr(diagnosing, "judge", lambda *given, **more: seen.append((given, more)))
     run_chunk(*plan, paths(tmp_path), PROVENANCE)
     truths = read_table(paths(whole)["truths"])
     for (campaign, _), more in seen:
@@ -219,7 +219,7 @@ def test_what_fails_is_a_row_with_its_error(plan, monkeypatch, tmp_path):
     def refuse(campaign, *_, **__):
         raise InputError("too few positions") if campaign.angles is None else KeyError("x")
 
-    monkeypatch.setattr(diagnosing, "diagnose", refuse)
+    monkeypatch.setattr(diagnosing, "judge", refuse)
     run_chunk(*plan, paths(tmp_path), PROVENANCE)
     outcomes = read_table(paths(tmp_path)["outcomes"])
     assert len(outcomes) == 3

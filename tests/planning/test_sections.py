@@ -3,9 +3,8 @@
 import json
 
 import pytest
-import yaml
 from places import ROOT
-from snakemake_helpers import one_line, snakemake
+from snakemake_helpers import jobs, one_line, run_workflow
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
@@ -97,13 +96,20 @@ def test_a_case_that_cannot_be_used_is_said_in_a_line(section, content, message)
 
 
 def test_the_workflow_says_it_too(tmp_path):
-    config = {"study": "tiny", "plan": {"sensors": ["adxl35"]}}
-    (tmp_path / "tiny.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")
-    fixed = ["--snakefile", ROOT / "workflow" / "plan.smk", "--cores", 1]
-    result = snakemake(tmp_path, *fixed, "--configfile", "tiny.yaml")
+    result = run_workflow("plan", tmp_path, {"study": "tiny", "plan": {"sensors": ["adxl35"]}})
     assert result.returncode == 1
     one_line(result.stdout, "tiny.yaml: plan.sensors: unknown sensor 'adxl35'")
     assert not (tmp_path / "results").exists()
+
+
+def test_a_section_alone_runs_only_its_rules(tmp_path):
+    config = {"study": "tiny", "pole": {"cases": {"gnss": {}, "again": {}}}}
+    assert jobs(run_workflow("plan", tmp_path, config, "--dry-run").stdout) == {"pole": 2}
+
+
+def test_without_a_section_there_is_nothing_to_do():
+    with pytest.raises(InputError, match="nothing to do; give at least one of plan, designs, "):
+        parse_example({"study": "x"})
 
 
 def test_a_fixed_scheme_must_determine_the_model():

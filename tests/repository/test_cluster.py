@@ -46,7 +46,7 @@ def test_the_profiles_differ_in_where_they_run_only():
 @pytest.mark.parametrize("rule", [name for name, text in STUDY.items() if "script:" in text])
 def test_a_rule_says_what_it_takes(rule):
     assert re.search(r"^    threads: \d+$", STUDY[rule], re.MULTILINE)
-    assert re.search(r"^        mem_mb=", STUDY[rule], re.MULTILINE)
+    assert re.search(r"^        mem_mb=megabytes\(", STUDY[rule], re.MULTILINE)
 
 
 def test_without_slurm_one_line_says_what_to_install(monkeypatch, capsys):

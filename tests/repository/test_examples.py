@@ -15,7 +15,7 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.units import GON, MGON
 from accelstudy.design.estimability import estimability
 from accelstudy.diagnosis.decision import priors
-from accelstudy.diagnosis.decision.explanations import CREDIBLE
+from accelstudy.diagnosis.decision.posterior import CREDIBLE
 from accelstudy.diagnosis.evidence.size import DOUBT
 from accelstudy.files.tables import read_table
 from accelstudy.leveling.error import cap_forces, tilt_error

@@ -24,8 +24,7 @@ from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.commands.main import main
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.report.document.calibration import diagnosed_calibration
-from accelstudy.diagnosis.report.document.model_file import study_overlay
+from accelstudy.diagnosis.report.document import diagnosed_calibration, study_overlay
 from accelstudy.diagnosis.round_trip import parse_round_trip
 from accelstudy.drawing import saving
 from accelstudy.drawing.style import model_title
@@ -239,7 +238,7 @@ def test_a_calibration_without_a_bumped_position():
     _, diagnosis, content = calibration_of(gross_errors=gross)
     assert [hold["position"] for hold in content["excluded"]] == [21]
     assert content["n_positions"] == 29
-    truth = diagnosis.final.frame.solution.parameters
+    truth = diagnosis.final.solution.parameters
     np.testing.assert_allclose([p["value"] for p in content["parameters"]], truth, atol=1e-12)
     assert content["quality"]["global_test"]["accepted"]
 

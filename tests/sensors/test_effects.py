@@ -13,8 +13,8 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.design.estimability import estimability
-from accelstudy.diagnosis.report.words.families import family_of
-from accelstudy.diagnosis.report.words.summary import GROUPS
+from accelstudy.diagnosis.decision.statement import family_of
+from accelstudy.diagnosis.report.words import GROUPS
 from accelstudy.effects import Course, HoldConditions, effect_names, get_effect
 from accelstudy.effects.hold_conditions import STILL
 from accelstudy.leveling.angles import roll_pitch, specific_force

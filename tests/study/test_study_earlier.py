@@ -111,14 +111,6 @@ def test_another_configuration_is_said(finished):
     assert f"1 of 4 tables are of another configuration: {NAMES[0]}. " in line
 
 
-def test_tables_of_which_any_change_makes_others_are_known_by_their_configuration(finished):
-    write(NAMES[0], setup=None, config_hash="old")
-    made_anew = {NAMES[0]: "old"}
-    assert list(earlier_run("results/none", NAMES[:1], made_anew, 1)) == []
-    (line,) = earlier_run("results/none", NAMES[:1], {NAMES[0]: "new"}, 1)
-    assert f"1 of 1 tables are of another configuration: {NAMES[0]}. " in line
-
-
 @pytest.mark.parametrize(
     ("name", "change", "words"),
     [

@@ -14,15 +14,15 @@ import pyarrow.parquet as pq
 import pytest
 import yaml
 from places import ROOT
-from snakemake_helpers import ENVIRONMENT, SNAKEMAKE, one_line, remains, snakemake
+from snakemake_helpers import ENVIRONMENT, SNAKEMAKE, jobs, one_line, remains, snakemake
 from study_helpers import NINE, grid
 
 import accelstudy
 from accelstudy.basics.errors import InputError
 from accelstudy.files import provenance
 from accelstudy.files.outputs import check_writable
+from accelstudy.files.reading import overlay, read_layer
 from accelstudy.files.tables import read_origin, read_table
-from accelstudy.jobs.code import code_hash
 from accelstudy.study import batches
 from accelstudy.study.figures import get_figure
 from accelstudy.study.tables import TABLES
@@ -44,21 +44,34 @@ TABLE_PATHS = [f"results/tiny/{name}.parquet" for name in TABLES]
 
 IN_BATCHES = f"""\
 from functools import partial
-
 from accelstudy.study import batches
-
 batches.batches = partial(batches.batches, size=240)
-
-
 include: "{ROOT}/workflow/Snakefile"
-
-
 rule study:
     default_target: True
-    input:
-        rules.all.input,
+    input: rules.all.input
 """
 """The workflow with two batches of four cells."""
+MODULE = """\
+from accelstudy.files.shipped import shipped
+configfile: "study.yaml"
+module inner:
+    snakefile: str(shipped("workflow/Snakefile"))
+    config: config
+    prefix: "inner"
+use rule * from inner as inner_*
+rule study:
+    default_target: True
+    input: rules.inner_all.input
+"""
+"""The workflow as a part of another one, as the guide to configurations has it."""
+RETRIED = f"""\
+include: "{ROOT}/workflow/rules/start.smk"
+rule retried:
+    output: "done"
+    resources: mem_mb=megabytes(100)
+    shell: "test {{resources.mem_mb}} = 200 && touch {{output}}"
+"""
 
 
 def words(folder, *arguments, snakefile=ROOT / "Snakefile", cores=2, config=TINY):
@@ -126,6 +139,12 @@ def finished(single, tmp_path):
     return Path(shutil.copytree(single, tmp_path / "copy"))
 
 
+def linked_figures(results):
+    """Figures to which the explorer leads."""
+    page = (results / "explorer.html").read_text(encoding="utf-8")
+    return {results / link for link in re.findall(r'href="(figures/[^"]+)"', page)}
+
+
 # --- the same content ----------------------------------------------------------------------------
 
 
@@ -141,9 +160,7 @@ def test_all_is_made(single):
     assert not list(results.glob("claims*"))
     assert (results / "logs" / "simulate" / "0000.log").read_text().count(" replicates, ") == 7
     assert remains(single) == []
-    page = (results / "explorer.html").read_text(encoding="utf-8")
-    links = re.findall(r'href="(figures/[^"]+)"', page)
-    assert {results / link for link in links} == {*results.glob("figures/*.svg")}
+    assert linked_figures(results) == {*results.glob("figures/*.svg")}
 
 
 def test_a_second_run_does_nothing(single):
@@ -185,11 +202,9 @@ def test_killed_and_resumed(single, tmp_path, monkeypatch):
 # --- what runs again -----------------------------------------------------------------------------
 
 
-def planned(folder, config=TINY):
+def planned(folder, **options):
     """Rules that a dry run would run, with the number of jobs."""
-    text = succeed(folder, "--dry-run", config=config)
-    counts = re.findall(r"^(\w+) +(\d+)$", text.split("Reasons:")[0], re.MULTILINE)
-    return {rule: int(count) for rule, count in counts if rule not in ("study", "total")}
+    return jobs(succeed(folder, "--dry-run", **options))
 
 
 def test_dry_run(tmp_path):
@@ -198,118 +213,47 @@ def test_dry_run(tmp_path):
     assert not (tmp_path / "results").exists()
 
 
-def test_other_attitudes_do_not_simulate_again(finished):
-    plan = planned(finished, config={**TINY, "leveling": {"attitudes": 30}})
+def test_other_attitudes_do_not_simulate_again(single):
+    plan = planned(single, config={**TINY, "leveling": {"attitudes": 30}})
     assert "summarise" in plan
     assert "simulate" not in plan
 
 
-@pytest.fixture(scope="module")
-def copied(tmp_path_factory):
-    """A copy of the package."""
-    copy = tmp_path_factory.mktemp("package") / "accelstudy"
-    no_caches = shutil.ignore_patterns("__pycache__")
-    return Path(shutil.copytree(accelstudy.__path__[0], copy, ignore=no_caches))
+def test_another_unit_of_angles_draws_again(single, monkeypatch):
+    monkeypatch.setitem(ENVIRONMENT, "ACCELSTUDY_ANGLE_UNIT", "deg")
+    assert planned(single).keys() == {"explorer", "figures"}
 
 
-@pytest.fixture
-def edit(copied, monkeypatch):
-    """Edit a file of the package, as far as what runs again is concerned."""
-    monkeypatch.setattr(accelstudy, "__file__", str(copied / "__init__.py"))
-    edited = {}
-
-    def append(name):
-        path = copied / name
-        edited[path] = path.read_text(encoding="utf-8")
-        path.write_text(edited[path] + "\n# an edit\n", encoding="utf-8")
-
-    yield append
-    for path, content in edited.items():
-        path.write_text(content, encoding="utf-8")
-
-
-def test_an_edit_of_the_package_runs_what_depends_on_it(finished, edit):
-    edit("drawing/style.py")
-    assert planned(finished).keys() == {"explorer", "figures"}
-    edit("effects/bias.py")
-    assert planned(finished).keys() >= {"simulate", "summarise", "collect", "figures"}
-
-
-STAGES = ("simulate", "summarise", "sensitivity", "claims", "figures")
-SEVERAL = {*STAGES}
-
-
-def hash_of(stage):
-    return code_hash(ROOT / "workflow" / "scripts" / f"{stage}.py")
-
-
-@pytest.mark.parametrize(
-    ("name", "stages"),
-    [
-        ("effects/bias.py", SEVERAL),
-        ("approaches/robot.py", SEVERAL),
-        ("schemes/mclaren.py", SEVERAL),
-        ("adjustment/gauss_helmert.py", SEVERAL),
-        ("simulation/sessions.py", SEVERAL),
-        ("noise_effects/base.py", SEVERAL),
-        ("simulation/hold_plan.py", SEVERAL),
-        ("study/config/schema.py", {"sensitivity", "claims", "figures"}),
-        ("study/monte_carlo/simulate.py", {"simulate"}),
-        ("study/monte_carlo/distributions.py", {"summarise", "claims"}),
-        ("leveling/error.py", SEVERAL),
-        ("leveling/sensitivity.py", {"sensitivity", "claims", "figures"}),
-        ("design/closed_forms.py", {"summarise"}),
-        ("drawing/style.py", {"figures"}),
-        ("study/figures/sweep.py", {"figures"}),
-        ("study/claims/base.py", {"claims"}),
-        ("study/claims/page.html.j2", {"claims"}),
-        ("pages/base.html.j2", {"claims"}),
-        ("commands/main.py", set()),
-        ("commands/catalogue.py", set()),
-        ("jobs/earlier.py", set()),
-        ("campaign/gross_errors/base.py", set()),
-    ],
-)
-def test_hash_of_the_code_that_a_stage_uses(name, stages, hashes, edit):
-    edit(name)
-    assert {stage for stage in STAGES if hash_of(stage) != hashes[stage]} == stages
-
-
-@pytest.fixture(scope="module")
-def hashes(copied):
-    """Of each stage, as the code is; where the package lies makes no difference."""
-    before = {stage: hash_of(stage) for stage in STAGES}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(accelstudy, "__file__", str(copied / "__init__.py"))
-        assert {stage: hash_of(stage) for stage in STAGES} == before
-    return before
-
-
-def test_a_new_file_counts_everywhere(hashes, copied, edit):
-    new = copied / "effects" / "new.py"
-    new.write_text("")
-    after = {stage: hash_of(stage) for stage in STAGES}
-    new.unlink()
-    assert all(after[stage] != hashes[stage] for stage in STAGES)
+def test_an_edit_of_the_package_runs_what_depends_on_it(single, tmp_path, monkeypatch):
+    copy = Path(shutil.copytree(accelstudy.__path__[0], tmp_path / "accelstudy"))
+    with (copy / "drawing" / "style.py").open("a") as file:
+        file.write("# an edit\n")
+    monkeypatch.setattr(accelstudy, "__file__", str(copy / "__init__.py"))
+    assert planned(single).keys() == {"explorer", "figures"}
 
 
 # --- bad input -----------------------------------------------------------------------------------
 
 
-def test_unknown_key_on_the_command_line(tmp_path):
-    text = refuse(tmp_path, "--config", "seeed=1")
-    one_line(text, "tiny.yaml: seeed: unknown key; did you mean 'seed'?", "known: study, seed")
+@pytest.mark.parametrize(
+    ("words", "config", "parts"),
+    [
+        (
+            ["--config", "seeed=1"],
+            TINY,
+            ["seeed: unknown key; did you mean 'seed'?", "known: study, seed"],
+        ),
+        ([], {**TINY, "paper": True}, ["paper: true needs the block `sensitivity`"]),
+        (
+            [],
+            "study: a\nseed: 1\nstudy: b\n",
+            ["not valid YAML: line 3, column 1: the key 'study' stands twice"],
+        ),
+    ],
+)
+def test_what_cannot_be_used_is_one_line(words, config, parts, tmp_path):
+    one_line(refuse(tmp_path, *words, config=config), "tiny.yaml: ", *parts)
     assert not (tmp_path / "results").exists()
-
-
-def test_paper_without_what_it_needs(tmp_path):
-    text = refuse(tmp_path, config={**TINY, "paper": True})
-    one_line(text, "tiny.yaml: paper: true needs the block `sensitivity`")
-
-
-def test_a_key_twice(tmp_path):
-    text = refuse(tmp_path, config="study: a\nseed: 1\nstudy: b\n")
-    one_line(text, "tiny.yaml: not valid YAML: line 3, column 1: the key 'study' stands twice")
 
 
 def test_results_is_a_file(tmp_path):
@@ -366,18 +310,35 @@ def test_truncated_estimates(finished):
     ],
 )
 def test_lint(snakefile, config, tmp_path):
+    """Jobs run where Snakemake does, with the package: no container has it."""
     given = ["--snakefile", ROOT / snakefile, "--configfile", ROOT / f"config/{config}.yaml"]
-    assert "Congratulations" in snakemake(tmp_path, "--lint", *given).stdout
+    text = snakemake(tmp_path, "--lint", *given).stdout
+    said = re.findall(r"^    \* (.*):$", text, re.MULTILINE)
+    assert set(said) == {"Specify a conda environment or container for each rule."}
 
 
-def test_report(finished):
-    succeed(finished, "--report", "report.zip")
-    with zipfile.ZipFile(finished / "report.zip") as archive:
+def test_every_rule_has_a_name_of_its_own():
+    files = [ROOT / "workflow" / "Snakefile", *(ROOT / "workflow").rglob("*.smk")]
+    text = "\n".join(path.read_text(encoding="utf-8") for path in files)
+    names = re.findall(r"^(?:use rule \w+ as|rule) (\w+)", text, re.MULTILINE)
+    assert sorted(names) == sorted({*names})
+
+
+def test_another_attempt_gets_more_memory(tmp_path):
+    (tmp_path / "Snakefile").write_text(RETRIED)
+    result = snakemake(tmp_path, "--cores", 1, "--retries", 1)
+    assert result.returncode == 0, result.stdout
+    assert (tmp_path / "done").exists()
+
+
+def check_report(folder, results):
+    """Check that a report has all figures with titles and captions."""
+    with zipfile.ZipFile(folder / "report.zip") as archive:
         assert archive.testzip() is None
         names = archive.namelist()
         (page,) = (name for name in names if name.endswith("report.html"))
         text = archive.read(page).decode()
-    figures = [*(finished / "results" / "tiny" / "figures").glob("*.svg")]
+    figures = [*(results / "figures").glob("*.svg")]
     for figure in figures:
         assert figure.name in text
         assert get_figure(figure.stem).title in text
@@ -385,3 +346,23 @@ def test_report(finished):
     assert "closed-forms" in {figure.stem for figure in figures}
     assert "Empirical standard deviation of each parameter" in text  # its caption
     assert "1 mgon = 0.0009" in text  # what a caption says of the study
+
+
+def test_report(single):
+    succeed(single, "--report", "report.zip")
+    check_report(single, single / "results" / "tiny")
+
+
+def test_a_module_with_a_prefix(single, tmp_path):
+    """All is in the folder of the prefix; a job finds its tables and figures there."""
+    shutil.copytree(single / "results", tmp_path / "inner" / "results")
+    results = tmp_path / "inner" / "results" / "tiny"
+    (results / "explorer.html").unlink()
+    (tmp_path / "Snakefile").write_text(MODULE)
+    (tmp_path / "study.yaml").write_text(yaml.safe_dump(overlay(read_layer(CONFIG), TINY)))
+    for words in ([], ["--report", "report.zip"]):
+        result = snakemake(tmp_path, "--cores", 1, *words)
+        assert result.returncode == 0, result.stdout
+    assert linked_figures(results) == {*results.glob("figures/*.svg")}
+    assert not (tmp_path / "results").exists()
+    check_report(tmp_path, results)

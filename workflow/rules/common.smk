@@ -1,37 +1,18 @@
 from functools import cache
-from pathlib import Path
 
-from snakemake.exceptions import WorkflowError
-
-from accelstudy.basics.errors import InputError
-from accelstudy.study.figures import (
-    angle_unit,
-    captions,
-    figure_names,
-    figure_tables,
-    get_figure,
-)
+from accelstudy.study.figures import captions, figure_names, figure_tables, get_figure
 from accelstudy.study.batches import batches
 from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study
-from accelstudy.files.reading import read_layer
 from accelstudy.study.effort import study_effort
 from accelstudy.jobs.job import setup_digest
-from accelstudy.files.outputs import check_writable
-from accelstudy.jobs.code import code_hash
 from accelstudy.study.tables import TABLES
 
-try:
-    for path in workflow.configfiles:
-        read_layer(path)  # Snakemake's own reading is less strict
-    STUDY = parse_study(config, ", ".join(map(str, workflow.configfiles)) or "config")
-    RESULTS = f"results/{STUDY.study}"
-    check_writable(RESULTS)
-    angle_unit(STUDY)
+STUDY, RESULTS = configured(parse_study, "study")
+STUDY = STUDY.model_copy(update={"angle_unit": STUDY.angle_unit or angle_unit()})
+with in_a_line():
     CELLS = study_cells(STUDY)
     EFFORT = study_effort(STUDY, CELLS)
-except InputError as error:
-    raise WorkflowError(str(error)) from None
 
 # Jobs get the checked configuration, with all defaults.
 config.update(STUDY.model_dump(mode="json"))
@@ -61,6 +42,10 @@ WRITTEN = {
 WHOLE = ("moments", "sketches")
 MEMORY = max(1000, round(EFFORT.memory / 1e6))
 FIGURES = figure_names(STUDY)
+# What figures and explorer take from the configuration; all else reaches them by the tables.
+SHOWN = {"angle_unit", "gravity_mps2", "grids", "leveling", "models", "noise", "presets"}
+SHOWN |= {"schemes", "sensitivity"}
+DRAWN = STUDY.model_dump(mode="json", include=SHOWN)
 CELL_FIGURES = [name for name in FIGURES if set(figure_tables(name)) <= {*TABLES}]
 SENSITIVITY_FIGURES = [name for name in FIGURES if name not in CELL_FIGURES]
 FINAL_TABLES = [
@@ -120,7 +105,8 @@ def in_report(name):
     entry = get_figure(name)
     return report(
         f"{RESULTS}/figures/{name}.svg",
-        caption=str(Path(f"{RESULTS}/figures/{name}.rst").absolute()),
+        # Snakemake takes any other path from where the rules are.
+        caption=os.path.abspath(placed(f"{RESULTS}/figures/{name}.rst")),
         category=entry.category,
         labels={"content": entry.title},
     )

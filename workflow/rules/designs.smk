@@ -1,8 +1,8 @@
 from accelstudy.proposal.config import DesignsConfig
 
-DESIGNS = section("designs", DesignsConfig)
+DESIGNS = section(EXAMPLE, "designs", DesignsConfig, SOURCE)
 DESIGNS_FILES = {kind: f"{RESULTS}/designs/efficiency.{kind}" for kind in ("parquet", "svg", "png")}
-DESIGNS_OUTPUTS = list(DESIGNS_FILES.values())
+OUTPUTS += DESIGNS_FILES.values()
 
 
 rule designs:
@@ -16,13 +16,13 @@ rule designs:
         f"{RESULTS}/benchmarks/designs/efficiency.tsv"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=megabytes(1000),
     params:
         # As written, with the paths of files, and as read, with the content of the files.
         section=EXAMPLE.designs,
         read=DESIGNS.model_dump(),
-        provenance=PROVENANCE,
-        code=code_hash(workflow.source_path("../scripts/designs.py")),
+        seed=EXAMPLE.seed,
+        code=code_of("designs"),
     message:
         "Compare position schemes with optimal designs"
     script:

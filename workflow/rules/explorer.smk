@@ -24,12 +24,11 @@ rule explorer:
         f"{RESULTS}/benchmarks/explorer.tsv"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=megabytes(1000),
     params:
-        study=STUDY.model_dump(mode="json"),
-        figures={name: f"{RESULTS}/figures/{name}.svg" for name in FIGURES},
-        angle_unit=angle_unit(STUDY),
-        code=code_hash(workflow.source_path("../scripts/explorer.py")),
+        study=DRAWN,
+        figures=FIGURES,
+        code=code_of("explorer"),
     message:
         "Make the explorer of the study"
     script:

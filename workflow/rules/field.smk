@@ -1,13 +1,13 @@
 from accelstudy.field.config import FieldConfig
 
-FIELD = section("field", FieldConfig).cases
+FIELD = section(EXAMPLE, "field", FieldConfig, SOURCE).cases
 FIELD_FILES = [f"shares.{kind}" for kind in ("parquet", "svg", "png")]
-FIELD_OUTPUTS = [f"{RESULTS}/field/{name}/{path}" for name in FIELD for path in FIELD_FILES]
+OUTPUTS += [f"{RESULTS}/field/{name}/{path}" for name in FIELD for path in FIELD_FILES]
 
 
 rule field:
     input:
-        lambda wildcards: FIELD[wildcards.case].files,
+        lambda wildcards: [given(path) for path in FIELD[wildcards.case].files],
     output:
         *(f"{RESULTS}/field/{{case}}/{path}" for path in FIELD_FILES),
     log:
@@ -16,11 +16,11 @@ rule field:
         f"{RESULTS}/benchmarks/field/{{case}}.tsv"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=megabytes(1000),
     params:
         case=lambda wildcards: FIELD[wildcards.case].model_dump(exclude_unset=True),
-        provenance=PROVENANCE,
-        code=code_hash(workflow.source_path("../scripts/field.py")),
+        seed=EXAMPLE.seed,
+        code=code_of("field"),
     message:
         "Work out which errors the variance of roll and pitch comes from: {wildcards.case}"
     script:

@@ -12,11 +12,11 @@ rule figures:
     priority: 1
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=megabytes(1000),
     params:
-        study=STUDY.model_dump(mode="json"),
+        study=DRAWN,
         captions=captions(CELL_FIGURES, STUDY),
-        code=code_hash(workflow.source_path("../scripts/figures.py")),
+        code=code_of("figures"),
     message:
         "Draw the figures of the calibrations"
     script:
@@ -33,8 +33,8 @@ use rule figures as sensitivity_figures with:
     benchmark:
         f"{RESULTS}/benchmarks/sensitivity_figures.tsv"
     params:
-        study=STUDY.model_dump(mode="json"),
+        study=DRAWN,
         captions=captions(SENSITIVITY_FIGURES, STUDY),
-        code=code_hash(workflow.source_path("../scripts/figures.py")),
+        code=code_of("figures"),
     message:
         "Draw the figures of the sensitivity analysis"

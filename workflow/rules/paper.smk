@@ -13,11 +13,11 @@ rule sensitivity:
     priority: 2
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=megabytes(2000),
     params:
         settings=STUDY.sensitivity.model_dump() if STUDY.sensitivity else None,
         sensor=STUDY.model_dump(include={"seed", "gravity_mps2", "noise", "sensor"}),
-        code=code_hash(workflow.source_path("../scripts/sensitivity.py")),
+        code=code_of("sensitivity"),
     message:
         "Analyse the sensitivity of roll and pitch"
     script:
@@ -45,9 +45,9 @@ rule claims:
         f"{RESULTS}/benchmarks/claims.tsv"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=megabytes(1000),
     params:
-        code=code_hash(workflow.source_path("../scripts/claims.py")),
+        code=code_of("claims"),
     message:
         "Check the paper's claims against the Monte Carlo"
     script:

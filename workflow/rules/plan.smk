@@ -1,8 +1,8 @@
 from accelstudy.plan.config import PlanConfig
 
-PLAN = section("plan", PlanConfig)
+PLAN = section(EXAMPLE, "plan", PlanConfig, SOURCE)
 PLAN_FILES = ["plan.parquet", "plan.md", "plan.svg", "plan.png", "positions.yaml", "study.yaml"]
-PLAN_OUTPUTS = [
+OUTPUTS += [
     *[f"{RESULTS}/plan/cases/{name}/{path}" for name in PLAN.cases for path in PLAN_FILES],
     *[f"{RESULTS}/plan/sensors.{kind}" for kind in ("parquet", "svg", "png")],
 ]
@@ -17,13 +17,13 @@ rule plan:
         f"{RESULTS}/benchmarks/plan/cases/{{plan}}.tsv"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=megabytes(2000),
     params:
         case=lambda wildcards: PLAN.cases[wildcards.plan].model_dump(mode="json"),
         replicates=PLAN.replicates,
-        folder=lambda wildcards: f"{RESULTS}/plan/cases/{wildcards.plan}",
-        provenance=PROVENANCE,
-        code=code_hash(workflow.source_path("../scripts/plan.py")),
+        seed=EXAMPLE.seed,
+        angle_unit=angle_unit(),
+        code=code_of("plan"),
     message:
         "Plan the calibration {wildcards.plan}"
     script:
@@ -41,11 +41,12 @@ rule plan_sensors:
         f"{RESULTS}/benchmarks/plan/sensors.tsv"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=megabytes(2000),
     params:
         sensors=PLAN.chosen_sensors,
-        provenance=PROVENANCE,
-        code=code_hash(workflow.source_path("../scripts/plan_sensors.py")),
+        seed=EXAMPLE.seed,
+        angle_unit=angle_unit(),
+        code=code_of("plan_sensors"),
     message:
         "Compare the sensors"
     script:

@@ -1,6 +1,6 @@
 from accelstudy.pole.config import PoleConfig
 
-POLES = section("pole", PoleConfig).cases
+POLES = section(EXAMPLE, "pole", PoleConfig, SOURCE).cases
 POLE_FILES = {
     "summary": "pole.json",
     "budget": "budget.parquet",
@@ -8,12 +8,12 @@ POLE_FILES = {
     "svg": "budget.svg",
     "png": "budget.png",
 }
-POLE_OUTPUTS = [f"{RESULTS}/pole/{name}/{path}" for name in POLES for path in POLE_FILES.values()]
+OUTPUTS += [f"{RESULTS}/pole/{name}/{path}" for name in POLES for path in POLE_FILES.values()]
 
 
 rule pole:
     input:
-        lambda wildcards: POLES[wildcards.pole].files,
+        lambda wildcards: [given(path) for path in POLES[wildcards.pole].files],
     output:
         **{kind: f"{RESULTS}/pole/{{pole}}/{path}" for kind, path in POLE_FILES.items()},
     log:
@@ -22,11 +22,11 @@ rule pole:
         f"{RESULTS}/benchmarks/pole/{{pole}}.tsv"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=megabytes(1000),
     params:
         case=lambda wildcards: POLES[wildcards.pole].model_dump(exclude_unset=True),
-        provenance=PROVENANCE,
-        code=code_hash(workflow.source_path("../scripts/pole.py")),
+        seed=EXAMPLE.seed,
+        code=code_of("pole"),
     message:
         "Work out the error of the pole's foot: {wildcards.pole}"
     script:

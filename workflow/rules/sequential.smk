@@ -1,7 +1,7 @@
 from accelstudy.sequential.config import SequentialConfig
 
-SEQUENTIAL = section("sequential", SequentialConfig)
-SEQUENTIAL_OUTPUTS = [
+SEQUENTIAL = section(EXAMPLE, "sequential", SequentialConfig, SOURCE)
+OUTPUTS += [
     f"{RESULTS}/sequential/{name}" for name in ("summary.parquet", "positions.svg", "positions.png")
 ]
 
@@ -17,11 +17,11 @@ rule sequential_sessions:
         approach="|".join(SEQUENTIAL.approaches),
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=megabytes(1000),
     params:
         config=SEQUENTIAL.model_dump(mode="json"),
-        provenance=PROVENANCE,
-        code=code_hash(workflow.source_path("../scripts/sequential_sessions.py")),
+        seed=EXAMPLE.seed,
+        code=code_of("sequential_sessions"),
     message:
         "Simulate sessions that choose their positions: {wildcards.approach}"
     script:
@@ -43,11 +43,11 @@ rule sequential:
         f"{RESULTS}/benchmarks/sequential/summary.tsv"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=megabytes(1000),
     params:
         config=SEQUENTIAL.model_dump(mode="json"),
-        provenance=PROVENANCE,
-        code=code_hash(workflow.source_path("../scripts/sequential_summary.py")),
+        seed=EXAMPLE.seed,
+        code=code_of("sequential_summary"),
     message:
         "Summarise how many positions the promised accuracy takes, and how often it is reached"
     script:

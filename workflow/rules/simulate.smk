@@ -7,10 +7,10 @@ rule simulate:
         f"{RESULTS}/benchmarks/simulate/{{part}}.tsv"
     threads: 1
     resources:
-        mem_mb=MEMORY,
+        mem_mb=megabytes(MEMORY),
     params:
         spec=lambda wildcards: part_spec(wildcards.part),
-        code=code_hash(workflow.source_path("../scripts/simulate.py")),
+        code=code_of("simulate"),
     message:
         "Simulate and calibrate batch {wildcards.part}"
     script:

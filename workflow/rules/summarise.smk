@@ -9,14 +9,14 @@ rule summarise:
         f"{RESULTS}/benchmarks/summarise/{{batch}}.tsv"
     threads: 1
     resources:
-        mem_mb=MEMORY,
+        mem_mb=megabytes(MEMORY),
     params:
         spec=lambda wildcards: {
             "cells": [cell.to_dict() for cell in BATCHES[wildcards.batch].cells]
         },
         setups=lambda wildcards: [setup_of(part) for part in PARTS_OF[wildcards.batch]],
         leveling=STUDY.leveling.model_dump(),
-        code=code_hash(workflow.source_path("../scripts/summarise.py")),
+        code=code_of("summarise"),
     message:
         "Work out sds, correlations and tilt errors of batch {wildcards.batch}"
     script:
@@ -34,9 +34,9 @@ rule collect:
         f"{RESULTS}/benchmarks/collect.tsv"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=megabytes(1000),
     params:
-        code=code_hash(workflow.source_path("../scripts/collect.py")),
+        code=code_of("collect"),
     message:
         "Join the tables of all batches"
     script:

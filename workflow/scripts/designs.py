@@ -1,15 +1,14 @@
 from accelstudy.drawing.saving import save
 from accelstudy.drawing.style import DPI
 from accelstudy.files.tables import write_table
-from accelstudy.jobs.job import logged
+from accelstudy.jobs.job import job
 from accelstudy.proposal.config import DesignsConfig
 from accelstudy.proposal.efficiency import efficiency_table
 from accelstudy.proposal.figure import efficiency_figure
 from accelstudy.schemes import get_scheme
 
-with logged(snakemake):
+with job(snakemake) as provenance:
     config = DesignsConfig.model_validate(snakemake.params.section)
-    provenance = snakemake.params.provenance
     table = efficiency_table(
         [config.task(approach) for approach in config.chosen_approaches],
         [get_scheme(name) for name in config.chosen_schemes],

@@ -1,11 +1,15 @@
+from pathlib import Path
+
 from accelstudy.jobs.job import job
 from accelstudy.study.config import StudyConfig
 from accelstudy.study.explorer.page import write_explorer
 
 with job(snakemake):
+    figures = Path(snakemake.output[0]).parent / "figures"
+    paths = {name: figures / f"{name}.svg" for name in snakemake.params.figures}
     write_explorer(
         StudyConfig.model_validate(snakemake.config),
         dict(snakemake.input.items()),
         snakemake.output[0],
-        {name: str(snakemake.report_href(path)) for name, path in snakemake.params.figures.items()},
+        {name: str(snakemake.report_href(path)) for name, path in paths.items()},
     )

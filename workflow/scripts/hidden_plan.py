@@ -3,4 +3,4 @@ from accelstudy.hidden.config import parse_hidden
 from accelstudy.jobs.job import logged
 
 with logged(snakemake):
-    write_plan(parse_hidden(snakemake.params.config), snakemake.output[0])
+    write_plan(parse_hidden(snakemake.config), snakemake.output[0])

@@ -1,12 +1,12 @@
 from accelstudy.hidden.config import parse_hidden
 from accelstudy.hidden.page import write_score
-from accelstudy.jobs.job import logged
+from accelstudy.jobs.job import job
 
-with logged(snakemake):
+with job(snakemake) as provenance:
     page = write_score(
-        parse_hidden(snakemake.params.config),
+        parse_hidden(snakemake.config),
         dict(snakemake.input.items()),
         dict(snakemake.output.items()),
-        snakemake.params.provenance,
+        provenance,
     )
     print(page, end="")

@@ -1,11 +1,8 @@
-import os
-
-from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, angles_in
 from accelstudy.campaign.batch.config import parse_batch
 from accelstudy.campaign.batch.overview import counts, summarise_campaigns
 from accelstudy.jobs.job import logged
 
-with logged(snakemake), angles_in(os.environ.get(ANGLE_UNIT_VARIABLE)):
+with logged(snakemake):
     batch = parse_batch(snakemake.config)
     table = summarise_campaigns(
         batch.batch,

@@ -1,11 +1,13 @@
-import os
+from pathlib import Path
 
-from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, angles_in
-from accelstudy.jobs.job import logged
+from accelstudy.jobs.job import job
 from accelstudy.plan.output import make_plan
 
-with logged(snakemake), angles_in(os.environ.get(ANGLE_UNIT_VARIABLE)):
-    given = snakemake.params
+with job(snakemake) as provenance:
     make_plan(
-        snakemake.wildcards.plan, given.case, given.replicates, given.folder, given.provenance
+        snakemake.wildcards.plan,
+        snakemake.params.case,
+        snakemake.params.replicates,
+        Path(snakemake.output[0]).parent,
+        provenance,
     )

@@ -87,8 +87,14 @@ class Assessment:
         return UNCHECKED if test is None or test.powerless else ACCEPTED
 
 
-def assess(fit: CampaignFit) -> Assessment:
-    """Assess a calibrated campaign."""
+def assess(fit: CampaignFit, without_gross_error: bool = False) -> Assessment:
+    """Assess a calibrated campaign.
+
+    Parameters
+    ----------
+    fit : CampaignFit
+    without_gross_error : bool, whether none was recognised in its campaign before
+    """
     session = (fit.model, fit.approach, fit.observed)
     solution = quality.solve(*session, fit.adjustment)
     shares, missing = tilt_shares(fit), tilt_missing(fit)
@@ -112,7 +118,7 @@ def assess(fit: CampaignFit) -> Assessment:
         tilt_parameters=left,
         tilt_missing=missing,
         implausible=implausible,
-        gross_error=recognise(fit.campaign, full),
+        gross_error=None if without_gross_error else recognise(fit.campaign, full),
     )
 
 

@@ -8,17 +8,69 @@ one, too small to be seen, is missing as well.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from scipy.special import softmax
 
-from accelstudy.diagnosis.decision.explanations import Explanation, credible_set
-from accelstudy.diagnosis.evidence.noise.kinds import NOISES
+from accelstudy.diagnosis.decision import priors
+from accelstudy.diagnosis.decision.problem import Problem
+from accelstudy.diagnosis.evidence.detection import Chance, Detection
+from accelstudy.diagnosis.evidence.field import UNKNOWN
+from accelstudy.diagnosis.evidence.hypotheses import (
+    Class,
+    Singles,
+    all_pairs,
+    classes_of,
+    equivalents,
+    unknown_beside,
+    weigh_singles,
+)
+from accelstudy.diagnosis.evidence.noise_models import colour_density
+from accelstudy.diagnosis.evidence.noise_tests import (
+    AXES,
+    COLOUR,
+    LEVEL,
+    NOISES,
+    TAILS,
+    most_evidence,
+    tail_test,
+)
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.effects import effect_names
+
+CREDIBLE = 0.9
+"""Posterior probability that a credible set reaches."""
+FIRST = 5
+"""Effects beside which something unknown is looked for."""
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """One thing that is missing, or two together.
+
+    Attributes
+    ----------
+    names : tuple of str, one or two: effects, or a noise effect, "outlier_position" or "unknown"
+    classes : tuple of tuple of str, the names that mean the same in this campaign, for each name
+    posterior : float, probability given that something is missing
+    """
+
+    names: tuple[str, ...]
+    classes: tuple[tuple[str, ...], ...]
+    posterior: float
+
+
+def credible_set(explanations: Iterable[Explanation]) -> tuple[Explanation, ...]:
+    """Most probable of explanations that exclude each other, until they hold 0.9 together."""
+    chosen: list[Explanation] = []
+    for explanation in sorted(explanations, key=lambda one: -one.posterior):
+        chosen.append(explanation)
+        if sum(one.posterior for one in chosen) >= CREDIBLE:
+            break
+    return tuple(chosen)
 
 
 @dataclass(frozen=True)
@@ -83,8 +135,8 @@ class Posterior:
                 into = min((single[c] for c in one.classes if c in single), default=None)
             if into is not None and into < i:
                 counted[into] = float(np.logaddexp(counted[into], counted.pop(i)))
-        told = [replace(self.all[i], log_weight=log) for i, log in counted.items()]
-        return tuple(sorted(told, key=lambda one: -one.log_weight))
+        merged = [replace(self.all[i], log_weight=log) for i, log in counted.items()]
+        return tuple(sorted(merged, key=lambda one: -one.log_weight))
 
     @cached_property
     def probabilities(self) -> tuple[float, ...]:
@@ -123,3 +175,113 @@ def _shares(weighed: Sequence[Weighed]) -> tuple[float, ...]:
 def of_effects(explanation: Explanation) -> bool:
     """Whether an explanation is of effects alone."""
     return all(members[0] in effect_names() for members in explanation.classes)
+
+
+# --- what is weighed ----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Weighing:
+    """Everything that could be the case, given that something is wrong.
+
+    Attributes
+    ----------
+    singles : Singles, the evidence for each candidate by itself
+    members : dict of candidate to the names that mean the same
+    classes : list of Class, candidates that mean the same together, strongest evidence first
+    alone : list of Weighed, one effect, one bumped position, or something unknown
+    pairs : list of Weighed, two of them, or one of them beside something unknown
+    noises : list of Weighed, only the noise is wrong, in one of its kinds
+    posterior : Posterior, of all of these
+    """
+
+    singles: Singles
+    members: Mapping[str, tuple[str, ...]]
+    classes: list[Class]
+    alone: list[Weighed]
+    pairs: list[Weighed]
+    noises: list[Weighed]
+    posterior: Posterior
+
+
+def weigh(problem: Problem, detection: Detection, chance: Chance) -> Weighing:
+    """Weigh everything that could be the case.
+
+    Parameters
+    ----------
+    problem : Problem
+    detection : Detection, of the same
+    chance : Chance, residuals without any effect
+    """
+    singles = weigh_singles(problem.examined, problem.field, problem.evidence)
+    members = equivalents(problem.examined, singles)
+    classes = classes_of(singles, members)
+    each = -np.log(max(len(classes), 1))
+    alone = [
+        Weighed((best.name,), (names,), singles.densities[best.name] + each, (best,))
+        for best, names in classes
+    ]
+    unknown = detection.densities.get(UNKNOWN)
+    if unknown is not None:
+        alone.append(Weighed((UNKNOWN,), ((UNKNOWN,),), unknown + np.log(priors.UNKNOWN)))
+    pairs = weigh_pairs(problem, singles, members, classes)
+    noises = _noises(problem, detection, chance)
+    posterior = Posterior.of([*alone, *pairs, *noises])
+    return Weighing(singles, members, classes, alone, pairs, noises, posterior)
+
+
+def weigh_pairs(
+    problem: Problem,
+    singles: Singles,
+    members: Mapping[str, tuple[str, ...]],
+    classes: Sequence[Class],
+) -> list[Weighed]:
+    """Weigh two candidates together, and each of the strongest beside something unknown.
+
+    Parameters
+    ----------
+    problem : Problem
+    singles, members, classes : as in `Weighing`
+    """
+    k = len(classes)
+    if k < 2:
+        return []
+    each = np.log(priors.TWO) - np.log(k * (k + 1) / 2)
+    called = {name: best.name for best, names in classes for name in names}
+    residuals, evidence, densities = problem.residuals, problem.evidence, singles.densities
+    weighed = []
+    for pair in all_pairs(singles.shapes, residuals, evidence):
+        one, other = sorted(pair.best, key=lambda h: -densities[h.name])
+        both = (members[one.name], members[other.name])
+        if both[0] != both[1] or one.effect is None:
+            names = tuple(called.get(h.name, h.name) for h in (one, other))
+            weighed.append(Weighed(names, both, pair.log_density + each, (one, other)))
+    for best, alike in classes[:FIRST]:
+        beside = unknown_beside(best, problem.groups, residuals, evidence)
+        if beside is not None:
+            total = densities[best.name] + beside - np.log(k)
+            prior = np.log(priors.TWO * priors.UNKNOWN)
+            weighed.append(Weighed((best.name, UNKNOWN), (alike, (UNKNOWN,)), total + prior))
+    return weighed
+
+
+def _noises(problem: Problem, detection: Detection, chance: Chance) -> list[Weighed]:
+    """Weigh each kind of wrong noise, with nothing else missing."""
+    residuals, evidence, by_level = problem.residuals, problem.evidence, detection.noise
+    nothing = float(np.logaddexp.reduce(by_level))
+    assert problem.axes is not None
+    # Weighted axes need no further evidence that they differ.
+    unequal = nothing + np.log(priors.AXES) + problem.axes.log_evidence
+    if problem.frame.solution is not problem.base.solution:
+        unequal = float(by_level[0])
+    tails = tail_test(residuals.positions, chance)
+    logs = {
+        COLOUR: np.log(priors.COLOUR) + colour_density(residuals, evidence),
+        AXES: unequal,
+        TAILS: nothing + np.log(priors.TAILS) + most_evidence(tails.p_value),
+    }
+    if len(by_level) > 1:
+        # More noise than within the holds is an offset from hold to hold.
+        name = LEVEL if evidence.level.known else COLOUR
+        logs[name] = np.logaddexp(logs.get(name, -np.inf), by_level[1])
+    return [Weighed((name,), ((name,),), float(log)) for name, log in logs.items()]

@@ -1,31 +1,61 @@
-"""The verdict: which explanation of the posterior is given."""
+"""The verdict: which explanation of the posterior is given, and what is said of the noise."""
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import special
 
 from accelstudy.adjustment.quality import Solution
 from accelstudy.basics.levels import REFUTED
 from accelstudy.basics.wording import comma_list, words
+from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision import priors
-from accelstudy.diagnosis.decision.explanations import Explanation
-from accelstudy.diagnosis.decision.posterior import Posterior, Weighed, of_effects
-from accelstudy.diagnosis.decision.search import Search
+from accelstudy.diagnosis.decision.posterior import (
+    Explanation,
+    Posterior,
+    Weighed,
+    Weighing,
+    of_effects,
+)
+from accelstudy.diagnosis.decision.problem import Problem, pose
+from accelstudy.diagnosis.decision.refits import best_refit
+from accelstudy.diagnosis.evidence.detection import Chance, Detection
 from accelstudy.diagnosis.evidence.field import UNKNOWN
-from accelstudy.diagnosis.evidence.noise.kinds import LEVEL, NOISES
-from accelstudy.diagnosis.space.examined import ExaminedFit, examine
-from accelstudy.diagnosis.space.groups import LACK_OF_FIT
-from accelstudy.diagnosis.space.hypotheses import Hypothesis
-from accelstudy.diagnosis.space.repeats import clusters
+from accelstudy.diagnosis.evidence.hypotheses import equivalents, strongest, weigh_singles
+from accelstudy.diagnosis.evidence.noise_tests import (
+    AXES,
+    COLOUR,
+    LEVEL,
+    NOISES,
+    STEPS,
+    TAILS,
+    NoiseTest,
+    axis_test,
+    colour_test,
+    level_test,
+    resolution_test,
+    tail_test,
+    within_hold_test,
+)
+from accelstudy.diagnosis.space.examined import Frame
+from accelstudy.diagnosis.space.groups import LACK_OF_FIT, LackOfFit, clusters
+from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis, Spaces
 from accelstudy.diagnosis.space.residuals import Residuals
-from accelstudy.diagnosis.space.spaces import LackOfFit, Spaces
 
 LARGE = 300.0
 """Noncentrality beyond which first order is not enough, and a refit judges an effect."""
+LEVEL_NOISE = 0.01
+"""Family-wise level of all tests of the noise but that of its level, which has `REFUTED`. With the
+test for anything that is missing they make 5 % false alarms."""
+RIVAL = 0.5
+"""Canonical cosine from which on an effect is listed as a rival."""
+SPECIFIC = (STEPS, COLOUR, AXES, TAILS, LEVEL)
+"""What may be wrong with the noise, the most specific first."""
 
 
 @dataclass(frozen=True)
@@ -46,12 +76,12 @@ class Choice:
 
 @dataclass(frozen=True)
 class Finding:
-    """What a search found.
+    """What is said of a problem, with the hypotheses and the fit that it is said by.
 
     Attributes
     ----------
     verdict : str, "no_effect", "named", "narrowed", "gross_error", "noise_model" or "unknown"
-    examined : ExaminedFit, of the fit with what was chosen, or of the base fit
+    frame : Frame, of the fit with what was chosen, or of the base fit
     reason : str
     chosen : tuple of Choice
     posterior : Posterior or None, where something is missing
@@ -59,7 +89,7 @@ class Finding:
     """
 
     verdict: str
-    examined: ExaminedFit
+    frame: Frame
     reason: str = ""
     chosen: tuple[Choice, ...] = ()
     posterior: Posterior | None = None
@@ -71,30 +101,58 @@ class Finding:
         return () if self.posterior is None else self.posterior.credible_set
 
 
-def find(search: Search) -> Finding:
+@dataclass(frozen=True)
+class Named:
+    """An effect, noise effect or gross error that was found.
+
+    Attributes
+    ----------
+    name, spec : str; of a bumped position `spec` is the name
+    equivalence_class : tuple of str, names that mean the same in this campaign
+    p_value : float, family-wise; None of a gross error that is recognised by its size
+    posterior : float; None of what is no rival of the others
+    rivals : tuple of (name, cosine)
+    imitators : tuple of str, further names that could leave the same, and more
+    parameters : tuple of (name, value, sigma, unit), SI
+    position : int, of a bumped position
+    """
+
+    name: str
+    spec: str
+    equivalence_class: tuple[str, ...]
+    p_value: float | None
+    posterior: float | None
+    rivals: tuple[tuple[str, float], ...] = ()
+    imitators: tuple[str, ...] = ()
+    parameters: tuple[tuple[str, float, float | None, str], ...] = ()
+    position: int | None = None
+
+
+def find(problem: Problem, weighing: Weighing) -> Finding:
     """Say what is missing, given that something is."""
-    posterior = search.posterior
+    posterior = weighing.posterior
     strongest = next((one for one in posterior.all if len(one.best) == 1), None)
-    if strongest is not None and _is_large(search, strongest):
-        posterior = _judged_by_refits(search, strongest)
+    if strongest is not None and _is_large(problem, strongest):
+        posterior = _judged_by_refits(problem, weighing, strongest)
     top = posterior.top
     if not top.best:
-        return _without_a_fit(search, posterior)
-    fit = search.refits.best(list(zip(top.best, top.classes, strict=True)))
+        return _without_a_fit(problem, posterior)
+    chosen = zip(top.best, top.classes, strict=True)
+    fit = best_refit(problem.examined, weighing.singles, chosen)
     if fit is None:
         reason = f"{_explained(top.names)} most of it, but a model with it has no solution"
-        return Finding("unknown", search.examined, reason, posterior=posterior)
+        return Finding("unknown", problem.frame, reason, posterior=posterior)
     best, solution = fit
-    left = _misfit(search, solution)
+    left = _misfit(problem, solution)
     if left:
-        said = comma_list([words(name) for name in top.names])
-        reason = f"with {said} added, the residuals are still {left}"
-        return Finding("unknown", search.examined, reason, posterior=posterior)
-    return _with_a_fit(search, posterior, best, solution)
+        added = comma_list([words(name) for name in top.names])
+        reason = f"with {added} added, the residuals are still {left}"
+        return Finding("unknown", problem.frame, reason, posterior=posterior)
+    return _with_a_fit(problem, posterior, best, solution)
 
 
 def _with_a_fit(
-    search: Search, posterior: Posterior, best: Sequence[Hypothesis], solution: Solution
+    problem: Problem, posterior: Posterior, best: Sequence[Hypothesis], solution: Solution
 ) -> Finding:
     """Judge the most probable explanation, which has a fit."""
     top, probability = posterior.top, posterior.explanations[0].posterior
@@ -110,8 +168,8 @@ def _with_a_fit(
     elif len(credible) <= priors.MANY and _of_effects(credible) >= priors.SURE:
         verdict = "narrowed"
     else:
-        return _without_a_fit(search, posterior)
-    return Finding(verdict, examine(solution), "", chosen, posterior)
+        return _without_a_fit(problem, posterior)
+    return Finding(verdict, Frame.of(solution), "", chosen, posterior)
 
 
 def _of_effects(credible: Sequence[Explanation]) -> float:
@@ -119,13 +177,13 @@ def _of_effects(credible: Sequence[Explanation]) -> float:
     return sum(one.posterior for one in credible if of_effects(one))
 
 
-def _without_a_fit(search: Search, posterior: Posterior) -> Finding:
+def _without_a_fit(problem: Problem, posterior: Posterior) -> Finding:
     """Judge where no effect or set of effects is probable enough."""
     first = posterior.explanations[0]
     if first.names[0] in NOISES and first.posterior >= priors.SURE:
         return Finding(
             "noise_model",
-            search.examined,
+            problem.frame,
             NOISES[first.names[0]],
             posterior=posterior,
             says_the_level=first.names[0] == LEVEL,
@@ -138,7 +196,7 @@ def _without_a_fit(search: Search, posterior: Posterior) -> Finding:
             f"{_explained(first.names)} it with a probability of {first.posterior:.2f} only, and "
             f"{second} with {posterior.explanations[1].posterior:.2f}"
         )
-    return Finding("unknown", search.examined, reason, posterior=posterior)
+    return Finding("unknown", problem.frame, reason, posterior=posterior)
 
 
 def _explained(names: Sequence[str]) -> str:
@@ -146,86 +204,94 @@ def _explained(names: Sequence[str]) -> str:
     return f"{comma_list([words(name) for name in names])} explain{'s' if len(names) == 1 else ''}"
 
 
-def _is_large(search: Search, top: Weighed) -> bool:
+def _is_large(problem: Problem, top: Weighed) -> bool:
     """Whether an effect is so large that its signature to first order is not enough."""
-    z, basis = search.residuals.z, top.best[0].basis
+    z, basis = problem.residuals.z, top.best[0].basis
     return top.best[0].effect is not None and float(np.sum((z @ basis) ** 2)) > LARGE
 
 
-def _judged_by_refits(search: Search, single: Weighed) -> Posterior:
+def _judged_by_refits(problem: Problem, weighing: Weighing, single: Weighed) -> Posterior:
     """Posterior where an effect is large: it alone, or with another one in what its refit leaves.
 
     To first order a large effect leaves so much that anything would seem to be beside it.
     """
-    pairs = [one for one in search.pairs if len(one.best) == 2]
-    refitted = [_refitted(search, one) for one in (single, *sorted(pairs, key=_weight)[-1:])]
-    found = [one for one, _ in refitted]
+    pairs = [one for one in weighing.pairs if len(one.best) == 2]
+    strongest_pair = sorted(pairs, key=lambda one: one.log_weight)[-1:]
+    refitted = [_refitted(problem, weighing, one) for one in (single, *strongest_pair)]
+    weighed = [one for one, _ in refitted]
     alone, solution = refitted[0]
     if solution is not None:
-        found += _beside(search, alone, solution)
-    others = [one for one in search.singles if one.best and one.names != single.names]
-    return Posterior.of([*found, *others, *search.noises])
+        weighed += _beside(problem, len(weighing.classes), alone, solution)
+    others = [one for one in weighing.alone if one.best and one.names != single.names]
+    return Posterior.of([*weighed, *others, *weighing.noises])
 
 
-def _weight(one: Weighed) -> float:
-    return one.log_weight
-
-
-def _refitted(search: Search, one: Weighed) -> tuple[Weighed, Solution | None]:
+def _refitted(
+    problem: Problem, weighing: Weighing, one: Weighed
+) -> tuple[Weighed, Solution | None]:
     """Weigh an explanation by its refit instead of by first order."""
-    fit = search.refits.best(list(zip(one.best, one.classes, strict=True)))
+    chosen = zip(one.best, one.classes, strict=True)
+    fit = best_refit(problem.examined, weighing.singles, chosen)
     if fit is None:
         return one, None
     best, solution = fit
-    z, basis = search.residuals.z, np.concatenate([h.basis for h in one.best], axis=1)
+    z, basis = problem.residuals.z, np.concatenate([h.basis for h in one.best], axis=1)
     left = z - basis @ np.linalg.lstsq(basis, z, rcond=None)[0]
     # The refit is one of the means; of slopes it takes up what first order does.
-    means = left[: len(search.residuals.positions.design)]
+    means = left[: len(problem.residuals.positions.design)]
     gain = max(float(means @ means) - solution.omega, 0.0)
     parts = float(z @ z - left @ left) + np.array([0.0, gain])
-    first, refit = search.evidence.of_spaces(parts, [basis.shape[1]] * 2, z @ z)
+    first, refit = problem.evidence.of_spaces(parts, [basis.shape[1]] * 2, z @ z)
     weight = one.log_weight + float(refit - first)
     return replace(one, log_weight=weight, best=tuple(best)), solution
 
 
-def _beside(search: Search, alone: Weighed, solution: Solution) -> list[Weighed]:
-    """One effect with another one, or with something unknown, in what its refit leaves."""
-    inner = Search(solution, search.seed, search.level, search.within)
+def _beside(problem: Problem, count: int, alone: Weighed, solution: Solution) -> list[Weighed]:
+    """One effect with another one, or with something unknown, in what its refit leaves.
+
+    Parameters
+    ----------
+    problem : Problem
+    count : int, classes of candidates
+    alone : Weighed, the effect
+    solution : Solution, its refit
+    """
+    inner = pose(replace(problem.base, solution=solution))
     z, field = inner.residuals.z, inner.field
+    members = equivalents(inner.examined, weigh_singles(inner.examined, field, inner.evidence))
     nothing = float(np.logaddexp.reduce(inner.evidence.of_noise(z @ z)))
     logs = field.densities(inner.evidence, z) - nothing + alone.log_weight
-    k = max(len(search.classes), 1)
-    found = []
+    k, weighed = max(count, 1), []
     for name, log in zip(field.names, logs.tolist(), strict=True):
         if name == UNKNOWN:
             weight = log + float(np.log(priors.TWO * priors.UNKNOWN))
             names, classes = (*alone.names, UNKNOWN), (*alone.classes, (UNKNOWN,))
-            found.append(Weighed(names, classes, weight))
+            weighed.append(Weighed(names, classes, weight))
             continue
-        other = inner.first_shape(name)
-        both = (*alone.classes, inner.members(other))
+        other = strongest(inner.examined.candidates[name], z)
+        both = (*alone.classes, members[name])
         weight = log + float(np.log(priors.TWO / k))
-        found.append(Weighed((*alone.names, name), both, weight, (*alone.best, other)))
-    return found
+        weighed.append(Weighed((*alone.names, name), both, weight, (*alone.best, other)))
+    return weighed
 
 
-def _misfit(search: Search, solution: Solution) -> str:
+def _misfit(problem: Problem, solution: Solution) -> str:
     """Say how much larger than the noise the residuals still are; empty if they are not.
 
     The noise is the given sigma. Where none is given, or where repeated positions refute it even
     after the refit, it is the difference of repeated positions.
     """
-    known = search.level.known
-    if known and 2 * float(special.chdtrc(solution.redundancy, solution.omega)) >= REFUTED:
+    stated = problem.evidence.level.known
+    if stated and 2 * float(special.chdtrc(solution.redundancy, solution.omega)) >= REFUTED:
         return ""
     ratio = float(np.sqrt(solution.omega / solution.redundancy))
-    than_stated = f"{ratio:.2g} times the stated noise" if known else ""
+    than_stated = f"{ratio:.2g} times the stated noise" if stated else ""
     left = Residuals.of(solution)
-    labels = clusters(search.examined.frame.forces)
+    labels = clusters(problem.frame.forces)
     if len(labels) != len(solution.misclosures) or len(np.unique(labels)) == len(labels):
         return than_stated
     square, freedom = _of_repeats(left, LackOfFit.of(left, labels))
-    if not freedom or (known and special.chdtrc(freedom, square) >= REFUTED / 2):
+    if not freedom or (stated and special.chdtrc(freedom, square) >= REFUTED / 2):
         return than_stated
     if _of_fit(left, square, freedom) >= REFUTED:
         return ""
@@ -233,11 +299,12 @@ def _misfit(search: Search, solution: Solution) -> str:
     return than_stated or f"{ratio:.2g} times what repeated positions differ by"
 
 
-def lack_of_fit(search: Search) -> float:
+def lack_of_fit(problem: Problem) -> float:
     """p-value of the test whether repeats agree better with each other than with the model."""
-    if LACK_OF_FIT not in search.groups:
+    residuals, groups = problem.residuals, problem.groups
+    if LACK_OF_FIT not in groups:
         return 1.0
-    return _of_fit(search.residuals, *_of_repeats(search.residuals, search.groups[LACK_OF_FIT]))
+    return _of_fit(residuals, *_of_repeats(residuals, groups[LACK_OF_FIT]))
 
 
 def _of_fit(residuals: Residuals, square: float, freedom: int) -> float:
@@ -253,3 +320,174 @@ def _of_repeats(residuals: Residuals, same: Spaces) -> tuple[float, int]:
     """Square of the differences of repeated positions, and its degrees of freedom."""
     square = float(residuals.z @ residuals.z) - float(same.parts(residuals.z)[0])
     return max(square, 0.0), residuals.redundancy - int(same.dims[0])
+
+
+# --- the noise ----------------------------------------------------------------------------------
+
+
+def tests_of_noise(
+    problem: Problem, frame: Frame, campaign: Campaign, chance: Chance
+) -> tuple[NoiseTest, ...]:
+    """All tests of the noise that a campaign allows, on the residuals of a fit.
+
+    Parameters
+    ----------
+    problem : Problem
+    frame : Frame, of the base fit or of the final one
+    campaign : Campaign
+    chance : Chance, residuals without any effect
+    """
+    residuals, base = frame.residuals.positions, problem.residuals.positions
+    sigma, sigma_base = (float(np.mean(one.sigmas[:, :3])) for one in (residuals, base))
+    # With a sigma far too large, the attitudes would look like steps.
+    least = sigma_base * min(1.0, float(np.sqrt(base.variance)))
+    tests = [level_test_of(problem, frame)] if problem.evidence.level.known else []
+    tests += [
+        axis_test(residuals, chance),
+        colour_test(residuals, chance),
+        tail_test(residuals, chance),
+        resolution_test(campaign.forces, least),
+    ]
+    if campaign.sd is not None and campaign.n_samples is not None:
+        tests.append(within_hold_test(residuals, sigma, campaign.sd, campaign.n_samples))
+    return tuple(tests)
+
+
+def level_test_of(problem: Problem, frame: Frame) -> NoiseTest:
+    """Test the level of the noise; the base fit by its own Ω, as the calibration does."""
+    if frame is problem.frame:
+        return level_test(Residuals.of(problem.base.solution))
+    return level_test(frame.residuals.positions)
+
+
+def sigma_holds(problem: Problem, frame: Frame) -> bool:
+    """Whether sigma is given, and the residuals of a fit do not refute it."""
+    stated = problem.evidence.level.known
+    return stated and level_test_of(problem, frame).p_value >= REFUTED
+
+
+def unit_variance(problem: Problem, frame: Frame) -> float:
+    """Variance of unit weight: 1 where the given sigma holds, else a posteriori."""
+    return 1.0 if sigma_holds(problem, frame) else frame.residuals.positions.variance
+
+
+def worst_of(tests: Sequence[NoiseTest]) -> NoiseTest | None:
+    """Return what is wrong with the noise, the most specific finding first."""
+    level = next((t for t in tests if t.name == LEVEL), None)
+    counted = [
+        t
+        for t in tests
+        # A sigma that the residuals confirm knows of what varies from hold to hold.
+        if not (t.by_holds and level is not None and level.p_value >= REFUTED)
+    ]
+    others = LEVEL_NOISE / max(len(counted) - (level is not None), 1)
+    failed = [t for t in counted if t.p_value < (REFUTED if t is level else others)]
+    return min(failed, key=lambda t: SPECIFIC.index(t.name), default=None)
+
+
+def judge_noise(problem: Problem, posterior: Posterior, worst: NoiseTest) -> Finding:
+    """Judge a failed test of the noise, when no effect was significant."""
+    frame = problem.frame
+    if lack_of_fit(problem) < REFUTED and worst.name != STEPS:
+        reason = (
+            "repeated positions agree better with each other than with the model, so it is not "
+            "the noise"
+        )
+        return Finding("unknown", frame, reason, posterior=posterior)
+    noise, of_level = posterior.of_noise, worst.name == LEVEL
+    # Larger residuals may be an effect that the test for a pattern could not see.
+    if not of_level or worst.estimate[0] < 1 or noise >= priors.MORE_PROBABLE:
+        return Finding(
+            "noise_model", frame, worst.remark, posterior=posterior, says_the_level=of_level
+        )
+    name = next(n for e in posterior.explanations for n in e.names if n not in NOISES)
+    reason = (
+        f"{worst.remark}; it may be the noise (probability {noise:.2f}), but "
+        f"{'something' if name == 'unknown' else 'an effect such as ' + name} is not excluded"
+    )
+    return Finding("unknown", frame, reason, posterior=posterior, says_the_level=True)
+
+
+# --- what was found -----------------------------------------------------------------------------
+
+
+def describe(
+    problem: Problem,
+    detection: Detection,
+    finding: Finding,
+    tests: Sequence[NoiseTest],
+    labels: NDArray[np.int_],
+    variance: float,
+) -> tuple[Named, ...]:
+    """Describe what was found.
+
+    Parameters
+    ----------
+    problem : Problem
+    detection : Detection, of the same
+    finding : Finding
+    tests : of the noise
+    labels : (n,) int array, of the positions
+    variance : float, of unit weight
+    """
+    if finding.verdict == "noise_model":
+        worst, posterior = worst_of(tests), finding.posterior
+        assert posterior is not None
+        top = next(e.names[0] for e in posterior.explanations if e.names[0] in NOISES)
+        name = top if worst is None else worst.name
+        p = detection.p_value if worst is None else worst.p_value
+        return (Named(name, name, (name,), p, posterior.of_noise),)
+    solution = finding.frame.solution
+    sigma = np.sqrt(np.diag(solution.cofactors) * variance)
+    columns = {name: i for i, name in enumerate(solution.model.parameter_names)}
+    named = []
+    for choice in finding.chosen:
+        best, p = choice.best, detection.p_family[choice.best.name]
+        if best.place is not None:
+            label = int(labels[best.place])
+            named.append(Named(OUTLIER, OUTLIER, (OUTLIER,), p, choice.probability, position=label))
+            continue
+        assert best.effect is not None
+        assert best.shown is not None
+        places = [(q, columns[q.name]) for q in best.shown.parameters]
+        examined, members = problem.examined, choice.members
+        named.append(
+            Named(
+                name=best.name,
+                spec=best.effect.spec,
+                equivalence_class=members,
+                p_value=p,
+                posterior=choice.probability,
+                rivals=tuple(
+                    (name, cosine)
+                    for name, cosine in examined.nearest(best)
+                    if cosine >= RIVAL and name not in members
+                ),
+                imitators=tuple(n for n in examined.imitators(best) if n not in members),
+                parameters=tuple(
+                    (q.name, float(solution.parameters[i]), float(sigma[i]), q.unit)
+                    for q, i in places
+                ),
+            )
+        )
+    return tuple(named)
+
+
+def probabilities(finding: Finding, detection: Detection) -> dict[str, float]:
+    """Posterior of each name, alone or with another; a class stands under its first name.
+
+    Where nothing is missing, they only show which name would come first, each by itself.
+    """
+    if finding.posterior is None:
+        logs = detection.densities
+        ranked = sorted(logs, key=lambda name: -logs[name])
+        shares = special.softmax([logs[name] for name in ranked]).tolist() if ranked else []
+        return dict(zip(ranked, shares, strict=True))
+    first: dict[tuple[str, ...], str] = {}
+    total: dict[str, float] = defaultdict(float)
+    for one, p in zip(finding.posterior.all, finding.posterior.probabilities, strict=True):
+        # Two bumped positions have one name.
+        named = zip(one.classes, one.names, strict=True)
+        for name in {first.setdefault(members, name): None for members, name in named}:
+            total[name] += p
+    return dict(sorted(total.items(), key=lambda item: -item[1]))

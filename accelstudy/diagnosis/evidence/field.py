@@ -10,8 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.diagnosis.evidence.size import Evidence, log_mean
-from accelstudy.diagnosis.space.hypotheses import BumpedPositions, EffectShapes, Shapes
-from accelstudy.diagnosis.space.spaces import Bases, Spaces
+from accelstudy.diagnosis.space.hypotheses import (
+    Bases,
+    BumpedPositions,
+    EffectShapes,
+    Shapes,
+    Spaces,
+)
 
 Array = NDArray[np.float64]
 
@@ -76,18 +81,18 @@ class Field:
 
     def parts(self, errors: Array) -> Array:
         """Squares of what residuals (..., m) have in each space, (..., s)."""
-        found, first = [], 0
+        squares, first = [], 0
         together = self._together
         seen = together.parts(errors) if len(together.dims) else None
         for spaces in self.spaces:
             for space in spaces:
                 if isinstance(space, Bases):
                     assert seen is not None
-                    found.append(seen[..., first : first + len(space.dims)])
+                    squares.append(seen[..., first : first + len(space.dims)])
                     first += len(space.dims)
                 else:
-                    found.append(space.parts(errors))
-        return np.concatenate(found, axis=-1)
+                    squares.append(space.parts(errors))
+        return np.concatenate(squares, axis=-1)
 
     def densities(self, evidence: Evidence, errors: Array) -> Array:
         """Log density of residuals (..., m) under each candidate, over its shapes, (..., K)."""
@@ -100,7 +105,7 @@ class Field:
         weighted = logs + np.log(np.concatenate(self.weights))
         # `numpy.logaddexp.reduceat` goes one by one, which takes eight times as long.
         top = np.maximum.reduceat(weighted, self.starts, axis=-1)
-        counts = [len(own) for own in self.weights]
+        counts = [len(weights) for weights in self.weights]
         weighted -= np.repeat(top, counts, axis=-1)
         sums = np.add.reduceat(np.exp(weighted), self.starts, axis=-1)
         return np.asarray(top + np.log(sums))
@@ -143,10 +148,10 @@ class Field:
         of_amount = np.repeat(candidate, dims)
         changed = noise.copy()
         for k in np.unique(candidate):
-            own = np.flatnonzero(candidate == k)
+            rows = np.flatnonzero(candidate == k)
             shapes = self.spaces[k][0]
             assert isinstance(shapes, EffectShapes | BumpedPositions)
-            changed[own] += shapes.drawn(drawn[own] - self.starts[k], amounts[of_amount == k])
+            changed[rows] += shapes.drawn(drawn[rows] - self.starts[k], amounts[of_amount == k])
         return changed
 
     def proposal(self, parts: Array) -> Array:

@@ -133,11 +133,11 @@ class Evidence:
         """
         dims, squares = np.asarray(dims), np.asarray(squares, dtype=float)
         noise, total = self.of_noise(squares), None
-        known, table_of = np.unique(dims, return_inverse=True)
+        sizes, table_of = np.unique(dims, return_inverse=True)
         for c, nu in enumerate(self.level.freedoms):
             share = np.minimum(parts / (nu + squares)[..., None], 1 - 1e-14)
             at = -(nu + self.redundancy) / 2 * np.log(1 - share)
-            tables = np.stack([_table(int(d), nu, self.redundancy) for d in known])
+            tables = np.stack([_table(int(d), nu, self.redundancy) for d in sizes])
             logs = noise[..., c, None] + _looked_up(tables, table_of, at)
             total = logs if total is None else np.logaddexp(total, logs)
         assert total is not None
@@ -152,16 +152,16 @@ def _looked_up(tables: Array, which: NDArray[np.int_], at: Array) -> Array:
     steps -= place
     place += which.astype(np.int32) * tables.shape[1]
     flat = tables.ravel()
-    found = np.diff(flat)[place]
-    found *= steps
-    found += flat[place]
+    values = np.diff(flat)[place]
+    values *= steps
+    values += flat[place]
     if np.any(far := at > _EVEN[-1]):
         beyond = np.nonzero(far)
-        own = which[beyond[-1]]
-        for k in np.unique(own):
-            some = tuple(index[own == k] for index in beyond)
-            found[some] = np.interp(at[some], _LOGS, tables[k])
-    return found
+        chosen = which[beyond[-1]]
+        for k in np.unique(chosen):
+            some = tuple(index[chosen == k] for index in beyond)
+            values[some] = np.interp(at[some], _LOGS, tables[k])
+    return values
 
 
 @lru_cache(maxsize=1024)

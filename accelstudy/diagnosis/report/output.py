@@ -2,27 +2,44 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import yaml
 
 from accelstudy.approaches import get_approach
+from accelstudy.basics import suggested
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.levels import REFUTED
 from accelstudy.basics.progress import stage
+from accelstudy.basics.wording import comma_list, words
 from accelstudy.campaign.calibration.document import json_text
 from accelstudy.campaign.format import read_campaign
+from accelstudy.diagnosis.decision.posterior import CREDIBLE
+from accelstudy.diagnosis.decision.priors import SURE
+from accelstudy.diagnosis.decision.verdict import LEVEL_NOISE
 from accelstudy.diagnosis.loop import REPLICATES, Loop, close_loop
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.report.document.calibration import diagnosed_calibration
-from accelstudy.diagnosis.report.document.diagnosis import diagnosis_document
-from accelstudy.diagnosis.report.document.model_file import study_overlay
-from accelstudy.diagnosis.report.document.positions import positions_table
+from accelstudy.diagnosis.report import words as wording
+from accelstudy.diagnosis.report.document import (
+    diagnosed_calibration,
+    diagnosis_document,
+    positions_table,
+    study_overlay,
+)
+from accelstudy.diagnosis.report.figures import diagnosis_figures
 from accelstudy.diagnosis.result import Diagnosis
+from accelstudy.diagnosis.space.examined import IMITATES
+from accelstudy.drawing.saving import save_all
+from accelstudy.effects import effect_names, get_effect
 from accelstudy.files.outputs import DIAGNOSIS, result_folder, whole_file
 from accelstudy.files.parquet import write_frame
+from accelstudy.pages import write_page
 from accelstudy.sensors.models import get_model
+from accelstudy.sensors.sensor import not_affine
 
 
 def diagnose_folder(
@@ -64,7 +81,6 @@ def diagnose_folder(
 def write_diagnosis(
     diagnosis: Diagnosis,
     folder: str | Path,
-    report: bool = True,
     loop: Loop | None = None,
     source: str | Path = "CAMPAIGN",
     place: str | Path = "",
@@ -75,7 +91,6 @@ def write_diagnosis(
     ----------
     diagnosis : Diagnosis
     folder : path, made if it is not there
-    report : bool, whether to write figures/ and report.html beside the files for programs
     loop : Loop, optional, simulations with the old and with the new model
     source, place : paths of the campaign and of the results, for the commands that the page gives
 
@@ -98,11 +113,7 @@ def write_diagnosis(
     with whole_file(folder / "model.yaml") as path:
         text = yaml.safe_dump(study_overlay(diagnosis), sort_keys=False, allow_unicode=True)
         path.write_text(MODEL_HEADER + text, encoding="utf-8")
-    if report:
-        # Drawing takes as long to import as all of the above to compute.
-        from accelstudy.diagnosis.report.page.report import write_report
-
-        write_report(diagnosis, document, positions, loop, folder, calibration, source, place)
+    _write_report(diagnosis, document, positions, loop, folder, calibration, source, place)
     with whole_file(folder / "diagnosis.json") as path:
         path.write_text(json_text(document), encoding="utf-8")
     return document
@@ -123,3 +134,107 @@ MODEL_HEADER = """\
 # The sensor and the noise that were found, as a study of their own:
 # snakemake --cores 2 --configfile config/config.yaml THIS_FILE
 """
+
+
+def _write_report(
+    diagnosis: Diagnosis,
+    document: dict[str, Any],
+    positions: pd.DataFrame,
+    loop: Loop | None,
+    folder: Path,
+    calibration: dict[str, Any] | None,
+    source: str | Path,
+    place: str | Path,
+) -> None:
+    """Write figures/ and report.html.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    document : dict, of `diagnosis_document`
+    positions : DataFrame, of `positions_table`
+    loop : Loop, optional
+    folder : Path
+    calibration : dict, of `diagnosed_calibration`, optional
+    source, place : paths of the campaign and of the results, for the commands that the page gives
+    """
+    drawn = save_all(diagnosis_figures(diagnosis, positions, loop), folder / "figures")
+    lines = wording.verdict_lines(diagnosis)
+    write_page(
+        folder / "report.html",
+        "diagnosis/report/report.html.j2",
+        " ".join(lines),
+        d=diagnosis,
+        doc=document,
+        groups=wording.GROUPS,
+        verdict="cannot tell" if wording.too_few(diagnosis) else diagnosis.verdict,
+        headline=lines[0],
+        lines=lines[1:],
+        sentence=wording.sentence,
+        described=wording.described,
+        confirmation=wording.confirmation(diagnosis),
+        advice=wording.advice(diagnosis),
+        equation=lambda effect: get_effect(effect["spec"]).equation,
+        is_effect=lambda name: name in effect_names(),
+        amount=wording.amount,
+        unit=wording.shown_unit,
+        estimate=wording.estimate,
+        figures=drawn,
+        changed=wording.changed(diagnosis),
+        keep_base=wording.keep_base(diagnosis),
+        calibration=calibration,
+        added=diagnosis.extended is not diagnosis.model,
+        judged=wording.judged(diagnosis),
+        question=wording.question(diagnosis.next_positions),
+        family=wording.family_words,
+        shares_a_direction=IMITATES,
+        credible=CREDIBLE,
+        wrong=round(10 * SURE),
+        withheld=round(10 * (1 - SURE)),
+        level=diagnosis.level,
+        level_noise=LEVEL_NOISE,
+        level_sigma=REFUTED,
+        sure=SURE,
+        next_steps=next_steps(diagnosis, calibration, source, place),
+    )
+
+
+def next_steps(
+    diagnosis: Diagnosis,
+    calibration: Mapping[str, Any] | None,
+    campaign: str | Path,
+    place: str | Path,
+) -> list[tuple[str, str]]:
+    """Say what to do next, most urgent first: what for, and the command.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    calibration : mapping, of `diagnosed_calibration`; None if there is none
+    campaign, place : paths of the folders of the campaign and of the results
+    """
+    d, steps = diagnosis, []
+    chosen, result = (campaign, d.model.name, d.approach.name), Path(place) / suggested.HERE
+    if d.recognised is not None:
+        command = suggested.calibrate(*chosen)
+        steps.append(("Correct the campaign, and calibrate it then", command))
+    if d.verdict in ("narrowed", "unknown"):
+        which = "the next positions" if d.next_positions else "positions"
+        what = f"Add {which} to the campaign, and diagnose it again"
+        steps.append((what, suggested.diagnose(*chosen)))
+    if d.better_for_leveling == "base":
+        command = suggested.calibrate(*chosen)
+        return [*steps, ("Calibrate with the base model, which levels better", command)]
+    if calibration is None or not calibration["quality"]["plausible"]:
+        return steps
+    use = "Level a log with the calibration that is beside this page"
+    steps.append((use, suggested.apply(result)))
+    inside = not_affine(d.extended)
+    form, why = "c", ""
+    if inside:
+        form, why = "json", f"; no matrix can hold {comma_list([words(name) for name in inside])}"
+    steps.append((f"Take it to a device{why}", suggested.export(form, result)))
+    if d.extended is not d.model:
+        command = suggested.calibrate("CAMPAIGN", Path(place) / "model.yaml", d.approach.name)
+        steps.append(("Calibrate the next campaign with this model", command))
+    return steps

@@ -1,30 +1,171 @@
-"""A fit and all that may be missing from its model: the catalogue, evaluated in its session."""
+"""A calibrated session, and all that may be missing from its model."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import takewhile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import Solution
 from accelstudy.basics.errors import InputError
-from accelstudy.diagnosis.space.frame import Frame
 from accelstudy.diagnosis.space.hypotheses import (
     ALIKE,
     OUTLIER,
+    Bases,
     BumpedPositions,
     EffectShapes,
     Hypothesis,
     Shapes,
     same_space,
 )
-from accelstudy.diagnosis.space.spaces import Bases
-from accelstudy.effects import Effect, effect_names, get_effect
+from accelstudy.diagnosis.space.residuals import VISIBLE, Residuals, ideal_residuals, spans
+from accelstudy.diagnosis.space.signatures import Moments, Signature, signatures
+from accelstudy.diagnosis.space.slopes import Slopes
+from accelstudy.effects import Effect, HoldConditions, effect_names, get_effect
+from accelstudy.leveling.angles import angles_of
 
 Array = NDArray[np.float64]
+
+
+ROUNDING = 1e-9
+"""Share of a signature that rounding errors may leave where nothing is left."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One calibrated session, in which effects are evaluated.
+
+    Attributes
+    ----------
+    solution : Solution
+    residuals : Residuals
+    ideal : Residuals, of an ideal sensor in the same positions
+    forces : (n, 3) array, m/s², of the ideal sensor
+    sensed : (n, 3) array, m/s², the same along the sensitive axes as the base fit finds them
+    angles : (n, 2) array, rad, attitude as the robot reads it, else as the forces show it
+    moments : Moments, of the holds, completed with what is implied
+    """
+
+    solution: Solution
+    residuals: Residuals
+    ideal: Residuals
+    forces: Array
+    sensed: Array
+    angles: Array
+    moments: Moments
+
+    @property
+    def hold(self) -> HoldConditions:
+        """The holds, completed with what is implied."""
+        return self.moments.hold
+
+    @classmethod
+    def of(cls, solution: Solution) -> Frame:
+        """Frame of a calibration at its solution."""
+        ideal, forces = ideal_residuals(solution)
+        observed, model = solution.observed, solution.model
+        if observed.angles is not None and solution.approach.uses_angles:
+            angles = np.asarray(observed.angles[0])
+        else:
+            angles = angles_of(forces)
+        t = model.axes_matrix(solution.parameters[: model.n_parameters])
+        frame = cls(
+            solution=solution,
+            residuals=Residuals.of(solution),
+            ideal=ideal,
+            forces=forces,
+            sensed=np.asarray(np.linalg.solve(t, forces.T).T),
+            angles=angles,
+            moments=Moments(implied_hold(solution, angles), rates=observed.slope is not None),
+        )
+        return frame.with_slopes()
+
+    def signature(self, effect: Effect) -> Signature:
+        """Signature of an effect of the sensor."""
+        return self.signatures((effect,))
+
+    def signatures(self, shapes: Sequence[Effect], ideal: bool = False) -> Signature:
+        """Signatures of shapes of an effect of the sensor, or of an ideal one, side by side."""
+        forces = self.forces if ideal else self.sensed
+        return signatures(shapes, forces, self.angles, self.solution.gravity, self.moments)
+
+    def with_slopes(self) -> Frame:
+        """Add the slopes within the holds where they tell more than the means."""
+        without = replace(self, moments=Moments(self.hold, rates=False))
+        slopes = Slopes.of(self.solution.observed, self.forces)
+        if slopes is None:
+            return without
+        modelled = [self.signature(effect) for effect in self.solution.model.effects]
+        rows = slopes.beside(self.residuals, self.solution.parameters, modelled, self.of_time())
+        if rows is None:
+            return without
+        return replace(
+            self,
+            residuals=self.residuals.with_slopes(rows),
+            ideal=self.ideal.with_slopes(replace(rows, errors=0 * rows.errors)),
+        )
+
+    def of_time(self) -> Iterator[Signature]:
+        """Signatures of the effects beside the model that change the output within a hold."""
+        modelled = {effect.name for effect in self.solution.model.effects}
+        for name in effect_names():
+            if name in modelled:
+                continue
+            try:
+                shapes = get_effect(name).candidates(self.hold, self.forces, self.solution.gravity)
+                shown = self.signatures(shapes).split(len(shapes)) if shapes else []
+            except InputError:  # a column is absent
+                continue
+            yield from takewhile(lambda one: bool(one.rate.any()), shown)
+
+    def hypotheses(self, shapes: Sequence[Effect]) -> list[Hypothesis | None]:
+        """Return what shapes of an effect would leave in the residuals; None for nothing."""
+
+        def of_each(columns: Array) -> Array:
+            """Columns (m, s k) of all shapes as those of each, (s, m, k)."""
+            return np.moveaxis(columns.reshape(len(columns), len(shapes), -1), 1, 0)
+
+        shown = self.signatures(shapes, ideal=True)
+        # A fit is made to the means, so they have to show the effect.
+        means = self.ideal.positions
+        projected = of_each(means.project(means.whitened(shown)))
+        sizes = means.size(shown, self.solution.gravity).reshape(len(shapes), -1)
+        directions, ideal, seen = spans(projected, sizes, VISIBLE)
+        if self.ideal.slopes:
+            projected = of_each(self.ideal.project(self.ideal.whitened(shown)))
+            ideal = spans(projected @ directions, None, ROUNDING)[1]
+        columns = of_each(self.residuals.project(self.residuals.whitened(self.signatures(shapes))))
+        # A force that passes a knee at the ideal sensor may not do so along the real axes.
+        sizes = np.linalg.norm(projected @ directions, axis=1)
+        also, basis, rank = spans(columns @ directions, sizes, ROUNDING)
+        for i in np.flatnonzero(rank < seen):
+            directions[i] = directions[i] @ also[i]
+            ideal[i] = spans((projected[i] @ directions[i])[None], None, ROUNDING)[1][0]
+        return [
+            Hypothesis(
+                name=effect.name,
+                effect=effect,
+                directions=directions[i, :, : rank[i]],
+                basis=basis[i, :, : rank[i]],
+                ideal=ideal[i, :, : rank[i]],
+            )
+            if rank[i]
+            else None
+            for i, effect in enumerate(shapes)
+        ]
+
+
+def implied_hold(solution: Solution, angles: Array) -> HoldConditions:
+    """Complete the holds with what is implied: the attitude, and yaw 0 where none is given."""
+    hold = solution.observed.hold or HoldConditions()
+    yaw = np.zeros(len(angles)) if hold.yaw is None else hold.yaw
+    return replace(hold, roll=angles[:, 0], pitch=angles[:, 1], yaw=yaw)
+
+
 IMITATES = 0.9995
 """Canonical cosine from which on two signatures are held to be the same in what is confirmed."""
 AT_ONCE = 10_000_000
@@ -33,40 +174,30 @@ AT_ONCE = 10_000_000
 
 @dataclass(frozen=True)
 class ExaminedFit:
-    """A calibrated session with the hypotheses about it, each evaluated at first use.
+    """A calibrated session with the hypotheses about it.
 
     Attributes
     ----------
     frame : Frame
+    candidates : dict of name to shapes, what may be missing
+    invisible : tuple of str, effects of rank 0
+    untestable : dict of effect to the reason why it cannot be tested
     """
 
     frame: Frame
+    candidates: Mapping[str, Shapes]
+    invisible: tuple[str, ...]
+    untestable: Mapping[str, str]
 
-    @property
-    def candidates(self) -> Mapping[str, Shapes]:
-        """Shapes of what may be missing, by its name."""
-        return self._catalogue[0]
-
-    @property
-    def invisible(self) -> tuple[str, ...]:
-        """Effects of rank 0."""
-        return self._catalogue[1]
-
-    @property
-    def untestable(self) -> Mapping[str, str]:
-        """Why an effect cannot be tested, by its name."""
-        return self._catalogue[2]
-
-    @cached_property
-    def _catalogue(self) -> tuple[dict[str, Shapes], tuple[str, ...], dict[str, str]]:
+    @classmethod
+    def of(cls, frame: Frame) -> ExaminedFit:
         """Evaluate the effects that are not in the model, and bumped positions."""
-        frame, solution = self.frame, self.frame.solution
-        residuals = frame.residuals
-        known = {effect.name for effect in solution.model.effects}
+        residuals, solution = frame.residuals, frame.solution
+        modelled = {effect.name for effect in solution.model.effects}
         candidates: dict[str, Shapes] = {}
         invisible, untestable = [], {}
         for name in effect_names():
-            if name in known:
+            if name in modelled:
                 continue
             try:
                 effects = get_effect(name).candidates(frame.hold, frame.forces, solution.gravity)
@@ -90,24 +221,24 @@ class ExaminedFit:
         bumped = BumpedPositions.of(residuals)
         if len(bumped):
             candidates[OUTLIER] = bumped
-        return candidates, tuple(invisible), untestable
+        return cls(frame, candidates, tuple(invisible), untestable)
 
     def hypothesis(self, effect: Effect) -> Hypothesis | None:
         """Return what an effect would leave in the residuals; None if nothing."""
         return self.frame.hypotheses((effect,))[0]
 
     def alike(self, others: Sequence[Hypothesis]) -> set[str]:
-        """Effects of which a shape cannot be told from one of other hypotheses."""
+        """Effects indistinguishable from any of the given hypotheses, in one of their shapes."""
         dims = np.array([other.dim for other in others])
         products = self._ideals.parts(np.concatenate([other.ideal.T for other in others]))
         # The squared cosines sum to the squares of all products, so most need no decomposition.
         squares = np.add.reduceat(products, np.cumsum(dims) - dims, axis=0)
-        found: set[str] = set()
+        same: set[str] = set()
         for i, k in np.argwhere(squares > dims[:, None] * ALIKE**2).tolist():
             shape = self._shapes[k]
-            if shape.name not in found and same_space(others[i], shape):
-                found.add(shape.name)
-        return found
+            if shape.name not in same and same_space(others[i], shape):
+                same.add(shape.name)
+        return same
 
     def nearest(self, hypothesis: Hypothesis) -> tuple[tuple[str, float], ...]:
         """Other effects and their largest canonical cosines, nearest first."""
@@ -126,13 +257,13 @@ class ExaminedFit:
     def _cosines(self, hypothesis: Hypothesis, rank: int) -> Array:
         """Canonical cosine of this rank, 1 for the largest, with each shape; 0 if it has fewer."""
         products = hypothesis.ideal.T @ self._ideals.together
-        found = np.zeros(len(self._shapes))
+        cosines = np.zeros(len(self._shapes))
         for d in np.unique(self._ideals.dims[self._ideals.dims >= rank]):
-            own = np.flatnonzero(self._ideals.dims == d)
-            blocks = products[:, self._ideals.ends[own][:, None] + np.arange(d)]
+            alike = np.flatnonzero(self._ideals.dims == d)
+            blocks = products[:, self._ideals.ends[alike][:, None] + np.arange(d)]
             values = np.linalg.svd(np.swapaxes(blocks, 0, 1), compute_uv=False)[:, rank - 1]
-            found[own] = np.minimum(values, 1.0)
-        return found
+            cosines[alike] = np.minimum(values, 1.0)
+        return cosines
 
     @cached_property
     def _shapes(self) -> list[Hypothesis]:
@@ -148,4 +279,4 @@ class ExaminedFit:
 
 def examine(solution: Solution) -> ExaminedFit:
     """Examine a calibrated session."""
-    return ExaminedFit(Frame.of(solution))
+    return ExaminedFit.of(Frame.of(solution))

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.diagnosis.space.examined import ExaminedFit
-from accelstudy.diagnosis.space.frame import Frame
-from accelstudy.diagnosis.space.repeats import clusters
+from accelstudy.diagnosis.space.examined import ExaminedFit, Frame
+from accelstudy.diagnosis.space.hypotheses import Bases, Spaces
+from accelstudy.diagnosis.space.residuals import ABSORBED, Residuals, span
 from accelstudy.diagnosis.space.signatures import Moment, Signature, rate_of
-from accelstudy.diagnosis.space.spaces import ABSORBED, Bases, LackOfFit, Repeats, Spaces, span
 from accelstudy.effects import HoldConditions, effect_names, get_effect
 
 Array = NDArray[np.float64]
+
+SAME_ATTITUDE = 0.01
+"""Positions closer than this (chord of unit vectors) repeat each other."""
 
 ROBOT = "robot_angles"
 """Group of the effects on what a robot reads, and of its base."""
@@ -32,15 +35,15 @@ def groups(examined: ExaminedFit) -> dict[str, Spaces]:
 
     They leave something of the residuals, and the model does something of them.
     """
-    r, found = examined.frame.residuals.redundancy, all_groups(examined)
-    shown = {name for name, space in found.items() if 0 < space.dims[0] < r}
-    return {n: q for n, q in found.items() if (REPEAT if n == LACK_OF_FIT else n) in shown}
+    r, spaces = examined.frame.residuals.redundancy, all_groups(examined)
+    shown = {name for name, space in spaces.items() if 0 < space.dims[0] < r}
+    return {n: q for n, q in spaces.items() if (REPEAT if n == LACK_OF_FIT else n) in shown}
 
 
 def all_groups(examined: ExaminedFit) -> dict[str, Spaces]:
     """Groups whose columns are there, those as well of which nothing shows or in which all does."""
     residuals, hold, n = examined.frame.residuals, examined.frame.hold, len(examined.frame.forces)
-    found: dict[str, Spaces] = {}
+    spaces: dict[str, Spaces] = {}
 
     def add(name: str, course: Callable[[Moment], Array]) -> None:
         """Enter a group given by changes of the sensor's output, (n, 3, k), in some holds."""
@@ -51,7 +54,7 @@ def all_groups(examined: ExaminedFit) -> dict[str, Spaces]:
     def add_rows(name: str, rows: Array) -> None:
         projected = residuals.project(rows)
         basis = span(projected, np.linalg.norm(rows, axis=0), ABSORBED)[1]
-        found[name] = Bases(basis, np.array([basis.shape[1]]))
+        spaces[name] = Bases(basis, np.array([basis.shape[1]]))
 
     for name, signatures in _signatures(examined.frame).items():
         rows = [residuals.whitened(s) for s in signatures]
@@ -66,8 +69,8 @@ def all_groups(examined: ExaminedFit) -> dict[str, Spaces]:
     labels = clusters(examined.frame.forces)
     if len(np.unique(labels)) < n:
         same = LackOfFit.of(residuals, labels)
-        found |= {REPEAT: Repeats(same, residuals.redundancy), LACK_OF_FIT: same}
-    return found
+        spaces |= {REPEAT: Repeats(same, residuals.redundancy), LACK_OF_FIT: same}
+    return spaces
 
 
 def _of_yaw(yaw: Array) -> Array:
@@ -118,7 +121,7 @@ def _signatures(frame: Frame) -> dict[str, list[Signature]]:
     Effects whose settings are searched finely are left out: they have no single space. The groups
     of `COURSES` hold any smooth course, which is more than their effects.
     """
-    found: dict[str, list[Signature]] = {}
+    by_group: dict[str, list[Signature]] = {}
     for effect in map(get_effect, effect_names()):
         if not effect.group or effect.group in COURSES or any(h.smooth for h in effect.takes):
             continue
@@ -129,5 +132,95 @@ def _signatures(frame: Frame) -> dict[str, list[Signature]]:
             shown = frame.signatures(shapes, ideal=True)
         except InputError:  # a column is absent
             continue
-        found.setdefault(effect.group, []).append(shown)
-    return found
+        by_group.setdefault(effect.group, []).append(shown)
+    return by_group
+
+
+@dataclass(frozen=True)
+class LackOfFit:
+    """All that positions of one attitude have in common: everything but their differences.
+
+    A change of conditions by t that is the same in all positions of an attitude is L_iᵀ t at unit
+    weight (but for what varies between them). Of these directions, orthonormal within each
+    attitude, those are left that the model does not absorb.
+
+    Attributes
+    ----------
+    order : (n,) int array, positions sorted by attitude
+    starts : (a,) int array, where each attitude begins there
+    weights : (n, c, c) array, W_i with Σ W_i e_i the coordinates (c,) of an attitude, sorted
+    absorbed : (a c + k, l) array, orthonormal basis of what the model absorbs, in coordinates
+    """
+
+    order: NDArray[np.int_]
+    starts: NDArray[np.int_]
+    weights: Array
+    absorbed: Array
+
+    @classmethod
+    def of(cls, residuals: Residuals, labels: NDArray[np.int_]) -> LackOfFit:
+        """Of residuals whose positions have labels (n,), the same for the same attitude."""
+        order = np.argsort(labels, kind="stable")
+        starts = np.flatnonzero(np.diff(labels[order], prepend=-1))
+        whitening = residuals.whitening[order]
+        normal = np.add.reduceat(whitening @ np.swapaxes(whitening, 1, 2), starts, axis=0)
+        inverse = np.linalg.inv(np.linalg.cholesky(normal))
+        counts = np.diff(np.append(starts, len(labels)))
+        same = cls(order, starts, np.repeat(inverse, counts, axis=0) @ whitening, np.empty((0, 0)))
+        left, values, _ = np.linalg.svd(same._means(residuals.absorbed.T).T, full_matrices=False)
+        return cls(order, starts, same.weights, left[:, values > ABSORBED])
+
+    @property
+    def dims(self) -> NDArray[np.int_]:
+        """Its dimension, (1,)."""
+        rows, absorbed = self.absorbed.shape
+        return np.array([rows - absorbed])
+
+    def parts(self, errors: Array) -> Array:
+        """Squares of what residuals (..., m) have in it, (..., 1)."""
+        same = self._means(errors)
+        part = np.sum(same**2, axis=-1) - np.sum((same @ self.absorbed) ** 2, axis=-1)
+        return np.maximum(part, 0.0)[..., None]
+
+    def _means(self, errors: Array) -> Array:
+        """Coordinates of residuals (..., m): of each attitude, and of observed gravity."""
+        n, c = self.weights.shape[:2]
+        blocks = errors[..., : n * c].reshape(*errors.shape[:-1], n, c)[..., self.order, :]
+        weighted = np.einsum("ncd,...nd->...nc", self.weights, blocks)
+        sums = np.add.reduceat(weighted, self.starts, axis=-2)
+        return np.concatenate([sums.reshape(*errors.shape[:-1], -1), errors[..., n * c :]], axis=-1)
+
+
+@dataclass(frozen=True)
+class Repeats:
+    """Differences between positions of one attitude: what lack of fit leaves of the residuals."""
+
+    lack_of_fit: LackOfFit
+    redundancy: int
+
+    @property
+    def dims(self) -> NDArray[np.int_]:
+        """Its dimension, (1,)."""
+        return self.redundancy - self.lack_of_fit.dims
+
+    def parts(self, errors: Array) -> Array:
+        """Squares of what residuals (..., m) have in it, (..., 1)."""
+        total = np.sum(errors**2, axis=-1, keepdims=True)
+        return np.maximum(total - self.lack_of_fit.parts(errors), 0.0)
+
+
+def clusters(forces: NDArray[np.float64]) -> NDArray[np.int_]:
+    """Label positions by attitude; positions with the same label repeat each other."""
+    unit = forces / np.linalg.norm(forces, axis=1, keepdims=True)
+    labels = -np.ones(len(unit), dtype=int)
+    # Only positions alike in one coordinate need to be compared.
+    order = np.argsort(unit[:, 0], kind="stable")
+    x = unit[order, 0]
+    first = np.searchsorted(x, unit[:, 0] - SAME_ATTITUDE)
+    last = np.searchsorted(x, unit[:, 0] + SAME_ATTITUDE, side="right")
+    for i in range(len(unit)):
+        if labels[i] < 0:
+            near = order[first[i] : last[i]]
+            near = near[labels[near] < 0]
+            labels[near[np.linalg.norm(unit[near] - unit[i], axis=1) < SAME_ATTITUDE]] = i
+    return labels

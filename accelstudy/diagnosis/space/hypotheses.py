@@ -1,17 +1,22 @@
-"""Hypotheses about what the model lacks: each shape of an effect is a space of residuals."""
+"""Hypotheses about what the model lacks: each shape of an effect is a space of residuals.
+
+Two things count of a space: its dimension, and the size of the part of the residuals that lies in
+it. Many spaces of one kind are evaluated together. No matrix of all conditions by all conditions is
+formed, so the effort grows with the number of positions.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TypeAlias, overload
+from functools import cached_property
+from typing import Protocol, TypeAlias, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import root_of
 from accelstudy.diagnosis.space.residuals import Residuals, position_products
-from accelstudy.diagnosis.space.spaces import Bases
 from accelstudy.effects import Effect
 
 Array = NDArray[np.float64]
@@ -19,6 +24,50 @@ ALIKE = 0.9999
 """Canonical cosine above which two signatures are the same."""
 
 OUTLIER = "outlier_position"
+
+
+class Spaces(Protocol):
+    """Some spaces of residuals."""
+
+    @property
+    def dims(self) -> NDArray[np.int_]:
+        """Their dimensions, (s,)."""
+
+    def parts(self, errors: Array) -> Array:
+        """Squares of what residuals (..., m) have in each of them, (..., s)."""
+
+
+@dataclass(frozen=True)
+class Bases:
+    """Spaces given by orthonormal bases in the residual space.
+
+    Attributes
+    ----------
+    together : (m, Σ l) array, one basis beside the other
+    dims : (s,) int array, l
+    """
+
+    together: Array
+    dims: NDArray[np.int_]
+
+    @classmethod
+    def beside_each_other(cls, bases: Sequence[Array]) -> Bases:
+        """Gather bases (m, l)."""
+        dims = np.array([basis.shape[1] for basis in bases])
+        return cls(np.concatenate(bases, axis=1), dims)
+
+    def split(self) -> list[Array]:
+        """Each of the bases, (m, l)."""
+        return np.split(self.together, self.ends[1:-1], axis=1)
+
+    def parts(self, errors: Array) -> Array:
+        """Squares of what residuals (..., m) have in each of them, (..., s)."""
+        return np.add.reduceat((errors @ self.together) ** 2, self.ends[:-1], axis=-1)
+
+    @cached_property
+    def ends(self) -> NDArray[np.int_]:
+        """Where the bases begin and the last one ends, (s + 1,)."""
+        return np.concatenate([[0], np.cumsum(self.dims)])
 
 
 @dataclass(frozen=True)
@@ -95,9 +144,9 @@ class EffectShapes(Bases, Sequence[Hypothesis]):
     @classmethod
     def of(cls, hypotheses: Sequence[Hypothesis]) -> EffectShapes:
         """Gather shapes."""
-        own = Bases.beside_each_other([h.basis for h in hypotheses])
-        shared = zip(hypotheses, own.split(), strict=True)
-        return cls(own.together, own.dims, tuple(replace(h, basis=q) for h, q in shared))
+        bases = Bases.beside_each_other([h.basis for h in hypotheses])
+        shared = zip(hypotheses, bases.split(), strict=True)
+        return cls(bases.together, bases.dims, tuple(replace(h, basis=q) for h, q in shared))
 
     def drawn(self, places: NDArray[np.int_], amounts: Array) -> Array:
         """Sum the columns of some bases, (b, m), with weights (Σ l,), one basis after the other."""

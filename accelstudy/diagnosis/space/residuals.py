@@ -26,6 +26,12 @@ from accelstudy.leveling.angles import angles_of, specific_force
 
 Array = NDArray[np.float64]
 
+VISIBLE = 3e-3
+"""An effect is invisible where the model absorbs all but this share of its signature."""
+
+ABSORBED = 1e-2
+"""A direction counts as absorbed by the model if less than this share of it is left."""
+
 
 @dataclass(frozen=True)
 class SlopeRows:
@@ -230,3 +236,42 @@ def ideal_residuals(solution: Solution) -> tuple[Residuals, Array]:
     a = np.linalg.solve(whitening, np.moveaxis(at.jac_parameters[:, :, 0], -1, 0))
     design = np.concatenate([a.reshape(-1, a.shape[-1]), solution.prior[0]])
     return Residuals(design, np.zeros(len(design)), whitening, b, np.sqrt(variances)), forces
+
+
+def span(columns: Array, sizes: Array | None, tolerance: float) -> tuple[Array, Array]:
+    """What columns (m, k) span: l combinations of them, (k, l), and a basis, (m, l); see `spans`.
+
+    Parameters
+    ----------
+    columns : (m, k) array
+    sizes : (k,) array, or None
+    tolerance : float
+    """
+    each = None if sizes is None else sizes[None]
+    directions, basis, (rank,) = spans(columns[None], each, tolerance)
+    return directions[0, :, :rank], basis[0, :, :rank]
+
+
+def spans(
+    columns: Array, sizes: Array | None, tolerance: float
+) -> tuple[Array, Array, NDArray[np.int_]]:
+    """What each of several sets of columns (s, m, k) spans.
+
+    Parameters
+    ----------
+    columns : (s, m, k) array
+    sizes : (s, k) array beside which the columns are seen; their own norms if None
+    tolerance : float, share of them below which a direction counts as nothing
+
+    Returns
+    -------
+    directions : (s, k, l) array, combinations of the columns, l the smaller of m and k
+    basis : (s, m, l) array, orthonormal, of their spaces
+    rank : (s,) int array; what is beyond it is zero
+    """
+    norms = np.linalg.norm(columns, axis=1) if sizes is None else sizes
+    scale = np.where(norms > 0, norms, 1.0)
+    left, values, right = np.linalg.svd(columns / scale[:, None], full_matrices=False)
+    seen = values > tolerance
+    directions = np.swapaxes(right, 1, 2) / scale[..., None] * seen[:, None]
+    return directions, left * seen[:, None], np.count_nonzero(seen, axis=1)

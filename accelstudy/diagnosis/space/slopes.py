@@ -23,9 +23,8 @@ from scipy.special import chdtr, chdtri
 
 from accelstudy.adjustment import Observations
 from accelstudy.adjustment.quality import column_basis
-from accelstudy.diagnosis.space.residuals import Residuals, SlopeRows
+from accelstudy.diagnosis.space.residuals import VISIBLE, Residuals, SlopeRows, span
 from accelstudy.diagnosis.space.signatures import Signature
-from accelstudy.diagnosis.space.spaces import VISIBLE, span
 
 Array = NDArray[np.float64]
 
@@ -73,21 +72,21 @@ class Slopes:
             return None
         along = forces / np.linalg.norm(forces, axis=1, keepdims=True)
         sigma = np.sqrt(np.sum((along * sd) ** 2, axis=1))
-        told = sigma > 0
-        by_rate = np.where(told[:, None], along / np.where(told, sigma, 1.0)[:, None], 0.0)
+        judged = sigma > 0
+        by_rate = np.where(judged[:, None], along / np.where(judged, sigma, 1.0)[:, None], 0.0)
         values = np.sum(by_rate * slope, axis=1)
         course = smooth_course(time, by_rate)
-        freedom = np.count_nonzero(told) - course.shape[1]
+        freedom = np.count_nonzero(judged) - course.shape[1]
         if freedom < FREEDOM:
             return None
         for _ in range(1 + len(values) // TENTH):
             taken, squares = about(course, values)
-            shown = told & (taken < ALONE)
+            shown = judged & (taken < ALONE)
             variance = max(1.0, trimmed_mean_square(squares[shown]))
             worst = int(np.argmax(np.where(shown, squares, 0.0)))
             if squares[worst] <= MOVED**2 * variance:
                 break
-            values[worst], by_rate[worst], course[worst], told[worst] = 0.0, 0.0, 0.0, False
+            values[worst], by_rate[worst], course[worst], judged[worst] = 0.0, 0.0, 0.0, False
         weight = 1 / np.sqrt(variance * (1 + DOUBT * taken))
         return cls(values * weight, by_rate * weight[:, None], variance)
 
@@ -99,21 +98,21 @@ class Slopes:
         self,
         residuals: Residuals,
         parameters: Array,
-        own: Sequence[Signature],
+        modelled: Sequence[Signature],
         others: Iterable[Signature],
     ) -> SlopeRows | None:
-        """Combinations of slopes that add to what the means say; None if there is none.
+        """Slope combinations independent of the means; None if there is none.
 
         Parameters
         ----------
         residuals : Residuals, of the means
         parameters : (u,) array, of the fit
-        own : signatures of the effects of the model, in the order of its parameters
+        modelled : signatures of the effects of the model, in the order of its parameters
         others : signatures of effects that may be missing and change the output within a hold
         """
-        design, ends = residuals.design, np.cumsum([0, *(s.rate.shape[2] for s in own)])
+        design, ends = residuals.design, np.cumsum([0, *(s.rate.shape[2] for s in modelled)])
         by_model = np.zeros((len(self.values), design.shape[1]))
-        by_model[:, : ends[-1]] = -np.concatenate([self.rows(s.rate) for s in own], axis=1)
+        by_model[:, : ends[-1]] = -np.concatenate([self.rows(s.rate) for s in modelled], axis=1)
         seen = []
         for first, end in pairwise(ends):
             if by_model[:, first:end].any():
@@ -160,7 +159,7 @@ def trimmed_mean_square(squares: Array) -> float:
 
 
 def telling(seen: Sequence[tuple[Array, Array, Array]], most: int) -> Array:
-    """Combinations of slopes that add to what the means say of effects, (n, q), orthonormal.
+    """Slope combinations independent of what the means say of effects, (n, q), orthonormal.
 
     Parameters
     ----------
@@ -168,14 +167,14 @@ def telling(seen: Sequence[tuple[Array, Array, Array]], most: int) -> Array:
         beside the model, and to the slopes, of unit weight, and its size in the means
     most : int
     """
-    found = [np.zeros((0, 0))]
+    combinations = [np.zeros((0, 0))]
     for means, slopes, size in seen:
         directions = span(means, size, VISIBLE)[0]
         shown = np.linalg.norm(means @ directions, axis=0)
         left, ratio, _ = np.linalg.svd(slopes @ directions / shown, full_matrices=False)
         worth = ratio**2 > WORTH
-        found.append(left[:, worth] * np.minimum(ratio[worth], 1.0))
-    if len(found) == 1:
-        return found[0]
-    left, length, _ = np.linalg.svd(np.concatenate(found[1:], axis=1), full_matrices=False)
+        combinations.append(left[:, worth] * np.minimum(ratio[worth], 1.0))
+    if len(combinations) == 1:
+        return combinations[0]
+    left, length, _ = np.linalg.svd(np.concatenate(combinations[1:], axis=1), full_matrices=False)
     return np.asarray(left[:, length > APART][:, :most])

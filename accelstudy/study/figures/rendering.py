@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, ANGLE_UNITS, angle_note, angles_in
+from accelstudy.basics.units import angle_note, angles_in, user_angle_unit
 from accelstudy.basics.wording import comma_list
 from accelstudy.files.outputs import whole_file
 from accelstudy.study.figures.base import FigureEntry, Tables, figure_tables, get_figure
@@ -48,19 +46,9 @@ def _caption(entry: FigureEntry, study: StudyConfig) -> str:
     return "\n".join(filter(None, [entry.caption, notes]))
 
 
-def angle_unit(study: StudyConfig) -> str | None:
-    """Unit of angles in figures: that of the study or, where it names none, of the user.
-
-    Raises
-    ------
-    InputError
-        If the environment variable of the user names no such unit.
-    """
-    unit = study.angle_unit or os.environ.get(ANGLE_UNIT_VARIABLE) or None
-    if unit not in (None, *ANGLE_UNITS):
-        units = " or ".join(ANGLE_UNITS)
-        raise InputError(f"{ANGLE_UNIT_VARIABLE}: {unit!r} is no unit of angles; choose {units}")
-    return unit
+def angle_unit(study: StudyConfig) -> str:
+    """Unit of angles in figures: that of the study or, where it names none, of the user."""
+    return study.angle_unit or user_angle_unit()
 
 
 def render(

@@ -1,0 +1,152 @@
+"""What a diagnosis has to explain: the fit of the base model, and all that it may lack."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.adjustment.quality import Solution, solve
+from accelstudy.approaches import Approach
+from accelstudy.basics.errors import InputError
+from accelstudy.campaign.calibration.fit import fit_campaign, least_sigma
+from accelstudy.campaign.session import Campaign
+from accelstudy.diagnosis.decision import priors
+from accelstudy.diagnosis.evidence.field import Field
+from accelstudy.diagnosis.evidence.noise_models import UnequalAxes
+from accelstudy.diagnosis.evidence.size import Evidence, Level
+from accelstudy.diagnosis.space.examined import ExaminedFit, Frame, examine
+from accelstudy.diagnosis.space.groups import groups
+from accelstudy.diagnosis.space.hypotheses import Spaces
+from accelstudy.diagnosis.space.residuals import Residuals
+from accelstudy.sensors.sensor import SensorModel
+
+Array = NDArray[np.float64]
+
+BEYOND_WHITE = 5.0
+"""Ratio of variances up to which white noise within the holds may explain the scatter of means."""
+ROUNDING = 1e-10
+"""Residuals below this share of gravity are rounding errors, and no measurement."""
+
+
+@dataclass(frozen=True)
+class BaseFit:
+    """The fit of a model to a campaign, with equal axes, and what is known of its noise.
+
+    Attributes
+    ----------
+    solution : Solution
+    level : Level, what is known of sigma
+    within : (3,) array, variances of position means if white noise within the holds is all there
+        is; None if unknown
+    """
+
+    solution: Solution
+    level: Level
+    within: Array | None
+
+
+def fit_base(campaign: Campaign, model: SensorModel, approach: Approach) -> BaseFit:
+    """Fit a model to a campaign; where no sigma is given, weights take that of the residuals.
+
+    Raises
+    ------
+    InputError
+        If the positions do not determine the model, or leave no redundancy to test anything.
+    """
+    stated, measured = campaign.sigma_force is not None, campaign
+    # Without a sigma the weights of forces and angles need one: that of the residuals.
+    for _ in range(1 if stated else 3):
+        fit = fit_campaign(measured, model, approach)
+        if fit.adjustment.redundancy <= 0:
+            raise InputError(
+                f"{campaign.name}: {campaign.n_positions} positions leave no redundancy beside "
+                f"the {model.n_parameters} parameters of {model.name!r}: nothing can "
+                "be tested; more positions are needed"
+            )
+        if not stated:
+            least = max(1e-9, least_sigma(campaign, approach))
+            sigma = max(fit.sigma_position, least)
+            measured = replace(measured, sigma_force=sigma, slope=None, sd_slope=None)
+    solution = solve(fit.model, fit.approach, fit.observed, fit.adjustment)
+    sd, n, within = campaign.sd, campaign.n_samples, None
+    if sd is not None and n is not None and np.all(sd > 0):
+        within = np.asarray(np.mean(sd**2 / n[:, None], axis=0))
+    if stated:
+        return BaseFit(solution, Level.given(), within)
+    if within is None or np.mean(within) <= least_sigma(campaign, approach) ** 2:
+        return BaseFit(solution, Level.unknown(), within)
+    if not 1 / BEYOND_WHITE < fit.sigma_position_posteriori**2 / np.mean(within) < BEYOND_WHITE:
+        return BaseFit(solution, Level.unknown(), within)
+    observed = replace(fit.observed, sigma_force=float(np.sqrt(np.mean(within))))
+    return BaseFit(solve(fit.model, fit.approach, observed), Level.within_holds(), within)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A fit and all that its model may lack, side by side.
+
+    Attributes
+    ----------
+    base : BaseFit, with equal axes
+    examined : ExaminedFit, the same with unequal axes weighted, and the hypotheses about it
+    axes : UnequalAxes, how probable these are; None of an exact fit
+    groups : dict of str to Spaces, groups of regressors: direction, time and so on
+    field : Field, all candidates
+    evidence : Evidence, by which they are weighed
+    """
+
+    base: BaseFit
+    examined: ExaminedFit
+    axes: UnequalAxes | None
+    groups: dict[str, Spaces]
+    field: Field
+    evidence: Evidence
+
+    @property
+    def frame(self) -> Frame:
+        """Session of the fit."""
+        return self.examined.frame
+
+    @property
+    def residuals(self) -> Residuals:
+        """Those of the fit."""
+        return self.examined.frame.residuals
+
+
+def pose(base: BaseFit) -> Problem:
+    """Set all that the model of a fit may lack side by side.
+
+    The axes are weighted by their noise where unequal axes explain the residuals better than equal
+    ones do, with nothing missing or with any single effect.
+    """
+    first, examined, axes = base.solution, examine(base.solution), None
+    if not is_exact(first):
+        residuals = examined.frame.residuals
+        evidence = Evidence(base.level, residuals.redundancy)
+        axes = UnequalAxes.of(residuals, evidence, base.within)
+        if np.log(priors.AXES) + axes.log_evidence > _best_odds(examined, evidence):
+            sigma = np.sqrt(axes.ratios)
+            mean = np.mean(np.sqrt(first.variances[:, :3]))
+            shaped = np.broadcast_to(mean * sigma / np.mean(sigma), (len(first.variances), 3))
+            observed = replace(first.observed, sigma_force=shaped)
+            examined = examine(solve(first.model, first.approach, observed))
+    shown = groups(examined)
+    evidence = Evidence(base.level, examined.frame.residuals.redundancy)
+    return Problem(base, examined, axes, shown, Field.of(examined.candidates, shown), evidence)
+
+
+def is_exact(fit: Solution) -> bool:
+    """Whether a campaign is its own model, so that only rounding errors are left."""
+    return float(np.sqrt(np.mean(fit.misclosures**2))) < ROUNDING * fit.gravity
+
+
+def _best_odds(examined: ExaminedFit, evidence: Evidence) -> float:
+    """Log odds of the most probable single effect against nothing, at least 0."""
+    field, z = Field.of(examined.candidates, {}), examined.frame.residuals.z
+    if not field.names:
+        return 0.0
+    nothing = np.logaddexp.reduce(evidence.of_noise(z @ z))
+    odds = np.max(field.densities(evidence, z)) - np.log(len(field.names)) - nothing
+    return max(0.0, float(odds))

@@ -1,0 +1,347 @@
+"""The evidence for each hypothesis, by itself and together with another."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.diagnosis.evidence.field import Field, shape_weights
+from accelstudy.diagnosis.evidence.size import Evidence, log_mean
+from accelstudy.diagnosis.space.examined import ExaminedFit
+from accelstudy.diagnosis.space.hypotheses import (
+    OUTLIER,
+    Bases,
+    BumpedPositions,
+    EffectShapes,
+    Hypothesis,
+    Shapes,
+    Spaces,
+)
+from accelstudy.diagnosis.space.residuals import ABSORBED, Residuals
+
+Array = NDArray[np.float64]
+
+
+ROUNDS = 3
+"""How often shapes are added about the best one."""
+BETWEEN = 5
+"""Shapes that are added between its neighbours."""
+WORTH = 12.0
+"""A candidate whose log evidence is this far below the strongest needs no further shapes."""
+UNDECIDED = 2.0
+"""Log evidence by which a shape may fall short of the best and still be the true one."""
+SAME = 0.25
+"""Log evidence within which two effects are equally good."""
+COLLINEAR = 0.05
+"""Two spaces are tried together only if this share of the second is left beside the first."""
+POSITIONS = 100
+"""Bumped positions that are tried in pairs, at most."""
+ROWS = 4096
+"""Conditions in one block of work."""
+
+Class: TypeAlias = tuple[Hypothesis, tuple[str, ...]]
+"""A hypothesis, and all names that mean the same in this campaign."""
+
+
+@dataclass(frozen=True)
+class Singles:
+    """The evidence for each candidate by itself.
+
+    Attributes
+    ----------
+    shapes : dict of candidate to shapes, closer together about the best one where it matters
+    logs : dict of candidate to the log densities of the residuals under its shapes, (s,)
+    densities : dict of candidate to the log density over its shapes
+    best : dict of candidate to the shape that explains most
+    """
+
+    shapes: Mapping[str, Shapes]
+    logs: Mapping[str, Array]
+    densities: Mapping[str, float]
+    best: Mapping[str, Hypothesis]
+
+
+def weigh_singles(examined: ExaminedFit, field: Field, evidence: Evidence) -> Singles:
+    """Weigh each candidate by itself.
+
+    Parameters
+    ----------
+    examined : ExaminedFit
+    field : Field, all its candidates, in the shapes that are tried at first
+    evidence : Evidence
+    """
+    z = examined.frame.residuals.z
+    if not examined.candidates:
+        return Singles({}, {}, {}, {})
+    first = dict(zip(field.names, field.densities(evidence, z).tolist(), strict=True))
+    least = max(first.values()) - WORTH
+    shapes = {
+        name: refined(examined, tried) if first[name] > least else tried
+        for name, tried in examined.candidates.items()
+    }
+    parts = {name: one.parts(z) for name, one in shapes.items()}
+    dims = np.concatenate([one.dims for one in shapes.values()])
+    ends = np.cumsum([len(one) for one in shapes.values()])[:-1]
+    each = np.split(evidence.of_spaces(np.concatenate([*parts.values()]), dims, z @ z), ends)
+    logs = dict(zip(shapes, each, strict=True))
+    return Singles(
+        shapes=shapes,
+        logs=logs,
+        densities={n: float(log_mean(logs[n], shape_weights(own))) for n, own in shapes.items()},
+        best={name: own[int(np.argmax(parts[name]))] for name, own in shapes.items()},
+    )
+
+
+def equivalents(examined: ExaminedFit, singles: Singles) -> dict[str, tuple[str, ...]]:
+    """Names that mean the same as each candidate in this campaign, itself included.
+
+    They do if any shapes are the same between which the residuals do not decide.
+    """
+    members: dict[str, tuple[str, ...]] = {}
+    for name, shapes in singles.shapes.items():
+        if isinstance(shapes, BumpedPositions):
+            members[name] = (name,)
+            continue
+        logs = singles.logs[name]
+        probable = [shapes[int(i)] for i in np.flatnonzero(logs > logs.max() - UNDECIDED)]
+        members[name] = tuple(sorted({*examined.alike(probable), name}))
+    return members
+
+
+def classes_of(singles: Singles, members: Mapping[str, tuple[str, ...]]) -> list[Class]:
+    """Candidates with those that mean the same, strongest evidence first."""
+    densities = singles.densities
+    left = sorted(densities, key=lambda name: -densities[name])
+    classes = []
+    while left:
+        name = left.pop(0)
+        same = members[name]
+        alike = [other for other in left if other in same]
+        left = [other for other in left if other not in same]
+        # Rounding errors must not choose among equally good names: the first one is taken.
+        least = densities[name] - SAME
+        name = min(other for other in (name, *alike) if densities[other] >= least)
+        classes.append((singles.best[name], same))
+    return classes
+
+
+def strongest(shapes: Shapes, z: Array) -> Hypothesis:
+    """Shape that explains most of residuals z (m,)."""
+    return shapes[int(np.argmax(shapes.parts(z)))]
+
+
+def refined(examined: ExaminedFit, shapes: Shapes) -> Shapes:
+    """Add shapes between the neighbours of the best one, and again between those."""
+    z = examined.frame.residuals.z
+    if not isinstance(shapes, EffectShapes) or len(shapes) < 2:
+        return shapes
+    if shapes[0].smooth is None:
+        return _completed(examined, shapes)
+    for _ in range(ROUNDS):
+        best = int(np.argmax(shapes.parts(z)))
+        around = (shapes[max(best - 1, 0)].value, shapes[min(best + 1, len(shapes) - 1)].value)
+        tried = _all_shaped(examined, shapes[best], np.geomspace(*around, BETWEEN + 2)[1:-1])
+        fine = [*shapes, *(h for h in tried if h is not None)]
+        shapes = EffectShapes.of(sorted(fine, key=lambda h: h.value))
+    return shapes
+
+
+def shaped(examined: ExaminedFit, hypothesis: Hypothesis, value: float) -> Hypothesis | None:
+    """Return a smooth effect with another value of its setting; None if less of it shows."""
+    return _all_shaped(examined, hypothesis, [value])[0]
+
+
+def _all_shaped(
+    examined: ExaminedFit, hypothesis: Hypothesis, values: Iterable[float]
+) -> list[Hypothesis | None]:
+    """Return one hypothesis per value of the smooth setting; None where less of it shows."""
+    assert hypothesis.effect is not None
+    assert hypothesis.smooth is not None
+    kind, name = type(hypothesis.effect), hypothesis.smooth
+    tried = examined.frame.hypotheses([kind(**{name: float(f"{v:.6g}")}) for v in values])
+    return [h if h is not None and h.dim == hypothesis.dim else None for h in tried]
+
+
+def _completed(examined: ExaminedFit, shapes: EffectShapes) -> EffectShapes:
+    """Add the shapes next to the best one that were passed over, until none is left."""
+    z, hold = examined.frame.residuals.z, examined.frame.hold
+    while True:
+        best = int(np.argmax(shapes.parts(z)))
+        effect = shapes[best].effect
+        assert effect is not None
+        fine = list(shapes)
+        for near in (best + 1, best - 1):
+            if 0 <= near < len(shapes):
+                other = shapes[near].effect
+                assert other is not None
+                between = effect.between(other, hold)
+                tried = examined.frame.hypotheses(between) if between else []
+                fitting = [h for h in tried if h is not None and h.dim == shapes[best].dim]
+                fine[max(best, near) : max(best, near)] = fitting
+        if len(fine) == len(shapes):
+            return shapes
+        shapes = EffectShapes.of(fine)
+
+
+def unknown_beside(
+    hypothesis: Hypothesis, groups: Mapping[str, Spaces], residuals: Residuals, evidence: Evidence
+) -> float | None:
+    """Log evidence of something unknown beside a hypothesis, against the hypothesis alone.
+
+    None where no group has a direction of its own beside it.
+    """
+    q = hypothesis.basis
+    left = residuals.z - q @ (q.T @ residuals.z)
+    rest = Evidence(evidence.level, residuals.redundancy - hypothesis.dim)
+    alone = np.logaddexp.reduce(rest.of_noise(left @ left))
+    parts: list[float] = []
+    dims: list[int] = []
+    for space in groups.values():
+        if not isinstance(space, Bases):
+            continue
+        # The squares of what is left of each direction beside the hypothesis.
+        common = q.T @ space.together
+        squares, directions = np.linalg.eigh(np.eye(common.shape[1]) - common.T @ common)
+        seen = squares > ABSORBED
+        if 0 < np.count_nonzero(seen) < rest.redundancy:
+            along = left @ space.together @ directions[:, seen]
+            parts.append(float(np.sum(along**2 / squares[seen])))
+            dims.append(int(np.count_nonzero(seen)))
+    if not parts:
+        return None
+    logs = rest.of_spaces(np.array(parts), dims, left @ left) - alone
+    return float(log_mean(logs))
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two candidates in their best shapes, and the log density of the residuals with both."""
+
+    best: tuple[Hypothesis, Hypothesis]
+    log_density: float
+
+
+def all_pairs(
+    candidates: Mapping[str, Shapes], residuals: Residuals, evidence: Evidence
+) -> list[Pair]:
+    """Evidence for all pairs of candidates, over all shapes of both.
+
+    Of the bumped positions only the `POSITIONS` that explain most by themselves are tried; pairs
+    with the others count as pairs without any evidence.
+
+    Parameters
+    ----------
+    candidates : mapping of name to shapes
+    residuals : Residuals
+    evidence : Evidence
+    """
+    z, r = residuals.z, residuals.redundancy
+    tried, weights = _tried(candidates, z)
+    if len(tried) < 2:
+        return []
+    names = [h.name for h in tried]
+    order = {name: i for i, name in enumerate(dict.fromkeys(names))}
+    number = np.array([order[name] for name in names])
+    dims = np.array([h.dim for h in tried])
+    products = _Products.of(tried, z)
+    one, other = np.triu_indices(len(tried), 1)
+    # Shapes of one effect are alternatives, but two positions may both be bumped.
+    apart = (number[one] != number[other]) | (number[one] == order.get(OUTLIER, -1))
+    apart &= dims[one] + dims[other] < r
+    one, other = one[apart], other[apart]
+    part, independent = np.zeros(len(one)), np.zeros(len(one), dtype=bool)
+    # The smaller space is taken beside the larger one, which is less to compute.
+    large = np.where(dims[one] < dims[other], other, one)
+    small = one + other - large
+    sizes = dims[large] * r + dims[small]
+    for size in np.unique(sizes):
+        alike = np.flatnonzero(sizes == size)
+        for some in np.array_split(alike, len(alike) // ROWS + 1):
+            part[some], independent[some] = products.of_both(large[some], small[some])
+    if not independent.any():
+        return []
+    one, other, part = one[independent], other[independent], part[independent]
+    logs = evidence.of_spaces(part, dims[one] + dims[other], float(z @ z))
+    weighted = logs + np.log(weights[one]) + np.log(weights[other])
+    keys = number[one] * len(order) + number[other]
+    sequence = np.argsort(keys, kind="stable")
+    starts = np.flatnonzero(np.diff(keys[sequence], prepend=-1))
+    totals = np.logaddexp.reduceat(weighted[sequence], starts)
+    pairs = []
+    for k, total in enumerate(totals):
+        alike = sequence[starts[k] : starts[k + 1] if k + 1 < len(starts) else None]
+        best = alike[np.argmax(logs[alike])]
+        twice = np.log(2.0) if number[one[best]] == number[other[best]] else 0.0
+        pairs.append(Pair((tried[one[best]], tried[other[best]]), float(total + twice)))
+    return pairs
+
+
+def _tried(candidates: Mapping[str, Shapes], z: Array) -> tuple[list[Hypothesis], Array]:
+    """Shapes of which pairs are made, and the prior probability of each in its candidate."""
+    tried: list[Hypothesis] = []
+    weights: list[Array] = []
+    for name, shapes in candidates.items():
+        places = np.arange(len(shapes))
+        if name == OUTLIER and len(places) > POSITIONS:
+            places = np.sort(np.argsort(-shapes.parts(z), kind="stable")[:POSITIONS])
+        tried += [shapes[int(k)] for k in places]
+        weights.append(shape_weights(shapes)[places])
+    return tried, np.concatenate(weights) if weights else np.zeros(0)
+
+
+@dataclass(frozen=True)
+class _Products:
+    """Products of the columns of the bases of hypotheses.
+
+    Attributes
+    ----------
+    gram : (Σ l, Σ l) array, of each with each
+    seen : (Σ l,) array, of each with residuals
+    starts, dims : (h,) int arrays, where the columns of each hypothesis begin, and their number l
+    """
+
+    gram: Array
+    seen: Array
+    starts: NDArray[np.int_]
+    dims: NDArray[np.int_]
+
+    @classmethod
+    def of(cls, hypotheses: Sequence[Hypothesis], z: Array) -> _Products:
+        """Multiply the bases of hypotheses (m, l) with each other and with residuals z (m,)."""
+        dims = np.array([h.dim for h in hypotheses])
+        starts = np.cumsum(dims) - dims
+        gram = np.zeros((dims.sum(),) * 2)
+        seen = np.zeros(len(gram))
+        # In blocks of conditions: all bases together would need twice the memory.
+        for rows in np.array_split(np.arange(len(z)), len(z) // ROWS + 1):
+            part = np.concatenate([h.basis[rows[0] : rows[-1] + 1] for h in hypotheses], axis=1)
+            gram += part.T @ part
+            seen += z[rows] @ part
+        return cls(gram, seen, starts, dims)
+
+    def of_both(
+        self, large: NDArray[np.int_], small: NDArray[np.int_]
+    ) -> tuple[Array, NDArray[np.bool_]]:
+        """Squares of what residuals have in two spaces together, and whether these are two.
+
+        (j,) each. All large ones have one dimension, and all small ones.
+        """
+        a, b = (
+            self.starts[places][:, None] + np.arange(self.dims[places[0]])
+            for places in (large, small)
+        )
+        cross = self.gram[a[:, :, None], b[:, None, :]]
+        left = np.eye(b.shape[1]) - np.swapaxes(cross, 1, 2) @ cross
+        if b.shape[1] == 1:
+            values, vectors = left[:, 0], np.ones_like(left)
+        else:
+            values, vectors = np.linalg.eigh(left)
+        rest = self.seen[b] - np.einsum("jab,ja->jb", cross, self.seen[a])
+        along = np.einsum("jab,ja->jb", vectors, rest) ** 2
+        part = np.sum(self.seen[a] ** 2, axis=1)
+        part += np.sum(along / np.maximum(values, COLLINEAR), axis=1)
+        return part, values[:, 0] > COLLINEAR

@@ -1,1 +1,0 @@
-"""Whether the noise is as assumed: its level, axes, colour, tails and resolution."""

@@ -1,0 +1,255 @@
+"""How well fits to some positions predict the others, with and without a named effect.
+
+Base model and extended model are fitted to some positions and predict the others. With r the
+misclosures of unit weight that the base model leaves there, A₂ their derivatives, C the cofactors
+of the base parameters and d = r − r' the correction that the extended model makes,
+
+    z = dᵀr / √(dᵀ (I + A₂ C A₂ᵀ) d)
+
+is standard normal if the base model is complete, whatever effect was chosen on the fitted
+positions. `held_out_gap` does this by rigorous fits, `LinearSplit` to first order, for many
+residuals at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.adjustment import Observations
+from accelstudy.adjustment.calibration import CalibrationProblem
+from accelstudy.adjustment.quality import Solution, whitening_of
+from accelstudy.diagnosis.space.examined import Frame
+from accelstudy.diagnosis.space.hypotheses import Hypothesis
+from accelstudy.effects import HoldConditions
+
+Array = NDArray[np.float64]
+
+
+HELD_OUT = 1 / 3
+"""Share of the positions that is held out."""
+SPLITS = 300
+RESAMPLES = 1000
+SIGNIFICANT = 1.645
+"""One-sided 5 % of the standard normal distribution."""
+
+
+@dataclass(frozen=True)
+class HeldOutGap:
+    """Evidence from held-out positions, in units of the noise variance.
+
+    Attributes
+    ----------
+    before, after : float, mean square of the misclosures of the base and of the extended model
+    floor : float, what it would be with the right model
+    reduction_ci95 : (float, float), of before − after, over resampled positions
+    z : float
+    held : tuple of int, indices of the held-out positions
+    misses : (tuple, tuple) of float, m/s², rms misclosure of each of them by either model
+    needed : float, z beyond which the correction is right at 5 %, given that it has a name
+    """
+
+    before: float
+    after: float
+    floor: float
+    reduction_ci95: tuple[float, float]
+    z: float
+    held: tuple[int, ...]
+    misses: tuple[tuple[float, ...], tuple[float, ...]]
+    needed: float = SIGNIFICANT
+
+    @property
+    def significant(self) -> bool:
+        """Whether the correction is right at 5 %."""
+        return self.z > self.needed
+
+
+def split_positions(
+    forces: Array, hold: HoldConditions, count: int, rng: np.random.Generator
+) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+    """Split positions into fitted and held-out ones, alike in direction, time and temperature.
+
+    Of many random splits the one is taken whose two parts agree best in the first and second
+    moments. It depends on where and when was measured, never on the readings.
+
+    Parameters
+    ----------
+    forces : (n, 3) array, of an ideal sensor
+    hold : HoldConditions
+    count : int, positions to hold out
+    rng : Generator
+    """
+    n = len(forces)
+    unit = forces / np.linalg.norm(forces, axis=1, keepdims=True)
+    columns = [*unit.T, *(unit[:, i] * unit[:, j] for i in range(3) for j in range(i + 1))]
+    for values in (hold.time, hold.temperature, hold.vibration):
+        if values is not None and np.ptp(values) > 0:
+            scaled = (values - np.mean(values)) / np.std(values)
+            columns += [scaled, scaled**2]
+    features = np.column_stack(columns)
+    scale = features.std(axis=0)
+    features = (features - features.mean(axis=0)) / np.where(scale > 0, scale, 1.0)
+    best, least = np.arange(n), np.inf
+    for _ in range(SPLITS):
+        order = rng.permutation(n)
+        # The means of the two parts differ in proportion to the sum over either.
+        imbalance = float(np.sum(features[order[:count]].sum(axis=0) ** 2))
+        if imbalance < least:
+            best, least = order, imbalance
+    return np.sort(best[count:]), np.sort(best[:count])
+
+
+def held_out_gap(
+    base: Solution,
+    extended: Solution,
+    rest: Observations,
+    held: NDArray[np.int_],
+    variance: float | None,
+    rng: np.random.Generator,
+) -> HeldOutGap:
+    """Predict positions by fits of two models to others.
+
+    Parameters
+    ----------
+    base, extended : Solution, of the same positions
+    rest : Observations, of the others
+    held : indices of the others, for the record
+    variance : float, of unit weight; None takes that of the base fit
+    rng : Generator, for the resampling
+    """
+    if variance is None:
+        variance = base.omega / base.redundancy
+    first, second = (Prediction.of(solution, rest) for solution in (base, extended))
+    d = first.white - second.white
+    slope = d @ first.slope
+    size = float(d @ d + slope @ base.cofactors @ slope)
+    before, after = (p.white.reshape(len(held), -1) ** 2 / variance for p in (first, second))
+    gain = np.mean(before - after, axis=1)
+    resampled = gain[rng.integers(len(gain), size=(RESAMPLES, len(gain)))].mean(axis=1)
+    low, high = np.quantile(resampled, [0.025, 0.975])
+    spread = np.einsum("mu,uv,mv->", second.slope, extended.cofactors, second.slope)
+    return HeldOutGap(
+        before=float(before.mean()),
+        after=float(after.mean()),
+        floor=float(1 + spread / len(d)),
+        reduction_ci95=(float(low), float(high)),
+        z=float(d @ first.white / np.sqrt(size * variance)) if size > 0 else 0.0,
+        held=tuple(int(i) for i in held),
+        misses=(first.misses, second.misses),
+    )
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What a fit leaves in unused positions.
+
+    Attributes
+    ----------
+    white : (m,) array, misclosures of unit weight
+    slope : (m, u) array, their derivatives by the parameters
+    misses : tuple of float, m/s², rms misclosure of each position
+    """
+
+    white: Array
+    slope: Array
+    misses: tuple[float, ...]
+
+    @classmethod
+    def of(cls, fit: Solution, observed: Observations) -> Prediction:
+        """Predict by a fit."""
+        problem = CalibrationProblem.of(fit.model, fit.approach, replace(observed, initial=None))
+        at = problem.linearised(fit.parameters, problem.observations[0])
+        b = np.moveaxis(at.jac_observations[:, :, 0], -1, 0)
+        psi = at.psi[:, 0].T
+        lower = whitening_of(b, problem.cofactors)
+        white = np.asarray(np.linalg.solve(lower, psi[..., None]), dtype=float)
+        by_parameters = np.moveaxis(at.jac_parameters[:, :, 0], -1, 0)
+        slope = np.asarray(np.linalg.solve(lower, by_parameters), dtype=float)
+        misses = np.sqrt(np.mean(psi**2, axis=1))
+        return cls(
+            white=white.ravel(),
+            slope=slope.reshape(white.size, -1),
+            misses=tuple(float(miss) for miss in misses),
+        )
+
+
+@dataclass(frozen=True)
+class LinearSplit:
+    """Positions of one fit, in two parts.
+
+    Attributes
+    ----------
+    frame : Frame, of all positions
+    fitted, held : (f,) and (h,) int arrays
+    """
+
+    frame: Frame
+    fitted: NDArray[np.int_]
+    held: NDArray[np.int_]
+
+    @cached_property
+    def rows(self) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+        """Rows of the conditions of either part; observed gravity is with the fitted one."""
+        n, c = self.frame.residuals.whitening.shape[:2]
+        fitted, held = (
+            (part[:, None] * c + np.arange(c)).ravel() for part in (self.fitted, self.held)
+        )
+        last = np.arange(n * c, len(self.frame.residuals.positions.design))
+        return np.concatenate([fitted, last]), held
+
+    @cached_property
+    def designs(self) -> tuple[Array, Array]:
+        """Ã of either part."""
+        design = self.frame.residuals.positions.design
+        return design[self.rows[0]], design[self.rows[1]]
+
+    @cached_property
+    def cofactors(self) -> Array:
+        """Of the parameters by the fitted part, (u, u)."""
+        a = self.designs[0]
+        return np.asarray(np.linalg.inv(a.T @ a), dtype=float)
+
+    def beside(self, errors: Array) -> tuple[Array, Array]:
+        """What the base model leaves of the fitted part, and of the held-out part it predicts.
+
+        Parameters
+        ----------
+        errors : (b, m) array, of all positions
+        """
+        a, b = self.designs
+        estimates = errors[:, self.rows[0]] @ a @ self.cofactors
+        return (
+            errors[:, self.rows[0]] - estimates @ a.T,
+            errors[:, self.rows[1]] - estimates @ b.T,
+        )
+
+    def corrections(self, hypothesis: Hypothesis, left: Array) -> Array:
+        """Corrections of the prediction by an effect that is fitted, too, (b, h c).
+
+        Parameters
+        ----------
+        hypothesis : Hypothesis, about an effect
+        left : (b, f c) array, what the base model leaves of the fitted part
+        """
+        ((fit, rest),) = self.predictors([hypothesis])
+        return np.asarray(left @ fit @ rest)
+
+    def predictors(self, hypotheses: Sequence[Hypothesis]) -> list[tuple[Array, Array]]:
+        """Matrices (f c, l) and (l, h c), whose product makes such corrections.
+
+        Parameters
+        ----------
+        hypotheses : shapes of one effect
+        """
+        effects = [one.effect for one in hypotheses if one.effect is not None]
+        shown = self.frame.residuals.positions.whitened(self.frame.signatures(effects))
+        matrices = []
+        columns = np.split(shown, len(effects), axis=1)
+        for one, column in zip(hypotheses, columns, strict=True):
+            fitted, rest = self.beside((column @ one.directions).T)
+            matrices.append((np.asarray(np.linalg.pinv(fitted), dtype=float), rest))
+        return matrices

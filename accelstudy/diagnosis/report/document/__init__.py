@@ -1,1 +1,0 @@
-"""The files for programs: JSON, YAML and the table of the positions."""

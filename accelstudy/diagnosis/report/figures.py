@@ -1,0 +1,385 @@
+"""The figures of a diagnosis."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator, NullLocator
+from numpy.typing import NDArray
+
+from accelstudy.basics.units import display_unit, to_display
+from accelstudy.basics.wording import number, words
+from accelstudy.diagnosis.decision.posterior import CREDIBLE, Explanation
+from accelstudy.diagnosis.decision.statement import family_of
+from accelstudy.diagnosis.evidence.field import UNKNOWN
+from accelstudy.diagnosis.loop import CASES, Loop
+from accelstudy.diagnosis.report.document import condition_sigma
+from accelstudy.diagnosis.report.words import GROUPS
+from accelstudy.diagnosis.result import Diagnosis
+from accelstudy.drawing.style import COLUMN, FULL, INK, MISSING, log_ticks, new_figure
+
+Array = NDArray[np.float64]
+
+
+def diagnosis_figures(
+    diagnosis: Diagnosis, positions: pd.DataFrame, loop: Loop | None = None
+) -> dict[str, Callable[[], Figure]]:
+    """Return a function that draws each figure; figures that would show nothing are left out.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    positions : DataFrame, of `positions_table`
+    loop : Loop, optional
+    """
+    d = diagnosis
+    figures: dict[str, Callable[[], Figure]] = {"residuals": lambda: residual_figure(d, positions)}
+    if d.screening.p_family:
+        figures["evidence"] = lambda: evidence_figure(d)
+    if len(d.credible_set) > 1:
+        figures["explanations"] = lambda: explanations_figure(d.credible_set)
+    if d.gap.held_out is not None:
+        figures["gap"] = lambda: gap_figure(d, positions)
+    # Without sigma, no size of the residuals is too large for noise.
+    if any(d.location.values()) and (d.sigma_known or d.verdict != "noise_model"):
+        figures["location"] = lambda: location_figure(d)
+    if loop is not None:
+        figures["loop"] = lambda: loop_figure(loop)
+    return figures
+
+
+BEFORE, AFTER, NOISE = "#D55E00", "#0072B2", "#E6E6E6"
+OTHER = "#999999"
+
+
+AXES = {"x": ("#0072B2", "o"), "y": ("#E69F00", "s"), "z": ("#009E73", "^"), "norm": (INK, "o")}
+"""Colour and marker of the components of a residual."""
+FEW = 4
+"""Number of different values up to which the components of a residual stand side by side."""
+ABREAST = 0.03
+"""Distance of the components there, as a part of the range."""
+
+
+def residual_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
+    """Residuals before and after against direction, time and temperature."""
+    names = [name for name in AXES if f"residual_{name}_before_mps2" in positions]
+    panels = _panels(diagnosis, positions, len(names))
+    refitted = diagnosis.final is not diagnosis.frame
+    explained = diagnosis.extended is not diagnosis.model
+    rows = ("before", "after") if refitted else ("before",)
+    figure = new_figure(FULL, 12 + 46 * len(rows))
+    # The scale of a bumped position would hide all others.
+    sharey: Literal["all", "row"] = "all" if explained else "row"
+    grid = figure.subplots(len(rows), len(panels), sharey=sharey, sharex="col", squeeze=False)
+    # Labels of narrow panels must not meet.
+    ticks = 3 if len(panels) > 2 else 5
+    # Residuals that exceed the stated noise must look too large.
+    gap = diagnosis.gap
+    posteriori = gap.before if gap.after is None else gap.after
+    sigma = 1e3 * condition_sigma(diagnosis.base, 1.0 if diagnosis.sigma_known else posteriori)
+    for when, line in zip(rows, grid, strict=True):
+        for (label, abscissa), ax in zip(panels.items(), line, strict=True):
+            ax.axhspan(-2 * sigma, 2 * sigma, color=NOISE)
+            ax.axhline(0, color=INK, linewidth=0.6)
+            for i, name in enumerate(names):
+                _draw_component(ax, positions, name, when, abscissa(i), explained)
+            ax.margins(y=0.08)
+            ax.xaxis.set_major_locator(MaxNLocator(ticks, steps=[1, 2, 5, 10]))
+            if when == rows[-1]:
+                ax.set_xlabel(label)
+        title = "base model" if when == "before" else "with what was found"
+        line[0].set_ylabel(f"{title}\nresidual / (mm/s²)")
+    handles, labels = grid[0, 0].get_legend_handles_labels()
+    once = dict(zip(labels, handles, strict=True))
+    figure.legend(once.values(), once.keys(), loc="outside upper left", ncols=7)
+    return figure
+
+
+def _panels(
+    diagnosis: Diagnosis, positions: pd.DataFrame, count: int
+) -> dict[str, Callable[[int], Array]]:
+    """Abscissa of each panel by its label, as a function of the component; there are `count`."""
+    frame = diagnosis.frame
+    unit = frame.forces / frame.solution.gravity
+    panels: dict[str, Callable[[int], Array]] = {}
+    if count == 1:
+        for k, axis in enumerate("xyz"):
+            panels[f"$f_{axis}/g$"] = lambda _, k=k: unit[:, k]  # type: ignore[misc]
+    else:
+        panels["$f/g$ of the same axis"] = lambda i: unit[:, i]
+    for column, label, scale in (
+        ("time_s", "time / min", 60),
+        ("temperature_degC", "temperature / °C", 1),
+    ):
+        values = positions[column].to_numpy() / scale
+        if np.isfinite(values).all() and np.ptp(values) > 0:
+            panels[label] = lambda i, v=values: _abreast(v, i, count)  # type: ignore[misc]
+    return panels
+
+
+def _abreast(values: Array, i: int, count: int) -> Array:
+    """Move component i of `count` aside where few values would let components hide each other."""
+    if len(np.unique(values)) > FEW:
+        return values
+    return values + ABREAST * np.ptp(values) * (i - (count - 1) / 2)
+
+
+def _draw_component(
+    ax: Axes, positions: pd.DataFrame, name: str, when: str, x: Array, explained: bool
+) -> None:
+    colour, marker = AXES[name]
+    label = "|f| − g" if name == "norm" else f"${name}$"
+    values = 1e3 * positions[f"residual_{name}_{when}_mps2"]
+    ax.plot(x, values, marker, color=colour, markersize=3.2, label=label)
+    if when == "before" and explained:
+        part = values - 1e3 * positions[f"residual_{name}_after_mps2"]
+        dash = BEFORE if name == "norm" else colour
+        ax.plot(x, part, "_", color=dash, markersize=8, markeredgewidth=1.3,
+                label=f"{label}, explained")  # fmt: skip
+    left_out = positions["split"] == "left out"
+    if when == "before" and left_out.any():
+        ax.plot(x[left_out], values[left_out], "o", color=BEFORE, markersize=9,
+                markerfacecolor="none", label="left out")  # fmt: skip
+
+
+SHOWN = 12
+"""Candidates in the figure of the evidence; weaker ones would only make it long."""
+SMALLEST_P = 1e-12
+
+
+def evidence_figure(diagnosis: Diagnosis) -> Figure:
+    """Family-wise p-value and posterior probability of each candidate."""
+    p_values = diagnosis.screening.p_family
+    # A class of equal effects has its probability under one name, the rest has none.
+    probabilities = diagnosis.probabilities
+
+    def rank(name: str) -> tuple[float, float, str]:
+        return max(p_values.get(name, 1.0), SMALLEST_P), -probabilities.get(name, 0.0), name
+
+    names = sorted({*p_values, *probabilities}, key=rank)
+    shown = [name for name in names if name != UNKNOWN][:SHOWN]
+    shown += [
+        n for n in names if n not in shown and (probabilities.get(n, 0) > 0.05 or n == UNKNOWN)
+    ]
+    named = {name for f in diagnosis.found for name in (f.name, *f.equivalence_class)}
+    colours = [AFTER if name in named else OTHER for name in shown]
+    place = np.arange(len(shown))[::-1]
+
+    figure = new_figure(FULL, 22 + 4.4 * len(shown))
+    left, right = figure.subplots(1, 2, sharey=True)
+    tested = [max(p_values.get(name, np.nan), SMALLEST_P) for name in shown]
+    smallest = float(np.nanmin([*tested, 1.0]))
+    left.hlines(place, tested, 1, color=colours, linewidth=1.2)
+    left.scatter(tested, place, color=colours, s=18, zorder=3)
+    level = diagnosis.level
+    left.axvline(level, color=BEFORE, linewidth=1, linestyle="--")
+    left.text(level, 1.0, f"level {level:g}", transform=left.get_xaxis_transform(),
+              color=BEFORE, ha="center", va="bottom", fontsize=7.5)  # fmt: skip
+    left.set_xscale("log")
+    left.set_xlim(2, min(0.3 * smallest, 1e-3))
+    left.xaxis.set_minor_locator(NullLocator())
+    left.set_xlabel("p-value, all candidates counted")
+    left.set_yticks(place, [words(name) for name in shown])
+    left.grid(axis="y", visible=False)
+    percent = [100 * probabilities.get(name, 0.0) for name in shown]
+    drawn = right.barh(place, percent, color=colours, height=0.6)
+    right.bar_label(drawn, [_percent(probabilities.get(n)) for n in shown], padding=2, fontsize=7.5)
+    right.set(xlim=(0, 115), xlabel="posterior probability, alone or with another / %")
+    right.set_xticks([0, 25, 50, 75, 100])
+    right.grid(axis="y", visible=False)
+    return figure
+
+
+def _percent(probability: float | None) -> str:
+    if probability is None:
+        return "shared"
+    if probability < 0.01:
+        return "< 1 %"
+    return "> 99 %" if probability > 0.99 else f"{100 * probability:.0f} %"
+
+
+def location_figure(diagnosis: Diagnosis) -> Figure:
+    """Share of the excess χ² that each group of regressors takes up, of those that can be told."""
+    shares = sorted(diagnosis.location.items(), key=lambda item: item[1])
+    figure = new_figure(FULL * 0.62, 14 + 5.5 * len(shares))
+    ax = figure.add_subplot()
+    titles = [GROUPS.get(name, words(name)) for name, _ in shares]
+    percent = [100 * share for _, share in shares]
+    usual = [100 * diagnosis.location_by_chance[name] for name, _ in shares]
+    place = np.arange(len(shares))
+    ax.barh(titles, percent, color=AFTER, height=0.6)
+    ax.vlines(usual, place - 0.42, place + 0.42, color=INK)
+    for row, ends in enumerate(zip(percent, usual, strict=True)):
+        ax.text(max(ends) + 1.5, row, f"{ends[0]:.0f} %", va="center", fontsize=7.5)
+    ax.set(xlim=(0, 112), xlabel="share of the excess χ² / %")
+    ax.grid(axis="y", visible=False)
+    return figure
+
+
+COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00")
+"""Of the families, the most probable first."""
+ALONE = "#999999"
+"""Of what belongs to no family, and of further families."""
+BARS = 8
+"""Explanations in the figure; weaker ones count as others."""
+HEIGHT = 0.64
+"""Of a bar, in rows."""
+
+
+def explanations_figure(explanations: tuple[Explanation, ...]) -> Figure:
+    """Posterior of each explanation, each bar from where the one above it ends."""
+    shown = explanations[:BARS]
+    families = [family for one in shown for family in _families(one) if family]
+    colours = dict(zip(dict.fromkeys(families), COLOURS, strict=False))
+    ends = np.cumsum([one.posterior for one in shown])
+    rest = max(0.0, 1 - float(ends[-1]))
+
+    figure = new_figure(COLUMN, 14 + 4 * len(colours) + 7 * (len(shown) + (rest > 0)))
+    ax = figure.add_subplot()
+    for row, (one, end) in enumerate(zip(shown, ends, strict=True)):
+        parts = _families(one)
+        height = HEIGHT / len(parts)
+        for i, family in enumerate(parts):
+            ax.barh(
+                row - HEIGHT / 2 + (i + 0.5) * height,
+                one.posterior,
+                left=end - one.posterior,
+                height=height,
+                color=colours.get(family, ALONE),
+            )
+    if rest > 0:
+        ax.barh(len(shown), rest, left=1 - rest, height=HEIGHT, color=MISSING)
+    ax.axvline(CREDIBLE, color=INK, linewidth=0.8, linestyle="--")
+    ax.text(CREDIBLE, 1.0, f"{CREDIBLE:g}", transform=ax.get_xaxis_transform(),
+            ha="center", va="bottom", fontsize=7.5)  # fmt: skip
+    for row, posterior in enumerate([*(one.posterior for one in shown), *([rest] * (rest > 0))]):
+        ax.annotate(f"{posterior:.2f}", (1, row), xytext=(4, 0), textcoords="offset points",
+                    va="center", fontsize=7.5, annotation_clip=False)  # fmt: skip
+    labels = ["\nwith ".join(map(words, one.names)) for one in shown]
+    ax.set_yticks(range(len(shown) + (rest > 0)), labels + ["all others"] * (rest > 0))
+    ax.set(xlim=(0, 1), xlabel="posterior probability, summed")
+    ax.invert_yaxis()
+    ax.grid(axis="y", visible=False)
+    if colours:
+        handles = [Patch(color=colour, label=family) for family, colour in colours.items()]
+        figure.legend(handles=handles, loc="outside upper left", ncols=1)
+    return figure
+
+
+def _families(explanation: Explanation) -> list[str]:
+    return [family_of(*members) for members in explanation.classes]
+
+
+SIMULATION_COLOURS = {"old": "#999999", "new": "#56B4E9"}
+DIFFERENT = 5
+"""Ratio of variances or tilt errors from which on an axis is logarithmic."""
+DIGITS = 48
+"""Most digits of position numbers along the axis."""
+LARGE = 20
+"""Ratio of mean squares from which on bars are drawn on a logarithmic scale."""
+
+
+def gap_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
+    """Residuals of the held-out positions before and after, and their mean squares."""
+    gap = diagnosis.gap.held_out
+    assert gap is not None
+    figure = new_figure(FULL, 62)
+    ax, bars = figure.subplots(1, 2, width_ratios=[2.6, 1])
+    held = positions[positions["split"] == "held-out"]
+    before, after = (1e3 * held[f"predicted_{when}_mps2"] for when in ("before", "after"))
+    sigma = 1e3 * condition_sigma(diagnosis.final.solution, diagnosis.unit_variance)
+    place = np.arange(len(held))
+    ax.axhspan(0, sigma, color=NOISE, label="noise alone (1 σ)")
+    ax.vlines(place, after, before, color=OTHER, linewidth=0.8)
+    ax.plot(place, before, "s", color=BEFORE, label="without the effect")
+    ax.plot(place, after, "o", color=AFTER, label="with the effect")
+    # Labels of long numbers must not meet.
+    every = -(-len(held) * len(str(held["position"].max())) // DIGITS)
+    ax.set_xticks(place[::every], held["position"][::every])
+    ax.set(xlabel="held-out position", ylabel="residual, rms / (mm/s²)")
+    ax.set_ylim(0, 1.05 * max(before.max(), after.max(), sigma))
+    ax.grid(axis="x", visible=False)
+    figure.legend(loc="outside upper left", ncols=3)
+
+    heights = {"without": gap.before, "with": gap.after, "right\nmodel": gap.floor}
+    drawn = bars.bar(list(heights), list(heights.values()), color=[BEFORE, AFTER, OTHER])
+    bars.bar_label(drawn, [number(value) for value in heights.values()], padding=1, fontsize=7.5)
+    bars.axhline(1, color=INK, linewidth=0.8, linestyle=":")
+    bars.set_ylabel("mean square / noise variance")
+    if max(heights.values()) > LARGE * min(heights.values()):
+        bars.set_yscale("log")
+    bars.margins(y=0.12)
+    bars.grid(axis="x", visible=False)
+    return figure
+
+
+def loop_figure(loop: Loop) -> Figure:
+    """Measured variances of unit weight among the simulated ones, and what the tilt error is."""
+    figure = new_figure(FULL, 62)
+    base, extended, tilt = figure.subplots(1, 3, width_ratios=[1.5, 1, 1.3])
+    _draw_variances(base, loop, "base", ("old", "new"))
+    _draw_variances(extended, loop, "extended", ("new",))
+    base.set_ylabel("simulated sessions")
+    handles = [
+        Patch(color=SIMULATION_COLOURS["old"], label="old simulation"),
+        Patch(color=SIMULATION_COLOURS["new"], label="new simulation"),
+        Line2D([], [], color=INK, linestyle="--", label="measurement"),
+    ]
+    figure.legend(handles=handles, loc="outside upper left", ncols=3)
+
+    titles = (
+        "base calibration,\nold simulation",
+        "base calibration,\nnew simulation",
+        "extended calibration,\nnew simulation",
+    )
+    colours = (SIMULATION_COLOURS["old"], BEFORE, AFTER)
+    place = np.arange(len(CASES))[::-1]
+    ends = []
+    for case, y, colour in zip(CASES, place, colours, strict=True):
+        values = to_display(loop.case(*case)["tilt_error_rad"], "rad")
+        rms = to_display(loop.tilt(*case), "rad").item()
+        low, high = np.quantile(values, [0.025, 0.975])
+        ends += [float(low), float(high)]
+        tilt.hlines(y, low, high, color=colour, linewidth=5, alpha=0.4)
+        tilt.plot(rms, y, "o", color=colour, markersize=6)
+        tilt.annotate(number(rms), (rms, y), xytext=(0, 7), textcoords="offset points",
+                      ha="center", fontsize=7.5)  # fmt: skip
+    tilt.set_yticks(place, titles)
+    tilt.set_ylim(-0.5, len(CASES) - 0.3)
+    tilt.set_xlabel(f"tilt error / {display_unit('rad')}")
+    tilt.grid(axis="y", visible=False)
+    _scale(tilt, min(ends), max(ends))
+    return figure
+
+
+def _draw_variances(ax: Axes, loop: Loop, calibration: str, simulations: tuple[str, ...]) -> None:
+    measured = loop.measured[calibration]
+    values = {s: loop.case(s, calibration)["sigma0_squared"].to_numpy() for s in simulations}
+    everything = np.concatenate([[measured], *values.values()])
+    low, high = float(everything.min()), float(everything.max())
+    bins = np.geomspace(low, high, 50) if high > DIFFERENT * low else np.linspace(low, high, 30)
+    for simulation, drawn in values.items():
+        counts, _ = np.histogram(drawn, bins)
+        # Scaled to the same height, or a narrow distribution would hide a wide one.
+        ax.stairs(counts / counts.max(), bins, fill=True, color=SIMULATION_COLOURS[simulation])
+    ax.axvline(measured, color=INK, linewidth=1.2, linestyle="--")
+    _scale(ax, low, high)
+    ax.set_yticks([])
+    ax.set_xlabel("variance of unit weight")
+    ax.set_title(f"{calibration} calibration")
+    ax.grid(axis="x", visible=False)
+
+
+def _scale(ax: Axes, low: float, high: float) -> None:
+    """Make the abscissa logarithmic where the values differ much."""
+    if high > DIFFERENT * low:
+        ax.set_xscale("log")
+        ax.set_xlim(0.7 * low, 1.4 * high)
+        log_ticks(ax.xaxis, low, high)

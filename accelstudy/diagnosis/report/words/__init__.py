@@ -1,1 +1,0 @@
-"""What a diagnosis found, in plain words."""

@@ -1,0 +1,246 @@
+"""What a campaign or a scheme can and cannot show of each effect: limits, detectable sizes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from accelstudy.adjustment.quality import noncentrality, solve
+from accelstudy.approaches import Approach
+from accelstudy.basics.shares import sigmas_95
+from accelstudy.basics.units import display_unit, to_display
+from accelstudy.basics.wording import number
+from accelstudy.campaign.calibration.fit import fit_campaign, usual_approach
+from accelstudy.campaign.session import Campaign
+from accelstudy.diagnosis.space.examined import ExaminedFit, Frame, examine
+from accelstudy.diagnosis.space.hypotheses import ALIKE, OUTLIER, Hypothesis, cosines
+from accelstudy.effects import Effect, get_effect
+from accelstudy.schemes import Scheme
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.simulation.hold_plan import check_needs_no_plan
+from accelstudy.simulation.sessions import Noise, session
+
+Array = NDArray[np.float64]
+
+
+POWER = 0.8
+
+
+@dataclass(frozen=True)
+class UpperLimit:
+    """Largest value of a parameter that the campaign does not exclude at 95 %, SI."""
+
+    name: str
+    parameter: str
+    value: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Visibility:
+    """What a campaign or a scheme can show of an effect.
+
+    Attributes
+    ----------
+    name : str
+    status : str, "visible", "invisible" or "untestable"
+    reason : str, why it is untestable
+    mdb : float, minimal detectable size of a parameter, the worst one, SI; infinite if a
+        combination of parameters does not show
+    mib : float, size at which the effect can also be told from the nearest other one, likewise
+    unit : str, SI unit of the parameters
+    confused : tuple of (name, cosine), the nearest other effects
+    easiest : Effect, in the shape that all this is said of; None if it is not visible
+    hardest : Effect, in the shape that is hardest to see of those that a diagnosis tries
+    hardest_mdb : float, its MDB
+    """
+
+    name: str
+    status: str
+    reason: str = ""
+    mdb: float = np.inf
+    mib: float = np.inf
+    unit: str = ""
+    confused: tuple[tuple[str, float], ...] = ()
+    easiest: Effect | None = None
+    hardest: Effect | None = None
+    hardest_mdb: float = np.inf
+
+
+def signature_columns(frame: Frame, hypothesis: Hypothesis) -> Array:
+    """Signature of each parameter of an effect in the residual space, (m, k)."""
+    assert hypothesis.effect is not None
+    return frame.residuals.project(frame.residuals.whitened(frame.signature(hypothesis.effect)))
+
+
+def whole_shapes(shapes: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Shapes of an effect in which all its parameters show."""
+    return [h for h in shapes if h.effect is not None and h.dim == len(h.effect.parameters)]
+
+
+def upper_limits(examined: ExaminedFit, known: bool, named: Sequence[str]) -> list[UpperLimit]:
+    """95 % limits |p̂| + 1.96 σ of the parameters of all effects that were not found.
+
+    Where the noise is not `known`, σ comes from what the model and the effect together leave of the
+    residuals, and Student's t takes the place of 1.96; without any residual left there is no limit.
+
+    Each effect is estimated beside the parameters of the model, in the shape that fits best of
+    those in which all its parameters show. The limit is that of the parameter that is known worst.
+    An effect without such a shape has no limit.
+    """
+    limits = []
+    for name, shapes in examined.candidates.items():
+        if name == OUTLIER or name in named:
+            continue
+        whole = whole_shapes(shapes)
+        if not whole:
+            continue
+        best = max(whole, key=lambda h: float(np.sum((examined.frame.residuals.z @ h.basis) ** 2)))
+        assert best.effect is not None
+        columns = signature_columns(examined.frame, best)
+        inverse = np.linalg.pinv(columns)
+        residuals = examined.frame.residuals
+        values, variance, needed = inverse @ residuals.z, 1.0, sigmas_95()
+        if not known:
+            left, r = residuals.z - columns @ values, residuals.redundancy - columns.shape[1]
+            if r < 1:
+                continue
+            variance, needed = float(left @ left) / r, sigmas_95(r)
+        bounds = np.abs(values) + needed * np.sqrt(variance * np.sum(inverse**2, axis=1))
+        worst = int(np.argmax(bounds))
+        parameter = best.effect.parameters[worst]
+        limits.append(UpperLimit(name, parameter.name, float(bounds[worst]), parameter.unit))
+    return limits
+
+
+def visibilities(examined: ExaminedFit, alpha: float = 0.001) -> list[Visibility]:
+    """What a campaign can show of each effect that is not in its model.
+
+    The minimal detectable bias (MDB) is the size √(λ0 / dᵀd) of a single parameter at which its
+    test of level `alpha` has the power `POWER`. For the minimal identifiable bias (MIB) only the
+    part of d counts that the nearest rival cannot imitate.
+
+    Of the shapes of an effect that a diagnosis tries, the one that shows best is judged, and of
+    those in which all parameters show if there are any. The shape that shows worst is given as
+    well, since a jump may happen at any time.
+    """
+    root = np.sqrt(noncentrality(1, alpha, POWER))
+    rows = []
+    for name, shapes in examined.candidates.items():
+        if name == OUTLIER:
+            continue
+        judged = whole_shapes(shapes) or shapes
+        columns = [signature_columns(examined.frame, h) for h in judged]
+        sizes = [np.linalg.norm(c, axis=0) for c in columns]
+        mdbs = [_size(root, s) for s in sizes]
+        easiest, hardest = int(np.argmin(mdbs)), int(np.argmax(mdbs))
+        best = judged[easiest]
+        near = examined.nearest(best)
+        rivals = [
+            max(examined.candidates[other], key=lambda h: float(cosines(best.ideal, h.ideal)[0]))
+            for other, cosine in near
+            if cosine <= ALIKE
+        ]
+        left = sizes[easiest]
+        for rival in rivals:
+            rest = columns[easiest] - rival.basis @ (rival.basis.T @ columns[easiest])
+            left = np.minimum(left, np.linalg.norm(rest, axis=0))
+        assert best.effect is not None
+        rows.append(
+            Visibility(
+                name=name,
+                status="visible",
+                mdb=mdbs[easiest],
+                mib=_size(root, left),
+                unit=best.effect.parameters[0].unit,
+                confused=near[:3],
+                easiest=best.effect,
+                hardest=judged[hardest].effect,
+                hardest_mdb=mdbs[hardest],
+            )
+        )
+    rows += [
+        Visibility(name, "invisible", unit=get_effect(name).parameters[0].unit)
+        for name in examined.invisible
+    ]
+    rows += [
+        Visibility(name, "untestable", reason, unit=get_effect(name).parameters[0].unit)
+        for name, reason in examined.untestable.items()
+    ]
+    return sorted(rows, key=lambda row: row.name)
+
+
+def _size(root: float, signature_norms: Array) -> float:
+    smallest = float(np.min(signature_norms))
+    return root / smallest if smallest > 1e-9 * np.max(signature_norms, initial=1e-300) else np.inf
+
+
+def examine_campaign(
+    campaign: Campaign, model: SensorModel, approach: Approach | None = None
+) -> ExaminedFit:
+    """Return what a campaign can show beside a model, with its own noise.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    model : SensorModel
+    approach : Approach; by default robot-aided if the campaign has the robot's angles
+    """
+    fit = fit_campaign(campaign, model, approach or usual_approach(campaign))
+    return examine(solve(fit.model, fit.approach, fit.observed, fit.adjustment))
+
+
+def examine_scheme(
+    scheme: Scheme, model: SensorModel, approach: Approach, noise: Noise | None = None
+) -> ExaminedFit:
+    """Return what a scheme can show beside a model; nothing is known of times and temperatures.
+
+    Raises
+    ------
+    InputError
+        If the positions do not determine the model, or it needs to know more of them.
+    """
+    check_needs_no_plan(model)
+    ideal = session(model, np.zeros(model.n_parameters), scheme.directions)
+    observed = ideal.observations(noise or Noise())
+    return examine(solve(model, approach, observed))
+
+
+def visibility_table(examined: ExaminedFit) -> pd.DataFrame:
+    """Table for people: one row per effect that is not in the model, in the units shown."""
+    rows = []
+    for row in visibilities(examined):
+
+        def shown(size: float, unit: str = row.unit, seen: bool = row.status == "visible") -> str:
+            return number(float(to_display(size, unit))) if seen else "–"
+
+        worst = _settings(row.hardest)
+        rows.append(
+            {
+                "effect": row.name,
+                "part": get_effect(row.name).part,
+                "status": row.status,
+                "MDB": shown(row.mdb),
+                "MIB": shown(row.mib),
+                "unit": display_unit(row.unit) if row.status == "visible" else "",
+                "with": _settings(row.easiest),
+                "worst MDB": f"{shown(row.hardest_mdb)} with {worst}" if worst else "",
+                "confused with": row.reason
+                or ", ".join(f"{name} {cosine:.2f}" for name, cosine in row.confused),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _settings(effect: Effect | None) -> str:
+    """Settings of an effect as it is written, with their units: ``t=290 s``."""
+    if effect is None:
+        return ""
+    units = {
+        setting.name: "" if setting.unit == "1" else f" {setting.unit}" for setting in effect.takes
+    }
+    return ", ".join(f"{name}={value:.4g}{units[name]}" for name, value in effect.settings.items())

@@ -1,1 +1,0 @@
-"""What a finding is worth: on held-out positions, in tilt, in further positions."""

@@ -1,0 +1,185 @@
+"""The evidence of hypotheses: densities, the test that is read off them, and the posterior."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, design, posed, shuffled
+from scipy import stats
+
+from accelstudy.diagnosis.decision.posterior import Explanation, Posterior, Weighed, credible_set
+from accelstudy.diagnosis.decision.verdict import _misfit
+from accelstudy.diagnosis.evidence.field import Field
+from accelstudy.diagnosis.evidence.noise_models import UnequalAxes
+from accelstudy.diagnosis.evidence.noise_tests import NOISES, most_evidence
+from accelstudy.diagnosis.evidence.size import SIZE_WEIGHTS, SIZES, Evidence, Level
+from accelstudy.schemes import get_scheme
+from accelstudy.simulation.sessions import Noise, session
+
+R = 40
+LEVELS = {"given": Level.given(), "not given": Level((1.0,), (0.5,), known=False)}
+
+
+def exact(level, z, basis):
+    """Log density by multivariate t distributions, up to a constant."""
+    total = -np.inf
+    sizes = [(0.0, 1.0)] if basis is None else zip(SIZES, SIZE_WEIGHTS, strict=True)
+    for size, weight in sizes:
+        shape = np.eye(R) if basis is None else np.eye(R) + size / basis.shape[1] * basis @ basis.T
+        for p, nu in zip(level.weights, level.freedoms, strict=True):
+            log = stats.multivariate_t.logpdf(z, shape=shape, df=nu)
+            total = np.logaddexp(total, log + np.log(weight * p))
+    return total
+
+
+@pytest.mark.parametrize("known", LEVELS)
+def test_densities_are_mixtures_of_t_distributions(known):
+    rng = np.random.default_rng(1)
+    bases = [np.linalg.qr(rng.standard_normal((R, d)))[0] for d in (1, 3, 6)]
+    evidence, odds = Evidence(LEVELS[known], R), []
+    for scale in (0.5, 1.0, 2.0):
+        z = scale * rng.standard_normal(R) + bases[1] @ np.array([0.0, 6.0, 0.0])
+        parts = np.array([np.sum((z @ b) ** 2) for b in bases])
+        found = [*evidence.of_spaces(parts, [1, 3, 6], z @ z),
+                 np.logaddexp.reduce(evidence.of_noise(z @ z))]  # fmt: skip
+        expected = [exact(LEVELS[known], z, b) for b in (*bases, None)]
+        odds.append(np.array(found) - expected)
+    # The constant is the same for all hypotheses and all residuals; the integral is a table.
+    assert np.ptp(odds) < 0.01
+
+
+@pytest.fixture(scope="module", params=[ROBOT, GRAVITY], ids=lambda approach: approach.name)
+def examined(request):
+    return design(shuffled("fibonacci-30"), request.param, seed=7)
+
+
+def test_noise_is_not_noise_with_an_effect(examined):
+    """What is drawn with an effect is found, and its weight takes it out again."""
+    residuals, rng = examined.frame.residuals, np.random.default_rng(3)
+    field = Field.of(examined.candidates, {})
+    changed = field.with_effects(np.zeros((400, len(residuals.design))), rng)
+    noise = rng.standard_normal(changed.shape) + residuals.project(changed.T).T
+    parts = field.parts(residuals.project(noise.T).T)
+    weights = np.exp(-field.proposal(parts))
+    squares = np.sum(residuals.project(noise.T).T ** 2, axis=1)
+    r = residuals.redundancy
+    assert np.mean(squares) > r + 10
+    assert np.sum(weights * squares) / np.sum(weights) == pytest.approx(r, rel=0.25)
+
+
+@pytest.mark.parametrize("approach", [ROBOT, GRAVITY], ids=lambda approach: approach.name)
+def test_axes_are_weighted_as_far_as_the_data_say(approach):
+    """Equal axes are seldom taken for unequal ones, clearly unequal ones always are."""
+    odds = {}
+    for effect in (None, "axis_noise(kappa_z=9)"):
+        effects = () if effect is None else (effect,)
+        odds[effect] = []
+        for seed in range(8):
+            noise = Noise(sigma_angle=1e-6, effects=effects)
+            residuals = design(shuffled("fibonacci-60"), approach, noise=noise, seed=seed)
+            residuals = residuals.frame.residuals
+            evidence = Evidence(Level.unknown(), residuals.redundancy)
+            axes = UnequalAxes.of(residuals, evidence, None)
+            odds[effect].append(axes.log_evidence)
+            assert np.prod(axes.ratios) == pytest.approx(1.0)
+            if effect is not None:
+                assert np.argmax(axes.ratios) == 2
+    assert np.median(odds[None]) < 0
+    assert np.median(odds["axis_noise(kappa_z=9)"]) > np.log(5)
+
+
+def test_what_the_holds_show_of_the_axes_counts_where_residuals_say_little():
+    """With equal residuals the ratios within the holds are believed by half or so."""
+    residuals = design(shuffled("mclaren-24"), GRAVITY, seed=3).frame.residuals
+    evidence = Evidence(Level.unknown(), residuals.redundancy)
+    alone = UnequalAxes.of(residuals, evidence, None).ratios
+    shown = UnequalAxes.of(residuals, evidence, np.array([1.0, 1.0, 4.0])).ratios
+    assert alone[2] / np.mean(alone[:2]) < shown[2] / np.mean(shown[:2]) < 5
+
+
+def test_a_p_value_means_no_more_than_it_can():
+    assert most_evidence(0.05) == pytest.approx(np.log(2.456), abs=1e-3)
+    assert most_evidence(0.5) == 0.0
+
+
+def test_the_posterior_merges_what_means_the_same():
+    a, b, c = ("a", "z"), ("b",), ("c",)
+    weighed = [
+        Weighed(("a",), (a,), np.log(0.3)),
+        Weighed(("z",), (a,), np.log(0.3)),
+        Weighed(("b", "c"), (b, c), np.log(0.1)),
+        Weighed(("c", "b"), (c, b), np.log(0.1)),
+        Weighed(("b",), (b,), np.log(0.2)),
+    ]
+    posterior = Posterior.of(weighed)
+    assert posterior.probabilities == pytest.approx((0.6, 0.2, 0.2))
+    assert posterior.explanations[0].names == ("a",)
+    assert sum(one.posterior for one in posterior.credible_set) == pytest.approx(1.0)
+
+
+def weighed(*names_and_probabilities):
+    """Explanations with a shape for each effect, as a search would give them."""
+    shape = object()
+    return [
+        Weighed(names, tuple((n,) for n in names), np.log(p), (shape,) * (names[0] not in NOISES))
+        for names, p in names_and_probabilities
+    ]
+
+
+def test_where_one_effect_is_more_probable_a_pair_counts_for_its_better_half():
+    one, other = ("bias_drift",), ("hysteresis",)
+    posterior = Posterior.of(
+        weighed((one, 0.5), (other, 0.2), (one + other, 0.1), ((*other, "bias"), 0.2))
+    )
+    assert [e.names for e in posterior.explanations] == [one, other]
+    assert [e.posterior for e in posterior.explanations] == pytest.approx([0.6, 0.4])
+    assert posterior.probabilities == pytest.approx((0.5, 0.2, 0.2, 0.1))
+
+
+def test_a_pair_that_is_more_probable_than_its_parts_stands():
+    pair = ("bias_drift", "hysteresis")
+    posterior = Posterior.of(weighed((pair, 0.3), (pair[:1], 0.25), (("bias",), 0.45)))
+    assert [e.names for e in posterior.explanations] == [("bias",), pair, pair[:1]]
+
+
+def test_where_two_effects_are_more_probable_all_pairs_stand():
+    pairs = [("bias", "hysteresis"), ("bias", "settling"), ("bias", "warm_up")]
+    posterior = Posterior.of(weighed(*((pair, 0.2) for pair in pairs), (("bias",), 0.4)))
+    assert {e.names for e in posterior.explanations} == {*pairs, ("bias",)}
+
+
+def test_wrong_noise_of_all_kinds_is_one_explanation():
+    posterior = Posterior.of(
+        weighed((("bias",), 0.4), (("axis_noise",), 0.2), (("heavy_tails",), 0.4 - 1e-9))
+    )
+    assert posterior.explanations[0].names == ("heavy_tails",)
+    assert posterior.of_noise == pytest.approx(0.6)
+
+
+def test_a_credible_set_is_the_smallest():
+    p = [0.05, 0.5, 0.1, 0.35]
+    found = credible_set(Explanation((str(x),), ((str(x),),), x) for x in p)
+    assert [one.posterior for one in found] == [0.5, 0.35, 0.1]
+
+
+@pytest.mark.parametrize(
+    ("level", "spread", "said"),
+    [
+        (Level.unknown(), 0.02, "times what repeated positions differ by"),
+        (Level.given(), 0.02, "times the stated noise"),
+        (Level.unknown(), 0.0, ""),
+        (Level.given(), 0.0, ""),
+    ],
+)
+def test_a_fit_that_misses_more_than_the_noise_is_no_explanation(level, spread, said):
+    rng = np.random.default_rng(8)
+    attitudes = get_scheme("fibonacci-24").directions
+    ideal = session(NINE, np.zeros(9), np.tile(attitudes, (2, 1)), G)
+    observed = ideal.draw(Noise(), 1, rng)
+    # Each attitude misses by an amount of its own, which its repeat has, too.
+    missed = np.tile(spread * rng.standard_normal((24, 3)), (2, 1))
+    observed = replace(observed, forces=observed.forces + missed)
+    problem = posed(GRAVITY, observed, level)
+    found = _misfit(problem, problem.base.solution)
+    assert found.endswith(said)
+    assert bool(found) == bool(said)

@@ -1,0 +1,251 @@
+"""The tests of the noise: they err as often as they say, and each finds what it is about."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, least, most
+from quality_helpers import BOTH, SIGMA, STANDARD_ERRORS, draw, one, solutions
+from scipy import stats
+
+from accelstudy.adjustment.quality import solve
+from accelstudy.diagnosis.evidence.detection import Chance
+from accelstudy.diagnosis.evidence.noise_tests import (
+    axis_factors,
+    axis_test,
+    colour_test,
+    level_test,
+    resolution_test,
+    tail_test,
+    within_hold_test,
+)
+from accelstudy.diagnosis.space.residuals import Residuals
+from accelstudy.simulation.sessions import Noise
+
+RUNS, SIMULATED = 200, 200
+RARE = 1e-4
+"""Probability with which a test of p-values fails by chance."""
+SHAPE_TESTS = {"axis": axis_test, "colour": colour_test, "tail": tail_test}
+
+
+def sessions(approach, *effects, seed, scheme="mclaren-24", runs=RUNS, **noise):
+    """Residuals of calibrated sessions, and their forces."""
+    drawn = draw(seed, scheme, noise=Noise(effects=effects, **noise), replicates=runs)
+    return [Residuals.of(s) for s in solutions(approach, drawn)], drawn
+
+
+@pytest.fixture(scope="module")
+def white():
+    return {a.name: sessions(a, seed=1)[0] for a in (GRAVITY, ROBOT)}
+
+
+def p_values(test, residuals, seed=2):
+    """p-values, each with simulated residuals of its own, so that they are independent."""
+    return np.array([test(r, chance(r, (seed, i))).p_value for i, r in enumerate(residuals)])
+
+
+def chance(residuals, seed):
+    """Simulated residuals of a fit."""
+    return Chance(np.random.SeedSequence(seed), len(residuals.design), SIMULATED)
+
+
+def independent(errors):
+    """Residuals of as many redundant conditions, of a model that absorbs two others."""
+    r = len(errors)
+    design = np.concatenate([np.zeros((r, 2)), np.eye(2)])
+    eye = np.ones((r + 2, 1, 1))
+    return Residuals(design, np.append(errors, [5.0, -3.0]), eye, eye, np.ones((r + 2, 1)))
+
+
+def assert_uniform(p):
+    """KS, which steps of 1/201 change little; and rejections at the usual levels."""
+    assert stats.kstest(p, "uniform").pvalue > RARE
+    for level in (0.01, 0.05, 0.10):
+        # A simulated p-value of at most `level` has the probability ⌊201 level⌋ / 201.
+        exact = np.floor((SIMULATED + 1) * level) / (SIMULATED + 1)
+        assert least(len(p), exact, RARE) <= np.sum(p <= level) <= most(len(p), level, RARE)
+
+
+# --- nothing is wrong ----------------------------------------------------------------------------
+
+
+@BOTH
+@pytest.mark.parametrize("name", SHAPE_TESTS)
+def test_p_values_of_white_noise_are_uniform(white, name, approach):
+    assert_uniform(p_values(SHAPE_TESTS[name], white[approach.name]))
+
+
+@BOTH
+def test_shape_tests_do_not_look_at_the_level(white, approach):
+    """All but the level stay the same when all residuals are scaled."""
+    for r in white[approach.name][:3]:
+        larger = replace(r, errors=7 * r.errors)
+        for test in SHAPE_TESTS.values():
+            assert test(larger, chance(r, 3)).p_value == test(r, chance(r, 3)).p_value
+
+
+@BOTH
+def test_p_values_of_the_level_are_uniform(white, approach):
+    assert_uniform(np.array([level_test(r).p_value for r in white[approach.name]]))
+
+
+@BOTH
+def test_white_noise_within_the_holds_explains_white_noise(white, approach):
+    """F with r and 3 Σ (n_i − 1) degrees of freedom, here few enough that the latter matter."""
+    rng = np.random.default_rng(5)
+    n_samples = np.full(24, 4)
+    p = []
+    for r in white[approach.name]:
+        sd = SIGMA * np.sqrt(4 * rng.chisquare(3, (24, 3)) / 3)
+        p.append(within_hold_test(r, SIGMA, sd, n_samples).p_value)
+    assert_uniform(np.array(p))
+
+
+@pytest.mark.parametrize("scheme", ["mclaren-24", "rings-24", "faces-edges-corners-26"])
+def test_readings_without_steps_have_none(scheme):
+    """The search is a bound (Bonferroni); attitudes on a grid of their own are no steps either."""
+    drawn = draw(6, scheme, noise=Noise(sigma_force=0.02), replicates=RUNS)
+    p = np.array([resolution_test(forces, 0.02).p_value for forces in drawn.forces])
+    for level in (0.01, 0.05, 0.10):
+        assert np.sum(p <= level) <= most(RUNS, level, RARE)
+
+
+# --- closed forms --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("size", [0.3, 1.0, 1.7])
+def test_the_level_test_is_the_two_sided_chi_square_test(size):
+    z = size * np.random.default_rng(7).standard_normal(40)
+    found = level_test(independent(z))
+    chi2 = stats.chi2(40)
+    tails = chi2.cdf(z @ z), chi2.sf(z @ z)
+    assert found.p_value == pytest.approx(2 * min(tails), rel=1e-12)
+    assert found.statistic == pytest.approx(z @ z)
+    assert found.estimate[0] == pytest.approx(z @ z / 40)
+    assert ("larger" if found.estimate[0] > 1 else "smaller") in found.remark
+
+
+def test_the_test_within_holds_is_the_f_test():
+    rng = np.random.default_rng(8)
+    z, sd = 1.3 * rng.standard_normal(30), rng.uniform(0.01, 0.02, (12, 3))
+    n_samples = np.full(12, 25)
+    found = within_hold_test(independent(z), 0.003, sd, n_samples)
+    ratio = (z @ z / 30 * 0.003**2) / np.mean(sd**2 / 25)
+    assert found.statistic == pytest.approx(ratio)
+    assert found.p_value == pytest.approx(stats.f.sf(ratio, 30, 3 * 12 * 24))
+
+
+def test_holds_that_say_nothing_of_their_noise_accuse_nothing():
+    """One sample has no sd, and samples that are all the same only say that they were rounded."""
+    z = independent(np.random.default_rng(9).standard_normal(30))
+    sd = np.full((12, 3), 0.02)
+    sd[:4] = 0
+    counts = np.where(np.arange(12) < 4, 1, 100)
+    some = within_hold_test(z, 0.002, sd, counts)
+    assert some.p_value == within_hold_test(z, 0.002, sd[4:], counts[4:]).p_value
+    for nothing in (
+        within_hold_test(z, 0.002, np.zeros((12, 3)), np.full(12, 100)),
+        within_hold_test(z, 0.002, np.zeros((12, 3)), np.ones(12, dtype=int)),
+    ):
+        assert nothing.p_value == 1
+        assert np.isfinite(nothing.statistic)
+
+
+@pytest.mark.parametrize(
+    ("approach", "scheme", "kappa", "sigma_angle"),
+    [
+        (ROBOT, "mclaren-24", (1.0, 1.0, 1.0), Noise().sigma_angle),
+        (ROBOT, "mclaren-24", (0.6, 1.0, 3.0), Noise().sigma_angle),
+        (ROBOT, "mclaren-24", (1.0, 1.0, 1.0), 2e-4),  # as large as the noise of the forces
+        (GRAVITY, "fibonacci-96", (0.9, 1.0, 2.0), Noise().sigma_angle),
+    ],
+)
+def test_variance_factors_of_the_axes_are_unbiased(approach, scheme, kappa, sigma_angle):
+    """Gravity takes many positions, so that none of the estimates is cut at 0."""
+    x, y, z = kappa
+    residuals, _ = sessions(
+        approach,
+        f"axis_noise(kappa_x={x}, kappa_y={y}, kappa_z={z})",
+        seed=10,
+        scheme=scheme,
+        runs=300,
+        sigma_angle=sigma_angle,
+    )
+    factors = np.array([axis_factors(r) for r in residuals])
+    assert np.mean(factors == 0) < 1e-2
+    error = factors.std(axis=0) / np.sqrt(len(factors))
+    assert np.all(np.abs(factors.mean(axis=0) - kappa) < STANDARD_ERRORS * error)
+
+
+# --- something is wrong --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "effect", "approach", "scheme"),
+    [
+        ("axis", "axis_noise(kappa_z=9)", ROBOT, "mclaren-24"),
+        ("axis", "axis_noise(kappa_z=9)", GRAVITY, "fibonacci-96"),
+        ("colour", "coloured_noise(share=0.9, tau=8)", ROBOT, "mclaren-24"),
+        ("colour", "coloured_noise(share=0.9, tau=8)", GRAVITY, "fibonacci-96"),
+        ("tail", "heavy_tails(nu=2.1)", ROBOT, "fibonacci-96"),
+        ("tail", "heavy_tails(nu=2.1)", GRAVITY, "fibonacci-96"),
+    ],
+)
+def test_what_is_large_is_found(name, effect, approach, scheme):
+    """At 1 % in more than 80 % of the sessions."""
+    residuals, _ = sessions(approach, effect, seed=12, scheme=scheme, runs=50)
+    assert np.sum(p_values(SHAPE_TESTS[name], residuals) <= 0.01) >= least(50, 0.8, RARE)
+
+
+def test_a_wrong_level_is_found_as_often_as_theory_says():
+    """Power of the chi-square test for κ = 1.5 in closed form."""
+    kappa = 1.5
+    residuals, _ = sessions(GRAVITY, f"noise_level(kappa={kappa})", seed=13, scheme="fibonacci-50")
+    chi2 = stats.chi2(residuals[0].redundancy)
+    low, high = chi2.ppf([0.025, 0.975])
+    power = chi2.cdf(low / kappa) + chi2.sf(high / kappa)
+    count = sum(level_test(r).p_value < 0.05 for r in residuals)
+    assert least(RUNS, power, RARE) <= count <= most(RUNS, power, RARE)
+
+
+@BOTH
+def test_unequal_axes_do_not_look_like_colour(approach):
+    """Weighted as they are, the axes leave the test what it is; unweighted it errs twice as often
+    at most, while the test of the axes finds them."""
+    kappa = np.array([1.0, 1.0, 4.0])
+    drawn = draw(14, noise=Noise(effects=("axis_noise(kappa_z=4)",)), replicates=120)
+    raw = [Residuals.of(s) for s in solutions(approach, drawn)]
+    assert np.sum(p_values(colour_test, raw) <= 0.05) <= most(len(raw), 0.1, RARE)
+    sigma = np.broadcast_to(SIGMA * np.sqrt(kappa), (24, 3))
+    weighted = [
+        Residuals.of(solve(NINE, approach, replace(one(drawn, i), sigma_force=sigma)))
+        for i in range(80)
+    ]
+    assert_uniform(p_values(colour_test, weighted))
+
+
+@pytest.mark.parametrize("lsb", [0.05, 0.2])
+def test_steps_of_the_readings_are_found_and_measured(lsb):
+    noise = Noise(sigma_force=0.01, effects=(f"quantisation(lsb={lsb})",))
+    drawn = draw(15, "fibonacci-50", noise=noise, replicates=50)
+    found = [resolution_test(forces, 0.01) for forces in drawn.forces]
+    assert sum(t.p_value < 0.01 for t in found) >= least(50, 0.99, RARE)
+    # Readings of ±g tell a wrong step once it is out by half a step there.
+    steps = np.array([t.estimate[0] for t in found])
+    assert np.all(np.abs(steps / lsb - 1) < lsb / (4 * G))
+
+
+@pytest.mark.parametrize("sigma", [1.0, 10.0, 1e3])
+def test_a_sigma_as_large_as_gravity_makes_no_steps(sigma):
+    """Readings that span less than some steps cannot show them."""
+    forces = draw(17, "fibonacci-50").forces[0]
+    assert resolution_test(forces, sigma).p_value == 1
+
+
+@BOTH
+def test_what_the_holds_do_not_see_is_colour(approach):
+    """An offset that is random from hold to hold has no sd within them."""
+    residuals, _ = sessions(approach, "coloured_noise(share=0.8, tau=0.1)", seed=16, runs=50)
+    sd, n_samples = np.full((24, 3), SIGMA * 10), np.full(24, 100)
+    p = np.array([within_hold_test(r, SIGMA, sd, n_samples).p_value for r in residuals])
+    assert np.sum(p < 0.01) >= least(50, 0.95, RARE)

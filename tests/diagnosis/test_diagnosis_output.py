@@ -1,0 +1,579 @@
+"""What a diagnosis writes: files, their content, the page for every verdict, and the loop."""
+
+import hashlib
+import json
+import re
+import shutil
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from types import SimpleNamespace
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from click.testing import CliRunner
+from jsonschema import Draft202012Validator
+from page_helpers import assert_sound, text_of
+from places import ROOT
+
+from accelstudy.approaches import get_approach
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import MGON, angles_in
+from accelstudy.basics.wording import number, p_value
+from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.calibration.output import write_calibration
+from accelstudy.campaign.format import write_campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
+from accelstudy.commands.main import main
+from accelstudy.diagnosis.consequences import separating_positions
+from accelstudy.diagnosis.decision.posterior import Explanation, Posterior, Weighed
+from accelstudy.diagnosis.decision.priors import SURE
+from accelstudy.diagnosis.decision.statement import certain_of
+from accelstudy.diagnosis.decision.verdict import Finding
+from accelstudy.diagnosis.held_out import Gap
+from accelstudy.diagnosis.loop import CASES as CASES_OF_LOOP
+from accelstudy.diagnosis.loop import Loop, close_loop
+from accelstudy.diagnosis.pipeline import diagnose
+from accelstudy.diagnosis.report.figures import gap_figure, loop_figure
+from accelstudy.diagnosis.report.output import diagnose_folder, write_diagnosis
+from accelstudy.diagnosis.report.words import headline, question, verdict_lines
+from accelstudy.diagnosis.round_trip import parse_round_trip
+from accelstudy.diagnosis.space.examined import examine
+from accelstudy.drawing import saving
+from accelstudy.drawing.style import STYLE
+from accelstudy.sensors.models import get_model
+from accelstudy.study.config import read_study
+
+NINE = get_model("bias-scale-nonorthogonality")
+THERMAL = "thermal_bias: 0.003, -0.002, 0.001"
+CASES = {
+    "named": {
+        "effects": (THERMAL,),
+        "temperature": (20.0, 40.0),
+        "temperature_order": "random",
+        "order": "random",
+    },
+    "clipped": {"effects": ("saturation(knee=9.3): 1, 1, 1",), "seed": 3},
+    "gravity": {"effects": ("quadratic_scale: 0.003, 0.004, -0.003",), "approach": "gravity"},
+    "no_effect": {},
+    "unknown": {
+        "effects": (THERMAL, "hysteresis: 0.03, 0.02, 0.03", "cubic_scale: 0.006, 0.005, 0.006"),
+        "temperature": (20.0, 40.0),
+        "temperature_order": "random",
+    },
+    "noise_model": {"noise_effects": ("noise_level(kappa=4)",)},
+    "gross_error": {"gross_errors": ("axis_error(x=2, y=1, z=3)", "row_order(first=3, second=9)")},
+}
+HEADLINES = {
+    "named": "The model lacks thermal bias.",
+    "clipped": "The model lacks saturation.",
+    "gravity": "The model lacks",
+    "no_effect": "Nothing that these data can show",
+    "unknown": "it has no name here",
+    "noise_model": "its noise is not",
+    "gross_error": "The data have a gross error",
+}
+
+
+SCHEMA = Draft202012Validator(
+    yaml.safe_load((ROOT / "docs/reference/diagnosis.schema.yaml").read_text(encoding="utf-8"))
+)
+
+
+def run(*arguments):
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+def simulated(case, folder):
+    settings = {"scheme": "fibonacci-36", "seed": 5, **CASES[case]}
+    campaign, _ = simulate_campaign(CampaignSettings(name=case, **settings))
+    write_campaign(campaign, folder, plausible=False)
+    return campaign
+
+
+RENDERED = {"named": ("residuals", "gap"), "unknown": ("evidence", "location")}
+"""Figures that are rendered, by case; all others are only composed, which takes far less time."""
+render = saving.save
+
+
+def rendering(*names):
+    """A way to save figures that renders those of some names, and writes a stand-in for others."""
+
+    def save(figure, svg_path, png_path, title, dpi):
+        if title in names:
+            return render(figure, svg_path, png_path, title, dpi)
+        svg_path.parent.mkdir(exist_ok=True)
+        svg_path.write_text("<svg></svg>", encoding="utf-8")
+        png_path.write_bytes(bytes(2000))
+        return "<svg></svg>"
+
+    return save
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """Diagnoses of all cases, each made once."""
+    root, made = tmp_path_factory.mktemp("diagnoses"), {}
+
+    def get(case):
+        if case not in made:
+            simulated(case, root / case)
+            out = root / f"{case}-out"
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setattr(saving, "save", rendering(*RENDERED.get(case, ())))
+                result = run("diagnose", root / case, "--out", out, "--replicates", 100)
+            assert result.exit_code == 0, result.output
+            content = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
+            made[case] = out, content, result.output
+        return made[case]
+
+    return get
+
+
+@pytest.fixture(scope="module")
+def named(tmp_path_factory):
+    """Diagnosis of the named effect, for what can be told of it otherwise."""
+    return diagnose(simulated("named", tmp_path_factory.mktemp("named") / "c"), NINE)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_every_verdict_is_written_and_told(written, case):
+    out, content, printed = written(case)
+    assert content["verdict"] == ("named" if case in ("gravity", "clipped") else case)
+    assert [error.message for error in SCHEMA.iter_errors(content)] == []
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert HEADLINES[case] in printed
+    assert HEADLINES[case] in text_of(page)
+    drawn = {path.stem for path in (out / "figures").glob("*.svg")}
+    assert {"evidence", "residuals"} <= drawn
+    assert page.count("<svg") == len(drawn)
+    assert all((out / f"figures/{name}.png").stat().st_size > 1000 for name in drawn)
+    assert_sound(page)
+    assert "src=" not in page
+    assert not list(out.rglob("*.part"))
+    if case in ("named", "gravity"):
+        assert {"gap", "loop", "location"} <= drawn
+        assert "on data that were not used?" in text_of(page)
+    if case == "gross_error":
+        assert [effect["name"] for effect in content["effects"]] == ["axis_error", "row_order"]
+        assert "The forces of positions 3, 9 are exchanged. The data were mended" in text_of(page)
+        assert "It concerns the noise" not in page
+    if case == "clipped":  # readings without an inverse cannot be simulated again
+        assert "loop" not in drawn
+    if case == "gravity":
+        assert "mounting rotation" in page.split("What can this campaign not see?")[1]
+
+
+def test_the_page_tells_its_story_in_order(written):
+    out, _, _ = written("named")
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert [text_of(h) for h in re.findall("<h2>(.*?)</h2>", page)] == [
+        "Is there a gap between simulation and measurement?",
+        "Where does it live?",
+        "What is it called?",
+        "How sure is that, and what else could it be?",
+        "Is the noise as assumed?",
+        "What is it worth?",
+        "Did the gap shrink on data that were not used?",
+        "Does the simulation now look like the measurement?",
+        "What can this campaign not see?",
+        "What to measure next",
+        "What to do next",
+        "Terms",
+    ]
+
+
+def told(diagnosis, folder):
+    """The content of diagnosis.json, which fits its schema, and the text of the page."""
+    content = write_diagnosis(diagnosis, folder)
+    assert [error.message for error in SCHEMA.iter_errors(content)] == []
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert_sound(page)
+    return content, text_of(page)
+
+
+def explained(*explanations):
+    return tuple(Explanation(names, tuple((n,) for n in names), p) for *names, p in explanations)
+
+
+@pytest.mark.usefixtures("not_rendered")
+def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
+    examined = examine(named.frame.solution)
+    shapes = examined.candidates
+    thermal, drift = (shapes[name][0] for name in ("thermal_bias", "thermal_scale"))
+    weighed = [
+        Weighed((name,), ((name,),), np.log(p), best)
+        for name, p, best in (
+            ("thermal_bias", 0.55, (thermal,)),
+            ("thermal_scale", 0.4, (drift,)),
+            ("unknown", 0.05, ()),
+        )
+    ]
+    finding = Finding("narrowed", named.final, posterior=Posterior.of(weighed))
+    diagnosis = replace(
+        named,
+        verdict="narrowed",
+        credible_set=finding.credible_set,
+        certain=certain_of("narrowed", finding.credible_set, examined),
+        gap=replace(named.gap, names=()),
+        next_positions=separating_positions(named.frame, finding),
+    )
+    content, text = told(diagnosis, tmp_path)
+    (part,) = content["certain"]
+    assert part["names"] == ["thermal_bias", "thermal_scale"]
+    assert part["posterior"] == pytest.approx(0.95)
+    assert 0 < part["purity"] < 1
+    for words in (
+        "➜ NARROWED The model lacks an effect of temperature: thermal bias or thermal scale.",
+        "This campaign cannot tell thermal bias (0.55) and thermal scale (0.4) apart; further",
+        "that such an effect is missing; not that it is thermal bias rather than a rival",
+        "a wrong name costs 7, a right name that is withheld 3",
+        "whether thermal bias or thermal scale is missing",
+        "temperature / °C",
+        "takes thermal bias, and its sigmas do not know of the others",
+        "accelstudy diagnose CAMPAIGN --model bias-scale-nonorthogonality --approach robot",
+        "credible set the most probable explanations",
+    ):
+        assert words in text, words
+    assert yaml.safe_load((tmp_path / "model.yaml").read_text("utf-8"))["models"]
+
+
+@pytest.mark.usefixtures("not_rendered")
+def test_what_is_certain_of_the_unknown_is_its_headline(named, tmp_path):
+    others = ("hysteresis", "settling", "saturation", "cubic_scale", "quadratic_scale")
+    known = explained(*(("thermal_bias", name, 0.19) for name in others))
+    diagnosis = replace(
+        named,
+        **{"verdict": "unknown", "found": (), "gap": Gap(named.gap.before), "leveling": None},
+        **{"extended": named.model, "final": named.frame, "reason": "too much is open"},
+        **{"credible_set": known, "changes": (), "next_positions": ()},
+        certain=certain_of("unknown", known, examine(named.frame.solution)),
+    )
+    content, text = told(diagnosis, tmp_path)
+    assert [part["names"] for part in content["certain"]] == [["thermal_bias"]]
+    assert "The model lacks thermal bias; what is missing beside it has no name here." in text
+
+
+@pytest.mark.usefixtures("not_rendered")
+@pytest.mark.parametrize(("after", "better"), [(98.0, "base"), (82.5, "extended")])
+def test_a_model_that_levels_worse_is_not_advised(named, tmp_path, after, better):
+    """On the page and its commands, in the terminal, and in both files for programs."""
+    diagnosis = replace(named, leveling=(82.0 * MGON, after * MGON))
+    content, page = told(diagnosis, tmp_path)
+    assert content["gap"]["better_for_leveling"] == better
+    calibration = json.loads((tmp_path / "calibration.json").read_text(encoding="utf-8"))
+    advised = "keep the base model"
+    for lines in ([page], verdict_lines(diagnosis), calibration["warnings"]):
+        assert any(advised in line for line in lines) == (better == "base")
+    assert ("accelstudy apply" in page) == (better == "extended")
+
+
+@pytest.mark.usefixtures("not_rendered")
+def test_no_other_signature_is_said_only_without_a_rival_like_it(named, tmp_path):
+    """A rival whose cosine prints as 1.000 is named instead."""
+    (found,) = named.found
+    for change, said in (
+        ({"rivals": (("thermal_curve", 0.9412),)}, False),
+        ({"rivals": (("thermal_curve", 0.99996),)}, True),
+        ({"imitators": ("thermal_curve",), "rivals": (("thermal_curve", 1.0),)}, True),
+    ):
+        _, page = told(replace(named, found=(replace(found, **change),)), tmp_path)
+        part = page.split("What is it called?")[1].split("How sure is that")[0]
+        assert ("No other effect" in part) != said
+        assert ("thermal curve" in part) == said
+
+
+def test_noise_alone_is_blamed_only_where_it_is_probable():
+    """A test of the noise fails by a drift too small to show as one; and by noise that is large."""
+    keys = {"scheme": "fibonacci-16", "approach": "gravity", "order": "random", "seed": 2}
+    hold = {"temperature": (15, 40), "temperature_order": "random", "vibration": (0, 2)}
+    drift = CampaignSettings(**keys, **hold, effects=("warm_up",), size=0.1)
+    noise = CampaignSettings(scheme="fibonacci-36", noise_effects=("noise_level(kappa=4)",))
+    for settings, sure in ((drift, False), (noise, True)):
+        found = diagnose(simulate_campaign(settings)[0], NINE)
+        assert found.verdict == "noise_model"
+        assert (found.found[0].posterior >= SURE) == sure
+        assert ("sensor model is adequate" in headline(found)) == sure
+        assert any("may be an effect" in line for line in verdict_lines(found)) != sure
+
+
+@pytest.mark.usefixtures("not_rendered")
+def test_every_redundancy_of_a_page_says_what_it_counts(tmp_path):
+    """Slopes within a long first hold add to that of the means, which the head and table give."""
+    measured, _ = simulate_campaign(CampaignSettings(approach="gravity", interval=15.0))
+    n = measured.n_positions
+    duration = np.where(np.arange(n) == 0, 90.0, 10.0)
+    time = np.cumsum(duration + 5) - 5 - duration / 2
+    sd = np.tile(0.04 / duration[:, None] ** 1.5, 3)
+    slope = sd * np.random.default_rng(7).standard_normal((n, 3))
+    found = diagnose(replace(measured, time=time, slope=slope, sd_slope=sd), NINE)
+    content, page = told(found, tmp_path)
+    added = content["redundancy"] - content["global_test"]["dof"]
+    assert added > 0
+    assert set(re.findall(r"redundancy (\d+)", page)) == {str(found.base.redundancy)}
+    assert f"add {added} to the redundancy of {found.base.redundancy}" in page
+
+
+def test_the_question_of_further_positions_is_a_sentence():
+    """Of two explanations, of which one may hold the other and more."""
+    for separates, asked in (
+        ((("bias_drift",), ("warm_up",)), "whether bias drift or warm up is missing"),
+        (((), ("scale_asymmetry",)), "whether scale asymmetry is missing as well"),
+        ((("scale_asymmetry",), ()), "whether scale asymmetry is missing as well"),
+    ):
+        assert question([SimpleNamespace(separates=separates)]) == asked
+    assert question([]) == ""
+
+
+@pytest.mark.parametrize(
+    ("change", "path"),
+    [
+        ({"credible_set": []}, "$.credible_set"),
+        ({"effects": []}, "$.effects"),
+        ({"gap": {"confirmed": True, "confirmed_statement": None}}, "$.gap.confirmed_statement"),
+        ({"verdict": "no_effect"}, "$.effects"),
+    ],
+)
+def test_the_schema_asks_what_a_verdict_requires(written, change, path):
+    _, content, _ = written("named")
+    changed = {**content, **change, "gap": {**content["gap"], **change.get("gap", {})}}
+    assert path in [error.json_path for error in SCHEMA.iter_errors(changed)]
+
+
+def test_the_headline_names_all_that_would_be_the_same():
+    settings = CampaignSettings(scheme="fibonacci-36", effects=("mounting_rotation",))
+    found = headline(diagnose(simulate_campaign(settings)[0], NINE))
+    assert "mounting rotation" in found
+    assert " or " in found
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [
+        (0.032, "p = 0.032"),
+        (4.31e-6, "p = 4.3 · 10⁻⁶"),
+        (1e-15, "p < 10⁻¹²"),
+        (0.9999, "p > 0.999"),
+    ],
+)
+def test_p_values_in_words(value, shown):
+    assert p_value(value) == shown
+
+
+def test_json_keeps_the_contract(written):
+    _, content, _ = written("named")
+    assert content["schema_version"] == 1
+    assert set(content["global_test"]) == {"statistic", "dof", "p_value", "sigma"}
+    assert {"sigma_mps2", "sigma_source", "tests"} <= set(content["noise"])
+    (effect,) = content["effects"]
+    assert effect["name"] == "thermal_bias"
+    assert "thermal_bias" in effect["equivalence_class"]
+    assert [set(p) for p in effect["parameters"]] == [{"name", "value", "sigma", "unit"}] * 3
+    errors = [
+        (p["value"] - truth) / p["sigma"]
+        for p, truth in zip(effect["parameters"], (0.003, -0.002, 0.001), strict=True)
+    ]
+    assert np.abs(errors).max() < 4.5
+    assert all(0 <= share <= 1 for share in content["location"].values())
+    gap = content["gap"]
+    assert isinstance(gap["confirmed"], bool)
+    assert set(gap["held_out_mse"]) == {"before", "after", "floor", "reduction_ci95"}
+    assert {"name", "parameter", "value", "unit"} == set(content["upper_limits"][0])
+    assert isinstance(content["invisible_effects"], list)
+
+
+def test_positions_say_what_was_held_out(written):
+    out, content, _ = written("named")
+    positions = pd.read_parquet(out / "positions.parquet")
+    held = positions["split"] == "held-out"
+    assert positions.loc[held, "position"].tolist() == content["gap"]["held_out_positions"]
+    predicted = positions[["predicted_before_mps2", "predicted_after_mps2"]]
+    assert predicted[held].notna().all().all()
+    assert predicted[~held].isna().all().all()
+    before, after = np.sqrt((predicted[held] ** 2).mean())
+    assert after < before
+    assert positions["test_before"].max() > positions["test_after"].max()
+    assert {"residual_x_before_mps2", "residual_z_after_mps2", "temperature_degC"} <= set(positions)
+
+
+@pytest.mark.usefixtures("not_rendered")
+def test_a_bumped_position_is_left_out(tmp_path):
+    campaign = simulated("no_effect", tmp_path / "c")
+    campaign.forces[7] += (0.05, -0.04, 0.06)
+    diagnosis = diagnose(campaign, NINE)
+    content = write_diagnosis(diagnosis, tmp_path / "out")
+    (effect,) = content["effects"]
+    assert (effect["name"], effect["position"]) == ("outlier_position", 8)
+    positions = pd.read_parquet(tmp_path / "out/positions.parquet")
+    assert positions.loc[positions["split"] == "left out", "position"].tolist() == [8]
+    assert np.flatnonzero(positions["residual_x_after_mps2"].isna()).tolist() == [7]
+
+
+@pytest.mark.parametrize("case", ["named", "gravity", "noise_model"])
+def test_the_model_is_a_study(written, case):
+    out, content, _ = written(case)
+    study = read_study(ROOT / "config/config.yaml", out / "model.yaml")
+    assert study.study == case
+    assert study.sigma_force == pytest.approx(content["noise"]["sigma_mps2"])
+    truth = study.truth(study.simulated_effects)
+    for parameter in [p for e in content["effects"] for p in e.get("parameters", [])]:
+        assert truth[parameter["name"]] == pytest.approx(parameter["value"])
+    assert len(study.grids[0].models) == (2 if case != "noise_model" else 1)
+
+
+def test_same_seed_same_files(written, tmp_path, monkeypatch):
+    monkeypatch.setattr(saving, "save", rendering(*RENDERED["named"]))
+    out, _, _ = written("named")
+    first = Path(shutil.copytree(out, tmp_path / "first"))
+    diagnose_folder(out.parent / "named", out, replicates=100)  # its commands name the folder
+    for path in sorted(first.rglob("*.*")):
+        if path.is_file() and path.suffix != ".parquet":
+            again = out / path.relative_to(first)
+            digests = [hashlib.sha256(p.read_bytes()).hexdigest() for p in (path, again)]
+            assert digests[0] == digests[1], path.name
+    for name in ("positions", "loop"):
+        tables = [pd.read_parquet(f / f"{name}.parquet") for f in (first, out)]
+        pd.testing.assert_frame_equal(*tables)
+
+
+def test_the_old_simulation_lacks_the_measurement(written, named, tmp_path, monkeypatch):
+    loop = close_loop(named, 300, seed=3)
+    assert not loop.contains("old", "base")
+    assert loop.contains("new", "base")
+    assert loop.measured["base"] == pytest.approx(named.gap.before)
+    assert loop.measured["extended"] == pytest.approx(named.gap.after, rel=0.05)
+    for case in (("old", "base"), ("new", "extended")):
+        values = loop.case(*case)["sigma0_squared"]
+        assert values.mean() == pytest.approx(1, abs=5 * values.std() / np.sqrt(len(values)))
+    before, after = named.leveling
+    assert loop.tilt("new", "base") == pytest.approx(before, rel=0.05)
+    assert loop.tilt("new", "extended") == pytest.approx(after, rel=0.1)
+    assert loop.tilt("old", "base") < 0.5 * before
+    out, content, _ = written("named")
+    shown = number(content["loop"]["cases"][0]["tilt_rms_mgon"])
+    assert f"promises a tilt error of {shown} mgon" in text_of(
+        (out / "report.html").read_text("utf-8")
+    )
+
+    monkeypatch.setattr(saving, "save", rendering("loop"))
+    with angles_in("deg"):
+        document = write_diagnosis(named, tmp_path / "deg", loop=loop)
+    assert document["gap"]["leveling_rms_mgon"]["before"] == pytest.approx(before / MGON)
+    page = (tmp_path / "deg/report.html").read_text("utf-8").partition("90° = 100 gon")[2]
+    promised = document["loop"]["cases"][0]["tilt_rms_mgon"]
+    assert f"promises a tilt error of {number(0.9 * promised)} mdeg" in page
+    assert "tilt error / mdeg" in page
+    assert re.findall(r"(?:[^.\w]|m)gon", page) == []
+
+
+@pytest.mark.usefixtures("not_rendered")
+def test_positions_that_are_just_enough_to_calibrate_show_nothing(tmp_path):
+    settings = CampaignSettings(scheme="d-optimal-10", approach="gravity")
+    diagnosis = diagnose(simulate_campaign(settings)[0], NINE)
+    assert diagnosis.base.redundancy == 1
+    write_diagnosis(diagnosis, tmp_path)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Too few positions to show whether anything is missing" in page
+    assert page.count("<svg") == 1  # that of the residuals
+
+
+def test_nothing_to_compare_without_an_effect(tmp_path):
+    assert close_loop(diagnose(simulated("no_effect", tmp_path / "c"), NINE)) is None
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["nowhere"], "nowhere"),
+        (["c", "--model", "bias-scal"], "did you mean 'bias-scale'"),
+        (["c", "--approach", "robots"], "did you mean 'robot'"),
+    ],
+)
+def test_bad_input_is_one_line(arguments, words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    simulated("no_effect", tmp_path / "c")
+    result = run("diagnose", *arguments, "--out", "out")
+    assert result.exit_code == 2
+    assert words in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.usefixtures("not_rendered")
+def test_a_figure_that_fails_takes_nothing_with_it(tmp_path, monkeypatch, capsys):
+    campaign = simulated("no_effect", tmp_path / "c")
+    diagnosis = diagnose(campaign, NINE)
+    monkeypatch.setattr("accelstudy.diagnosis.report.figures.evidence_figure", lambda *_: 1 / 0)
+    write_diagnosis(diagnosis, tmp_path / "out")
+    said = "The figure 'evidence' could not be drawn (ZeroDivisionError: division by zero)."
+    assert capsys.readouterr().err == f"warning: {said}\n"
+    page = (tmp_path / "out/report.html").read_text(encoding="utf-8")
+    assert said in page.replace("&#x27;", "'")
+    assert page.count("<svg") == 1
+    assert (tmp_path / "out/diagnosis.json").exists()
+    assert not list((tmp_path / "out").rglob("*.part"))
+
+    fit = fit_campaign(campaign, NINE, get_approach("robot"))
+    monkeypatch.setattr(
+        "accelstudy.campaign.calibration.output.correlation_figure", lambda _: 1 / 0
+    )
+    write_calibration(fit, tmp_path / "calibrated")
+    said = said.replace("evidence", "correlations")
+    assert capsys.readouterr().err == f"warning: {said}\n"
+    page = (tmp_path / "calibrated/report.html").read_text(encoding="utf-8")
+    assert said in page.replace("&#x27;", "'")
+    assert page.count("<svg") == 1
+
+
+def test_variances_of_unit_weight_that_are_nothing_are_not_compared(tmp_path, monkeypatch):
+    """No figure of them could be drawn."""
+    sessions = pd.DataFrame(
+        [
+            {"simulation": s, "calibration": c, "replicate": i, "sigma0_squared": value}
+            for s, c in CASES_OF_LOOP
+            for i, value in enumerate((0.0, np.nan, np.inf, 1.2))
+        ]
+    ).assign(converged=True, tilt_error_rad=1e-3)
+    loop = Loop(sessions, {"base": 1.0, "extended": 1.0})
+    assert loop.interval("old", "base") == (1.2, 1.2)
+    loop_figure(loop)
+    diagnosis = diagnose(simulated("gravity", tmp_path / "c"), NINE)
+    nothing = sessions[["sigma0_squared", "tilt_error_rad", "converged"]][:1]
+    monkeypatch.setattr("accelstudy.diagnosis.loop._session_table", lambda *_: nothing)
+    assert close_loop(diagnosis, 1) is None
+
+
+def test_numbers_of_many_positions_do_not_meet():
+    n = 1250
+    positions = pd.DataFrame(
+        {"split": "held-out", "position": np.arange(4, 4 * n + 1, 4), "predicted_before_mps2": 0.1}
+    ).assign(predicted_after_mps2=0.01)
+    solution = SimpleNamespace(whitening=np.eye(3)[None])
+    gap = SimpleNamespace(held_out=SimpleNamespace(before=2.0, after=1.0, floor=1.0))
+    final = SimpleNamespace(solution=solution)
+    diagnosis = SimpleNamespace(gap=gap, final=final, unit_variance=1e-6)
+    with mpl.rc_context(STYLE):
+        figure = gap_figure(diagnosis, positions)
+        figure.draw_without_rendering()
+        boxes = [label.get_window_extent() for label in figure.axes[0].get_xticklabels()]
+    assert len(boxes) > 5
+    assert all(a.x1 + 3 < b.x0 for a, b in pairwise(boxes))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"modle": 1}, "did you mean 'model'"),
+        ({"model": "nine"}, "unknown model 'nine'"),
+        ({"campaign": {"schem": "rings-24"}}, "did you mean 'scheme'"),
+        ({"campaign": {"sigma": -1}}, "sigma: must be from 1e-09"),
+    ],
+)
+def test_the_example_is_checked(change, words):
+    content = yaml.safe_load((ROOT / "config/diagnose-example.yaml").read_text(encoding="utf-8"))
+    assert parse_round_trip(content).campaign.name == "diagnose-example"
+    with pytest.raises(InputError, match=words):
+        parse_round_trip({**content, **change})

@@ -1,0 +1,185 @@
+"""Signatures of effects: derivatives of the observations, and what a design shows of them."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, campaign, design, shuffled, some_holds
+
+from accelstudy.adjustment.quality import solve
+from accelstudy.diagnosis.space.hypotheses import OUTLIER
+from accelstudy.diagnosis.space.residuals import Residuals
+from accelstudy.diagnosis.space.signatures import signature
+from accelstudy.diagnosis.visibility import (
+    examine_campaign,
+    signature_columns,
+    upper_limits,
+    visibilities,
+)
+from accelstudy.effects import effect_names, get_effect
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.simulation.sessions import Noise, session
+
+USUAL = [effect.name for effect in NINE.effects]
+OTHERS = [name for name in effect_names() if name not in USUAL]
+EACH = pytest.mark.parametrize("name", effect_names())
+
+
+def full_session(model=NINE, parameters=None, scheme="mclaren-24"):
+    directions = shuffled(scheme)
+    hold = some_holds(len(directions))
+    if parameters is None:
+        parameters = np.zeros(model.n_parameters)
+    return session(model, parameters, directions, G, hold)
+
+
+FULL = full_session()
+
+
+@pytest.fixture(scope="module")
+def designs():
+    """Examined fits with all columns, in varied yaw, by approach."""
+    directions = shuffled("fibonacci-30")
+    hold = some_holds(len(directions))
+    return {approach.name: design(directions, approach, hold) for approach in (ROBOT, GRAVITY)}
+
+
+# --- derivatives ---------------------------------------------------------------------------------
+
+
+@EACH
+def test_a_signature_is_the_derivative_of_what_is_observed(name):
+    """Finite differences of a sensor that has the model's effects and this one.
+
+    The knee of the saturation and the signs of the forces stay on one side of a small step.
+    """
+    effect = get_effect(name)
+    others = tuple(e for e in NINE.effects if e.name != name)
+    model = SensorModel("both", (*others, effect))
+    first = sum(len(e.parameters) for e in others)
+    k = len(effect.parameters)
+    # Effects act on the force along the sensitive axes, at an ideal sensor that of the body.
+    shown = signature(effect, FULL.f_b, FULL.angles, G, FULL.hold)
+    assert shown.force.shape == (len(FULL.f_b), 3, k)
+    step = 1e-6 * effect.typical[0]
+    for j in range(k):
+        change = np.zeros(model.n_parameters)
+        change[first + j] = step
+        force = (
+            model.sense(FULL.f_b, change, G, FULL.hold)
+            - model.sense(FULL.f_b, -change, G, FULL.hold)
+        ) / (2 * step)
+        reading = (
+            model.reading_errors(FULL.angles, change, FULL.hold)
+            - model.reading_errors(FULL.angles, -change, FULL.hold)
+        ) / (2 * step)
+        rounding = 1e-14 * G / step
+        assert np.abs(force).max() + np.abs(reading).max() > 100 * rounding
+        np.testing.assert_allclose(shown.force[..., j], force, rtol=1e-6, atol=rounding)
+        np.testing.assert_allclose(shown.angles[..., j], reading, rtol=1e-6, atol=rounding)
+
+
+@EACH
+def test_a_signature_is_linear_in_the_parameters(name):
+    effect = get_effect(name)
+    directions = np.random.default_rng(1).standard_normal((len(effect.parameters), 2))
+    shown = signature(effect, FULL.f_b, FULL.angles, G, FULL.hold)
+    model = SensorModel("one", (effect,))
+    reduced = shown.reduced(directions)
+    p = effect.typical[0] * 1e-3 * directions[:, 1]
+    turned = np.array(effect.axes(tuple(p), np), dtype=float)
+    if turned.any():
+        expected = FULL.f_b @ (np.linalg.inv(np.eye(3) + turned).T - np.eye(3))
+        tolerance = {"rtol": 1e-3, "atol": 1e-4 * np.abs(expected).max()}
+    else:
+        expected = model.sense(FULL.f_b, p, G, FULL.hold) - FULL.f_b
+        tolerance = {"rtol": 1e-9, "atol": 1e-14 * G}
+    found = reduced.force[..., 1] * effect.typical[0] * 1e-3
+    np.testing.assert_allclose(found, expected, **tolerance)
+
+
+@pytest.mark.parametrize("approach", [ROBOT, GRAVITY], ids=lambda a: a.name)
+@pytest.mark.parametrize("name", OTHERS)
+def test_what_an_effect_leaves_in_the_residuals(designs, name, approach):
+    """z of an adjustment of data with a small effect, in which no noise was drawn."""
+    effect, examined = get_effect(name), designs[approach.name]
+    directions = shuffled("fibonacci-30")
+    hold = some_holds(len(directions))
+    if name in examined.invisible:
+        columns = np.zeros((len(examined.frame.residuals.design), len(effect.parameters)))
+    else:
+        h = examined.candidates[name][0]
+        effect = h.effect
+        columns = signature_columns(examined.frame, h)
+    model = SensorModel("with", (*NINE.effects, effect))
+    rng = np.random.default_rng(5)
+    p = 1e-3 * effect.typical[0] * rng.choice([-1.0, 1.0], len(effect.parameters))
+    truth = np.concatenate([np.zeros(NINE.n_parameters), p])
+    observed = session(model, truth, directions, G, hold).observations(Noise())
+    fitted = Residuals.of(solve(NINE, approach, observed)).z
+    expected = columns @ p
+    scale = np.linalg.norm(
+        examined.frame.residuals.whitened(
+            signature(effect, examined.frame.forces, examined.frame.angles, G, examined.frame.hold)
+        )
+        @ p
+    )
+    assert np.linalg.norm(fitted - expected) < 2e-3 * scale + 1e-9
+
+
+# --- what can be seen ----------------------------------------------------------------------------
+
+
+def test_an_effect_is_judged_in_the_settings_that_a_diagnosis_tries():
+    """A jump before the last holds, which point the same way, hardly shows; one in the middle does.
+
+    What is excluded by the residuals and what they would show go together.
+    """
+    directions = shuffled("fibonacci-30")
+    directions[-3:] = [[0, 0, 1], [0, 0.01, 1], [0.01, 0, 1]]
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    examined = design(directions, GRAVITY, some_holds(30), seed=1)
+    rows = {row.name: row for row in visibilities(examined)}
+    jump = rows["bias_jump"]
+    tried = [h.effect.spec for h in examined.candidates["bias_jump"]]
+    assert {jump.easiest.spec, jump.hardest.spec} <= set(tried)
+    assert 600 < jump.easiest.settings["t"] < 1200 < jump.hardest.settings["t"]
+    assert jump.hardest_mdb > 5 * jump.mdb
+    limits = {limit.name: limit.value for limit in upper_limits(examined, True, ())}
+    for name in ("bias_jump", "warm_up", "saturation"):
+        assert rows[name].mdb < 3 * limits[name], name
+    for row in rows.values():
+        if row.status == "visible" and len(examined.candidates[row.name]) == 1:
+            assert row.mdb == row.hardest_mdb, row.name
+    assert rows["bias_drift"].easiest.settings == {}
+
+
+def test_the_limit_of_a_parameter_holds_where_no_noise_is_stated():
+    """Noise of twice the unit, r = 5: a large parameter is beyond its limit in 2.5 % of all.
+
+    That is when noise takes it down by more than half of its interval of 95 %.
+    """
+    rng = np.random.default_rng(5)
+    examined = design(shuffled("fibonacci-14"), GRAVITY, some_holds(14), seed=1)
+    residuals = examined.frame.residuals
+    assert residuals.redundancy == 5
+    names = [n for n, shapes in examined.candidates.items() if {h.dim for h in shapes} == {1}]
+    shape = examined.candidates[next(n for n in names if n != OUTLIER)][0]
+    columns = residuals.whitened(examined.frame.signature(shape.effect))
+    size = 1000 / float(np.linalg.norm(residuals.project(columns)))
+    short = 0
+    for _ in range(n := 1500):
+        errors = columns[:, 0] * size + 2 * rng.standard_normal(len(columns))
+        frame = replace(examined.frame, residuals=replace(residuals, errors=errors))
+        fit = SimpleNamespace(frame=frame, candidates={shape.effect.name: (shape,)})
+        (limit,) = upper_limits(fit, False, ())
+        short += limit.value < size
+    assert abs(short / n - 0.025) < 4.5 * np.sqrt(0.025 * 0.975 / n)
+
+
+def test_a_sensor_whose_range_is_far_beyond_gravity_does_not_saturate():
+    measured, _ = campaign(3)
+    assert "saturation" in examine_campaign(measured, NINE).candidates
+    wide = examine_campaign(replace(measured, full_range=8 * G), NINE)
+    assert wide.invisible == ("gravity_error", "saturation")

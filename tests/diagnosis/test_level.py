@@ -1,0 +1,77 @@
+"""How often noise alone counts as something missing: as the level says, no more and no less."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosis_helpers import GRAVITY, NINE, ROBOT, campaign, design, shuffled
+
+from accelstudy.diagnosis import pipeline
+from accelstudy.diagnosis.evidence.detection import Chance, detect, tail, total_odds
+from accelstudy.diagnosis.evidence.field import Field
+from accelstudy.diagnosis.evidence.size import Evidence, Level
+from accelstudy.diagnosis.pipeline import diagnose
+from accelstudy.diagnosis.result import level_of_effects
+from accelstudy.diagnosis.space.groups import groups
+
+GIVEN, NOT_GIVEN = 0.03, 0.04
+"""How often noise alone may count as something missing, where sigma is given and where not."""
+RUNS, SETS = 24, 400
+"""Null simulations, and sets of noise that are judged by each."""
+STANDARD_ERRORS = 4
+
+
+@pytest.fixture(scope="module")
+def designs():
+    return {a.name: design(shuffled("mclaren-24"), a, seed=7) for a in (ROBOT, GRAVITY)}
+
+
+@pytest.mark.parametrize(
+    ("approach", "level", "wanted"),
+    [
+        ("robot", Level.given(), GIVEN),
+        ("robot", Level.unknown(), NOT_GIVEN),
+        ("gravity", Level.given(), GIVEN),
+        ("gravity", Level.unknown(), NOT_GIVEN),
+        ("gravity", Level.within_holds(), NOT_GIVEN),
+    ],
+)
+def test_noise_alone_counts_as_often_as_the_level_says(designs, approach, level, wanted):
+    """Each null simulation has a seed of its own, so that the rates scatter as they really do."""
+    examined, rng = designs[approach], np.random.default_rng([1, 2])
+    residuals = examined.frame.residuals
+    field = Field.of(examined.candidates, groups(examined))
+    evidence = Evidence(level, residuals.redundancy)
+    rates, seen, weights = [], [], []
+    for seed in range(RUNS):
+        chance = Chance(np.random.SeedSequence(seed), len(residuals.design))
+        errors = rng.standard_normal((SETS, len(residuals.design)))
+        detection = detect(field, evidence, replace(residuals, errors=errors[0]), chance)
+        by_chance = detection.by_chance
+        z = residuals.project(errors.T).T
+        odds = total_odds(field.odds(evidence, field.parts(z), np.sum(z**2, axis=1)))
+        p = np.array([tail(by_chance.values, by_chance.weights, value) for value in odds])
+        assert p[0] == pytest.approx(detection.p_value)
+        rates.append(np.mean(p < level_of_effects(level.known)))
+        seen.append(odds)
+        weights.append(np.mean(by_chance.weights))
+    error = np.std(rates, ddof=1) / np.sqrt(RUNS)
+    # Small enough that a level of one percent more or less would not pass.
+    assert STANDARD_ERRORS * error < 0.012
+    assert np.mean(rates) == pytest.approx(wanted, abs=STANDARD_ERRORS * error)
+    # The weights make noise of what was drawn with effects, and the odds have the mean 1: the bound
+    # beyond what was simulated.
+    assert np.mean(weights) == pytest.approx(1.0, abs=0.03)
+    for value in (0.0, 1.0, 2.0):
+        assert np.mean(np.concatenate(seen) > value) <= np.exp(-value)
+
+
+@pytest.mark.parametrize(("known", "level"), [(True, GIVEN), (False, NOT_GIVEN)])
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_diagnosis_decides_at_this_level(monkeypatch, known, level, side):
+    """Noise alone, of which the test says that it is just below or just above the level."""
+    monkeypatch.setattr(
+        pipeline, "detect", lambda *given: replace(detect(*given), p_value=level + side * 1e-6)
+    )
+    found = diagnose(campaign(1, scheme="mclaren-24", sigma_known=known)[0], NINE)
+    assert (found.verdict == "no_effect") == (side > 0)

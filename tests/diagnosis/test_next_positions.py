@@ -1,0 +1,114 @@
+"""Where to measure next: beside all candidates, each fitted by brute force."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosis_helpers import GRAVITY, NINE, G, shuffled
+from norm_model import SHOWN, nine
+
+from accelstudy.adjustment.quality import solve
+from accelstudy.approaches import get_approach
+from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
+from accelstudy.diagnosis.next_positions import GRID, next_positions
+from accelstudy.diagnosis.space.examined import examine
+from accelstudy.leveling.angles import specific_force
+from accelstudy.schemes import get_scheme
+from accelstudy.sensors.models import compose
+from accelstudy.simulation.sessions import Noise, session
+
+QUADRATIC = np.array([4e-4, -3e-4, 2e-4])
+SIGMA = 0.002
+
+
+@pytest.fixture(scope="module")
+def rivals():
+    """Readings of a sensor with a quadratic scale, for which two effects may stand.
+
+    The noise makes that either predicts other things of what the other one says.
+    """
+    model = compose("quadratic", (*(e.spec for e in NINE.effects), "quadratic_scale"))
+    directions = shuffled("mclaren-24")
+    ideal = session(model, np.append(np.zeros(9), QUADRATIC), directions, G)
+    observed = ideal.draw(Noise(sigma_force=SIGMA), 1, np.random.default_rng(2))
+    examined = examine(solve(NINE, GRAVITY, replace(observed, angles=None)))
+    shapes = [examined.candidates[name][0] for name in ("quadratic_scale", "cubic_scale")]
+    seen = (np.linalg.norm(observed.forces[0], axis=1) - G) / SIGMA
+    return examined, shapes, -directions, seen
+
+
+def rows(u, name):
+    """Rows of the adjustment with an effect, of unit weight, for forces along u (n, 3)."""
+    return np.column_stack([nine(u), SHOWN[name](u, G)]) / SIGMA
+
+
+def fitted(design, seen):
+    """Parameters and the sum of squares of what a fit leaves."""
+    values = np.linalg.lstsq(design, seen, rcond=None)[0]
+    return values, np.sum((seen - design @ values) ** 2)
+
+
+def separations(u, old, taken, candidates):
+    """What each candidate adds beside those taken: either explanation is right, or the other."""
+    names = ("quadratic_scale", "cubic_scale")
+    total = np.zeros(len(candidates))
+    for right, wrong in (names, names[::-1]):
+        told = fitted(rows(u, right), old)[0]
+        before = np.concatenate([u, taken])
+        seen = np.append(old, rows(taken, right) @ told)
+        least = fitted(rows(before, wrong), seen)[1]
+        for i, one in enumerate(candidates):
+            more = np.append(seen, rows(one[None], right) @ told)
+            total[i] += fitted(rows(np.vstack([before, one]), wrong), more)[1] - least
+    return total / 2
+
+
+def test_each_position_adds_most_of_all_candidates(rivals):
+    """One after the other, each in an attitude of its own, beside those that were taken before."""
+    examined, (quadratic, cubic), u, old = rivals
+    found = next_positions(examined.frame, (quadratic,), (cubic,))
+    assert len(found) == 3
+    own = []  # repeats of the first attitudes that clearly differ
+    for i in range(len(u)):
+        if len(own) < 3 and all(np.linalg.norm(u[i] - u[k]) > 0.5 for k in own):
+            own.append(i)
+    candidates = np.concatenate([u[own], -get_scheme(GRID).directions])
+    alone = separations(u, old, np.empty((0, 3)), candidates)
+    taken = np.empty((0, 3))
+    for position in found:
+        force = np.array(specific_force(position.roll, position.pitch, 1.0))
+        far = np.linalg.norm(candidates[:, None] - taken, axis=2)
+        free = np.all(far > 0.5, axis=1)
+        gains = separations(u, old, taken, candidates)
+        here = int(np.argmin(np.linalg.norm(candidates - force, axis=1)))
+        assert candidates[here] == pytest.approx(force, abs=1e-3)
+        assert free[here]
+        assert gains[here] == pytest.approx(gains[free].max(), rel=0.02)
+        assert position.gain**2 == pytest.approx(alone[here], rel=0.02)
+        taken = np.vstack([taken, force])
+    # Some attitudes would tell much less, so that the choice matters.
+    assert np.median(alone) < 0.5 * alone.max()
+    assert not found[0].anywhere
+    assert found[0].temperature is found[0].later is None
+    assert found[0].separates == (("quadratic_scale",), ("cubic_scale",))
+
+
+def test_effects_of_time_are_told_apart_by_repeats_later():
+    campaign, _ = simulate_campaign(
+        CampaignSettings(
+            scheme="fibonacci-30", interval=60.0, effects=("bias_drift: 1e-5, 1e-5, 1e-5",)
+        )
+    )
+    fit = fit_campaign(campaign, NINE, get_approach("robot"))
+    examined = examine(solve(fit.model, fit.approach, fit.observed))
+    drift, warm = (examined.candidates[name][0] for name in ("bias_drift", "warm_up"))
+    found = next_positions(examined.frame, (drift,), (warm,))
+    assert all(position.anywhere and position.temperature is None for position in found)
+    assert [position.later for position in found] == pytest.approx([30 * 60.0] * 3)
+    assert [found[0].roll, found[0].pitch] == pytest.approx(campaign.angles[0], abs=0.01)
+    assert found[0].separates == (("bias_drift",), ("warm_up",))
+    # What both explanations have in common separates nothing.
+    quadratic = examined.candidates["quadratic_scale"][0]
+    both = next_positions(examined.frame, (drift, quadratic), (warm, quadratic))
+    assert both[0].separates == (("bias_drift",), ("warm_up",))

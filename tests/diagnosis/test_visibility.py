@@ -1,0 +1,92 @@
+"""What a scheme can show: detectable and identifiable sizes, beside a model written by hand."""
+
+import numpy as np
+import pytest
+from diagnosis_helpers import GRAVITY, NINE, G
+from norm_model import SHOWN, left_of, nine
+from scipy import stats
+
+from accelstudy.diagnosis.visibility import examine_scheme, visibilities, visibility_table
+from accelstudy.effects import effect_names, effects_without
+from accelstudy.schemes import get_scheme
+from accelstudy.simulation.sessions import Noise
+
+SIGMA = 0.002
+LAMBDA = 17.075
+"""Noncentrality at which a test of one parameter at 0.1 % has a power of 80 % (Baarda 1968)."""
+OTHERS = [name for name in effect_names() if name not in (*SHOWN, *(e.name for e in NINE.effects))]
+
+
+@pytest.fixture(scope="module")
+def shown():
+    """A scheme without a robot, beside a catalogue of three nonlinear effects."""
+    with effects_without(OTHERS):
+        examined = examine_scheme(
+            get_scheme("fibonacci-36"), NINE, GRAVITY, Noise(sigma_force=SIGMA)
+        )
+        return examined, visibility_table(examined)
+
+
+@pytest.fixture(scope="module")
+def by_hand():
+    """What nine parameters leave of the three effects, in units of the noise."""
+    u = -get_scheme("fibonacci-36").directions
+    return {name: left_of(nine(u), f(u, G)) / SIGMA for name, f in SHOWN.items()}
+
+
+def test_the_noncentrality_is_that_of_the_power():
+    limit = stats.chi2.isf(0.001, 1)
+    assert stats.ncx2.sf(limit, 1, LAMBDA) == pytest.approx(0.8, abs=1e-4)
+
+
+@pytest.mark.parametrize("name", SHOWN)
+def test_detectable_and_identifiable_sizes_by_hand(shown, by_hand, name):
+    """The worst parameter; and what the other effects cannot imitate of it."""
+    row = next(row for row in visibilities(shown[0]) if row.name == name)
+    left = by_hand[name]
+    assert row.mdb == pytest.approx(np.sqrt(LAMBDA) / np.linalg.norm(left, axis=0).min(), rel=1e-4)
+    rivals = [columns for other, columns in by_hand.items() if other != name]
+    beside = [np.linalg.norm(left_of(rival, left), axis=0) for rival in rivals]
+    assert row.mib == pytest.approx(np.sqrt(LAMBDA) / np.min(beside), rel=1e-4)
+
+
+def test_the_nearest_effects_come_first_with_their_cosines(shown, by_hand):
+    bases = {name: np.linalg.qr(columns)[0] for name, columns in by_hand.items()}
+    for row in visibilities(shown[0]):
+        cosines = {
+            other: np.linalg.svd(bases[row.name].T @ basis, compute_uv=False)[0]
+            for other, basis in bases.items()
+            if other != row.name
+        }
+        found = dict(row.confused)
+        assert list(found) == sorted(cosines, key=lambda other: -cosines[other])
+        assert found == pytest.approx(cosines, abs=1e-6)
+
+
+def test_power_is_as_promised(shown, by_hand):
+    """Of the test of one parameter of the size that is called detectable, in simulated noise."""
+    row = next(row for row in visibilities(shown[0]) if row.name == "quadratic_scale")
+    left = by_hand["quadratic_scale"]
+    column = left[:, np.argmin(np.linalg.norm(left, axis=0))]
+    noise = np.random.default_rng(1).standard_normal((4000, len(column)))
+    test = ((noise + row.mdb * column) @ column / np.linalg.norm(column)) ** 2
+    power = np.mean(test > stats.chi2.isf(0.001, 1))
+    assert power == pytest.approx(0.8, abs=4 * np.sqrt(0.8 * 0.2 / 4000))
+
+
+def test_the_table_says_what_shows_what_does_not_and_why(shown):
+    table = shown[1].set_index("effect")
+    for row in visibilities(shown[0]):
+        assert float(table.loc[row.name, "MDB"]) == pytest.approx(1e6 * row.mdb, rel=5e-3)
+        assert table.loc[row.name, ["status", "unit"]].tolist() == ["visible", "ppm"]
+    examined = examine_scheme(get_scheme("fibonacci-36"), NINE, GRAVITY)
+    table = visibility_table(examined).set_index("effect")
+    for name in ("mounting_rotation", "encoder_offset"):  # which no norm can show
+        shown_of = table.loc[name, ["status", "MDB", "MIB", "unit"]].tolist()
+        assert shown_of == ["invisible", "–", "–", ""]
+    assert table.loc["bias_drift", "status"] == "untestable"
+    assert "'time'" in table.loc["bias_drift", "confused with"]
+    # Of a knee those that are tried show differently: from the one that shows best to the worst.
+    assert table.loc["saturation", "with"].startswith("knee=")
+    best, worst = (table.loc["saturation", column] for column in ("MDB", "worst MDB"))
+    assert float(best) < float(worst.split(" with knee=")[0])
