@@ -20,9 +20,9 @@ from accelstudy.effects import effect_names
 from accelstudy.files.reading import overlay, read_layer
 from accelstudy.schemes import scheme_names
 from accelstudy.sensors.models import MODELS
-from accelstudy.study.cells.batches import batches
-from accelstudy.study.cells.cell import Cell
-from accelstudy.study.cells.of_study import study_cells
+from accelstudy.study.batches import batches
+from accelstudy.study.cell import Cell
+from accelstudy.study.cells import study_cells
 from accelstudy.study.config import StudyConfig, config_schema, parse_study, read_study
 
 CONFIG = ROOT / "config" / "config.yaml"
@@ -589,14 +589,12 @@ VALID = st.fixed_dictionaries(
 @given(keys=VALID, size=st.integers(1, 20_000))
 def test_cells_of_any_valid_study(keys, size):
     study = make_study(**keys)
-    assert parse_study(study.model_dump()) == study
     assert parse_study(json.loads(json.dumps(study.model_dump(mode="json")))) == study
 
     cells = study_cells(study)
     assert cells
     assert len({cell.name for cell in cells}) == len(cells)
     for cell in cells:
-        assert Cell.from_dict(cell.to_dict()) == cell
         assert Cell.from_dict(json.loads(json.dumps(cell.to_dict()))) == cell
         assert set(cell.truth) >= set(cell.simulated_model.parameter_names)
     # One cell, one set-up.
