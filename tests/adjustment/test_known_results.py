@@ -36,36 +36,22 @@ SCALE, OFFSET = 0.0024, np.array([33123, 33275, 32364])
 COUNTS = ("--unit", "counts", "--scale", SCALE, "--offset", ",".join(map(str, OFFSET)))
 MPU_9150 = ("--columns", "fx=0,fy=1,fz=2", "--rate", 100, "--gravity", 9.81)
 IMPORTS = {
-    "xsens": (
-        "imu_tk_xsens/xsens_acc.mat",
-        *("--columns", "fx=1,fy=2,fz=3", "--time", 0, *COUNTS, "--gravity", 9.81744),
-    ),
-    "xsens, white": (
-        "imu_tk_xsens/derived_static_means.csv",
-        *("--means", *COUNTS, "--gravity", 9.81744),
-    ),
+    "xsens": ("imu_tk_xsens/xsens_acc.mat",
+              *("--columns", "fx=1,fy=2,fz=3", "--time", 0, *COUNTS, "--gravity", 9.81744)),
+    "xsens, white": ("imu_tk_xsens/derived_static_means.csv",
+                     *("--means", *COUNTS, "--gravity", 9.81744)),
     **{f"mpu9150 {i}": (f"mpu9150/imu{i}.log", *MPU_9150) for i in range(3)},
-    "ctu 24": (
-        "ctu_innalabs/CalibrationOfLowCostTriaxialInertialSensors.mat",
-        *("--means", "--unit", "g"),
-    ),
-    "ctu 49": (
-        "ctu_innalabs/CalibrationOfLowCostTriaxialInertialSensors50.mat",
-        *("--means", "--unit", "g"),
-    ),
-    "mpu6050": (
-        "mpu6050/example_data_calibration.csv",
-        *("--rate", 100, "--unit", "counts", "--scale", STANDARD_GRAVITY / 16384),
-    ),
-    "phone": (
-        "ctu_innalabs/MobileAccData30orientationRawSample01.mat",
-        *("--rate", 100, "--settings", "short.yaml"),
-    ),
-    "ferraris": (
-        "ferraris/example_ferraris_session.csv",
-        *("--columns", "fx=acc_x,fy=acc_y,fz=acc_z", "--rate", 204.8, "--gravity", 9.81),
-    ),
-}
+    "ctu 24": ("ctu_innalabs/CalibrationOfLowCostTriaxialInertialSensors.mat",
+               *("--means", "--unit", "g")),
+    "ctu 49": ("ctu_innalabs/CalibrationOfLowCostTriaxialInertialSensors50.mat",
+               *("--means", "--unit", "g")),
+    "mpu6050": ("mpu6050/example_data_calibration.csv",
+                *("--rate", 100, "--unit", "counts", "--scale", STANDARD_GRAVITY / 16384)),
+    "phone": ("ctu_innalabs/MobileAccData30orientationRawSample01.mat",
+              *("--rate", 100, "--settings", "short.yaml")),
+    "ferraris": ("ferraris/example_ferraris_session.csv",
+                 *("--columns", "fx=acc_x,fy=acc_y,fz=acc_z", "--rate", 204.8, "--gravity", 9.81)),
+}  # fmt: skip
 SHORT = "shortest_s: 0.2\n"  # the phone was held for 1.5 to 4 s, of which windows take 1.4 s
 
 

@@ -72,18 +72,12 @@ def write_log(folder):
 
 BATCH = {
     "batch": "bench",
-    "campaigns": [
-        {"campaign": "campaigns/*"},
-        {"campaign": "campaigns/aided", "approach": "robot"},
-        {"campaign": "campaigns/aided", "name": "six", "model": "bias-scale"},
-        {
-            "log": "log.parquet",
-            "name": "session",
-            "import": {"rate_hz": 100},
-            "gravity": {"value_mps2": 9.81},
-        },
-    ],
-}
+    "campaigns": [{"campaign": "campaigns/*"},
+                  {"campaign": "campaigns/aided", "approach": "robot"},
+                  {"campaign": "campaigns/aided", "name": "six", "model": "bias-scale"},
+                  {"log": "log.parquet", "name": "session", "import": {"rate_hz": 100},
+                   "gravity": {"value_mps2": 9.81}}],
+}  # fmt: skip
 NAMES = ["plain", "spoilt", "aided", "six", "session"]
 
 
@@ -373,31 +367,24 @@ def test_patterns(tmp_path, monkeypatch):
     assert [task.source for task in parse_batch(content).tasks()] == ["all/file.csv", "[1].csv"]
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"campaings": []}, "campaings: unknown key; did you mean 'campaigns'?"),
-        ({"campaigns": []}, "campaigns: must not be empty, not []"),
-        ({"campaigns": [{}]}, "campaigns.0: give exactly one of campaign, log, public"),
-        ({"campaigns": [{"log": "a", "public": "b"}]}, "campaigns.0: give exactly one of"),
-        ({"campaigns": [{"logg": "a"}]}, "campaigns.0.logg: unknown key; did you mean 'log'?"),
-        ({"campaigns": [{"campaign": "a", "import": {}}]}, "campaigns.0: import: goes with log"),
-        (
-            {"campaigns": [{"log": "a", "import": {"rate": 100}}]},
-            "campaigns.0.import.rate: unknown key; did you mean 'rate_hz'?",
-        ),
-        ({"campaigns": [{"log": "a", "name": "a/b"}]}, "campaigns.0.name: "),
-        ({"campaigns": [{"public": "xsens"}]}, "campaigns.0: unknown public data 'xsens'; did you"),
-        ({"campaigns": [{"public": "ferraris-sections"}]}, "hold no forces"),
-        ({"campaigns": [{"log": "a", "model": "six"}]}, "campaigns.0: unknown model 'six'"),
-        ({"approach": "gravty"}, "unknown approach 'gravty'; did you mean 'gravity'?"),
-        ({"campaigns": [{"campaign": "no/*"}]}, "campaigns.0: no folder matches no/*"),
-        (
-            {"campaigns": [{"campaign": "x/a"}, {"log": "y/a.csv"}]},
-            "campaigns: x/a and y/a.csv are both named 'a'; give one another `name`",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("change", "message"), [
+    ({"campaings": []}, "campaings: unknown key; did you mean 'campaigns'?"),
+    ({"campaigns": []}, "campaigns: must not be empty, not []"),
+    ({"campaigns": [{}]}, "campaigns.0: give exactly one of campaign, log, public"),
+    ({"campaigns": [{"log": "a", "public": "b"}]}, "campaigns.0: give exactly one of"),
+    ({"campaigns": [{"logg": "a"}]}, "campaigns.0.logg: unknown key; did you mean 'log'?"),
+    ({"campaigns": [{"campaign": "a", "import": {}}]}, "campaigns.0: import: goes with log"),
+    ({"campaigns": [{"log": "a", "import": {"rate": 100}}]},
+     "campaigns.0.import.rate: unknown key; did you mean 'rate_hz'?"),
+    ({"campaigns": [{"log": "a", "name": "a/b"}]}, "campaigns.0.name: "),
+    ({"campaigns": [{"public": "xsens"}]}, "campaigns.0: unknown public data 'xsens'; did you"),
+    ({"campaigns": [{"public": "ferraris-sections"}]}, "hold no forces"),
+    ({"campaigns": [{"log": "a", "model": "six"}]}, "campaigns.0: unknown model 'six'"),
+    ({"approach": "gravty"}, "unknown approach 'gravty'; did you mean 'gravity'?"),
+    ({"campaigns": [{"campaign": "no/*"}]}, "campaigns.0: no folder matches no/*"),
+    ({"campaigns": [{"campaign": "x/a"}, {"log": "y/a.csv"}]},
+     "campaigns: x/a and y/a.csv are both named 'a'; give one another `name`"),
+])  # fmt: skip
 def test_one_line_for_a_wrong_key(change, message):
     content = {"batch": "b", "campaigns": [{"campaign": "a"}], **change}
     with pytest.raises(InputError) as caught:

@@ -282,14 +282,11 @@ def test_check_sigmas(campaign):
     assert "alpha_zx" in result.output
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["calibrate", "nowhere", "--out", "out"],
-        ["export", "nowhere.json"],
-        ["check-sigmas", "nowhere"],
-    ],
-)
+@pytest.mark.parametrize("arguments", [
+    ["calibrate", "nowhere", "--out", "out"],
+    ["export", "nowhere.json"],
+    ["check-sigmas", "nowhere"],
+])  # fmt: skip
 def test_what_is_not_there_is_one_line(arguments, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     line = refusal(*arguments)

@@ -30,10 +30,7 @@ CONTENT = bytes(range(256)) * 64
 
 def data(url, content=CONTENT):
     return PublicData(
-        description="a file",
-        url=url,
-        sha256=hashlib.sha256(content).hexdigest(),
-        licence="MIT",
+        description="a file", url=url, sha256=hashlib.sha256(content).hexdigest(), licence="MIT"
     )
 
 
@@ -142,14 +139,11 @@ def test_command_lists():
         assert f"{name}: {entry.description}\n    {entry.licence}, {entry.url}\n" in result.output
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["xsens"], "unknown public data 'xsens'; did you mean 'xsens-mti'?"),
-        (["ferraris-sections", "--out", "out"], "'ferraris-sections' hold no forces"),
-        (["xsens-mti"], "--out: give the folder of the campaign"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "message"), [
+    (["xsens"], "unknown public data 'xsens'; did you mean 'xsens-mti'?"),
+    (["ferraris-sections", "--out", "out"], "'ferraris-sections' hold no forces"),
+    (["xsens-mti"], "--out: give the folder of the campaign"),
+])  # fmt: skip
 def test_command_refuses(arguments, message):
     assert message in refusal("public", *arguments)
 

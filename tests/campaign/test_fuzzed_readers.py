@@ -65,15 +65,12 @@ def one_line_at_most(folder, *arguments):
 
 
 anything = st.recursive(
-    st.none()
-    | st.booleans()
-    | st.integers()
-    | st.floats()
-    | st.text(max_size=5)
-    | st.sampled_from(["counts", "g", "bias", "scale", "\ud800", 10**400, 1e308, -1, 3, "*/"]),
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5) | st.sampled_from(
+        ["counts", "g", "bias", "scale", "\ud800", 10**400, 1e308, -1, 3, "*/"],
+    ),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner),
     max_leaves=4,
-)
+)  # fmt: skip
 
 
 def replaced(content, path, value, remove):

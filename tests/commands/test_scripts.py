@@ -31,37 +31,22 @@ RESULTS = {
     "check-sigmas": ("accepted", "--replicates", 2),
     "advise": ("accepted", "--tilt-accuracy", "10mgon", "--tilt-range", "30gon"),
     "data-sheet": ("accepted", "--out", "sheet.yaml"),
-    "design": (
-        "--positions",
-        6,
-        "--starts",
-        1,
-        "--model",
-        "bias",
-        "--attitudes",
-        "cube",
-        "--out",
-        "a.yaml",
-    ),
+    "design": ("--positions", 6, "--starts", 1, "--model", "bias", "--attitudes", "cube", "--out",
+               "a.yaml"),
     "schemes": ("faces-6",),
     "effects": (),
     "public": (),
     "calibrate": ("accepted", "--out", "plain"),
-}
+}  # fmt: skip
 """Arguments of commands that have --quiet."""
 HAVE = {
     "import": r"^campaign: log \(20 positions\)$",
     "simulate-campaign": r"^campaign: again \(24 positions\)$",
-    "apply": r"^3000 of 3000 rows leveled: leveled.csv$",
-    "check-sigmas": "sd_empirical",
-    "advise": "tilt accuracy: roll",
-    "data-sheet": "^sigma of the mean of a position: 2 mm/s²$",
-    "design": "roll/gon",
-    "schemes": "faces-6",
-    "effects": "^warm_up: ",
-    "public": "^xsens-mti: ",
+    "apply": r"^3000 of 3000 rows leveled: leveled.csv$", "check-sigmas": "sd_empirical",
+    "advise": "tilt accuracy: roll", "data-sheet": "^sigma of the mean of a position: 2 mm/s²$",
+    "design": "roll/gon", "schemes": "faces-6", "effects": "^warm_up: ", "public": "^xsens-mti: ",
     "calibrate": "^ACCEPTED: ",
-}
+}  # fmt: skip
 """What its result has."""
 
 UNDRAWN = "accelstudy.campaign.calibration.output.residual_figure", lambda *_: Figure()

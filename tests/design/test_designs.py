@@ -169,19 +169,15 @@ def test_a_job_needs_no_file(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(
     ("text", "wrong"),
-    {
-        "": "not a mapping",
-        "scheme: a\n": "directions: must be a list of rows",
-        "directions: [[1, 2]]\n": "row 1 is not",
-        "directions: [[0, 0, 1], [0, 0, 0]]\n": "row 2 is not",
-        f"directions: [[0, 0, {10**400}]]\n": "row 1 is not",
-        "directions: [[0, 0, .inf]]\n": "row 1 is not",
-        "directions: [[0, 0, true]]\n": "row 1 is not",
-        "direction: [[0, 0, 1]]\n": "unknown key 'direction'; did you mean 'directions'",
-        "scheme: a/b\ndirections: [[0, 0, 1]]\n": "scheme: 'a/b' cannot be",
-        "scheme: 3\ndirections: [[0, 0, 1]]\n": "scheme: must be a text",
-    }.items(),
-)
+    {"": "not a mapping", "scheme: a\n": "directions: must be a list of rows",
+     "directions: [[1, 2]]\n": "row 1 is not",
+     "directions: [[0, 0, 1], [0, 0, 0]]\n": "row 2 is not",
+     f"directions: [[0, 0, {10**400}]]\n": "row 1 is not",
+     "directions: [[0, 0, .inf]]\n": "row 1 is not", "directions: [[0, 0, true]]\n": "row 1 is not",
+     "direction: [[0, 0, 1]]\n": "unknown key 'direction'; did you mean 'directions'",
+     "scheme: a/b\ndirections: [[0, 0, 1]]\n": "scheme: 'a/b' cannot be",
+     "scheme: 3\ndirections: [[0, 0, 1]]\n": "scheme: must be a text"}.items(),
+)  # fmt: skip
 def test_a_file_that_is_no_scheme(tmp_path, text, wrong):
     path = tmp_path / "bad.yaml"
     path.write_text(text)
@@ -192,28 +188,22 @@ def test_a_file_that_is_no_scheme(tmp_path, text, wrong):
         study(path)
 
 
-@pytest.mark.parametrize(
-    ("asked", "wrong"),
-    [
-        ({"criterion": "E"}, "unknown criterion 'E'"),
-        (
-            {"criterion": "D", "neglect": ("cubic_scale",)},
-            "criterion D: effects that are neglected",
-        ),
-        ({"neglect": ("cubic_scale",), "discriminate": ("a", "b")}, "exclude each other"),
-        ({"neglect": ("bias",)}, "'bias' is in the model"),
-        ({"neglect": ("quadratic_scale=5mm",)}, "neglect: quadratic_scale=5mm: .*unit must be"),
-        ({"discriminate": ("cubic_scale", "cubic_scale")}, "twice; give two effects"),
-        ({"prior": ("bias",)}, "expected NAME=SIZE"),
-        ({"prior": ("bias=0",)}, "must be more than 0"),
-        ({"prior": ("bise=1mg",)}, "did you mean 'bias'"),
-        ({"positions": 0}, "positions: must be from 1 to 300"),
-        ({"attitudes": "cub"}, "did you mean 'cube'"),
-        ({"mountings": 10}, "mountings: must be from 1 to 9"),
-        ({"mountings": 2, "attitudes": "cube"}, "mountings: need all attitudes"),
-        ({"roll": (0.1, -0.1)}, "roll: the first angle must be less"),
-    ],
-)
+@pytest.mark.parametrize(("asked", "wrong"), [
+    ({"criterion": "E"}, "unknown criterion 'E'"),
+    ({"criterion": "D", "neglect": ("cubic_scale",)}, "criterion D: effects that are neglected"),
+    ({"neglect": ("cubic_scale",), "discriminate": ("a", "b")}, "exclude each other"),
+    ({"neglect": ("bias",)}, "'bias' is in the model"),
+    ({"neglect": ("quadratic_scale=5mm",)}, "neglect: quadratic_scale=5mm: .*unit must be"),
+    ({"discriminate": ("cubic_scale", "cubic_scale")}, "twice; give two effects"),
+    ({"prior": ("bias",)}, "expected NAME=SIZE"),
+    ({"prior": ("bias=0",)}, "must be more than 0"),
+    ({"prior": ("bise=1mg",)}, "did you mean 'bias'"),
+    ({"positions": 0}, "positions: must be from 1 to 300"),
+    ({"attitudes": "cub"}, "did you mean 'cube'"),
+    ({"mountings": 10}, "mountings: must be from 1 to 9"),
+    ({"mountings": 2, "attitudes": "cube"}, "mountings: need all attitudes"),
+    ({"roll": (0.1, -0.1)}, "roll: the first angle must be less"),
+])  # fmt: skip
 def test_contradictory_wishes_are_said_in_one_line(asked, wrong):
     with pytest.raises(InputError, match=wrong):
         Request(**{"positions": 8, **asked}).find()
@@ -289,15 +279,12 @@ def test_efficiencies_of_schemes_as_a_table_and_a_figure():
     assert below.get_xlabel() == "positions"
 
 
-@pytest.mark.parametrize(
-    ("section", "wrong"),
-    [
-        ({"positions": [8]}, "designs.*positions: must be from 9 to 300, not 8"),
-        ({"schemes": "faces-7"}, "unknown scheme 'faces-7'"),
-        ({"model": "bias-scale+hysteresis"}, "depends on the order of the positions"),
-        ({"tilt_range_gon": 100}, "designs.tilt_range_gon"),
-    ],
-)
+@pytest.mark.parametrize(("section", "wrong"), [
+    ({"positions": [8]}, "designs.*positions: must be from 9 to 300, not 8"),
+    ({"schemes": "faces-7"}, "unknown scheme 'faces-7'"),
+    ({"model": "bias-scale+hysteresis"}, "depends on the order of the positions"),
+    ({"tilt_range_gon": 100}, "designs.tilt_range_gon"),
+])  # fmt: skip
 def test_a_section_that_cannot_be_done(section, wrong):
     example = parse_example({"study": "x", "designs": section})
     with pytest.raises(InputError, match=wrong):

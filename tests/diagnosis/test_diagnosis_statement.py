@@ -208,13 +208,10 @@ def test_the_unknown_is_said_by_families():
     )
 
 
-@pytest.mark.parametrize(
-    "explanations",
-    [
-        [("unknown", 0.95)],
-        [("coloured_noise", 0.5), ("heavy_tails", 0.45)],
-        [("bias_drift", 0.3), ("hysteresis", 0.2), ("coloured_noise", 0.3), ("unknown", 0.15)],
-    ],
-)
+@pytest.mark.parametrize("explanations", [
+    [("unknown", 0.95)],
+    [("coloured_noise", 0.5), ("heavy_tails", 0.45)],
+    [("bias_drift", 0.3), ("hysteresis", 0.2), ("coloured_noise", 0.3), ("unknown", 0.15)],
+])  # fmt: skip
 def test_nothing_is_certain_of_what_no_effect_explains(explanations):
     assert without_a_name(made(*explanations)).startswith("Something is missing from the model")

@@ -265,20 +265,17 @@ def test_figures_of_much_and_of_nothing(tables):
             assert draw().axes
 
 
-@pytest.mark.parametrize(
-    ("figure", "cases", "measured", "n"),
-    [
-        ("right, and withheld", "λ = 25", 0, 2),
-        ("names in a 90 % set beyond the oracle's", "λ = 25", 1 / 3, 3),
-        ("named, and wrong, as the posteriors expect", "one and two", 0.2, 6),
-        ("named, and wrong", "posterior from 0.8 on", 2 / 6, 6),
-        ("named, and wrong", "posterior from 0.85 on", np.nan, 0),
-        ("one of the two alone", "λ = 40", 1 / 3, 3),
-        ("named or narrowed wrongly", "fifth", 1, 1),
-        ("confirmed, of those wrong", "family taken out", np.nan, 0),
-        ("by gravity alone, sigma not given", "nothing missing", 0, 1),
-    ],
-)
+@pytest.mark.parametrize(("figure", "cases", "measured", "n"), [
+    ("right, and withheld", "λ = 25", 0, 2),
+    ("names in a 90 % set beyond the oracle's", "λ = 25", 1 / 3, 3),
+    ("named, and wrong, as the posteriors expect", "one and two", 0.2, 6),
+    ("named, and wrong", "posterior from 0.8 on", 2 / 6, 6),
+    ("named, and wrong", "posterior from 0.85 on", np.nan, 0),
+    ("one of the two alone", "λ = 40", 1 / 3, 3),
+    ("named or narrowed wrongly", "fifth", 1, 1),
+    ("confirmed, of those wrong", "family taken out", np.nan, 0),
+    ("by gravity alone, sigma not given", "nothing missing", 0, 1),
+])  # fmt: skip
 def test_what_pages_say_beside_the_targets(tables, figure, cases, measured, n):
     table = further(tables["campaigns"])
     (row,) = table[(table["figure"] == figure) & table["cases"].str.contains(cases)].to_dict(

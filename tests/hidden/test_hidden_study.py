@@ -17,14 +17,7 @@ from accelstudy.files.tables import read_table, write_table
 from accelstudy.hidden import campaigns, diagnosing
 from accelstudy.hidden.baselines import METHODS, run_baselines
 from accelstudy.hidden.campaigns import KEY
-from accelstudy.hidden.cells import (
-    Cell,
-    chunks,
-    number_of_chunks,
-    planned,
-    study_cells,
-    write_plan,
-)
+from accelstudy.hidden.cells import Cell, chunks, number_of_chunks, planned, study_cells, write_plan
 from accelstudy.hidden.config import KNOWN, parse_hidden
 from accelstudy.hidden.diagnosing import run_chunk
 from accelstudy.hidden.physics import Case

@@ -87,18 +87,15 @@ def test_a_composition_is_calibrated_and_checked(made):
     assert "thermal_scale" in run("effects", "--campaign", made / "c", "--model", HIDDEN)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["calibrate", "c", "--out", "no"], "no vibration_mps2"),
-        (["diagnose", "c", "--out", "no"], "no vibration_mps2"),
-        (["check-sigmas", "c"], "no vibration_mps2"),
-        (["effects", "--campaign", "c"], "no vibration_mps2"),
-        (["effects", "--scheme", "mclaren-24"], "which a scheme does not give"),
-        (["schemes", "mclaren-24"], "which a scheme does not give"),
-        (["simulate-campaign", "--out", "no"], "vibration: missing"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "words"), [
+    (["calibrate", "c", "--out", "no"], "no vibration_mps2"),
+    (["diagnose", "c", "--out", "no"], "no vibration_mps2"),
+    (["check-sigmas", "c"], "no vibration_mps2"),
+    (["effects", "--campaign", "c"], "no vibration_mps2"),
+    (["effects", "--scheme", "mclaren-24"], "which a scheme does not give"),
+    (["schemes", "mclaren-24"], "which a scheme does not give"),
+    (["simulate-campaign", "--out", "no"], "vibration: missing"),
+])  # fmt: skip
 def test_what_cannot_feed_a_model_says_so_in_one_line(arguments, words, made, monkeypatch):
     monkeypatch.chdir(made)
     text = run(*arguments, "--model", "bias-scale+vibration_rectification", code=2)
@@ -213,14 +210,11 @@ def whole():
     return calibration_of()[2]
 
 
-@pytest.mark.parametrize(
-    ("error", "words"),
-    [
-        ("axis_error(x=-2, y=1, z=3)", "axes are swapped: x is read as y, y is read as −x"),
-        ("unit_error(force=0.1019716212978)", "the forces are in g"),
-        ("unit_error(angle=0.9)", "the robot's angles are in degrees"),
-    ],
-)
+@pytest.mark.parametrize(("error", "words"), [
+    ("axis_error(x=-2, y=1, z=3)", "axes are swapped: x is read as y, y is read as −x"),
+    ("unit_error(force=0.1019716212978)", "the forces are in g"),
+    ("unit_error(angle=0.9)", "the robot's angles are in degrees"),
+])  # fmt: skip
 def test_a_calibration_of_mended_data_says_so(error, words, whole):
     assert whole["mended"] is None
     campaign, diagnosis, content = calibration_of(gross_errors=(error,))
