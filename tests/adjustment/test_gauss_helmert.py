@@ -433,14 +433,11 @@ CERTIFIED = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("problem", "start"),
-    [
-        ("Misra1a", [500.0, 0.0001]),  # NIST's first start, far away
-        ("Misra1a", [250.0, 0.0005]),
-        ("Rat43", [700.0, 5.0, 0.75, 1.3]),  # NIST's second start
-    ],
-)
+@pytest.mark.parametrize(("problem", "start"), [
+    ("Misra1a", [500.0, 0.0001]),  # NIST's first start, far away
+    ("Misra1a", [250.0, 0.0005]),
+    ("Rat43", [700.0, 5.0, 0.75, 1.3]),  # NIST's second start
+])  # fmt: skip
 @pytest.mark.usefixtures("all_digits")
 def test_certified_regression(problem, start):
     equations, y, parameters, sigma, rss = CERTIFIED[problem]

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 import pytest
-from click.testing import CliRunner
+from calling import call
 from places import SHARED
 from scipy.stats import f as f_distribution
 
@@ -22,7 +22,6 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign
-from accelstudy.commands.main import main
 from accelstudy.sensors.models import get_model
 
 DATA = SHARED / "data"
@@ -87,10 +86,6 @@ class Outcome(NamedTuple):
         return np.array(affine["gauges"][gauge]), np.array(affine["bias_mps2"])
 
 
-def run(*arguments):
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
-
-
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory):
     """What the import said, and the folder that it wrote; each log is imported once."""
@@ -102,7 +97,7 @@ def campaign(tmp_path_factory):
         file, *options = IMPORTS[name]
         options = [folder / "short.yaml" if o == "short.yaml" else o for o in options]
         out = folder / name
-        result = run("import", DATA / file, "--out", out, "--no-figure", *options)
+        result = call("import", DATA / file, "--out", out, "--no-figure", *options)
         assert result.exit_code == 0, result.output
         return result.output, out
 
@@ -117,7 +112,7 @@ def known(campaign):
     def calibrated(name, model=NINE):
         said, folder = campaign(name)
         out = folder.with_name(f"{name}, {model}")
-        result = run("calibrate", folder, "--model", model, "--out", out)
+        result = call("calibrate", folder, "--model", model, "--out", out)
         assert result.exit_code == 0, result.output
         content = json.loads((out / "calibration.json").read_text(encoding="utf-8"))
         return Outcome(said, result.output, content)
@@ -293,7 +288,7 @@ def six_positions(tmp_path_factory):
     forces = session[["acc_x", "acc_y", "acc_z"]]
     means = pd.DataFrame([forces[s["start"] : s["end"]].mean() for s in sections])
     means.to_csv(folder / "means.csv", index=False)
-    imported = run(
+    imported = call(
         *("import", folder / "means.csv", "--means", "--gravity", 9.81, "--out", folder / "six")
     )
     assert imported.exit_code == 0, imported.output
@@ -301,7 +296,7 @@ def six_positions(tmp_path_factory):
 
 
 def test_ferraris_says_what_six_positions_do_not_determine(six_positions, tmp_path):
-    result = run("calibrate", six_positions, "--out", tmp_path / "out")
+    result = call("calibrate", six_positions, "--out", tmp_path / "out")
     assert result.exit_code == 2
     assert "6 positions do not determine the model" in result.stderr
     assert "alpha_yz, alpha_zy, alpha_zx" in result.stderr
@@ -314,7 +309,7 @@ def test_ferraris_determines_six_parameters(six_positions, tmp_path):
 
     Exactly so if the sensor stood upright; at an angle of ε they differ by g ε²/2.
     """
-    result = run("calibrate", six_positions, "--model", "bias-scale", "--out", tmp_path)
+    result = call("calibrate", six_positions, "--model", "bias-scale", "--out", tmp_path)
     assert result.exit_code == 0, result.output
     assert "no redundancy" in result.output
     content = json.loads((tmp_path / "calibration.json").read_text(encoding="utf-8"))

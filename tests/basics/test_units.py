@@ -27,28 +27,25 @@ from accelstudy.basics.units import (
 )
 
 
-@pytest.mark.parametrize(
-    ("value", "given", "unit", "expected"),
-    [
-        (400, "gon", "rad", 2 * math.pi),
-        (1000, "mgon", "rad", GON),
-        (1, "mgon", "rad", MGON),
-        (90, "deg", "rad", math.pi / 2),
-        (3600, "arcsec", "rad", math.pi / 180),
-        (2, "mrad", "rad", 2e-3),
-        (200, "ppm", "1", 2e-4),
-        (3, "%", "1", 0.03),
-        (1, "g", "m/s^2", 9.80665),
-        (1, "mg", "m/s^2", 9.80665e-3),
-        (50, "mm/s^2", "m/s^2", 0.05),
-        (1, "mg/K", "m/s^2/K", 9.80665e-3),
-        (3.6, "mm/s^2/h", "m/s^2/s", 1e-6),
-        (9.80665, "ug/g^2", "s^2/m", 1e-6),
-        (50, "ppm/K", "1/K", 5e-5),
-        (100, "ug", "m/s^2", 9.80665e-4),
-        (7, "K", "K", 7),  # a unit that is shown as it is
-    ],
-)
+@pytest.mark.parametrize(("value", "given", "unit", "expected"), [
+    (400, "gon", "rad", 2 * math.pi),
+    (1000, "mgon", "rad", GON),
+    (1, "mgon", "rad", MGON),
+    (90, "deg", "rad", math.pi / 2),
+    (3600, "arcsec", "rad", math.pi / 180),
+    (2, "mrad", "rad", 2e-3),
+    (200, "ppm", "1", 2e-4),
+    (3, "%", "1", 0.03),
+    (1, "g", "m/s^2", 9.80665),
+    (1, "mg", "m/s^2", 9.80665e-3),
+    (50, "mm/s^2", "m/s^2", 0.05),
+    (1, "mg/K", "m/s^2/K", 9.80665e-3),
+    (3.6, "mm/s^2/h", "m/s^2/s", 1e-6),
+    (9.80665, "ug/g^2", "s^2/m", 1e-6),
+    (50, "ppm/K", "1/K", 5e-5),
+    (100, "ug", "m/s^2", 9.80665e-4),
+    (7, "K", "K", 7),  # a unit that is shown as it is
+])  # fmt: skip
 def test_conversions(value, given, unit, expected):
     assert to_si(value, given, unit) == pytest.approx(expected, rel=1e-14)
 

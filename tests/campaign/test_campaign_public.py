@@ -7,7 +7,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
-from campaign_helpers import refusal, succeed
+from calling import refusal, succeed
 from places import DATA
 
 from accelstudy.basics.errors import InputError, UnknownNameError

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from campaign_helpers import refusal, succeed
+from calling import refusal, succeed
 from scipy.io import savemat
 from test_import_holds import G, session, shared, write
 

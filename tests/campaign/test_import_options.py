@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from campaign_helpers import refusal, run, succeed
+from calling import call, refusal, succeed
 from test_import_campaign import XSENS
 from test_import_holds import RATE, G, session, shared, write
 
@@ -247,15 +247,12 @@ def wobbling(rng, size, cut, n=9000):
     return size * motion / motion.std()
 
 
-@pytest.mark.parametrize(
-    "motion",
-    [
-        lambda rng: turning(0.5) + wobbling(rng, 4.0, 3),  # waved about
-        lambda rng: turning(0.1) + wobbling(rng, 0.4, 2),  # turned gently by hand
-        lambda rng: turning(0.02),  # on a turntable
-        lambda rng: wobbling(rng, 2.0, 3) - [0, 0, G],  # carried upright
-    ],
-)
+@pytest.mark.parametrize("motion", [
+    lambda rng: turning(0.5) + wobbling(rng, 4.0, 3),  # waved about
+    lambda rng: turning(0.1) + wobbling(rng, 0.4, 2),  # turned gently by hand
+    lambda rng: turning(0.02),  # on a turntable
+    lambda rng: wobbling(rng, 2.0, 3) - [0, 0, G],  # carried upright
+])  # fmt: skip
 def test_what_was_never_still_is_refused(tmp_path, motion):
     rng = np.random.default_rng(1)
     path = write(tmp_path, motion(rng) + 0.02 * rng.standard_normal((9000, 3)))
@@ -409,7 +406,7 @@ def test_means_with_a_robot(tmp_path, frame, unit):
         *(*arguments, "--out", tmp_path / "new", "--robot-sigma", 3.2, "--robot-unit", wrong),
     )
     assert f"--robot-unit {unit} would be right" in line
-    result = run("import", *arguments, "--out", tmp_path / "new")
+    result = call("import", *arguments, "--out", tmp_path / "new")
     assert "--robot-sigma takes them for the robot's" in result.stderr
 
 

@@ -8,6 +8,7 @@ import click
 import pandas as pd
 import pytest
 import yaml
+from calling import call
 from click.testing import CliRunner
 from study_helpers import NINE, PROVENANCE, content, grid
 
@@ -20,10 +21,6 @@ from accelstudy.files.tables import write_table
 from accelstudy.noise_effects import noise_effect_names
 from accelstudy.schemes import get_scheme, scheme_families, scheme_names
 from accelstudy.sensors.models import MODELS, PRESETS, compose, get_model
-
-
-def call(*arguments):
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
 
 
 def output(*arguments):

@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 import yaml
-from click.testing import CliRunner
+from calling import refusal, succeed
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON
-from accelstudy.commands.main import main
 from accelstudy.design.estimability import estimability
 from accelstudy.design.task import Task, position_rows
 from accelstudy.leveling.error import cap_forces, tilt_error
@@ -27,17 +26,11 @@ from accelstudy.study.config import parse_study
 NINE = get_model("bias-scale-nonorthogonality")
 
 
-def run(*arguments, code=0):
-    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
-    assert result.exit_code == code, result.output
-    return result
-
-
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     """A design, and what the command said."""
     path = tmp_path_factory.mktemp("designs") / "mine.yaml"
-    said = run("design", "--positions", 8, "--tilt-range", "30gon", "--starts", 1,
+    said = succeed("design", "--positions", 8, "--tilt-range", "30gon", "--starts", 1,
                "--least-angle", "15gon", "--roll", "-110gon", "110gon", "--out", path)  # fmt: skip
     return path, said.output
 
@@ -76,23 +69,23 @@ def test_a_design_is_made_again_to_the_bit_and_replaces_nothing(made, tmp_path):
     before = path.read_bytes()
     again = ["design", "--positions", 8, "--tilt-range", "30gon", "--starts", 1, "--least-angle",
              "15gon", "--roll", "-110gon", "110gon", "--out"]  # fmt: skip
-    assert "is there already; --force replaces it" in run(*again, path, code=2).stderr
+    assert "is there already; --force replaces it" in refusal(*again, path)
     assert path.read_bytes() == before
     copy = tmp_path / "mine.yaml"
-    run(*again, copy)
+    succeed(*again, copy)
     assert copy.read_bytes() == before
-    told = run("design", "--after", path, "--out", path, "--force", code=2)
-    assert "is the input" in told.stderr
-    assert "must end in .yaml" in run("design", "--out", tmp_path / "mine", code=2).stderr
+    told = refusal("design", "--after", path, "--out", path, "--force")
+    assert "is the input" in told
+    assert "must end in .yaml" in refusal("design", "--out", tmp_path / "mine")
 
 
 def test_commands_take_the_file_for_a_scheme(made, tmp_path):
     path, _ = made
     name = get_scheme(str(path)).name
-    assert f"{name}  8" in run("schemes", "--approach", "robot", path).output
-    run("simulate-campaign", "--scheme", path, "--out", tmp_path / "c", "--name", "c")
+    assert f"{name}  8" in succeed("schemes", "--approach", "robot", path).output
+    succeed("simulate-campaign", "--scheme", path, "--out", tmp_path / "c", "--name", "c")
     assert len((tmp_path / "c/positions.csv").read_text().splitlines()) == 9
-    assert "visible" in run("effects", "--scheme", path, "--approach", "robot").output
+    assert "visible" in succeed("effects", "--scheme", path, "--approach", "robot").output
 
 
 @pytest.mark.parametrize(
@@ -108,7 +101,7 @@ def test_commands_take_the_file_for_a_scheme(made, tmp_path):
 )  # fmt: skip
 def test_what_a_design_is_for_is_said(asked, said, held, tmp_path):
     path = tmp_path / "d.yaml"
-    told = run("design", "--positions", 8, "--starts", 1, *asked, "--out", path).output
+    told = succeed("design", "--positions", 8, "--starts", 1, *asked, "--out", path).output
     assert said in told
     share = float(told.partition("Efficiency at least ")[2].partition(" %")[0])
     assert 50 < share <= 100

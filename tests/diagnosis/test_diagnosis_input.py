@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from click.testing import CliRunner
+from calling import call
 from diagnosis_helpers import NINE, ROTATIONS, campaign
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.commands.main import main
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.document import diagnosis_document
 from accelstudy.effects import effect_names
@@ -54,8 +53,7 @@ def command(folder, measured, *options, header=None, table=None, out="out"):
     if table is not None:
         path = folder / "c/positions.csv"
         table(pd.read_csv(path)).to_csv(path, index=False)
-    arguments = ["diagnose", str(folder / "c"), "--out", str(folder / out), "--replicates", "100"]
-    return CliRunner().invoke(main, [*arguments, *options])
+    return call("diagnose", folder / "c", "--out", folder / out, "--replicates", "100", *options)
 
 
 def document(folder, run):

@@ -151,15 +151,12 @@ def test_holds_that_say_nothing_of_their_noise_accuse_nothing():
         assert np.isfinite(nothing.statistic)
 
 
-@pytest.mark.parametrize(
-    ("approach", "scheme", "kappa", "sigma_angle"),
-    [
-        (ROBOT, "mclaren-24", (1.0, 1.0, 1.0), Noise().sigma_angle),
-        (ROBOT, "mclaren-24", (0.6, 1.0, 3.0), Noise().sigma_angle),
-        (ROBOT, "mclaren-24", (1.0, 1.0, 1.0), 2e-4),  # as large as the noise of the forces
-        (GRAVITY, "fibonacci-96", (0.9, 1.0, 2.0), Noise().sigma_angle),
-    ],
-)
+@pytest.mark.parametrize(("approach", "scheme", "kappa", "sigma_angle"), [
+    (ROBOT, "mclaren-24", (1.0, 1.0, 1.0), Noise().sigma_angle),
+    (ROBOT, "mclaren-24", (0.6, 1.0, 3.0), Noise().sigma_angle),
+    (ROBOT, "mclaren-24", (1.0, 1.0, 1.0), 2e-4),  # as large as the noise of the forces
+    (GRAVITY, "fibonacci-96", (0.9, 1.0, 2.0), Noise().sigma_angle),
+])  # fmt: skip
 def test_variance_factors_of_the_axes_are_unbiased(approach, scheme, kappa, sigma_angle):
     """Gravity takes many positions, so that none of the estimates is cut at 0."""
     x, y, z = kappa

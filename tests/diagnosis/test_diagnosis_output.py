@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from click.testing import CliRunner
+from calling import call
 from jsonschema import Draft202012Validator
 from page_helpers import assert_sound, text_of
 from places import ROOT
@@ -27,7 +27,6 @@ from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.output import write_calibration
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.commands.main import main
 from accelstudy.diagnosis.consequences import separating_positions
 from accelstudy.diagnosis.decision.posterior import Explanation, Posterior, Weighed
 from accelstudy.diagnosis.decision.priors import SURE
@@ -77,10 +76,6 @@ SCHEMA = Draft202012Validator(
 )
 
 
-def run(*arguments):
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
-
-
 def simulated(case, folder):
     settings = {"scheme": "fibonacci-36", "seed": 5, **CASES[case]}
     campaign, _ = simulate_campaign(CampaignSettings(name=case, **settings))
@@ -118,7 +113,7 @@ def written(tmp_path_factory):
             out = root / f"{case}-out"
             with pytest.MonkeyPatch.context() as patch:
                 patch.setattr(saving, "save", rendering(*RENDERED.get(case, ())))
-                result = run("diagnose", root / case, "--out", out, "--replicates", 100)
+                result = call("diagnose", root / case, "--out", out, "--replicates", 100)
             assert result.exit_code == 0, result.output
             content = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
             made[case] = out, content, result.output
@@ -471,7 +466,7 @@ def test_nothing_to_compare_without_an_effect(tmp_path):
 def test_bad_input_is_one_line(arguments, words, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     simulated("no_effect", tmp_path / "c")
-    result = run("diagnose", *arguments, "--out", "out")
+    result = call("diagnose", *arguments, "--out", "out")
     assert result.exit_code == 2
     assert words in result.stderr
     assert result.stderr.count("\n") == 1

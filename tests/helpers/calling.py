@@ -10,6 +10,13 @@ def call(*words):
     return CliRunner().invoke(main, [str(word) for word in words])
 
 
+def succeed(*words):
+    """Result of a command that must end well."""
+    result = call(*words)
+    assert result.exit_code == 0, f"{words}: {result.output}"
+    return result
+
+
 def refusal(*words):
     """The one line on stderr by which a command refuses its input."""
     result = call(*words)

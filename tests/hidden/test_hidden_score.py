@@ -125,31 +125,28 @@ def test_names_are_right_in_any_order_and_each_for_another_effect():
     assert not all_true([["a"], ["b"]], [["a"]])
 
 
-@pytest.mark.parametrize(
-    ("figure", "cases", "measured", "n", "met"),
-    [
-        ("campaigns without an answer", "all", 1 / len(CASES), len(CASES), "no"),
-        ("false alarm", "sigma given", 1 / 20, 20, "yes"),
-        ("false alarm", "sigma not given", 1 / 20, 20, "yes"),
-        ("named or narrowed to effects", "wrong noise", 0, 1, "yes"),
-        # Drift is right, and the mounting by its other name; narrowed to the wrong one is not.
-        ("best name right, named or narrowed", "λ = 25", 2 / 4, 4, "yes"),
-        # A second name beside the right one is wrong, and so is no answer.
-        ("best name right, named or narrowed", "λ = 60", 0, 2, "no"),
-        ("best name right, named or narrowed", "over all λ", 2 / 6, 6, "no"),
-        ("named, and wrong", "one and two", 2 / 6, 6, "no"),
-        ("90 % set holds the truth", "λ = 25", 3 / 3, 3, "yes"),
-        ("90 % set holds the truth", "λ = 60", 0, 1, "no"),
-        ("names in a 90 % set", "λ = 25", 4 / 3, 3, "yes"),
-        ("names in a 90 % set", "λ = 60", 2, 1, "no"),
-        ("both of two right", "λ = 40", 1 / 3, 3, "no"),
-        ("named or narrowed wrongly", "never in the catalogue", 1, 1, "no"),
-        ("named or narrowed wrongly", "family taken out", 0, 1, "yes"),
-        ("confirmed", "nothing missing", None, None, "no"),
-        # A bumped hold is recognised where it is.
-        ("recognised", "gross errors", 2 / 4, 4, "no"),
-    ],
-)
+@pytest.mark.parametrize(("figure", "cases", "measured", "n", "met"), [
+    ("campaigns without an answer", "all", 1 / len(CASES), len(CASES), "no"),
+    ("false alarm", "sigma given", 1 / 20, 20, "yes"),
+    ("false alarm", "sigma not given", 1 / 20, 20, "yes"),
+    ("named or narrowed to effects", "wrong noise", 0, 1, "yes"),
+    # Drift is right, and the mounting by its other name; narrowed to the wrong one is not.
+    ("best name right, named or narrowed", "λ = 25", 2 / 4, 4, "yes"),
+    # A second name beside the right one is wrong, and so is no answer.
+    ("best name right, named or narrowed", "λ = 60", 0, 2, "no"),
+    ("best name right, named or narrowed", "over all λ", 2 / 6, 6, "no"),
+    ("named, and wrong", "one and two", 2 / 6, 6, "no"),
+    ("90 % set holds the truth", "λ = 25", 3 / 3, 3, "yes"),
+    ("90 % set holds the truth", "λ = 60", 0, 1, "no"),
+    ("names in a 90 % set", "λ = 25", 4 / 3, 3, "yes"),
+    ("names in a 90 % set", "λ = 60", 2, 1, "no"),
+    ("both of two right", "λ = 40", 1 / 3, 3, "no"),
+    ("named or narrowed wrongly", "never in the catalogue", 1, 1, "no"),
+    ("named or narrowed wrongly", "family taken out", 0, 1, "yes"),
+    ("confirmed", "nothing missing", None, None, "no"),
+    # A bumped hold is recognised where it is.
+    ("recognised", "gross errors", 2 / 4, 4, "no"),
+])  # fmt: skip
 def test_targets(tables, figure, cases, measured, n, met):
     row = target(tables, figure, cases)
     assert row["met"] == met

@@ -38,18 +38,15 @@ def test_the_specific_force_has_the_norm_of_gravity(roll, pitch, g):
     assert np.linalg.norm(specific_force(roll, pitch, g)) == pytest.approx(g, rel=1e-14)
 
 
-@pytest.mark.parametrize(
-    ("f", "roll", "pitch"),
-    [
-        ((0, 0, -G), 0, 0),  # level
-        ((0, -G, 0), 100, 0),  # on the right side
-        ((0, G, 0), -100, 0),
-        ((G, 0, 0), None, 100),  # nose up: no roll
-        ((-G, 0, 0), None, -100),
-        ((G * np.sin(10 * GON), 0, -G * np.cos(10 * GON)), 0, 10),
-        ((0, -G * np.sin(30 * GON), -G * np.cos(30 * GON)), 30, 0),
-    ],
-)
+@pytest.mark.parametrize(("f", "roll", "pitch"), [
+    ((0, 0, -G), 0, 0),  # level
+    ((0, -G, 0), 100, 0),  # on the right side
+    ((0, G, 0), -100, 0),
+    ((G, 0, 0), None, 100),  # nose up: no roll
+    ((-G, 0, 0), None, -100),
+    ((G * np.sin(10 * GON), 0, -G * np.cos(10 * GON)), 0, 10),
+    ((0, -G * np.sin(30 * GON), -G * np.cos(30 * GON)), 30, 0),
+])  # fmt: skip
 def test_signs_of_the_convention(f, roll, pitch):
     """North-east-down: f_b = g (sin θ, −cos θ sin φ, −cos θ cos φ), in gon."""
     found = np.array(roll_pitch(f)) / GON

@@ -443,22 +443,19 @@ def test_the_norm_of_gravity_is_blind_to_rotations_and_to_the_robot():
             assert seen.rank == 9 + NUMBERS[name], name
 
 
-@pytest.mark.parametrize(
-    ("effects", "approach", "columns", "rank"),
-    [
-        # Mounting rotation and cross-axis misalignment span the same three dimensions.
-        (("mounting_rotation", "cross_axis_misalignment"), ROBOT, {}, 12),
-        # A zero offset of roll is a rotation about x; one of pitch is none.
-        (("mounting_rotation", "encoder_offset"), ROBOT, {}, 13),
-        # A zero offset of pitch is a tilt of the base, unless the yaw varies.
-        (("base_tilt", "encoder_offset"), ROBOT, {"yaw": np.zeros(60)}, 12),
-        (("base_tilt", "encoder_offset"), ROBOT, {}, 13),
-        (("quadratic_scale", "cross_coupling"), GRAVITY, {}, 15),
-        (("quadratic_scale", "cross_coupling"), ROBOT, {}, 18),
-        # Constant temperature is a bias and a scale.
-        (("thermal_bias", "thermal_scale"), ROBOT, {"temperature": np.full(60, 35.0)}, 9),
-    ],
-)
+@pytest.mark.parametrize(("effects", "approach", "columns", "rank"), [
+    # Mounting rotation and cross-axis misalignment span the same three dimensions.
+    (("mounting_rotation", "cross_axis_misalignment"), ROBOT, {}, 12),
+    # A zero offset of roll is a rotation about x; one of pitch is none.
+    (("mounting_rotation", "encoder_offset"), ROBOT, {}, 13),
+    # A zero offset of pitch is a tilt of the base, unless the yaw varies.
+    (("base_tilt", "encoder_offset"), ROBOT, {"yaw": np.zeros(60)}, 12),
+    (("base_tilt", "encoder_offset"), ROBOT, {}, 13),
+    (("quadratic_scale", "cross_coupling"), GRAVITY, {}, 15),
+    (("quadratic_scale", "cross_coupling"), ROBOT, {}, 18),
+    # Constant temperature is a bias and a scale.
+    (("thermal_bias", "thermal_scale"), ROBOT, {"temperature": np.full(60, 35.0)}, 9),
+])  # fmt: skip
 def test_what_equals_what(effects, approach, columns, rank):
     scheme = get_scheme("fibonacci-60")
     assert design(*effects, approach=approach, scheme=scheme, **columns).rank == rank

@@ -5,11 +5,10 @@ import re
 import numpy as np
 import pytest
 import yaml
-from click.testing import CliRunner
+from calling import succeed
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.commands.main import main
 from accelstudy.drawing.style import _parameters, model_title
 from accelstudy.effects import Effect, base, effect_names, get_effect, register
 from accelstudy.effects.base import formulas, per_axis
@@ -18,12 +17,6 @@ from accelstudy.sensors.plausibility import largest
 from accelstudy.study.config import parse_study
 
 NINE = "bias-scale-nonorthogonality"
-
-
-def run(*arguments):
-    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
-    assert result.exit_code == 0, result.output
-    return result.output
 
 
 @pytest.mark.parametrize(("text", "name", "number"), [
@@ -126,17 +119,19 @@ def squared():
 
 @pytest.mark.usefixtures("not_rendered")
 def test_an_effect_that_says_no_more_than_it_must_serves_everywhere(squared, tmp_path):
-    text = run("effects")
+    text = succeed("effects").output
     assert "squared_scale: f_i² k2_i/g" in text
-    assert squared in run("effects", "--scheme", "mclaren-24")
-    run("simulate-campaign", "--out", tmp_path / "c", "--seed", "3", "--model", NINE,
+    assert squared in succeed("effects", "--scheme", "mclaren-24").output
+    succeed("simulate-campaign", "--out", tmp_path / "c", "--seed", "3", "--model", NINE,
         "--effect", squared, "--size", "5")  # fmt: skip
-    assert squared in run("effects", "--campaign", tmp_path / "c")
-    text = run("diagnose", tmp_path / "c", "--out", tmp_path / "d", "--replicates", "100")
+    assert squared in succeed("effects", "--campaign", tmp_path / "c").output
+    text = succeed(
+        "diagnose", tmp_path / "c", "--out", tmp_path / "d", "--replicates", "100"
+    ).output
     assert "squared scale" in text
     page = (tmp_path / "d/report.html").read_text(encoding="utf-8")
     assert "squared scale" in page
-    run("calibrate", tmp_path / "c", "--model", f"{NINE}+{squared}", "--out", tmp_path / "k")
+    succeed("calibrate", tmp_path / "c", "--model", f"{NINE}+{squared}", "--out", tmp_path / "k")
     assert largest(get_effect(squared)) == np.inf
 
 
