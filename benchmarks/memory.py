@@ -39,13 +39,14 @@ def study_of(replicates, keep):
 def run(step, content, folder):
     """One rule, on files in a folder."""
     from accelstudy.files.tables import collect, read_table
-    from accelstudy.study.cells.batches import Share
-    from accelstudy.study.cells.of_study import study_cells
+    from accelstudy.study.batches import Share
+    from accelstudy.study.cells import study_cells
+    from accelstudy.study.claims.judging import judge_claims
     from accelstudy.study.config import parse_study
     from accelstudy.study.figures import figure_names, figure_tables, render
     from accelstudy.study.monte_carlo.simulate import simulate_batch
-    from accelstudy.study.results import analysis
-    from accelstudy.study.results.summary import summarise_batch
+    from accelstudy.study.sensitivity import analyse_sensitivity, analyse_shapley
+    from accelstudy.study.summary import summarise_batch
 
     study = parse_study(content)
     cells = study_cells(study)
@@ -71,8 +72,8 @@ def run(step, content, folder):
             folder / f"{name}.parquet"
             for name in ("summary", "correlations", "sensitivity", "shapley")
         )
-        analysis.analyse_sensitivity(study, summary, sensitivity, PROVENANCE)
-        analysis.analyse_shapley(study, summary, correlations, shapley, PROVENANCE)
+        analyse_sensitivity(study, summary, sensitivity, PROVENANCE)
+        analyse_shapley(study, summary, correlations, shapley, PROVENANCE)
     elif rule == "claims":
         parts = {
             name: [folder / "whole" / cell.approach / f"{name}.parquet" for cell in cells]
@@ -82,7 +83,7 @@ def run(step, content, folder):
             parts[kept] = [folder / cell.approach / "estimates.parquet" for cell in cells]
         outputs = {name: folder / f"{name}.parquet" for name in ("claims", "by_scheme", "html")}
         tables = (folder / f"{name}.parquet" for name in ("correlations", "sensitivity", "shapley"))
-        analysis.judge_claims(study, parts, *tables, outputs, PROVENANCE)
+        judge_claims(study, parts, *tables, outputs, PROVENANCE)
     else:
         for name in figure_names(study):
             tables = {key: read_table(folder / f"{key}.parquet") for key in figure_tables(name)}

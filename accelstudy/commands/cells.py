@@ -18,9 +18,9 @@ def cells_command(configs: tuple[Path, ...]) -> None:
     overlays those before it, as with Snakemake's --configfile.
     """
     from accelstudy.design.estimability import estimability
-    from accelstudy.study.cells.of_study import study_cells
+    from accelstudy.study.cells import study_cells
     from accelstudy.study.config import read_study
-    from accelstudy.study.monte_carlo.effort import study_effort
+    from accelstudy.study.effort import study_effort
 
     study = read_study(*configs)
     chosen = study_cells(study)

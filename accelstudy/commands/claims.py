@@ -17,6 +17,6 @@ def claims_command(results: Path) -> None:
     RESULTS is the folder of a study, such as results/paper.
     """
     from accelstudy.files.tables import read_table
-    from accelstudy.study.claims.page import claims_markdown
+    from accelstudy.study.claims.judging import claims_markdown
 
     click.echo(claims_markdown(read_table(results / "claims.parquet")), nl=False)

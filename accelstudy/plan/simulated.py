@@ -18,8 +18,8 @@ from accelstudy.plan.candidates import Candidate
 from accelstudy.plan.optimised import is_best
 from accelstudy.plan.question import Question
 from accelstudy.schemes.files import held
-from accelstudy.study.cells.cell import Cell
-from accelstudy.study.cells.of_study import study_cells
+from accelstudy.study.cell import Cell
+from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study
 from accelstudy.study.monte_carlo.followed import cell_tilt_error
 from accelstudy.study.monte_carlo.simulate import blocks

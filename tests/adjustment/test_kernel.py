@@ -17,8 +17,8 @@ from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import BLOCK, Noise, session
-from accelstudy.study.cells import compiling
-from accelstudy.study.cells.compiling import POSITIONS_PER_PARAMETER
+from accelstudy.study import compiling
+from accelstudy.study.compiling import POSITIONS_PER_PARAMETER
 from accelstudy.study.monte_carlo.simulate import blocks
 
 pytest.importorskip("llvmlite")

@@ -19,8 +19,8 @@ from accelstudy.proposal.proposal import _drift_shown, field_order
 from accelstudy.proposal.request import Request
 from accelstudy.schemes import files, get_scheme
 from accelstudy.sensors.models import get_model
-from accelstudy.study.cells.cell import Cell
-from accelstudy.study.cells.of_study import study_cells
+from accelstudy.study.cell import Cell
+from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study
 
 NINE = get_model("bias-scale-nonorthogonality")

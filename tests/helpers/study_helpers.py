@@ -3,12 +3,12 @@
 from accelstudy.adjustment.calibration import Block
 from accelstudy.basics.units import MGON
 from accelstudy.files.tables import collect, read_table
-from accelstudy.study.cells.batches import Share, batches
-from accelstudy.study.cells.of_study import study_cells
+from accelstudy.study.batches import Share, batches
+from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study
 from accelstudy.study.monte_carlo.simulate import blocks, simulate_batch
-from accelstudy.study.results.estimates import TABLES
-from accelstudy.study.results.summary import summarise_batch
+from accelstudy.study.summary import summarise_batch
+from accelstudy.study.tables import TABLES
 
 NINE = "bias-scale-nonorthogonality"
 PROVENANCE = {"config_hash": "0123456789abcdef", "seed": 1}

@@ -272,7 +272,7 @@ def test_what_runs_again_after_an_edit(monkeypatch, tmp_path):
         "hidden/physics/measuring.py": {*stages},
         "effects/bias_drift.py": {*stages},
         "commands/main.py": set(),
-        "study/results/summary.py": set(),
+        "study/summary.py": set(),
     }.items():
         before = {stage: hash_of(stage) for stage in stages}
         with (package / name).open("a") as file:

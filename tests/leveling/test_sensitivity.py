@@ -12,7 +12,7 @@ from accelstudy.basics.units import GON, MGON
 from accelstudy.files.tables import read_table
 from accelstudy.leveling.sensitivity import FORCES, leveling_sensitivity, total_effects
 from accelstudy.sensors.models import get_model
-from accelstudy.study.results.sensitivity import analyse_sensitivity
+from accelstudy.study.sensitivity import analyse_sensitivity
 
 SETTINGS = {"base_samples": 1024, "resamples": 50, "seed": 1}
 # Confidence intervals are of 95 %: 2.5 half widths are 4.9 standard deviations.

@@ -28,7 +28,7 @@ from accelstudy.plan.wording import answer_lines, effort, reason_lines, table_li
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise
-from accelstudy.study.cells.of_study import study_cells
+from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study, read_study
 from accelstudy.study.monte_carlo.simulate import blocks
 

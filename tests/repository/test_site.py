@@ -21,7 +21,7 @@ from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.files.tables import read_table
 from accelstudy.sensors.models import get_model
-from accelstudy.study.results.sensitivity import analyse_sensitivity, analyse_shapley
+from accelstudy.study.sensitivity import analyse_sensitivity, analyse_shapley
 
 SENSITIVITY = {"base_samples": 2, "resamples": 2, "roll_gon": 10, "pitch_gon": 0}
 PROVENANCE = {"config_hash": "0123456789abcdef", "seed": 1}

@@ -30,7 +30,7 @@ from accelstudy.drawing.style import model_title
 from accelstudy.effects import HoldConditions
 from accelstudy.sensors.frames import parse_frame
 from accelstudy.sensors.models import get_model
-from accelstudy.study.cells.of_study import study_cells
+from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study
 
 NINE = "bias-scale-nonorthogonality"

@@ -13,7 +13,7 @@ from accelstudy.noise_effects import get_noise_effect, noise_effect_names
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise, session
-from accelstudy.study.cells.cell import Cell
+from accelstudy.study.cell import Cell
 
 MODEL = get_model("bias-scale-nonorthogonality")
 SIGMA, R = 0.003, 4000

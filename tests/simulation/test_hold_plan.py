@@ -14,7 +14,7 @@ from accelstudy.leveling.error import cap_forces, leveling_error
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.hold_plan import HoldPlan
-from accelstudy.study.cells.cell import Cell
+from accelstudy.study.cell import Cell
 
 FULL = HoldPlan(30.0, (10.0, 40.0), "random", (0.5, 2.0), "random", seed=3)
 

@@ -18,7 +18,7 @@ from study_helpers import NINE, grid
 from test_workflow import TABLE_PATHS, TINY, command, in_batches, run, succeed
 
 from accelstudy.basics.errors import InputError
-from accelstudy.study.results.estimates import read_estimates
+from accelstudy.study.tables import read_estimates
 
 # Eight cells in four batches, each long enough to be caught while it writes.
 STUDY = {

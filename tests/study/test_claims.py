@@ -23,14 +23,12 @@ from accelstudy.basics.wording import interval, number
 from accelstudy.files.tables import read_table, write_table
 from accelstudy.leveling.sensitivity import leveling_sensitivity
 from accelstudy.sensors.models import get_model
-from accelstudy.study.cells.of_study import study_cells
+from accelstudy.study.cells import study_cells
 from accelstudy.study.claims import NOT_REPRODUCED, REPRODUCED, SLIP, evidence_from, judge
-from accelstudy.study.claims.page import claims_markdown, claims_page
-from accelstudy.study.figures import figure_tables
+from accelstudy.study.claims.judging import claims_markdown, claims_page, judge_claims
+from accelstudy.study.figures import draw_figures, figure_tables
 from accelstudy.study.monte_carlo.distributions import Sample
-from accelstudy.study.results.figure_files import draw_figures
-from accelstudy.study.results.judging import judge_claims
-from accelstudy.study.results.sensitivity import analyse_shapley
+from accelstudy.study.sensitivity import analyse_shapley
 
 STANDARD_ERRORS = 4.5
 REPLICATES = 2000

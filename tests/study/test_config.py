@@ -20,9 +20,9 @@ from accelstudy.effects import effect_names
 from accelstudy.files.reading import overlay, read_layer
 from accelstudy.schemes import scheme_names
 from accelstudy.sensors.models import MODELS
-from accelstudy.study.cells.batches import batches
-from accelstudy.study.cells.cell import Cell
-from accelstudy.study.cells.of_study import study_cells
+from accelstudy.study.batches import batches
+from accelstudy.study.cell import Cell
+from accelstudy.study.cells import study_cells
 from accelstudy.study.config import StudyConfig, config_schema, parse_study, read_study
 
 CONFIG = ROOT / "config" / "config.yaml"

@@ -1,11 +1,14 @@
 """The explorer shows what the tables hold; in a browser, what a person chooses of it."""
 
+import base64
+import gzip
 import json
 import re
 import shutil
 from urllib.parse import unquote, urlsplit
 
 import numpy as np
+import pandas as pd
 import pytest
 from page_helpers import assert_sound
 from playwright.sync_api import sync_playwright
@@ -16,10 +19,9 @@ from accelstudy.basics.wording import number
 from accelstudy.drawing.style import APPROACH_COLOURS, model_title
 from accelstudy.study.explorer import page as explorer
 from accelstudy.study.explorer.content import plain
-from accelstudy.study.explorer.links import figures_of
-from accelstudy.study.explorer.page import explorer_page, write_explorer
+from accelstudy.study.explorer.page import explorer_page, figures_of, write_explorer
 from accelstudy.study.figures import figure_names
-from accelstudy.study.results.estimates import TABLES
+from accelstudy.study.tables import TABLES
 
 CROSS = f"{NINE}-crossaxis"
 KEYS = {
@@ -71,154 +73,155 @@ def page(written):
     return written.read_text(encoding="utf-8")
 
 
-def data_of(page):
-    found = re.search(r'<script type="application/json" id="study">(.*?)</script>', page, re.DOTALL)
-    return json.loads(found[1])
+def heads_of(page):
+    """What the rows of the page's tables refer to."""
+    text = re.search(r'<script type="application/json" id="study">(.*?)</script>', page, re.DOTALL)
+    return json.loads(text[1])
 
 
-def rows_of(data):
-    return [dict(zip(data["fields"], row, strict=True)) for row in data["rows"]]
+def table_of(page, name):
+    """A table of the page, as its script reads it."""
+    text = re.search(f'id="packed-{name}">(.*?)</script>', page)[1]
+    return pd.DataFrame(json.loads(gzip.decompress(base64.b64decode(text))))
 
 
-def same(found, expected):
+def same(numbers, expected):
     """Compare numbers, none where there is none, with those of a table."""
-    found = np.array([np.nan if value is None else value for value in found], float)
-    np.testing.assert_allclose(found, np.asarray(expected, float), rtol=DIGITS)
+    numbers, expected = (np.asarray(values, float) for values in (numbers, expected))
+    np.testing.assert_allclose(numbers, expected, rtol=DIGITS)
 
 
 # --- the data ------------------------------------------------------------------------------------
 
 
 def test_set_ups_are_those_of_the_tables(page, tables):
-    data, cells = data_of(page), tables["cells"]
-    rows = rows_of(data)
-    assert [data["models"][row["model"]]["name"] for row in rows] == list(cells["model"])
-    assert [data["schemes"][row["scheme"]]["name"] for row in rows] == list(cells["scheme"])
-    assert [data["approaches"][row["approach"]] for row in rows] == list(cells["approach"])
-    assert [row["n"] for row in rows] == list(cells["n_positions"])
-    same([row["sensor-noise"] for row in rows], cells["sensor_sigma_mps2"] * 1e3)
-    robot = cells["robot_sigma_mgon"].where(cells["approach"] == "robot")
-    same([row["robot-noise"] for row in rows], robot)
+    heads, rows, cells = heads_of(page), table_of(page, "setups"), tables["cells"]
+    for key in ("model", "scheme"):
+        assert [heads["names"][key][number] for number in rows[key]] == list(cells[key])
+    assert [heads["titles"]["approach"][a] for a in rows["approach"]] == list(cells["approach"])
+    assert list(rows["n"]) == list(cells["n_positions"])
+    same(rows["sensor-noise"], cells["sensor_sigma_mps2"] * 1e3)
+    same(rows["robot-noise"], cells["robot_sigma_mgon"].where(cells["approach"] == "robot"))
     leveling = tables["leveling"].set_index("cell").reindex(cells["cell"])
     tilt = tables["quantiles"].query("quantity == 'tilt'").set_index(["cell", "name"])
-    same([row["both_q95"] for row in rows], leveling["both_rms_q95_mgon"])
+    same(rows["both_q95"], leveling["both_rms_q95_mgon"])
     for angle in ("roll", "pitch"):
-        same([row[f"{angle}_rms"] for row in rows], leveling[f"{angle}_rms_mgon"])
-        same([row[f"{angle}_q95"] for row in rows], leveling[f"{angle}_rms_q95_mgon"])
+        same(rows[f"{angle}_rms"], leveling[f"{angle}_rms_mgon"])
+        same(rows[f"{angle}_q95"], leveling[f"{angle}_rms_q95_mgon"])
         for end, probability in (("low", 0.025), ("high", 0.975)):
-            its = tilt[np.isclose(tilt["probability"].astype(float), probability)]["value"]
-            its = its.xs(angle, level="name").reindex(cells["cell"])
-            same([row[f"{angle}_{end}"] for row in rows], its)
+            quantile = tilt[np.isclose(tilt["probability"].astype(float), probability)]["value"]
+            quantile = quantile.xs(angle, level="name").reindex(cells["cell"])
+            same(rows[f"{angle}_{end}"], quantile)
 
 
 def test_parameters_are_those_of_the_summary(page, tables):
-    data, summary = data_of(page), tables["summary"]
-    quantities = ("truth", "bias_high", "empirical", "posteriori", "linear", "ratio", "ratio_low")
-    columns = ("truth", "bias_ci95_high", "sd_empirical", "sd_posteriori_mean", "sd_linear")
-    columns += ("sd_ratio", "sd_ratio_ci95_low")
-    for (_, its), (parameters, _) in zip(
-        summary.groupby("cell", sort=False), data["details"], strict=True
-    ):
-        number_of_list, estimable, *values = parameters
-        values = dict(zip(data["quantities"], values, strict=True))
-        listed = data["parameters"][number_of_list]
-        assert [name for name, _ in listed] == [plain(name) for name in its["parameter"]]
-        units = [data["units"][unit].replace("²", "^2") for _, unit in listed]
-        assert units == list(its["unit"])
-        assert estimable == list(its["estimable"])
-        for quantity, column in zip(quantities, columns, strict=True):
-            same(values[quantity], its[column])
-        same(values["coverage_low"], its["coverage_95_low"] * 100)
-        assert all(
-            low <= mean <= high
-            for low, mean, high in zip(
-                values["posteriori_low"],
-                values["posteriori"],
-                values["posteriori_high"],
-                strict=True,
-            )
-            if mean is not None
-        )
+    rows, summary = table_of(page, "parameters"), tables["summary"]
+    assert list(tables["cells"]["cell"].iloc[rows["i"]]) == list(summary["cell"])
+    assert list(rows["parameter"]) == [plain(name) for name in summary["parameter"]]
+    assert list(rows["unit"].str.replace("²", "^2")) == list(summary["unit"])
+    assert list(rows["failed"] == "") == list(summary["estimable"])
+    for quantity, column in {
+        "truth": "truth",
+        "bias_high": "bias_ci95_high",
+        "empirical": "sd_empirical",
+        "posteriori": "sd_posteriori_mean",
+        "linear": "sd_linear",
+        "ratio": "sd_ratio",
+        "ratio_low": "sd_ratio_ci95_low",
+    }.items():
+        same(rows[quantity], summary[column])
+    same(rows["coverage_low"], summary["coverage_95_low"] * 100)
+    some = rows[rows["posteriori"].notna()]
+    assert len(some)
+    assert some["posteriori"].between(some["posteriori_low"], some["posteriori_high"]).all()
 
 
 def test_correlations_are_those_of_the_tables(page, tables):
-    data = data_of(page)
-    table = tables["correlations"]
-    for cell, (_, matrix) in zip(tables["cells"]["cell"], data["details"], strict=True):
-        its = table[table["cell"] == cell]
-        u = int(np.sqrt(len(its)))
-        assert len(matrix) == u * u
-        lower = np.tril(np.ones((u, u), bool)).ravel()
-        expected = np.where(lower, its["adjustment"], its["empirical"])
-        assert np.abs(np.array(matrix, float) / 1000 - expected).max(initial=0) <= 0.0005
+    rows, table = table_of(page, "correlations"), tables["correlations"]
+    assert list(tables["cells"]["cell"].iloc[rows["i"]]) == list(table["cell"])
+    for _, cell in table.assign(shown=rows["value"].astype(float)).groupby("cell"):
+        u = int(np.sqrt(len(cell)))
+        shown, adjustment, empirical = (
+            cell[name].to_numpy().reshape(u, u) for name in ("shown", "adjustment", "empirical")
+        )
+        assert np.isnan(np.diag(shown)).all()
+        for triangle, expected in (
+            (np.tril_indices(u, -1), adjustment),
+            (np.triu_indices(u, 1), empirical),
+        ):
+            assert np.abs(shown[triangle] / 1000 - expected[triangle]).max() <= 0.0005
 
 
 def test_failures_are_there(page, tables):
-    data = data_of(page)
-    blind = [row for row in rows_of(data) if not row["estimable"]]
+    rows = table_of(page, "setups")
+    blind = rows[rows["failed"] == "not estimable"]
     assert len(blind) == BLIND
-    reasons = {data["reasons"][row["reason"]] for row in blind}
-    assert reasons == set(tables["cells"].query("not estimable")["reason"])
-    assert all(row["roll_rms"] is None and row["converged"] == 0 for row in blind)
+    assert set(blind["reason"]) == set(tables["cells"].query("not estimable")["reason"])
+    assert blind["roll_rms"].isna().all()
+    assert (blind["converged"] == 0).all()
     assert f"{BLIND} cannot be estimated" in page
 
 
+def test_some_failed_and_an_infinite_condition(study, tables):
+    """As the page's script reads them."""
+    cells = tables["cells"].copy()
+    sound = cells.index[cells["estimable"]]
+    cells.loc[sound[0], "n_converged"] = 0
+    cells.loc[sound[1], "n_converged"] = 7
+    cells["condition"] = np.inf
+    rows = table_of(explorer_page(study, {**tables, "cells": cells}, {}), "setups")
+    assert list(rows.loc[sound[:3], "state"]) == [
+        "none converged",
+        "7 of 40 converged",
+        "all converged",
+    ]
+    assert list(rows.loc[sound[:3], "failed"]) == ["none converged", "", ""]
+    assert np.isinf(rows["condition"]).all()
+
+
 def test_the_page_is_small_and_whole_and_the_same_again(page, study, tables):
-    assert len(page.encode()) <= explorer.LIMIT
+    assert len(page.encode()) <= 1_000_000
     assert_sound(re.sub(r"<script\b.*?</script>", "", page, flags=re.DOTALL))
     assert not re.search(r'(?:src|href)="(?!figures/|#)', page)
-    assert "A page has at most" not in page
+    assert "of only the first" not in page
     assert explorer_page(study, tables, {}) == page
 
 
 def test_angles_in_degrees(study, tables):
     with angles_in("deg"):
         page = explorer_page(study, tables, {})
-    data = data_of(page)
-    assert data["angle"] == "mdeg"
-    assert "mgon" not in data["units"]
-    same([rows_of(data)[0]["roll_rms"]], tables["leveling"]["roll_rms_mgon"][:1] * 0.9)
+    heads = heads_of(page)
+    assert heads["angle"] == "mdeg"
+    assert "mgon" not in heads["units"]
+    same(table_of(page, "setups")["roll_rms"][:1], tables["leveling"]["roll_rms_mgon"][:1] * 0.9)
 
 
 def test_charts_have_the_colours_of_the_figures(page):
-    charts = json.dumps(data_of(page)["charts"])
+    charts = json.dumps(heads_of(page)["charts"])
     for colour in APPROACH_COLOURS.values():
         assert colour in charts
         assert page.count(f'fill="{colour}"') == 1
 
 
-def test_what_has_no_room_is_said(page, study, tables, monkeypatch):
-    details = len(json.dumps(data_of(page)["details"], separators=(",", ":")))
-
-    def smaller_by(size):
-        limit = len(page.encode()) - size
-        monkeypatch.setattr(explorer, "LIMIT", limit)
-        small = explorer_page(study, tables, {})
-        assert len(small.encode()) <= limit
-        data = data_of(small)
-        (said,) = re.findall(r'<p class="failed">(A page[^<]*)', small)
-        return len(data["rows"]), len(data["details"]), said
-
-    rows, few, said = smaller_by(details // 2)
-    assert 0 < few < rows == 24
-    assert f"the parameters and correlations of only the first {few} of 24 set-ups" in said
-    few, none, said = smaller_by(details + 500)
-    assert none == 0 < few < 24
-    missing = 24 - few
-    blind = (~tables["cells"]["estimable"])[few:].sum()
-    assert f"only the first {few} of 24 set-ups are here" in said
-    assert f"The other {missing} ({blind} of them not estimable) are in the tables" in said
+def test_what_is_left_out_is_said(study, tables, monkeypatch):
+    monkeypatch.setattr(explorer, "DETAILED", 10)
+    page = explorer_page(study, tables, {})
+    assert "the parameters and correlations of only the first 10 of 24 set-ups" in page.lower()
+    assert len(table_of(page, "setups")) == 24
+    simulated = tables["correlations"]["cell"].isin(tables["cells"]["cell"][:10])
+    assert len(table_of(page, "correlations")) == simulated.sum()
+    assert set(table_of(page, "parameters")["i"]) == set(range(10))
 
 
 def test_figures_that_show_a_set_up(study, tables):
     cells = tables["cells"].to_dict("records")
-    found = dict(zip(tables["cells"]["cell"], figures_of(study, cells), strict=True))
-    assert {name for names in found.values() for name in names} <= set(figure_names(study))
-    usual = found[f"{NINE}/mclaren-24/robot"]
+    shown = dict(zip(tables["cells"]["cell"], figures_of(study, cells), strict=True))
+    assert {name for names in shown.values() for name in names} <= set(figure_names(study))
+    usual = shown[f"{NINE}/mclaren-24/robot"]
     assert usual == ["sweep-sensor-noise", "sweep-robot-noise", "closed-forms"]
-    other = found[f"{NINE}/mclaren-24/robot/sensor_sigma_mps2=0.001/robot_sigma_mgon=0.32"]
+    other = shown[f"{NINE}/mclaren-24/robot/sensor_sigma_mps2=0.001/robot_sigma_mgon=0.32"]
     assert other == ["closed-forms"]
-    assert "closed-forms" not in found[f"{CROSS}/mclaren-24/gravity"]
+    assert "closed-forms" not in shown[f"{CROSS}/mclaren-24/gravity"]
 
 
 # --- in a browser --------------------------------------------------------------------------------
@@ -278,6 +281,11 @@ def points(tab, chart):
     """Number of points of a chart that one can see."""
     marks = f"#chart-{chart} [aria-roledescription=point]"
     return tab.locator(f"{marks}:not([opacity='0'])").count()
+
+
+def limits(tab):
+    """Number of lines at the tilt error that is allowed, one in each chart."""
+    return tab.locator(":is(#chart-roll, #chart-pitch) .layer_0_marks line").count()
 
 
 def test_the_first_sight(shown, tables):
@@ -366,14 +374,20 @@ def test_the_table_sorts_by_a_click_or_a_key(shown, tables):
     kept = column(shown, "roll_rms")
     load(shown, shown.url)
     assert shown.input_value("#need") == "15"
+    assert limits(shown) == 2
     assert column(shown, "roll_rms") == kept
     assert head.get_attribute("aria-sort") == "descending"
+    shown.click("button[type=reset]")
+    shown.wait_for_function("document.querySelectorAll('#setups tbody tr').length === 24")
+    assert limits(shown) == 0
 
 
 def test_filters_by_tilt_error_and_by_state(shown, tables):
     most = tables["leveling"]["both_rms_q95_mgon"]
     limit = float(f"{most.median():.3g}")
+    assert limits(shown) == 0
     shown.fill("#need", str(limit))
+    assert limits(shown) == 2
     left = (most <= limit).sum()
     assert 0 < left < len(most)
     assert len(column(shown, "model")) == left

@@ -24,6 +24,7 @@ from accelstudy.study.config import StudyConfig, parse_study
 from accelstudy.study.figures import (
     captions,
     draw,
+    draw_figures,
     figure_names,
     figure_tables,
     get_figure,
@@ -32,8 +33,7 @@ from accelstudy.study.figures import (
     total_effects,
 )
 from accelstudy.study.figures.factors import FACTORS
-from accelstudy.study.results.figure_files import draw_figures
-from accelstudy.study.results.sensitivity import analyse_sensitivity, analyse_shapley
+from accelstudy.study.sensitivity import analyse_sensitivity, analyse_shapley
 
 PROVENANCE = {"config_hash": "test", "seed": 1}
 NINE = "bias-scale-nonorthogonality"
@@ -448,7 +448,7 @@ def test_a_figure_that_cannot_be_drawn_is_named(tables, paper, tmp_path):
 
 IMPORTED = """\
 import sys
-import accelstudy.study.figures, accelstudy.study.monte_carlo.effort
+import accelstudy.study.figures, accelstudy.study.effort
 import accelstudy.jobs.earlier, accelstudy.jobs.job
 print([name for name in ("matplotlib", "pandas", "scipy.stats") if name in sys.modules])
 """

@@ -12,8 +12,8 @@ from accelstudy.approaches import approach_names
 from accelstudy.basics.units import MGON
 from accelstudy.sensors.models import MODELS, PRESETS
 from accelstudy.simulation.sessions import BLOCK, Noise
-from accelstudy.study.cells.batches import batches
-from accelstudy.study.cells.of_study import study_cells
+from accelstudy.study.batches import batches
+from accelstudy.study.cells import study_cells
 from accelstudy.study.monte_carlo.simulate import blocks
 
 GRAVITY, ROBOT = f"{NINE}/mclaren-24/gravity", f"{NINE}/mclaren-24/robot"

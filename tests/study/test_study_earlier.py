@@ -14,7 +14,7 @@ from accelstudy.files.parquet import write_parquet
 from accelstudy.files.tables import write_table
 from accelstudy.jobs import earlier
 from accelstudy.jobs.earlier import earlier_run, remove_foreign
-from accelstudy.study.results.estimates import read_estimates
+from accelstudy.study.tables import read_estimates
 
 RESULTS = "results/tiny"
 NAMES = [f"{RESULTS}/estimates/{number:04d}.parquet" for number in range(3)]

@@ -8,9 +8,9 @@ from study_helpers import content, grid, make_study
 
 from accelstudy.basics.errors import InputError
 from accelstudy.commands.main import main
-from accelstudy.study.cells.of_study import study_cells
+from accelstudy.study.cells import study_cells
 from accelstudy.study.config import read_study
-from accelstudy.study.monte_carlo.effort import study_effort
+from accelstudy.study.effort import study_effort
 
 
 def effort(**keys):

@@ -9,14 +9,14 @@ import pytest
 from scheme_helpers import KNOWN
 from study_helpers import grid, make_cells, make_study, parts_in, run_study
 
-from accelstudy.study.cells import batches as batching
-from accelstudy.study.cells import cell as cells_module
-from accelstudy.study.cells.batches import batches, job_size
-from accelstudy.study.cells.of_study import study_cells
+from accelstudy.study import batches as batching
+from accelstudy.study import cell as cells_module
+from accelstudy.study.batches import batches, job_size
+from accelstudy.study.cells import study_cells
 from accelstudy.study.claims import evidence_from
 from accelstudy.study.monte_carlo import distributions, simulate
 from accelstudy.study.monte_carlo.moments import Moments, Node, Tree, moments_of
-from accelstudy.study.results.estimates import TABLES
+from accelstudy.study.tables import TABLES
 
 RNG = np.random.default_rng(3)
 # 330 replicates are 7 chunks of 50, the last one not full.

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from accelstudy.study.claims.evidence import RatioOfSketches
+from accelstudy.study.claims.judging import RatioOfSketches
 from accelstudy.study.monte_carlo.sketch import (
     LEAST,
     RELATIVE_ERROR,

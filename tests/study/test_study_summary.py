@@ -13,9 +13,9 @@ from scipy.stats import binom
 from study_helpers import NINE, PAPER_SENSOR, grid, run_study
 
 from accelstudy.schemes import get_scheme
-from accelstudy.study.cells.compiling import calibrator
+from accelstudy.study.compiling import calibrator
 from accelstudy.study.monte_carlo import simulate as module
-from accelstudy.study.results.estimates import read_estimates
+from accelstudy.study.tables import read_estimates
 
 STANDARD_ERRORS = 4.5
 REPLICATES = 2000

@@ -23,9 +23,9 @@ from accelstudy.files import provenance
 from accelstudy.files.outputs import check_writable
 from accelstudy.files.reading import overlay, read_layer
 from accelstudy.files.tables import read_origin, read_table
-from accelstudy.study.cells import batches
+from accelstudy.study import batches
 from accelstudy.study.figures import get_figure
-from accelstudy.study.results.estimates import TABLES
+from accelstudy.study.tables import TABLES
 
 CONFIG = ROOT / "config" / "config.yaml"
 
@@ -44,7 +44,7 @@ TABLE_PATHS = [f"results/tiny/{name}.parquet" for name in TABLES]
 
 IN_BATCHES = f"""\
 from functools import partial
-from accelstudy.study.cells import batches
+from accelstudy.study import batches
 batches.batches = partial(batches.batches, size=240)
 include: "{ROOT}/workflow/Snakefile"
 rule study:

@@ -1,12 +1,12 @@
 from functools import cache
 
 from accelstudy.study.figures import captions, figure_names, figure_tables, get_figure
-from accelstudy.study.cells.batches import batches
-from accelstudy.study.cells.of_study import study_cells
+from accelstudy.study.batches import batches
+from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study
-from accelstudy.study.monte_carlo.effort import study_effort
+from accelstudy.study.effort import study_effort
 from accelstudy.jobs.job import setup_digest
-from accelstudy.study.results.estimates import TABLES
+from accelstudy.study.tables import TABLES
 
 STUDY, RESULTS = configured(parse_study, "study")
 STUDY = STUDY.model_copy(update={"angle_unit": STUDY.angle_unit or angle_unit()})

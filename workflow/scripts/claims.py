@@ -1,6 +1,6 @@
 from accelstudy.jobs.job import job, lists
+from accelstudy.study.claims.judging import judge_claims
 from accelstudy.study.config import StudyConfig
-from accelstudy.study.results.judging import judge_claims
 
 with job(snakemake) as provenance:
     study = StudyConfig.model_validate(snakemake.config)

@@ -2,7 +2,7 @@ from pathlib import Path
 
 from accelstudy.jobs.job import job
 from accelstudy.study.config import StudyConfig
-from accelstudy.study.results.figure_files import draw_figures
+from accelstudy.study.figures import draw_figures
 
 with job(snakemake):
     draw_figures(

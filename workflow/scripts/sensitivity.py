@@ -1,6 +1,6 @@
 from accelstudy.jobs.job import job
 from accelstudy.study.config import StudyConfig
-from accelstudy.study.results.sensitivity import analyse_sensitivity, analyse_shapley
+from accelstudy.study.sensitivity import analyse_sensitivity, analyse_shapley
 
 with job(snakemake) as provenance:
     study = StudyConfig.model_validate(snakemake.config)

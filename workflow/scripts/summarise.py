@@ -1,5 +1,5 @@
 from accelstudy.jobs.job import job, lists
-from accelstudy.study.results.summary import summarise_batch
+from accelstudy.study.summary import summarise_batch
 
 with job(snakemake) as provenance:
     summarise_batch(

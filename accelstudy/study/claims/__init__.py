@@ -21,7 +21,7 @@ from accelstudy.study.claims.base import (
     judge,
     register,
 )
-from accelstudy.study.claims.evidence import evidence_from
+from accelstudy.study.claims.judging import evidence_from
 
 __all__ = [
     "NOT_REPRODUCED",

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from accelstudy.study.cells.cell import Cell
+from accelstudy.study.cell import Cell
 from accelstudy.study.monte_carlo.distributions import Distribution
 from accelstudy.study.monte_carlo.statistics import Statistics
 
@@ -70,7 +70,7 @@ class Evidence:
         of the effect's parameters, robot-aided over gravity-based; where both have redundancy
     cells : (scheme, approach) -> Cell
     scheme : str, the default scheme
-    correlations : DataFrame, see `accelstudy.study.results.summary`
+    correlations : DataFrame, see `accelstudy.study.summary`
     sensitivity : DataFrame, see `accelstudy.leveling.sensitivity`, with a column `analysis`
     shapley : DataFrame, see `accelstudy.leveling.shares`, with a column `analysis`
     base_samples, resamples, seed : of the sensitivity analysis
@@ -116,17 +116,17 @@ def judge(evidence: Evidence) -> tuple[pd.DataFrame, pd.DataFrame]:
     claims : DataFrame, one row per `Claim`, by section, slips last
     by_scheme : DataFrame, one row per `SchemeClaim`
     """
-    found = [row for its in _JUDGES for row in its(evidence)]
-    claims = [row for row in found if isinstance(row, Claim)]
+    rows = [row for judge_family in _JUDGES for row in judge_family(evidence)]
+    claims = [row for row in rows if isinstance(row, Claim)]
     claims.sort(key=lambda claim: (claim.verdict == SLIP, claim.section))
-    by_scheme = [row for row in found if isinstance(row, SchemeClaim)]
+    by_scheme = [row for row in rows if isinstance(row, SchemeClaim)]
     return pd.DataFrame(claims), pd.DataFrame(by_scheme)
 
 
-def schemes_with_both(known: Iterable[tuple[str, str]]) -> list[str]:
+def schemes_with_both(pairs: Iterable[tuple[str, str]]) -> list[str]:
     """Schemes that occur with both approaches, in order."""
-    known = list(known)
-    return [s for s, approach in known if approach == "gravity" and (s, "robot") in known]
+    pairs = list(pairs)
+    return [s for s, approach in pairs if approach == "gravity" and (s, "robot") in pairs]
 
 
 def verdict(holds: bool) -> str:

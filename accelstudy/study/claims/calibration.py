@@ -208,10 +208,10 @@ def _correlations_by_scheme(evidence: Evidence) -> Iterable[SchemeClaim]:
 
 def _mean_sigmas(evidence: Evidence, scheme: str, effect: str) -> list[tuple[float, float]]:
     """Mean sigma a posteriori of an effect with its standard error (SI): gravity, robot."""
-    found = []
+    sigmas = []
     for approach in ("gravity", "robot"):
         statistics = evidence.statistics[scheme, approach]
         at = list(statistics.followed.effects).index(effect)
         error = statistics.error_of_mean(EFFECT)[at]
-        found.append((float(statistics.mean(EFFECT)[at]), float(error)))
-    return found
+        sigmas.append((float(statistics.mean(EFFECT)[at]), float(error)))
+    return sigmas

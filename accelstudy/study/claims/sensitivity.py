@@ -133,7 +133,7 @@ def _order_of_inputs(table: pd.DataFrame) -> Claim:
         rank = rows.groupby(output)["total_effect"].rank(ascending=False, method="first")
         ranked = rows.assign(over=rows["input"], rank=rank)[[*output, "over", "rank"]]
         first = pairs.merge(ranked, on=[*output, "over"])["rank"].min()
-        winners, losers = (", ".join(sorted(set(pairs[its]))) for its in ("input", "over"))
+        winners, losers = (", ".join(sorted(set(pairs[column]))) for column in ("input", "over"))
         share = len(pairs[output].drop_duplicates()) / len(rows[output].drop_duplicates())
         return 100 * share, f"{winners} overtake {losers}, from rank {first:.0f} down; {text}"
 

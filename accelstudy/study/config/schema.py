@@ -102,9 +102,9 @@ class StudyConfig(Block):
     def _schemes_of_files(cls, given: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
         """Remember these schemes before the grids name them."""
         for name, content in given.items():
-            if (found := remember(content, name).name) != name:
+            if (proper := remember(content, name).name) != name:
                 raise InputError(
-                    f"{name}: is the name of other positions; the name of these is {found}"
+                    f"{name}: is the name of other positions; the name of these is {proper}"
                 )
         return dict(given)
 
@@ -286,10 +286,10 @@ class StudyConfig(Block):
             key = effect.spec if effect.spec in given else effect.name
             quantity = given.get(key)
             # The value may be that of the whole effect although the model has a part of it.
-            known = [parameter.name for parameter in get_effect(key).parameters]
+            names = [parameter.name for parameter in get_effect(key).parameters]
             for name, unit in ((p.name, p.unit) for p in effect.parameters):
                 values[name] = (
-                    float(to_si(quantity.value[known.index(name)], quantity.unit, unit))
+                    float(to_si(quantity.value[names.index(name)], quantity.unit, unit))
                     if quantity
                     else 0.0
                 )

@@ -24,6 +24,10 @@ BAR = 0.4
 """Opacity of a bar, as in the figures."""
 STEPS = {"step": 30, "for": "position"}
 """Height of the rows, pixels."""
+SHOWN = {"rms": "rms", "low": "2.5 %", "q95": "95 %", "high": "97.5 %"}
+"""What is shown of the tilt error in an angle, and its title."""
+PALE = 0.2
+"""Opacity of set-ups that are not compared with the chosen one."""
 BLUES = ("#F7FBFF", "#6BAED6", "#08306B")
 """Of correlations from none to 1, as in the figures."""
 
@@ -47,7 +51,8 @@ def look() -> dict[str, Any]:
 def all_charts(approaches: Sequence[str]) -> dict[str, Any]:
     """All charts by their kinds; the page has several of a kind, and their titles."""
     return {
-        "tilt": tilt_chart(approaches),
+        "roll": tilt_chart("roll", approaches),
+        "pitch": tilt_chart("pitch", approaches),
         "sds": sds_chart(approaches),
         "ratio": interval_chart("ratio", 1, approaches),
         "coverage": interval_chart("coverage", 95, approaches),
@@ -55,43 +60,44 @@ def all_charts(approaches: Sequence[str]) -> dict[str, Any]:
     }
 
 
-def tilt_chart(approaches: Sequence[str]) -> dict[str, Any]:
+def tilt_chart(angle: str, approaches: Sequence[str]) -> dict[str, Any]:
     """Tilt error in one angle, a point and a range for each set-up.
 
-    Its data: `row`, `model`, `scheme`, `approach`, `value`, `low`, `high`, `q95`, `state`,
-    `failed`, `cross`, `chosen`, `strength` and `i`; and `wanted`, the error that is allowed. The
-    page sets the ends of its axis, `least` and `most`, so that those of both angles are alike.
+    Its data are set-ups, each with `row`, the row that it stands in, `alike`, whether it differs
+    from the chosen one only in what the rows show, and `chosen`. The error that is allowed comes
+    from the input `need` of the page.
     """
     rows = alt.Chart(alt.NamedData(DATA)).encode(
         y=_rows("row"),
         yOffset=_offset(approaches),
         color=_colour(approaches),
-        opacity=_plain("strength"),
+        opacity=_given("datum.alike", 1, PALE),
         tooltip=[
             *_words("model", "scheme", "approach", "state"),
-            *_numbers({"value": "rms", "low": "2.5 %", "q95": "95 %", "high": "97.5 %"}),
+            *_numbers({f"{angle}_{name}": title for name, title in SHOWN.items()}),
         ],
     )
-    ends = {"domainMin": alt.ExprRef("least"), "domainMax": alt.ExprRef("most")}
-    x = alt.X("value:Q", title=None, axis=alt.Axis(format="~r", tickCount=6))
-    x = x.scale(type="log", nice=False, **ends)
-    ranges = rows.mark_rule(size=2).encode(x=alt.X("low:Q"), x2="high:Q")
-    ticks = rows.mark_tick(thickness=2, size=10).encode(x="q95:Q")
+    # Both angles have the same axis; beyond its ends there is room for the crosses.
+    x = alt.X(f"{angle}_rms:Q", title=None, axis=alt.Axis(format="~r", tickCount=6))
+    x = x.scale(type="log", nice=False, padding=16)
+    ends = rows.mark_rule().encode(x="least:Q", x2="most:Q", opacity=alt.value(0))
+    ranges = rows.mark_rule(size=2).encode(x=f"{angle}_low:Q", x2=f"{angle}_high:Q")
+    ticks = rows.mark_tick(thickness=2, size=10).encode(x=f"{angle}_q95:Q")
     points = rows.mark_point(filled=True, size=55).encode(x=x, shape=_shape(approaches))
     chosen = rows.mark_point(size=230, strokeWidth=2).encode(
-        x="value:Q", color=alt.value(INK), opacity=_plain("chosen")
+        x=x, color=alt.value(INK), opacity=_given("datum.chosen", 1, 0)
     )
     marks = alt.Scale(domain=list(FAILED), range=list(FAILED.values()))
     failed = rows.mark_point(size=45, strokeWidth=2).encode(
         x=alt.value(alt.ExprRef("width - 8")),
         shape=alt.Shape("failed:N", scale=marks, legend=None),
-        opacity=_plain("cross"),
+        opacity=_given("!datum.failed", 0, alt.ExprRef(f"datum.alike ? 1 : {PALE}")),
     )
-    wanted = alt.Chart(alt.NamedData("wanted")).encode(x="value:Q")
-    wanted = wanted.mark_rule(color=INK, strokeDash=DASHES)
-    layers = alt.layer(wanted, ranges, ticks, chosen, points, failed)
-    layers = layers.resolve_scale(shape="independent")
-    layers = layers.add_params(alt.param(name="least", value=1), alt.param(name="most", value=10))
+    need = alt.param(name="need", bind=alt.BindDirect(element="#need"))
+    wanted = alt.Chart(alt.InlineData([{}])).transform_calculate(wanted="+need")
+    wanted = wanted.transform_filter("datum.wanted > 0").mark_rule(color=INK, strokeDash=DASHES)
+    layers = alt.layer(wanted.encode(x="wanted:Q"), ends, ranges, ticks, chosen, points, failed)
+    layers = layers.resolve_scale(shape="independent").add_params(need)
     return _finished(layers, "Tilt error of the set-ups that are shown")
 
 
@@ -123,7 +129,7 @@ def interval_chart(quantity: str, right: float, approaches: Sequence[str]) -> di
 
 
 def correlation_chart() -> dict[str, Any]:
-    """Matrix of correlations; its data: `first`, `second`, `value`, `size` and `label`."""
+    """Matrix of correlations; its data: `first`, `second` and `value`, in thousandths."""
     size = alt.ExprRef("min(12, width / 2.7 / domain('x').length)")
     axis = alt.Axis(
         title=None,
@@ -134,10 +140,15 @@ def correlation_chart() -> dict[str, Any]:
         domain=False,
         grid=False,
     )
-    fields = alt.Chart(alt.NamedData(DATA)).encode(
+    fields = alt.Chart(alt.NamedData(DATA)).transform_calculate(
+        correlation="datum.value === null ? null : datum.value / 1000",
+        size="abs(datum.value) / 1000",
+        label="datum.size < 0.005 ? '' : replace(format(datum.correlation, '.2f'), '0.', '.')",
+    )
+    fields = fields.encode(
         x=alt.X("second:N", sort=None, axis=axis, scale=alt.Scale(paddingInner=0.04)),
         y=alt.Y("first:N", sort=None, axis=axis, scale=alt.Scale(paddingInner=0.04)),
-        tooltip=[*_words("first", "second"), *_numbers({"value": "correlation"})],
+        tooltip=[*_words("first", "second"), *_numbers({"correlation": "correlation"})],
     )
     scale = alt.Scale(domain=[0, 1], range=list(BLUES), type="pow", exponent=0.6)
     colour = alt.Color("size:Q", scale=scale, legend=None)
@@ -174,12 +185,14 @@ def _words(*fields: str) -> list[alt.Tooltip]:
 
 def _numbers(titles: Mapping[str, str]) -> list[alt.Tooltip]:
     """Numbers of a tooltip, with three digits, by their fields."""
-    return [alt.Tooltip(f"{field}:Q", title=its, format=".3~r") for field, its in titles.items()]
+    return [
+        alt.Tooltip(f"{field}:Q", title=title, format=".3~r") for field, title in titles.items()
+    ]
 
 
-def _plain(field: str) -> alt.Opacity:
-    """Opacity that the data say."""
-    return alt.Opacity(f"{field}:Q", scale=None)
+def _given(test: str, opacity: float, otherwise: Any) -> Any:
+    """Opacity that depends on the data."""
+    return alt.condition(test, alt.value(opacity), alt.value(otherwise))
 
 
 def _offset(approaches: Sequence[str]) -> alt.YOffset:

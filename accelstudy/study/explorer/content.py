@@ -1,24 +1,25 @@
 """What an explorer shows of a study, from its tables: set-ups, their parameters, correlations.
 
-A set-up is a cell of the study. Numbers are in the units that people see, with four digits, as text
-that JSON takes: so they are counted before the page is made.
+A set-up is a cell of the study. Each is a table with numbers in the units that people see; `packed`
+makes it a text that the page's script reads again.
 """
 
 from __future__ import annotations
 
+import base64
+import gzip
+import json
 import re
-from collections.abc import Iterable, Iterator, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from accelstudy.approaches import get_approach
-from accelstudy.drawing.style import group_label, group_of, in_order, model_title, shown, symbol
-from accelstudy.schemes import get_scheme
+from accelstudy.drawing.style import group_label, group_of, in_order, shown, symbol
 from accelstudy.study.figures.base import Tables
-from accelstudy.study.figures.factors import NOISES, Factor, family
+from accelstudy.study.figures.factors import NOISES, Factor
 
 ANGLES = ("roll", "pitch")
 QUANTITIES = {
@@ -28,8 +29,8 @@ QUANTITIES = {
     "bias_high": "bias_ci95_high",
     "empirical": "sd_empirical",
     "posteriori": "sd_posteriori_mean",
-    "posteriori_low": "",
-    "posteriori_high": "",
+    "posteriori_low": "posteriori_low",
+    "posteriori_high": "posteriori_high",
     "linear": "sd_linear",
     "closed": "sd_closed_form",
     "ratio": "sd_ratio",
@@ -58,19 +59,14 @@ def plain(parameter: str) -> str:
     return re.sub(r"[${}]", "", text)
 
 
-def number(value: float) -> str:
-    """Write a number as JSON takes it, with four digits; what is too large for it is infinite."""
-    if np.isnan(value):
-        return "null"
-    return f"{value:.4g}".replace("inf", "1e999")
-
-
-class Codes(dict[Any, int]):
-    """Numbers of different things, in the order in which they came."""
-
-    def __missing__(self, thing: Any) -> int:
-        self[thing] = len(self)
-        return self[thing]
+def packed(table: pd.DataFrame) -> str:
+    """Write the columns of a table as JSON, gzipped, in base 64; numbers with four digits."""
+    columns = {name: column.tolist() for name, column in table.items()}
+    for name in table.select_dtypes("float"):
+        columns[name] = [None if v != v else float(f"{v:.4g}") for v in columns[name]]
+    # Infinite is what is too large for a number of JSON.
+    text = json.dumps(columns, ensure_ascii=False).replace("Infinity", "1e999")
+    return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode()
 
 
 def varied(cells: pd.DataFrame) -> list[Factor]:
@@ -92,7 +88,7 @@ def without_robot(cells: pd.DataFrame) -> pd.DataFrame:
 
 def setups(
     cells: pd.DataFrame, tables: Tables, figures: Sequence[Sequence[str]]
-) -> tuple[dict[str, Any], Iterator[str]]:
+) -> tuple[pd.DataFrame, list[dict[str, str]]]:
     """Set-ups, a row each.
 
     Parameters
@@ -103,60 +99,48 @@ def setups(
 
     Returns
     -------
-    heads : what the rows refer to: fields, models, schemes, approaches, reasons, figures, groups
-    rows : JSON, one text each
+    DataFrame : model, scheme and approach by their number, in the order in which they come
+    list of dict : label and unit of each group of parameters, whose sds are in `sd-0`, `sd-1`, ...
     """
-    factors = varied(cells)
-    codes = {name: Codes() for name in ("model", "scheme", "approach", "reason", "figures")}
-    columns: dict[str, list[str]] = {}
-    for name in ("model", "scheme", "approach", "reason"):
-        columns[name] = [str(codes[name][value]) for value in cells[name]]
-    columns["figures"] = [str(codes["figures"][tuple(names)]) for names in figures]
-    for name, column in {
-        "n": "n_positions",
-        "estimable": "estimable",
-        "redundancy": "redundancy",
-        "replicates": "n_replicates",
-        "converged": "n_converged",
-    }.items():
-        columns[name] = [str(int(value)) for value in cells[column]]
-    measured = {factor.name: levels(cells, factor) for factor in factors}
-    measured["condition"] = cells["condition"].to_numpy(float)
-    measured |= _tilt(cells, tables)
-    sds = _sds_of_groups(cells, tables["summary"])
-    measured |= {f"sd-{i}": values for i, (_, _, values) in enumerate(sds)}
-    for name, values in measured.items():
-        columns[name] = [number(value) for value in values]
-    heads = {
-        "fields": list(columns),
-        "models": [{"name": name, "title": model_title(name)} for name in codes["model"]],
-        "schemes": [
-            {"name": name, "title": get_scheme(name).title, "family": family(name)}
-            for name in codes["scheme"]
-        ],
-        "approaches": list(codes["approach"]),
-        "reasons": list(codes["reason"]),
-        "figures": [list(names) for names in codes["figures"]],
-        "groups": [{"label": label, "unit": unit} for label, unit, _ in sds],
+    some, all_of = cells["n_converged"], cells["n_replicates"]
+    failed = np.select([~cells["estimable"], some == 0], ["not estimable", "none converged"], "")
+    share = some.astype(str) + " of " + all_of.astype(str) + " converged"
+    table = {
+        **{key: pd.factorize(cells[key])[0] for key in ("model", "scheme", "approach")},
+        "n": cells["n_positions"],
+        "failed": failed,
+        "state": np.select(
+            [failed != "", some == all_of], [failed, "all converged"], share.astype(object)
+        ),
+        "reason": cells["reason"],
+        "figures": [" ".join(names) for names in figures],
+        "redundancy": cells["redundancy"],
+        "condition": cells["condition"].astype(float),
+        "replicates": all_of,
+        "converged": some,
+        **{factor.name: levels(cells, factor) for factor in varied(cells)},
     }
-    return heads, (f"[{','.join(row)}]" for row in zip(*columns.values(), strict=True))
+    tilt = pd.DataFrame(_tilt(cells, tables))
+    ends = tilt[[f"{angle}_{name}" for angle in ANGLES for name in ("low", "rms", "high")]]
+    sds = _sds_of_groups(cells, tables["summary"])
+    table |= {**tilt, "least": ends.min(axis=1), "most": ends.max(axis=1)}
+    table |= {f"sd-{i}": values for i, (_, _, values) in enumerate(sds)}
+    return pd.DataFrame(table), [{"label": label, "unit": unit} for label, unit, _ in sds]
 
 
 def _tilt(cells: pd.DataFrame, tables: Tables) -> dict[str, NDArray[np.float64]]:
     """Tilt error of each cell: rms, central 95 %, and what 95 % stay below, singly and in both."""
     leveling, quantiles = tables["leveling"].set_index("cell"), tables["quantiles"]
     quantiles = quantiles[quantiles["quantity"] == "tilt"]
-    found = {}
+    errors = {}
     for angle in ANGLES:
         for name, column in (("rms", "rms"), ("q95", "rms_q95")):
-            found[f"{angle}_{name}"] = cells["cell"].map(leveling[f"{angle}_{column}_mgon"])
+            errors[f"{angle}_{name}"] = cells["cell"].map(leveling[f"{angle}_{column}_mgon"])
         for name, probability in (("low", 0.025), ("high", 0.975)):
-            its = quantiles[quantiles["name"] == angle]
-            found[f"{angle}_{name}"] = cells["cell"].map(
-                _at(its, probability).set_index("cell")["value"]
-            )
-    found["both_q95"] = cells["cell"].map(leveling["both_rms_q95_mgon"])
-    return {name: shown(values.to_numpy(float), "mgon")[0] for name, values in found.items()}
+            rows = _at(quantiles[quantiles["name"] == angle], probability)
+            errors[f"{angle}_{name}"] = cells["cell"].map(rows.set_index("cell")["value"])
+    errors["both_q95"] = cells["cell"].map(leveling["both_rms_q95_mgon"])
+    return {name: shown(values.to_numpy(float), "mgon")[0] for name, values in errors.items()}
 
 
 def _at(quantiles: pd.DataFrame, probability: float) -> pd.DataFrame:
@@ -169,106 +153,65 @@ def _sds_of_groups(
 ) -> list[tuple[str, str, NDArray[np.float64]]]:
     """Label, unit and mean empirical sd of each group of parameters, in each cell."""
     table = summary.assign(group=summary["parameter"].map(group_of))
-    found = []
+    sds = []
     for group in in_order(table["group"]):
-        its = table[table["group"] == group]
-        for unit, rows in its.groupby("unit", sort=False):
+        members = table[table["group"] == group]
+        for unit, rows in members.groupby("unit", sort=False):
             mean = rows.groupby("cell")["sd_empirical"].mean()
             values, shown_unit = shown(cells["cell"].map(mean).to_numpy(float), str(unit))
-            found.append((group_label(group), shown_unit, values))
-    return found
+            sds.append((group_label(group), shown_unit, values))
+    return sds
 
 
-def parameters(cells: pd.DataFrame, tables: Tables) -> tuple[dict[str, Any], Iterator[str]]:
-    """Parameters of each cell.
-
-    Returns
-    -------
-    heads : what the texts refer to: units; lists of parameters, each with its symbol and the number
-        of its unit; and quantities
-    texts : JSON, a list for each cell: the number of its list of parameters, 1 or 0 for each that
-        can be estimated or not, and a list for each of `QUANTITIES`
-    """
-    summary = _with_quantiles(tables)
-    values = _as_shown(summary)
-    lists, units = Codes(), Codes()
-    of_rows = [
-        (plain(name), units[shown([], unit)[1]])
-        for name, unit in zip(summary["parameter"], summary["unit"], strict=True)
-    ]
-    places = summary.groupby("cell", sort=False).indices
-    at = [places.get(cell, ()) for cell in cells["cell"]]
-    list_of = [lists[tuple(of_rows[i] for i in its)] for its in at]
-    estimable = summary["estimable"].to_numpy(bool)
-
-    def texts() -> Iterator[str]:
-        for number_of_list, its in zip(list_of, at, strict=True):
-            parts = [",".join(str(int(estimable[i])) for i in its)]
-            parts += [",".join(number(column[i]) for i in its) for column in values.values()]
-            yield f"[{number_of_list},{','.join(f'[{part}]' for part in parts)}]"
-
-    heads = {"units": list(units), "parameters": list(lists), "quantities": list(QUANTITIES)}
-    return heads, texts()
-
-
-def _with_quantiles(tables: Tables) -> pd.DataFrame:
-    """The summary, with the central 95 % of the sds a posteriori."""
+def parameters(cells: pd.DataFrame, tables: Tables) -> pd.DataFrame:
+    """Parameters of cells, a row each: `i`, the number of its cell, and all of `QUANTITIES`."""
     quantiles = tables["quantiles"]
     quantiles = quantiles[quantiles["quantity"] == "sd_posteriori"]
-    ends = pd.DataFrame(
+    keys = ["cell", "parameter"]
+    summary = _of(cells, tables["summary"])
+    for name, probability in (("posteriori_low", 0.025), ("posteriori_high", 0.975)):
+        ends = _at(quantiles, probability).set_index(["cell", "name"])["value"].astype(float)
+        summary = summary.join(ends.rename_axis(keys).rename(name), on=keys)
+    values = summary[list(QUANTITIES.values())].astype(float)
+    values.columns = pd.Index(QUANTITIES)
+    values.loc[:, [name for name in QUANTITIES if name.startswith("coverage")]] *= 100
+    in_units = [name for name in QUANTITIES if not name.startswith(("ratio", "coverage"))]
+    shown_unit = {}
+    for unit in summary["unit"].unique():
+        rows = summary["unit"] == unit
+        values.loc[rows, in_units], shown_unit[unit] = shown(values.loc[rows, in_units], unit)
+    return pd.DataFrame(
         {
-            name: _at(quantiles, probability).set_index(["cell", "name"])["value"].astype(float)
-            for name, probability in (("posteriori_low", 0.025), ("posteriori_high", 0.975))
+            "i": summary["i"],
+            "parameter": [plain(name) for name in summary["parameter"]],
+            "unit": [shown_unit[unit] for unit in summary["unit"]],
+            "failed": np.where(summary["estimable"], "", "not estimable"),
+            **values,
         }
     )
-    keys = ["cell", "parameter"]
-    return tables["summary"].merge(ends.rename_axis(keys), "left", left_on=keys, right_index=True)
 
 
-def _as_shown(summary: pd.DataFrame) -> dict[str, NDArray[np.float64]]:
-    """Values of `QUANTITIES` in the units that people see, shares in %."""
-    found = {}
-    for key, column in QUANTITIES.items():
-        values = summary[column or key].to_numpy(float, copy=True)
-        if key.startswith("coverage"):
-            values *= 100
-        elif not key.startswith("ratio"):
-            for unit in summary["unit"].unique():
-                its = (summary["unit"] == unit).to_numpy()
-                values[its] = shown(values[its], unit)[0]
-        found[key] = values
-    return found
+def correlations(cells: pd.DataFrame, tables: Tables) -> pd.DataFrame:
+    """Correlations of the parameters of cells, in thousandths, a row each, row by row of a matrix.
 
-
-def correlations(cells: pd.DataFrame, table: pd.DataFrame) -> Iterator[str]:
-    """Correlations of each cell in thousandths, JSON, one text each.
-
-    A text is a list, row by row: below the diagonal the mean of those of the adjustment, above it
-    the empirical ones. It is empty where there are none.
+    Below the diagonal are the means of those of the adjustment, above it the empirical ones.
     """
-    places = table.groupby("cell", sort=False).indices
-    adjustment, empirical = (table[name].to_numpy() for name in ("adjustment", "empirical"))
-    for cell in cells["cell"]:
-        at = places.get(cell, np.array([], int))
-        u = int(np.sqrt(len(at)))
-        lower = np.tril(np.ones((u, u), bool)).ravel()
-        both = np.where(lower, adjustment[at], empirical[at]) * 1000
-        yield f"[{','.join('null' if np.isnan(v) else str(round(v)) for v in both)}]"
+    table = _of(cells, tables["correlations"])
+    place = table.groupby("i").cumcount()
+    u = np.sqrt(table.groupby("i")["i"].transform("size")).round()
+    value = table["adjustment"].where(place // u > place % u, table["empirical"])
+    return pd.DataFrame(
+        {
+            "i": table["i"],
+            "first": [plain(name) for name in table["parameter_1"]],
+            "second": [plain(name) for name in table["parameter_2"]],
+            "value": value.where(place // u != place % u).mul(1000).round(),
+        }
+    )
 
 
-def fitting(texts: Iterable[str], room: int) -> tuple[list[str], int]:
-    """Take texts, from the first on, as long as they fit into some room (bytes).
-
-    Returns
-    -------
-    list of str
-    int, the room that is left
-    """
-    found = []
-    for text in texts:
-        size = len(text.encode()) + 1
-        if size > room:
-            break
-        found.append(text)
-        room -= size
-    return found, room
+def _of(cells: pd.DataFrame, table: pd.DataFrame) -> pd.DataFrame:
+    """Rows of a table that belong to these cells, with `i`, the number of the cell."""
+    number = pd.Series(range(len(cells)), index=cells["cell"])
+    table = table.assign(i=table["cell"].astype(str).map(number))
+    return table[table["i"].notna()].astype({"i": int}).reset_index(drop=True)

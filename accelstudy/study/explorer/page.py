@@ -1,9 +1,12 @@
-"""The page of an explorer: everything in one file, at most `LIMIT` bytes of it."""
+"""The page of an explorer: everything in one file, its tables and its library packed."""
 
 from __future__ import annotations
 
+import base64
+import gzip
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,31 +15,39 @@ import pandas as pd
 
 from accelstudy.basics.units import angles_in, display_unit, unit_label
 from accelstudy.basics.wording import comma_list, counted
-from accelstudy.drawing.style import approach_colour, approach_marker
+from accelstudy.drawing.style import approach_colour, approach_marker, model_title
+from accelstudy.files.kept import keep, kept
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.tables import read_table
 from accelstudy.pages import render
+from accelstudy.schemes import get_scheme
+from accelstudy.sensors.models import PRESETS
 from accelstudy.study.config import StudyConfig
 from accelstudy.study.explorer import charts
 from accelstudy.study.explorer.content import (
     ANGLES,
     correlations,
-    fitting,
     levels,
-    number,
+    packed,
     parameters,
     setups,
     varied,
     without_robot,
 )
-from accelstudy.study.explorer.library import library
-from accelstudy.study.explorer.links import figures_of
 from accelstudy.study.figures import angle_unit, figure_names, get_figure
-from accelstudy.study.figures.factors import FACTORS, NOISES, POSITIONS, Factor, varies
-from accelstudy.study.results.estimates import TABLES
+from accelstudy.study.figures.factors import (
+    FACTORS,
+    NOISES,
+    POSITIONS,
+    Factor,
+    blocks,
+    family,
+    varies,
+)
+from accelstudy.study.tables import TABLES
 
-LIMIT = 1_500_000
-"""Bytes of the page."""
+DETAILED = 2000
+"""Set-ups that are on the page with their parameters and correlations."""
 TEMPLATE = "study/explorer/explorer.html.j2"
 PATHS = {
     "o": "M-4,0a4,4 0 1,0 8,0a4,4 0 1,0 -8,0",
@@ -98,75 +109,66 @@ def explorer_page(
     """Return the page; parameters as in `write_explorer`, but the tables themselves."""
     cells = without_robot(tables["cells"])
     factors = varied(cells)
-    heads, rows = setups(cells, tables, figures_of(study, cells.to_dict("records")))
-    more, details = parameters(cells, tables)
+    titles = {
+        "model": [model_title(name) for name in cells["model"].unique()],
+        "scheme": [get_scheme(name).title for name in cells["scheme"].unique()],
+        "approach": list(cells["approach"].unique()),
+    }
+    rows, groups = setups(cells, tables, figures_of(study, cells.to_dict("records")))
+    parts = {
+        "setups": rows,
+        "parameters": parameters(cells.head(DETAILED), tables),
+        "correlations": correlations(cells.head(DETAILED), tables),
+    }
+    units = list(parts["parameters"]["unit"].unique())
     content = {
-        **heads,
-        **more,
+        "titles": titles,
+        "names": {key: list(cells[key].unique()) for key in ("model", "scheme")},
+        "families": [family(name) for name in cells["scheme"].unique()],
+        "units": units,
         "angle": display_unit("rad"),
-        "factors": [factor.name for factor in factors],
-        "titles": {factor.name: factor.title for factor in factors},
-        "noises": {factor.name: _unit(factor) for factor in factors},
+        "noises": {factor.name: [factor.title, _unit(factor)] for factor in factors},
+        "detailed": DETAILED,
         "start": _start(study, cells),
         "report": dict(in_report),
         "look": charts.look(),
-        "charts": charts.all_charts(heads["approaches"]),
+        "charts": charts.all_charts(titles["approach"]),
     }
-    shown = {
-        "study": study.study,
-        "counts": _counts(cells),
-        "fixed": _fixed(cells),
-        "controls": _controls(cells, heads),
-        "by": _first_rows(study, heads),
-        "columns": _columns(factors, heads["groups"]),
-        "quantities": PARAMETER_COLUMNS,
-        "texts": ("model", "scheme", "approach", "state", "parameter", "unit"),
-        "unit": display_unit("rad"),
-        "units": more["units"],
-        "approaches": [
+    return render(
+        TEMPLATE,
+        study=study.study,
+        counts=_counts(cells),
+        left_out=_left_out(cells),
+        fixed=_fixed(cells),
+        controls=_controls(cells, titles),
+        by=_first_rows(study, titles),
+        columns=_columns(factors, groups),
+        quantities=PARAMETER_COLUMNS,
+        texts=("model", "scheme", "approach", "state", "parameter", "unit"),
+        unit=display_unit("rad"),
+        units=units,
+        approaches=[
             {"name": name, "colour": approach_colour(name), "path": PATHS[approach_marker(name)]}
-            for name in heads["approaches"]
+            for name in titles["approach"]
         ],
-        "figures": [
-            {"name": name, "title": get_figure(name).title} for name in figure_names(study)
-        ],
-        "tables": comma_list([f"{name}.parquet" for name in TABLES]),
-        "library": library(),
-    }
-
-    def page(left_out: Sequence[str], **lists: Sequence[str]) -> str:
-        text = json.dumps(content, ensure_ascii=False, separators=(",", ":"))
-        text = text[:-1] + "".join(f',"{name}":[{",".join(its)}]' for name, its in lists.items())
+        figures=[{"name": name, "title": get_figure(name).title} for name in figure_names(study)],
+        tables=comma_list([f"{name}.parquet" for name in TABLES]),
         # No text of the data can end the element that it stands in.
-        data = f"{text}}}".replace("<", "\\u003c")
-        return render(TEMPLATE, **shown, left_out=left_out, content=data)
-
-    room = LIMIT - len(page([500 * "x"], rows=[], details=[]).encode())
-    matrices = correlations(cells, tables["correlations"])
-    both = (f"[{its},{matrix}]" for its, matrix in zip(details, matrices, strict=True))
-    kept_rows, room = fitting(rows, room)
-    kept_details, _ = fitting(both if len(kept_rows) == len(cells) else (), room)
-    left_out = _left_out(cells, len(kept_rows), len(kept_details))
-    return page(left_out, rows=kept_rows, details=kept_details)
+        content=json.dumps(content, ensure_ascii=False, separators=(",", ":")).replace(
+            "<", "\\u003c"
+        ),
+        packed={"library": library(), **{name: packed(table) for name, table in parts.items()}},
+    )
 
 
-def _left_out(cells: pd.DataFrame, rows: int, details: int) -> list[str]:
-    """Say what has no room on the page."""
-    end = f"A page has at most {LIMIT / 1e6:g} MB"
-    if rows < len(cells):
-        missing = cells[rows:]
-        blind = int((~missing["estimable"]).sum())
-        return [
-            f"{end}, so only the first {rows} of {len(cells)} set-ups are here, without their "
-            f"parameters and correlations. The other {len(missing)} ({blind} of them not "
-            "estimable) are in the tables."
-        ]
-    if details < len(cells):
-        return [
-            f"{end}, so the parameters and correlations of only the first {details} of "
-            f"{len(cells)} set-ups are here. Those of the others are in the tables."
-        ]
-    return []
+def _left_out(cells: pd.DataFrame) -> str:
+    """Say what is not on the page."""
+    if len(cells) <= DETAILED:
+        return ""
+    return (
+        f"The parameters and correlations of only the first {DETAILED} of {len(cells)} set-ups "
+        "are here. Those of the others are in the tables."
+    )
 
 
 def _counts(cells: pd.DataFrame) -> str:
@@ -184,8 +186,8 @@ def _counts(cells: pd.DataFrame) -> str:
         if count
     ]
     calibrations = f"{int(cells['n_replicates'].sum()):,}".replace(",", "\u202f")
-    said = f"{counted(len(cells), 'set-up')} with {calibrations} simulated calibrations"
-    return f"{said}; of the set-ups, {comma_list(failed)}." if failed else f"{said}."
+    total = f"{counted(len(cells), 'set-up')} with {calibrations} simulated calibrations"
+    return f"{total}; of the set-ups, {comma_list(failed)}." if failed else f"{total}."
 
 
 def _fixed(cells: pd.DataFrame) -> str:
@@ -199,31 +201,27 @@ def _fixed(cells: pd.DataFrame) -> str:
     return comma_list(parts)
 
 
-def _controls(cells: pd.DataFrame, heads: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _controls(cells: pd.DataFrame, titles: Mapping[str, Sequence[str]]) -> list[dict[str, Any]]:
     """What can be chosen: a title and options, each with its value and text."""
     controls: list[dict[str, Any]] = [
         {"key": key, "title": key, "options": list(enumerate(options))}
-        for key, options in (
-            ("model", [model["title"] for model in heads["models"]]),
-            ("scheme", [scheme["title"] for scheme in heads["schemes"]]),
-            ("approach", heads["approaches"]),
-        )
+        for key, options in titles.items()
     ]
-    for factor, key in ((POSITIONS, "n"), *((its, its.name) for its in varied(cells))):
+    for factor, key in ((POSITIONS, "n"), *((noise, noise.name) for noise in varied(cells))):
         values = np.unique(levels(cells, factor))
-        options = [(number(value), f"{value:.4g}") for value in values[~np.isnan(values)]]
+        options = [(f"{value:.4g}", f"{value:.4g}") for value in values[~np.isnan(values)]]
         controls.append(
             {"key": key, "title": factor.title, "unit": _unit(factor), "options": options}
         )
     return controls
 
 
-def _first_rows(study: StudyConfig, heads: Mapping[str, Any]) -> str:
+def _first_rows(study: StudyConfig, titles: Mapping[str, Sequence[str]]) -> str:
     """What the rows of the chart are at first: what the study varies."""
     swept = [factor for factor in FACTORS if varies(study, factor)]
     if swept:
         return "n" if swept[0] is POSITIONS else swept[0].name
-    return "scheme" if len(heads["schemes"]) > 1 else "model"
+    return "scheme" if len(titles["scheme"]) > 1 else "model"
 
 
 def _columns(factors: Sequence[Factor], groups: Sequence[Mapping[str, str]]) -> list[Column]:
@@ -262,3 +260,61 @@ def _start(study: StudyConfig, cells: pd.DataFrame) -> int:
     if study.sensitivity is not None:
         return names.index(f"{study.sensitivity.model}/{study.sensitivity.scheme}/gravity")
     return int(cells["estimable"].to_numpy(bool).argmax())
+
+
+def figures_of(study: StudyConfig, cells: Sequence[Mapping[Any, Any]]) -> list[list[str]]:
+    """Names of the figures that show a set-up.
+
+    Parameters
+    ----------
+    study : StudyConfig
+    cells : rows of the table `cells`
+
+    Returns
+    -------
+    list of list of str, one for each cell
+    """
+    names = figure_names(study)
+    tests = {name: test for name, test in _tests(study).items() if name in names}
+    return [[name for name, test in tests.items() if test(cell)] for cell in cells]
+
+
+def _tests(study: StudyConfig) -> dict[str, Callable[[Mapping[Any, Any]], bool]]:
+    """Whether a figure shows a cell, by the figure's name; those nearest to one cell first."""
+    settings = study.sensitivity
+    paper = f"{settings.model}/{settings.scheme}/" if settings else ""
+    presets = {f"{preset.model}/{preset.scheme}" for preset in PRESETS}
+    tests: dict[str, Callable[[Mapping[Any, Any]], bool]] = {
+        **dict.fromkeys(
+            ("figure-7", "figure-8"),
+            lambda cell: cell["cell"] == f"{paper}{cell['approach']}",
+        ),
+        "table-1": lambda cell: cell["cell"].rpartition("/")[0] in presets,
+        "leveling-overview": lambda cell: True,
+    }
+    for factor in FACTORS:
+        tests[f"sweep-{factor.name}"] = _drawn(study, factor)
+    tests["closed-forms"] = lambda cell: bool(cell["n_converged"])
+    return tests
+
+
+def _drawn(study: StudyConfig, factor: Factor) -> Callable[[Mapping[Any, Any]], bool]:
+    """Whether a cell is in the figure over a factor."""
+    names = {name for block in blocks(study, factor) for name in block.cells["cell"]}
+    return lambda cell: cell["cell"] in names
+
+
+def library() -> str:
+    """Return Vega-Embed, with all it needs, as vl-convert bundles it, gzipped, in base 64.
+
+    To bundle it takes two seconds, so the text is kept for the next study.
+    """
+    key = f"vega-{version('vl-convert-python')}"
+    packed = kept("explorer", key)
+    if packed is None:
+        import vl_convert
+
+        code = vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;")
+        packed = base64.b64encode(gzip.compress(code.encode(), mtime=0))
+        keep("explorer", key, packed)
+    return packed.decode()

@@ -12,7 +12,7 @@ from accelstudy.study.figures.base import (
     get_figure,
     register,
 )
-from accelstudy.study.figures.rendering import angle_unit, captions, draw, render
+from accelstudy.study.figures.rendering import angle_unit, captions, draw, draw_figures, render
 
 __all__ = [
     "FigureEntry",
@@ -20,6 +20,7 @@ __all__ = [
     "angle_unit",
     "captions",
     "draw",
+    "draw_figures",
     "figure_names",
     "figure_tables",
     "get_figure",

@@ -97,7 +97,7 @@ def cell_table(study: StudyConfig) -> pd.DataFrame:
     """One row per cell of a study; the robot's noise is NaN where no robot is used."""
     import pandas as pd  # slow, and not needed by studies that vary nothing
 
-    from accelstudy.study.cells.of_study import study_cells
+    from accelstudy.study.cells import study_cells
 
     rows = [
         {
@@ -143,7 +143,7 @@ def blocks(study: StudyConfig, factor: Factor) -> list[Block]:
         "gravity_sigma_mps2": study.noise.gravity.sigma_mps2,
         "gravity_error_mps2": study.noise.gravity.error_mps2,
     }
-    found: dict[tuple[tuple[str, Level], ...], list[pd.DataFrame]] = {}
+    parts_of: dict[tuple[tuple[str, Level], ...], list[pd.DataFrame]] = {}
     for (_, subject), rows in table.groupby(["model", by], sort=False):
         if not _several(rows[factor.column]):
             continue
@@ -153,8 +153,8 @@ def blocks(study: StudyConfig, factor: Factor) -> list[Block]:
                 rows = _hold(rows, other, factor, usual[other.column], levels)
         if _several(rows[factor.column]):
             rows = rows.assign(x=rows[factor.column], subject=str(subject))
-            found.setdefault(tuple(levels.items()), []).append(rows)
-    return [Block(dict(levels), pd.concat(parts)) for levels, parts in found.items()]
+            parts_of.setdefault(tuple(levels.items()), []).append(rows)
+    return [Block(dict(levels), pd.concat(parts)) for levels, parts in parts_of.items()]
 
 
 def _lists_values(study: StudyConfig, factor: Factor) -> bool:
@@ -196,8 +196,8 @@ def _hold(
 
 def factor_note(study: StudyConfig, factor: Factor) -> str:
     """Say in a caption what a study holds fixed where it varies a factor."""
-    found = blocks(study, factor)
-    held = list(dict.fromkeys(text for block in found if (text := levels_text(block.levels))))
+    swept = blocks(study, factor)
+    held = list(dict.fromkeys(text for block in swept if (text := levels_text(block.levels))))
     return f"Over the {factor.title}, held fixed: " + "; or ".join(held) + "."
 
 

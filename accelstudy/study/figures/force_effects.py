@@ -135,7 +135,7 @@ def _draw_circles(ax: Axes, cells: pd.DataFrame) -> None:
 
     x, y = (to_attitude(cells[f"{name}_gon"].to_numpy(float) * GON) for name in OUTPUTS)
     share = cells["share"].to_numpy(float)
-    known = np.isfinite(share)
+    defined = np.isfinite(share)
     edge: Style = {"edgecolors": "white", "linewidths": 0.4, "s": 12}
-    ax.scatter(x[known], y[known], c=share[known], vmin=0, vmax=1, cmap="viridis", **edge)
-    ax.plot(x[~known], y[~known], **UNDEFINED)
+    ax.scatter(x[defined], y[defined], c=share[defined], vmin=0, vmax=1, cmap="viridis", **edge)
+    ax.plot(x[~defined], y[~defined], **UNDEFINED)

@@ -72,9 +72,9 @@ def tilt_errors(tables: Tables, study: StudyConfig) -> Figure:
     schemes = sorted(set(table["scheme"]), key=lambda name: (get_scheme(name).n_positions, name))
     models = list(dict.fromkeys(table["model"]))
     approaches = list(dict.fromkeys(table["approach"]))
-    known = table[[f"{angle}_rms" for angle in ANGLES]].to_numpy(float)
-    known = known[np.isfinite(known)]
-    norm = LogNorm(*np.quantile(known, (0, 0.97))) if len(known) else LogNorm(1, 10)
+    errors = table[[f"{angle}_rms" for angle in ANGLES]].to_numpy(float)
+    errors = errors[np.isfinite(errors)]
+    norm = LogNorm(*np.quantile(errors, (0, 0.97))) if len(errors) else LogNorm(1, 10)
     unit = display_unit("rad")
     one_reading = float(to_display(study.sigma_force / study.gravity_mps2, "rad"))
 
@@ -100,7 +100,7 @@ def tilt_errors(tables: Tables, study: StudyConfig) -> Figure:
     axes[0, 0].set_xticks(range(len(models)), [model_title(name) for name in models])
     for ax in axes[-1]:
         ax.tick_params(axis="x", rotation=90)
-    if image is not None and len(known):
+    if image is not None and len(errors):
         largest = to_attitude(study.leveling.max_tilt_gon * GON)
         label = f"tilt error (rms) at tilts up to {largest:g} {attitude_unit()} / {unit}"
         bar = fig.colorbar(image, ax=axes, label=label, pad=0.02, aspect=50, extend="max")
@@ -125,11 +125,11 @@ def _with_tilt(cells: pd.DataFrame, leveling: pd.DataFrame) -> pd.DataFrame:
     """Cells with the rms of each angle, and the 95 % quantile of both, as shown; NaN if none."""
     import pandas as pd
 
-    found = leveling.set_index("cell") if len(leveling) else pd.DataFrame()
+    by_cell = leveling.set_index("cell") if len(leveling) else pd.DataFrame()
     columns = {}
     for angle in ANGLES:
         for what, name in (("rms", f"{angle}_rms_mgon"), ("q95", "both_rms_q95_mgon")):
-            values = cells["cell"].map(found.get(name, {})).astype(float)
+            values = cells["cell"].map(by_cell.get(name, {})).astype(float)
             columns[f"{angle}_{what}"] = shown(values, "mgon")[0]
     return cells.assign(**columns)
 

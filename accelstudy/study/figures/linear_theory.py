@@ -62,13 +62,13 @@ def monte_carlo_against_theory(tables: Tables, study: StudyConfig) -> Figure:
         "closed form": (rows[exact], "sd_closed_form"),
         "linear theory (other cells)": (rows[~exact], "sd_linear"),
     }
-    groups = [max(len(set(its["group"])), 1) for its, _ in panels.values()]
+    groups = [max(len(set(members["group"])), 1) for members, _ in panels.values()]
     fig = new_figure(FULL, 80)
     axes = fig.subplots(1, 2, sharey=True, width_ratios=[max(n, 2) for n in groups])
-    for ax, (title, (its, reference)) in zip(axes, panels.items(), strict=True):
-        its = its[its[reference].gt(0) & np.isfinite(its[reference])]
-        ratio = its["sd_empirical"] / its[reference]
-        _draw_ratios(ax, its.assign(ratio=ratio))
+    for ax, (title, (members, reference)) in zip(axes, panels.items(), strict=True):
+        members = members[members[reference].gt(0) & np.isfinite(members[reference])]
+        ratio = members["sd_empirical"] / members[reference]
+        _draw_ratios(ax, members.assign(ratio=ratio))
         ax.set_title(title)
     axes[0].set_ylabel("empirical sd / expected sd")
     approaches = [name for name in ("gravity", "robot") if (rows["approach"] == name).any()]
@@ -95,24 +95,26 @@ def _draw_ratios(ax: Axes, rows: pd.DataFrame) -> None:
         return
     labels = []
     for i, group in enumerate(groups):
-        its = rows[rows["group"] == group].sort_values(["approach", "half"], kind="stable")
-        x = i * (1 + GAP) + (np.arange(len(its)) + 0.5) / len(its)
-        ends = np.linspace(i * (1 + GAP), i * (1 + GAP) + 1, len(its) + 1)
-        ax.stairs(1 + its["half"], ends, baseline=1 - its["half"], fill=True, color=BAND, zorder=0)
-        for approach in its["approach"].unique():
-            chosen = (its["approach"] == approach).to_numpy()
+        members = rows[rows["group"] == group].sort_values(["approach", "half"], kind="stable")
+        x = i * (1 + GAP) + (np.arange(len(members)) + 0.5) / len(members)
+        ends = np.linspace(i * (1 + GAP), i * (1 + GAP) + 1, len(members) + 1)
+        ax.stairs(
+            1 + members["half"], ends, baseline=1 - members["half"], fill=True, color=BAND, zorder=0
+        )
+        for approach in members["approach"].unique():
+            chosen = (members["approach"] == approach).to_numpy()
             ax.plot(
                 x[chosen],
-                its["ratio"][chosen],
+                members["ratio"][chosen],
                 linestyle="",
                 markersize=1.6,
                 markeredgewidth=0,
                 marker=approach_marker(approach),
                 color=approach_colour(approach),
             )
-        within = (its["ratio"] - 1).abs() <= its["half"]
+        within = (members["ratio"] - 1).abs() <= members["half"]
         name = group_label(group).replace("non-orthogonality", "non-orthogo-\nnality")
-        labels.append(f"{name}\n{100 * within.mean():.0f} %\nof {len(its)}")
+        labels.append(f"{name}\n{100 * within.mean():.0f} %\nof {len(members)}")
     ax.set_xticks([i * (1 + GAP) + 0.5 for i in range(len(groups))], labels)
     ax.tick_params(axis="x", length=0)
     within = (rows["ratio"] - 1).abs() <= rows["half"]

@@ -68,7 +68,7 @@ def errors_and_sigmas(tables: Tables, study: StudyConfig) -> Figure:
     fig = new_figure(FULL, 16 + 46 * len(units))
     axes = fig.subplots(len(units), 2, squeeze=False)
     for row, unit in zip(axes, units, strict=True):
-        names = [name for name, its in parameters if its == unit]
+        names = [name for name, si_unit in parameters if si_unit == unit]
         shown = unit_label(display_unit(unit))
         for ax in row:
             ax.axhline(0, color=INK, linewidth=0.6)
@@ -80,10 +80,10 @@ def errors_and_sigmas(tables: Tables, study: StudyConfig) -> Figure:
         drawn = False
         for cell, approach in _cells(study):
             for x, name in enumerate(names):
-                found = _single_runs(tables, cell, name)
-                if found is not None:
+                runs = _single_runs(tables, cell, name)
+                if runs is not None:
                     drawn = True
-                    _draw_parameter(row, x, found, approach)
+                    _draw_parameter(row, x, runs, approach)
         if not drawn:
             for ax in row:
                 say_empty(ax)
@@ -147,8 +147,11 @@ def _single_runs(tables: Tables, cell: str, name: str) -> _SingleRuns | None:
     table = table[(table["cell"] == cell) & (table["name"] == name)]
 
     def three(first: str, quantity: str) -> tuple[float, float, float]:
-        its = table[table["quantity"] == quantity]
-        ends = [its["value"][np.isclose(its["probability"], p)].max() for p in (0.025, 0.975)]
+        quantiles = table[table["quantity"] == quantity]
+        ends = [
+            quantiles["value"][np.isclose(quantiles["probability"], p)].max()
+            for p in (0.025, 0.975)
+        ]
         values = shown([row[first], *ends], row["unit"])[0]
         return float(values[0]), float(values[1]), float(values[2])
 
@@ -159,7 +162,7 @@ def _single_runs(tables: Tables, cell: str, name: str) -> _SingleRuns | None:
     )
 
 
-def _draw_parameter(axes: NDArray[np.object_], x: int, its: _SingleRuns, approach: str) -> None:
+def _draw_parameter(axes: NDArray[np.object_], x: int, runs: _SingleRuns, approach: str) -> None:
     """Draw one parameter of one approach into the panels of errors and of sds."""
     colour, marker = approach_colour(approach), approach_marker(approach)
     at = x + (APPROACHES.index(approach) - 0.5) * (WIDTH + 0.04)
@@ -170,12 +173,12 @@ def _draw_parameter(axes: NDArray[np.object_], x: int, its: _SingleRuns, approac
         "markerfacecolor": "white",
         "zorder": 4,
     }
-    _draw_range(axes[0], at, *its.errors[1:], colour)
-    axes[0].plot(at, its.errors[0], **one)
-    if np.isfinite(its.mean_sd):
-        axes[1].bar(at, its.mean_sd, WIDTH, color=colour, alpha=0.4)
-        _draw_range(axes[1], at, *its.sds[1:], colour)
-        axes[1].plot(at, its.sds[0], **one)
+    _draw_range(axes[0], at, *runs.errors[1:], colour)
+    axes[0].plot(at, runs.errors[0], **one)
+    if np.isfinite(runs.mean_sd):
+        axes[1].bar(at, runs.mean_sd, WIDTH, color=colour, alpha=0.4)
+        _draw_range(axes[1], at, *runs.sds[1:], colour)
+        axes[1].plot(at, runs.sds[0], **one)
     else:
         axes[1].text(at, 0, "no redundancy ", rotation=90, ha="center", va="bottom", fontsize=7)
 
@@ -204,15 +207,17 @@ def _draw_range(ax: Axes, at: float, low: float, high: float, colour: str) -> No
 def correlations(tables: Tables, study: StudyConfig) -> Figure:
     """Absolute correlations less the identity, from the cofactors of the adjustment."""
     names = [name for name, _ in _parameters(study)]
-    found = {
+    matrices = {
         approach: _matrix(tables["correlations"], cell, names) for cell, approach in _cells(study)
     }
-    largest = max((np.nanmax(matrix) for matrix in found.values() if matrix is not None), default=0)
+    largest = max(
+        (np.nanmax(matrix) for matrix in matrices.values() if matrix is not None), default=0
+    )
     top = max(0.1, np.ceil(largest * 20) / 20)
     fig = new_figure(FULL, 84)
     axes = fig.subplots(1, 2)
     image = None
-    for ax, (approach, matrix) in zip(axes, found.items(), strict=True):
+    for ax, (approach, matrix) in zip(axes, matrices.items(), strict=True):
         ax.set_title(f"{approach}-based" if approach == "gravity" else f"{approach}-aided")
         ax.grid(False)
         ax.set_xticks(range(len(names)), [symbol(name) for name in names])

@@ -63,8 +63,8 @@ def rare_events(tables: Tables, study: StudyConfig) -> Figure:
     if not setups:
         say_empty(tails[0])
     for ax, (model, scheme) in zip(tails, setups, strict=False):
-        own = tilt[(tilt["model"] == model) & (tilt["scheme"] == scheme)]
-        _draw_tails(ax, own)
+        of_setup = tilt[(tilt["model"] == model) & (tilt["scheme"] == scheme)]
+        _draw_tails(ax, of_setup)
         ax.set_title(f"{model_title(model)}, {scheme}")
     _draw_failures(failures, cells[cells["n_replicates"] > 0])
     left_out = len(setups[MOST:])
@@ -73,7 +73,10 @@ def rare_events(tables: Tables, study: StudyConfig) -> Figure:
     fig.legend(
         handles=[
             *approach_handles(dict.fromkeys(cells["approach"]), linestyle="-", marker=""),
-            *(Line2D([], [], color=INK, linestyle=its, label=name) for name, its in LINES.items()),
+            *(
+                Line2D([], [], color=INK, linestyle=style, label=name)
+                for name, style in LINES.items()
+            ),
             Line2D([], [], color=INK, label="none failed: 97.5 % limit", **NONE),
         ],
         loc="outside lower center",
@@ -83,10 +86,10 @@ def rare_events(tables: Tables, study: StudyConfig) -> Figure:
 
 
 def _draw_tails(ax: Axes, rows: pd.DataFrame) -> None:
-    for (cell, name), its in rows.groupby(["cell", "name"], sort=False):
-        values, unit = shown(its["value"], its["unit"].iloc[0])
-        colour = approach_colour(its["approach"].iloc[0])
-        beyond = 1 - its["probability"].to_numpy(float)
+    for (cell, name), quantiles in rows.groupby(["cell", "name"], sort=False):
+        values, unit = shown(quantiles["value"], quantiles["unit"].iloc[0])
+        colour = approach_colour(quantiles["approach"].iloc[0])
+        beyond = 1 - quantiles["probability"].to_numpy(float)
         ax.plot(beyond, values, LINES[str(name)], color=colour, gid=f"{cell} {name}")
         ax.set_ylabel(f"tilt error / {unit}")
     ax.set_xscale("log")
@@ -98,12 +101,12 @@ def _draw_tails(ax: Axes, rows: pd.DataFrame) -> None:
 def _draw_failures(ax: Axes, cells: pd.DataFrame) -> None:
     from accelstudy.basics.shares import clopper_pearson
 
-    for approach, its in cells.groupby("approach", sort=False):
-        its = its.sort_values("sensor_sigma_mps2")
-        n = its["n_replicates"].to_numpy(float)
-        failed = n - its["n_converged"].to_numpy(float)
+    for approach, group in cells.groupby("approach", sort=False):
+        group = group.sort_values("sensor_sigma_mps2")
+        n = group["n_replicates"].to_numpy(float)
+        failed = n - group["n_converged"].to_numpy(float)
         low, high = clopper_pearson(failed, n)
-        share, sigma = failed / n, its["sensor_sigma_mps2"].to_numpy(float)
+        share, sigma = failed / n, group["sensor_sigma_mps2"].to_numpy(float)
         colour, some = approach_colour(str(approach)), failed > 0
         bars = np.stack([share - low, high - share])[:, some]
         ax.errorbar(sigma[some], share[some], bars, color=colour, marker="o", elinewidth=0.8)

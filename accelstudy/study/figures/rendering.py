@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from accelstudy.basics.units import angle_note, angles_in, user_angle_unit
-from accelstudy.study.figures.base import FigureEntry, Tables, get_figure
+from accelstudy.basics.wording import comma_list
+from accelstudy.files.outputs import whole_file
+from accelstudy.study.figures.base import FigureEntry, Tables, figure_tables, get_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -60,3 +62,34 @@ def render(
     from accelstudy.drawing.style import DPI
 
     save(draw(name, tables, study), svg_path, png_path, get_figure(name).title, DPI)
+
+
+def draw_figures(
+    study: StudyConfig, captions: Mapping[str, str], tables: Mapping[str, Any], folder: str | Path
+) -> None:
+    """Draw figures, and write each into a folder under its name: as SVG, as PNG, and its caption.
+
+    It stops at the first figure that cannot be drawn; the error names that figure.
+
+    Parameters
+    ----------
+    study : StudyConfig
+    captions : mapping of the name of a figure to its caption
+    tables : mapping of the name of a table to its path
+    folder : str or Path
+    """
+    from accelstudy.files.tables import read_table
+
+    read = {name: read_table(tables[name]) for name in figure_tables(*captions)}
+    for name, caption in captions.items():
+        path = Path(folder, name)
+        try:
+            render(name, read, study, path.with_suffix(".svg"), path.with_suffix(".png"))
+        except Exception as error:
+            error.add_note(
+                f"The figure {name!r} could not be drawn, so all of its job are missing: "
+                f"{comma_list([*captions])}."
+            )
+            raise
+        with whole_file(path.with_suffix(".rst")) as written:
+            written.write_text(f"{caption}\n", encoding="utf-8")

@@ -93,8 +93,8 @@ for _factor in FACTORS:
     )(partial(over_factor, factor=_factor))
 
 
-def _draw(tables: Tables, factor: Factor, found: list[Block]) -> Figure:
-    parts = [part for block in found for part in _parts(block)]
+def _draw(tables: Tables, factor: Factor, swept: list[Block]) -> Figure:
+    parts = [part for block in swept for part in _parts(block)]
     left_out, parts = len(parts[MOST_BLOCKS:]), parts[:MOST_BLOCKS]
     drawn = [_values(block, tables) for block in parts]
     names = [[*in_order(set(rows["group"]) - set(TILTS)), *TILTS] for rows in drawn]
@@ -117,7 +117,7 @@ def _draw(tables: Tables, factor: Factor, found: list[Block]) -> Figure:
             panels.setdefault((block.series[0][0], group), []).append(ax)
         part.suptitle(_title(block, factor), fontsize=8)
         _add_legend(part, rows, block.series, factor)
-    failed = any(its.any() for rows in drawn for its in _failures(rows).values())
+    failed = any(marks.any() for rows in drawn for marks in _failures(rows).values())
     for drawn_alike in panels.values():
         _same_y(drawn_alike, failed)
     if left_out:
@@ -160,12 +160,12 @@ def _values(block: Block, tables: Tables) -> pd.DataFrame:
         squared=("squared", "mean"),
         significant=("significant", "all"),
     )
-    found = [groups.assign(bias=groups.pop("squared") ** 0.5)]
+    biases = [groups.assign(bias=groups.pop("squared") ** 0.5)]
     for angle in TILTS:
         rms = leveling.set_index("cell")[f"{angle}_rms_mgon"] if len(leveling) else pd.Series()
         tilt = pd.DataFrame({"cell": cells["cell"], "value": cells["cell"].map(rms).astype(float)})
-        found.append(tilt.assign(group=angle, unit="mgon", significant=False))
-    return cells.merge(pd.concat(found, ignore_index=True), on="cell")
+        biases.append(tilt.assign(group=angle, unit="mgon", significant=False))
+    return cells.merge(pd.concat(biases, ignore_index=True), on="cell")
 
 
 def _title(block: Block, factor: Factor) -> str:
@@ -196,10 +196,10 @@ def _draw_panel(
     ax: Axes, rows: pd.DataFrame, factor: Factor, series: list[tuple[str, str]]
 ) -> None:
     group, unit = rows["group"].iloc[0], rows["unit"].iloc[0]
-    for (*name, approach), its in rows.groupby(["model", "subject", "approach"], sort=False):
+    for (*name, approach), members in rows.groupby(["model", "subject", "approach"], sort=False):
         i = series.index((str(name[0]), str(name[1])))
         style = {**_series_style(i), "color": approach_colour(str(approach))}
-        _draw_series(ax, its.sort_values("x"), factor, style, height=TOP - 0.07 * i)
+        _draw_series(ax, members.sort_values("x"), factor, style, height=TOP - 0.07 * i)
     if rows["value"].gt(0).any():
         ax.set_yscale("log")
     else:

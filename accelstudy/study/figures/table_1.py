@@ -116,16 +116,16 @@ def _places(approaches: list[str]) -> dict[str, float]:
 def _draw_group(ax: Axes, rows: pd.DataFrame, approaches: list[str]) -> None:
     marks = []
     for y, preset in enumerate(PRESETS):
-        known = False
+        drawn = False
         for approach, offset in _places(approaches).items():
-            its = rows[rows["cell"] == _cell(preset, approach)]
-            if its.empty:
+            parameters = rows[rows["cell"] == _cell(preset, approach)]
+            if parameters.empty:
                 continue
-            known = True
-            values, _ = shown(its["sd_empirical"], its["unit"].iloc[0])
-            pale = bool(its["estimable"].all())
+            drawn = True
+            values, _ = shown(parameters["sd_empirical"], parameters["unit"].iloc[0])
+            pale = bool(parameters["estimable"].all())
             marks.append(_Mark(approach, y + offset, values.mean(), pale))
-        if not known:
+        if not drawn:
             _dash(ax, y)
     _draw_marks(ax, marks)
 
@@ -135,8 +135,8 @@ def _draw_tilt(
 ) -> None:
     ax.set_title("tilt error\n(roll, rms)")
     ax.set_xlabel(shown([], "mgon")[1])
-    known = {} if leveling.empty else leveling.set_index("cell")["roll_rms_mgon"].to_dict()
-    rms = dict(zip(known, shown(list(known.values()), "mgon")[0], strict=True))
+    errors = {} if leveling.empty else leveling.set_index("cell")["roll_rms_mgon"].to_dict()
+    rms = dict(zip(errors, shown(list(errors.values()), "mgon")[0], strict=True))
     run = set(summary["cell"])
     marks = []
     for y, preset in enumerate(PRESETS):
@@ -163,12 +163,12 @@ class _Mark:
 
 def _draw_marks(ax: Axes, marks: list[_Mark]) -> None:
     """Markers and numbers at standard deviations, or crosses where there are none."""
-    for (approach, known, pale), found in groupby(sorted(marks, key=_alike), key=_alike):
-        its = list(found)
-        colour, y = approach_colour(approach), [mark.y for mark in its]
+    for (approach, known, pale), group in groupby(sorted(marks, key=_alike), key=_alike):
+        members = list(group)
+        colour, y = approach_colour(approach), [mark.y for mark in members]
         if not known:
             ax.plot(
-                np.full(len(its), CROSS_AT),
+                np.full(len(members), CROSS_AT),
                 y,
                 "x",
                 color=colour,
@@ -176,8 +176,8 @@ def _draw_marks(ax: Axes, marks: list[_Mark]) -> None:
                 alpha=PALE if pale else 1,
             )
             continue
-        ax.plot([mark.value for mark in its], y, approach_marker(approach), color=colour)
-        for mark in its:
+        ax.plot([mark.value for mark in members], y, approach_marker(approach), color=colour)
+        for mark in members:
             ax.annotate(
                 _number(mark.value),
                 (mark.value, mark.y),

@@ -15,7 +15,7 @@ from accelstudy.basics.shares import sigmas_95
 from accelstudy.basics.units import GON
 from accelstudy.effects import get_effect
 from accelstudy.leveling.error import TiltError, cap_forces, tilt_error
-from accelstudy.study.cells.cell import Cell
+from accelstudy.study.cell import Cell
 from accelstudy.study.monte_carlo.moments import Moments, moments_of
 from accelstudy.study.monte_carlo.sketch import Key, Sketch
 
@@ -107,17 +107,17 @@ class CellSketches:
     def __init__(self, followed: Followed, tilt: TiltError | None) -> None:
         self.followed = followed
         self.tilt = tilt
-        self.found: dict[Key, Sketch] = {}
+        self.by_key: dict[Key, Sketch] = {}
 
     def add(self, block: Block, values: Array) -> None:
         """Count the calibrations of a block, given their `Followed.values`."""
         keys = self.followed.keys
         for key in self.followed.sketched(block.redundancy):
-            self.found.setdefault(key, Sketch()).add(values[:, keys.index(key)])
+            self.by_key.setdefault(key, Sketch()).add(values[:, keys.index(key)])
         if self.tilt is not None:
             estimates = block.estimates[block.converged][:, : len(self.tilt.reference)]
             for name, rms in zip(TILTS, tilts(self.tilt, estimates), strict=True):
-                self.found.setdefault((TILT, name), Sketch()).add(rms)
+                self.by_key.setdefault((TILT, name), Sketch()).add(rms)
 
 
 def tilts(tilt: TiltError, estimates: Array) -> Array:

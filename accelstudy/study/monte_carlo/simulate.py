@@ -18,9 +18,9 @@ from accelstudy.design.estimability import estimability
 from accelstudy.files.tables import parquet_writer
 from accelstudy.leveling.error import TiltError
 from accelstudy.simulation.sessions import BLOCK, session
-from accelstudy.study.cells.batches import Share
-from accelstudy.study.cells.cell import CHUNK, Cell
-from accelstudy.study.cells.compiling import calibrator
+from accelstudy.study.batches import Share
+from accelstudy.study.cell import CHUNK, Cell
+from accelstudy.study.compiling import calibrator
 from accelstudy.study.monte_carlo.followed import CellSketches, Followed, cell_tilt_error
 from accelstudy.study.monte_carlo.moments import MOMENTS, Node, Tree, moments_table
 from accelstudy.study.monte_carlo.sketch import SKETCHES, sketch_table
@@ -92,7 +92,7 @@ def simulate_batch(
 
     Parameters
     ----------
-    spec : mapping with `seed`, `shares` (plain data of `accelstudy.study.cells.batches.Share`)
+    spec : mapping with `seed`, `shares` (plain data of `accelstudy.study.batches.Share`)
         and, for `sketches`, `leveling` (max_tilt_gon and attitudes)
     outputs : paths of `moments`, and of `estimates`, where replicates are kept, or of `sketches`
     provenance : see `accelstudy.files.tables.origin`
@@ -111,7 +111,7 @@ def simulate_batch(
         write_estimates = opened("estimates", ESTIMATES, measured=measured)
         for number, share in enumerate(shares, 1):
             cell = share.cell
-            found = estimability(
+            design = estimability(
                 cell.positions,
                 cell.estimated_model,
                 cell.conditions,
@@ -119,8 +119,8 @@ def simulate_batch(
                 gravity=cell.gravity,
                 hold=cell.hold,
             )
-            if not found.estimable:
-                log.info("%d/%d %s: %s", number, len(shares), cell.name, found.reason)
+            if not design.estimable:
+                log.info("%d/%d %s: %s", number, len(shares), cell.name, design.reason)
                 continue
             followed, tree = Followed.of(cell), Tree()
             sketches = None
@@ -135,7 +135,7 @@ def simulate_batch(
                     write_estimates(_estimates_table(cell, chunk, index * CHUNK * BLOCK))
             write_moments(moments_table(cell.name, tree))
             if sketches is not None:
-                write_sketches(sketch_table(cell.name, sketches.found))
+                write_sketches(sketch_table(cell.name, sketches.by_key))
             counts = tree.nodes
             log.info(
                 "%d/%d %s: %d replicates, %d not converged",

@@ -166,13 +166,13 @@ def sketch_table(cell: str, sketches: Mapping[Key, Sketch]) -> pa.Table:
 
 def merged_sketches(tables: Iterable[pa.Table]) -> dict[Key, Sketch]:
     """Sketches of one cell from rows of `sketch_table` of its parts, in any order."""
-    found: dict[Key, Sketch] = {}
+    sketches: dict[Key, Sketch] = {}
     for table in tables:
         rows = table.to_pandas()
-        for key, its in rows.groupby(["quantity", "name"], observed=True, sort=False):
-            buckets = its["bucket"].to_numpy(np.int64)
+        for key, group in rows.groupby(["quantity", "name"], observed=True, sort=False):
+            buckets = group["bucket"].to_numpy(np.int64)
             lowest = int(buckets.min())
             counts = np.zeros(int(buckets.max()) - lowest + 1, np.int64)
-            counts[buckets - lowest] = its["count"].to_numpy()
-            found.setdefault((str(key[0]), str(key[1])), Sketch()).merge(Sketch(lowest, counts))
-    return found
+            counts[buckets - lowest] = group["count"].to_numpy()
+            sketches.setdefault((str(key[0]), str(key[1])), Sketch()).merge(Sketch(lowest, counts))
+    return sketches

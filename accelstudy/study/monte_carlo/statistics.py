@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from accelstudy.files.parquet import read_parquet
 from accelstudy.files.tables import REMEDY
-from accelstudy.study.cells.cell import Cell
+from accelstudy.study.cell import Cell
 from accelstudy.study.monte_carlo.followed import ERROR, Followed
 from accelstudy.study.monte_carlo.moments import Moments, Tree, moments_of, read_nodes
 

@@ -23,7 +23,7 @@ from accelstudy.adjustment.observations import Observations
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
 from accelstudy.sensors.sensor import SensorModel
-from accelstudy.study.cells.cell import Cell
+from accelstudy.study.cell import Cell
 
 POSITIONS_PER_PARAMETER = 50_000
 """Positions of all calibrations together, per parameter, from which on compilation saves time.

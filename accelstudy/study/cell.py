@@ -40,7 +40,7 @@ class Cell:
     truth : dict of parameter name to true value, SI
     holds : HoldPlan, conditions of the holds
     directions : tuple of (x, y, z), of a scheme that was read from a file; None of any other
-    compiled : bool, whether compiled code calibrates it; see `accelstudy.study.cells.compiling`
+    compiled : bool, whether compiled code calibrates it; see `accelstudy.study.compiling`
     """
 
     name: str

@@ -87,8 +87,8 @@ def analyse_shapley(
     tables = []
     for approach in APPROACHES:
         sigma = _empirical_sigma(study, approach, summary)
-        own = pairs[pairs["cell"] == _cell(study, approach)]
-        matrix = own.pivot_table("adjustment", "parameter_1", "parameter_2", observed=True)
+        of_cell = pairs[pairs["cell"] == _cell(study, approach)]
+        matrix = of_cell.pivot_table("adjustment", "parameter_1", "parameter_2", observed=True)
         table = leveling_shares(
             settings.roll_gon,
             settings.pitch_gon,

@@ -14,8 +14,8 @@ from accelstudy.schemes import scheme_names
 from accelstudy.schemes.files import held
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise
-from accelstudy.study.cells.cell import Cell
-from accelstudy.study.cells.compiling import with_compiled
+from accelstudy.study.cell import Cell
+from accelstudy.study.compiling import with_compiled
 
 if TYPE_CHECKING:
     from accelstudy.study.config import Grid, StudyConfig
@@ -30,8 +30,8 @@ def study_cells(study: StudyConfig) -> list[Cell]:
     cells: dict[str, Cell] = {}
     for grid in study.all_grids:
         for cell in _grid_cells(study, grid):
-            known = cells.get(cell.name)
-            if known is None or cell.replicates > known.replicates:
+            earlier = cells.get(cell.name)
+            if earlier is None or cell.replicates > earlier.replicates:
                 cells[cell.name] = cell
     return with_compiled(list(cells.values()))
 

@@ -9,7 +9,7 @@ from itertools import pairwise
 from typing import Any
 
 from accelstudy.simulation.sessions import BLOCK
-from accelstudy.study.cells.cell import CHUNK, Cell
+from accelstudy.study.cell import CHUNK, Cell
 
 LEAST_PER_JOB = 400_000
 """Calibrations in one job: seconds of compiled code, as starting Python takes seconds too."""

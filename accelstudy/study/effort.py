@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from accelstudy.basics.errors import InputError
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import BLOCK
-from accelstudy.study.cells.batches import batches
-from accelstudy.study.cells.cell import Cell
+from accelstudy.study.batches import batches
+from accelstudy.study.cell import Cell
 from accelstudy.study.config import StudyConfig
 from accelstudy.study.monte_carlo.distributions import EXACT
 
@@ -129,7 +129,7 @@ def _memory(study: StudyConfig, cell: Cell) -> float:
 
 
 def _disk(study: StudyConfig, cells: Sequence[Cell]) -> float:
-    """Of the calibrations that are kept; of sketches, which hardly grow with the calibrations."""
+    """Bytes on disk: of kept calibrations, or of sketches, which hardly grow with their number."""
     if _keeps(study):
         return sum(BYTES_ON_DISK * cell.replicates * cell.n_unknowns for cell in cells)
     jobs = sum(len(batch.jobs) for batch in batches(cells))

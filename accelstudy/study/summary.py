@@ -18,7 +18,7 @@ from accelstudy.design.estimability import Estimability, estimability
 from accelstudy.effects import get_effect
 from accelstudy.files.tables import parquet_writer, write_table
 from accelstudy.leveling.error import TiltError
-from accelstudy.study.cells.cell import Cell
+from accelstudy.study.cell import Cell
 from accelstudy.study.monte_carlo.distributions import Distribution, cell_distributions
 from accelstudy.study.monte_carlo.followed import (
     ANGLES,
@@ -32,7 +32,7 @@ from accelstudy.study.monte_carlo.followed import (
 from accelstudy.study.monte_carlo.moments import MOMENTS, moments_table
 from accelstudy.study.monte_carlo.sketch import RELATIVE_ERROR, SKETCHES, Key, Sketch, sketch_table
 from accelstudy.study.monte_carlo.statistics import Statistics, read_statistics
-from accelstudy.study.results.estimates import TABLES
+from accelstudy.study.tables import TABLES
 
 Array = NDArray[np.float64]
 
@@ -60,7 +60,7 @@ def summarise_batch(
     provenance : see `accelstudy.files.tables.origin`
     """
     cells = [Cell.from_dict(data) for data in spec["cells"]]
-    known = read_statistics(parts["moments"], cells)
+    by_cell = read_statistics(parts["moments"], cells)
     rows: dict[str, list[pd.DataFrame]] = {name: [] for name in TABLES}
     with ExitStack() as files:
         write_moments, write_sketches = (
@@ -77,22 +77,26 @@ def summarise_batch(
                 cell.gravity,
                 cell.hold,
             )
-            statistics, tree = known.get(cell.name, (Statistics.of_none(cell), None))
+            statistics, tree = by_cell.get(cell.name, (Statistics.of_none(cell), None))
             tilt: TiltError | None = None
-            found: Mapping[Key, Distribution] = {}
+            distributions: Mapping[Key, Distribution] = {}
             if tree is not None and statistics.converged:
                 mean = statistics.followed.truth + statistics.mean(ERROR)
                 tilt = cell_tilt_error(cell, mean, leveling)
-                found = cell_distributions(cell, parts, statistics, tilt)
+                distributions = cell_distributions(cell, parts, statistics, tilt)
             if tree is not None:
                 write_moments(moments_table(cell.name, tree))
-                sketches = {key: its for key, its in found.items() if isinstance(its, Sketch)}
+                sketches = {
+                    key: distribution
+                    for key, distribution in distributions.items()
+                    if isinstance(distribution, Sketch)
+                }
                 write_sketches(sketch_table(cell.name, sketches))
             rows["cells"].append(_cell_row(cell, theory, statistics))
             rows["summary"].append(_summary_rows(cell, theory, statistics))
             rows["correlations"].append(_correlation_rows(cell, statistics))
-            rows["quantiles"].append(_quantile_rows(cell, statistics, found))
-            row = _leveling_row(cell, statistics, tilt, found)
+            rows["quantiles"].append(_quantile_rows(cell, statistics, distributions))
+            row = _leveling_row(cell, statistics, tilt, distributions)
             rows["leveling"].append(row if theory.estimable else row[:0])
     for name in TABLES:
         write_table(outputs[name], pd.concat(rows[name], ignore_index=True), provenance)
@@ -247,39 +251,44 @@ def _correlation_rows(cell: Cell, statistics: Statistics) -> pd.DataFrame:
 
 
 def _quantile_rows(
-    cell: Cell, statistics: Statistics, found: Mapping[Key, Distribution]
+    cell: Cell, statistics: Statistics, distributions: Mapping[Key, Distribution]
 ) -> pd.DataFrame:
     """Quantiles of the errors and sds of each parameter and of the tilt error, in shown units."""
     units = {**statistics.followed.units, **dict.fromkeys(TILTS, "rad")}
     n = statistics.converged
     tail = np.minimum(PROBABILITIES, 1 - PROBABILITIES)
     shown = PROBABILITIES[(tail >= 0.0249) | (n * tail >= 0.999)]
-    its = {key: distribution for key, distribution in found.items() if key[1] in units}
+    with_unit = {
+        key: distribution for key, distribution in distributions.items() if key[1] in units
+    }
     values = [
         to_recorded(distribution.quantile(shown), units[name])
-        for (_, name), distribution in its.items()
+        for (_, name), distribution in with_unit.items()
     ]
-    errors = [RELATIVE_ERROR if isinstance(each, Sketch) else 0.0 for each in its.values()]
+    errors = [RELATIVE_ERROR if isinstance(each, Sketch) else 0.0 for each in with_unit.values()]
 
     def each(items: Iterable[Any]) -> NDArray[Any]:
         return np.repeat(np.array([*items]), len(shown))
 
     rows = {
-        "quantity": each(quantity for quantity, _ in its),
-        "name": each(name for _, name in its),
-        "unit": each(recorded_unit(units[name]) for _, name in its),
-        "probability": np.tile(shown, len(its)),
+        "quantity": each(quantity for quantity, _ in with_unit),
+        "name": each(name for _, name in with_unit),
+        "unit": each(recorded_unit(units[name]) for _, name in with_unit),
+        "probability": np.tile(shown, len(with_unit)),
         "value": np.ravel(values),
         "relative_error": each(errors),
     }
     labels = _labels(cell)
-    if not its:
+    if not with_unit:
         return pd.DataFrame(columns=[*labels, *rows]).assign(**labels, n_converged=n)
     return pd.DataFrame({**labels, **rows, "n_converged": n})
 
 
 def _leveling_row(
-    cell: Cell, statistics: Statistics, tilt: TiltError | None, found: Mapping[Key, Distribution]
+    cell: Cell,
+    statistics: Statistics,
+    tilt: TiltError | None,
+    distributions: Mapping[Key, Distribution],
 ) -> pd.DataFrame:
     """Rms of the tilt error over all calibrations, and its 95 % quantiles."""
     rms, q95 = np.full(len(ANGLES), np.nan), np.full(len(TILTS), np.nan)
@@ -288,8 +297,8 @@ def _leveling_row(
         u = len(tilt.reference)
         columns = statistics.followed.columns(ERROR)
         rms = tilt.rms_of_all(statistics.moments.comoment[columns, columns][:u, :u] / n)
-    if (TILT, TILTS[0]) in found:
-        q95 = np.array([float(found[TILT, name].quantile(0.95)) for name in TILTS])
+    if (TILT, TILTS[0]) in distributions:
+        q95 = np.array([float(distributions[TILT, name].quantile(0.95)) for name in TILTS])
     row = _labels(cell)
     for i, angle in enumerate(ANGLES):
         row[f"{angle}_rms_mgon"] = rms[i] / MGON

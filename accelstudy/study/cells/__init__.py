@@ -1,1 +1,0 @@
-"""Cells of a study: one model, scheme and approach each; and how jobs share them."""

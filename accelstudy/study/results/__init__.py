@@ -1,1 +1,0 @@
-"""Results of a study: summary tables, sensitivity, and the page of claims."""
