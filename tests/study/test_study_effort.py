@@ -49,33 +49,21 @@ def test_a_hundred_billion_calibrations_can_be_said():
     assert 100 < found.seconds / 3600 < 5000
 
 
-@pytest.mark.parametrize(
-    ("keys", "words"),
-    [
-        (
-            {
-                "grids": [
-                    grid(
-                        replicates=10**9,
-                        sensor_sigma_mps2=[1e-3 * i for i in range(1, 5000)],
-                    )
-                ]
-            },
-            ["grids", "calibrations", "lower replicates", "keep: summary"],
-        ),
-        (
-            {
-                "grids": [
-                    grid(
-                        sensor_sigma_mps2=[1e-3 * i for i in range(1, 1000)],
-                        gravity_sigma_mps2=[1e-6 * i for i in range(1, 1000)],
-                    )
-                ]
-            },
-            ["grids.0: number of cells: must be from 1 to 100000"],
-        ),
-    ],
-)
+@pytest.mark.parametrize(("keys", "words"), [
+    ({"grids": [grid(replicates=10**9, sensor_sigma_mps2=[1e-3 * i for i in range(1, 5000)])]},
+     ["grids", "calibrations", "lower replicates", "keep: summary"]),
+    (
+        {
+            "grids": [
+                grid(
+                    sensor_sigma_mps2=[1e-3 * i for i in range(1, 1000)],
+                    gravity_sigma_mps2=[1e-6 * i for i in range(1, 1000)],
+                ),
+            ],
+        },
+        ["grids.0: number of cells: must be from 1 to 100000"],
+    ),
+])  # fmt: skip
 def test_what_no_machine_can_do(keys, words):
     with pytest.raises(InputError) as error:
         effort(**keys)
