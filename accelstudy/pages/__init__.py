@@ -137,7 +137,7 @@ def _environment(markup: bool) -> Environment:
         badge=lambda verdict: BADGES[verdict][0],
         colour=lambda verdict: BADGES[verdict][1],
         amount=amount,
-        comma_list=lambda items: comma_list(list(items)),
+        comma_list=lambda items, last="and": comma_list(list(items), last),
         counted=counted,
         number=number,
         p=probability,

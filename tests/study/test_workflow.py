@@ -19,7 +19,7 @@ from study_helpers import NINE, grid
 
 import accelstudy
 from accelstudy.basics.errors import InputError
-from accelstudy.files import provenance
+from accelstudy.files import outputs
 from accelstudy.files.outputs import check_writable
 from accelstudy.files.reading import overlay, read_layer
 from accelstudy.files.tables import read_origin, read_table
@@ -256,7 +256,7 @@ def test_results_cannot_be_written(tmp_path, monkeypatch):
     closed = tmp_path / "closed"
     closed.mkdir(mode=0o500)
     if os.geteuid() == 0:  # whom permission bits do not bind
-        monkeypatch.setattr(provenance.os, "access", lambda path, mode: Path(path) != closed)
+        monkeypatch.setattr(outputs.os, "access", lambda path, mode: Path(path) != closed)
     for folder in (closed / "a" / "b", closed, tmp_path):
         expected = re.escape(f"{folder}: cannot hold results: {closed} is not writable")
         with pytest.raises(InputError, match=f"^{expected}$"):
