@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from calling import refused
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
@@ -146,10 +147,8 @@ def test_47_axis_errors_that_the_norm_of_gravity_does_not_see():
     ("unit_error(angle=nan)", "angle=nan must be a number above 0"),
 ])  # fmt: skip
 def test_what_is_wrong(spec, expected):
-    with pytest.raises(InputError) as error:
+    with refused(expected):
         spoiled(spec)
-    assert expected in str(error.value)
-    assert "\n" not in str(error.value)
 
 
 def test_no_angles_no_unit_of_angles():

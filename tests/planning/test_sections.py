@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from calling import refused
 from places import ROOT
 from snakemake_helpers import jobs, one_line, run_workflow
 
@@ -50,15 +51,13 @@ def case(section, content):
     ("sequential", {"accuracies": 0}, "sequential.accuracies: must be greater"),
 ])  # fmt: skip
 def test_a_section_that_cannot_be_used_is_said_in_a_line(section, content, message):
-    with pytest.raises(InputError) as error:
+    with refused(message):
         parse_section(
             parse_example({"study": "x", section: content}, "file"),
             section,
             CLASSES.get(section, PlanConfig),
             "file",
         )
-    assert message in str(error.value)
-    assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize(("section", "content", "message"), [
@@ -79,10 +78,8 @@ def test_a_section_that_cannot_be_used_is_said_in_a_line(section, content, messa
     ("field", {"restart": True}, "mine.restart: unknown key; did you mean 'restarted'?"),
 ])  # fmt: skip
 def test_a_case_that_cannot_be_used_is_said_in_a_line(section, content, message):
-    with pytest.raises(InputError) as error:
+    with refused(message):
         case(section, content)
-    assert message in str(error.value)
-    assert "\n" not in str(error.value)
 
 
 def test_the_workflow_says_it_too(tmp_path):
