@@ -517,14 +517,12 @@ VALID = st.fixed_dictionaries(
 @given(keys=VALID, size=st.integers(1, 20_000))
 def test_cells_of_any_valid_study(keys, size):
     study = make_study(**keys)
-    assert parse_study(study.model_dump()) == study
     assert parse_study(json.loads(json.dumps(study.model_dump(mode="json")))) == study
 
     cells = study_cells(study)
     assert cells
     assert len({cell.name for cell in cells}) == len(cells)
     for cell in cells:
-        assert Cell.from_dict(cell.to_dict()) == cell
         assert Cell.from_dict(json.loads(json.dumps(cell.to_dict()))) == cell
         assert set(cell.truth) >= set(cell.simulated_model.parameter_names)
     # One cell, one set-up.
