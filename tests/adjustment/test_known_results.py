@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from calling import call
-from places import SHARED
+from places import DATA, needs_data
 from scipy.stats import f as f_distribution
 
 from accelstudy.approaches import get_approach
@@ -24,10 +24,7 @@ from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign
 from accelstudy.sensors.models import get_model
 
-DATA = SHARED / "data"
-pytestmark = pytest.mark.skipif(
-    not DATA.is_dir(), reason=f"needs the public data in {DATA}; set ACCELSTUDY_SHARED"
-)
+pytestmark = needs_data
 
 NINE = "bias-scale-nonorthogonality"
 MG = 1e-3 * STANDARD_GRAVITY

@@ -13,7 +13,7 @@ import yaml
 from calling import refused
 from campaign_helpers import simulated_campaign
 from page_helpers import assert_sound, text_of
-from places import DATA, ROOT
+from places import DATA, ROOT, needs_data
 from snakemake_helpers import ENVIRONMENT, jobs, one_line, remains, run_workflow, snakemake
 from test_import_holds import session, write
 
@@ -313,7 +313,7 @@ def test_what_cannot_be_downloaded_is_reported_and_tried_again(registry, tmp_pat
     assert jobs(succeed(tmp_path, config, "--dry-run")) == {"calibrate": 1, "overview": 1}
 
 
-@pytest.mark.skipif(not DATA.is_dir(), reason=f"needs the public data in {DATA}")
+@needs_data
 def test_public_data_from_a_folder_that_has_them(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     entries = [{"public": name} for name in ("mpu9150-0", "innalabs-24", "ferraris-annotated")]

@@ -11,7 +11,7 @@ import pytest
 from campaign_helpers import GRAVITY, NINE, ROBOT, simulated_campaign
 from hypothesis import given
 from hypothesis import strategies as st
-from places import DATA
+from places import DATA, needs_data
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
@@ -25,8 +25,6 @@ from accelstudy.campaign.session import Campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
-
-needs_data = pytest.mark.skipif(not DATA.is_dir(), reason=f"needs the public data in {DATA}")
 
 
 @pytest.mark.parametrize("approach", [GRAVITY, ROBOT], ids=lambda a: a.name)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from calling import refusal, refused, succeed
-from places import DATA
+from places import DATA, needs_data
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.campaign.format import read_campaign
@@ -96,9 +96,6 @@ def test_the_registry_says_how_a_file_is_read(name):
         assert {*settings.columns} == {"fx", "fy", "fz"}
         assert (settings.scale is not None) == (settings.unit == "counts")
         assert settings.means or settings.rate_hz is not None or settings.time is not None
-
-
-needs_data = pytest.mark.skipif(not DATA.is_dir(), reason=f"needs the public data in {DATA}")
 
 
 @needs_data
