@@ -87,14 +87,10 @@ def test_jacobian_of_many_forces():
     np.testing.assert_allclose(found[2, 3], jacobian(f[2, 3]), rtol=1e-14)
 
 
-def test_sigma_at_level_is_13_mgon():
-    sigma = sigma_roll_pitch(force(0, 0), EQUAL_NOISE) / MGON
-    np.testing.assert_allclose(sigma, 12.98, atol=0.005)
-
-
-def test_sigma_at_a_pitch_of_50_gon():
-    sigma = sigma_roll_pitch(force(0, 50 * GON), EQUAL_NOISE) / MGON
-    np.testing.assert_allclose(sigma, [18.36, 12.98], atol=0.005)
+@pytest.mark.parametrize(("pitch", "expected"), [(0, 12.98), (50, [18.36, 12.98])])
+def test_sigma_of_the_tilt(pitch, expected):
+    sigma = sigma_roll_pitch(force(0, pitch * GON), EQUAL_NOISE) / MGON
+    np.testing.assert_allclose(sigma, expected, atol=0.005)
 
 
 @given(roll=ROLLS, pitch=PITCHES, sigma=st.floats(1e-6, 0.1))
