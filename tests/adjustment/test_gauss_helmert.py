@@ -27,10 +27,7 @@ PEARSON = np.array(
     ]
 ).T
 YORK_WEIGHTS = np.array(
-    [
-        [1000, 1000, 500, 800, 200, 80, 60, 20, 1.8, 1],
-        [1, 1.8, 4, 8, 20, 20, 70, 70, 100, 500],
-    ]
+    [[1000, 1000, 500, 800, 200, 80, 60, 20, 1.8, 1], [1, 1.8, 4, 8, 20, 20, 70, 70, 100, 500]]
 ).T
 YORK_COFACTORS = 1 / YORK_WEIGHTS
 YORK = [5.479910224, -0.480533407]
@@ -428,31 +425,19 @@ def rat43():
 
 
 CERTIFIED = {
-    "Misra1a": (
-        misra1a(),
-        MISRA1A[0],
-        [2.3894212918e02, 5.5015643181e-04],
-        [2.7070075241e00, 7.2668688436e-06],
-        1.2455138894e-01,
-    ),
-    "Rat43": (
-        rat43(),
-        RAT43,
-        [6.9964151270e02, 5.2771253025e00, 7.5962938329e-01, 1.2792483859e00],
-        [1.6302297817e01, 2.0828735829e00, 1.9566123451e-01, 6.8761936385e-01],
-        8.7864049080e03,
-    ),
-}
+    "Misra1a": (misra1a(), MISRA1A[0], [2.3894212918e02, 5.5015643181e-04],
+                [2.7070075241e00, 7.2668688436e-06], 1.2455138894e-01),
+    "Rat43": (rat43(), RAT43, [6.9964151270e02, 5.2771253025e00, 7.5962938329e-01, 1.2792483859e00],
+              [1.6302297817e01, 2.0828735829e00, 1.9566123451e-01, 6.8761936385e-01],
+              8.7864049080e03),
+}  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("problem", "start"),
-    [
-        ("Misra1a", [500.0, 0.0001]),  # NIST's first start, far away
-        ("Misra1a", [250.0, 0.0005]),
-        ("Rat43", [700.0, 5.0, 0.75, 1.3]),  # NIST's second start
-    ],
-)
+@pytest.mark.parametrize(("problem", "start"), [
+    ("Misra1a", [500.0, 0.0001]),  # NIST's first start, far away
+    ("Misra1a", [250.0, 0.0005]),
+    ("Rat43", [700.0, 5.0, 0.75, 1.3]),  # NIST's second start
+])  # fmt: skip
 @pytest.mark.usefixtures("all_digits")
 def test_certified_regression(problem, start):
     equations, y, parameters, sigma, rss = CERTIFIED[problem]

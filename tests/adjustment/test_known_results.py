@@ -14,21 +14,17 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 import pytest
-from click.testing import CliRunner
-from places import SHARED
+from calling import call
+from places import DATA, needs_data
 from scipy.stats import f as f_distribution
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign
-from accelstudy.commands.main import main
 from accelstudy.sensors.models import get_model
 
-DATA = SHARED / "data"
-pytestmark = pytest.mark.skipif(
-    not DATA.is_dir(), reason=f"needs the public data in {DATA}; set ACCELSTUDY_SHARED"
-)
+pytestmark = needs_data
 
 NINE = "bias-scale-nonorthogonality"
 MG = 1e-3 * STANDARD_GRAVITY
@@ -36,36 +32,22 @@ SCALE, OFFSET = 0.0024, np.array([33123, 33275, 32364])
 COUNTS = ("--unit", "counts", "--scale", SCALE, "--offset", ",".join(map(str, OFFSET)))
 MPU_9150 = ("--columns", "fx=0,fy=1,fz=2", "--rate", 100, "--gravity", 9.81)
 IMPORTS = {
-    "xsens": (
-        "imu_tk_xsens/xsens_acc.mat",
-        *("--columns", "fx=1,fy=2,fz=3", "--time", 0, *COUNTS, "--gravity", 9.81744),
-    ),
-    "xsens, white": (
-        "imu_tk_xsens/derived_static_means.csv",
-        *("--means", *COUNTS, "--gravity", 9.81744),
-    ),
+    "xsens": ("imu_tk_xsens/xsens_acc.mat",
+              *("--columns", "fx=1,fy=2,fz=3", "--time", 0, *COUNTS, "--gravity", 9.81744)),
+    "xsens, white": ("imu_tk_xsens/derived_static_means.csv",
+                     *("--means", *COUNTS, "--gravity", 9.81744)),
     **{f"mpu9150 {i}": (f"mpu9150/imu{i}.log", *MPU_9150) for i in range(3)},
-    "ctu 24": (
-        "ctu_innalabs/CalibrationOfLowCostTriaxialInertialSensors.mat",
-        *("--means", "--unit", "g"),
-    ),
-    "ctu 49": (
-        "ctu_innalabs/CalibrationOfLowCostTriaxialInertialSensors50.mat",
-        *("--means", "--unit", "g"),
-    ),
-    "mpu6050": (
-        "mpu6050/example_data_calibration.csv",
-        *("--rate", 100, "--unit", "counts", "--scale", STANDARD_GRAVITY / 16384),
-    ),
-    "phone": (
-        "ctu_innalabs/MobileAccData30orientationRawSample01.mat",
-        *("--rate", 100, "--settings", "short.yaml"),
-    ),
-    "ferraris": (
-        "ferraris/example_ferraris_session.csv",
-        *("--columns", "fx=acc_x,fy=acc_y,fz=acc_z", "--rate", 204.8, "--gravity", 9.81),
-    ),
-}
+    "ctu 24": ("ctu_innalabs/CalibrationOfLowCostTriaxialInertialSensors.mat",
+               *("--means", "--unit", "g")),
+    "ctu 49": ("ctu_innalabs/CalibrationOfLowCostTriaxialInertialSensors50.mat",
+               *("--means", "--unit", "g")),
+    "mpu6050": ("mpu6050/example_data_calibration.csv",
+                *("--rate", 100, "--unit", "counts", "--scale", STANDARD_GRAVITY / 16384)),
+    "phone": ("ctu_innalabs/MobileAccData30orientationRawSample01.mat",
+              *("--rate", 100, "--settings", "short.yaml")),
+    "ferraris": ("ferraris/example_ferraris_session.csv",
+                 *("--columns", "fx=acc_x,fy=acc_y,fz=acc_z", "--rate", 204.8, "--gravity", 9.81)),
+}  # fmt: skip
 SHORT = "shortest_s: 0.2\n"  # the phone was held for 1.5 to 4 s, of which windows take 1.4 s
 
 
@@ -101,10 +83,6 @@ class Outcome(NamedTuple):
         return np.array(affine["gauges"][gauge]), np.array(affine["bias_mps2"])
 
 
-def run(*arguments):
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
-
-
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory):
     """What the import said, and the folder that it wrote; each log is imported once."""
@@ -116,7 +94,7 @@ def campaign(tmp_path_factory):
         file, *options = IMPORTS[name]
         options = [folder / "short.yaml" if o == "short.yaml" else o for o in options]
         out = folder / name
-        result = run("import", DATA / file, "--out", out, "--no-figure", *options)
+        result = call("import", DATA / file, "--out", out, "--no-figure", *options)
         assert result.exit_code == 0, result.output
         return result.output, out
 
@@ -131,7 +109,7 @@ def known(campaign):
     def calibrated(name, model=NINE):
         said, folder = campaign(name)
         out = folder.with_name(f"{name}, {model}")
-        result = run("calibrate", folder, "--model", model, "--out", out)
+        result = call("calibrate", folder, "--model", model, "--out", out)
         assert result.exit_code == 0, result.output
         content = json.loads((out / "calibration.json").read_text(encoding="utf-8"))
         return Outcome(said, result.output, content)
@@ -307,7 +285,7 @@ def six_positions(tmp_path_factory):
     forces = session[["acc_x", "acc_y", "acc_z"]]
     means = pd.DataFrame([forces[s["start"] : s["end"]].mean() for s in sections])
     means.to_csv(folder / "means.csv", index=False)
-    imported = run(
+    imported = call(
         *("import", folder / "means.csv", "--means", "--gravity", 9.81, "--out", folder / "six")
     )
     assert imported.exit_code == 0, imported.output
@@ -315,7 +293,7 @@ def six_positions(tmp_path_factory):
 
 
 def test_ferraris_says_what_six_positions_do_not_determine(six_positions, tmp_path):
-    result = run("calibrate", six_positions, "--out", tmp_path / "out")
+    result = call("calibrate", six_positions, "--out", tmp_path / "out")
     assert result.exit_code == 2
     assert "6 positions do not determine the model" in result.stderr
     assert "alpha_yz, alpha_zy, alpha_zx" in result.stderr
@@ -328,7 +306,7 @@ def test_ferraris_determines_six_parameters(six_positions, tmp_path):
 
     Exactly so if the sensor stood upright; at an angle of ε they differ by g ε²/2.
     """
-    result = run("calibrate", six_positions, "--model", "bias-scale", "--out", tmp_path)
+    result = call("calibrate", six_positions, "--model", "bias-scale", "--out", tmp_path)
     assert result.exit_code == 0, result.output
     assert "no redundancy" in result.output
     content = json.loads((tmp_path / "calibration.json").read_text(encoding="utf-8"))

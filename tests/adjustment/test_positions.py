@@ -78,9 +78,7 @@ def test_variance_components_solve_their_equations_with_whole_matrices(sigma_gra
         NINE,
         ROBOT,
         replace(
-            observed,
-            sigma_force=force * noise.sigma_force,
-            sigma_angle=angle * noise.sigma_angle,
+            observed, sigma_force=force * noise.sigma_force, sigma_angle=angle * noise.sigma_angle
         ),
     )
     n, c, u = solution.jac_parameters.shape
@@ -177,14 +175,10 @@ def examined(request):
     """A campaign with a repeated scheme, all columns and observed gravity."""
     campaign, _ = simulate_campaign(
         CampaignSettings(
-            seed=4,
-            scheme="fibonacci-15",
-            repeats=2,
-            approach=request.param,
-            temperature=(10.0, 40.0),
-            temperature_order="random",
-        )
-    )
+            seed=4, scheme="fibonacci-15", repeats=2, approach=request.param,
+            temperature=(10.0, 40.0), temperature_order="random",
+        ),
+    )  # fmt: skip
     fit = fit_campaign(replace(campaign, sigma_gravity=1e-3), NINE, get_approach(request.param))
     return examine(solve(NINE, fit.approach, fit.observed, fit.adjustment))
 

@@ -183,9 +183,7 @@ def test_variance_components_are_the_fixed_point():
     found = variance_components(NINE, ROBOT, observed)
     force, angle = np.sqrt(found.factors)
     scaled = replace(
-        observed,
-        sigma_force=force * observed.sigma_force,
-        sigma_angle=angle * observed.sigma_angle,
+        observed, sigma_force=force * observed.sigma_force, sigma_angle=angle * observed.sigma_angle
     )
     solution = solve(NINE, ROBOT, scaled)
     shares = redundancy_numbers(solution).observations

@@ -41,16 +41,13 @@ def test_names_of_sources(tmp_path):
         parse_batch({"batch": "x", "campaigns": [{"log": "x" * 300}]})
 
 
-@pytest.mark.parametrize(
-    ("path", "name"),
-    [
-        ("adxl355", "adxl355"),
-        ("../../etc", "etc"),
-        ("a/b c", "a-b c"),
-        ("\x1b[31mred", "-[31mred"),
-        ("Prüfling 7", "Prüfling 7"),
-    ],
-)
+@pytest.mark.parametrize(("path", "name"), [
+    ("adxl355", "adxl355"),
+    ("../../etc", "etc"),
+    ("a/b c", "a-b c"),
+    ("\x1b[31mred", "-[31mred"),
+    ("Prüfling 7", "Prüfling 7"),
+])  # fmt: skip
 def test_a_folder_is_suggested_in_the_folder_where_one_is(path, name):
     assert shlex.split(diagnose(path, "m", "gravity"))[-1] in (
         f"{name}-diagnosis",

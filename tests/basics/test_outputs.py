@@ -9,12 +9,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from calling import call
 from campaign_helpers import simulated_campaign
-from click.testing import CliRunner
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.format import write_campaign
-from accelstudy.commands.main import main
 from accelstudy.files.outputs import (
     CALIBRATION,
     CAMPAIGN,
@@ -245,16 +244,12 @@ def test_two_runs_that_write_one_file_do_not_meet(tmp_path):
 # --- the commands --------------------------------------------------------------------------------
 
 
-def command(*arguments):
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
-
-
 @pytest.fixture(scope="module")
 def measured(tmp_path_factory):
     """A campaign, its calibration, and a log."""
     folder = tmp_path_factory.mktemp("measured")
     write_campaign(simulated_campaign({"b_x": 0.05}), folder / "campaign")
-    result = command("calibrate", folder / "campaign", "--out", folder / "calibrated")
+    result = call("calibrate", folder / "campaign", "--out", folder / "calibrated")
     assert result.exit_code == 0, result.output
     write(
         folder,
@@ -286,12 +281,12 @@ def test_commands_overwrite_nothing(measured, tmp_path, name):
         if name != "import":
             (out / "campaign.yaml").unlink()
     before = content(tmp_path)
-    result = command(*commands(measured, out)[name])
+    result = call(*commands(measured, out)[name])
     assert (result.exit_code, result.stderr.count("\n")) == (2, 1), result.output
     assert "--force" in result.stderr
     assert content(tmp_path) == before
     if name != "diagnose":  # it takes seconds, and is done below
-        result = command(*commands(measured, out)[name], "--force")
+        result = call(*commands(measured, out)[name], "--force")
         assert result.exit_code == 0, result.output
         assert out.read_text() != "mine" if out.is_file() else (out / "mine").read_text() == "mine"
 
@@ -300,7 +295,7 @@ def test_commands_overwrite_nothing(measured, tmp_path, name):
 def test_commands_write_nothing_into_input(measured, name):
     before = content(measured)
     target = measured / ("campaign" if name != "import" else "")
-    result = command(*commands(measured, target)[name], "--force")
+    result = call(*commands(measured, target)[name], "--force")
     assert (result.exit_code, result.stderr.count("\n")) == (2, 1), result.output
     assert "input" in result.stderr
     assert content(measured) == before
@@ -308,7 +303,7 @@ def test_commands_write_nothing_into_input(measured, name):
 
 def test_an_error_of_reading_names_what_was_read(measured, tmp_path):
     calibration = measured / "calibrated/calibration.json"
-    result = command("apply", calibration, "/proc/self/mem", "--out", tmp_path / "out.csv")
+    result = call("apply", calibration, "/proc/self/mem", "--out", tmp_path / "out.csv")
     assert result.stderr == "error: /proc/self/mem: cannot be read: Input/output error\n"
     assert content(tmp_path) == {}
 
@@ -318,7 +313,7 @@ def test_a_pipe_is_not_taken_for_the_output(measured, tmp_path):
     os.write(start, (measured / "calibrated/calibration.json").read_bytes())
     os.close(start)
     out = tmp_path / "out.csv"
-    result = command("apply", f"/dev/fd/{end}", measured / "log.csv", "--out", out)
+    result = call("apply", f"/dev/fd/{end}", measured / "log.csv", "--out", out)
     os.close(end)
     assert result.exit_code == 0, result.output
     assert out.is_file()
@@ -333,7 +328,7 @@ def test_a_full_disk_is_one_line(measured, tmp_path, name, room):
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (room, limits[1]))
     try:
-        result = command(*commands(measured, tmp_path / "a/out")[name])
+        result = call(*commands(measured, tmp_path / "a/out")[name])
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert (result.exit_code, result.stderr.count("\n")) == (2, 1), repr(result.exception)

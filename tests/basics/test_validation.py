@@ -21,16 +21,13 @@ class Plan(Block):
     names: tuple[str, ...] = ()
 
 
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [
-        ({"grid": {"size": 0}}, "grid.size: must be at least 1, not 0"),
-        ({"grid": {"sise": 1, "size": 1}}, "grid.sise: unknown key; did you mean 'size'? (known:"),
-        ({}, "grid: must be given"),
-        ({"grid": [1]}, "grid: expected keys and values, not [1]"),
-        ({"grid": {"size": 0}, "names": 3}, "(and 1 more)"),
-    ],
-)
+@pytest.mark.parametrize(("content", "said"), [
+    ({"grid": {"size": 0}}, "grid.size: must be at least 1, not 0"),
+    ({"grid": {"sise": 1, "size": 1}}, "grid.sise: unknown key; did you mean 'size'? (known:"),
+    ({}, "grid: must be given"),
+    ({"grid": [1]}, "grid: expected keys and values, not [1]"),
+    ({"grid": {"size": 0}, "names": 3}, "(and 1 more)"),
+])  # fmt: skip
 def test_an_error_is_one_line_with_source_and_key(content, said):
     for section, start in (("", "plan.yaml: "), ("case", "plan.yaml: case.")):
         with pytest.raises(InputError) as error:
@@ -49,38 +46,20 @@ def test_no_mapping_at_all_has_no_key():
 
 
 ERRORS_OF = {
-    "any": "",
-    "bool": "bool_type bool_parsing",
-    "dataclass": "dataclass_type",
-    "dataclass-args": "missing",
-    "dataclass-field": "",
-    "default": "",
-    "definition-ref": "",
-    "definitions": "",
-    "dict": "dict_type",
-    "float": "float_type float_parsing finite_number",
-    "function-after": "",
-    "function-before": "",
-    "int": "int_type int_parsing int_parsing_size int_from_float",
-    "list": "list_type",
-    "literal": "literal_error",
-    "model": "model_type",
-    "model-field": "",
-    "model-fields": "missing",
-    "nullable": "",
-    "str": "string_type string_unicode",
-    "tuple": "tuple_type too_short too_long missing",
-    "union": "",
-}
+    "any": "", "bool": "bool_type bool_parsing", "dataclass": "dataclass_type",
+    "dataclass-args": "missing", "dataclass-field": "", "default": "", "definition-ref": "",
+    "definitions": "", "dict": "dict_type", "float": "float_type float_parsing finite_number",
+    "function-after": "", "function-before": "",
+    "int": "int_type int_parsing int_parsing_size int_from_float", "list": "list_type",
+    "literal": "literal_error", "model": "model_type", "model-field": "", "model-fields": "missing",
+    "nullable": "", "str": "string_type string_unicode",
+    "tuple": "tuple_type too_short too_long missing", "union": "",
+}  # fmt: skip
 """Errors of pydantic by the type of a part of a model; those of functions are ours."""
 ERRORS_OF_BOUND = {
-    "gt": "greater_than",
-    "ge": "greater_than_equal",
-    "lt": "less_than",
-    "le": "less_than_equal",
-    "min_length": "too_short string_too_short",
-    "max_length": "too_long string_too_long",
-}
+    "gt": "greater_than", "ge": "greater_than_equal", "lt": "less_than", "le": "less_than_equal",
+    "min_length": "too_short string_too_short", "max_length": "too_long string_too_long",
+}  # fmt: skip
 
 
 def models():

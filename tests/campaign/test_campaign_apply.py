@@ -9,6 +9,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from calling import refused
 from campaign_helpers import GRAVITY, NINE, ROBOT, simulated_campaign
 from scipy.io import savemat
 
@@ -89,10 +90,8 @@ def test_sigmas_of_leveling_hold_over_calibrations_and_readings(plain):
 def test_what_is_no_calibration_is_one_line(tmp_path, content):
     path = tmp_path / "calibration.json"
     path.write_text(content, encoding="utf-8")
-    with pytest.raises(InputError) as error:
+    with refused(str(path)):
         read_calibration(path)
-    assert str(path) in str(error.value)
-    assert "\n" not in str(error.value)
     with pytest.raises(InputError, match="no such file"):
         read_calibration(tmp_path / "none.json")
     with pytest.raises(InputError, match="a folder; give the calibration"):
@@ -121,13 +120,9 @@ def fitted(folder, effects, values, approach=GRAVITY, scheme="fibonacci-30", **c
     drawn = simulated.draw(Noise(sigma_force=SIGMA, sigma_angle=0.1 * MGON), 1, rng)
     angles = {"angles": drawn.angles[0], "sigma_angle": 0.1 * MGON} if approach is ROBOT else {}
     campaign = Campaign(
-        name="extended",
-        positions=np.arange(1, n + 1),
-        forces=drawn.forces[0],
-        gravity=simulated.gravity,
-        sigma_force=SIGMA,
-        **{**conditions, **angles, **changes},
-    )
+        name="extended", positions=np.arange(1, n + 1), forces=drawn.forces[0],
+        gravity=simulated.gravity, sigma_force=SIGMA, **{**conditions, **angles, **changes},
+    )  # fmt: skip
     fit = fit_campaign(campaign, model, approach)
     path = folder / "calibration.json"
     path.write_text(json.dumps(calibration_document(fit), allow_nan=False), encoding="utf-8")
@@ -155,17 +150,14 @@ def errors_of(path, attitudes=ATTITUDES):
     return found - attitudes / MGON, table[["sigma_roll_mgon", "sigma_pitch_mgon"]].to_numpy()
 
 
-@pytest.mark.parametrize(
-    ("effects", "values", "columns"),
-    [
-        ("thermal_bias", {"b_T_x": 2e-3, "b_T_y": -3e-3}, {"temperature": np.linspace(16, 34, 40)}),
-        ("thermal_scale", {"s_T_x": 2e-4, "s_T_z": 1e-4}, {"temperature": np.linspace(16, 34, 40)}),
-        ("warm_up(tau=200)", {"w_x": 0.05, "w_y": 0.03}, {"time": np.linspace(0, 3000, 40)}),
-        ("bias_jump(t=300)", {"c_x": 0.03, "c_z": 0.02}, {"time": np.linspace(0, 580, 40)}),
-        ("bias_drift", {"d_x": 5e-5, "d_y": -4e-5}, {"time": np.linspace(0, 600, 40)}),
-        ("vibration_rectification", {"K_vre_x": 5e-3}, {"vibration": np.linspace(0, 2, 40)}),
-    ],
-)
+@pytest.mark.parametrize(("effects", "values", "columns"), [
+    ("thermal_bias", {"b_T_x": 2e-3, "b_T_y": -3e-3}, {"temperature": np.linspace(16, 34, 40)}),
+    ("thermal_scale", {"s_T_x": 2e-4, "s_T_z": 1e-4}, {"temperature": np.linspace(16, 34, 40)}),
+    ("warm_up(tau=200)", {"w_x": 0.05, "w_y": 0.03}, {"time": np.linspace(0, 3000, 40)}),
+    ("bias_jump(t=300)", {"c_x": 0.03, "c_z": 0.02}, {"time": np.linspace(0, 580, 40)}),
+    ("bias_drift", {"d_x": 5e-5, "d_y": -4e-5}, {"time": np.linspace(0, 600, 40)}),
+    ("vibration_rectification", {"K_vre_x": 5e-3}, {"vibration": np.linspace(0, 2, 40)}),
+])  # fmt: skip
 def test_what_depends_on_conditions_is_corrected_by_those_of_the_row(
     tmp_path, effects, values, columns
 ):
@@ -264,14 +256,11 @@ def test_what_depends_on_the_position_before_is_left_and_said(tmp_path):
     np.testing.assert_allclose(found, nine, atol=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("effects", "values"),
-    [
-        ("base_tilt", {"tilt_a": 5e-3, "tilt_b": -3e-3}),
-        ("encoder_scale", {"e_roll": 1e-3, "e_pitch": -1e-3}),
-        ("mounting_rotation", {"eps_x": 0.01, "eps_y": -0.02, "eps_z": 0.015}),
-    ],
-)
+@pytest.mark.parametrize(("effects", "values"), [
+    ("base_tilt", {"tilt_a": 5e-3, "tilt_b": -3e-3}),
+    ("encoder_scale", {"e_roll": 1e-3, "e_pitch": -1e-3}),
+    ("mounting_rotation", {"eps_x": 0.01, "eps_y": -0.02, "eps_z": 0.015}),
+])  # fmt: skip
 def test_the_sensor_takes_along_what_is_its_own(tmp_path, effects, values):
     """What the rig had is left with it; the rotation against the flange is taken along."""
     own = values if effects == "mounting_rotation" else {}
@@ -410,26 +399,16 @@ def test_parquet_keeps_its_types(plain, tmp_path):
     assert text[2].startswith("2,2.5,9.5,,1970-01-01 00:00:00.000000001,")
 
 
-@pytest.mark.parametrize(
-    ("name", "content", "words"),
-    [
-        ("log.csv", "fx,fy,fz,fz\n1,2,9,9\n", "which column is fz"),
-        ("log.csv", "fx,fy,fz\n", "no line of numbers"),
-        (
-            "log.csv",
-            "fx,fy,fz\n0.1,0.2,-1\n0.5,0.5,-0.8\n",
-            "about 1.02 m.s.2: these look like g; give --unit g",
-        ),
-        (
-            "log.csv",
-            "fx,fy,fz\n100,200,9000\n0,9100,100\n1,2,9\n",
-            "give the --unit or the --columns",
-        ),
-        ("log.csv", "fx,fy,fz\n" + 2 * "0,0,-1000\n" + "1,2,-9\n", "nowhere near gravity"),
-        ("log.csv", "a,b,c,d\n1,2,9,9\n", "which column is fx"),
-        ("log.parquet", "fx,fy,fz\n1,2,9\n", "not a whole Parquet file"),
-    ],
-)
+@pytest.mark.parametrize(("name", "content", "words"), [
+    ("log.csv", "fx,fy,fz,fz\n1,2,9,9\n", "which column is fz"),
+    ("log.csv", "fx,fy,fz\n", "no line of numbers"),
+    ("log.csv", "fx,fy,fz\n0.1,0.2,-1\n0.5,0.5,-0.8\n",
+     "about 1.02 m.s.2: these look like g; give --unit g"),
+    ("log.csv", "fx,fy,fz\n100,200,9000\n0,9100,100\n1,2,9\n", "give the --unit or the --columns"),
+    ("log.csv", "fx,fy,fz\n" + 2 * "0,0,-1000\n" + "1,2,-9\n", "nowhere near gravity"),
+    ("log.csv", "a,b,c,d\n1,2,9,9\n", "which column is fx"),
+    ("log.parquet", "fx,fy,fz\n1,2,9\n", "not a whole Parquet file"),
+])  # fmt: skip
 def test_a_bad_log_leaves_nothing_behind(plain, tmp_path, name, content, words):
     log = tmp_path / name
     log.write_text(content, encoding="utf-8")
@@ -442,15 +421,9 @@ def test_a_bad_log_leaves_nothing_behind(plain, tmp_path, name, content, words):
 @pytest.mark.parametrize("chunk_size", [2, 100])
 def test_a_lost_sample_does_not_lose_the_log(plain, log, tmp_path, chunk_size):
     rows = [
-        "1,2,9,a",
-        "# a comment",
-        "1,2,,b",
-        "1,2,nan,c",
-        "1,2",
-        "1,2,9,d,1,2,9",
-        "1,-,9,e",
+        "1,2,9,a", "# a comment", "1,2,,b", "1,2,nan,c", "1,2", "1,2,9,d,1,2,9", "1,-,9,e",
         "1,2,9,f",
-    ]
+    ]  # fmt: skip
     log.write_text("fx,fy,fz,note\n" + "\n".join(rows) + "\n", encoding="utf-8")
     leveled = level_log(plain, log, tmp_path / "out.csv", chunk_size=chunk_size)
     found = pd.read_csv(tmp_path / "out.csv", dtype=str, keep_default_na=False)
@@ -467,16 +440,13 @@ def test_a_lost_sample_does_not_lose_the_log(plain, log, tmp_path, chunk_size):
 
 
 @pytest.mark.parametrize("wanted", ["out.csv.gz", "out.pq"])
-@pytest.mark.parametrize(
-    ("name", "text"),
-    [
-        ("blank.log", "{x} {y} {z} 5\n"),
-        ("semicolon.csv", "{x};{y};{z};5\n"),
-        ("comma.csv", "{x};{y};{z};5,0\n"),
-        ("tab.txt", "{x}\t{y}\t{z}\t5\n"),
-        ("packed.csv.gz", "{x},{y},{z},5\n"),
-    ],
-)
+@pytest.mark.parametrize(("name", "text"), [
+    ("blank.log", "{x} {y} {z} 5\n"),
+    ("semicolon.csv", "{x};{y};{z};5\n"),
+    ("comma.csv", "{x};{y};{z};5,0\n"),
+    ("tab.txt", "{x}\t{y}\t{z}\t5\n"),
+    ("packed.csv.gz", "{x},{y},{z},5\n"),
+])  # fmt: skip
 def test_any_layout_that_import_reads_is_leveled(plain, tmp_path, name, text, wanted):
     log = tmp_path / name
     forces = mixed_log()[["fx", "fy", "fz"]].to_numpy(float)
@@ -495,11 +465,7 @@ def test_any_layout_that_import_reads_is_leveled(plain, tmp_path, name, text, wa
         assert [*found][:4] == [f"column_{i}" for i in range(4)]
         np.testing.assert_array_equal(found[["column_0", "column_1", "column_2"]], forces)
         assert (found["column_3"] == 5).all()
-        np.testing.assert_allclose(
-            calibrated_in(found),
-            plain.correct(forces),
-            atol=1e-9,
-        )
+        np.testing.assert_allclose(calibrated_in(found), plain.correct(forces), atol=1e-9)
 
 
 def test_a_matlab_array_is_leveled(plain, tmp_path):
@@ -509,11 +475,7 @@ def test_a_matlab_array_is_leveled(plain, tmp_path):
     known = replace(plain, log=LogLayout(variable="acc", unit="g", rate_hz=100))
     level_log(known, log, tmp_path / "out.csv")
     found = read_back(tmp_path / "out.csv")
-    np.testing.assert_allclose(
-        calibrated_in(found),
-        plain.correct(forces),
-        atol=1e-8,
-    )
+    np.testing.assert_allclose(calibrated_in(found), plain.correct(forces), atol=1e-8)
 
 
 def test_a_single_reading_is_as_noisy_as_within_the_holds(tmp_path):
@@ -576,10 +538,7 @@ def test_a_reading_at_the_end_of_the_range_is_no_measurement(plain, tmp_path):
     values = {"k_sat_x": 1.0, "k_sat_y": 1.0, "k_sat_z": 1.0}
     model = get_model("bias-scale-nonorthogonality+saturation(knee=9)")
     clipping = replace(
-        plain,
-        model=model,
-        parameters=model.vector(values),
-        covariance=np.zeros((12, 12)),
+        plain, model=model, parameters=model.vector(values), covariance=np.zeros((12, 12))
     )
     ranged = replace(plain, content={**plain.content, "range_mps2": 9.05})
     (tmp_path / "log.csv").write_text("fx,fy,fz\n0,0,-9.05\n1,5,-8\n", encoding="utf-8")

@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from calling import refused
 from campaign_helpers import simulated_campaign
 from page_helpers import assert_sound, text_of
-from places import DATA, ROOT
+from places import DATA, ROOT, needs_data
 from snakemake_helpers import ENVIRONMENT, jobs, one_line, remains, run_workflow, snakemake
 from test_import_holds import session, write
 
 import accelstudy
-from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
 from accelstudy.campaign.batch.config import Task, parse_batch
 from accelstudy.campaign.batch.overview import (
@@ -72,18 +72,12 @@ def write_log(folder):
 
 BATCH = {
     "batch": "bench",
-    "campaigns": [
-        {"campaign": "campaigns/*"},
-        {"campaign": "campaigns/aided", "approach": "robot"},
-        {"campaign": "campaigns/aided", "name": "six", "model": "bias-scale"},
-        {
-            "log": "log.parquet",
-            "name": "session",
-            "import": {"rate_hz": 100},
-            "gravity": {"value_mps2": 9.81},
-        },
-    ],
-}
+    "campaigns": [{"campaign": "campaigns/*"},
+                  {"campaign": "campaigns/aided", "approach": "robot"},
+                  {"campaign": "campaigns/aided", "name": "six", "model": "bias-scale"},
+                  {"log": "log.parquet", "name": "session", "import": {"rate_hz": 100},
+                   "gravity": {"value_mps2": 9.81}}],
+}  # fmt: skip
 NAMES = ["plain", "spoilt", "aided", "six", "session"]
 
 
@@ -319,7 +313,7 @@ def test_what_cannot_be_downloaded_is_reported_and_tried_again(registry, tmp_pat
     assert jobs(succeed(tmp_path, config, "--dry-run")) == {"calibrate": 1, "overview": 1}
 
 
-@pytest.mark.skipif(not DATA.is_dir(), reason=f"needs the public data in {DATA}")
+@needs_data
 def test_public_data_from_a_folder_that_has_them(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     entries = [{"public": name} for name in ("mpu9150-0", "innalabs-24", "ferraris-annotated")]
@@ -373,38 +367,28 @@ def test_patterns(tmp_path, monkeypatch):
     assert [task.source for task in parse_batch(content).tasks()] == ["all/file.csv", "[1].csv"]
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"campaings": []}, "campaings: unknown key; did you mean 'campaigns'?"),
-        ({"campaigns": []}, "campaigns: must not be empty, not []"),
-        ({"campaigns": [{}]}, "campaigns.0: give exactly one of campaign, log, public"),
-        ({"campaigns": [{"log": "a", "public": "b"}]}, "campaigns.0: give exactly one of"),
-        ({"campaigns": [{"logg": "a"}]}, "campaigns.0.logg: unknown key; did you mean 'log'?"),
-        ({"campaigns": [{"campaign": "a", "import": {}}]}, "campaigns.0: import: goes with log"),
-        (
-            {"campaigns": [{"log": "a", "import": {"rate": 100}}]},
-            "campaigns.0.import.rate: unknown key; did you mean 'rate_hz'?",
-        ),
-        ({"campaigns": [{"log": "a", "name": "a/b"}]}, "campaigns.0.name: "),
-        ({"campaigns": [{"public": "xsens"}]}, "campaigns.0: unknown public data 'xsens'; did you"),
-        ({"campaigns": [{"public": "ferraris-sections"}]}, "hold no forces"),
-        ({"campaigns": [{"log": "a", "model": "six"}]}, "campaigns.0: unknown model 'six'"),
-        ({"approach": "gravty"}, "unknown approach 'gravty'; did you mean 'gravity'?"),
-        ({"campaigns": [{"campaign": "no/*"}]}, "campaigns.0: no folder matches no/*"),
-        (
-            {"campaigns": [{"campaign": "x/a"}, {"log": "y/a.csv"}]},
-            "campaigns: x/a and y/a.csv are both named 'a'; give one another `name`",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("change", "message"), [
+    ({"campaings": []}, "campaings: unknown key; did you mean 'campaigns'?"),
+    ({"campaigns": []}, "campaigns: must not be empty, not []"),
+    ({"campaigns": [{}]}, "campaigns.0: give exactly one of campaign, log, public"),
+    ({"campaigns": [{"log": "a", "public": "b"}]}, "campaigns.0: give exactly one of"),
+    ({"campaigns": [{"logg": "a"}]}, "campaigns.0.logg: unknown key; did you mean 'log'?"),
+    ({"campaigns": [{"campaign": "a", "import": {}}]}, "campaigns.0: import: goes with log"),
+    ({"campaigns": [{"log": "a", "import": {"rate": 100}}]},
+     "campaigns.0.import.rate: unknown key; did you mean 'rate_hz'?"),
+    ({"campaigns": [{"log": "a", "name": "a/b"}]}, "campaigns.0.name: "),
+    ({"campaigns": [{"public": "xsens"}]}, "campaigns.0: unknown public data 'xsens'; did you"),
+    ({"campaigns": [{"public": "ferraris-sections"}]}, "hold no forces"),
+    ({"campaigns": [{"log": "a", "model": "six"}]}, "campaigns.0: unknown model 'six'"),
+    ({"approach": "gravty"}, "unknown approach 'gravty'; did you mean 'gravity'?"),
+    ({"campaigns": [{"campaign": "no/*"}]}, "campaigns.0: no folder matches no/*"),
+    ({"campaigns": [{"campaign": "x/a"}, {"log": "y/a.csv"}]},
+     "campaigns: x/a and y/a.csv are both named 'a'; give one another `name`"),
+])  # fmt: skip
 def test_one_line_for_a_wrong_key(change, message):
     content = {"batch": "b", "campaigns": [{"campaign": "a"}], **change}
-    with pytest.raises(InputError) as caught:
+    with refused(message, start="batch.yaml: "):
         parse_batch(content, "batch.yaml")
-    assert str(caught.value).startswith("batch.yaml: ")
-    assert message in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 def test_the_workflow_says_it(tmp_path):

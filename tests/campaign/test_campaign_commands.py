@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from campaign_helpers import GRAVITY, NINE, refusal, run, simulated_campaign, succeed
+from calling import call, refusal, succeed
+from campaign_helpers import GRAVITY, NINE, simulated_campaign
 from page_helpers import assert_sound, text_of
 
 from accelstudy.campaign.calibration.assessment import assess
@@ -155,7 +156,7 @@ def test_a_bumped_position_is_named(tmp_path):
 def test_understated_noise_is_said(tmp_path):
     drawn = simulated_campaign(TRUTH, noise=Noise(sigma_force=0.006), sigma=0.002)
     write_campaign(drawn, tmp_path / "loud")
-    result = run("calibrate", tmp_path / "loud", "--out", tmp_path / "out")
+    result = call("calibrate", tmp_path / "loud", "--out", tmp_path / "out")
     assert "understated, or an effect is missing" in result.output
 
 
@@ -201,7 +202,7 @@ def test_near_the_pole_the_rows_say_that_their_sigmas_do_not_hold(calibrations, 
     log, out = tmp_path / "log.csv", tmp_path / "level.csv"
     pd.DataFrame(readings, columns=["fx", "fy", "fz"]).to_csv(log, index=False)
     calibration = calibrations["robot"][1] / "calibration.json"
-    result = run("apply", calibration, log, "--out", out, "--sigma", sigma)
+    result = call("apply", calibration, log, "--out", out, "--sigma", sigma)
     assert "use the calibrated force" in result.output
     level = pd.read_csv(out)
     near = level["near_pole"].to_numpy()
@@ -235,7 +236,7 @@ def test_what_cannot_be_a_sensor_is_said(tmp_path):
         table, campaign = tmp_path / "means.csv", tmp_path / "c"
         pd.DataFrame(read, columns=names).to_csv(table, index=False)
         options = "--unit", "counts", "--scale", factor * scale, "--offset", 0, "--force"
-        imported = run("import", table, "--means", "--out", campaign, *options).output
+        imported = call("import", table, "--means", "--out", campaign, *options).output
         assert ("49 % less than gravity" in imported) == (said == "s_x")
         assert ("check --scale and --offset" in imported) == (said == "s_x")
         measured = read_campaign(campaign)
@@ -265,10 +266,10 @@ def test_a_bad_log_is_one_line(calibrations, tmp_path):
         assert not (tmp_path / "x.csv").exists()
     log.write_text("1,2,9\n", encoding="utf-8")
     arguments = "apply", calibration, log, "--out", tmp_path / "x.csv"
-    assert "--columns: expected fx=1" in run(*arguments, "--columns", "0,1,2").stderr
-    assert run(*arguments, "--columns", "fx=1,fy=0,fz=2", "--unit", "m/s^2").exit_code == 0
-    assert "--force" in run(*arguments).stderr
-    assert "is the input" in run(*arguments[:4], log, "--force").stderr
+    assert "--columns: expected fx=1" in call(*arguments, "--columns", "0,1,2").stderr
+    assert call(*arguments, "--columns", "fx=1,fy=0,fz=2", "--unit", "m/s^2").exit_code == 0
+    assert "--force" in call(*arguments).stderr
+    assert "is the input" in call(*arguments[:4], log, "--force").stderr
     assert log.read_text(encoding="utf-8") == "1,2,9\n"
 
 
@@ -283,14 +284,11 @@ def test_check_sigmas(campaign):
     assert "alpha_zx" in result.output
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["calibrate", "nowhere", "--out", "out"],
-        ["export", "nowhere.json"],
-        ["check-sigmas", "nowhere"],
-    ],
-)
+@pytest.mark.parametrize("arguments", [
+    ["calibrate", "nowhere", "--out", "out"],
+    ["export", "nowhere.json"],
+    ["check-sigmas", "nowhere"],
+])  # fmt: skip
 def test_what_is_not_there_is_one_line(arguments, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     line = refusal(*arguments)

@@ -11,7 +11,7 @@ import pytest
 from campaign_helpers import GRAVITY, NINE, ROBOT, simulated_campaign
 from hypothesis import given
 from hypothesis import strategies as st
-from places import DATA
+from places import DATA, needs_data
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
@@ -25,8 +25,6 @@ from accelstudy.campaign.session import Campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
-
-needs_data = pytest.mark.skipif(not DATA.is_dir(), reason=f"needs the public data in {DATA}")
 
 
 @pytest.mark.parametrize("approach", [GRAVITY, ROBOT], ids=lambda a: a.name)
@@ -107,14 +105,11 @@ def calibration_in(unit, nominal=None):
     }
 
 
-@pytest.mark.parametrize(
-    ("unit", "nominal"),
-    [
-        ("m/s^2", None),
-        ("g", None),
-        ("counts", {"scale": [0.02, 0.021, 0.019], "offset": [33000, 33100, 32900]}),
-    ],
-)
+@pytest.mark.parametrize(("unit", "nominal"), [
+    ("m/s^2", None),
+    ("g", None),
+    ("counts", {"scale": [0.02, 0.021, 0.019], "offset": [33000, 33100, 32900]}),
+])  # fmt: skip
 def test_the_device_matrix_takes_raw_readings(unit, nominal):
     calibration = calibration_in(unit, nominal)
     matrix = device_matrix(calibration)
@@ -145,14 +140,11 @@ def campaign_of(forces, gravity, sigma=None):
 
 
 @needs_data
-@pytest.mark.parametrize(
-    ("imu", "scale", "bias", "myz_deg", "mxz", "mxy"),
-    [
-        (0, (0.363, 0.315, 0.647), (0.103, 0.097, 0.344), 0.123, 0.317, 0.02),
-        (1, (0.471, 0.482, 0.932), (0.09, 0.07, 0.338), -0.284, 0.145, -0.01),
-        (2, (0.382, 0.355, 0.780), (0.096, 0.008, -0.045), 0.26, 0.282, -0.012),
-    ],
-)
+@pytest.mark.parametrize(("imu", "scale", "bias", "myz_deg", "mxz", "mxy"), [
+    (0, (0.363, 0.315, 0.647), (0.103, 0.097, 0.344), 0.123, 0.317, 0.02),
+    (1, (0.471, 0.482, 0.932), (0.09, 0.07, 0.338), -0.284, 0.145, -0.01),
+    (2, (0.382, 0.355, 0.780), (0.096, 0.008, -0.045), 0.26, 0.282, -0.012),
+])  # fmt: skip
 def test_mpu9150_agrees_with_its_authors(imu, scale, bias, myz_deg, mxz, mxy):
     forces = public_means(f"mpu9150/derived_static_means_imu{imu}.csv")
     fit = fit_campaign(campaign_of(forces, 9.81), NINE, GRAVITY)

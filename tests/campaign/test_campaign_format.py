@@ -30,26 +30,15 @@ def campaign(**changes):
     n = len(ROLL)
     noise = np.random.default_rng(1).normal(0, 0.02, (n, 3))
     everything = Campaign(
-        name="small",
-        sensor="a sensor",
-        positions=np.arange(1, n + 1),
-        forces=np.column_stack(specific_force(ROLL * GON, PITCH * GON, G)) + noise,
-        gravity=G,
-        sigma_gravity=1e-5,
-        sigma_force=0.002,
-        angles=np.column_stack([ROLL, PITCH]) * GON,
-        sigma_angle=3.2 * MGON,
-        n_samples=np.full(n, 200),
-        sd=np.full((n, 3), 0.03),
-        slope=noise / 100,
-        sd_slope=np.full((n, 3), 1e-4),
-        full_range=20.0,
+        name="small", sensor="a sensor", positions=np.arange(1, n + 1),
+        forces=np.column_stack(specific_force(ROLL * GON, PITCH * GON, G)) + noise, gravity=G,
+        sigma_gravity=1e-5, sigma_force=0.002, angles=np.column_stack([ROLL, PITCH]) * GON,
+        sigma_angle=3.2 * MGON, n_samples=np.full(n, 200), sd=np.full((n, 3), 0.03),
+        slope=noise / 100, sd_slope=np.full((n, 3), 1e-4), full_range=20.0,
         log=LogLayout(columns={"fx": 0, "fy": "b", "fz": 2}, rate_hz=100, frame="flu"),
-        time=10.0 * np.arange(n),
-        temperature=np.linspace(-5, 30, n),
-        vibration=np.full(n, 0.001),
+        time=10.0 * np.arange(n), temperature=np.linspace(-5, 30, n), vibration=np.full(n, 0.001),
         yaw=np.linspace(-1, 1, n),
-    )
+    )  # fmt: skip
     return replace(everything, **changes)
 
 
@@ -97,13 +86,10 @@ def test_holds_that_are_left_out_stay_in_the_file_and_in_the_history(tmp_path):
     assert untimed.hold.order.tolist() == [1, 2, 4, 5, 6, 7]
 
 
-@pytest.mark.parametrize(
-    ("reasons", "message"),
-    [
-        ({9: "moved"}, "excluded: there is no position 9"),
-        (dict.fromkeys(range(1, 9), "moved"), "excluded: no position is left"),
-    ],
-)
+@pytest.mark.parametrize(("reasons", "message"), [
+    ({9: "moved"}, "excluded: there is no position 9"),
+    (dict.fromkeys(range(1, 9), "moved"), "excluded: no position is left"),
+])  # fmt: skip
 def test_what_cannot_be_left_out(reasons, message):
     with pytest.raises(InputError, match=message):
         campaign().without(reasons)
@@ -130,25 +116,18 @@ def campaigns(draw):
     return Campaign(
         name=draw(st.text(st.characters(exclude_categories=["Cs"]), min_size=1)),
         sensor=maybe(draw(st.text(st.characters(exclude_categories=["Cs"])))),
-        positions=np.cumsum(rng.integers(1, 3, n)),
-        forces=forces,
-        gravity=gravity,
-        sigma_gravity=draw(st.just(0.0) | floats(1e-9, 1e-3)),
-        unit=unit,
+        positions=np.cumsum(rng.integers(1, 3, n)), forces=forces, gravity=gravity,
+        sigma_gravity=draw(st.just(0.0) | floats(1e-9, 1e-3)), unit=unit,
         sigma_force=maybe(draw(floats(1e-6, 1))),
         angles=np.column_stack([roll, pitch]) if robot else None,
         sigma_angle=draw(st.just(0.0) | floats(1e-9, 1e-3)) if robot else None,
-        yaw=rng.normal(size=n) if robot else None,
-        n_samples=maybe(rng.integers(1, 10**6, n)),
-        sd=maybe(rng.uniform(0, 1, (n, 3))),
-        slope=maybe(rng.normal(0, 1e-3, (n, 3))),
-        sd_slope=maybe(rng.uniform(0, 1e-3, (n, 3))),
-        full_range=maybe(draw(floats(20, 200))),
-        time=maybe(np.cumsum(rng.uniform(0, 60, n))),
-        temperature=maybe(rng.uniform(-40, 85, n)),
+        yaw=rng.normal(size=n) if robot else None, n_samples=maybe(rng.integers(1, 10**6, n)),
+        sd=maybe(rng.uniform(0, 1, (n, 3))), slope=maybe(rng.normal(0, 1e-3, (n, 3))),
+        sd_slope=maybe(rng.uniform(0, 1e-3, (n, 3))), full_range=maybe(draw(floats(20, 200))),
+        time=maybe(np.cumsum(rng.uniform(0, 60, n))), temperature=maybe(rng.uniform(-40, 85, n)),
         vibration=maybe(rng.uniform(0, 1, n)),
         nominal=Conversion(scale, offset) if unit == "counts" else None,
-    )
+    )  # fmt: skip
 
 
 @given(campaigns(), st.sampled_from(["csv", "parquet"]))
@@ -347,11 +326,8 @@ BAD = {
     "odd tag": (text("campaign.yaml", "a: !!int ''"), "tag does not fit"),
     "empty YAML": (text("campaign.yaml", ""), "not a mapping"),
     "unknown key": (header(sensr="x"), "sensr: unknown key", "did you mean 'sensor'"),
-    "unknown key below": (
-        header(gravity={"value_mps2": 9.8, "sigma": 0}),
-        "gravity.sigma: unknown key",
-        "did you mean 'sigma_mps2'",
-    ),
+    "unknown key below": (header(gravity={"value_mps2": 9.8, "sigma": 0}),
+                          "gravity.sigma: unknown key", "did you mean 'sigma_mps2'"),
     "version": (header(schema_version=2), "schema_version", "2 is of a newer version"),
     "version true": (header(schema_version=True), "schema_version", "not true"),
     "no version": (header(schema_version=None), "schema_version", "must be given"),
@@ -360,31 +336,19 @@ BAD = {
     "unit": (header(unit="mg"), "unit", "'m/s^2', 'g' or 'counts'", "not 'mg'"),
     "no gravity": (header(gravity={}), "gravity.value_mps2", "must be given"),
     "negative gravity": (header(gravity={"value_mps2": -9.81}), "from 0.001 to 1000"),
-    "infinite gravity": (
-        header(gravity={"value_mps2": float("inf")}),
-        "from 0.001 to 1000 m/s², not inf",
-    ),
+    "infinite gravity": (header(gravity={"value_mps2": float("inf")}),
+                         "from 0.001 to 1000 m/s², not inf"),
     "gravity in g": (header(gravity={"value_mps2": 1}), "gravity.value_mps2: 1", "some 9.8"),
-    "negative sigma of gravity": (
-        header(gravity={"value_mps2": 9.81, "sigma_mps2": -1}),
-        "gravity.sigma_mps2",
-    ),
+    "negative sigma of gravity": (header(gravity={"value_mps2": 9.81, "sigma_mps2": -1}),
+                                  "gravity.sigma_mps2"),
     "no noise at all": (header(sensor_noise={"sigma_mps2": 0}), "sensor_noise.sigma_mps2"),
     "counts without nominal": (header(unit="counts"), "nominal: missing"),
-    "nominal without counts": (
-        header(nominal={"scale": [1, 1, 1], "offset": [0, 0, 0]}),
-        "nominal: goes with unit: counts, not with unit: m/s^2",
-    ),
-    "two scales": (
-        header(unit="counts", nominal={"scale": [1, 1], "offset": [0, 0, 0]}),
-        "nominal.scale",
-        "at least 3",
-    ),
-    "scale zero": (
-        header(unit="counts", nominal={"scale": [1, 0, 1], "offset": [0, 0, 0]}),
-        "nominal.scale.1",
-        "zero",
-    ),
+    "nominal without counts": (header(nominal={"scale": [1, 1, 1], "offset": [0, 0, 0]}),
+                               "nominal: goes with unit: counts, not with unit: m/s^2"),
+    "two scales": (header(unit="counts", nominal={"scale": [1, 1], "offset": [0, 0, 0]}),
+                   "nominal.scale", "at least 3"),
+    "scale zero": (header(unit="counts", nominal={"scale": [1, 0, 1], "offset": [0, 0, 0]}),
+                   "nominal.scale.1", "zero"),
     "empty CSV": (text("positions.csv", ""), "empty", "position, fx, fy, fz"),
     "names only": (text("positions.csv", "position,fx,fy,fz\n"), "no positions"),
     "truncated CSV": (cut("positions.csv", 0.7), "line", "columns", "whole"),
@@ -411,53 +375,31 @@ BAD = {
     "many samples": (columns(n_samples=at(2, 1e300)), "n_samples: position 2", "not 1e+300"),
     "negative sd": (columns(sd_fy=at(5, -0.1)), "sd_fy: position 5: must be from 0 to"),
     "one sd": (columns(sd_fx=None), "sd_fx: the column is missing", "sd_fy, sd_fz"),
-    "too cold": (
-        columns(temperature_degC=at(1, -300)),
-        "temperature_degC: position 1: ",
-        "not -300",
-    ),
-    "negative vibration": (
-        columns(vibration_mps2=at(1, -1)),
-        "vibration_mps2: position 1: ",
-        "not -1",
-    ),
+    "too cold": (columns(temperature_degC=at(1, -300)), "temperature_degC: position 1: ",
+                 "not -300"),
+    "negative vibration": (columns(vibration_mps2=at(1, -1)), "vibration_mps2: position 1: ",
+                           "not -1"),
     "time runs back": (columns(time_s=at(4, 15)), "time_s: position 4: 15 is before"),
-    "roll only": (
-        columns(pitch_robot_gon=None),
-        "pitch_robot_gon: the column is missing (it goes with roll_robot_gon)",
-    ),
-    "yaw only": (
-        both(header(robot=None), columns(pitch_robot_gon=None, roll_robot_gon=None)),
-        "positions.csv: yaw_robot_gon: goes with roll_robot_gon and pitch_robot_gon",
-    ),
+    "roll only": (columns(pitch_robot_gon=None),
+                  "pitch_robot_gon: the column is missing (it goes with roll_robot_gon)"),
+    "yaw only": (both(header(robot=None), columns(pitch_robot_gon=None, roll_robot_gon=None)),
+                 "positions.csv: yaw_robot_gon: goes with roll_robot_gon and pitch_robot_gon"),
     "robot without sigma": (header(robot=None), "robot.angle_sigma_mgon: missing"),
     "sigma without robot": (
         both(columns(**dict.fromkeys(ROBOT_COLUMNS))),
         "robot.angle_sigma_mgon: is given, but positions.csv has no roll_robot_gon",
     ),
-    "degrees": (
-        columns(roll_robot_gon=times(0.9), pitch_robot_gon=times(0.9)),
-        "roll_robot_gon, pitch_robot_gon: the angles look like degrees, not gon",
-    ),
-    "radians": (
-        columns(roll_robot_gon=times(GON), pitch_robot_gon=times(GON)),
-        "look like radians, not gon",
-    ),
-    "opposite sign": (
-        columns(fx=times(-1), fy=times(-1), fz=times(-1)),
-        "opposite sign",
-        "(0, 0, -g)",
-    ),
-    "g for m/s^2": (
-        columns(fx=times(1 / G), fy=times(1 / G), fz=times(1 / G)),
-        "norm is about 1",
-        "looks like g, not m/s^2",
-    ),
+    "degrees": (columns(roll_robot_gon=times(0.9), pitch_robot_gon=times(0.9)),
+                "roll_robot_gon, pitch_robot_gon: the angles look like degrees, not gon"),
+    "radians": (columns(roll_robot_gon=times(GON), pitch_robot_gon=times(GON)),
+                "look like radians, not gon"),
+    "opposite sign": (columns(fx=times(-1), fy=times(-1), fz=times(-1)), "opposite sign",
+                      "(0, 0, -g)"),
+    "g for m/s^2": (columns(fx=times(1 / G), fy=times(1 / G), fz=times(1 / G)), "norm is about 1",
+                    "looks like g, not m/s^2"),
     "m/s^2 for g": (both(header(unit="g")), "looks like m/s^2, not g", "`unit` in campaign.yaml"),
-    "counts for m/s^2": (
-        columns(fx=times(1e3), fy=times(1e3), fz=times(1e3)),
-        "looks like counts, not m/s^2",
-    ),
+    "counts for m/s^2": (columns(fx=times(1e3), fy=times(1e3), fz=times(1e3)),
+                         "looks like counts, not m/s^2"),
     "m/s^2 for counts": (
         both(header(unit="counts", nominal={"scale": [0.01] * 3, "offset": [0, 0, 0]})),
         "looks like m/s^2, not counts",
@@ -467,20 +409,14 @@ BAD = {
             header(unit="counts", nominal={"scale": [0.01] * 3, "offset": [0, 0, 0]}),
             columns(fx=times(400), fy=times(400), fz=times(400)),
         ),
-        "positions.csv: ",
-        "nowhere near gravity",
-        "`nominal`",
+        "positions.csv: ", "nowhere near gravity", "`nominal`",
     ),
-    "no unit fits": (
-        columns(fx=times(0.3), fy=times(0.3), fz=times(0.3)),
-        "nowhere near gravity, 9.81 m/s^2",
-    ),
+    "no unit fits": (columns(fx=times(0.3), fy=times(0.3), fz=times(0.3)),
+                     "nowhere near gravity, 9.81 m/s^2"),
     "one huge cell": (columns(fy=at(3, 1e11)), "fx, fy, fz: position 3: more than 1000 times"),
-    "huge": (
-        columns(fx=times(1e300), fy=times(1e300), fz=times(1e300)),
-        "fx: position 1: must be from -1e+12 to",
-    ),
-}
+    "huge": (columns(fx=times(1e300), fy=times(1e300), fz=times(1e300)),
+             "fx: position 1: must be from -1e+12 to"),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(("change", "parts"), [(c, p) for c, *p in BAD.values()], ids=BAD)
@@ -497,16 +433,13 @@ def test_bad_input_ends_with_one_line_that_says_where(tmp_path, change, parts):
         assert part in message
 
 
-@pytest.mark.parametrize(
-    ("column", "part"),
-    [
-        (pa.array(["a"] * 8), "fx: position 1: 'a' is no number"),
-        (pa.array([None, *range(7)]), "fx: position 1: empty"),
-        (pa.array([True] * 8), "fx: position 1: True is no number"),
-        (pa.array([[1.0]] * 8), "fx: position 1: [1.0] is no number"),
-        (pa.array([1.0, *[float("nan")] * 7]), "fx: position 2: nan is not finite"),
-    ],
-)
+@pytest.mark.parametrize(("column", "part"), [
+    (pa.array(["a"] * 8), "fx: position 1: 'a' is no number"),
+    (pa.array([None, *range(7)]), "fx: position 1: empty"),
+    (pa.array([True] * 8), "fx: position 1: True is no number"),
+    (pa.array([[1.0]] * 8), "fx: position 1: [1.0] is no number"),
+    (pa.array([1.0, *[float("nan")] * 7]), "fx: position 2: nan is not finite"),
+])  # fmt: skip
 def test_bad_columns_of_parquet(tmp_path, column, part):
     write_campaign(campaign(), tmp_path, "parquet")
     path = tmp_path / "positions.parquet"
@@ -555,20 +488,17 @@ def test_a_poor_sensor_is_no_error(tmp_path):
     assert_same(read_campaign(tmp_path), poor)
 
 
-@pytest.mark.parametrize(
-    ("changes", "part"),
-    [
-        ({"name": ""}, "name"),
-        ({"name": "\ud800"}, "name"),
-        ({"unit": "mg"}, "unit"),
-        ({"unit": "counts"}, "nominal"),
-        ({"forces": np.full((8, 3), np.nan)}, "not finite"),
-        ({"time": np.arange(7)}, r"time: shape \(7,\), not \(8,\)"),
-        ({"positions": np.arange(8)}, "position 0"),
-        ({"angles": None}, "yaw"),
-        ({"sigma_angle": None}, "robot"),
-    ],
-)
+@pytest.mark.parametrize(("changes", "part"), [
+    ({"name": ""}, "name"),
+    ({"name": "\ud800"}, "name"),
+    ({"unit": "mg"}, "unit"),
+    ({"unit": "counts"}, "nominal"),
+    ({"forces": np.full((8, 3), np.nan)}, "not finite"),
+    ({"time": np.arange(7)}, r"time: shape \(7,\), not \(8,\)"),
+    ({"positions": np.arange(8)}, "position 0"),
+    ({"angles": None}, "yaw"),
+    ({"sigma_angle": None}, "robot"),
+])  # fmt: skip
 def test_what_could_not_be_read_again_is_not_written(tmp_path, changes, part):
     with pytest.raises(InputError, match=part):
         write_campaign(campaign(**changes), tmp_path / "folder")

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from calling import refused
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
@@ -93,14 +94,11 @@ def test_axes():
     assert all(drawn("axis_error", seed).spec != "axis_error(x=1, y=2, z=3)" for seed in range(99))
 
 
-@pytest.mark.parametrize(
-    ("spec", "unit", "expected"),
-    [
-        ("unit_error(force=0.101971621297793)", "forces", lambda f: f / STANDARD_GRAVITY),
-        ("unit_error(angle=0.9)", "angles", lambda a: np.deg2rad(np.rad2deg(a) * 180 / 200)),
-        ("unit_error(angle=0.015707963267949)", "angles", lambda a: a * np.pi / 200),
-    ],
-)
+@pytest.mark.parametrize(("spec", "unit", "expected"), [
+    ("unit_error(force=0.101971621297793)", "forces", lambda f: f / STANDARD_GRAVITY),
+    ("unit_error(angle=0.9)", "angles", lambda a: np.deg2rad(np.rad2deg(a) * 180 / 200)),
+    ("unit_error(angle=0.015707963267949)", "angles", lambda a: a * np.pi / 200),
+])  # fmt: skip
 def test_units(spec, unit, expected):
     campaign = spoiled(spec)
     np.testing.assert_allclose(getattr(campaign, unit), expected(getattr(CLEAN, unit)), rtol=1e-12)
@@ -139,23 +137,18 @@ def test_47_axis_errors_that_the_norm_of_gravity_does_not_see():
         assert found == pytest.approx(usual, rel=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("spec", "expected"),
-    [
-        ("axis_eror", "unknown gross error 'axis_eror'; did you mean 'axis_error'?"),
-        ("axis_error(x=1, y=1, z=3)", "must be 1, 2, 3 in some order, each with a sign"),
-        ("axis_error(x=2)", "must be 1, 2, 3 in some order"),
-        ("outlier_position(position=25)", "position=25 is no position of simulated; they are 1 to"),
-        ("row_order(first=2)", "give first and second, or neither"),
-        ("unit_error(force=0)", "force=0 must be a number above 0"),
-        ("unit_error(angle=nan)", "angle=nan must be a number above 0"),
-    ],
-)
+@pytest.mark.parametrize(("spec", "expected"), [
+    ("axis_eror", "unknown gross error 'axis_eror'; did you mean 'axis_error'?"),
+    ("axis_error(x=1, y=1, z=3)", "must be 1, 2, 3 in some order, each with a sign"),
+    ("axis_error(x=2)", "must be 1, 2, 3 in some order"),
+    ("outlier_position(position=25)", "position=25 is no position of simulated; they are 1 to"),
+    ("row_order(first=2)", "give first and second, or neither"),
+    ("unit_error(force=0)", "force=0 must be a number above 0"),
+    ("unit_error(angle=nan)", "angle=nan must be a number above 0"),
+])  # fmt: skip
 def test_what_is_wrong(spec, expected):
-    with pytest.raises(InputError) as error:
+    with refused(expected):
         spoiled(spec)
-    assert expected in str(error.value)
-    assert "\n" not in str(error.value)
 
 
 def test_no_angles_no_unit_of_angles():
@@ -177,13 +170,9 @@ DESIGNS = {
     "hot": {"scheme": "dodecahedron-20", "effects": ("thermal_bias",), "size": 3.0, **TEMPERATURE},
     "clipped": {"scheme": "fibonacci-24", "effects": ("saturation",), "size": 2.0},
     "turned": {"scheme": "rings-24", "effects": ("mounting_rotation",), "size": 5.0},
-    "many": {
-        "scheme": "fibonacci-50",
-        "repeat_first": 10,
-        "effects": ("cubic_scale",),
-        "size": 9.0,
-    },
-}
+    "many": {"scheme": "fibonacci-50", "repeat_first": 10, "effects": ("cubic_scale",),
+             "size": 9.0},
+}  # fmt: skip
 """Campaigns without a gross error, some with effects that are far too large for any sensor."""
 
 

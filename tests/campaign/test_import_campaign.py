@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from campaign_helpers import refusal, succeed
+from calling import refusal, succeed
 from scipy.io import savemat
 from test_import_holds import G, session, shared, write
 
@@ -92,16 +92,13 @@ def test_means(tmp_path):
     assert (report.holds, report.accuracy) == (None, None)
 
 
-@pytest.mark.parametrize(
-    ("change", "settings", "message"),
-    [
-        ({"n": 0}, {}, "n_samples: must be positive"),
-        ({"sy": -1}, {}, "must not be negative"),
-        ({"fy": np.nan}, {}, r"line 2, column fy \(fy\): nothing"),
-        ({}, {"columns": {"temp": 1}}, "unknown column 'temp'"),
-        ({}, {"columns": {"fx": "q"}}, "no column 'q'"),
-    ],
-)
+@pytest.mark.parametrize(("change", "settings", "message"), [
+    ({"n": 0}, {}, "n_samples: must be positive"),
+    ({"sy": -1}, {}, "must not be negative"),
+    ({"fy": np.nan}, {}, r"line 2, column fy \(fy\): nothing"),
+    ({}, {"columns": {"temp": 1}}, "unknown column 'temp'"),
+    ({}, {"columns": {"fx": "q"}}, "no column 'q'"),
+])  # fmt: skip
 def test_bad_means(tmp_path, change, settings, message):
     row = {"n": 4, "fx": 1.0, "fy": 2.0, "fz": 3.0, "sx": 1.0, "sy": 1.0, "sz": 1.0} | change
     pd.DataFrame([row, row]).to_csv(tmp_path / "means.csv", index=False)
@@ -116,17 +113,14 @@ def test_means_as_columns(tmp_path):
     assert campaign.sigma_force is None
 
 
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        ({"rate": 100}, r"settings: rate: unknown key; did you mean 'rate_hz'\?"),
-        ({"rate_hz": -1}, r"settings: rate_hz: must be from 1e-06 to 1e\+09 per second, not -1"),
-        ({"rate_hz": True}, "rate_hz: must be a number, not true"),
-        ({"unit": "ft"}, r"settings: unit: must be 'm/s\^2', 'g' or 'counts', not 'ft'"),
-        ({"columns": {"fx": 1.5}}, "columns.fx"),
-        ({"gravity": {"value": 1}}, "gravity.value: unknown key"),
-    ],
-)
+@pytest.mark.parametrize(("content", "message"), [
+    ({"rate": 100}, r"settings: rate: unknown key; did you mean 'rate_hz'\?"),
+    ({"rate_hz": -1}, r"settings: rate_hz: must be from 1e-06 to 1e\+09 per second, not -1"),
+    ({"rate_hz": True}, "rate_hz: must be a number, not true"),
+    ({"unit": "ft"}, r"settings: unit: must be 'm/s\^2', 'g' or 'counts', not 'ft'"),
+    ({"columns": {"fx": 1.5}}, "columns.fx"),
+    ({"gravity": {"value": 1}}, "gravity.value: unknown key"),
+])  # fmt: skip
 def test_bad_settings(content, message):
     with pytest.raises(InputError, match=message) as caught:
         parse_settings(content)
@@ -195,17 +189,14 @@ def test_command_with_everything(tmp_path):
     assert not (tmp_path / "out" / "segmentation.svg").exists()
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ([], "give the column of time (--time), or the rate (--rate)"),
-        (["--rate", "100", "--columns", "fx"], "--columns: expected fx=1,fy=2,fz=3"),
-        (["--rate", "100", "--unit", "counts", "--scale", "a"], "--scale: expected numbers"),
-        (["--rate", "-5"], "options: rate_hz: must be from 1e-06 to 1e+09 per second"),
-        (["--rate", "nan"], "options: rate_hz"),
-        (["--rate", "100", "--threshold", "1e-9"], "no static hold"),
-    ],
-)
+@pytest.mark.parametrize(("options", "message"), [
+    ([], "give the column of time (--time), or the rate (--rate)"),
+    (["--rate", "100", "--columns", "fx"], "--columns: expected fx=1,fy=2,fz=3"),
+    (["--rate", "100", "--unit", "counts", "--scale", "a"], "--scale: expected numbers"),
+    (["--rate", "-5"], "options: rate_hz: must be from 1e-06 to 1e+09 per second"),
+    (["--rate", "nan"], "options: rate_hz"),
+    (["--rate", "100", "--threshold", "1e-9"], "no static hold"),
+])  # fmt: skip
 def test_command_says_what_is_wrong(log, tmp_path, options, message):
     line = refusal("import", log, "--out", tmp_path / "out", *options)
     assert message in line

@@ -216,12 +216,9 @@ def near(holds, reference, scale=1.0):
 
 def test_xsens():
     log = open_log(
-        shared("imu_tk_xsens/xsens_acc.mat"),
-        columns={"fx": 1, "fy": 2, "fz": 3},
-        time=0,
-        unit="counts",
-        scale=1 / 415,
-    )
+        shared("imu_tk_xsens/xsens_acc.mat"), columns={"fx": 1, "fy": 2, "fz": 3}, time=0,
+        unit="counts", scale=1 / 415,
+    )  # fmt: skip
     holds = find_holds(log)
     assert 38 <= len(holds) <= 42
     assert holds.t1[0] - holds.t0[0] == pytest.approx(51, abs=0.5)

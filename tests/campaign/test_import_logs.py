@@ -43,26 +43,23 @@ def written(folder, text, name="log.csv"):
 BY_PLACE = {"columns": {"fx": 1, "fy": "2", "fz": 3}, "time": 0}
 
 
-@pytest.mark.parametrize(
-    ("text", "options"),
-    [
-        (lines(before=["t,fx,fy,fz"]), {}),
-        (lines(before=["Fs,100", "Waiting time,3", '"Time_s","Acc X","Acc Y","Acc Z"']), {}),
-        (lines(before=["# made by hand", "# time,ax,ay,az"]), {}),
-        (lines(before=["% a comment", "", "%another"]), BY_PLACE),
-        (lines("\t", before=["time\tfx\tfy\tfz"]), {}),
-        (lines(";", ",", ["time;fx;fy;fz"]), {}),
-        (lines("   "), BY_PLACE),
-        (lines("   ", ","), BY_PLACE),
-        (lines(" , "), BY_PLACE),
-        (lines().replace("\n", ",x_a\n"), BY_PLACE),
-        (lines().replace("\n", "\r\n"), BY_PLACE),
-        (lines().rstrip("\n"), BY_PLACE),
-        ("\ufeff" + lines(before=["t,fx,fy,fz"]), {}),
-        (lines().replace("\n", "\n\n"), BY_PLACE),
-        (lines().replace("\n", "\n# why not\n", 3), BY_PLACE),
-    ],
-)
+@pytest.mark.parametrize(("text", "options"), [
+    (lines(before=["t,fx,fy,fz"]), {}),
+    (lines(before=["Fs,100", "Waiting time,3", '"Time_s","Acc X","Acc Y","Acc Z"']), {}),
+    (lines(before=["# made by hand", "# time,ax,ay,az"]), {}),
+    (lines(before=["% a comment", "", "%another"]), BY_PLACE),
+    (lines("\t", before=["time\tfx\tfy\tfz"]), {}),
+    (lines(";", ",", ["time;fx;fy;fz"]), {}),
+    (lines("   "), BY_PLACE),
+    (lines("   ", ","), BY_PLACE),
+    (lines(" , "), BY_PLACE),
+    (lines().replace("\n", ",x_a\n"), BY_PLACE),
+    (lines().replace("\n", "\r\n"), BY_PLACE),
+    (lines().rstrip("\n"), BY_PLACE),
+    ("\ufeff" + lines(before=["t,fx,fy,fz"]), {}),
+    (lines().replace("\n", "\n\n"), BY_PLACE),
+    (lines().replace("\n", "\n# why not\n", 3), BY_PLACE),
+])  # fmt: skip
 @pytest.mark.parametrize("chunk_size", [7, 65536])
 def test_text(tmp_path, text, options, chunk_size):
     path = written(tmp_path, text)
@@ -144,27 +141,24 @@ def changed(row, place, value):
     return "\n".join(rows) + "\n"
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("", "the file is empty"),
-        ("\n\n", "no line of numbers"),
-        ("so,it,goes\nand,goes,on\n", "no line of numbers"),
-        (changed(20, 2, "nan"), r"line 21, column 2 \(fy\): 'nan', not a usable number"),
-        (changed(20, 3, "-inf"), r"line 21, column 3 \(fz\): '-inf', not"),
-        (changed(20, 1, "1.2.3"), r"line 21, column 1 \(fx\): '1.2.3', not"),
-        (changed(20, 1, ""), r"line 21, column 1 \(fx\): nothing, not"),
-        (changed(20, 1, "True"), r"line 21, column 1 \(fx\): 'True', not"),
-        (changed(20, 1, "1e300"), r"line 21, column 1 \(fx\): '1e300', not"),
-        (changed(20, 3, "1,5"), "line 21: 5 columns instead of 4"),
-        (changed(20, 3, "1,5,6"), "line 21: 6 columns instead of 4"),
-        (changed(20, 0, "0.1"), r"line 21, column 0 \(time\): time does not increase \('0.1'\)"),
-        (changed(20, 0, "4.75"), "line 21, .*time does not increase"),
-        (lines()[:-12], r"line 50, column 3 \(fz\): the line ends before it, not"),
-        ("\n".join(f"{i},1,2,{i}" for i in range(9)), r"column 1 \(fx\) is constant"),
-        ("0,1,2,3\n", r"too few samples \(1\)"),
-    ],
-)
+@pytest.mark.parametrize(("text", "message"), [
+    ("", "the file is empty"),
+    ("\n\n", "no line of numbers"),
+    ("so,it,goes\nand,goes,on\n", "no line of numbers"),
+    (changed(20, 2, "nan"), r"line 21, column 2 \(fy\): 'nan', not a usable number"),
+    (changed(20, 3, "-inf"), r"line 21, column 3 \(fz\): '-inf', not"),
+    (changed(20, 1, "1.2.3"), r"line 21, column 1 \(fx\): '1.2.3', not"),
+    (changed(20, 1, ""), r"line 21, column 1 \(fx\): nothing, not"),
+    (changed(20, 1, "True"), r"line 21, column 1 \(fx\): 'True', not"),
+    (changed(20, 1, "1e300"), r"line 21, column 1 \(fx\): '1e300', not"),
+    (changed(20, 3, "1,5"), "line 21: 5 columns instead of 4"),
+    (changed(20, 3, "1,5,6"), "line 21: 6 columns instead of 4"),
+    (changed(20, 0, "0.1"), r"line 21, column 0 \(time\): time does not increase \('0.1'\)"),
+    (changed(20, 0, "4.75"), "line 21, .*time does not increase"),
+    (lines()[:-12], r"line 50, column 3 \(fz\): the line ends before it, not"),
+    ("\n".join(f"{i},1,2,{i}" for i in range(9)), r"column 1 \(fx\) is constant"),
+    ("0,1,2,3\n", r"too few samples \(1\)"),
+])  # fmt: skip
 @pytest.mark.parametrize("chunk_size", [7, 65536])
 def test_bad_text(tmp_path, text, message, chunk_size):
     path = written(tmp_path, text)
@@ -180,31 +174,25 @@ def test_the_line_is_that_of_the_file(tmp_path):
         everything(open_log(written(tmp_path, text)))
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({}, r"which column is fx\? The columns are a, b, a, c, counted from 0"),
-        ({"columns": {"fx": "q"}}, "fx: no column 'q'; there are a, b, a, c"),
-        ({"columns": {"fx": 4}}, "fx: no column 4; there are 4, counted from 0"),
-        ({"columns": {"fx": -1}}, "fx: no column -1"),
-        ({"columns": {"fx": "a"}}, "there are several columns 'a'"),
-        ({"columns": {"fx": 1, "fy": 1, "fz": 3}}, "name the same column"),
-        ({"columns": {"gx": 1}}, "unknown column 'gx'"),
-        (
-            {"columns": {"fx": 1, "fy": 2, "fz": 3}},
-            "give the column of time",
-        ),
-        ({**BY_PLACE, "rate": 100}, "not both"),
-        ({"columns": BY_PLACE["columns"], "rate": 0}, "rate must be positive"),
-        ({**BY_PLACE, "unit": "counts"}, "needs a nominal scale"),
-        ({**BY_PLACE, "unit": "counts", "scale": 0}, "must not be 0"),
-        ({**BY_PLACE, "unit": "counts", "scale": (1, 2)}, "one number or three"),
-        ({**BY_PLACE, "unit": "counts", "scale": 1, "offset": np.inf}, "must be finite"),
-        ({**BY_PLACE, "scale": 2}, "goes with unit counts"),
-        ({**BY_PLACE, "unit": "ft"}, "unknown unit of a log 'ft'"),
-        ({**BY_PLACE, "time_unit": "h"}, "unknown unit of time 'h'"),
-    ],
-)
+@pytest.mark.parametrize(("options", "message"), [
+    ({}, r"which column is fx\? The columns are a, b, a, c, counted from 0"),
+    ({"columns": {"fx": "q"}}, "fx: no column 'q'; there are a, b, a, c"),
+    ({"columns": {"fx": 4}}, "fx: no column 4; there are 4, counted from 0"),
+    ({"columns": {"fx": -1}}, "fx: no column -1"),
+    ({"columns": {"fx": "a"}}, "there are several columns 'a'"),
+    ({"columns": {"fx": 1, "fy": 1, "fz": 3}}, "name the same column"),
+    ({"columns": {"gx": 1}}, "unknown column 'gx'"),
+    ({"columns": {"fx": 1, "fy": 2, "fz": 3}}, "give the column of time"),
+    ({**BY_PLACE, "rate": 100}, "not both"),
+    ({"columns": BY_PLACE["columns"], "rate": 0}, "rate must be positive"),
+    ({**BY_PLACE, "unit": "counts"}, "needs a nominal scale"),
+    ({**BY_PLACE, "unit": "counts", "scale": 0}, "must not be 0"),
+    ({**BY_PLACE, "unit": "counts", "scale": (1, 2)}, "one number or three"),
+    ({**BY_PLACE, "unit": "counts", "scale": 1, "offset": np.inf}, "must be finite"),
+    ({**BY_PLACE, "scale": 2}, "goes with unit counts"),
+    ({**BY_PLACE, "unit": "ft"}, "unknown unit of a log 'ft'"),
+    ({**BY_PLACE, "time_unit": "h"}, "unknown unit of time 'h'"),
+])  # fmt: skip
 def test_bad_options(tmp_path, options, message):
     path = written(tmp_path, lines(before=["a,b,a,c"]))
     with pytest.raises(InputError, match=message):
@@ -277,15 +265,11 @@ def test_a_line_without_end_is_not_read(tmp_path):
         open_log(path, rate=1)
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "\n".join(" ".join(["word"] * (i % 200)) for i in range(400)),
-        "\n".join(f"{i},{'a,' * (i % 300)}" for i in range(500)),
-        '"1"\n' * 5000,
-        ",".join(['"1.5"'] * 5000),
-    ],
-)
+@pytest.mark.parametrize("text", [
+    "\n".join(" ".join(["word"] * (i % 200)) for i in range(400)),
+    "\n".join(f"{i},{'a,' * (i % 300)}" for i in range(500)), '"1"\n' * 5000,
+    ",".join(['"1.5"'] * 5000),
+])  # fmt: skip
 def test_what_is_no_table_is_no_more_work_than_its_size(tmp_path, monkeypatch, text):
     looked_at, split = [], sources.split_line
 

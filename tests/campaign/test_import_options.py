@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from campaign_helpers import refusal, run, succeed
+from calling import call, refusal, succeed
 from test_import_campaign import XSENS
 from test_import_holds import RATE, G, session, shared, write
 
@@ -161,19 +161,16 @@ def test_sigma_does_not_depend_on_the_offset():
     np.testing.assert_allclose(sigmas, sigmas[0], rtol=0.01)
 
 
-@pytest.mark.parametrize(
-    ("factor", "options", "message"),
-    [
-        (1 / G, [], "look like g; give --unit g"),
-        (1, ["--unit", "g"], "look like m/s^2; give --unit m/s^2"),
-        (1e3, [], "look like counts; give --unit counts and --scale"),
-        (1, ["--gravity", "1.62"], "does not fit a gravity of 1.62 m/s²; give --gravity"),
-        (1, ["--threshold", "1e300"], "threshold_mps2: must be at most 1"),
-        (1, ["--frame", "fru"], "is left-handed"),
-        (1, ["--range", "8 feet"], "--range: expected a number"),
-        (1, ["--robot-sigma", "3"], r"its angles go with a table of means"),
-    ],
-)
+@pytest.mark.parametrize(("factor", "options", "message"), [
+    (1 / G, [], "look like g; give --unit g"),
+    (1, ["--unit", "g"], "look like m/s^2; give --unit m/s^2"),
+    (1e3, [], "look like counts; give --unit counts and --scale"),
+    (1, ["--gravity", "1.62"], "does not fit a gravity of 1.62 m/s²; give --gravity"),
+    (1, ["--threshold", "1e300"], "threshold_mps2: must be at most 1"),
+    (1, ["--frame", "fru"], "is left-handed"),
+    (1, ["--range", "8 feet"], "--range: expected a number"),
+    (1, ["--robot-sigma", "3"], r"its angles go with a table of means"),
+])  # fmt: skip
 def test_options_are_named_and_nothing_is_written(tmp_path, turned, factor, options, message):
     path = write(tmp_path, factor * turned[0])
     line = refusal("import", path, "--out", tmp_path / "out", "--rate", 100, *options)
@@ -250,15 +247,12 @@ def wobbling(rng, size, cut, n=9000):
     return size * motion / motion.std()
 
 
-@pytest.mark.parametrize(
-    "motion",
-    [
-        lambda rng: turning(0.5) + wobbling(rng, 4.0, 3),  # waved about
-        lambda rng: turning(0.1) + wobbling(rng, 0.4, 2),  # turned gently by hand
-        lambda rng: turning(0.02),  # on a turntable
-        lambda rng: wobbling(rng, 2.0, 3) - [0, 0, G],  # carried upright
-    ],
-)
+@pytest.mark.parametrize("motion", [
+    lambda rng: turning(0.5) + wobbling(rng, 4.0, 3),  # waved about
+    lambda rng: turning(0.1) + wobbling(rng, 0.4, 2),  # turned gently by hand
+    lambda rng: turning(0.02),  # on a turntable
+    lambda rng: wobbling(rng, 2.0, 3) - [0, 0, G],  # carried upright
+])  # fmt: skip
 def test_what_was_never_still_is_refused(tmp_path, motion):
     rng = np.random.default_rng(1)
     path = write(tmp_path, motion(rng) + 0.02 * rng.standard_normal((9000, 3)))
@@ -310,18 +304,15 @@ def settings(folder, text):
     return path
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (["--exclude", "13:moved"], "exclude: there is no hold 13; they are 1 to 8"),
-        (["--exclude", "13"], "exclude: expected a hold or a time, and why, as 13:moved"),
-        (["--exclude", "1s-2s:x"], "exclude: 1s-2s: no hold lies there"),
-        (["--join", "4"], "join: expected numbers of holds or a time, as 4,5 or"),
-        (["--join", "1s-2s"], "join: 1s-2s: fewer than two holds lie there"),
-        (["--join", "4,5"], "join: holds 4 and 5 differ by"),
-        (["--join", "4,6"], "join: 4, 6: hold 5 lies between them"),
-    ],
-)
+@pytest.mark.parametrize(("options", "message"), [
+    (["--exclude", "13:moved"], "exclude: there is no hold 13; they are 1 to 8"),
+    (["--exclude", "13"], "exclude: expected a hold or a time, and why, as 13:moved"),
+    (["--exclude", "1s-2s:x"], "exclude: 1s-2s: no hold lies there"),
+    (["--join", "4"], "join: expected numbers of holds or a time, as 4,5 or"),
+    (["--join", "1s-2s"], "join: 1s-2s: fewer than two holds lie there"),
+    (["--join", "4,5"], "join: holds 4 and 5 differ by"),
+    (["--join", "4,6"], "join: 4, 6: hold 5 lies between them"),
+])  # fmt: skip
 def test_holds_that_are_not_there(tmp_path, turned, options, message):
     line = refusal(
         "import", write(tmp_path, turned[0]), "--out", tmp_path / "out", "--rate", 100, *options
@@ -415,7 +406,7 @@ def test_means_with_a_robot(tmp_path, frame, unit):
         *(*arguments, "--out", tmp_path / "new", "--robot-sigma", 3.2, "--robot-unit", wrong),
     )
     assert f"--robot-unit {unit} would be right" in line
-    result = run("import", *arguments, "--out", tmp_path / "new")
+    result = call("import", *arguments, "--out", tmp_path / "new")
     assert "--robot-sigma takes them for the robot's" in result.stderr
 
 

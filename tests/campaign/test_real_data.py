@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from places import DATA, ROOT
+from places import DATA, ROOT, needs_data
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import shown_unit
@@ -23,9 +23,7 @@ PAGE = (ROOT / "docs/guides/real-data.md").read_text(encoding="utf-8")
 FLAT = " ".join(PAGE.split())
 NINE = get_model("bias-scale-nonorthogonality")
 
-pytestmark = pytest.mark.skipif(
-    not DATA.is_dir(), reason="the public measurements are not on this machine (ACCELSTUDY_SHARED)"
-)
+pytestmark = needs_data
 
 WHITE, UNKNOWN = "white", "not given"
 DIAGNOSED = [

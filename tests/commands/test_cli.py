@@ -8,6 +8,7 @@ import click
 import pandas as pd
 import pytest
 import yaml
+from calling import call
 from click.testing import CliRunner
 from study_helpers import NINE, PROVENANCE, content, grid
 
@@ -20,10 +21,6 @@ from accelstudy.files.tables import write_table
 from accelstudy.noise_effects import noise_effect_names
 from accelstudy.schemes import get_scheme, scheme_families, scheme_names
 from accelstudy.sensors.models import MODELS, PRESETS, compose, get_model
-
-
-def call(*arguments):
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
 
 
 def output(*arguments):
@@ -263,18 +260,15 @@ def test_claims(tmp_path):
 # --- bad input -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("arguments", "expected"),
-    [
-        (["scheme", "mclaren-42"], "unknown scheme 'mclaren-42'"),
-        (["scheme", "../etc"], "../etc: no such file"),
-        (["schemes", "faces-6", "nothing"], "unknown scheme 'nothing'"),
-        (["schemes", "--model", "bias-scales"], "did you mean 'bias-scale'?"),
-        (["schemes", "--approach", "robots"], "did you mean 'robot'?"),
-        (["cells", "/nowhere/study.yaml"], "/nowhere/study.yaml: no such file"),
-        (["claims", "/nowhere"], "/nowhere/claims.parquet: no such file"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "expected"), [
+    (["scheme", "mclaren-42"], "unknown scheme 'mclaren-42'"),
+    (["scheme", "../etc"], "../etc: no such file"),
+    (["schemes", "faces-6", "nothing"], "unknown scheme 'nothing'"),
+    (["schemes", "--model", "bias-scales"], "did you mean 'bias-scale'?"),
+    (["schemes", "--approach", "robots"], "did you mean 'robot'?"),
+    (["cells", "/nowhere/study.yaml"], "/nowhere/study.yaml: no such file"),
+    (["claims", "/nowhere"], "/nowhere/claims.parquet: no such file"),
+])  # fmt: skip
 def test_unknown_names_and_files(arguments, expected):
     result = call(*arguments)
     assert result.exit_code == 2

@@ -6,11 +6,10 @@ What is registered is taken from the registries, so that something new is covere
 import json
 
 import pytest
-from click.testing import CliRunner
+from calling import call
 from page_helpers import assert_sound, text_of
 
 from accelstudy.campaign.gross_errors import gross_error_names
-from accelstudy.commands.main import main
 from accelstudy.effects import effect_names
 from accelstudy.noise_effects import noise_effect_names
 from accelstudy.sensors.models import get_model
@@ -48,7 +47,7 @@ DRAWN = {"gravity-outlier"}
 
 
 def run(*arguments, fails=False):
-    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
+    result = call(*arguments)
     assert result.exit_code in ((0, 2) if fails else (0,)), f"{arguments}: {result.output}"
     assert "could not be" not in result.output
     return result

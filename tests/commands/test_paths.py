@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from campaign_helpers import succeed
+from calling import succeed
 from places import DATA
 
 from accelstudy.campaign.format import read_campaign

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from calling import succeed
 from matplotlib.figure import Figure
 
 from accelstudy.basics import suggested
@@ -31,46 +31,25 @@ RESULTS = {
     "check-sigmas": ("accepted", "--replicates", 2),
     "advise": ("accepted", "--tilt-accuracy", "10mgon", "--tilt-range", "30gon"),
     "data-sheet": ("accepted", "--out", "sheet.yaml"),
-    "design": (
-        "--positions",
-        6,
-        "--starts",
-        1,
-        "--model",
-        "bias",
-        "--attitudes",
-        "cube",
-        "--out",
-        "a.yaml",
-    ),
+    "design": ("--positions", 6, "--starts", 1, "--model", "bias", "--attitudes", "cube", "--out",
+               "a.yaml"),
     "schemes": ("faces-6",),
     "effects": (),
     "public": (),
     "calibrate": ("accepted", "--out", "plain"),
-}
+}  # fmt: skip
 """Arguments of commands that have --quiet."""
 HAVE = {
     "import": r"^campaign: log \(20 positions\)$",
     "simulate-campaign": r"^campaign: again \(24 positions\)$",
-    "apply": r"^3000 of 3000 rows leveled: leveled.csv$",
-    "check-sigmas": "sd_empirical",
-    "advise": "tilt accuracy: roll",
-    "data-sheet": "^sigma of the mean of a position: 2 mm/s²$",
-    "design": "roll/gon",
-    "schemes": "faces-6",
-    "effects": "^warm_up: ",
-    "public": "^xsens-mti: ",
+    "apply": r"^3000 of 3000 rows leveled: leveled.csv$", "check-sigmas": "sd_empirical",
+    "advise": "tilt accuracy: roll", "data-sheet": "^sigma of the mean of a position: 2 mm/s²$",
+    "design": "roll/gon", "schemes": "faces-6", "effects": "^warm_up: ", "public": "^xsens-mti: ",
     "calibrate": "^ACCEPTED: ",
-}
+}  # fmt: skip
 """What its result has."""
 
 UNDRAWN = "accelstudy.campaign.calibration.output.residual_figure", lambda *_: Figure()
-
-
-def call(*arguments):
-    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
-    assert result.exit_code == 0, result.output
-    return result
 
 
 @pytest.fixture(scope="module")
@@ -83,8 +62,8 @@ def made(tmp_path_factory):
         patch.setattr(*UNDRAWN)
         np.savetxt("log.csv", readings, "%.5f", delimiter=",")
         for state, options in STATES.items():
-            call("simulate-campaign", "--out", state, *options)
-        call("calibrate", "accepted", "--out", "plain")
+            succeed("simulate-campaign", "--out", state, *options)
+        succeed("calibrate", "accepted", "--out", "plain")
     return folder
 
 
@@ -97,7 +76,7 @@ def here(made, monkeypatch):
 def quiet(command, *arguments):
     """What a command prints with --quiet: a part of what it prints without, and all warnings."""
     force = ["--force"] if "force" in {p.name for p in main.commands[command].params} else []
-    without, with_it = (call(command, *arguments, *force, *more) for more in ((), ("--quiet",)))
+    without, with_it = (succeed(command, *arguments, *force, *more) for more in ((), ("--quiet",)))
     assert with_it.stderr == without.stderr
     assert all(line.startswith("warning: ") for line in without.stderr.splitlines())
     whole = iter(without.stdout.splitlines())
@@ -163,10 +142,10 @@ def test_what_is_suggested_writes_into_no_campaign(tmp_path, monkeypatch, typed)
     monkeypatch.chdir(tmp_path / place)
     name = "-campaign" if typed == "-campaign" else "campaign"
     source = tmp_path / ("elsewhere" if typed[0] in "-a" else "") / name
-    call("simulate-campaign", f"--out={source}", "--scheme", "faces-6", "--force")
+    succeed("simulate-campaign", f"--out={source}", "--scheme", "faces-6", "--force")
     line = suggested.calibrate(typed.format(source), "bias", "gravity")
     (arguments,) = suggestions(line)
-    call(*arguments)
+    succeed(*arguments)
     assert len([*tmp_path.rglob("calibration.json")]) == 1
     assert not [*source.rglob("calibration.json")]
 
@@ -177,18 +156,18 @@ def test_all_that_is_suggested_runs_from_the_log_to_the_last_page(monkeypatch):
     shutil.copytree("rejected", "imu/left")
     shutil.copytree("accepted", "imu/right")
     printed = "".join(
-        call("calibrate", f"imu/{side}", "--approach", "robot", "--out", f"both/{side}").stdout
+        succeed("calibrate", f"imu/{side}", "--approach", "robot", "--out", f"both/{side}").stdout
         for side in ("left", "right")
     )
     reading = ("--columns", "fx=0,fy=1,fz=2", "--rate", "50")
     (diagnose, apply) = suggestions(printed)
-    call(*apply, *reading)
+    succeed(*apply, *reading)
     monkeypatch.setattr("accelstudy.diagnosis.report.output.diagnosis_figures", lambda *_: {})
-    done = call(*diagnose, "--replicates", "100", "--quiet")
+    done = succeed(*diagnose, "--replicates", "100", "--quiet")
     assert done.stdout == "The model lacks quadratic scale.\n"
     page = Path("imu-left-diagnosis/report.html").read_text(encoding="utf-8")
     steps = suggestions("\n".join(map(unescape, re.findall("<pre>(.*?)</pre>", page))))
     assert [step[0] for step in steps] == ["apply", "export", "calibrate"]
     for command, *arguments in steps:
-        call(command, *arguments, *(reading if command == "apply" else ()))
+        succeed(command, *arguments, *(reading if command == "apply" else ()))
     assert "imu-left-diagnosis-leveled.csv" in steps[0]

@@ -241,13 +241,10 @@ def test_table_of_schemes(scheme, m, correlation, gravity, robot):
         assert worst["bias"] * 1e3 == pytest.approx(bias, abs=0.005)
 
 
-@pytest.mark.parametrize(
-    ("scheme", "reductions", "gravity_correlation", "robot_correlation"),
-    [
-        ("mclaren-24", {"bias": 41, "scale": 28, "nonorthogonality": 54}, 0.25, 0.012),
-        ("rings-24", {"bias": 41, "scale": 15, "nonorthogonality": 64}, 0.14, 0.007),
-    ],
-)
+@pytest.mark.parametrize(("scheme", "reductions", "gravity_correlation", "robot_correlation"), [
+    ("mclaren-24", {"bias": 41, "scale": 28, "nonorthogonality": 54}, 0.25, 0.012),
+    ("rings-24", {"bias": 41, "scale": 15, "nonorthogonality": 64}, 0.14, 0.007),
+])  # fmt: skip
 def test_what_a_robot_gains(scheme, reductions, gravity_correlation, robot_correlation):
     """The paper says 50, 30, 70 % of one simulation; linear theory says this of the worst axis."""
     gravity, robot = design(scheme), design(scheme, approach=ROBOT)

@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 import yaml
-from click.testing import CliRunner
+from calling import refusal, succeed
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON
-from accelstudy.commands.main import main
 from accelstudy.design.estimability import estimability
 from accelstudy.design.task import Task, position_rows
 from accelstudy.leveling.error import cap_forces, tilt_error
@@ -27,17 +26,11 @@ from accelstudy.study.config import parse_study
 NINE = get_model("bias-scale-nonorthogonality")
 
 
-def run(*arguments, code=0):
-    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
-    assert result.exit_code == code, result.output
-    return result
-
-
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     """A design, and what the command said."""
     path = tmp_path_factory.mktemp("designs") / "mine.yaml"
-    said = run("design", "--positions", 8, "--tilt-range", "30gon", "--starts", 1,
+    said = succeed("design", "--positions", 8, "--tilt-range", "30gon", "--starts", 1,
                "--least-angle", "15gon", "--roll", "-110gon", "110gon", "--out", path)  # fmt: skip
     return path, said.output
 
@@ -76,23 +69,23 @@ def test_a_design_is_made_again_to_the_bit_and_replaces_nothing(made, tmp_path):
     before = path.read_bytes()
     again = ["design", "--positions", 8, "--tilt-range", "30gon", "--starts", 1, "--least-angle",
              "15gon", "--roll", "-110gon", "110gon", "--out"]  # fmt: skip
-    assert "is there already; --force replaces it" in run(*again, path, code=2).stderr
+    assert "is there already; --force replaces it" in refusal(*again, path)
     assert path.read_bytes() == before
     copy = tmp_path / "mine.yaml"
-    run(*again, copy)
+    succeed(*again, copy)
     assert copy.read_bytes() == before
-    told = run("design", "--after", path, "--out", path, "--force", code=2)
-    assert "is the input" in told.stderr
-    assert "must end in .yaml" in run("design", "--out", tmp_path / "mine", code=2).stderr
+    told = refusal("design", "--after", path, "--out", path, "--force")
+    assert "is the input" in told
+    assert "must end in .yaml" in refusal("design", "--out", tmp_path / "mine")
 
 
 def test_commands_take_the_file_for_a_scheme(made, tmp_path):
     path, _ = made
     name = get_scheme(str(path)).name
-    assert f"{name}  8" in run("schemes", "--approach", "robot", path).output
-    run("simulate-campaign", "--scheme", path, "--out", tmp_path / "c", "--name", "c")
+    assert f"{name}  8" in succeed("schemes", "--approach", "robot", path).output
+    succeed("simulate-campaign", "--scheme", path, "--out", tmp_path / "c", "--name", "c")
     assert len((tmp_path / "c/positions.csv").read_text().splitlines()) == 9
-    assert "visible" in run("effects", "--scheme", path, "--approach", "robot").output
+    assert "visible" in succeed("effects", "--scheme", path, "--approach", "robot").output
 
 
 @pytest.mark.parametrize(
@@ -108,7 +101,7 @@ def test_commands_take_the_file_for_a_scheme(made, tmp_path):
 )  # fmt: skip
 def test_what_a_design_is_for_is_said(asked, said, held, tmp_path):
     path = tmp_path / "d.yaml"
-    told = run("design", "--positions", 8, "--starts", 1, *asked, "--out", path).output
+    told = succeed("design", "--positions", 8, "--starts", 1, *asked, "--out", path).output
     assert said in told
     share = float(told.partition("Efficiency at least ")[2].partition(" %")[0])
     assert 50 < share <= 100
@@ -169,19 +162,15 @@ def test_a_job_needs_no_file(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(
     ("text", "wrong"),
-    {
-        "": "not a mapping",
-        "scheme: a\n": "directions: must be a list of rows",
-        "directions: [[1, 2]]\n": "row 1 is not",
-        "directions: [[0, 0, 1], [0, 0, 0]]\n": "row 2 is not",
-        f"directions: [[0, 0, {10**400}]]\n": "row 1 is not",
-        "directions: [[0, 0, .inf]]\n": "row 1 is not",
-        "directions: [[0, 0, true]]\n": "row 1 is not",
-        "direction: [[0, 0, 1]]\n": "unknown key 'direction'; did you mean 'directions'",
-        "scheme: a/b\ndirections: [[0, 0, 1]]\n": "scheme: 'a/b' cannot be",
-        "scheme: 3\ndirections: [[0, 0, 1]]\n": "scheme: must be a text",
-    }.items(),
-)
+    {"": "not a mapping", "scheme: a\n": "directions: must be a list of rows",
+     "directions: [[1, 2]]\n": "row 1 is not",
+     "directions: [[0, 0, 1], [0, 0, 0]]\n": "row 2 is not",
+     f"directions: [[0, 0, {10**400}]]\n": "row 1 is not",
+     "directions: [[0, 0, .inf]]\n": "row 1 is not", "directions: [[0, 0, true]]\n": "row 1 is not",
+     "direction: [[0, 0, 1]]\n": "unknown key 'direction'; did you mean 'directions'",
+     "scheme: a/b\ndirections: [[0, 0, 1]]\n": "scheme: 'a/b' cannot be",
+     "scheme: 3\ndirections: [[0, 0, 1]]\n": "scheme: must be a text"}.items(),
+)  # fmt: skip
 def test_a_file_that_is_no_scheme(tmp_path, text, wrong):
     path = tmp_path / "bad.yaml"
     path.write_text(text)
@@ -192,28 +181,22 @@ def test_a_file_that_is_no_scheme(tmp_path, text, wrong):
         study(path)
 
 
-@pytest.mark.parametrize(
-    ("asked", "wrong"),
-    [
-        ({"criterion": "E"}, "unknown criterion 'E'"),
-        (
-            {"criterion": "D", "neglect": ("cubic_scale",)},
-            "criterion D: effects that are neglected",
-        ),
-        ({"neglect": ("cubic_scale",), "discriminate": ("a", "b")}, "exclude each other"),
-        ({"neglect": ("bias",)}, "'bias' is in the model"),
-        ({"neglect": ("quadratic_scale=5mm",)}, "neglect: quadratic_scale=5mm: .*unit must be"),
-        ({"discriminate": ("cubic_scale", "cubic_scale")}, "twice; give two effects"),
-        ({"prior": ("bias",)}, "expected NAME=SIZE"),
-        ({"prior": ("bias=0",)}, "must be more than 0"),
-        ({"prior": ("bise=1mg",)}, "did you mean 'bias'"),
-        ({"positions": 0}, "positions: must be from 1 to 300"),
-        ({"attitudes": "cub"}, "did you mean 'cube'"),
-        ({"mountings": 10}, "mountings: must be from 1 to 9"),
-        ({"mountings": 2, "attitudes": "cube"}, "mountings: need all attitudes"),
-        ({"roll": (0.1, -0.1)}, "roll: the first angle must be less"),
-    ],
-)
+@pytest.mark.parametrize(("asked", "wrong"), [
+    ({"criterion": "E"}, "unknown criterion 'E'"),
+    ({"criterion": "D", "neglect": ("cubic_scale",)}, "criterion D: effects that are neglected"),
+    ({"neglect": ("cubic_scale",), "discriminate": ("a", "b")}, "exclude each other"),
+    ({"neglect": ("bias",)}, "'bias' is in the model"),
+    ({"neglect": ("quadratic_scale=5mm",)}, "neglect: quadratic_scale=5mm: .*unit must be"),
+    ({"discriminate": ("cubic_scale", "cubic_scale")}, "twice; give two effects"),
+    ({"prior": ("bias",)}, "expected NAME=SIZE"),
+    ({"prior": ("bias=0",)}, "must be more than 0"),
+    ({"prior": ("bise=1mg",)}, "did you mean 'bias'"),
+    ({"positions": 0}, "positions: must be from 1 to 300"),
+    ({"attitudes": "cub"}, "did you mean 'cube'"),
+    ({"mountings": 10}, "mountings: must be from 1 to 9"),
+    ({"mountings": 2, "attitudes": "cube"}, "mountings: need all attitudes"),
+    ({"roll": (0.1, -0.1)}, "roll: the first angle must be less"),
+])  # fmt: skip
 def test_contradictory_wishes_are_said_in_one_line(asked, wrong):
     with pytest.raises(InputError, match=wrong):
         Request(**{"positions": 8, **asked}).find()
@@ -289,15 +272,12 @@ def test_efficiencies_of_schemes_as_a_table_and_a_figure():
     assert below.get_xlabel() == "positions"
 
 
-@pytest.mark.parametrize(
-    ("section", "wrong"),
-    [
-        ({"positions": [8]}, "designs.*positions: must be from 9 to 300, not 8"),
-        ({"schemes": "faces-7"}, "unknown scheme 'faces-7'"),
-        ({"model": "bias-scale+hysteresis"}, "depends on the order of the positions"),
-        ({"tilt_range_gon": 100}, "designs.tilt_range_gon"),
-    ],
-)
+@pytest.mark.parametrize(("section", "wrong"), [
+    ({"positions": [8]}, "designs.*positions: must be from 9 to 300, not 8"),
+    ({"schemes": "faces-7"}, "unknown scheme 'faces-7'"),
+    ({"model": "bias-scale+hysteresis"}, "depends on the order of the positions"),
+    ({"tilt_range_gon": 100}, "designs.tilt_range_gon"),
+])  # fmt: skip
 def test_a_section_that_cannot_be_done(section, wrong):
     example = parse_example({"study": "x", "designs": section})
     with pytest.raises(InputError, match=wrong):

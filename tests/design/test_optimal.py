@@ -262,14 +262,10 @@ def free():
 LEVEL = Constraints((RollRange(-60 * GON, 60 * GON), PitchRange(-60 * GON, 60 * GON)))
 
 
-@pytest.mark.parametrize(
-    "constraints",
-    [
-        LEVEL,
-        Constraints((), LeastAngle(35 * GON)),
-        Constraints((OffPole(50 * GON), *LEVEL.single), LeastAngle(12 * GON)),
-    ],
-)
+@pytest.mark.parametrize("constraints", [
+    LEVEL, Constraints((), LeastAngle(35 * GON)),
+    Constraints((OffPole(50 * GON), *LEVEL.single), LeastAngle(12 * GON)),
+])  # fmt: skip
 def test_constraints_are_kept_and_cost_efficiency(constraints, free):
     task = BY_ROBOT
     criterion = get_criterion("I", task)

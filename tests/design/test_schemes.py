@@ -66,13 +66,9 @@ def test_names_are_those_of_the_literature_and_more():
     sizes = [get_scheme(name).n_positions for name in names]
     assert sizes == sorted(sizes)
     assert {*scheme_families()} >= {
-        "antipodal-free-N",
-        "d-optimal-N",
-        "fibonacci-N",
-        "i-optimal-N",
-        "random-N",
+        "antipodal-free-N", "d-optimal-N", "fibonacci-N", "i-optimal-N", "random-N",
         "random-N-SEED",
-    }
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize("name", scheme_names())
@@ -93,19 +89,16 @@ def test_directions_are_read_only():
         get_scheme("mclaren-24").directions[0, 0] = 1
 
 
-@pytest.mark.parametrize(
-    ("name", "close"),
-    [
-        ("mclaren", "mclaren-24"),
-        ("McLaren-24", "mclaren-24"),
-        ("face-6", "faces-6"),
-        ("fibonacci-0", "fibonacci-50"),
-        ("fibonacci-024", "fibonacci-24"),
-        ("fibonaci-12", "fibonacci-12"),
-        ("randm-20-7", "random-20-7"),
-        ("random-38-01", "random-38"),
-    ],
-)
+@pytest.mark.parametrize(("name", "close"), [
+    ("mclaren", "mclaren-24"),
+    ("McLaren-24", "mclaren-24"),
+    ("face-6", "faces-6"),
+    ("fibonacci-0", "fibonacci-50"),
+    ("fibonacci-024", "fibonacci-24"),
+    ("fibonaci-12", "fibonacci-12"),
+    ("randm-20-7", "random-20-7"),
+    ("random-38-01", "random-38"),
+])  # fmt: skip
 def test_unknown_names_are_answered_with_the_valid_ones(name, close):
     with pytest.raises(UnknownSchemeError) as error:
         get_scheme(name)
@@ -172,34 +165,28 @@ def test_rotation_is_about_fixed_axes():
 # Geometry
 
 
-@pytest.mark.parametrize(
-    ("name", "m"),
-    [
-        ("faces-6", 0),
-        ("faces-edges-18", 0.0556),
-        ("rings-24", 0.0417),
-        ("rhombicuboctahedron-24", 0.0688),
-        ("mclaren-24", 0.0667),
-        ("icosahedron-12", 0.0667),
-        ("dodecahedron-20", 0.0667),
-        ("icosidodecahedron-30", 0.0667),
-        ("faces-edges-corners-26", 0.0726),
-    ],
-)
+@pytest.mark.parametrize(("name", "m"), [
+    ("faces-6", 0),
+    ("faces-edges-18", 0.0556),
+    ("rings-24", 0.0417),
+    ("rhombicuboctahedron-24", 0.0688),
+    ("mclaren-24", 0.0667),
+    ("icosahedron-12", 0.0667),
+    ("dodecahedron-20", 0.0667),
+    ("icosidodecahedron-30", 0.0667),
+    ("faces-edges-corners-26", 0.0726),
+])  # fmt: skip
 def test_fourth_moments(name, m):
     assert get_scheme(name).fourth_moment == pytest.approx(m, abs=5e-5)
 
 
-@pytest.mark.parametrize(
-    ("name", "separation", "edges"),
-    [
-        ("faces-6", np.pi / 2, 12),
-        ("icosahedron-12", np.arccos(np.sqrt(1 / 5)), 30),
-        ("dodecahedron-20", np.arccos(np.sqrt(5) / 3), 30),
-        ("rhombicuboctahedron-24", np.arccos((3 + 2 * np.sqrt(2)) / (5 + 2 * np.sqrt(2))), 48),
-        ("icosidodecahedron-30", np.pi / 5, 60),
-    ],
-)
+@pytest.mark.parametrize(("name", "separation", "edges"), [
+    ("faces-6", np.pi / 2, 12),
+    ("icosahedron-12", np.arccos(np.sqrt(1 / 5)), 30),
+    ("dodecahedron-20", np.arccos(np.sqrt(5) / 3), 30),
+    ("rhombicuboctahedron-24", np.arccos((3 + 2 * np.sqrt(2)) / (5 + 2 * np.sqrt(2))), 48),
+    ("icosidodecahedron-30", np.pi / 5, 60),
+])  # fmt: skip
 def test_polyhedra_have_their_edges(name, separation, edges):
     found = angles(get_scheme(name).directions)
     assert found.min() == pytest.approx(separation)

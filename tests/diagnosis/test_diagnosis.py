@@ -79,27 +79,13 @@ def test_held_out_z_is_standard_normal_if_nothing_is_missing(name, scheme, count
 # --- hidden effects ------------------------------------------------------------------------------
 
 HIDDEN = {
-    "axis_nonperpendicularity": 3.0,
-    "base_tilt": 1.0,
-    "bias_drift": 60.0,
-    "bias_jump(t=750)": 1.0,
-    "cross_axis_misalignment": 1.0,
-    "cross_coupling": 6.0,
-    "cubic_scale": 30.0,
-    "encoder_eccentricity": 15.0,
-    "encoder_offset": 6.0,
-    "encoder_scale": 40.0,
-    "hysteresis": 3.0,
-    "mounting_rotation": 1.0,
-    "quadratic_scale": 4.0,
-    "saturation(knee=8)": 0.1,
-    "scale_asymmetry": 20.0,
-    "settling": 2.0,
-    "thermal_bias": 2.0,
-    "thermal_scale": 3.0,
-    "vibration_rectification": 60.0,
-    "warm_up(tau=300)": 4.0,
-}
+    "axis_nonperpendicularity": 3.0, "base_tilt": 1.0, "bias_drift": 60.0, "bias_jump(t=750)": 1.0,
+    "cross_axis_misalignment": 1.0, "cross_coupling": 6.0, "cubic_scale": 30.0,
+    "encoder_eccentricity": 15.0, "encoder_offset": 6.0, "encoder_scale": 40.0, "hysteresis": 3.0,
+    "mounting_rotation": 1.0, "quadratic_scale": 4.0, "saturation(knee=8)": 0.1,
+    "scale_asymmetry": 20.0, "settling": 2.0, "thermal_bias": 2.0, "thermal_scale": 3.0,
+    "vibration_rectification": 60.0, "warm_up(tau=300)": 4.0,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("spec", HIDDEN)
@@ -169,27 +155,21 @@ def test_what_an_effect_does_to_the_other_parameters_is_predicted(approach):
     assert np.max(np.abs(np.subtract(before, true) / sigma)) > 10
 
 
-@pytest.mark.parametrize(
-    ("approach", "effect", "invisible"),
-    [
-        ("gravity", "mounting_rotation", {"gravity_error", *ROTATIONS}),
-        ("robot", "gravity_error", {"gravity_error"}),
-    ],
-)
+@pytest.mark.parametrize(("approach", "effect", "invisible"), [
+    ("gravity", "mounting_rotation", {"gravity_error", *ROTATIONS}),
+    ("robot", "gravity_error", {"gravity_error"}),
+])  # fmt: skip
 def test_what_an_approach_cannot_see_it_says(approach, effect, invisible):
     found = diagnose(campaign(3, approach=approach, effects=(effect,))[0], NINE)
     assert found.verdict == "no_effect"
     assert set(found.invisible) == invisible
 
 
-@pytest.mark.parametrize(
-    ("effect", "allowed"),
-    [
-        ("noise_level", {"noise_level"}),
-        ("axis_noise", {"axis_noise", "noise_level"}),
-        ("quantisation", {"quantisation"}),
-    ],
-)
+@pytest.mark.parametrize(("effect", "allowed"), [
+    ("noise_level", {"noise_level"}),
+    ("axis_noise", {"axis_noise", "noise_level"}),
+    ("quantisation", {"quantisation"}),
+])  # fmt: skip
 def test_noise_is_named_as_noise(effect, allowed):
     found = diagnose(campaign(2, noise_effects=(effect,))[0], NINE)
     assert found.verdict == "noise_model"

@@ -162,15 +162,12 @@ def test_a_credible_set_is_the_smallest():
     assert [one.posterior for one in found] == [0.5, 0.35, 0.1]
 
 
-@pytest.mark.parametrize(
-    ("level", "spread", "said"),
-    [
-        (Level.unknown(), 0.02, "times what repeated positions differ by"),
-        (Level.given(), 0.02, "times the stated noise"),
-        (Level.unknown(), 0.0, ""),
-        (Level.given(), 0.0, ""),
-    ],
-)
+@pytest.mark.parametrize(("level", "spread", "said"), [
+    (Level.unknown(), 0.02, "times what repeated positions differ by"),
+    (Level.given(), 0.02, "times the stated noise"),
+    (Level.unknown(), 0.0, ""),
+    (Level.given(), 0.0, ""),
+])  # fmt: skip
 def test_a_fit_that_misses_more_than_the_noise_is_no_explanation(level, spread, said):
     rng = np.random.default_rng(8)
     attitudes = get_scheme("fibonacci-24").directions

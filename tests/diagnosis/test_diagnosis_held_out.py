@@ -11,12 +11,7 @@ from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis import held_out
 from accelstudy.diagnosis.decision.refits import refit
 from accelstudy.diagnosis.evidence.detection import Chance, detect
-from accelstudy.diagnosis.evidence.hypotheses import (
-    Singles,
-    classes_of,
-    equivalents,
-    weigh_singles,
-)
+from accelstudy.diagnosis.evidence.hypotheses import Singles, classes_of, equivalents, weigh_singles
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.prediction import SIGNIFICANT, LinearSplit, held_out_gap, split_positions

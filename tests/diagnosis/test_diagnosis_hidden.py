@@ -24,9 +24,7 @@ from accelstudy.effects import get_effect
 
 RARE = 1e-3
 """Probability with which a count exceeds its limit by chance."""
-PLAIN = {
-    **{"scheme": "mclaren-24", "temperature": (20.0, 35.0), "temperature_order": "linear"},
-}
+PLAIN = {**{"scheme": "mclaren-24", "temperature": (20.0, 35.0), "temperature_order": "linear"}}
 """In the order of the scheme, warming steadily, so that some effects are exactly alike."""
 UNKNOWN_NOISE = {**FULL, "scheme": "xsens-38", "repeat_first": 0, "sigma_known": False}
 DESIGNS = {"full": FULL, "plain": PLAIN, "unknown noise": UNKNOWN_NOISE}

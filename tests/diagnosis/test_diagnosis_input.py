@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from click.testing import CliRunner
+from calling import call
 from diagnosis_helpers import NINE, ROTATIONS, campaign
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.commands.main import main
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.document import diagnosis_document
 from accelstudy.effects import effect_names
@@ -54,8 +53,7 @@ def command(folder, measured, *options, header=None, table=None, out="out"):
     if table is not None:
         path = folder / "c/positions.csv"
         table(pd.read_csv(path)).to_csv(path, index=False)
-    arguments = ["diagnose", str(folder / "c"), "--out", str(folder / out), "--replicates", "100"]
-    return CliRunner().invoke(main, [*arguments, *options])
+    return call("diagnose", folder / "c", "--out", folder / out, "--replicates", "100", *options)
 
 
 def document(folder, run):
@@ -81,35 +79,21 @@ TABLES = {
     "no position": (lambda t: t.drop(columns="position"), ("position: the column is missing",)),
     "a label twice": (cell("position", 5, 5), ("position: position 5", "follows no smaller")),
     "no label": (cell("position", 5, ""), ("position: row 6: empty",)),
-    "shuffled": (
-        lambda t: t.sample(frac=1, random_state=1),
-        ("follows no smaller", "in order of acquisition"),
-    ),
-    "backwards": (
-        lambda t: t.assign(time_s=t["time_s"].to_numpy()[::-1]),
-        ("time_s: position 2", "in order of acquisition"),
-    ),
-    "endless force": (
-        lambda t: t.assign(fx=t["fx"] * 1e300),
-        ("fx: position 1", "must be from -1e+12"),
-    ),
-    "no force": (
-        lambda t: t.assign(**{f: 1e-300 * np.arange(N) for f in ("fx", "fy", "fz")}),
-        ("fx, fy, fz", "no unit"),
-    ),
-    "endless angles": (
-        lambda t: t.assign(roll_robot_gon=t["roll_robot_gon"] * 1e300),
-        ("roll_robot_gon: position 1", "must be from -400 to 400 gon"),
-    ),
-    "endless heat": (
-        lambda t: t.assign(temperature_degC=t["temperature_degC"] * 1e300),
-        ("temperature_degC: position 1", "must be from -273.15 to 10000 °C"),
-    ),
-    "feet": (
-        lambda t: t.assign(**{f: 3.28 * t[f] for f in ("fx", "fy", "fz")}),
-        ("fx, fy, fz", "nowhere near gravity"),
-    ),
-}
+    "shuffled": (lambda t: t.sample(frac=1, random_state=1),
+                 ("follows no smaller", "in order of acquisition")),
+    "backwards": (lambda t: t.assign(time_s=t["time_s"].to_numpy()[::-1]),
+                  ("time_s: position 2", "in order of acquisition")),
+    "endless force": (lambda t: t.assign(fx=t["fx"] * 1e300),
+                      ("fx: position 1", "must be from -1e+12")),
+    "no force": (lambda t: t.assign(**{f: 1e-300 * np.arange(N) for f in ("fx", "fy", "fz")}),
+                 ("fx, fy, fz", "no unit")),
+    "endless angles": (lambda t: t.assign(roll_robot_gon=t["roll_robot_gon"] * 1e300),
+                       ("roll_robot_gon: position 1", "must be from -400 to 400 gon")),
+    "endless heat": (lambda t: t.assign(temperature_degC=t["temperature_degC"] * 1e300),
+                     ("temperature_degC: position 1", "must be from -273.15 to 10000 °C")),
+    "feet": (lambda t: t.assign(**{f: 3.28 * t[f] for f in ("fx", "fy", "fz")}),
+             ("fx, fy, fz", "nowhere near gravity")),
+}  # fmt: skip
 HEADERS = {
     "no sigma at all": (("sensor_noise", "sigma_mps2", 0.0), "sensor_noise.sigma_mps2"),
     "tiny sigma": (("sensor_noise", "sigma_mps2", 1e-12), "sensor_noise.sigma_mps2"),

@@ -151,26 +151,19 @@ def test_holds_that_say_nothing_of_their_noise_accuse_nothing():
         assert np.isfinite(nothing.statistic)
 
 
-@pytest.mark.parametrize(
-    ("approach", "scheme", "kappa", "sigma_angle"),
-    [
-        (ROBOT, "mclaren-24", (1.0, 1.0, 1.0), Noise().sigma_angle),
-        (ROBOT, "mclaren-24", (0.6, 1.0, 3.0), Noise().sigma_angle),
-        (ROBOT, "mclaren-24", (1.0, 1.0, 1.0), 2e-4),  # as large as the noise of the forces
-        (GRAVITY, "fibonacci-96", (0.9, 1.0, 2.0), Noise().sigma_angle),
-    ],
-)
+@pytest.mark.parametrize(("approach", "scheme", "kappa", "sigma_angle"), [
+    (ROBOT, "mclaren-24", (1.0, 1.0, 1.0), Noise().sigma_angle),
+    (ROBOT, "mclaren-24", (0.6, 1.0, 3.0), Noise().sigma_angle),
+    (ROBOT, "mclaren-24", (1.0, 1.0, 1.0), 2e-4),  # as large as the noise of the forces
+    (GRAVITY, "fibonacci-96", (0.9, 1.0, 2.0), Noise().sigma_angle),
+])  # fmt: skip
 def test_variance_factors_of_the_axes_are_unbiased(approach, scheme, kappa, sigma_angle):
     """Gravity takes many positions, so that none of the estimates is cut at 0."""
     x, y, z = kappa
     residuals, _ = sessions(
-        approach,
-        f"axis_noise(kappa_x={x}, kappa_y={y}, kappa_z={z})",
-        seed=10,
-        scheme=scheme,
-        runs=300,
-        sigma_angle=sigma_angle,
-    )
+        approach, f"axis_noise(kappa_x={x}, kappa_y={y}, kappa_z={z})", seed=10, scheme=scheme,
+        runs=300, sigma_angle=sigma_angle,
+    )  # fmt: skip
     factors = np.array([axis_factors(r) for r in residuals])
     assert np.mean(factors == 0) < 1e-2
     error = factors.std(axis=0) / np.sqrt(len(factors))
@@ -180,17 +173,14 @@ def test_variance_factors_of_the_axes_are_unbiased(approach, scheme, kappa, sigm
 # --- something is wrong --------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("name", "effect", "approach", "scheme"),
-    [
-        ("axis", "axis_noise(kappa_z=9)", ROBOT, "mclaren-24"),
-        ("axis", "axis_noise(kappa_z=9)", GRAVITY, "fibonacci-96"),
-        ("colour", "coloured_noise(share=0.9, tau=8)", ROBOT, "mclaren-24"),
-        ("colour", "coloured_noise(share=0.9, tau=8)", GRAVITY, "fibonacci-96"),
-        ("tail", "heavy_tails(nu=2.1)", ROBOT, "fibonacci-96"),
-        ("tail", "heavy_tails(nu=2.1)", GRAVITY, "fibonacci-96"),
-    ],
-)
+@pytest.mark.parametrize(("name", "effect", "approach", "scheme"), [
+    ("axis", "axis_noise(kappa_z=9)", ROBOT, "mclaren-24"),
+    ("axis", "axis_noise(kappa_z=9)", GRAVITY, "fibonacci-96"),
+    ("colour", "coloured_noise(share=0.9, tau=8)", ROBOT, "mclaren-24"),
+    ("colour", "coloured_noise(share=0.9, tau=8)", GRAVITY, "fibonacci-96"),
+    ("tail", "heavy_tails(nu=2.1)", ROBOT, "fibonacci-96"),
+    ("tail", "heavy_tails(nu=2.1)", GRAVITY, "fibonacci-96"),
+])  # fmt: skip
 def test_what_is_large_is_found(name, effect, approach, scheme):
     """At 1 % in more than 80 % of the sessions."""
     residuals, _ = sessions(approach, effect, seed=12, scheme=scheme, runs=50)

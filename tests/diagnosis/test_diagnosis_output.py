@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from click.testing import CliRunner
+from calling import call
 from jsonschema import Draft202012Validator
 from page_helpers import assert_sound, text_of
 from places import ROOT
@@ -27,7 +27,6 @@ from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.output import write_calibration
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.commands.main import main
 from accelstudy.diagnosis.consequences import separating_positions
 from accelstudy.diagnosis.decision.posterior import Explanation, Posterior, Weighed
 from accelstudy.diagnosis.decision.priors import SURE
@@ -50,41 +49,31 @@ from accelstudy.study.config import read_study
 NINE = get_model("bias-scale-nonorthogonality")
 THERMAL = "thermal_bias: 0.003, -0.002, 0.001"
 CASES = {
-    "named": {
-        "effects": (THERMAL,),
-        "temperature": (20.0, 40.0),
-        "temperature_order": "random",
-        "order": "random",
-    },
+    "named": {"effects": (THERMAL,),
+              "temperature": (20.0, 40.0),
+              "temperature_order": "random",
+              "order": "random"},
     "clipped": {"effects": ("saturation(knee=9.3): 1, 1, 1",), "seed": 3},
     "gravity": {"effects": ("quadratic_scale: 0.003, 0.004, -0.003",), "approach": "gravity"},
     "no_effect": {},
-    "unknown": {
-        "effects": (THERMAL, "hysteresis: 0.03, 0.02, 0.03", "cubic_scale: 0.006, 0.005, 0.006"),
-        "temperature": (20.0, 40.0),
-        "temperature_order": "random",
-    },
+    "unknown": {"effects": (THERMAL, "hysteresis: 0.03, 0.02, 0.03",
+                            "cubic_scale: 0.006, 0.005, 0.006"),
+                "temperature": (20.0, 40.0),
+                "temperature_order": "random"},
     "noise_model": {"noise_effects": ("noise_level(kappa=4)",)},
     "gross_error": {"gross_errors": ("axis_error(x=2, y=1, z=3)", "row_order(first=3, second=9)")},
-}
+}  # fmt: skip
 HEADLINES = {
-    "named": "The model lacks thermal bias.",
-    "clipped": "The model lacks saturation.",
-    "gravity": "The model lacks",
-    "no_effect": "Nothing that these data can show",
-    "unknown": "it has no name here",
-    "noise_model": "its noise is not",
+    "named": "The model lacks thermal bias.", "clipped": "The model lacks saturation.",
+    "gravity": "The model lacks", "no_effect": "Nothing that these data can show",
+    "unknown": "it has no name here", "noise_model": "its noise is not",
     "gross_error": "The data have a gross error",
-}
+}  # fmt: skip
 
 
 SCHEMA = Draft202012Validator(
     yaml.safe_load((ROOT / "docs/reference/diagnosis.schema.yaml").read_text(encoding="utf-8"))
 )
-
-
-def run(*arguments):
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
 
 
 def simulated(case, folder):
@@ -124,7 +113,7 @@ def written(tmp_path_factory):
             out = root / f"{case}-out"
             with pytest.MonkeyPatch.context() as patch:
                 patch.setattr(saving, "save", rendering(*RENDERED.get(case, ())))
-                result = run("diagnose", root / case, "--out", out, "--replicates", 100)
+                result = call("diagnose", root / case, "--out", out, "--replicates", 100)
             assert result.exit_code == 0, result.output
             content = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
             made[case] = out, content, result.output
@@ -171,19 +160,13 @@ def test_the_page_tells_its_story_in_order(written):
     out, _, _ = written("named")
     page = (out / "report.html").read_text(encoding="utf-8")
     assert [text_of(h) for h in re.findall("<h2>(.*?)</h2>", page)] == [
-        "Is there a gap between simulation and measurement?",
-        "Where does it live?",
-        "What is it called?",
-        "How sure is that, and what else could it be?",
-        "Is the noise as assumed?",
-        "What is it worth?",
+        "Is there a gap between simulation and measurement?", "Where does it live?",
+        "What is it called?", "How sure is that, and what else could it be?",
+        "Is the noise as assumed?", "What is it worth?",
         "Did the gap shrink on data that were not used?",
-        "Does the simulation now look like the measurement?",
-        "What can this campaign not see?",
-        "What to measure next",
-        "What to do next",
-        "Terms",
-    ]
+        "Does the simulation now look like the measurement?", "What can this campaign not see?",
+        "What to measure next", "What to do next", "Terms",
+    ]  # fmt: skip
 
 
 def told(diagnosis, folder):
@@ -214,13 +197,10 @@ def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
     ]
     finding = Finding("narrowed", named.final, posterior=Posterior.of(weighed))
     diagnosis = replace(
-        named,
-        verdict="narrowed",
-        credible_set=finding.credible_set,
+        named, verdict="narrowed", credible_set=finding.credible_set,
         certain=certain_of("narrowed", finding.credible_set, examined),
-        gap=replace(named.gap, names=()),
-        next_positions=separating_positions(named.frame, finding),
-    )
+        gap=replace(named.gap, names=()), next_positions=separating_positions(named.frame, finding),
+    )  # fmt: skip
     content, text = told(diagnosis, tmp_path)
     (part,) = content["certain"]
     assert part["names"] == ["thermal_bias", "thermal_scale"]
@@ -328,15 +308,12 @@ def test_the_question_of_further_positions_is_a_sentence():
     assert question([]) == ""
 
 
-@pytest.mark.parametrize(
-    ("change", "path"),
-    [
-        ({"credible_set": []}, "$.credible_set"),
-        ({"effects": []}, "$.effects"),
-        ({"gap": {"confirmed": True, "confirmed_statement": None}}, "$.gap.confirmed_statement"),
-        ({"verdict": "no_effect"}, "$.effects"),
-    ],
-)
+@pytest.mark.parametrize(("change", "path"), [
+    ({"credible_set": []}, "$.credible_set"),
+    ({"effects": []}, "$.effects"),
+    ({"gap": {"confirmed": True, "confirmed_statement": None}}, "$.gap.confirmed_statement"),
+    ({"verdict": "no_effect"}, "$.effects"),
+])  # fmt: skip
 def test_the_schema_asks_what_a_verdict_requires(written, change, path):
     _, content, _ = written("named")
     changed = {**content, **change, "gap": {**content["gap"], **change.get("gap", {})}}
@@ -350,15 +327,12 @@ def test_the_headline_names_all_that_would_be_the_same():
     assert " or " in found
 
 
-@pytest.mark.parametrize(
-    ("value", "shown"),
-    [
-        (0.032, "p = 0.032"),
-        (4.31e-6, "p = 4.3 · 10⁻⁶"),
-        (1e-15, "p < 10⁻¹²"),
-        (0.9999, "p > 0.999"),
-    ],
-)
+@pytest.mark.parametrize(("value", "shown"), [
+    (0.032, "p = 0.032"),
+    (4.31e-6, "p = 4.3 · 10⁻⁶"),
+    (1e-15, "p < 10⁻¹²"),
+    (0.9999, "p > 0.999"),
+])  # fmt: skip
 def test_p_values_in_words(value, shown):
     assert p_value(value) == shown
 
@@ -484,18 +458,15 @@ def test_nothing_to_compare_without_an_effect(tmp_path):
     assert close_loop(diagnose(simulated("no_effect", tmp_path / "c"), NINE)) is None
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["nowhere"], "nowhere"),
-        (["c", "--model", "bias-scal"], "did you mean 'bias-scale'"),
-        (["c", "--approach", "robots"], "did you mean 'robot'"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "words"), [
+    (["nowhere"], "nowhere"),
+    (["c", "--model", "bias-scal"], "did you mean 'bias-scale'"),
+    (["c", "--approach", "robots"], "did you mean 'robot'"),
+])  # fmt: skip
 def test_bad_input_is_one_line(arguments, words, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     simulated("no_effect", tmp_path / "c")
-    result = run("diagnose", *arguments, "--out", "out")
+    result = call("diagnose", *arguments, "--out", "out")
     assert result.exit_code == 2
     assert words in result.stderr
     assert result.stderr.count("\n") == 1
@@ -531,12 +502,9 @@ def test_a_figure_that_fails_takes_nothing_with_it(tmp_path, monkeypatch, capsys
 def test_variances_of_unit_weight_that_are_nothing_are_not_compared(tmp_path, monkeypatch):
     """No figure of them could be drawn."""
     sessions = pd.DataFrame(
-        [
-            {"simulation": s, "calibration": c, "replicate": i, "sigma0_squared": value}
-            for s, c in CASES_OF_LOOP
-            for i, value in enumerate((0.0, np.nan, np.inf, 1.2))
-        ]
-    ).assign(converged=True, tilt_error_rad=1e-3)
+        [{"simulation": s, "calibration": c, "replicate": i, "sigma0_squared": value}
+         for s, c in CASES_OF_LOOP for i, value in enumerate((0.0, np.nan, np.inf, 1.2))],
+    ).assign(converged=True, tilt_error_rad=1e-3)  # fmt: skip
     loop = Loop(sessions, {"base": 1.0, "extended": 1.0})
     assert loop.interval("old", "base") == (1.2, 1.2)
     loop_figure(loop)
@@ -563,15 +531,12 @@ def test_numbers_of_many_positions_do_not_meet():
     assert all(a.x1 + 3 < b.x0 for a, b in pairwise(boxes))
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"modle": 1}, "did you mean 'model'"),
-        ({"model": "nine"}, "unknown model 'nine'"),
-        ({"campaign": {"schem": "rings-24"}}, "did you mean 'scheme'"),
-        ({"campaign": {"sigma": -1}}, "sigma: must be from 1e-09"),
-    ],
-)
+@pytest.mark.parametrize(("change", "words"), [
+    ({"modle": 1}, "did you mean 'model'"),
+    ({"model": "nine"}, "unknown model 'nine'"),
+    ({"campaign": {"schem": "rings-24"}}, "did you mean 'scheme'"),
+    ({"campaign": {"sigma": -1}}, "sigma: must be from 1e-09"),
+])  # fmt: skip
 def test_the_example_is_checked(change, words):
     content = yaml.safe_load((ROOT / "config/diagnose-example.yaml").read_text(encoding="utf-8"))
     assert parse_round_trip(content).campaign.name == "diagnose-example"

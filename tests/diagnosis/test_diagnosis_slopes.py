@@ -88,16 +88,13 @@ def test_rates_are_derivatives_of_the_definition_by_time():
     assert changing <= {"thermal_curve"}
 
 
-@pytest.mark.parametrize(
-    ("temperature", "steady"),
-    [
-        (np.linspace(20, 40, 24), True),
-        (np.round(np.linspace(20, 40, 24), 0), True),  # a coarse thermometer
-        (40 - 20 * np.exp(-np.arange(24) / 8), True),
-        (np.repeat([20.0, 40.0, 20.0], 8), False),
-        (np.random.default_rng(2).uniform(20, 40, 24), False),
-    ],
-)
+@pytest.mark.parametrize(("temperature", "steady"), [
+    (np.linspace(20, 40, 24), True),
+    (np.round(np.linspace(20, 40, 24), 0), True),  # a coarse thermometer
+    (40 - 20 * np.exp(-np.arange(24) / 8), True),
+    (np.repeat([20.0, 40.0, 20.0], 8), False),
+    (np.random.default_rng(2).uniform(20, 40, 24), False),
+])  # fmt: skip
 def test_a_temperature_that_is_set_anew_rests_within_the_holds(temperature, steady):
     rate = temperature_rate(60.0 * np.arange(24), temperature)
     assert rate.any() == steady

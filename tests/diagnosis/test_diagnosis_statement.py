@@ -30,75 +30,44 @@ def made(*explanations):
     return tuple(found)
 
 
-@pytest.mark.parametrize(
-    ("explanations", "certain", "beside"),
-    [
-        # one name
-        ([("thermal_bias", 0.97)], [("", {"thermal_bias": 0.97}, None)], []),
-        # near rivals are one family
-        (
-            [("bias_drift", 0.51), ("warm_up", 0.44)],
-            [(SLOW, {"bias_drift": 0.51, "warm_up": 0.44}, 0.93)],
-            [],
-        ),
-        # four pairs are a set for each part
-        (
-            FOUR_PAIRS,
-            [
-                (SLOW, {"bias_drift": 0.56, "warm_up": 0.43}, 0.93),
-                (EVEN, {"quadratic_scale": 0.64, "scale_asymmetry": 0.35}, 0.96),
-            ],
-            [],
-        ),
-        # what one name leaves is open
-        (
-            [
-                ("hysteresis+quadratic_scale", 0.4),
-                ("hysteresis", 0.3),
-                ("hysteresis+warm_up", 0.25),
-            ],
-            [("", {"hysteresis": 0.95}, None)],
-            [(("quadratic_scale",), 0.4), ((), 0.3), (("warm_up",), 0.25)],
-        ),
-        # a family beside which more may be missing
-        (
-            [("bias_drift", 0.5), ("warm_up+hysteresis", 0.42)],
-            [(SLOW, {"bias_drift": 0.5, "warm_up": 0.42}, 0.93)],
-            [((), 0.5), (("hysteresis",), 0.42)],
-        ),
-        # strangers leave nothing certain
-        (
-            [("bias_drift+hysteresis", 0.5), ("saturation", 0.45)],
-            [],
-            [(("bias_drift", "hysteresis"), 0.5), (("saturation",), 0.45)],
-        ),
-        # a class with a name of another family is of no family
-        (
-            [("bias_drift=thermal_bias", 0.5), ("warm_up", 0.45)],
-            [],
-            [(("bias_drift",), 0.5), (("warm_up",), 0.45)],
-        ),
-        # two of a family are two things
-        (
-            [("bias_drift+warm_up", 0.6), ("bias_drift+quadratic_scale", 0.35)],
-            [("", {"bias_drift": 0.95}, None)],
-            [(("warm_up",), 0.6), (("quadratic_scale",), 0.35)],
-        ),
-        # two bumped positions count once
-        (
-            [("outlier_position+outlier_position", 0.6), ("outlier_position", 0.35)],
-            [("", {"outlier_position": 0.95}, None)],
-            [],
-        ),
-        # too little is not certain
-        (
-            [("bias_drift", 0.5), ("warm_up", 0.3)],
-            [],
-            [(("bias_drift",), 0.5), (("warm_up",), 0.3)],
-        ),
-        ([], [], []),
-    ],
-)
+@pytest.mark.parametrize(("explanations", "certain", "beside"), [
+    # one name
+    ([("thermal_bias", 0.97)], [("", {"thermal_bias": 0.97}, None)], []),
+    # near rivals are one family
+    ([("bias_drift", 0.51), ("warm_up", 0.44)],
+     [(SLOW, {"bias_drift": 0.51, "warm_up": 0.44}, 0.93)], []),
+    # four pairs are a set for each part
+    (FOUR_PAIRS,
+     [(SLOW, {"bias_drift": 0.56, "warm_up": 0.43}, 0.93),
+      (EVEN, {"quadratic_scale": 0.64, "scale_asymmetry": 0.35}, 0.96)],
+     []),
+    # what one name leaves is open
+    ([("hysteresis+quadratic_scale", 0.4), ("hysteresis", 0.3), ("hysteresis+warm_up", 0.25)],
+     [("", {"hysteresis": 0.95}, None)],
+     [(("quadratic_scale",), 0.4), ((), 0.3), (("warm_up",), 0.25)]),
+    # a family beside which more may be missing
+    ([("bias_drift", 0.5), ("warm_up+hysteresis", 0.42)],
+     [(SLOW, {"bias_drift": 0.5, "warm_up": 0.42}, 0.93)],
+     [((), 0.5), (("hysteresis",), 0.42)]),
+    # strangers leave nothing certain
+    ([("bias_drift+hysteresis", 0.5), ("saturation", 0.45)],
+     [],
+     [(("bias_drift", "hysteresis"), 0.5), (("saturation",), 0.45)]),
+    # a class with a name of another family is of no family
+    ([("bias_drift=thermal_bias", 0.5), ("warm_up", 0.45)],
+     [],
+     [(("bias_drift",), 0.5), (("warm_up",), 0.45)]),
+    # two of a family are two things
+    ([("bias_drift+warm_up", 0.6), ("bias_drift+quadratic_scale", 0.35)],
+     [("", {"bias_drift": 0.95}, None)],
+     [(("warm_up",), 0.6), (("quadratic_scale",), 0.35)]),
+    # two bumped positions count once
+    ([("outlier_position+outlier_position", 0.6), ("outlier_position", 0.35)],
+     [("", {"outlier_position": 0.95}, None)], []),
+    # too little is not certain
+    ([("bias_drift", 0.5), ("warm_up", 0.3)], [], [(("bias_drift",), 0.5), (("warm_up",), 0.3)]),
+    ([], [], []),
+])  # fmt: skip
 def test_what_is_certain_of_a_set_and_what_is_open(explanations, certain, beside):
     """Parts by their family, unless they have one name, with the posteriors and the purity."""
     cosine = lambda a, b: COSINES.get(frozenset({a, b}), 0.2)  # noqa: E731
@@ -111,59 +80,41 @@ def test_what_is_certain_of_a_set_and_what_is_open(explanations, certain, beside
     assert [(one.names, pytest.approx(one.posterior)) for one in found.open] == beside
 
 
-@pytest.mark.parametrize(
-    ("explanations", "words", "apart"),
-    [
-        (
-            [("bias_drift", 0.51), ("warm_up", 0.44)],
-            "a slow change in time: bias drift or warm up",
-            "bias drift (0.51) and warm up (0.44) apart",
-        ),
-        (
-            FOUR_PAIRS,
-            "a slow change in time (bias drift or warm up) and an even nonlinearity (quadratic "
-            "scale or scale asymmetry)",
-            "bias drift (0.56) and warm up (0.43), nor quadratic scale (0.64) and scale asymmetry "
-            "(0.35) apart",
-        ),
-        (
-            [("base_tilt=encoder_offset", 0.6), ("encoder_scale", 0.35)],
-            "an error in the attitude of the rig: base tilt, encoder offset or encoder scale",
-            "base tilt or encoder offset (0.6) and encoder scale (0.35) apart",
-        ),
-        (
-            [("bias_drift", 0.5), ("warm_up+hysteresis", 0.42)],
-            "a slow change in time (bias drift or warm up), and perhaps hysteresis",
-            "bias drift (0.5) and warm up (0.42) apart, nor whether hysteresis (0.42) is missing "
-            "as well",
-        ),
-        (
-            [("thermal_bias", 0.5), ("warm_up", 0.42)],
-            "thermal bias or warm up",
-            "thermal bias (0.5) and warm up (0.42) apart",
-        ),
-        (
-            [("bias_drift+hysteresis", 0.5), ("saturation", 0.45)],
-            "bias drift with hysteresis, or saturation",
-            "bias drift with hysteresis (0.5) and saturation (0.45) apart",
-        ),
-        (
-            [("bias_drift", 0.5), ("warm_up", 0.3), ("coloured_noise", 0.12)],
-            "a slow change in time: bias drift or warm up, unless it is coloured noise",
-            "bias drift (0.5) and warm up (0.3) apart",
-        ),
-        (  # what has next to no probability is left to the figure
-            [("bias_drift", 0.55), ("warm_up", 0.3), ("warm_up+settling", 0.04), ("unknown", 0.03)],
-            "a slow change in time: bias drift or warm up",
-            "bias drift (0.55) and warm up (0.34) apart",
-        ),
-        (
-            [("hysteresis", 0.68), ("coloured_noise", 0.25)],
-            "hysteresis, unless it is coloured noise",
-            "hysteresis (0.68) and coloured noise (0.25) apart",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("explanations", "words", "apart"), [
+    ([("bias_drift", 0.51), ("warm_up", 0.44)], "a slow change in time: bias drift or warm up",
+     "bias drift (0.51) and warm up (0.44) apart"),
+    (
+        FOUR_PAIRS,
+        "a slow change in time (bias drift or warm up) and an even nonlinearity (quadratic "
+        "scale or scale asymmetry)",
+        "bias drift (0.56) and warm up (0.43), nor quadratic scale (0.64) and scale asymmetry "
+        "(0.35) apart",
+    ),
+    ([("base_tilt=encoder_offset", 0.6), ("encoder_scale", 0.35)],
+     "an error in the attitude of the rig: base tilt, encoder offset or encoder scale",
+     "base tilt or encoder offset (0.6) and encoder scale (0.35) apart"),
+    (
+        [("bias_drift", 0.5), ("warm_up+hysteresis", 0.42)],
+        "a slow change in time (bias drift or warm up), and perhaps hysteresis",
+        "bias drift (0.5) and warm up (0.42) apart, nor whether hysteresis (0.42) is missing "
+        "as well",
+    ),
+    ([("thermal_bias", 0.5), ("warm_up", 0.42)], "thermal bias or warm up",
+     "thermal bias (0.5) and warm up (0.42) apart"),
+    ([("bias_drift+hysteresis", 0.5), ("saturation", 0.45)],
+     "bias drift with hysteresis, or saturation",
+     "bias drift with hysteresis (0.5) and saturation (0.45) apart"),
+    ([("bias_drift", 0.5), ("warm_up", 0.3), ("coloured_noise", 0.12)],
+     "a slow change in time: bias drift or warm up, unless it is coloured noise",
+     "bias drift (0.5) and warm up (0.3) apart"),
+    (  # what has next to no probability is left to the figure
+        [("bias_drift", 0.55), ("warm_up", 0.3), ("warm_up+settling", 0.04), ("unknown", 0.03)],
+        "a slow change in time: bias drift or warm up",
+        "bias drift (0.55) and warm up (0.34) apart",
+    ),
+    ([("hysteresis", 0.68), ("coloured_noise", 0.25)], "hysteresis, unless it is coloured noise",
+     "hysteresis (0.68) and coloured noise (0.25) apart"),
+])  # fmt: skip
 def test_a_small_set_in_words(explanations, words, apart):
     assert missing(made(*explanations)) == words
     assert not_told_apart(made(*explanations)) == f"This campaign cannot tell {apart}"
@@ -208,13 +159,10 @@ def test_the_unknown_is_said_by_families():
     )
 
 
-@pytest.mark.parametrize(
-    "explanations",
-    [
-        [("unknown", 0.95)],
-        [("coloured_noise", 0.5), ("heavy_tails", 0.45)],
-        [("bias_drift", 0.3), ("hysteresis", 0.2), ("coloured_noise", 0.3), ("unknown", 0.15)],
-    ],
-)
+@pytest.mark.parametrize("explanations", [
+    [("unknown", 0.95)],
+    [("coloured_noise", 0.5), ("heavy_tails", 0.45)],
+    [("bias_drift", 0.3), ("hysteresis", 0.2), ("coloured_noise", 0.3), ("unknown", 0.15)],
+])  # fmt: skip
 def test_nothing_is_certain_of_what_no_effect_explains(explanations):
     assert without_a_name(made(*explanations)).startswith("Something is missing from the model")

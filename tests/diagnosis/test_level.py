@@ -26,16 +26,13 @@ def designs():
     return {a.name: design(shuffled("mclaren-24"), a, seed=7) for a in (ROBOT, GRAVITY)}
 
 
-@pytest.mark.parametrize(
-    ("approach", "level", "wanted"),
-    [
-        ("robot", Level.given(), GIVEN),
-        ("robot", Level.unknown(), NOT_GIVEN),
-        ("gravity", Level.given(), GIVEN),
-        ("gravity", Level.unknown(), NOT_GIVEN),
-        ("gravity", Level.within_holds(), NOT_GIVEN),
-    ],
-)
+@pytest.mark.parametrize(("approach", "level", "wanted"), [
+    ("robot", Level.given(), GIVEN),
+    ("robot", Level.unknown(), NOT_GIVEN),
+    ("gravity", Level.given(), GIVEN),
+    ("gravity", Level.unknown(), NOT_GIVEN),
+    ("gravity", Level.within_holds(), NOT_GIVEN),
+])  # fmt: skip
 def test_noise_alone_counts_as_often_as_the_level_says(designs, approach, level, wanted):
     """Each null simulation has a seed of its own, so that the rates scatter as they really do."""
     examined, rng = designs[approach], np.random.default_rng([1, 2])

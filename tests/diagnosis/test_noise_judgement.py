@@ -97,19 +97,16 @@ def judged(monkeypatch, name, factor=1.5, of_noise=0.5, fit=0.5):
     return judge_noise(SimpleNamespace(frame="fit"), Posterior.of(weighed), test)
 
 
-@pytest.mark.parametrize(
-    ("case", "said", "says_the_level"),
-    [
-        ({"name": AXES, "of_noise": 0.1}, "noise_model", False),
-        ({"name": LEVEL, "of_noise": 0.51}, "noise_model", True),
-        ({"name": LEVEL, "of_noise": 0.49}, "unknown", True),
-        ({"name": LEVEL, "of_noise": 0.1, "factor": 0.5}, "noise_model", True),
-        ({"name": TAILS, "fit": 0.009}, "unknown", False),
-        ({"name": TAILS, "fit": 0.011}, "noise_model", False),
-        ({"name": LEVEL, "of_noise": 0.9, "fit": 0.009}, "unknown", False),
-        ({"name": STEPS, "fit": 0.009}, "noise_model", False),
-    ],
-)
+@pytest.mark.parametrize(("case", "said", "says_the_level"), [
+    ({"name": AXES, "of_noise": 0.1}, "noise_model", False),
+    ({"name": LEVEL, "of_noise": 0.51}, "noise_model", True),
+    ({"name": LEVEL, "of_noise": 0.49}, "unknown", True),
+    ({"name": LEVEL, "of_noise": 0.1, "factor": 0.5}, "noise_model", True),
+    ({"name": TAILS, "fit": 0.009}, "unknown", False),
+    ({"name": TAILS, "fit": 0.011}, "noise_model", False),
+    ({"name": LEVEL, "of_noise": 0.9, "fit": 0.009}, "unknown", False),
+    ({"name": STEPS, "fit": 0.009}, "noise_model", False),
+])  # fmt: skip
 def test_what_a_significant_test_means(monkeypatch, case, said, says_the_level):
     """Larger residuals may be an effect; a misfit that repeats share is no noise, but steps are."""
     found = judged(monkeypatch, **case)
@@ -151,15 +148,12 @@ def test_lack_of_fit_is_the_analysis_of_variance(missed):
     assert lack_of_fit(problem) == pytest.approx(stats.f.sf(f, 9, 18), rel=0.02)
 
 
-@pytest.mark.parametrize(
-    ("level", "scatter", "holds"),
-    [
-        (Level.given(), 1.0, True),
-        (Level.given(), 2.0, False),
-        (Level.given(), 0.4, False),
-        (Level.unknown(), 1.0, False),
-    ],
-)
+@pytest.mark.parametrize(("level", "scatter", "holds"), [
+    (Level.given(), 1.0, True),
+    (Level.given(), 2.0, False),
+    (Level.given(), 0.4, False),
+    (Level.unknown(), 1.0, False),
+])  # fmt: skip
 def test_sigma_is_taken_where_it_is_given_and_not_refuted(level, scatter, holds):
     problem = repeated(level, scatter)
     e = problem.base.solution.misclosures[:, 0] / 0.002

@@ -1,11 +1,9 @@
-"""A campaign as a sensor of the nine parameters would give it, and commands on campaigns."""
+"""A campaign as a sensor of the nine parameters would give it."""
 
 import numpy as np
-from click.testing import CliRunner
 
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.session import Campaign
-from accelstudy.commands.main import main
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise, session
@@ -28,24 +26,3 @@ def simulated_campaign(values, scheme="mclaren-24", seed=1, noise=None, sigma=0.
         angles=drawn.angles[0],
         sigma_angle=noise.sigma_angle,
     )
-
-
-def run(*arguments):
-    """Run a command, however it ends."""
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
-
-
-def succeed(*arguments):
-    """Run a command that must end well."""
-    result = run(*arguments)
-    assert result.exit_code == 0, f"{arguments}: {result.output}"
-    return result
-
-
-def refusal(*arguments):
-    """Run a command that must be refused; the one line that says why."""
-    result = run(*arguments)
-    assert result.exit_code == 2, result.output
-    assert result.stderr.startswith("error: ")
-    assert result.stderr.count("\n") == 1
-    return result.stderr

@@ -12,10 +12,7 @@ from accelstudy.design.task import Task
 from accelstudy.schemes.optimal import TABLE
 from accelstudy.sensors.models import get_model
 
-SIZES = {
-    "D": range(10, 41),
-    "I": (*range(9, 41), 45, 50, 60, 70, 80, 100, 120),
-}
+SIZES = {"D": range(10, 41), "I": (*range(9, 41), 45, 50, 60, 70, 80, 100, 120)}
 TASK = Task(get_model("bias-scale-nonorthogonality"), get_approach("gravity"))
 DECIMALS = 6
 

@@ -108,18 +108,15 @@ def alike(old, new):
     return True
 
 
-@pytest.mark.parametrize(
-    ("head", "new", "same"),
-    [
-        ("posterior", "0.715", True),
-        ("posterior", "0.68", False),
-        ("posterior", "–", False),
-        ("verdict", "narrowed", False),
-        ("explanation", "warm up", False),
-        ("σ₀²", "1.31", True),
-        ("σ₀²", "1.4", False),
-    ],
-)
+@pytest.mark.parametrize(("head", "new", "same"), [
+    ("posterior", "0.715", True),
+    ("posterior", "0.68", False),
+    ("posterior", "–", False),
+    ("verdict", "narrowed", False),
+    ("explanation", "warm up", False),
+    ("σ₀²", "1.31", True),
+    ("σ₀²", "1.4", False),
+])  # fmt: skip
 def test_another_answer_is_noticed(head, new, same):
     row = {"verdict": "named", "explanation": "bias drift", "posterior": "0.71", "σ₀²": "1.30"}
     assert alike(row, {**row, head: new}) == same

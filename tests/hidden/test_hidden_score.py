@@ -125,31 +125,28 @@ def test_names_are_right_in_any_order_and_each_for_another_effect():
     assert not all_true([["a"], ["b"]], [["a"]])
 
 
-@pytest.mark.parametrize(
-    ("figure", "cases", "measured", "n", "met"),
-    [
-        ("campaigns without an answer", "all", 1 / len(CASES), len(CASES), "no"),
-        ("false alarm", "sigma given", 1 / 20, 20, "yes"),
-        ("false alarm", "sigma not given", 1 / 20, 20, "yes"),
-        ("named or narrowed to effects", "wrong noise", 0, 1, "yes"),
-        # Drift is right, and the mounting by its other name; narrowed to the wrong one is not.
-        ("best name right, named or narrowed", "λ = 25", 2 / 4, 4, "yes"),
-        # A second name beside the right one is wrong, and so is no answer.
-        ("best name right, named or narrowed", "λ = 60", 0, 2, "no"),
-        ("best name right, named or narrowed", "over all λ", 2 / 6, 6, "no"),
-        ("named, and wrong", "one and two", 2 / 6, 6, "no"),
-        ("90 % set holds the truth", "λ = 25", 3 / 3, 3, "yes"),
-        ("90 % set holds the truth", "λ = 60", 0, 1, "no"),
-        ("names in a 90 % set", "λ = 25", 4 / 3, 3, "yes"),
-        ("names in a 90 % set", "λ = 60", 2, 1, "no"),
-        ("both of two right", "λ = 40", 1 / 3, 3, "no"),
-        ("named or narrowed wrongly", "never in the catalogue", 1, 1, "no"),
-        ("named or narrowed wrongly", "family taken out", 0, 1, "yes"),
-        ("confirmed", "nothing missing", None, None, "no"),
-        # A bumped hold is recognised where it is.
-        ("recognised", "gross errors", 2 / 4, 4, "no"),
-    ],
-)
+@pytest.mark.parametrize(("figure", "cases", "measured", "n", "met"), [
+    ("campaigns without an answer", "all", 1 / len(CASES), len(CASES), "no"),
+    ("false alarm", "sigma given", 1 / 20, 20, "yes"),
+    ("false alarm", "sigma not given", 1 / 20, 20, "yes"),
+    ("named or narrowed to effects", "wrong noise", 0, 1, "yes"),
+    # Drift is right, and the mounting by its other name; narrowed to the wrong one is not.
+    ("best name right, named or narrowed", "λ = 25", 2 / 4, 4, "yes"),
+    # A second name beside the right one is wrong, and so is no answer.
+    ("best name right, named or narrowed", "λ = 60", 0, 2, "no"),
+    ("best name right, named or narrowed", "over all λ", 2 / 6, 6, "no"),
+    ("named, and wrong", "one and two", 2 / 6, 6, "no"),
+    ("90 % set holds the truth", "λ = 25", 3 / 3, 3, "yes"),
+    ("90 % set holds the truth", "λ = 60", 0, 1, "no"),
+    ("names in a 90 % set", "λ = 25", 4 / 3, 3, "yes"),
+    ("names in a 90 % set", "λ = 60", 2, 1, "no"),
+    ("both of two right", "λ = 40", 1 / 3, 3, "no"),
+    ("named or narrowed wrongly", "never in the catalogue", 1, 1, "no"),
+    ("named or narrowed wrongly", "family taken out", 0, 1, "yes"),
+    ("confirmed", "nothing missing", None, None, "no"),
+    # A bumped hold is recognised where it is.
+    ("recognised", "gross errors", 2 / 4, 4, "no"),
+])  # fmt: skip
 def test_targets(tables, figure, cases, measured, n, met):
     row = target(tables, figure, cases)
     assert row["met"] == met
@@ -265,20 +262,17 @@ def test_figures_of_much_and_of_nothing(tables):
             assert draw().axes
 
 
-@pytest.mark.parametrize(
-    ("figure", "cases", "measured", "n"),
-    [
-        ("right, and withheld", "λ = 25", 0, 2),
-        ("names in a 90 % set beyond the oracle's", "λ = 25", 1 / 3, 3),
-        ("named, and wrong, as the posteriors expect", "one and two", 0.2, 6),
-        ("named, and wrong", "posterior from 0.8 on", 2 / 6, 6),
-        ("named, and wrong", "posterior from 0.85 on", np.nan, 0),
-        ("one of the two alone", "λ = 40", 1 / 3, 3),
-        ("named or narrowed wrongly", "fifth", 1, 1),
-        ("confirmed, of those wrong", "family taken out", np.nan, 0),
-        ("by gravity alone, sigma not given", "nothing missing", 0, 1),
-    ],
-)
+@pytest.mark.parametrize(("figure", "cases", "measured", "n"), [
+    ("right, and withheld", "λ = 25", 0, 2),
+    ("names in a 90 % set beyond the oracle's", "λ = 25", 1 / 3, 3),
+    ("named, and wrong, as the posteriors expect", "one and two", 0.2, 6),
+    ("named, and wrong", "posterior from 0.8 on", 2 / 6, 6),
+    ("named, and wrong", "posterior from 0.85 on", np.nan, 0),
+    ("one of the two alone", "λ = 40", 1 / 3, 3),
+    ("named or narrowed wrongly", "fifth", 1, 1),
+    ("confirmed, of those wrong", "family taken out", np.nan, 0),
+    ("by gravity alone, sigma not given", "nothing missing", 0, 1),
+])  # fmt: skip
 def test_what_pages_say_beside_the_targets(tables, figure, cases, measured, n):
     table = further(tables["campaigns"])
     (row,) = table[(table["figure"] == figure) & table["cases"].str.contains(cases)].to_dict(

@@ -38,18 +38,15 @@ def test_the_specific_force_has_the_norm_of_gravity(roll, pitch, g):
     assert np.linalg.norm(specific_force(roll, pitch, g)) == pytest.approx(g, rel=1e-14)
 
 
-@pytest.mark.parametrize(
-    ("f", "roll", "pitch"),
-    [
-        ((0, 0, -G), 0, 0),  # level
-        ((0, -G, 0), 100, 0),  # on the right side
-        ((0, G, 0), -100, 0),
-        ((G, 0, 0), None, 100),  # nose up: no roll
-        ((-G, 0, 0), None, -100),
-        ((G * np.sin(10 * GON), 0, -G * np.cos(10 * GON)), 0, 10),
-        ((0, -G * np.sin(30 * GON), -G * np.cos(30 * GON)), 30, 0),
-    ],
-)
+@pytest.mark.parametrize(("f", "roll", "pitch"), [
+    ((0, 0, -G), 0, 0),  # level
+    ((0, -G, 0), 100, 0),  # on the right side
+    ((0, G, 0), -100, 0),
+    ((G, 0, 0), None, 100),  # nose up: no roll
+    ((-G, 0, 0), None, -100),
+    ((G * np.sin(10 * GON), 0, -G * np.cos(10 * GON)), 0, 10),
+    ((0, -G * np.sin(30 * GON), -G * np.cos(30 * GON)), 30, 0),
+])  # fmt: skip
 def test_signs_of_the_convention(f, roll, pitch):
     """North-east-down: f_b = g (sin θ, −cos θ sin φ, −cos θ cos φ), in gon."""
     found = np.array(roll_pitch(f)) / GON
@@ -90,14 +87,10 @@ def test_jacobian_of_many_forces():
     np.testing.assert_allclose(found[2, 3], jacobian(f[2, 3]), rtol=1e-14)
 
 
-def test_sigma_at_level_is_13_mgon():
-    sigma = sigma_roll_pitch(force(0, 0), EQUAL_NOISE) / MGON
-    np.testing.assert_allclose(sigma, 12.98, atol=0.005)
-
-
-def test_sigma_at_a_pitch_of_50_gon():
-    sigma = sigma_roll_pitch(force(0, 50 * GON), EQUAL_NOISE) / MGON
-    np.testing.assert_allclose(sigma, [18.36, 12.98], atol=0.005)
+@pytest.mark.parametrize(("pitch", "expected"), [(0, 12.98), (50, [18.36, 12.98])])
+def test_sigma_of_the_tilt(pitch, expected):
+    sigma = sigma_roll_pitch(force(0, pitch * GON), EQUAL_NOISE) / MGON
+    np.testing.assert_allclose(sigma, expected, atol=0.005)
 
 
 @given(roll=ROLLS, pitch=PITCHES, sigma=st.floats(1e-6, 0.1))

@@ -113,12 +113,9 @@ def test_forces_alone(roll, pitch):
     phi, theta = roll * GON, pitch * GON
     expected = {
         "roll": [0, np.cos(phi) ** 2, np.sin(phi) ** 2],
-        "pitch": [
-            np.cos(theta) ** 2,
-            (np.sin(theta) * np.sin(phi)) ** 2,
-            (np.sin(theta) * np.cos(phi)) ** 2,
-        ],
-    }
+        "pitch": [np.cos(theta) ** 2, (np.sin(theta) * np.sin(phi)) ** 2,
+                  (np.sin(theta) * np.cos(phi)) ** 2],
+    }  # fmt: skip
     for output, effects in expected.items():
         rows = table[table["output"] == output]
         assert rows["input"].tolist() == [*FORCES]

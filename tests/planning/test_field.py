@@ -16,14 +16,9 @@ from accelstudy.pole.sensor import CalibratedSensor, from_linear_theory
 from accelstudy.sensors.models import get_model
 
 SHEET = DataSheet(
-    "mine",
-    velocity_random_walk=1e-3,
-    bias_instability=4e-4,
-    acceleration_random_walk=1e-5,
-    repeatability=2e-3,
-    bias_per_kelvin=2e-4,
-    scale_per_kelvin=3e-4,
-)
+    "mine", velocity_random_walk=1e-3, bias_instability=4e-4, acceleration_random_walk=1e-5,
+    repeatability=2e-3, bias_per_kelvin=2e-4, scale_per_kelvin=3e-4,
+)  # fmt: skip
 USE = Use(averaging=4.0, age=3600.0, temperature_change=5.0)
 
 

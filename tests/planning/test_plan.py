@@ -24,13 +24,7 @@ from accelstudy.plan.question import BY_HAND, ROBOT, Question
 from accelstudy.plan.reasons import in_use, limits, needs, spoilers
 from accelstudy.plan.simulated import simulate, study_of
 from accelstudy.plan.theory import theory_of
-from accelstudy.plan.wording import (
-    answer_lines,
-    effort,
-    reason_lines,
-    table_lines,
-    unreachable,
-)
+from accelstudy.plan.wording import answer_lines, effort, reason_lines, table_lines, unreachable
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise
@@ -173,12 +167,9 @@ def test_the_study_of_a_plan_makes_its_numbers_again(plan, tmp_path):
     cell = cells[plan.first.simulated.cell]
     simulated = blocks(cell, study.seed, 0, cell.n_blocks)
     error = leveling_error(
-        cell.simulated_model,
-        cell.simulated_model.vector(cell.truth),
-        cell.estimated_model,
-        np.concatenate([block.estimates for block in simulated]),
-        cap_forces(30 * GON, 200),
-    )
+        cell.simulated_model, cell.simulated_model.vector(cell.truth), cell.estimated_model,
+        np.concatenate([block.estimates for block in simulated]), cap_forces(30 * GON, 200),
+    )  # fmt: skip
     np.testing.assert_allclose(error.rms, plan.first.simulated.rms, rtol=1e-12)
 
 
@@ -266,23 +257,16 @@ def test_set_up_is_told_in_its_own_unit():
     assert effort(candidate).endswith("600 s each, about 4.57 hours, with 30 minutes to set it up")
 
 
-@pytest.mark.parametrize(
-    ("options", "parts"),
-    [
-        ({"equipment": (BY_HAND,)}, ("No calibration tried here reaches 0.1 mgon (rms) by hand",)),
-        ({"most_seconds": 600.0}, ("within 10 min",)),
-        (
-            {"most_seconds": 60.0},
-            ("No calibration fits within 1 min: the shortest takes 9 positions by hand",),
-        ),
-        (
-            {"most_positions": 5, "equipment": (BY_HAND,)},
-            ("No calibration fits with at most 5 positions by hand: the shortest takes 9",),
-        ),
-        ({"sigma_angle": 1 * GON, "equipment": (ROBOT,)}, ("the best leaves", "with a robot")),
-        ({"confidence": 0.95}, ("(95 % of them)",)),
-    ],
-)
+@pytest.mark.parametrize(("options", "parts"), [
+    ({"equipment": (BY_HAND,)}, ("No calibration tried here reaches 0.1 mgon (rms) by hand",)),
+    ({"most_seconds": 600.0}, ("within 10 min",)),
+    ({"most_seconds": 60.0},
+     ("No calibration fits within 1 min: the shortest takes 9 positions by hand",)),
+    ({"most_positions": 5, "equipment": (BY_HAND,)},
+     ("No calibration fits with at most 5 positions by hand: the shortest takes 9",)),
+    ({"sigma_angle": 1 * GON, "equipment": (ROBOT,)}, ("the best leaves", "with a robot")),
+    ({"confidence": 0.95}, ("(95 % of them)",)),
+])  # fmt: skip
 def test_what_cannot_be_reached_is_one_line_with_what_can(options, parts):
     question = Question(0.1 * MGON, 30 * GON, of_sigma(0.002), **options)
     result = answer(question, replicates=200)
@@ -364,24 +348,19 @@ def test_an_unreachable_target_has_an_exit_status_of_its_own():
     assert call(*ASKED, "--equipment", "gravity", "--quiet").stderr == ""
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ((), "--tilt-accuracy"),
-        (("--tilt-accuracy", "10"), "expected a number with its unit"),
-        (("--tilt-accuracy", "10mgon"), "give the sensor by --sensor, or its noise by --sigma"),
-        (("--tilt-accuracy", "10mgon", "--sensor", "paper", "--sigma", "2mm/s2"), "not both"),
-        (("--tilt-accuracy", "10mgon", "--sensor", "adxl35"), "did you mean 'adxl355'"),
-        (("--tilt-accuracy", "10mgon", "--sensor", "no.yaml"), "no.yaml: no such file"),
-        (("--tilt-accuracy", "10mgon", "--sigma", "0mm/s2"), "must be at least"),
-        (("--tilt-accuracy", "10mgon", "--sigma", "2mm/s2", "--tilt-range", "95gon"), "at most 90"),
-        (
-            ("--tilt-accuracy", "10mgon", "--sigma", "2mm/s2", "--confidence", "120%"),
-            "--confidence: must be rms, or a share",
-        ),
-        (("--tilt-accuracy", "10mgon", "--sigma", "2mm/s2", "--equipment", "crane"), "crane"),
-    ],
-)
+@pytest.mark.parametrize(("words", "message"), [
+    ((), "--tilt-accuracy"),
+    (("--tilt-accuracy", "10"), "expected a number with its unit"),
+    (("--tilt-accuracy", "10mgon"), "give the sensor by --sensor, or its noise by --sigma"),
+    (("--tilt-accuracy", "10mgon", "--sensor", "paper", "--sigma", "2mm/s2"), "not both"),
+    (("--tilt-accuracy", "10mgon", "--sensor", "adxl35"), "did you mean 'adxl355'"),
+    (("--tilt-accuracy", "10mgon", "--sensor", "no.yaml"), "no.yaml: no such file"),
+    (("--tilt-accuracy", "10mgon", "--sigma", "0mm/s2"), "must be at least"),
+    (("--tilt-accuracy", "10mgon", "--sigma", "2mm/s2", "--tilt-range", "95gon"), "at most 90"),
+    (("--tilt-accuracy", "10mgon", "--sigma", "2mm/s2", "--confidence", "120%"),
+     "--confidence: must be rms, or a share"),
+    (("--tilt-accuracy", "10mgon", "--sigma", "2mm/s2", "--equipment", "crane"), "crane"),
+])  # fmt: skip
 def test_bad_input_ends_with_exit_status_2(words, message):
     result = call("plan", *words)
     assert result.exit_code == 2

@@ -23,13 +23,9 @@ from accelstudy.sensors.models import get_model
 
 NINE = "bias-scale-nonorthogonality"
 SHEET = DataSheet(
-    "test",
-    velocity_random_walk=2e-3,
-    bias_instability=1e-3,
-    bias_per_kelvin=2e-4,
-    scale_per_kelvin=1e-4,
-    repeatability=3e-3,
-)
+    "test", velocity_random_walk=2e-3, bias_instability=1e-3, bias_per_kelvin=2e-4,
+    scale_per_kelvin=1e-4, repeatability=3e-3,
+)  # fmt: skip
 TILTS = np.array([0.0, 10.0, 30.0, 50.0]) * GON
 
 
@@ -377,15 +373,12 @@ def test_shares_of_the_table_make_the_whole(sensor):
     np.testing.assert_allclose(parts, 1.0, rtol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("texts", "why"),
-    [
-        ({"lenght": "2m"}, "did you mean 'length'"),
-        ({"length": "2"}, "length: expected a number with its unit"),
-        ({"length": "40m"}, "at most 30 m"),
-        ({"sensor_height": "2.5m"}, "above the top of the pole"),
-    ],
-)
+@pytest.mark.parametrize(("texts", "why"), [
+    ({"lenght": "2m"}, "did you mean 'length'"),
+    ({"length": "2"}, "length: expected a number with its unit"),
+    ({"length": "40m"}, "at most 30 m"),
+    ({"sensor_height": "2.5m"}, "above the top of the pole"),
+])  # fmt: skip
 def test_what_is_no_pole_is_refused(texts, why):
     with pytest.raises(ValueError, match=why):
         setup_of(texts)

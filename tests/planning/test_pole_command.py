@@ -81,22 +81,19 @@ def test_degrees_are_shown_where_they_are_wanted(tmp_path):
     assert " gon" not in done.stdout
 
 
-@pytest.mark.parametrize(
-    ("arguments", "why"),
-    [
-        (("--length", "2"), "--length: expected a number with its unit"),
-        (("--length", "2gon"), "--length: '2gon': the unit must be one of"),
-        (("--tilt-range", "100gon"), "--tilt-range: '100gon': must be"),
-        (("--mounting", "frx"), "frame 'frx'"),
-        (("--hand-height", "3m"), "above the top of the pole"),
-        (("--sensor", "adxl356"), "did you mean 'adxl355'"),
-        (("--scheme", "faces-6"), "scheme faces-6"),
-        (("--calibration", "no/calibration.json"), "no/calibration.json: no such file"),
-        (("--calibration", "c.json", "--scheme", "faces-6"), "--calibration and --scheme exclude"),
-        (("--tilt-sigma", "9mgon", "--hold", "2s"), "--tilt-sigma and --hold exclude each other"),
-        (("--model", "bias+warm_up"), "warm_up"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "why"), [
+    (("--length", "2"), "--length: expected a number with its unit"),
+    (("--length", "2gon"), "--length: '2gon': the unit must be one of"),
+    (("--tilt-range", "100gon"), "--tilt-range: '100gon': must be"),
+    (("--mounting", "frx"), "frame 'frx'"),
+    (("--hand-height", "3m"), "above the top of the pole"),
+    (("--sensor", "adxl356"), "did you mean 'adxl355'"),
+    (("--scheme", "faces-6"), "scheme faces-6"),
+    (("--calibration", "no/calibration.json"), "no/calibration.json: no such file"),
+    (("--calibration", "c.json", "--scheme", "faces-6"), "--calibration and --scheme exclude"),
+    (("--tilt-sigma", "9mgon", "--hold", "2s"), "--tilt-sigma and --hold exclude each other"),
+    (("--model", "bias+warm_up"), "warm_up"),
+])  # fmt: skip
 def test_bad_input_ends_with_one_line(arguments, why, tmp_path):
     assert why in refusal("pole", *QUICK, *arguments, "--out", tmp_path / "out")
     assert not (tmp_path / "out").exists()

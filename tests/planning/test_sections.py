@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from calling import refused
 from places import ROOT
 from snakemake_helpers import jobs, one_line, run_workflow
 
@@ -36,63 +37,49 @@ def case(section, content):
     return parse_section(example, section, CLASSES[section], "file").cases["mine"]
 
 
-@pytest.mark.parametrize(
-    ("section", "content", "message"),
-    [
-        ("plam", {}, "file: plam: unknown key; did you mean 'plan'?"),
-        ("study", "a/b", "file: study: "),
-        ("plan", {"sensor": "paper"}, "file: plan.sensor: unknown key; did you"),
-        ("plan", {"sensors": "adxl35"}, "did you mean 'adxl355'?"),
-        ("plan", 5, "file: plan: "),
-        (
-            "sequential",
-            {"approaches": "robots"},
-            "unknown approach 'robots'; did you mean 'robot'?",
-        ),
-        ("sequential", {"rules": ["bounds"]}, "unknown rule 'bounds'; did you mean 'bound'?"),
-        ("sequential", {"instead_of": "mclaren"}, "unknown scheme 'mclaren'"),
-        ("sequential", {"model": "bias-scale+warm_up"}, "needs the time of each position"),
-        ("sequential", {"session": 3}, "sequential.session: unknown key; did you mean 'sessions'?"),
-        ("sequential", {"accuracies": 0}, "sequential.accuracies: must be greater"),
-    ],
-)
+@pytest.mark.parametrize(("section", "content", "message"), [
+    ("plam", {}, "file: plam: unknown key; did you mean 'plan'?"),
+    ("study", "a/b", "file: study: "),
+    ("plan", {"sensor": "paper"}, "file: plan.sensor: unknown key; did you"),
+    ("plan", {"sensors": "adxl35"}, "did you mean 'adxl355'?"),
+    ("plan", 5, "file: plan: "),
+    ("sequential", {"approaches": "robots"}, "unknown approach 'robots'; did you mean 'robot'?"),
+    ("sequential", {"rules": ["bounds"]}, "unknown rule 'bounds'; did you mean 'bound'?"),
+    ("sequential", {"instead_of": "mclaren"}, "unknown scheme 'mclaren'"),
+    ("sequential", {"model": "bias-scale+warm_up"}, "needs the time of each position"),
+    ("sequential", {"session": 3}, "sequential.session: unknown key; did you mean 'sessions'?"),
+    ("sequential", {"accuracies": 0}, "sequential.accuracies: must be greater"),
+])  # fmt: skip
 def test_a_section_that_cannot_be_used_is_said_in_a_line(section, content, message):
-    with pytest.raises(InputError) as error:
+    with refused(message):
         parse_section(
             parse_example({"study": "x", section: content}, "file"),
             section,
             CLASSES.get(section, PlanConfig),
             "file",
         )
-    assert message in str(error.value)
-    assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize(
-    ("section", "content", "message"),
-    [
-        ("plan", {"tilt_accuracy": "9", "sigma": "1mg"}, "tilt_accuracy: expected a number with"),
-        ("plan", {"tilt_accuracy": "9mgon", "sigma": "0mm/s2"}, "sigma: '0mm/s2': must be at"),
-        ("plan", {"tilt_accuracy": "9mgon"}, "give sensor or sigma, one of them"),
-        ("pole", {"sensr": "paper"}, "file: pole.cases.mine.sensr: unknown key"),
-        ("pole", {"sensor": "papr"}, "file: pole.cases.mine: sensor: unknown sensor 'papr'; did"),
-        ("pole", {"setup": {"length": "2"}}, "mine: setup: length: expected a number with its"),
-        ("pole", {"setup": {"long": "2m"}}, "mine: setup: unknown quantity of a pole 'long'"),
-        ("pole", {"hold": "2m"}, "mine: hold: '2m': the unit must be one of"),
-        ("pole", {"calibration": "c.json", "hold": "2s"}, "calibration and hold exclude each"),
-        ("pole", {"tilt_sigma": "10"}, "mine: tilt_sigma: expected a number with its unit"),
-        ("field", {"sensor": "adxl35"}, "file: field.cases.mine: sensor: unknown sensor 'adxl35'"),
-        ("field", {"age": "8"}, "mine: age: expected a number with its unit"),
-        ("field", {"temperature_change": "300K"}, "mine: temperature_change: '300K': must be"),
-        ("field", {"pitch_gon": [90]}, "file: field.cases.mine.pitch_gon.0: "),
-        ("field", {"restart": True}, "mine.restart: unknown key; did you mean 'restarted'?"),
-    ],
-)
+@pytest.mark.parametrize(("section", "content", "message"), [
+    ("plan", {"tilt_accuracy": "9", "sigma": "1mg"}, "tilt_accuracy: expected a number with"),
+    ("plan", {"tilt_accuracy": "9mgon", "sigma": "0mm/s2"}, "sigma: '0mm/s2': must be at"),
+    ("plan", {"tilt_accuracy": "9mgon"}, "give sensor or sigma, one of them"),
+    ("pole", {"sensr": "paper"}, "file: pole.cases.mine.sensr: unknown key"),
+    ("pole", {"sensor": "papr"}, "file: pole.cases.mine: sensor: unknown sensor 'papr'; did"),
+    ("pole", {"setup": {"length": "2"}}, "mine: setup: length: expected a number with its"),
+    ("pole", {"setup": {"long": "2m"}}, "mine: setup: unknown quantity of a pole 'long'"),
+    ("pole", {"hold": "2m"}, "mine: hold: '2m': the unit must be one of"),
+    ("pole", {"calibration": "c.json", "hold": "2s"}, "calibration and hold exclude each"),
+    ("pole", {"tilt_sigma": "10"}, "mine: tilt_sigma: expected a number with its unit"),
+    ("field", {"sensor": "adxl35"}, "file: field.cases.mine: sensor: unknown sensor 'adxl35'"),
+    ("field", {"age": "8"}, "mine: age: expected a number with its unit"),
+    ("field", {"temperature_change": "300K"}, "mine: temperature_change: '300K': must be"),
+    ("field", {"pitch_gon": [90]}, "file: field.cases.mine.pitch_gon.0: "),
+    ("field", {"restart": True}, "mine.restart: unknown key; did you mean 'restarted'?"),
+])  # fmt: skip
 def test_a_case_that_cannot_be_used_is_said_in_a_line(section, content, message):
-    with pytest.raises(InputError) as error:
+    with refused(message):
         case(section, content)
-    assert message in str(error.value)
-    assert "\n" not in str(error.value)
 
 
 def test_the_workflow_says_it_too(tmp_path):

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from click.testing import CliRunner
+from calling import call, refusal, succeed
 from study_helpers import content, grid
 
 from accelstudy.adjustment.quality import solve
@@ -22,7 +22,6 @@ from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.readings import readings_of
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.commands.main import main
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.document import diagnosed_calibration, study_overlay
 from accelstudy.diagnosis.round_trip import parse_round_trip
@@ -41,15 +40,8 @@ HIDDEN = f"{NINE}+warm_up(tau=400)+thermal_bias"
 TURNED = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
 
 
-def run_out(*arguments):
-    """Standard output only."""
-    return CliRunner().invoke(main, [str(argument) for argument in arguments]).stdout
-
-
-def run(*arguments, code=0):
-    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
-    assert result.exit_code == code, result.output
-    return result.output
+def run(*arguments):
+    return succeed(*arguments).output
 
 
 @pytest.fixture(scope="module")
@@ -87,21 +79,18 @@ def test_a_composition_is_calibrated_and_checked(made):
     assert "thermal_scale" in run("effects", "--campaign", made / "c", "--model", HIDDEN)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["calibrate", "c", "--out", "no"], "no vibration_mps2"),
-        (["diagnose", "c", "--out", "no"], "no vibration_mps2"),
-        (["check-sigmas", "c"], "no vibration_mps2"),
-        (["effects", "--campaign", "c"], "no vibration_mps2"),
-        (["effects", "--scheme", "mclaren-24"], "which a scheme does not give"),
-        (["schemes", "mclaren-24"], "which a scheme does not give"),
-        (["simulate-campaign", "--out", "no"], "vibration: missing"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "words"), [
+    (["calibrate", "c", "--out", "no"], "no vibration_mps2"),
+    (["diagnose", "c", "--out", "no"], "no vibration_mps2"),
+    (["check-sigmas", "c"], "no vibration_mps2"),
+    (["effects", "--campaign", "c"], "no vibration_mps2"),
+    (["effects", "--scheme", "mclaren-24"], "which a scheme does not give"),
+    (["schemes", "mclaren-24"], "which a scheme does not give"),
+    (["simulate-campaign", "--out", "no"], "vibration: missing"),
+])  # fmt: skip
 def test_what_cannot_feed_a_model_says_so_in_one_line(arguments, words, made, monkeypatch):
     monkeypatch.chdir(made)
-    text = run(*arguments, "--model", "bias-scale+vibration_rectification", code=2)
+    text = refusal(*arguments, "--model", "bias-scale+vibration_rectification")
     assert "'vibration_rectification'" in text
     assert words in text
     assert text.count("\n") == 1
@@ -213,14 +202,11 @@ def whole():
     return calibration_of()[2]
 
 
-@pytest.mark.parametrize(
-    ("error", "words"),
-    [
-        ("axis_error(x=-2, y=1, z=3)", "axes are swapped: x is read as y, y is read as −x"),
-        ("unit_error(force=0.1019716212978)", "the forces are in g"),
-        ("unit_error(angle=0.9)", "the robot's angles are in degrees"),
-    ],
-)
+@pytest.mark.parametrize(("error", "words"), [
+    ("axis_error(x=-2, y=1, z=3)", "axes are swapped: x is read as y, y is read as −x"),
+    ("unit_error(force=0.1019716212978)", "the forces are in g"),
+    ("unit_error(angle=0.9)", "the robot's angles are in degrees"),
+])  # fmt: skip
 def test_a_calibration_of_mended_data_says_so(error, words, whole):
     assert whole["mended"] is None
     campaign, diagnosis, content = calibration_of(gross_errors=(error,))
@@ -300,7 +286,7 @@ def test_a_stranger_implements_an_exported_calibration(diagnosed):
     assert set(json.loads(text)["symbols"]) == {"f_x", "g", "time", "temperature"}
     assert yaml.safe_load(run("export", path, "--form", "yaml")) == json.loads(text)
     for form in ("c", "matrix"):
-        line = run("export", path, "--form", form, code=2)
+        line = refusal("export", path, "--form", form)
         assert "no matrix can hold thermal_bias and warm_up" in line
         assert "json and yaml" in line
         assert line.count("\n") == 1
@@ -319,12 +305,13 @@ def test_forms_take_and_give_the_axes_of_the_log(frame, whole, tmp_path):
     axes = parse_frame(frame)
     forces = axes.to_frd((raw - offset) * scale) @ np.transpose(TURNED)
     expected = axes.from_frd(calibration.correct(forces))
-    result = CliRunner().invoke(main, ["export", str(path), "--form", "matrix"])
+    result = call("export", path, "--form", "matrix")
     assert result.stderr == "warning: the calibration is of mended data: x is read as −y\n"
     matrix = np.array([row.split() for row in result.stdout.splitlines()], float)
     np.testing.assert_allclose(raw @ matrix[:, :3].T + matrix[:, 3], expected, atol=1e-8)
-    np.testing.assert_allclose(by_the_export(run_out("export", path), raw), expected, atol=1e-8)
-    header = run_out("export", path, "--form", "c")
+    by_json = by_the_export(succeed("export", path).stdout, raw)
+    np.testing.assert_allclose(by_json, expected, atol=1e-8)
+    header = succeed("export", path, "--form", "c").stdout
     assert f"in the axes {frame}:" in header
     assert ("x forward, y left, z up." in header) == (frame == "flu")
     assert "x, y, z in counts" in header
@@ -354,10 +341,7 @@ def test_apply_mends_readings_as_the_data_were(tmp_path):
         (["--unit", "g"], "the forces are in g; readings are converted by the options only"),
     ):
         arguments = ["apply", path, log, "--columns", "fx=0,fy=1,fz=2", *options]
-        result = CliRunner().invoke(
-            main, [*map(str, arguments), "--out", str(tmp_path / "out.csv"), "--force"]
-        )
-        assert result.exit_code == 0, result.output
+        result = succeed(*arguments, "--out", tmp_path / "out.csv", "--force")
         assert f"warning: the calibration is of mended data: {words}" in result.stderr
         leveled = pd.read_csv(tmp_path / "out.csv")
         columns = [f"f{axis}_calibrated_mps2" for axis in "xyz"]

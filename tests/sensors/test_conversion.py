@@ -16,17 +16,14 @@ def test_counts_and_g_come_back():
     np.testing.assert_array_equal(conversion_of("g").to_si(raw), raw * 9.80665)
 
 
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        (("counts",), "needs a nominal scale"),
-        (("counts", [1, 2]), "scale: one number or three, not 2"),
-        (("counts", [1, 0, 1]), "scale: must not be 0"),
-        (("counts", 1, np.inf), "offset: must be finite"),
-        (("g", 2), "goes with unit counts, not g"),
-        (("mg",), "unknown unit of a log 'mg'"),
-    ],
-)
+@pytest.mark.parametrize(("given", "said"), [
+    (("counts",), "needs a nominal scale"),
+    (("counts", [1, 2]), "scale: one number or three, not 2"),
+    (("counts", [1, 0, 1]), "scale: must not be 0"),
+    (("counts", 1, np.inf), "offset: must be finite"),
+    (("g", 2), "goes with unit counts, not g"),
+    (("mg",), "unknown unit of a log 'mg'"),
+])  # fmt: skip
 def test_what_does_not_fit_the_unit(given, said):
     with pytest.raises(InputError, match=said):
         conversion_of(*given)

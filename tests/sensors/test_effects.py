@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from calling import refused
 from scipy.spatial.transform import Rotation
 
 from accelstudy.adjustment import calibrate
@@ -222,17 +223,11 @@ def test_base_tilt_turns_with_the_same_matrix_as_gravity():
     np.testing.assert_allclose(attitude.inv().apply([0, 0, -G]), level, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("spec", "expected"),
-    [
-        ("warm_up(tau=300)", lambda p: np.outer(np.exp(-HOLD.time / 300), p)),
-        ("bias_jump(t=1000)", lambda p: np.outer(HOLD.time > 1000, p)),
-        (
-            "saturation(knee=5)",
-            lambda p: -p * np.sign(FORCES) * np.maximum(0, np.abs(FORCES) - 5),
-        ),
-    ],
-)
+@pytest.mark.parametrize(("spec", "expected"), [
+    ("warm_up(tau=300)", lambda p: np.outer(np.exp(-HOLD.time / 300), p)),
+    ("bias_jump(t=1000)", lambda p: np.outer(HOLD.time > 1000, p)),
+    ("saturation(knee=5)", lambda p: -p * np.sign(FORCES) * np.maximum(0, np.abs(FORCES) - 5)),
+])  # fmt: skip
 def test_settings_shape_an_effect(spec, expected):
     p = np.array([1.0, -2.0, 0.5])
     np.testing.assert_allclose(added(get_effect(spec), p).output, expected(p), rtol=0, atol=1e-13)
@@ -360,35 +355,30 @@ def test_candidates_need_the_time(name):
         get_effect(name).candidates(HoldConditions(), FORCES, G)
 
 
-@pytest.mark.parametrize(
-    ("spec", "expected"),
-    [
-        ("warmup", "unknown effect 'warmup'; did you mean 'warm_up'?"),
-        ("warm_up(t=3)", "unknown setting of the effect 'warm_up' 't' (known: tau)"),
-        ("bias(tau=3)", "unknown setting of the effect 'bias' 'tau' (known: )"),
-        ("warm_up(tau)", "'tau' is no setting; expected name=number, such as tau=300"),
-        ("warm_up(tau=ten)", "'tau=ten' is no setting"),
-        ("warm_up(tau=0)", "effect 'warm_up': tau=0 must be a number above 0"),
-        ("thermal_bias(tau=-1)", "tau=-1 must be a number above 0, or 0"),
-        ("saturation(knee=nan)", "knee=nan must be a number above 0"),
-        ("bias_jump(t=inf)", "t=inf must be a number that is finite"),
-        ("warm_up(tau=1", "unknown effect"),
-        ("heavy_tail", "unknown noise effect 'heavy_tail'; did you mean 'heavy_tails'?"),
-        ("heavy_tails(mu=3)", "unknown setting of the noise effect 'heavy_tails' 'mu'"),
-        ("heavy_tails(nu=2)", "noise effect 'heavy_tails': nu=2 must be a number above 2"),
-        ("heavy_tails(nu=nan)", "must be a number above 2"),
-        ("heavy_tails(3)", "'3' is no setting; expected name=number, such as nu=300"),
-        ("coloured_noise(share=1)", "share=1 must be a number above 0 and below 1"),
-        ("quantisation(lsb=0)", "lsb=0 must be a number above 0"),
-    ],
-)
+@pytest.mark.parametrize(("spec", "expected"), [
+    ("warmup", "unknown effect 'warmup'; did you mean 'warm_up'?"),
+    ("warm_up(t=3)", "unknown setting of the effect 'warm_up' 't' (known: tau)"),
+    ("bias(tau=3)", "unknown setting of the effect 'bias' 'tau' (known: )"),
+    ("warm_up(tau)", "'tau' is no setting; expected name=number, such as tau=300"),
+    ("warm_up(tau=ten)", "'tau=ten' is no setting"),
+    ("warm_up(tau=0)", "effect 'warm_up': tau=0 must be a number above 0"),
+    ("thermal_bias(tau=-1)", "tau=-1 must be a number above 0, or 0"),
+    ("saturation(knee=nan)", "knee=nan must be a number above 0"),
+    ("bias_jump(t=inf)", "t=inf must be a number that is finite"),
+    ("warm_up(tau=1", "unknown effect"),
+    ("heavy_tail", "unknown noise effect 'heavy_tail'; did you mean 'heavy_tails'?"),
+    ("heavy_tails(mu=3)", "unknown setting of the noise effect 'heavy_tails' 'mu'"),
+    ("heavy_tails(nu=2)", "noise effect 'heavy_tails': nu=2 must be a number above 2"),
+    ("heavy_tails(nu=nan)", "must be a number above 2"),
+    ("heavy_tails(3)", "'3' is no setting; expected name=number, such as nu=300"),
+    ("coloured_noise(share=1)", "share=1 must be a number above 0 and below 1"),
+    ("quantisation(lsb=0)", "lsb=0 must be a number above 0"),
+])  # fmt: skip
 def test_what_is_wrong_with_a_spec(spec, expected):
     """Of an effect, or of a noise effect."""
     get = get_noise_effect if spec.startswith(("heavy", "coloured", "quant")) else get_effect
-    with pytest.raises(InputError) as error:
+    with refused(expected):
         get(spec)
-    assert expected in str(error.value)
-    assert "\n" not in str(error.value)
 
 
 # --- estimation ----------------------------------------------------------------------------------
@@ -452,22 +442,19 @@ def test_the_norm_of_gravity_is_blind_to_rotations_and_to_the_robot():
             assert seen.rank == 9 + NUMBERS[name], name
 
 
-@pytest.mark.parametrize(
-    ("effects", "approach", "columns", "rank"),
-    [
-        # Mounting rotation and cross-axis misalignment span the same three dimensions.
-        (("mounting_rotation", "cross_axis_misalignment"), ROBOT, {}, 12),
-        # A zero offset of roll is a rotation about x; one of pitch is none.
-        (("mounting_rotation", "encoder_offset"), ROBOT, {}, 13),
-        # A zero offset of pitch is a tilt of the base, unless the yaw varies.
-        (("base_tilt", "encoder_offset"), ROBOT, {"yaw": np.zeros(60)}, 12),
-        (("base_tilt", "encoder_offset"), ROBOT, {}, 13),
-        (("quadratic_scale", "cross_coupling"), GRAVITY, {}, 15),
-        (("quadratic_scale", "cross_coupling"), ROBOT, {}, 18),
-        # Constant temperature is a bias and a scale.
-        (("thermal_bias", "thermal_scale"), ROBOT, {"temperature": np.full(60, 35.0)}, 9),
-    ],
-)
+@pytest.mark.parametrize(("effects", "approach", "columns", "rank"), [
+    # Mounting rotation and cross-axis misalignment span the same three dimensions.
+    (("mounting_rotation", "cross_axis_misalignment"), ROBOT, {}, 12),
+    # A zero offset of roll is a rotation about x; one of pitch is none.
+    (("mounting_rotation", "encoder_offset"), ROBOT, {}, 13),
+    # A zero offset of pitch is a tilt of the base, unless the yaw varies.
+    (("base_tilt", "encoder_offset"), ROBOT, {"yaw": np.zeros(60)}, 12),
+    (("base_tilt", "encoder_offset"), ROBOT, {}, 13),
+    (("quadratic_scale", "cross_coupling"), GRAVITY, {}, 15),
+    (("quadratic_scale", "cross_coupling"), ROBOT, {}, 18),
+    # Constant temperature is a bias and a scale.
+    (("thermal_bias", "thermal_scale"), ROBOT, {"temperature": np.full(60, 35.0)}, 9),
+])  # fmt: skip
 def test_what_equals_what(effects, approach, columns, rank):
     scheme = get_scheme("fibonacci-60")
     assert design(*effects, approach=approach, scheme=scheme, **columns).rank == rank

@@ -41,16 +41,13 @@ def test_well_known_frames():
     np.testing.assert_array_equal(parse_frame("rfu").rearranged(np.array([1, 2, 3])), [2, 1, 3])
 
 
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("fru", "is left-handed; with x and y like this z must point the other way: frd"),
-        ("ff", "expected three letters"),
-        ("frb", "expected three letters"),
-        ("ned", "expected three letters"),
-        ("", "expected three letters"),
-    ],
-)
+@pytest.mark.parametrize(("name", "message"), [
+    ("fru", "is left-handed; with x and y like this z must point the other way: frd"),
+    ("ff", "expected three letters"),
+    ("frb", "expected three letters"),
+    ("ned", "expected three letters"),
+    ("", "expected three letters"),
+])  # fmt: skip
 def test_no_frames(name, message):
     with pytest.raises(InputError, match=message):
         parse_frame(name)

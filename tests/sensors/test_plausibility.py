@@ -23,8 +23,7 @@ def test_a_parameter_is_implausible_only_if_it_is_clearly_beyond_its_bound():
 
 
 @pytest.mark.parametrize(
-    ("effect", "most", "least"),
-    [("bias", 0.25 * 9.80665, 0.35 * 9.80665), ("scale", 0.1, 0.25)],
+    ("effect", "most", "least"), [("bias", 0.25 * 9.80665, 0.35 * 9.80665), ("scale", 0.1, 0.25)]
 )
 def test_what_data_sheets_allow_is_plausible_and_what_is_clearly_beyond_is_not(effect, most, least):
     """The ADXL345 allows ±250 mg of its z axis and ±10 % of its sensitivity."""

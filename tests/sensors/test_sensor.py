@@ -128,17 +128,14 @@ def test_vector_orders_a_mapping_and_fills_in_zeros():
 # --- batches -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("forces_batch", "parameters_batch", "gravity_batch", "batch"),
-    [
-        ((), (), (), ()),
-        ((), (5,), (), (5,)),
-        ((5,), (), (), (5,)),
-        ((5,), (5,), (5,), (5,)),
-        ((), (), (5,), (5,)),
-        ((4, 1), (5,), (), (4, 5)),
-    ],
-)
+@pytest.mark.parametrize(("forces_batch", "parameters_batch", "gravity_batch", "batch"), [
+    ((), (), (), ()),
+    ((), (5,), (), (5,)),
+    ((5,), (), (), (5,)),
+    ((5,), (5,), (5,), (5,)),
+    ((), (), (5,), (5,)),
+    ((4, 1), (5,), (), (4, 5)),
+])  # fmt: skip
 def test_batches_broadcast(forces_batch, parameters_batch, gravity_batch, batch):
     model = get_model("bias-scale-nonorthogonality-quadratic-cubic")
     rng = np.random.default_rng(1)

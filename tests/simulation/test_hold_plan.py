@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from calling import refused
 from scipy import stats
 from study_helpers import NINE, grid, make_cells, make_study, run_study, simulated
 
@@ -146,41 +147,26 @@ def test_any_effect_can_be_switched_on(name):
     assert np.isfinite(simulated(cells[f"{NINE}/mclaren-24/robot"]).estimates).all()
 
 
-@pytest.mark.parametrize(
-    ("keys", "expected"),
-    [
-        (
-            {"simulated_effects": ["thermal_bias"]},
-            "holds.temperature_degC: missing; the effect 'thermal_bias' needs the temperature of",
-        ),
-        (
-            {"models": {"mine": MINE}, "grids": [grid("mine")], "holds": {"interval_s": 1}},
-            "holds.temperature_degC: missing; the effect 'thermal_bias'",
-        ),
-        (
-            {"simulated_effects": ["warm_up"], "holds": {**HOLDS, "interval_s": None}},
-            "holds.interval_s: missing; the effect 'warm_up' needs the time",
-        ),
-        (
-            {"holds": {"temperature_degC": [-300, 20]}},
-            "holds.temperature_degC.0: must be from -273.15 to 10000 °C, not -300",
-        ),
-        ({"holds": {"temperature_degC": [20]}}, "holds.temperature_degC.1: must be given"),
-        ({"holds": {"interval_s": 0}}, "holds.interval_s: must be from 1e-06 to 1000000 s, not 0"),
-        ({"holds": {"yaw": "all"}}, "holds.yaw: must be 'none' or 'random'"),
-        ({"holds": {"vibration": [0, 1]}}, "did you mean 'vibration_mps2'?"),
-        ({"sensor": {"warm_up(t=3)": {"value": 1, "unit": "mg"}}}, "unknown setting of the effect"),
-        (
-            {"sensor": {"thermal_bias": {"value": [1, 1, 1], "unit": "mg"}}},
-            "unknown unit of a quantity in m/s^2/K 'mg'",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("keys", "expected"), [
+    ({"simulated_effects": ["thermal_bias"]},
+     "holds.temperature_degC: missing; the effect 'thermal_bias' needs the temperature of"),
+    ({"models": {"mine": MINE}, "grids": [grid("mine")], "holds": {"interval_s": 1}},
+     "holds.temperature_degC: missing; the effect 'thermal_bias'"),
+    ({"simulated_effects": ["warm_up"], "holds": {**HOLDS, "interval_s": None}},
+     "holds.interval_s: missing; the effect 'warm_up' needs the time"),
+    ({"holds": {"temperature_degC": [-300, 20]}},
+     "holds.temperature_degC.0: must be from -273.15 to 10000 °C, not -300"),
+    ({"holds": {"temperature_degC": [20]}}, "holds.temperature_degC.1: must be given"),
+    ({"holds": {"interval_s": 0}}, "holds.interval_s: must be from 1e-06 to 1000000 s, not 0"),
+    ({"holds": {"yaw": "all"}}, "holds.yaw: must be 'none' or 'random'"),
+    ({"holds": {"vibration": [0, 1]}}, "did you mean 'vibration_mps2'?"),
+    ({"sensor": {"warm_up(t=3)": {"value": 1, "unit": "mg"}}}, "unknown setting of the effect"),
+    ({"sensor": {"thermal_bias": {"value": [1, 1, 1], "unit": "mg"}}},
+     "unknown unit of a quantity in m/s^2/K 'mg'"),
+])  # fmt: skip
 def test_what_is_wrong_with_a_configuration(keys, expected):
-    with pytest.raises(InputError) as error:
+    with refused(expected):
         make_study(**keys)
-    assert expected in str(error.value)
-    assert "\n" not in str(error.value)
 
 
 def test_sensitivity_is_of_models_that_need_no_holds():

@@ -222,31 +222,28 @@ def test_the_command_writes_a_campaign_and_apart_from_it_the_truth(tmp_path):
     assert not any(word in text for word in ("warm_up", "heavy", "seed", "truth"))
 
 
-@pytest.mark.parametrize(
-    ("arguments", "expected"),
-    [
-        (["--effect", "thermal_bias"], "temperature: missing; the effect 'thermal_bias' needs"),
-        (["--effect", "warm_up", "--no-time"], "interval: missing; the effect 'warm_up' needs"),
-        (["--effect", "thermal_bia"], "did you mean 'thermal_bias'?"),
-        (["--effect", "bias: 1, 2"], "expected 3 numbers after the colon (b_x in m/s^2, b_y in"),
-        (["--effect", "bias: 1, x, 2"], "expected 3 numbers after the colon"),
-        (["--effect", "warm_up(tau=1)", "--effect", "warm_up"], "occur in two effects"),
-        (["--noise-effect", "white"], "unknown noise effect 'white'"),
-        (["--gross", "row_order(first=1, second=99)"], "second=99 is no position"),
-        (["--sigma", "0"], "sigma: must be from 1e-09 to 1000 m/s², not 0"),
-        (["--repeats", "0"], "repeats: must be from 1 to 100000, not 0"),
-        (["--repeat-first", "25"], "repeat_first: must be at most 24"),
-        (["--temperature", "20"], "temperature: expected two numbers, as 20:40, not '20'"),
-        (["--temperature", "-300:20"], "temperature: must be from -273.15 to 10000 °C, not -300"),
-        (["--temperature-order", "abba"], "unknown temperature_order 'abba'"),
-        (["--yaw", "some"], "unknown yaw 'some'"),
-        (["--samples-per-hold", "1"], "n_samples: must be from 2 to 1000000000, not 1"),
-        (["--hold", "30"], "duration: slopes need n_samples, too"),
-        (["--hold", "90", "--samples-per-hold", "9"], "90 s are more than the interval between"),
-        (["--scheme", "mclaren-25"], "unknown scheme"),
-        (["--truth", "/dev/null/truth.yaml"], "/dev/null is not a folder"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "expected"), [
+    (["--effect", "thermal_bias"], "temperature: missing; the effect 'thermal_bias' needs"),
+    (["--effect", "warm_up", "--no-time"], "interval: missing; the effect 'warm_up' needs"),
+    (["--effect", "thermal_bia"], "did you mean 'thermal_bias'?"),
+    (["--effect", "bias: 1, 2"], "expected 3 numbers after the colon (b_x in m/s^2, b_y in"),
+    (["--effect", "bias: 1, x, 2"], "expected 3 numbers after the colon"),
+    (["--effect", "warm_up(tau=1)", "--effect", "warm_up"], "occur in two effects"),
+    (["--noise-effect", "white"], "unknown noise effect 'white'"),
+    (["--gross", "row_order(first=1, second=99)"], "second=99 is no position"),
+    (["--sigma", "0"], "sigma: must be from 1e-09 to 1000 m/s², not 0"),
+    (["--repeats", "0"], "repeats: must be from 1 to 100000, not 0"),
+    (["--repeat-first", "25"], "repeat_first: must be at most 24"),
+    (["--temperature", "20"], "temperature: expected two numbers, as 20:40, not '20'"),
+    (["--temperature", "-300:20"], "temperature: must be from -273.15 to 10000 °C, not -300"),
+    (["--temperature-order", "abba"], "unknown temperature_order 'abba'"),
+    (["--yaw", "some"], "unknown yaw 'some'"),
+    (["--samples-per-hold", "1"], "n_samples: must be from 2 to 1000000000, not 1"),
+    (["--hold", "30"], "duration: slopes need n_samples, too"),
+    (["--hold", "90", "--samples-per-hold", "9"], "90 s are more than the interval between"),
+    (["--scheme", "mclaren-25"], "unknown scheme"),
+    (["--truth", "/dev/null/truth.yaml"], "/dev/null is not a folder"),
+])  # fmt: skip
 def test_bad_input_ends_with_one_line_and_leaves_nothing(arguments, expected, tmp_path):
     result = call("--out", tmp_path / "one", *arguments)
     assert result.exit_code == 2

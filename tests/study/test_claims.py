@@ -8,15 +8,7 @@ import pandas as pd
 import pytest
 from page_helpers import text_of
 from scipy.special import gammaln
-from study_helpers import (
-    NINE,
-    PAPER_TRUTH,
-    PROVENANCE,
-    grid,
-    make_study,
-    parts_in,
-    run_study,
-)
+from study_helpers import NINE, PAPER_TRUTH, PROVENANCE, grid, make_study, parts_in, run_study
 
 from accelstudy.basics.units import MGON
 from accelstudy.basics.wording import interval, number
@@ -70,16 +62,10 @@ def tables(folder):
 @pytest.fixture(scope="module")
 def evidence(tables, folder):
     return evidence_from(
-        study_cells(make_study(**KEYS)),
-        parts_in(folder),
-        scheme="mclaren-24",
-        correlations=tables["correlations"],
-        sensitivity=tables["sensitivity"],
-        shapley=tables["shapley"],
-        base_samples=BASE_SAMPLES,
-        resamples=RESAMPLES,
-        seed=1,
-    )
+        study_cells(make_study(**KEYS)), parts_in(folder), scheme="mclaren-24",
+        correlations=tables["correlations"], sensitivity=tables["sensitivity"],
+        shapley=tables["shapley"], base_samples=BASE_SAMPLES, resamples=RESAMPLES, seed=1,
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -95,17 +81,14 @@ def mean_of_chi(r):
 # --- numbers -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("scheme", "effect", "linear"),
-    [
-        ("mclaren-24", "bias", 41),
-        ("mclaren-24", "scale", 28),
-        ("mclaren-24", "nonorthogonality", 54),
-        ("rings-24", "bias", 41),
-        ("rings-24", "scale", 15),
-        ("rings-24", "nonorthogonality", 64),
-    ],
-)
+@pytest.mark.parametrize(("scheme", "effect", "linear"), [
+    ("mclaren-24", "bias", 41),
+    ("mclaren-24", "scale", 28),
+    ("mclaren-24", "nonorthogonality", 54),
+    ("rings-24", "bias", 41),
+    ("rings-24", "scale", 15),
+    ("rings-24", "nonorthogonality", 64),
+])  # fmt: skip
 def test_mean_reductions_are_those_of_linear_theory(judged, scheme, effect, linear):
     """Up to the rounding of the published numbers, Monte Carlo, and E σ̂0 < σ0."""
     row = judged[1].loc[f"reduction-{effect}", scheme]
@@ -207,18 +190,15 @@ def with_reduction(evidence, percent, replicates=500, spread=0.05):
     return replace(evidence, statistics=statistics, ratios=ratios)
 
 
-@pytest.mark.parametrize(
-    ("percent", "spread", "verdict"),
-    [
-        (50, 0.001, REPRODUCED),
-        (54, 0.001, REPRODUCED),  # rounds to about 50
-        (46, 0.001, REPRODUCED),
-        (57, 0.001, NOT_REPRODUCED),
-        (41, 0.001, NOT_REPRODUCED),
-        (0, 0.05, NOT_REPRODUCED),
-        (41, 0.5, REPRODUCED),  # single simulations spread over the paper's number
-    ],
-)
+@pytest.mark.parametrize(("percent", "spread", "verdict"), [
+    (50, 0.001, REPRODUCED),
+    (54, 0.001, REPRODUCED),  # rounds to about 50
+    (46, 0.001, REPRODUCED),
+    (57, 0.001, NOT_REPRODUCED),
+    (41, 0.001, NOT_REPRODUCED),
+    (0, 0.05, NOT_REPRODUCED),
+    (41, 0.5, REPRODUCED),  # single simulations spread over the paper's number
+])  # fmt: skip
 def test_verdict_on_a_reduction(evidence, percent, spread, verdict):
     changed = with_reduction(evidence, percent, spread=spread)
     claims, by_scheme = judge(changed)
@@ -333,14 +313,9 @@ def test_claims_as_the_workflow_judges_them(tables, folder, judged, tmp_path):
         "html": tmp_path / "claims.html",
     }
     judge_claims(
-        make_study(**KEYS),
-        parts_in(folder),
-        folder / "correlations.parquet",
-        folder / "sensitivity.parquet",
-        folder / "shapley.parquet",
-        outputs,
-        PROVENANCE,
-    )
+        make_study(**KEYS), parts_in(folder), folder / "correlations.parquet",
+        folder / "sensitivity.parquet", folder / "shapley.parquet", outputs, PROVENANCE,
+    )  # fmt: skip
     claims = read_table(outputs["claims"])
     pd.testing.assert_frame_equal(claims.set_index("claim"), judged[0], check_dtype=False)
     assert len(read_table(outputs["by_scheme"])) == len(judged[1])

@@ -27,15 +27,12 @@ CROSS = f"{NINE}-crossaxis"
 KEYS = {
     "grids": [
         grid(
-            [NINE, CROSS],
-            ["mclaren-24", "icosahedron-12"],
-            replicates=40,
-            sensor_sigma_mps2=[0.001, 0.002],
-            robot_sigma_mgon=[0.32, 3.2],
-        )
+            [NINE, CROSS], ["mclaren-24", "icosahedron-12"], replicates=40,
+            sensor_sigma_mps2=[0.001, 0.002], robot_sigma_mgon=[0.32, 3.2],
+        ),
     ],
     "leveling": {"attitudes": 10},
-}
+}  # fmt: skip
 BLIND = 4
 """Set-ups of the cross-axis model with gravity alone, which nothing can estimate."""
 DIGITS = 6e-4

@@ -46,20 +46,16 @@ PAPER = {
     "study": "tiny",
     "seed": 1,
     "sensor": SENSOR,
-    "grids": [
-        {"models": NINE, "schemes": ["faces-6", "mclaren-24"], "replicates": 30},
-        {"models": f"{NINE}-crossaxis", "schemes": "mclaren-24", "replicates": 10},
-    ],
+    "grids": [{"models": NINE, "schemes": ["faces-6", "mclaren-24"], "replicates": 30},
+              {"models": f"{NINE}-crossaxis", "schemes": "mclaren-24", "replicates": 10}],
     "presets": {"replicates": 5},
     "leveling": {"attitudes": 10},
-    "sensitivity": {
-        "base_samples": 32,
-        "resamples": 10,
-        "roll_gon": [-50, 0, 50],
-        "pitch_gon": [-25, 0, 25],
-    },
+    "sensitivity": {"base_samples": 32,
+                    "resamples": 10,
+                    "roll_gon": [-50, 0, 50],
+                    "pitch_gon": [-25, 0, 25]},
     "paper": True,
-}
+}  # fmt: skip
 
 
 def run(keys: dict, folder: Path) -> dict[str, pd.DataFrame]:
@@ -236,10 +232,7 @@ def test_shapley_effects_name_what_overtakes(tables, paper):
     at = table["output"].eq("roll") & table["roll_gon"].eq(50) & table["pitch_gon"].eq(25)
     table.loc[at & table["input"].eq("s_y"), "shapley_effect"] = 0.9
     level, tilted = draw("shapley", {"shapley": table}, paper).axes
-    assert (level.get_title(), tilted.get_title()) == (
-        r"$\theta$ = 0 gon",
-        r"$\theta$ = 25 gon",
-    )
+    assert (level.get_title(), tilted.get_title()) == (r"$\theta$ = 0 gon", r"$\theta$ = 25 gon")
     assert level.get_ylabel() == "scale\non roll"
     rings = [
         (line.get_xdata()[0], line.get_ydata()[0])
@@ -311,14 +304,10 @@ def test_a_study_without_estimable_cells_draws(name, tables, paper):
     summary[numbers] = np.nan
     summary["n_converged"] = 0
     nothing = {
-        "cells": cells,
-        "summary": summary,
-        "leveling": pd.DataFrame(),
-        "correlations": pd.DataFrame(),
-        "quantiles": tables["quantiles"].iloc[:0],
-        "sensitivity": tables["sensitivity"].iloc[:0],
-        "shapley": tables["shapley"].iloc[:0],
-    }
+        "cells": cells, "summary": summary, "leveling": pd.DataFrame(),
+        "correlations": pd.DataFrame(), "quantiles": tables["quantiles"].iloc[:0],
+        "sensitivity": tables["sensitivity"].iloc[:0], "shapley": tables["shapley"].iloc[:0],
+    }  # fmt: skip
     needed = {key: nothing[key] for key in figure_tables(name)}
     paint(draw(name, needed, paper))
 
@@ -337,17 +326,13 @@ def test_effects_of_the_models_causes_and_approaches_have_colours_of_their_own()
 # Machado, Oliveira & Fernandes (2009), linear RGB, severity 1.
 EYES = {
     "normal": np.eye(3),
-    "protanopia": [
-        [0.152286, 1.052583, -0.204868],
-        [0.114503, 0.786281, 0.099216],
-        [-0.003882, -0.048116, 1.051998],
-    ],
-    "deuteranopia": [
-        [0.367322, 0.860646, -0.227968],
-        [0.280085, 0.672501, 0.047413],
-        [-0.011820, 0.042940, 0.968881],
-    ],
-}
+    "protanopia": [[0.152286, 1.052583, -0.204868],
+                   [0.114503, 0.786281, 0.099216],
+                   [-0.003882, -0.048116, 1.051998]],
+    "deuteranopia": [[0.367322, 0.860646, -0.227968],
+                     [0.280085, 0.672501, 0.047413],
+                     [-0.011820, 0.042940, 0.968881]],
+}  # fmt: skip
 
 
 def seen(colour, eye):
@@ -414,15 +399,12 @@ def test_colours_are_the_same_in_every_figure(tables, paper):
         assert colours[group] == style.group_colour(group)
 
 
-@pytest.mark.parametrize(
-    ("model", "title"),
-    [
-        ("bias-scale-nonorthogonality", "9: + non-orthogonality"),
-        ("bias-scale-nonorthogonality-thermal_bias", "9 + thermal bias"),
-        ("bias-scale-base_tilt-hysteresis", "6 + base tilt + hysteresis"),
-        ("mine", "mine"),
-    ],
-)
+@pytest.mark.parametrize(("model", "title"), [
+    ("bias-scale-nonorthogonality", "9: + non-orthogonality"),
+    ("bias-scale-nonorthogonality-thermal_bias", "9 + thermal bias"),
+    ("bias-scale-base_tilt-hysteresis", "6 + base tilt + hysteresis"),
+    ("mine", "mine"),
+])  # fmt: skip
 def test_titles_of_models_are_short(model, title):
     assert style.model_title(model) == title
 

@@ -3,16 +3,15 @@
 import importlib.util
 
 import pytest
-from click.testing import CliRunner
+from calling import call
 from snakemake_helpers import snakemake
 
-from accelstudy.commands.main import main
 from accelstudy.study.config import read_study
 from accelstudy.study.figures import figure_names
 
 
 def init(*arguments):
-    return CliRunner().invoke(main, ["init", *map(str, arguments)])
+    return call("init", *arguments)
 
 
 @pytest.fixture(scope="module")

@@ -10,10 +10,7 @@ from accelstudy.study.figures import draw, figure_names
 KEYS = {
     "keep": "summary",
     "leveling": {"attitudes": 5},
-    "grids": [
-        grid(replicates=300),
-        grid(replicates=60, approaches="gravity", sensor_sigma_mps2=3),
-    ],
+    "grids": [grid(replicates=300), grid(replicates=60, approaches="gravity", sensor_sigma_mps2=3)],
 }
 
 

@@ -51,13 +51,10 @@ def test_all_is_every_combination():
 def test_noise_of_a_grid_is_in_the_name_and_in_the_cell():
     cells = make_cells(
         grid(
-            approaches="robot",
-            sensor_sigma_mps2=[0.002, 0.01],
-            robot_sigma_mgon=[0, 3.2],
-            gravity_sigma_mps2=1e-4,
-            gravity_error_mps2=-3e-4,
-        )
-    )
+            approaches="robot", sensor_sigma_mps2=[0.002, 0.01], robot_sigma_mgon=[0, 3.2],
+            gravity_sigma_mps2=1e-4, gravity_error_mps2=-3e-4,
+        ),
+    )  # fmt: skip
     rest = "gravity_sigma_mps2=0.0001/gravity_error_mps2=-0.0003"
     assert {name.removeprefix(f"{ROBOT}/"): cell.noise for name, cell in cells.items()} == {
         f"robot_sigma_mgon=0/{rest}": Noise(0.002, 0.0, 1e-4, -3e-4),

@@ -19,11 +19,8 @@ from accelstudy.study.tables import read_estimates
 RESULTS = "results/tiny"
 NAMES = [f"{RESULTS}/estimates/{number:04d}.parquet" for number in range(3)]
 OUTPUTS = [
-    *NAMES,
-    f"{RESULTS}/summary.parquet",
-    f"{RESULTS}/figures/a.png",
-    f"{RESULTS}/claims.html",
-]
+    *NAMES, f"{RESULTS}/summary.parquet", f"{RESULTS}/figures/a.png", f"{RESULTS}/claims.html",
+]  # fmt: skip
 SETUPS = {name: f"setup {name}" for name in NAMES}
 
 
@@ -111,15 +108,12 @@ def test_another_configuration_is_said(finished):
     assert f"1 of 4 tables are of another configuration: {NAMES[0]}. " in line
 
 
-@pytest.mark.parametrize(
-    ("name", "change", "words"),
-    [
-        ("calibration.json", lambda content: content[:-1], "calibration.json is damaged"),
-        ("figures/a.svg", lambda content: content[:-2], "figures/a.svg is damaged"),
-        ("positions.parquet", flipped, "positions.parquet is damaged"),
-        ("diagnosis.json", None, "diagnosis.json is missing"),
-    ],
-)
+@pytest.mark.parametrize(("name", "change", "words"), [
+    ("calibration.json", lambda content: content[:-1], "calibration.json is damaged"),
+    ("figures/a.svg", lambda content: content[:-2], "figures/a.svg is damaged"),
+    ("positions.parquet", flipped, "positions.parquet is damaged"),
+    ("diagnosis.json", None, "diagnosis.json is missing"),
+])  # fmt: skip
 def test_a_folder_is_whole_or_refused(name, change, words, tmp_path, monkeypatch):
     """Of all that a job wrote together, Snakemake misses nothing but the folder."""
     monkeypatch.chdir(tmp_path)

@@ -2,12 +2,11 @@
 
 import pytest
 import yaml
-from click.testing import CliRunner
+from calling import call
 from places import ROOT
 from study_helpers import content, grid, make_study
 
 from accelstudy.basics.errors import InputError
-from accelstudy.commands.main import main
 from accelstudy.study.cells import study_cells
 from accelstudy.study.config import read_study
 from accelstudy.study.effort import study_effort
@@ -49,33 +48,21 @@ def test_a_hundred_billion_calibrations_can_be_said():
     assert 100 < found.seconds / 3600 < 5000
 
 
-@pytest.mark.parametrize(
-    ("keys", "words"),
-    [
-        (
-            {
-                "grids": [
-                    grid(
-                        replicates=10**9,
-                        sensor_sigma_mps2=[1e-3 * i for i in range(1, 5000)],
-                    )
-                ]
-            },
-            ["grids", "calibrations", "lower replicates", "keep: summary"],
-        ),
-        (
-            {
-                "grids": [
-                    grid(
-                        sensor_sigma_mps2=[1e-3 * i for i in range(1, 1000)],
-                        gravity_sigma_mps2=[1e-6 * i for i in range(1, 1000)],
-                    )
-                ]
-            },
-            ["grids.0: number of cells: must be from 1 to 100000"],
-        ),
-    ],
-)
+@pytest.mark.parametrize(("keys", "words"), [
+    ({"grids": [grid(replicates=10**9, sensor_sigma_mps2=[1e-3 * i for i in range(1, 5000)])]},
+     ["grids", "calibrations", "lower replicates", "keep: summary"]),
+    (
+        {
+            "grids": [
+                grid(
+                    sensor_sigma_mps2=[1e-3 * i for i in range(1, 1000)],
+                    gravity_sigma_mps2=[1e-6 * i for i in range(1, 1000)],
+                ),
+            ],
+        },
+        ["grids.0: number of cells: must be from 1 to 100000"],
+    ),
+])  # fmt: skip
 def test_what_no_machine_can_do(keys, words):
     with pytest.raises(InputError) as error:
         effort(**keys)
@@ -85,7 +72,7 @@ def test_what_no_machine_can_do(keys, words):
 
 def test_cells_says_it(tmp_path):
     (tmp_path / "tiny.yaml").write_text(yaml.safe_dump(content()), encoding="utf-8")
-    result = CliRunner().invoke(main, ["cells", str(tmp_path / "tiny.yaml")])
+    result = call("cells", tmp_path / "tiny.yaml")
     assert result.exit_code == 0, result.output
     last = result.stdout.splitlines()[-1]
     assert "calibrations: about" in last

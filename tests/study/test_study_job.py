@@ -22,13 +22,10 @@ def a_job(log, inputs=(), params=None, **config):
     handlers, level = logging.root.handlers, logging.root.level
     logging.root.handlers = []
     snakemake = SimpleNamespace(
-        log=[str(log)],
-        config=make_study(**config).model_dump(mode="json"),
-        rule="simulate",
-        input=[str(path) for path in inputs],
-        output=["results/tiny/summary.parquet"],
+        log=[str(log)], config=make_study(**config).model_dump(mode="json"), rule="simulate",
+        input=[str(path) for path in inputs], output=["results/tiny/summary.parquet"],
         params=params or {},
-    )
+    )  # fmt: skip
     try:
         with job(snakemake) as given:
             yield given
@@ -62,21 +59,14 @@ def test_bad_input_ends_with_one_line(log, capsys):
     assert "Traceback" not in text
 
 
-@pytest.mark.parametrize(
-    ("error", "message"),
-    [
-        (MemoryError(), "simulate: not enough memory; run fewer jobs at once (--cores 1, or"),
-        (
-            OSError(errno.ENOSPC, "Error writing. Detail: [errno 28] No space left on device"),
-            "results/tiny/summary.parquet: cannot be written: No space left on device; free some "
-            "space and run again",
-        ),
-        (
-            OSError(errno.EROFS, "Read-only file system", "results/tiny/.accelstudy-1.part"),
-            "results/tiny/summary.parquet: cannot be written: Read-only file system; make it",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("error", "message"), [
+    (MemoryError(), "simulate: not enough memory; run fewer jobs at once (--cores 1, or"),
+    (OSError(errno.ENOSPC, "Error writing. Detail: [errno 28] No space left on device"),
+     "results/tiny/summary.parquet: cannot be written: No space left on device; free some "
+     "space and run again"),
+    (OSError(errno.EROFS, "Read-only file system", "results/tiny/.accelstudy-1.part"),
+     "results/tiny/summary.parquet: cannot be written: Read-only file system; make it"),
+])  # fmt: skip
 def test_what_the_machine_lacks_is_one_line(error, message, log, capsys):
     with pytest.raises(SystemExit) as ended, a_job(log):
         raise error
@@ -105,15 +95,12 @@ def test_the_set_up_of_a_batch_is_recorded(log):
     assert setup_digest({"seed": 2, "cells": []}) != provenance["setup"]
 
 
-@pytest.mark.parametrize(
-    ("made", "refused"),
-    [
-        ({"seed": 1}, False),
-        ({"seed": 2}, True),
-        ({"seed": 1, "setup": setup_digest("this")}, False),
-        ({"seed": 1, "setup": setup_digest("other")}, True),
-    ],
-)
+@pytest.mark.parametrize(("made", "refused"), [
+    ({"seed": 1}, False),
+    ({"seed": 2}, True),
+    ({"seed": 1, "setup": setup_digest("this")}, False),
+    ({"seed": 1, "setup": setup_digest("other")}, True),
+])  # fmt: skip
 def test_a_table_of_another_configuration_is_refused(made, refused, log, tmp_path, capsys):
     """As a job leaves it that outlived its run, and ended after that of the next run."""
     path = tmp_path / "estimates.parquet"

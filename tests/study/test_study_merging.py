@@ -146,10 +146,7 @@ def test_many_kept_replicates_are_sketched(kept, monkeypatch, tmp_path):
 
 def test_claims_need_no_replicates(tmp_path):
     """Each session with each, rather than those of one number: the same within Monte Carlo."""
-    keys = {
-        "grids": [grid(replicates=600)],
-        "leveling": {"attitudes": 5},
-    }
+    keys = {"grids": [grid(replicates=600)], "leveling": {"attitudes": 5}}
     ratios = {}
     for keep in ("replicates", "summary"):
         run_study(tmp_path / keep, batch_size=200, keep=keep, **keys)

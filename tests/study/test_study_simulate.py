@@ -126,13 +126,10 @@ def test_origin_is_in_every_file(tmp_path):
     assert len(paths) == 2 + (5 + 2) + 5
     for path in paths:
         assert read_origin(path) == {
-            **PROVENANCE,
-            "version": accelstudy.__version__,
-            "commit": git_commit(),
-            "numpy": np.__version__,
-            "scipy": scipy.__version__,
+            **PROVENANCE, "version": accelstudy.__version__, "commit": git_commit(),
+            "numpy": np.__version__, "scipy": scipy.__version__,
             "llvmlite": tables._version("llvmlite"),
-        }
+        }  # fmt: skip
         assert json.loads(pq.read_schema(path).metadata[b"accelstudy"]) == read_origin(path)
 
 

@@ -187,15 +187,12 @@ def test_one_replicate_has_no_spread(tmp_path):
 # --- correlations --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("cell", "published", "digits"),
-    [
-        (f"{MCLAREN}/gravity", 0.25, 0.005),
-        (f"{MCLAREN}/robot", 0.012, 0.0005),
-        (f"{NINE}/rings-24/gravity", 0.14, 0.005),
-        (f"{NINE}/rings-24/robot", 0.007, 0.0005),
-    ],
-)
+@pytest.mark.parametrize(("cell", "published", "digits"), [
+    (f"{MCLAREN}/gravity", 0.25, 0.005),
+    (f"{MCLAREN}/robot", 0.012, 0.0005),
+    (f"{NINE}/rings-24/gravity", 0.14, 0.005),
+    (f"{NINE}/rings-24/robot", 0.007, 0.0005),
+])  # fmt: skip
 def test_correlation_of_the_scales(study, cell, published, digits):
     table = study["correlations"]
     rows = table[

@@ -31,15 +31,12 @@ CONFIG = ROOT / "config" / "config.yaml"
 
 # Two models, two schemes, two approaches: eight cells, of which one cannot be estimated.
 TINY = {
-    "study": "tiny",
-    "paper": False,
-    "sensitivity": None,
-    "presets": None,
+    "study": "tiny", "paper": False, "sensitivity": None, "presets": None,
     "leveling": {"attitudes": 20},
     "grids": [
-        grid(["bias-scale", NINE], ["mclaren-24", "faces-6"], 60, approaches=["gravity", "robot"])
+        grid(["bias-scale", NINE], ["mclaren-24", "faces-6"], 60, approaches=["gravity", "robot"]),
     ],
-}
+}  # fmt: skip
 TABLE_PATHS = [f"results/tiny/{name}.parquet" for name in TABLES]
 
 IN_BATCHES = f"""\
@@ -235,22 +232,14 @@ def test_an_edit_of_the_package_runs_what_depends_on_it(single, tmp_path, monkey
 # --- bad input -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("words", "config", "parts"),
-    [
-        (
-            ["--config", "seeed=1"],
-            TINY,
-            ["seeed: unknown key; did you mean 'seed'?", "known: study, seed"],
-        ),
-        ([], {**TINY, "paper": True}, ["paper: true needs the block `sensitivity`"]),
-        (
-            [],
-            "study: a\nseed: 1\nstudy: b\n",
-            ["not valid YAML: line 3, column 1: the key 'study' stands twice"],
-        ),
-    ],
-)
+@pytest.mark.parametrize(("words", "config", "parts"), [
+    (["--config", "seeed=1"],
+     TINY,
+     ["seeed: unknown key; did you mean 'seed'?", "known: study, seed"]),
+    ([], {**TINY, "paper": True}, ["paper: true needs the block `sensitivity`"]),
+    ([], "study: a\nseed: 1\nstudy: b\n",
+     ["not valid YAML: line 3, column 1: the key 'study' stands twice"]),
+])  # fmt: skip
 def test_what_cannot_be_used_is_one_line(words, config, parts, tmp_path):
     one_line(refuse(tmp_path, *words, config=config), "tiny.yaml: ", *parts)
     assert not (tmp_path / "results").exists()
@@ -299,16 +288,13 @@ def test_truncated_estimates(finished):
 # --- around it -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("snakefile", "config"),
-    [
-        ("Snakefile", "config"),
-        ("workflow/campaigns.smk", "campaigns"),
-        ("workflow/diagnose.smk", "diagnose-example"),
-        ("workflow/hidden.smk", "hidden-effects"),
-        ("workflow/plan.smk", "plan-example"),
-    ],
-)
+@pytest.mark.parametrize(("snakefile", "config"), [
+    ("Snakefile", "config"),
+    ("workflow/campaigns.smk", "campaigns"),
+    ("workflow/diagnose.smk", "diagnose-example"),
+    ("workflow/hidden.smk", "hidden-effects"),
+    ("workflow/plan.smk", "plan-example"),
+])  # fmt: skip
 def test_lint(snakefile, config, tmp_path):
     """Jobs run where Snakemake does, with the package: no container has it."""
     given = ["--snakefile", ROOT / snakefile, "--configfile", ROOT / f"config/{config}.yaml"]
