@@ -15,8 +15,6 @@ REGISTRIES = (
 """Rooms in which each idea has a file, however small."""
 SMALL = 40
 """Lines of code below which a file with one user in its own room is a fragment of that user."""
-FRAGMENTS = 10
-"""How many there still are; this number may only fall."""
 
 
 @pytest.fixture(scope="module")
@@ -42,11 +40,8 @@ def test_the_table_for_contributors_has_all_rooms_in_the_order_of_imports(graph)
 
 
 def test_a_small_file_with_one_user_belongs_to_its_user(graph):
-    found = [module for module in sorted(graph.modules) if is_fragment(module, graph)]
-    assert len(found) <= FRAGMENTS, (
-        f"{len(found)} files have less than {SMALL} lines of code, and only one module of their "
-        f"room uses them. Move what is new into that module: {', '.join(found)}"
-    )
+    fragments = [module for module in sorted(graph.modules) if is_fragment(module, graph)]
+    assert fragments == [], f"less than {SMALL} lines of code, and one module of the room uses them"
 
 
 def is_fragment(module, graph):
