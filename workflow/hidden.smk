@@ -24,11 +24,13 @@ COMPARED = STUDY.model_dump(mode="json", exclude={"study", "diagnosis_seed"})
 CHUNKS = number_of_chunks(STUDY)
 NUMBERS = [f"{i:04d}" for i in range(CHUNKS)]
 # Digest of what each table of a chunk depends on. It tells those of another configuration.
+DIGESTS = {
+    **dict.fromkeys(("truths", "outcomes", "seconds"), setup_digest(DIAGNOSED)),
+    "baselines": setup_digest(COMPARED),
+}
 SETUPS = {
-    f"{RESULTS}/{table}/{chunk}.parquet": setup_digest(
-        COMPARED if table == "baselines" else DIAGNOSED
-    )
-    for table in ("truths", "outcomes", "seconds", "baselines")
+    f"{RESULTS}/{table}/{chunk}.parquet": digest
+    for table, digest in DIGESTS.items()
     for chunk in NUMBERS
 }
 OUTPUTS = [

@@ -177,10 +177,6 @@ class Code:
             result = self.line(f"insertelement {_VECTOR} {result}, double {value}, i64 {lane}")
         return Lanes(self, result)
 
-    def no_lane(self) -> Mask:
-        """Return a mask without lanes."""
-        return Mask(self, "zeroinitializer")
-
     @contextmanager
     def loop(self, count: str) -> Iterator[str]:
         """Write a loop over an index from 0 to below `count`."""

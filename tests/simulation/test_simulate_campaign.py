@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 import yaml
-from click.testing import CliRunner
+from calling import call
 from scipy import stats
 
 from accelstudy.approaches import get_approach
@@ -14,7 +14,6 @@ from accelstudy.basics.units import MGON
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.commands.main import main
 from accelstudy.effects import get_effect
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
@@ -28,10 +27,6 @@ def simulate(**settings):
 
 def values(entries):
     return {p["name"]: p["value"] for entry in entries for p in entry["parameters"]}
-
-
-def call(*arguments):
-    return CliRunner().invoke(main, ["simulate-campaign", *map(str, arguments)])
 
 
 # --- what is simulated ---------------------------------------------------------------------------
@@ -201,7 +196,8 @@ def test_slopes_within_the_holds():
 def test_the_command_writes_a_campaign_and_apart_from_it_the_truth(tmp_path):
     folder, truth_path = tmp_path / "one", tmp_path / "truth" / "one.yaml"
     result = call(
-        "--out", folder, "--truth", truth_path, "--seed", 7, "--effect", "warm_up(tau=300)",
+        "simulate-campaign", "--out", folder, "--truth", truth_path, "--seed", 7,
+        "--effect", "warm_up(tau=300)",
         "--noise-effect", "heavy_tails(nu=3)", "--gross", "unit_error(force=0.1)",
         "--temperature", "20:40", "--temperature-order", "ABBA", "--vibration", "0:1",
         "--yaw", "random", "--samples-per-hold", 50, "--sigma-unknown", "--robot-sigma-mgon", 5,
@@ -245,7 +241,7 @@ def test_the_command_writes_a_campaign_and_apart_from_it_the_truth(tmp_path):
     (["--truth", "/dev/null/truth.yaml"], "/dev/null is not a folder"),
 ])  # fmt: skip
 def test_bad_input_ends_with_one_line_and_leaves_nothing(arguments, expected, tmp_path):
-    result = call("--out", tmp_path / "one", *arguments)
+    result = call("simulate-campaign", "--out", tmp_path / "one", *arguments)
     assert result.exit_code == 2
     assert result.stderr.startswith("error: ")
     assert expected in result.stderr
