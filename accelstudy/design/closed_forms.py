@@ -60,12 +60,6 @@ def gravity_sigma(
     }
 
 
-def gravity_scale_correlation(directions: Array) -> float:
-    """Correlation of two scales in the gravity-based calibration, −3m / (1 − 3m)."""
-    m = float(np.mean(directions[:, 0] ** 2 * directions[:, 1] ** 2))
-    return -3 * m / (1 - 3 * m)
-
-
 def perfect_robot_ratio(directions: Array) -> dict[str, float]:
     """Standard deviations with a robot without error, relative to the gravity-based ones.
 
