@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from function_conditions import FunctionConditions
 from hypothesis import given
 from hypothesis import strategies as st
 from quality_helpers import BOTH, GRAVITY, NINE, ROBOT, STANDARD_ERRORS, one
@@ -18,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import kstest, norm, t
 from study_helpers import PAPER_TRUTH
 
-from accelstudy.adjustment import CalibrationEquations, FunctionConditions, adjust, calibrate
+from accelstudy.adjustment import CalibrationEquations, adjust, calibrate
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY

@@ -152,12 +152,12 @@ def find_joint_holds(
 
 
 def import_to(
-    folder: str | Path, path: str | Path, settings: ImportSettings, figure: bool = True
+    folder: str | Path, path: str | Path, settings: ImportSettings
 ) -> tuple[Campaign, ImportReport]:
     """Import a file of one sensor and write the campaign to a folder; see `import_each`."""
     if settings.sensors:
         raise InputError("sensors: several sensors make several campaigns; only one fits here")
-    return import_each({"": Path(folder)}, [path], settings, figure)[""]
+    return import_each({"": Path(folder)}, [path], settings)[""]
 
 
 def import_each(

@@ -53,8 +53,8 @@ def segment_logs(
     surveys: Sequence[tuple[Survey, Threshold]],
     trim: float,
     shortest: float,
-    full_range: float = np.inf,
-    one_each: bool = False,
+    full_range: float,
+    one_each: bool,
 ) -> list[Segmentation]:
     """Segments in which all sensors rest, of logs with simultaneous samples.
 
@@ -310,8 +310,8 @@ def runs_at_rest(
     largest: Sequence[float],
     cut: int,
     extremes: Sequence[Array],
-    full_range: float = np.inf,
-    advance: Callable[[float], None] = lambda done: None,
+    full_range: float,
+    advance: Callable[[float], None],
 ) -> Iterator[list[GrowingHold]]:
     """Runs of windows in which all sensors rest, cut at both ends; a run may have no samples left.
 

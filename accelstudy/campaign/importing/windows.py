@@ -27,7 +27,7 @@ _BINS = np.linspace(-40.0, 40.0, 4001)  # decades of variance
 
 
 def surveyed(
-    logs: Sequence[Recording], window: float, threshold: float | None = None
+    logs: Sequence[Recording], window: float, threshold: float | None
 ) -> list[tuple[Survey, Threshold]]:
     """Read logs of simultaneous samples once, each for its noise and for what is at rest in it.
 
@@ -36,7 +36,7 @@ def surveyed(
     logs : sequence of Recording
     window : float, s
     threshold : float, m/s², standard deviation of a window up to which it is at rest; chosen from
-        the data of each log if omitted
+        the data of each log if None
 
     Raises
     ------
@@ -180,9 +180,9 @@ class Survey:
         self.extremes[0] = _two_lowest(self.extremes[0], batch.forces)
         self.extremes[1] = -_two_lowest(-self.extremes[1], -batch.forces)
 
-    def quietest(self, share: float = 0.01) -> float:
-        """Standard deviation that this share of the windows does not exceed, m/s²."""
-        rank = np.searchsorted(np.cumsum(self.counts), share * self.counts.sum())
+    def quietest(self) -> float:
+        """Standard deviation that a hundredth of the windows does not exceed, m/s²."""
+        rank = np.searchsorted(np.cumsum(self.counts), 0.01 * self.counts.sum())
         return float(10.0 ** (_BINS[min(rank, len(_BINS) - 2) + 1] / 2))
 
 
