@@ -87,7 +87,11 @@ def campaign_of_holds(
     """Make the campaign of the holds of one sensor, and its report."""
     accuracy = holds.noise.accuracy
     warnings = [*holds.warnings, *_doubts(holds.noise, settings.gravity.value_mps2)]
-    notes = [] if settings.frame == "frd" else [_frame_note(settings)]
+    notes = []
+    if settings.frame != "frd":
+        notes.append(
+            f"axes: {settings.frame} in the log, turned to frd (forward, right, down) here"
+        )
     forces = holds.mean
     if settings.unit == "counts" and settings.offset is None:
         settings, offset, note = _with_offset(settings, holds)
@@ -176,10 +180,6 @@ def _with_offset(
     )
     settings = settings.model_copy(update={"offset": offset.tolist()})
     return settings, frame.to_frd(offset * scale), [note]
-
-
-def _frame_note(settings: ImportSettings) -> str:
-    return f"axes: {settings.frame} in the log, turned to frd (forward, right, down) here"
 
 
 def imported_campaign(
