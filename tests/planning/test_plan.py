@@ -11,7 +11,8 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from calling import call
+from calling import call, succeed
+from page_helpers import assert_told_alike
 from places import ROOT
 
 from accelstudy.approaches import get_approach
@@ -51,24 +52,37 @@ MCLAREN = get_scheme("mclaren-24")
 HAS = ("bias", "scale", "nonorthogonality", "quadratic_scale")
 SIZES = (9, 12, 20, 30, 40, 80, 120)
 MODELS = ("bias-scale", NINE, f"{NINE}-quadratic-cubic")
+QUESTION = "plan --tilt-accuracy 10mgon --tilt-range 30gon --sigma 2mm/s2"
 G = STANDARD_GRAVITY
 SIGMA = 0.002
 REPLICATES = 10_000
 
 
-@pytest.fixture(scope="module", autouse=True)
-def few_candidates():
-    """Schemes of a few sizes and a few models are enough; the README's plan tries all of them."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(known, "SIZES", SIZES)
-        patch.setattr(known, "PLANNED_MODELS", MODELS)
-        yield
+@pytest.fixture(autouse=True)
+def few_candidates(monkeypatch):
+    """Schemes of a few sizes and a few models are enough, but for the plan of the README."""
+    monkeypatch.setattr(known, "SIZES", SIZES)
+    monkeypatch.setattr(known, "PLANNED_MODELS", MODELS)
 
 
 @pytest.fixture(scope="module")
-def plan():
-    """The question of the README: 10 mgon up to 30 gon with 2 mm/s² per position."""
-    return answer(asked(), replicates=4000)
+def told():
+    """The plan that the README asks for, and what the command prints of it."""
+    plans = []
+
+    def kept(*given):
+        plans.append(answer(*given))
+        return plans[0]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("accelstudy.plan.answer.answer", kept)
+        printed = succeed(*QUESTION.split()).stdout
+    return plans[0], printed
+
+
+@pytest.fixture(scope="module")
+def plan(told):
+    return told[0]
 
 
 def asked(sheet=None, **options):
@@ -187,7 +201,7 @@ def test_simulation_agrees_with_linear_theory(plan):
     for ranked in plan.ranked:
         if ranked.simulated is not None:
             expected, simulated = ranked.candidate.expected.rms, ranked.simulated
-            assert simulated.simulated == 4000
+            assert simulated.simulated == plan.replicates
             assert np.all(np.abs(simulated.rms - expected) < 4 * simulated.error + 0.01 * expected)
 
 
@@ -265,6 +279,14 @@ def test_what_would_spoil_a_plan_is_of_the_size_that_leaves_the_target():
 
 
 # --- words ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/index.md"])
+def test_the_answer_that_a_page_quotes_is_the_commands_own(told, page):
+    text = (ROOT / page).read_text(encoding="utf-8").partition(f"accelstudy {QUESTION}\n")[2]
+    quoted = re.search(r"```[^\n]*\n(.*?)```", text, re.DOTALL)[1]
+    lines = told[1].splitlines(keepends=True)
+    assert_told_alike("".join(lines[: quoted.count("\n")]), quoted)
 
 
 def test_the_answer_stands_in_the_first_line(plan):
@@ -414,7 +436,7 @@ def test_the_recommended_positions_suffice_and_both_angles_stay_below_what_is_sa
     said = plan.first.simulated
     assert value == pytest.approx(said.rms.max(), abs=4 * np.hypot(error, said.error.max()))
     inside = np.mean(np.all(left < said.of_both(0.95), axis=1))
-    shares = 0.05 * 0.95 * (1 / len(left) + 1 / 4000)
+    shares = 0.05 * 0.95 * (1 / len(left) + 1 / plan.replicates)
     assert abs(inside - 0.95) < 4 * np.sqrt(shares)
 
 
