@@ -16,14 +16,16 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.signatures import Moment, rate_of
 from accelstudy.effects import get_effect
+from accelstudy.leveling.angles import wrapped
 
 Array = NDArray[np.float64]
 
@@ -35,8 +37,8 @@ HARMONICS = 4
 """Harmonics of an angle."""
 CYCLES = np.arange(1.0, 5.01, 0.25)
 """Cycles of a periodic function of time in a session."""
-DIRECTIONS = 12
-"""Functions of the direction of gravity, for each axis."""
+DIRECTIONS, SOME = 12, 60
+"""Functions of the direction of gravity for each axis, and directions that they are made of."""
 SURVIVES = 3e-3
 """Share of a shape that the model must leave, or the shape is not seen."""
 KEPT, LEAST = 24, 2e-3
@@ -169,7 +171,7 @@ def _coordinates(frame: Frame) -> Iterator[_Coordinate]:
         )
     if hold.temperature is not None:
         yield from smooth("temperature", SLOW, lambda at: at.temperature[:, None])
-    if getattr(hold, order) is None:
+    if getattr(hold, order) is None or np.ptp(hold.column(order)) == 0:
         return
     when = hold.column(order)
     yield from smooth("time", SLOW, lambda at: getattr(at, order)[:, None])
@@ -177,13 +179,18 @@ def _coordinates(frame: Frame) -> Iterator[_Coordinate]:
     before = np.concatenate([f[:1], f[:-1]])
     yield from smooth("previous", ("bias",), lambda at: before)
     yield from smooth("next", ("bias",), lambda at: np.append(f[1:], f[-1:], 0) - f)
-    moved = np.diff(frame.angles, axis=0, prepend=frame.angles[:1])
+    moved = wrapped(np.diff(frame.angles, axis=0, prepend=frame.angles[:1]))
     yield from smooth("move", ("reading",), lambda at: moved)
     if hold.temperature is not None and np.all(np.diff(when) > 0):
         rates = np.diff(hold.temperature) / np.diff(when)
         last = np.append(rates[:1], rates)
         for rate in (last, (last + np.append(rates, rates[-1:])) / 2):
-            yield from smooth("dT/dt", ("bias", "scale"), lambda at, rate=rate: rate[:, None])
+            yield from smooth("dT/dt", ("bias", "scale"), partial(_as_it_is, rate[:, None]))
+
+
+def _as_it_is(values: Array, now: Moment) -> Array:
+    """Values that do not change within a hold."""
+    return values
 
 
 def _sines(at: Course, values: Array) -> tuple[Course, Array]:
@@ -224,19 +231,24 @@ def _waves(order: str, when: Array) -> tuple[Course, Array]:
 def _on_the_sphere(f: Array) -> tuple[Course, Array]:
     """Functions of the direction of forces (n, 3), smooth by any of two lengths."""
     unit = f / np.linalg.norm(f, axis=1, keepdims=True)
-    apart = 2 - 2 * unit @ unit.T
-    courses, priors = [], []
-    for i, length in enumerate(LENGTHS[1:]):
-        values, vectors = np.linalg.eigh(np.exp(-apart / (2 * length**2)))
-        courses.append(vectors[:, -DIRECTIONS:])
-        prior = np.zeros((2, len(values[-DIRECTIONS:])))
-        prior[i] = values[-DIRECTIONS:]
-        priors.append(prior)
-    functions = np.concatenate(courses, axis=1)[:, None]
-    return lambda now: functions, np.concatenate(priors, axis=1)
+    # Of many directions some will do: the functions are smooth (Nyström).
+    some = unit[np.unique(np.linspace(0, len(unit) - 1, SOME).round().astype(int))]
+    features, weights = [], []
+    for length in LENGTHS[1:]:
+        values, vectors = np.linalg.eigh(_alike(some, some, length))
+        kept = values[-DIRECTIONS:]
+        features.append(_alike(unit, some, length) @ vectors[:, -DIRECTIONS:] / kept)
+        weights.append(kept)
+    functions = np.concatenate(features, axis=1)[:, None]
+    return lambda now: functions, np.asarray(block_diag(*weights))
 
 
-def _spectrum(omega: Array) -> Array:
+def _alike(one: Array, other: Array, length: float) -> Array:
+    """Covariance of a smooth function at unit vectors, by the squares of their chords."""
+    return np.asarray(np.exp((one @ other.T - 1) / length**2))
+
+
+def _spectrum(omega: NDArray[Any]) -> Array:
     """Spectral density of a squared exponential, by the length scale, (3, k)."""
     return np.asarray(np.exp(-(np.multiply.outer(LENGTHS, omega) ** 2) / 2))
 
@@ -287,7 +299,10 @@ def _change(course: Course, target: str, f: Array, frame: Frame, now: Moment) ->
         return _each(h, 3) * f[..., None] ** 2
     if target == "common scale":
         return f[..., None] * h
-    tilt = get_effect("base_tilt").output((), np.eye(2), frame.solution.gravity, _Beside(now), np)
+    a, b, nothing = np.array([1.0, 0.0]), np.array([0.0, 1.0]), np.zeros(2)
+    tilt = get_effect("base_tilt").output(
+        (nothing, nothing, nothing), (a, b), frame.solution.gravity, _Beside(now), np
+    )
     return np.einsum("nac,nk->nack", np.stack(tilt, axis=1), h[:, 0]).reshape(len(f), 3, -1)
 
 
