@@ -16,7 +16,7 @@ from accelstudy.diagnosis.space.groups import LACK_OF_FIT, groups
 
 GIVEN, NOT_GIVEN = 0.03, 0.04
 """How often noise alone may count as something missing, where sigma is given and where not."""
-RUNS, SETS = 24, 400
+RUNS, SETS = 28, 400
 """Null simulations, and sets of noise that are judged by each."""
 STANDARD_ERRORS = 4
 

@@ -89,7 +89,7 @@ class Field:
     @cached_property
     def unknown(self) -> Unknown | None:
         """Something without a name; None where nothing but the candidates shows."""
-        if self.frame is None:
+        if self.frame is None or not self.candidates:
             return None
         unknown = Unknown(LearnedShapes.of(self.frame), self.attitude)
         return unknown if unknown.places else None
