@@ -15,7 +15,8 @@ What it is worth: the tilt error of a calibrated sensor without and with it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections import defaultdict
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,15 +26,18 @@ from accelstudy.adjustment.quality import Solution, suspects
 from accelstudy.basics.progress import stage
 from accelstudy.basics.units import GON
 from accelstudy.campaign.calibration.assessment import SUSPECT
-from accelstudy.diagnosis.decision.posterior import of_effects
+from accelstudy.diagnosis.decision.posterior import Posterior, of_effects
 from accelstudy.diagnosis.decision.problem import Problem, is_exact
 from accelstudy.diagnosis.decision.verdict import Finding
 from accelstudy.diagnosis.evidence.detection import Chance
+from accelstudy.diagnosis.evidence.field import UNKNOWN, Unknown
+from accelstudy.diagnosis.evidence.hypotheses import strongest
 from accelstudy.diagnosis.next_positions import NextPosition, next_positions
 from accelstudy.diagnosis.space.examined import ExaminedFit, Frame
 from accelstudy.diagnosis.space.groups import LACK_OF_FIT, REPEAT, ROBOT, all_groups
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
 from accelstudy.diagnosis.space.residuals import Residuals
+from accelstudy.diagnosis.space.shapes import Place
 from accelstudy.diagnosis.space.signatures import signature
 from accelstudy.diagnosis.visibility import UpperLimit, upper_limits
 from accelstudy.effects import HoldConditions
@@ -146,6 +150,41 @@ def _absent(name: str, hold: HoldConditions) -> str:
     if columns[name] is None:
         return f"the campaign gives no {column}"
     return f"the {column} is the same in all positions"
+
+
+@dataclass(frozen=True)
+class LikeShape:
+    """Where something without a name may live: a target that is a function of a coordinate.
+
+    Attributes
+    ----------
+    coordinate, target : str
+    posterior : float, given that it is such a function, or one of the attitude alone
+    """
+
+    coordinate: str
+    target: str
+    posterior: float
+
+
+def like_shapes(problem: Problem, posterior: Posterior | None) -> tuple[LikeShape, ...]:
+    """Places of what has no name, most probable first, beside the effect that it comes with."""
+    unknown, z = problem.field.unknown, problem.residuals.z
+    told = () if posterior is None else posterior.credible_set
+    names = next((one.names for one in told if UNKNOWN in one.names), None)
+    if unknown is None or names is None:
+        return ()
+    evidence = problem.evidence
+    for name in names[: names.index(UNKNOWN)]:
+        beside = strongest(problem.examined.candidates[name], z)
+        z = z - beside.basis @ (beside.basis.T @ z)
+        evidence = replace(evidence, redundancy=evidence.redundancy - beside.dim)
+        unknown = Unknown(unknown.shapes.beside(beside.basis))
+    logs = unknown.densities(evidence, unknown.parts(z[None]), np.array([z @ z]))[0]
+    total: dict[Place, float] = defaultdict(float)
+    for place, p in zip(unknown.places, special.softmax(logs).tolist(), strict=True):
+        total[place] += p
+    return tuple(LikeShape(*place, p) for place, p in sorted(total.items(), key=lambda i: -i[1]))
 
 
 def limits_of_others(problem: Problem, finding: Finding, known: bool) -> tuple[UpperLimit, ...]:

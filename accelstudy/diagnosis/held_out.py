@@ -294,7 +294,7 @@ def _on_the_part(
     variance = np.ones(len(noise))
     if not part.evidence.level.known:
         variance = np.sum(left**2, axis=1) / (fitted.shape[1] - len(split.cofactors))
-    names, values = part.field.names, np.zeros(len(noise))
+    names, values = tuple(part.field.candidates), np.zeros(len(noise))
     for k in np.unique(candidate):
         if names[k] == OUTLIER:
             continue
@@ -315,14 +315,11 @@ def _on_the_part(
 
 def _choices(part: Problem, z: Array) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
     """Candidate that explains most, and which of its shapes, for each of residuals (b, m)."""
-    field = part.field
-    logs = part.evidence.of_spaces(field.parts(z), field.dims, np.sum(z**2, axis=-1))
-    total = field.combined(logs)
-    total[:, [k for k, name in enumerate(field.names) if name == UNKNOWN]] = -np.inf
-    candidate = np.argmax(total, axis=1)
+    field = part.field.named
+    logs = field.of_shapes(part.evidence, field.parts(z), np.sum(z**2, axis=-1))
+    candidate = np.argmax(field.combined(logs), axis=1)
     shape = np.zeros(len(z), dtype=int)
-    ends = [*field.starts[1:], len(field.dims)]
     for k in np.unique(candidate):
         rows = np.flatnonzero(candidate == k)
-        shape[rows] = np.argmax(logs[rows, field.starts[k] : ends[k]], axis=1)
+        shape[rows] = np.argmax(logs[rows, field.starts[k] : field.starts[k + 1]], axis=1)
     return candidate, shape

@@ -24,6 +24,7 @@ from accelstudy.campaign.gross_errors.recognition import recognise
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.consequences import (
     leveling_rms,
+    like_shapes,
     limits_of_others,
     locate,
     marked_positions,
@@ -91,6 +92,7 @@ def diagnose(
         location=location.shares,
         location_by_chance=location.by_chance,
         not_located=location.untestable,
+        like=like_shapes(problem, finding.posterior) if verdict.verdict == "unknown" else (),
         leveling=leveling,
         changes=parameter_changes(problem, finding, variance),
         upper_limits=limits_of_others(problem, finding, verdict.sigma_holds),

@@ -13,7 +13,7 @@ from accelstudy.approaches import Approach
 from accelstudy.basics.levels import REFUTED
 from accelstudy.campaign.gross_errors.recognition import Recognised
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.consequences import Change
+from accelstudy.diagnosis.consequences import Change, LikeShape
 from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.decision.statement import Part
 from accelstudy.diagnosis.decision.verdict import Named
@@ -128,6 +128,7 @@ class Diagnosis(Verdict):
     location : dict of group to the share of the excess χ², where it tells
     location_by_chance : dict of these groups to the share that any pattern has on average
     not_located : dict of the other groups to the reason why nothing can be told of them
+    like : tuple of LikeShape, where something without a name may live, most probable first
     leveling : (float, float), tilt error without and with what was found, rad, or None
     changes : tuple of Change, of the parameters of the base model by effects that were added
     upper_limits : tuple of UpperLimit, of the effects that were not found
@@ -141,6 +142,7 @@ class Diagnosis(Verdict):
     location: Mapping[str, float]
     location_by_chance: Mapping[str, float]
     not_located: Mapping[str, str]
+    like: tuple[LikeShape, ...]
     leveling: tuple[float, float] | None
     changes: tuple[Change, ...]
     upper_limits: tuple[UpperLimit, ...]

@@ -12,11 +12,11 @@ from accelstudy.diagnosis.evidence.field import Field
 from accelstudy.diagnosis.evidence.size import Evidence, Level
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.result import level_of_effects
-from accelstudy.diagnosis.space.groups import groups
+from accelstudy.diagnosis.space.groups import LACK_OF_FIT, groups
 
 GIVEN, NOT_GIVEN = 0.03, 0.04
 """How often noise alone may count as something missing, where sigma is given and where not."""
-RUNS, SETS = 24, 400
+RUNS, SETS = 28, 400
 """Null simulations, and sets of noise that are judged by each."""
 STANDARD_ERRORS = 4
 
@@ -37,7 +37,7 @@ def test_noise_alone_counts_as_often_as_the_level_says(designs, approach, level,
     """Each null simulation has a seed of its own, so that the rates scatter as they really do."""
     examined, rng = designs[approach], np.random.default_rng([1, 2])
     residuals = examined.frame.residuals
-    field = Field.of(examined.candidates, groups(examined))
+    field = Field(examined.candidates, examined.frame, groups(examined).get(LACK_OF_FIT))
     evidence = Evidence(level, residuals.redundancy)
     rates, seen, weights = [], [], []
     for seed in range(RUNS):

@@ -43,7 +43,7 @@ from accelstudy.effects import effect_names
 
 CREDIBLE = 0.9
 """Posterior probability that a credible set reaches."""
-FIRST = 5
+FIRST = 3
 """Effects beside which something unknown is looked for."""
 
 
@@ -256,8 +256,10 @@ def weigh_pairs(
         if both[0] != both[1] or one.effect is None:
             names = tuple(called.get(h.name, h.name) for h in (one, other))
             weighed.append(Weighed(names, both, pair.log_density + each, (one, other)))
-    for best, alike in classes[:FIRST]:
-        beside = unknown_beside(best, problem.groups, residuals, evidence)
+    unknown = problem.field.unknown
+    for best, alike in classes[:FIRST] if unknown else ():
+        assert unknown is not None
+        beside = unknown_beside(best, unknown, residuals, evidence)
         if beside is not None:
             total = densities[best.name] + beside - np.log(k)
             prior = np.log(priors.TWO * priors.UNKNOWN)

@@ -6,7 +6,7 @@ bumped position share it evenly. The probability that a given sigma is wrong is 
 
 TWO = 0.15
 """Two effects are missing: of the models that lack something one in eight lacks more."""
-UNKNOWN = 0.04
+UNKNOWN = 0.1
 """Something is missing that is not in the catalogue, which has the usual effects."""
 COLOUR = 0.06
 """Nothing is missing but the noise has some colour, as all real noise has."""

@@ -17,7 +17,7 @@ from accelstudy.diagnosis.evidence.field import Field
 from accelstudy.diagnosis.evidence.noise_models import UnequalAxes
 from accelstudy.diagnosis.evidence.size import Evidence, Level
 from accelstudy.diagnosis.space.examined import ExaminedFit, Frame, examine
-from accelstudy.diagnosis.space.groups import groups
+from accelstudy.diagnosis.space.groups import LACK_OF_FIT, groups
 from accelstudy.diagnosis.space.hypotheses import Spaces
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.sensors.sensor import SensorModel
@@ -134,7 +134,8 @@ def pose(base: BaseFit) -> Problem:
             examined = examine(solve(first.model, first.approach, observed))
     shown = groups(examined)
     evidence = Evidence(base.level, examined.frame.residuals.redundancy)
-    return Problem(base, examined, axes, shown, Field.of(examined.candidates, shown), evidence)
+    field = Field(examined.candidates, examined.frame, shown.get(LACK_OF_FIT))
+    return Problem(base, examined, axes, shown, field, evidence)
 
 
 def is_exact(fit: Solution) -> bool:
@@ -144,7 +145,7 @@ def is_exact(fit: Solution) -> bool:
 
 def _best_odds(examined: ExaminedFit, evidence: Evidence) -> float:
     """Log odds of the most probable single effect against nothing, at least 0."""
-    field, z = Field.of(examined.candidates, {}), examined.frame.residuals.z
+    field, z = Field(examined.candidates), examined.frame.residuals.z
     if not field.names:
         return 0.0
     nothing = np.logaddexp.reduce(evidence.of_noise(z @ z))

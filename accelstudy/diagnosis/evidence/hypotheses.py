@@ -9,19 +9,17 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.diagnosis.evidence.field import Field, shape_weights
-from accelstudy.diagnosis.evidence.size import Evidence, log_mean
+from accelstudy.diagnosis.evidence.field import Field, Unknown, shape_weights
+from accelstudy.diagnosis.evidence.size import Evidence, log_mean, log_sum
 from accelstudy.diagnosis.space.examined import ExaminedFit
 from accelstudy.diagnosis.space.hypotheses import (
     OUTLIER,
-    Bases,
     BumpedPositions,
     EffectShapes,
     Hypothesis,
     Shapes,
-    Spaces,
 )
-from accelstudy.diagnosis.space.residuals import ABSORBED, Residuals
+from accelstudy.diagnosis.space.residuals import Residuals
 
 Array = NDArray[np.float64]
 
@@ -77,7 +75,8 @@ def weigh_singles(examined: ExaminedFit, field: Field, evidence: Evidence) -> Si
     z = examined.frame.residuals.z
     if not examined.candidates:
         return Singles({}, {}, {}, {})
-    first = dict(zip(field.names, field.densities(evidence, z).tolist(), strict=True))
+    densities = field.named.densities(evidence, z)
+    first = dict(zip(field.candidates, densities.tolist(), strict=True))
     least = max(first.values()) - WORTH
     shapes = {
         name: refined(examined, tried) if first[name] > least else tried
@@ -188,33 +187,20 @@ def _completed(examined: ExaminedFit, shapes: EffectShapes) -> EffectShapes:
 
 
 def unknown_beside(
-    hypothesis: Hypothesis, groups: Mapping[str, Spaces], residuals: Residuals, evidence: Evidence
+    hypothesis: Hypothesis, unknown: Unknown, residuals: Residuals, evidence: Evidence
 ) -> float | None:
     """Log evidence of something unknown beside a hypothesis, against the hypothesis alone.
 
-    None where no group has a direction of its own beside it.
+    None where no shape has anything of its own beside it.
     """
     q = hypothesis.basis
     left = residuals.z - q @ (q.T @ residuals.z)
     rest = Evidence(evidence.level, residuals.redundancy - hypothesis.dim)
-    alone = np.logaddexp.reduce(rest.of_noise(left @ left))
-    parts: list[float] = []
-    dims: list[int] = []
-    for space in groups.values():
-        if not isinstance(space, Bases):
-            continue
-        # The squares of what is left of each direction beside the hypothesis.
-        common = q.T @ space.together
-        squares, directions = np.linalg.eigh(np.eye(common.shape[1]) - common.T @ common)
-        seen = squares > ABSORBED
-        if 0 < np.count_nonzero(seen) < rest.redundancy:
-            along = left @ space.together @ directions[:, seen]
-            parts.append(float(np.sum(along**2 / squares[seen])))
-            dims.append(int(np.count_nonzero(seen)))
-    if not parts:
+    beside = Unknown(unknown.shapes.beside(q))
+    if not beside.places:
         return None
-    logs = rest.of_spaces(np.array(parts), dims, left @ left) - alone
-    return float(log_mean(logs))
+    each = beside.densities(rest, beside.parts(left[None]), np.array([left @ left]))
+    return float(log_sum(each[0]) - np.logaddexp.reduce(rest.of_noise(left @ left)))
 
 
 @dataclass(frozen=True)

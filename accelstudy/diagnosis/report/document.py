@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -99,6 +99,7 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
         "location": {name: json_number(share) for name, share in d.location.items()},
         "location_by_chance": {n: json_number(p) for n, p in d.location_by_chance.items()},
         "location_untestable": dict(d.not_located),
+        "like": [asdict(place) for place in d.like],
         "gap": _gap(d),
         "parameter_changes": [
             {

@@ -39,6 +39,24 @@ GROUPS = {
 }
 """How a residual of each group of regressors varies."""
 
+COORDINATES = {
+    "dT/dt": "the rate of the temperature",
+    "force": "the force",
+    "previous": "the force in the position before",
+    "next": "the step to the next position",
+    "angle": "roll and pitch",
+    "yaw": "the yaw",
+    "move": "the last move of the robot",
+}
+"""Coordinates of a function without a name; others are called as they are."""
+TARGETS = {
+    "bias": "a bias",
+    "scale": "a scale",
+    "reading": "an error of the robot's readings",
+    "tilt": "a tilt of the base",
+}
+"""What may be such a function."""
+
 
 def too_few(diagnosis: Diagnosis) -> bool:
     """Whether nothing was found since nothing could be tested."""
@@ -94,6 +112,7 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
         "weights": _weights(d),
         "suspects": {label: p for label, p in sorted(d.suspects) if label not in bumped},
         "most_probable": most_probable(d.credible_set),
+        "like": like(d),
         "location": _location(d),
         "effects": [(f, get_effect(f.spec).equation) for f in d.found if _is_effect(f)],
         "positions": bumped,
@@ -163,6 +182,19 @@ def _location(d: Diagnosis) -> list[tuple[str, float]]:
     """Groups with the largest shares of the excess, in words, and these shares."""
     ranked = sorted(d.location.items(), key=lambda item: -item[1])[:3]
     return [(GROUPS.get(name, words(name)), share) for name, share in ranked if share > 0]
+
+
+def like(diagnosis: Diagnosis) -> str:
+    """Say of what something without a name may be a function; nothing where that is open."""
+    worth = [one for one in diagnosis.like if one.posterior >= WORTH]
+    return _listed(
+        [
+            (f"{TARGETS[o.target]} that varies with {COORDINATES.get(o.coordinate, o.coordinate)}",
+             o.posterior)
+            for o in worth
+        ],
+        "or",
+    )  # fmt: skip
 
 
 def sentence(text: str) -> str:
