@@ -33,6 +33,7 @@ from accelstudy.diagnosis.consequences import (
 from accelstudy.diagnosis.decision.posterior import weigh
 from accelstudy.diagnosis.decision.problem import Problem, fit_base, is_exact, pose
 from accelstudy.diagnosis.decision.statement import certain_of
+from accelstudy.diagnosis.decision.unrecorded import with_unrecorded
 from accelstudy.diagnosis.decision.verdict import (
     Finding,
     Named,
@@ -155,6 +156,8 @@ def _judged(
 
     variance = unit_variance(problem, finding.frame)
     named = describe(problem, detection, finding, tests, campaign.positions, variance)
+    if weighing is not None:
+        finding = with_unrecorded(problem, weighing, finding, named)
     gap = measured_gap(finding, base.solution)
     if weighing is not None and finding.verdict in ("named", "narrowed"):
         with stage("held-out positions"):
@@ -180,6 +183,7 @@ def _judged(
             verdict=verdict,
             reason=reason,
             says_the_level=finding.says_the_level,
+            unrecorded=finding.unrecorded if recognised is None else (),
             credible_set=finding.credible_set,
             found=named,
             base=base.solution,

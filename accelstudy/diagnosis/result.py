@@ -51,6 +51,7 @@ class Verdict:
     verdict : str, "no_effect", "named", "narrowed", "unknown", "noise_model" or "gross_error"
     reason : str, why the verdict is what it is
     says_the_level : bool, whether the reason says how large the residuals are
+    unrecorded : tuple of str, absent columns of which what changes slowly may be an effect
     credible_set : tuple of Explanation, most probable first; empty if nothing is missing
     found : tuple of Named
     base : Solution, of the base model with equal axes
@@ -76,6 +77,7 @@ class Verdict:
     verdict: str
     reason: str
     says_the_level: bool
+    unrecorded: tuple[str, ...]
     credible_set: tuple[Explanation, ...]
     found: tuple[Named, ...]
     base: Solution

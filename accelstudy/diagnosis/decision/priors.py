@@ -10,6 +10,9 @@ UNKNOWN = 0.04
 """Something is missing that is not in the catalogue, which has the usual effects."""
 COLOUR = 0.06
 """Nothing is missing but the noise has some colour, as all real noise has."""
+UNRECORDED = 0.3
+"""The bias follows something that nobody recorded, most often a temperature: where that has no
+column, it is the commonest of all, and no effect of the catalogue can stand for it."""
 AXES = 0.03
 """Nothing is missing but the axes differ in noise."""
 TAILS = 0.02

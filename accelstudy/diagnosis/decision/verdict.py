@@ -86,6 +86,7 @@ class Finding:
     chosen : tuple of Choice
     posterior : Posterior or None, where something is missing
     says_the_level : bool, whether the reason says how large the residuals are
+    unrecorded : tuple of str, absent columns of which what changes slowly may be an effect
     """
 
     verdict: str
@@ -94,6 +95,7 @@ class Finding:
     chosen: tuple[Choice, ...] = ()
     posterior: Posterior | None = None
     says_the_level: bool = False
+    unrecorded: tuple[str, ...] = ()
 
     @property
     def credible_set(self) -> tuple[Explanation, ...]:
