@@ -157,7 +157,7 @@ def _judged(
     variance = unit_variance(problem, finding.frame)
     named = describe(problem, detection, finding, tests, campaign.positions, variance)
     if weighing is not None:
-        finding = with_unrecorded(problem, weighing, finding, named)
+        finding = with_unrecorded(problem, weighing, finding)
     gap = measured_gap(finding, base.solution)
     if weighing is not None and finding.verdict in ("named", "narrowed"):
         with stage("held-out positions"):
@@ -183,7 +183,8 @@ def _judged(
             verdict=verdict,
             reason=reason,
             says_the_level=finding.says_the_level,
-            unrecorded=finding.unrecorded if recognised is None else (),
+            slow=finding.slow,
+            unrecorded=finding.unrecorded and recognised is None,
             credible_set=finding.credible_set,
             found=named,
             base=base.solution,

@@ -51,7 +51,8 @@ class Verdict:
     verdict : str, "no_effect", "named", "narrowed", "unknown", "noise_model" or "gross_error"
     reason : str, why the verdict is what it is
     says_the_level : bool, whether the reason says how large the residuals are
-    unrecorded : tuple of str, absent columns of which what changes slowly may be an effect
+    slow : float, probability of slow noise that may be an effect of a column that is absent
+    unrecorded : bool, whether the reason says so
     credible_set : tuple of Explanation, most probable first; empty if nothing is missing
     found : tuple of Named
     base : Solution, of the base model with equal axes
@@ -77,7 +78,8 @@ class Verdict:
     verdict: str
     reason: str
     says_the_level: bool
-    unrecorded: tuple[str, ...]
+    slow: float
+    unrecorded: bool
     credible_set: tuple[Explanation, ...]
     found: tuple[Named, ...]
     base: Solution

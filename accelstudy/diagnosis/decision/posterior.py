@@ -279,10 +279,12 @@ def _noises(
     if problem.frame.solution is not problem.base.solution:
         unequal = float(by_level[0])
     tails = tail_test(residuals.positions, chance)
-    processes = colour_densities(residuals, evidence)
-    fast, *lasting = np.log(priors.COLOUR / len(processes)) + processes
-    frame, of_course = problem.frame, priors.COLOUR + priors.UNRECORDED * bool(problem.absent)
+    # The kinds of coloured noise share its weight evenly; a smooth course is one of them.
+    processes, frame = colour_densities(residuals, evidence), problem.frame
+    each = priors.COLOUR / (len(processes) + 1)
+    of_course = each + (priors.UNRECORDED if problem.absent else 0.0)
     course = np.log(of_course) + course_density(residuals, frame.hold.time, frame.forces, evidence)
+    fast, *lasting = np.log(each) + processes
     slow = float(np.logaddexp.reduce([*lasting, course]))
     logs = {
         AXES: unequal,

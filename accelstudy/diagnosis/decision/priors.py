@@ -11,8 +11,8 @@ UNKNOWN = 0.04
 COLOUR = 0.06
 """Nothing is missing but the noise has some colour, as all real noise has."""
 UNRECORDED = 0.3
-"""The bias follows something that nobody recorded, most often a temperature: where that has no
-column, it is the commonest of all, and no effect of the catalogue can stand for it."""
+"""Nothing of the catalogue is missing, but the sensor follows something that nobody recorded: a
+temperature, most often. Where it has no column, it is the commonest cause of all."""
 AXES = 0.03
 """Nothing is missing but the axes differ in noise."""
 TAILS = 0.02

@@ -7,27 +7,25 @@ model is adequate.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from accelstudy.basics.wording import comma_list
 from accelstudy.diagnosis.decision import priors
-from accelstudy.diagnosis.decision.posterior import Weighing
+from accelstudy.diagnosis.decision.posterior import Posterior, Weighing
 from accelstudy.diagnosis.decision.problem import Problem
-from accelstudy.diagnosis.decision.verdict import Finding, Named
+from accelstudy.diagnosis.decision.verdict import Finding
+from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.noise_tests import COLOUR
 from accelstudy.diagnosis.space.groups import COURSES, REPEAT
 from accelstudy.effects import effect_names, get_effect
 
 ASKED = {"temperature": "the temperature at the sensor", "time": "the time of each hold"}
 """What to record, by the column that is absent."""
-WORTH = 0.1
-"""Probability from which on slow noise is worth a word beside drifts."""
 
 
-def with_unrecorded(
-    problem: Problem, weighing: Weighing, finding: Finding, named: Sequence[Named]
-) -> Finding:
+def with_unrecorded(problem: Problem, weighing: Weighing, finding: Finding) -> Finding:
     """Say it where noise, or nothing with a name, may be an effect of what was not recorded.
 
     Parameters
@@ -35,12 +33,22 @@ def with_unrecorded(
     problem : Problem
     weighing : Weighing, of the same
     finding : Finding
-    named : what was found, as it is described
     """
-    if not problem.absent or not _is_slow(weighing, finding, named):
+    posterior, absent = finding.posterior, problem.absent
+    if finding.verdict not in ("noise_model", "unknown") or not absent or posterior is None:
         return finding
-    of = "temperature or time" if "temperature" in problem.absent else "time"
-    asked = [ASKED[name] for name in problem.absent]
+    coloured = sum(
+        p
+        for one, p in zip(posterior.all, posterior.probabilities, strict=True)
+        if one.names == (COLOUR,)
+    )
+    slow = weighing.slow * coloured
+    if finding.verdict == "noise_model" and slow < posterior.of_noise / 2:
+        return replace(finding, slow=slow)
+    if finding.verdict == "unknown" and slow + _of_courses(problem, posterior) < priors.SURE:
+        return replace(finding, slow=slow)
+    of = "temperature or time" if "temperature" in absent else "time"
+    asked = [ASKED[name] for name in absent]
     if REPEAT not in problem.groups:
         asked.append("repeats of one attitude in between")
     clauses = (
@@ -48,16 +56,18 @@ def with_unrecorded(
         finding.reason,
         f"{comma_list(asked)} would show which",
     )
-    return replace(finding, reason="; ".join(clauses), unrecorded=problem.absent)
+    return replace(finding, slow=slow, reason="; ".join(clauses), unrecorded=True)
 
 
-def _is_slow(weighing: Weighing, finding: Finding, named: Sequence[Named]) -> bool:
-    """Whether what is found changes slowly over the session, and slow noise may be all of it."""
-    if finding.verdict == "noise_model":
-        return named[0].name == COLOUR and weighing.slow >= priors.MORE_PROBABLE
-    if finding.verdict != "unknown" or finding.posterior is None:
-        return False
-    slow = {COLOUR, *(n for n in effect_names() if get_effect(n).group in COURSES)}
-    told = [one for one in finding.posterior.explanations if slow.issuperset(one.names)]
-    noise = weighing.slow * sum(one.posterior for one in told if COLOUR in one.names)
-    return noise >= WORTH and sum(one.posterior for one in told) >= priors.SURE
+def _of_courses(problem: Problem, posterior: Posterior) -> float:
+    """Probability of effects of time or temperature, and of something unknown like them."""
+    courses = {name for name in effect_names() if get_effect(name).group in COURSES}
+    z, groups = problem.residuals.z, problem.groups
+    if groups:
+        parts = np.array([float(space.parts(z)[0]) for space in groups.values()])
+        dims = [int(space.dims[0]) for space in groups.values()]
+        strongest = int(np.argmax(problem.evidence.of_spaces(parts, dims, z @ z)))
+        if list(groups)[strongest] in COURSES:
+            courses.add(UNKNOWN)
+    told = posterior.explanations
+    return sum(one.posterior for one in told if courses.issuperset(one.names))

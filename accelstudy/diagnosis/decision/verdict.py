@@ -86,7 +86,8 @@ class Finding:
     chosen : tuple of Choice
     posterior : Posterior or None, where something is missing
     says_the_level : bool, whether the reason says how large the residuals are
-    unrecorded : tuple of str, absent columns of which what changes slowly may be an effect
+    slow : float, probability of slow noise that may be an effect of a column that is absent
+    unrecorded : bool, whether the reason says so
     """
 
     verdict: str
@@ -95,7 +96,8 @@ class Finding:
     chosen: tuple[Choice, ...] = ()
     posterior: Posterior | None = None
     says_the_level: bool = False
-    unrecorded: tuple[str, ...] = ()
+    slow: float = 0.0
+    unrecorded: bool = False
 
     @property
     def credible_set(self) -> tuple[Explanation, ...]:
@@ -436,7 +438,11 @@ def describe(
         worst, posterior = worst_of(tests), finding.posterior
         assert posterior is not None
         top = next(e.names[0] for e in posterior.explanations if e.names[0] in NOISES)
-        name = top if worst is None else worst.name
+        # Of larger residuals the level says least; what they are, the evidence says.
+        if worst is None or (worst.name == LEVEL and posterior.of_noise >= priors.SURE):
+            name = top
+        else:
+            name = worst.name
         p = detection.p_value if worst is None else worst.p_value
         return (Named(name, name, (name,), p, posterior.of_noise),)
     solution = finding.frame.solution

@@ -48,6 +48,8 @@ def too_few(diagnosis: Diagnosis) -> bool:
 def headline(diagnosis: Diagnosis) -> str:
     """Say the verdict in one sentence."""
     d, kind = diagnosis, diagnosis.verdict
+    if d.unrecorded:
+        return sentence(d.reason.split("; ")[0])
     if kind == "unknown":
         return without_a_name(d.credible_set)
     if kind == "narrowed":
@@ -65,10 +67,18 @@ def headline(diagnosis: Diagnosis) -> str:
 
 def _may_be_an_effect(diagnosis: Diagnosis) -> bool:
     """Whether a test of the noise fails, and yet it is not sure that only the noise is wrong."""
-    if diagnosis.verdict != "noise_model":
-        return False
-    posterior = diagnosis.found[0].posterior
-    return posterior is not None and posterior < SURE
+    return diagnosis.verdict == "noise_model" and noise_only(diagnosis) < SURE
+
+
+def noise_only(diagnosis: Diagnosis) -> float:
+    """Probability that only the noise is wrong, and that nothing unrecorded makes it so."""
+    return (diagnosis.found[0].posterior or 0.0) - diagnosis.slow
+
+
+def _reasons(diagnosis: Diagnosis) -> list[str]:
+    """Clauses of the reason that the headline does not say."""
+    d = diagnosis
+    return d.reason.split("; ")[1:] if d.unrecorded else [d.reason] if d.reason else []
 
 
 def _title(named: Named, titled: set[str]) -> str:
@@ -87,8 +97,8 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
         "headline": headline(d),
         "not_told_apart": not_told_apart(d.credible_set),
         "explanation": explanation_words(d.credible_set[0]) if d.credible_set else "",
-        "reason": sentence(d.reason) if d.reason else "",
-        "noise_only": d.found[0].posterior if _may_be_an_effect(d) else None,
+        "reasons": [sentence(part) for part in _reasons(d)],
+        "noise_only": noise_only(d) if _may_be_an_effect(d) and not d.unrecorded else None,
         "usual_cause": USUAL_CAUSE,
         "residuals_over_noise": _residuals_over_noise(d),
         "weights": _weights(d),
