@@ -183,7 +183,7 @@ def _judged(
             verdict=verdict,
             reason=reason,
             says_the_level=finding.says_the_level,
-            slow=finding.slow,
+            coloured=finding.coloured,
             unrecorded=finding.unrecorded and recognised is None,
             credible_set=finding.credible_set,
             found=named,

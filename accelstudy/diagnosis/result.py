@@ -51,7 +51,7 @@ class Verdict:
     verdict : str, "no_effect", "named", "narrowed", "unknown", "noise_model" or "gross_error"
     reason : str, why the verdict is what it is
     says_the_level : bool, whether the reason says how large the residuals are
-    slow : float, probability of slow noise that may be an effect of a column that is absent
+    coloured : float, probability of coloured noise that may be an effect of an absent column
     unrecorded : bool, whether the reason says so
     credible_set : tuple of Explanation, most probable first; empty if nothing is missing
     found : tuple of Named
@@ -78,7 +78,7 @@ class Verdict:
     verdict: str
     reason: str
     says_the_level: bool
-    slow: float
+    coloured: float
     unrecorded: bool
     credible_set: tuple[Explanation, ...]
     found: tuple[Named, ...]

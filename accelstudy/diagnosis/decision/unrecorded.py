@@ -37,26 +37,27 @@ def with_unrecorded(problem: Problem, weighing: Weighing, finding: Finding) -> F
     posterior, absent = finding.posterior, problem.absent
     if finding.verdict not in ("noise_model", "unknown") or not absent or posterior is None:
         return finding
-    coloured = sum(
-        p
-        for one, p in zip(posterior.all, posterior.probabilities, strict=True)
-        if one.names == (COLOUR,)
-    )
-    slow = weighing.slow * coloured
-    if finding.verdict == "noise_model" and slow < posterior.of_noise / 2:
-        return replace(finding, slow=slow)
-    if finding.verdict == "unknown" and slow + _of_courses(problem, posterior) < priors.SURE:
-        return replace(finding, slow=slow)
+    shares = zip(posterior.all, posterior.probabilities, strict=True)
+    coloured = sum(p for one, p in shares if one.names == (COLOUR,))
+    slow, finding = weighing.slow * coloured, replace(finding, coloured=coloured)
+    if finding.verdict == "noise_model":
+        enough = coloured >= posterior.of_noise / 2
+    else:
+        enough = slow + _of_courses(problem, posterior) >= priors.SURE
+    if not enough:
+        return finding
+    lasting = finding.verdict == "unknown" or slow >= coloured / 2
     of = "temperature or time" if "temperature" in absent else "time"
     asked = [ASKED[name] for name in absent]
     if REPEAT not in problem.groups:
         asked.append("repeats of one attitude in between")
     clauses = (
-        f"slow noise, or an effect of {of} that these columns cannot tell",
+        f"{'slow noise' if lasting else 'noise that differs from hold to hold'}, or an effect of "
+        f"{of} that these columns cannot tell",
         finding.reason,
         f"{comma_list(asked)} would show which",
     )
-    return replace(finding, slow=slow, reason="; ".join(clauses), unrecorded=True)
+    return replace(finding, reason="; ".join(clauses), unrecorded=True)
 
 
 def _of_courses(problem: Problem, posterior: Posterior) -> float:

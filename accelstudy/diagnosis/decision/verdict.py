@@ -86,7 +86,7 @@ class Finding:
     chosen : tuple of Choice
     posterior : Posterior or None, where something is missing
     says_the_level : bool, whether the reason says how large the residuals are
-    slow : float, probability of slow noise that may be an effect of a column that is absent
+    coloured : float, probability of coloured noise that may be an effect of an absent column
     unrecorded : bool, whether the reason says so
     """
 
@@ -96,7 +96,7 @@ class Finding:
     chosen: tuple[Choice, ...] = ()
     posterior: Posterior | None = None
     says_the_level: bool = False
-    slow: float = 0.0
+    coloured: float = 0.0
     unrecorded: bool = False
 
     @property

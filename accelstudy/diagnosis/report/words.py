@@ -72,7 +72,7 @@ def _may_be_an_effect(diagnosis: Diagnosis) -> bool:
 
 def noise_only(diagnosis: Diagnosis) -> float:
     """Probability that only the noise is wrong, and that nothing unrecorded makes it so."""
-    return (diagnosis.found[0].posterior or 0.0) - diagnosis.slow
+    return (diagnosis.found[0].posterior or 0.0) - diagnosis.coloured
 
 
 def _reasons(diagnosis: Diagnosis) -> list[str]:
