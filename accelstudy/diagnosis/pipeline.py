@@ -44,6 +44,7 @@ from accelstudy.diagnosis.decision.verdict import (
     sigma_holds,
     tests_of_noise,
     unit_variance,
+    unless_weak,
     worst_of,
 )
 from accelstudy.diagnosis.evidence.detection import SIMULATIONS, Chance, detect
@@ -143,15 +144,14 @@ def _judged(
     if is_exact(base.solution):
         reason = "the campaign is its own model: what is left are rounding errors"
         finding = Finding("no_effect", frame, reason)
-    elif detection.p_value < level:
-        weighing = weigh(problem, detection, chance)
-        finding = find(problem, weighing)
-        tests = tests_of_noise(problem, finding.frame, campaign, chance)
     else:
-        tests = tests_of_noise(problem, frame, campaign, chance)
-        worst = worst_of(tests)
-        if worst is not None:
+        if detection.p_value < level:
             weighing = weigh(problem, detection, chance)
+            finding = unless_weak(problem, detection, find(problem, weighing))
+        tests = tests_of_noise(problem, finding.frame, campaign, chance)
+        worst = worst_of(tests) if finding.verdict == "no_effect" else None
+        if worst is not None:
+            weighing = weighing or weigh(problem, detection, chance)
             finding = judge_noise(problem, weighing.posterior, worst)
 
     variance = unit_variance(problem, finding.frame)
@@ -185,6 +185,7 @@ def _judged(
             says_the_level=finding.says_the_level,
             coloured=finding.coloured,
             unrecorded=finding.unrecorded and recognised is None,
+            weak=finding.weak and recognised is None,
             credible_set=finding.credible_set,
             found=named,
             base=base.solution,

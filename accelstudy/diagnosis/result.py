@@ -53,6 +53,7 @@ class Verdict:
     says_the_level : bool, whether the reason says how large the residuals are
     coloured : float, probability of coloured noise that may be an effect of an absent column
     unrecorded : bool, whether the reason says so
+    weak : bool, whether there is evidence that something is missing, too weak for a verdict
     credible_set : tuple of Explanation, most probable first; empty if nothing is missing
     found : tuple of Named
     base : Solution, of the base model with equal axes
@@ -80,6 +81,7 @@ class Verdict:
     says_the_level: bool
     coloured: float
     unrecorded: bool
+    weak: bool
     credible_set: tuple[Explanation, ...]
     found: tuple[Named, ...]
     base: Solution
