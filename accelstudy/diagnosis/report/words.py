@@ -22,7 +22,7 @@ from accelstudy.diagnosis.decision.statement import (
 from accelstudy.diagnosis.decision.verdict import Named
 from accelstudy.diagnosis.next_positions import NextPosition
 from accelstudy.diagnosis.result import Diagnosis
-from accelstudy.diagnosis.space.groups import REPEAT
+from accelstudy.diagnosis.space.groups import COURSES, REPEAT
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.pages import lines
 from accelstudy.sensors.plausibility import USUAL_CAUSE
@@ -116,7 +116,12 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
         "suspects": {label: p for label, p in sorted(d.suspects) if label not in bumped},
         "most_probable": most_probable(d.credible_set),
         "location": _location(d),
-        "effects": [(f, get_effect(f.spec).equation) for f in d.found if _is_effect(f)],
+        "effects": [
+            (f, effect.equation, effect.group in COURSES)
+            for f in d.found
+            if _is_effect(f)
+            for effect in [get_effect(f.spec)]
+        ],
         "positions": bumped,
         "changed": changed(d),
         "keep_base": keep_base(d),
