@@ -1,9 +1,10 @@
 """What follows from a finding: where it lives, what it changed, and what it is worth.
 
 Where it lives: the share of the excess χ² that each group of regressors takes up. A group of k
-regressors takes up k of r redundant conditions. Of a pattern that has nothing to do with it, it has
-a share of Beta(k/2, (r − k)/2) by chance, k/r on average. Where that is often nearly all of it, the
-share says nothing, and is not told.
+regressors takes up k of r redundant conditions. Of residuals that have nothing to do with it, it
+has a part of Beta(k/2, (r − k)/2) by chance, k/r on average. Of an excess E above the noise, r + E
+in all, the group has nearly all if it has k + 0.9 E. Where chance often gives that, as it does where
+the redundancy or the excess is small, the share says nothing, and is not told.
 
 What it changed: an effect with the signature S (whitened, by its parameters p) that a model with
 the design Ã lacks shifts the estimates of the model by −(ÃᵀÃ)⁻¹ Ãᵀ S p (omitted-variable bias).
@@ -63,7 +64,7 @@ ABSENT = {
 NEARLY_ALL = 0.9
 """Share that would seem to say where a pattern lives."""
 SELDOM = 0.05
-"""Probability with which any pattern may have such a share in a group by chance."""
+"""Probability with which any pattern may have such a share in one of the groups by chance."""
 
 
 @dataclass(frozen=True)
@@ -104,11 +105,12 @@ def locate(problem: Problem, chance: Chance, finding: Finding, variance: float) 
         left = [float((z @ z - space.parts(z)[0]) / (r - space.dims[0])) for space in spaces]
         variance = min([variance, *left])
     groups = {n: space for n, space in all_groups(examined).items() if n != LACK_OF_FIT}
-    nearly_all = {}
+    excess, nearly_all = max(float(z @ z) / variance - r, 0.0), {}
     expected = {name: float(space.dims[0]) for name, space in groups.items()}
     usual = {name: k / r for name, k in expected.items()}
     for name, k in expected.items():
-        by_chance = special.betainc((r - k) / 2, k / 2, 1 - NEARLY_ALL) if 0 < k < r else k >= r
+        part = (k + NEARLY_ALL * excess) / (r + excess)
+        by_chance = special.betainc((r - k) / 2, k / 2, 1 - part) if 0 < k < r else k >= r
         nearly_all[name] = float(by_chance)
     bumped = examined.candidates.get(OUTLIER)
     if bumped is not None:
@@ -121,18 +123,20 @@ def locate(problem: Problem, chance: Chance, finding: Finding, variance: float) 
         largest, total = chance.statistic(residuals, largest_part).T
         expected[SINGLE] = float(np.mean(largest))
         usual[SINGLE] = float(np.mean(largest / total))
-        nearly_all[SINGLE] = float(np.mean(largest >= NEARLY_ALL * total))
+        enough = (expected[SINGLE] + NEARLY_ALL * excess) / (r + excess)
+        nearly_all[SINGLE] = float(np.mean(largest >= enough * total))
     untestable = {}
     for name in GROUPS:
         if name not in groups:
             untestable[name] = _absent(name, problem.frame.hold)
         elif int(groups[name].dims.max()) == 0:
             untestable[name] = "the parameters of the model absorb all of it"
-        elif nearly_all[name] > SELDOM:
+        elif nearly_all[name] > SELDOM / len(groups):
             untestable[name] = (
-                f"with a redundancy of {r}, nearly all of any pattern could be in it by chance"
+                f"with a redundancy of {r} and residuals of this size, nearly all of any pattern "
+                "could be in it by chance"
             )
-    excess, shares = float(z @ z) / variance - r, {}
+    shares = {}
     for name, space in groups.items():
         if name not in untestable:
             part = float(space.parts(z).max()) / variance

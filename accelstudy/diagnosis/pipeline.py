@@ -34,6 +34,7 @@ from accelstudy.diagnosis.consequences import (
 from accelstudy.diagnosis.decision.posterior import weigh
 from accelstudy.diagnosis.decision.problem import Problem, fit_base, is_exact, pose
 from accelstudy.diagnosis.decision.statement import certain_of
+from accelstudy.diagnosis.decision.unrecorded import with_unrecorded
 from accelstudy.diagnosis.decision.verdict import (
     Finding,
     Named,
@@ -44,6 +45,7 @@ from accelstudy.diagnosis.decision.verdict import (
     sigma_holds,
     tests_of_noise,
     unit_variance,
+    unless_weak,
     worst_of,
 )
 from accelstudy.diagnosis.evidence.detection import SIMULATIONS, Chance, detect
@@ -144,19 +146,20 @@ def _judged(
     if is_exact(base.solution):
         reason = "the campaign is its own model: what is left are rounding errors"
         finding = Finding("no_effect", frame, reason)
-    elif detection.p_value < level:
-        weighing = weigh(problem, detection, chance)
-        finding = find(problem, weighing)
-        tests = tests_of_noise(problem, finding.frame, campaign, chance)
     else:
-        tests = tests_of_noise(problem, frame, campaign, chance)
-        worst = worst_of(tests)
-        if worst is not None:
+        if detection.p_value < level:
             weighing = weigh(problem, detection, chance)
+            finding = unless_weak(problem, detection, find(problem, weighing))
+        tests = tests_of_noise(problem, finding.frame, campaign, chance)
+        worst = worst_of(tests) if finding.verdict == "no_effect" else None
+        if worst is not None:
+            weighing = weighing or weigh(problem, detection, chance)
             finding = judge_noise(problem, weighing.posterior, worst)
 
     variance = unit_variance(problem, finding.frame)
     named = describe(problem, detection, finding, tests, campaign.positions, variance)
+    if weighing is not None:
+        finding = with_unrecorded(problem, weighing, finding)
     gap = measured_gap(finding, base.solution)
     if weighing is not None and finding.verdict in ("named", "narrowed"):
         with stage("held-out positions"):
@@ -182,6 +185,9 @@ def _judged(
             verdict=verdict,
             reason=reason,
             says_the_level=finding.says_the_level,
+            coloured=finding.coloured,
+            unrecorded=finding.unrecorded and recognised is None,
+            weak=finding.weak and recognised is None,
             credible_set=finding.credible_set,
             found=named,
             base=base.solution,

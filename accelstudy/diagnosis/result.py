@@ -51,6 +51,9 @@ class Verdict:
     verdict : str, "no_effect", "named", "narrowed", "unknown", "noise_model" or "gross_error"
     reason : str, why the verdict is what it is
     says_the_level : bool, whether the reason says how large the residuals are
+    coloured : float, probability of coloured noise that may be an effect of an absent column
+    unrecorded : bool, whether the reason says so
+    weak : bool, whether there is evidence that something is missing, too weak for a verdict
     credible_set : tuple of Explanation, most probable first; empty if nothing is missing
     found : tuple of Named
     base : Solution, of the base model with equal axes
@@ -76,6 +79,9 @@ class Verdict:
     verdict: str
     reason: str
     says_the_level: bool
+    coloured: float
+    unrecorded: bool
+    weak: bool
     credible_set: tuple[Explanation, ...]
     found: tuple[Named, ...]
     base: Solution

@@ -28,7 +28,7 @@ from accelstudy.diagnosis.evidence.hypotheses import (
     unknown_beside,
     weigh_singles,
 )
-from accelstudy.diagnosis.evidence.noise_models import colour_density
+from accelstudy.diagnosis.evidence.noise_models import colour_densities, course_density
 from accelstudy.diagnosis.evidence.noise_tests import (
     AXES,
     COLOUR,
@@ -192,6 +192,7 @@ class Weighing:
     alone : list of Weighed, one effect, one bumped position, or something unknown
     pairs : list of Weighed, two of them, or one of them beside something unknown
     noises : list of Weighed, only the noise is wrong, in one of its kinds
+    slow : float, probability that coloured noise, if it is that, lasts for some holds
     posterior : Posterior, of all of these
     """
 
@@ -201,6 +202,7 @@ class Weighing:
     alone: list[Weighed]
     pairs: list[Weighed]
     noises: list[Weighed]
+    slow: float
     posterior: Posterior
 
 
@@ -225,9 +227,9 @@ def weigh(problem: Problem, detection: Detection, chance: Chance) -> Weighing:
     if unknown is not None:
         alone.append(Weighed((UNKNOWN,), ((UNKNOWN,),), unknown + np.log(priors.UNKNOWN)))
     pairs = weigh_pairs(problem, singles, members, classes)
-    noises = _noises(problem, detection, chance)
+    noises, slow = _noises(problem, detection, chance)
     posterior = Posterior.of([*alone, *pairs, *noises])
-    return Weighing(singles, members, classes, alone, pairs, noises, posterior)
+    return Weighing(singles, members, classes, alone, pairs, noises, slow, posterior)
 
 
 def weigh_pairs(
@@ -267,8 +269,10 @@ def weigh_pairs(
     return weighed
 
 
-def _noises(problem: Problem, detection: Detection, chance: Chance) -> list[Weighed]:
-    """Weigh each kind of wrong noise, with nothing else missing."""
+def _noises(
+    problem: Problem, detection: Detection, chance: Chance
+) -> tuple[list[Weighed], float]:
+    """Weigh each kind of wrong noise, with nothing else missing; and how slow coloured noise is."""
     residuals, evidence, by_level = problem.residuals, problem.evidence, detection.noise
     nothing = float(np.logaddexp.reduce(by_level))
     assert problem.axes is not None
@@ -277,13 +281,22 @@ def _noises(problem: Problem, detection: Detection, chance: Chance) -> list[Weig
     if problem.frame.solution is not problem.base.solution:
         unequal = float(by_level[0])
     tails = tail_test(residuals.positions, chance)
+    # The kinds of coloured noise share its weight evenly; a smooth course is one of them.
+    processes, frame = colour_densities(residuals, evidence), problem.frame
+    each = priors.COLOUR / (len(processes) + 1)
+    of_course = each + (priors.UNRECORDED if problem.absent else 0.0)
+    course = np.log(of_course) + course_density(residuals, frame.hold.time, frame.forces, evidence)
+    fast, *lasting = np.log(each) + processes
+    slow = float(np.logaddexp.reduce([*lasting, course]))
     logs = {
-        COLOUR: np.log(priors.COLOUR) + colour_density(residuals, evidence),
         AXES: unequal,
         TAILS: nothing + np.log(priors.TAILS) + most_evidence(tails.p_value),
     }
-    if len(by_level) > 1:
+    if len(by_level) > 1 and evidence.level.known:
+        logs[LEVEL] = by_level[1]
+    elif len(by_level) > 1:
         # More noise than within the holds is an offset from hold to hold.
-        name = LEVEL if evidence.level.known else COLOUR
-        logs[name] = np.logaddexp(logs.get(name, -np.inf), by_level[1])
-    return [Weighed((name,), ((name,),), float(log)) for name, log in logs.items()]
+        fast = np.logaddexp(fast, by_level[1])
+    logs[COLOUR] = np.logaddexp(slow, fast)
+    weighed = [Weighed((name,), ((name,),), float(log)) for name, log in logs.items()]
+    return weighed, float(np.exp(slow - logs[COLOUR]))

@@ -114,6 +114,11 @@ class Problem:
         """Those of the fit."""
         return self.examined.frame.residuals
 
+    @property
+    def absent(self) -> tuple[str, ...]:
+        """Columns that would tell what changes slowly, and that the campaign lacks."""
+        return tuple(n for n in ("temperature", "time") if getattr(self.frame.hold, n) is None)
+
 
 def pose(base: BaseFit) -> Problem:
     """Set all that the model of a fit may lack side by side.

@@ -16,6 +16,7 @@ from itertools import combinations, product
 from accelstudy.campaign.gross_errors import get_gross_error, gross_error_names
 from accelstudy.diagnosis.decision.posterior import CREDIBLE, Explanation
 from accelstudy.diagnosis.decision.priors import MANY, SURE
+from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.space.examined import ExaminedFit
 from accelstudy.diagnosis.space.hypotheses import cosines
 from accelstudy.effects import effect_names, get_effect
@@ -78,6 +79,11 @@ class Part:
     names: tuple[Name, ...]
     posterior: float
     purity: float | None = None
+
+    @property
+    def is_effect(self) -> bool:
+        """Whether it is an effect or a gross error: no noise, and nothing unknown."""
+        return self.family != "noise" and self.names[0].name != UNKNOWN
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from scipy import special
 
 from accelstudy.adjustment.quality import Solution
 from accelstudy.basics.levels import REFUTED
-from accelstudy.basics.wording import comma_list, words
+from accelstudy.basics.wording import comma_list, p_value, words
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision import priors
 from accelstudy.diagnosis.decision.posterior import (
@@ -24,6 +24,7 @@ from accelstudy.diagnosis.decision.posterior import (
 )
 from accelstudy.diagnosis.decision.problem import Problem, pose
 from accelstudy.diagnosis.decision.refits import best_refit
+from accelstudy.diagnosis.decision.statement import statement
 from accelstudy.diagnosis.evidence.detection import Chance, Detection
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.hypotheses import equivalents, strongest, weigh_singles
@@ -86,6 +87,9 @@ class Finding:
     chosen : tuple of Choice
     posterior : Posterior or None, where something is missing
     says_the_level : bool, whether the reason says how large the residuals are
+    coloured : float, probability of coloured noise that may be an effect of an absent column
+    unrecorded : bool, whether the reason says so
+    weak : bool, whether there is evidence that something is missing, too weak for a verdict
     """
 
     verdict: str
@@ -94,6 +98,9 @@ class Finding:
     chosen: tuple[Choice, ...] = ()
     posterior: Posterior | None = None
     says_the_level: bool = False
+    coloured: float = 0.0
+    unrecorded: bool = False
+    weak: bool = False
 
     @property
     def credible_set(self) -> tuple[Explanation, ...]:
@@ -197,6 +204,25 @@ def _without_a_fit(problem: Problem, posterior: Posterior) -> Finding:
             f"{second} with {posterior.explanations[1].posterior:.2f}"
         )
     return Finding("unknown", problem.frame, reason, posterior=posterior)
+
+
+def unless_weak(problem: Problem, detection: Detection, finding: Finding) -> Finding:
+    """Take back that something is missing, where the calibration is right to accept its fit.
+
+    The evidence for something is wider than the test of the calibration, and its level less strict.
+    What it finds beyond that level counts if something of it has a name, or is certain.
+    """
+    test = level_test(Residuals.of(problem.base.solution))
+    refuted_sigma = problem.evidence.level.known and test.p_value < REFUTED
+    if finding.verdict != "unknown" or detection.p_value < REFUTED or refuted_sigma:
+        return finding
+    if any(part.is_effect for part in statement(finding.credible_set).certain):
+        return finding
+    reason = (
+        f"the evidence that something is missing is weak ({p_value(detection.p_value)}), and "
+        f"nothing of it is certain; more positions, and repeats of these, would show it"
+    )
+    return Finding("no_effect", problem.frame, reason, weak=True)
 
 
 def _explained(names: Sequence[str]) -> str:
@@ -434,7 +460,11 @@ def describe(
         worst, posterior = worst_of(tests), finding.posterior
         assert posterior is not None
         top = next(e.names[0] for e in posterior.explanations if e.names[0] in NOISES)
-        name = top if worst is None else worst.name
+        # Of larger residuals the level says least; what they are, the evidence says.
+        if worst is None or (worst.name == LEVEL and posterior.of_noise >= priors.SURE):
+            name = top
+        else:
+            name = worst.name
         p = detection.p_value if worst is None else worst.p_value
         return (Named(name, name, (name,), p, posterior.of_noise),)
     solution = finding.frame.solution

@@ -6,6 +6,7 @@ import math
 from collections import defaultdict
 from collections.abc import Sequence
 
+from accelstudy.basics.levels import ACCEPTED, UNCHECKED
 from accelstudy.basics.wording import comma_list, probability, words
 from accelstudy.diagnosis.decision.posterior import CREDIBLE, Explanation
 from accelstudy.diagnosis.decision.priors import SURE
@@ -21,7 +22,7 @@ from accelstudy.diagnosis.decision.statement import (
 from accelstudy.diagnosis.decision.verdict import Named
 from accelstudy.diagnosis.next_positions import NextPosition
 from accelstudy.diagnosis.result import Diagnosis
-from accelstudy.diagnosis.space.groups import REPEAT
+from accelstudy.diagnosis.space.groups import COURSES, REPEAT
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.pages import lines
 from accelstudy.sensors.plausibility import USUAL_CAUSE
@@ -66,6 +67,8 @@ def too_few(diagnosis: Diagnosis) -> bool:
 def headline(diagnosis: Diagnosis) -> str:
     """Say the verdict in one sentence."""
     d, kind = diagnosis, diagnosis.verdict
+    if d.unrecorded or d.weak:
+        return sentence(d.reason.split("; ")[0])
     if kind == "unknown":
         return without_a_name(d.credible_set)
     if kind == "narrowed":
@@ -76,17 +79,35 @@ def headline(diagnosis: Diagnosis) -> str:
         names = comma_list([_title(f, {named.name for named in found}) for f in found])
     if too_few(d):
         kind = "too few"
-    elif _may_be_an_effect(d):
+    elif may_be_an_effect(d):
         kind = "noise or effect"
     return lines(TEMPLATE, "headline", kind, names)[0]
 
 
-def _may_be_an_effect(diagnosis: Diagnosis) -> bool:
+def badge(diagnosis: Diagnosis) -> str:
+    """Name the badge of a page: the verdict or, where there is none, the state of a calibration."""
+    if not diagnosis.weak:
+        return UNCHECKED if too_few(diagnosis) else diagnosis.verdict
+    test = diagnosis.global_test
+    return UNCHECKED if test is None or test.powerless else ACCEPTED
+
+
+def may_be_an_effect(diagnosis: Diagnosis) -> bool:
     """Whether a test of the noise fails, and yet it is not sure that only the noise is wrong."""
-    if diagnosis.verdict != "noise_model":
-        return False
-    posterior = diagnosis.found[0].posterior
-    return posterior is not None and posterior < SURE
+    return diagnosis.verdict == "noise_model" and _noise_only(diagnosis) < SURE
+
+
+def _noise_only(diagnosis: Diagnosis) -> float:
+    """Probability that only the noise is wrong, and that nothing unrecorded makes it so."""
+    return (diagnosis.found[0].posterior or 0.0) - diagnosis.coloured
+
+
+def _reasons(diagnosis: Diagnosis) -> list[str]:
+    """Clauses of the reason that the headline does not say."""
+    d = diagnosis
+    if d.unrecorded or d.weak:
+        return d.reason.split("; ")[1:]
+    return [d.reason] if d.reason else []
 
 
 def _title(named: Named, titled: set[str]) -> str:
@@ -105,8 +126,8 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
         "headline": headline(d),
         "not_told_apart": not_told_apart(d.credible_set),
         "explanation": explanation_words(d.credible_set[0]) if d.credible_set else "",
-        "reason": sentence(d.reason) if d.reason else "",
-        "noise_only": d.found[0].posterior if _may_be_an_effect(d) else None,
+        "reasons": [sentence(part) for part in _reasons(d)],
+        "noise_only": _noise_only(d) if may_be_an_effect(d) and not d.unrecorded else None,
         "usual_cause": USUAL_CAUSE,
         "residuals_over_noise": _residuals_over_noise(d),
         "weights": _weights(d),
@@ -114,7 +135,12 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
         "most_probable": most_probable(d.credible_set),
         "like": like(d),
         "location": _location(d),
-        "effects": [(f, get_effect(f.spec).equation) for f in d.found if _is_effect(f)],
+        "effects": [
+            (f, effect.equation, effect.group in COURSES)
+            for f in d.found
+            if _is_effect(f)
+            for effect in [get_effect(f.spec)]
+        ],
         "positions": bumped,
         "changed": changed(d),
         "keep_base": keep_base(d),
@@ -178,10 +204,11 @@ def _weights(d: Diagnosis) -> list[float]:
     return (variances / variances.mean()).tolist()
 
 
-def _location(d: Diagnosis) -> list[tuple[str, float]]:
-    """Groups with the largest shares of the excess, in words, and these shares."""
+def _location(d: Diagnosis) -> list[tuple[str, float, float]]:
+    """Groups with the largest shares of the excess, in words, these shares, and those by chance."""
     ranked = sorted(d.location.items(), key=lambda item: -item[1])[:3]
-    return [(GROUPS.get(name, words(name)), share) for name, share in ranked if share > 0]
+    chance = d.location_by_chance
+    return [(GROUPS.get(n, words(n)), share, chance[n]) for n, share in ranked if share > 0]
 
 
 def like(diagnosis: Diagnosis) -> str:
@@ -251,7 +278,7 @@ def missing(credible_set: Sequence[Explanation]) -> str:
 def without_a_name(credible_set: Sequence[Explanation]) -> str:
     """Say in a sentence what is certain of something that has no name as a whole."""
     set_says = statement(credible_set)
-    parts = comma_list([_part(part) for part in set_says.certain if _part_is_effect(part)])
+    parts = comma_list([_part(part) for part in set_says.certain if part.is_effect])
     if not parts:
         return "Something is missing from the model, and it has no name here."
     if refuted(credible_set):
@@ -357,7 +384,3 @@ def _if_it_is_an_effect(effects: Sequence[Explanation]) -> Statement:
 def _surely_more(set_says: Statement, probability: float) -> bool:
     """Whether something is missing beside what is certain."""
     return sum(one.posterior for one in set_says.open if one.names) >= probability
-
-
-def _part_is_effect(part: Part) -> bool:
-    return part.family != "noise" and part.names[0].name not in NOT_AN_EFFECT
