@@ -9,8 +9,8 @@ from accelstudy.effects.base import Effect, per_axis, register
 FIRST = 0.25
 """Part of a stated range up to which a sensor certainly does not saturate."""
 ROUND = 0.005
-"""m/s² on either side of the knee over which it is round, as the noise of the samples of a hold makes
-that of their mean. An adjustment may not settle at a sharp corner."""
+"""m/s² on either side of the knee over which it is round, as the noise of its samples makes that of
+a mean. At a sharp corner an adjustment may not settle."""
 
 
 @register

@@ -48,7 +48,7 @@ def symbols(*names: str) -> tuple[sp.Symbol, ...]:
 def derivative(expressions: Sequence[Any], variables: Sequence[sp.Symbol]) -> sp.Matrix:
     """Jacobian matrix; the derivative of a step is zero, as it is almost everywhere."""
     matrix = sp.Matrix(list(expressions)).jacobian(list(variables))
-    # Of a step of something that SymPy does not know to be finite it leaves the derivative as it is.
+    # SymPy leaves that of a step as it is if it does not know what steps to be finite.
     of_step = matrix.atoms(sp.Derivative)
     assert all(isinstance(left.expr, sp.sign) for left in of_step)
     matrix = matrix.xreplace(dict.fromkeys(of_step, sp.S.Zero))
