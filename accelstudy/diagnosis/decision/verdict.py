@@ -12,7 +12,7 @@ from scipy import special
 
 from accelstudy.adjustment.quality import Solution
 from accelstudy.basics.levels import REFUTED
-from accelstudy.basics.wording import comma_list, words
+from accelstudy.basics.wording import comma_list, grouped
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision import priors
 from accelstudy.diagnosis.decision.posterior import (
@@ -24,6 +24,7 @@ from accelstudy.diagnosis.decision.posterior import (
 )
 from accelstudy.diagnosis.decision.problem import Problem, pose
 from accelstudy.diagnosis.decision.refits import best_refit
+from accelstudy.diagnosis.evidence.bounds import within_bounds
 from accelstudy.diagnosis.evidence.detection import Chance, Detection
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.hypotheses import equivalents, strongest, weigh_singles
@@ -145,8 +146,7 @@ def find(problem: Problem, weighing: Weighing) -> Finding:
     best, solution = fit
     left = _misfit(problem, solution)
     if left:
-        added = comma_list([words(name) for name in top.names])
-        reason = f"with {added} added, the residuals are still {left}"
+        reason = f"with {comma_list(grouped(top.names))} added, the residuals are still {left}"
         return Finding("unknown", problem.frame, reason, posterior=posterior)
     return _with_a_fit(problem, posterior, best, solution)
 
@@ -191,7 +191,7 @@ def _without_a_fit(problem: Problem, posterior: Posterior) -> Finding:
     if UNKNOWN in first.names:
         reason = "no effect or pair of effects of the catalogue explains it"
     else:
-        second = comma_list([words(name) for name in posterior.explanations[1].names])
+        second = comma_list(grouped(posterior.explanations[1].names))
         reason = (
             f"{_explained(first.names)} it with a probability of {first.posterior:.2f} only, and "
             f"{second} with {posterior.explanations[1].posterior:.2f}"
@@ -200,8 +200,8 @@ def _without_a_fit(problem: Problem, posterior: Posterior) -> Finding:
 
 
 def _explained(names: Sequence[str]) -> str:
-    """One or two names with the verb that belongs to them."""
-    return f"{comma_list([words(name) for name in names])} explain{'s' if len(names) == 1 else ''}"
+    """Names with the verb that belongs to them."""
+    return f"{comma_list(grouped(names))} explain{'s' if len(names) == 1 else ''}"
 
 
 def _is_large(problem: Problem, top: Weighed) -> bool:
@@ -211,13 +211,15 @@ def _is_large(problem: Problem, top: Weighed) -> bool:
 
 
 def _judged_by_refits(problem: Problem, weighing: Weighing, single: Weighed) -> Posterior:
-    """Posterior where an effect is large: it alone, or with another one in what its refit leaves.
+    """Posterior where an effect is large: it alone, or with more in what its refit leaves.
 
     To first order a large effect leaves so much that anything would seem to be beside it.
     """
-    pairs = [one for one in weighing.pairs if len(one.best) == 2]
-    strongest_pair = sorted(pairs, key=lambda one: one.log_weight)[-1:]
-    refitted = [_refitted(problem, weighing, one) for one in (single, *strongest_pair)]
+    tried = [single]
+    for count in (2, 3):
+        together = [one for one in weighing.pairs if len(one.best) == count]
+        tried += sorted(together, key=lambda one: one.log_weight)[-1:]
+    refitted = [_refitted(problem, weighing, one) for one in tried]
     weighed = [one for one, _ in refitted]
     alone, solution = refitted[0]
     if solution is not None:
@@ -270,7 +272,8 @@ def _beside(problem: Problem, count: int, alone: Weighed, solution: Solution) ->
             continue
         other = strongest(inner.examined.candidates[name], z)
         both = (*alone.classes, members[name])
-        weight = log + float(np.log(priors.TWO / k))
+        within = float(within_bounds((other,), z, inner.evidence)[0])
+        weight = log + within + float(np.log(priors.TWO / k))
         weighed.append(Weighed((*alone.names, name), both, weight, (*alone.best, other)))
     return weighed
 
@@ -374,14 +377,14 @@ def unit_variance(problem: Problem, frame: Frame) -> float:
 def worst_of(tests: Sequence[NoiseTest]) -> NoiseTest | None:
     """Return what is wrong with the noise, the most specific finding first."""
     level = next((t for t in tests if t.name == LEVEL), None)
-    counted = [
+    grouped = [
         t
         for t in tests
         # A sigma that the residuals confirm knows of what varies from hold to hold.
         if not (t.by_holds and level is not None and level.p_value >= REFUTED)
     ]
-    others = LEVEL_NOISE / max(len(counted) - (level is not None), 1)
-    failed = [t for t in counted if t.p_value < (REFUTED if t is level else others)]
+    others = LEVEL_NOISE / max(len(grouped) - (level is not None), 1)
+    failed = [t for t in grouped if t.p_value < (REFUTED if t is level else others)]
     return min(failed, key=lambda t: SPECIFIC.index(t.name), default=None)
 
 

@@ -154,7 +154,7 @@ class Frame:
         for i in np.flatnonzero(rank < seen):
             directions[i] = directions[i] @ also[i]
             ideal[i] = spans((projected[i] @ directions[i])[None], None, ROUNDING)[1][0]
-        return [
+        found = [
             Hypothesis(
                 name=effect.name,
                 effect=effect,
@@ -166,6 +166,21 @@ class Frame:
             else None
             for i, effect in enumerate(shapes)
         ]
+        if not np.isfinite(shapes[0].bounds).any():
+            return found
+        return [
+            None if one is None else replace(one, estimates=_estimates(one, columns[i]))
+            for i, one in enumerate(found)
+        ]
+
+
+def _estimates(hypothesis: Hypothesis, columns: Array) -> Array:
+    """Turn products of a basis with residuals into parameters; columns (m, k) of all of these."""
+    assert hypothesis.effect is not None
+    assert hypothesis.shown is not None
+    shown = hypothesis.shown.parameters
+    kept = [i for i, q in enumerate(hypothesis.effect.parameters) if q in shown]
+    return np.asarray(np.linalg.inv(hypothesis.basis.T @ columns[:, kept]))
 
 
 def implied_hold(solution: Solution, angles: Array) -> HoldConditions:
