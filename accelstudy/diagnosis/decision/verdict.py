@@ -377,14 +377,14 @@ def unit_variance(problem: Problem, frame: Frame) -> float:
 def worst_of(tests: Sequence[NoiseTest]) -> NoiseTest | None:
     """Return what is wrong with the noise, the most specific finding first."""
     level = next((t for t in tests if t.name == LEVEL), None)
-    grouped = [
+    counted = [
         t
         for t in tests
         # A sigma that the residuals confirm knows of what varies from hold to hold.
         if not (t.by_holds and level is not None and level.p_value >= REFUTED)
     ]
-    others = LEVEL_NOISE / max(len(grouped) - (level is not None), 1)
-    failed = [t for t in grouped if t.p_value < (REFUTED if t is level else others)]
+    others = LEVEL_NOISE / max(len(counted) - (level is not None), 1)
+    failed = [t for t in counted if t.p_value < (REFUTED if t is level else others)]
     return min(failed, key=lambda t: SPECIFIC.index(t.name), default=None)
 
 
