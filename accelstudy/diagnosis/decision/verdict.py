@@ -23,7 +23,7 @@ from accelstudy.diagnosis.decision.posterior import (
     of_effects,
 )
 from accelstudy.diagnosis.decision.problem import Problem, pose
-from accelstudy.diagnosis.decision.refits import best_refit
+from accelstudy.diagnosis.decision.refits import best_refit, with_settings
 from accelstudy.diagnosis.evidence.bounds import within_bounds
 from accelstudy.diagnosis.evidence.detection import Chance, Detection
 from accelstudy.diagnosis.evidence.field import UNKNOWN
@@ -47,6 +47,7 @@ from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.groups import LACK_OF_FIT, LackOfFit, clusters
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis, Spaces
 from accelstudy.diagnosis.space.residuals import Residuals
+from accelstudy.sensors.plausibility import impossible_parameters
 
 LARGE = 300.0
 """Noncentrality beyond which first order is not enough, and a refit judges an effect."""
@@ -115,6 +116,7 @@ class Named:
     rivals : tuple of (name, cosine)
     imitators : tuple of str, further names that could leave the same, and more
     parameters : tuple of (name, value, sigma, unit), SI
+    settings : tuple of the same, of those that were searched for
     position : int, of a bumped position
     """
 
@@ -126,6 +128,7 @@ class Named:
     rivals: tuple[tuple[str, float], ...] = ()
     imitators: tuple[str, ...] = ()
     parameters: tuple[tuple[str, float, float | None, str], ...] = ()
+    settings: tuple[tuple[str, float, float | None, str], ...] = ()
     position: int | None = None
 
 
@@ -148,7 +151,18 @@ def find(problem: Problem, weighing: Weighing) -> Finding:
     if left:
         reason = f"with {comma_list(grouped(top.names))} added, the residuals are still {left}"
         return Finding("unknown", problem.frame, reason, posterior=posterior)
+    if impossible := _impossible(solution):
+        reason = f"with {comma_list(grouped(top.names))} added, no sensor has {impossible}"
+        return Finding("unknown", problem.frame, reason, posterior=posterior)
     return _with_a_fit(problem, posterior, best, solution)
+
+
+def _impossible(solution: Solution) -> str:
+    """Parameters that are beyond their physical bounds; empty if none is."""
+    sigma = np.sqrt(np.diag(solution.cofactors) * max(1.0, solution.omega / solution.redundancy))
+    u = solution.model.n_parameters
+    effects = solution.model.effects
+    return comma_list(impossible_parameters(effects, solution.parameters[:u], sigma[:u]))
 
 
 def _with_a_fit(
@@ -441,8 +455,11 @@ def describe(
         p = detection.p_value if worst is None else worst.p_value
         return (Named(name, name, (name,), p, posterior.of_noise),)
     solution = finding.frame.solution
-    sigma = np.sqrt(np.diag(solution.cofactors) * variance)
+    hypotheses = [choice.best for choice in finding.chosen]
+    cofactors = with_settings(problem.examined, solution, hypotheses)
+    sigma = np.sqrt(np.diag(cofactors) * variance)
     columns = {name: i for i, name in enumerate(solution.model.parameter_names)}
+    of_settings = iter(sigma[len(solution.parameters) :].tolist())
     named = []
     for choice in finding.chosen:
         best, p = choice.best, detection.p_family[choice.best.name]
@@ -454,6 +471,7 @@ def describe(
         assert best.shown is not None
         places = [(q, columns[q.name]) for q in best.shown.parameters]
         examined, members = problem.examined, choice.members
+        searched = [s for s in best.effect.takes if s.name == best.smooth]
         named.append(
             Named(
                 name=best.name,
@@ -470,6 +488,10 @@ def describe(
                 parameters=tuple(
                     (q.name, float(solution.parameters[i]), float(sigma[i]), q.unit)
                     for q, i in places
+                ),
+                settings=tuple(
+                    (s.name, best.value, best.value * of_log, s.unit)
+                    for s, of_log in zip(searched, of_settings, strict=False)
                 ),
             )
         )
