@@ -141,6 +141,10 @@ class Effect(WithSettings):
         """Shapes of the effect, that is, settings to try, for given holds with forces f (n, 3)."""
         return (self,)
 
+    def possible(self, hold: HoldConditions) -> bool:
+        """Whether its settings can be, as far as the holds tell."""
+        return True
+
     def between(self, other: Effect, hold: HoldConditions) -> Sequence[Effect]:
         """Shapes between two candidates, which were skipped because there are many positions."""
         return ()

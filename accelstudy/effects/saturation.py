@@ -46,7 +46,10 @@ class Saturation(Effect):
         """Return knees that some, but not most, of the forces exceed, within a stated range."""
         parts = (*np.arange(0.5, 0.96, 0.05), 0.97, 0.98, 0.99)
         knees = (float(f"{part * g:.4g}") for part in parts)
-        full = hold.full_range
-        return tuple(
-            Saturation(knee=knee) for knee in knees if full is None or FIRST * full <= knee <= full
-        )
+        tried = (Saturation(knee=knee) for knee in knees)
+        return tuple(effect for effect in tried if effect.possible(hold))
+
+    def possible(self, hold):
+        """Return whether the knee is within a stated range, and not far within it."""
+        full, knee = hold.full_range, self.settings["knee"]
+        return full is None or FIRST * full <= knee <= full

@@ -168,12 +168,18 @@ def shaped(examined: ExaminedFit, hypothesis: Hypothesis, value: float) -> Hypot
 def _all_shaped(
     examined: ExaminedFit, hypothesis: Hypothesis, values: Iterable[float]
 ) -> list[Hypothesis | None]:
-    """Return one hypothesis per value of the smooth setting; None where less of it shows."""
+    """Return one hypothesis per value of the smooth setting; None where less of it shows.
+
+    None stands for settings that cannot be, too.
+    """
     assert hypothesis.effect is not None
     assert hypothesis.smooth is not None
     kind, name = type(hypothesis.effect), hypothesis.smooth
-    tried = examined.frame.hypotheses([kind(**{name: float(f"{v:.6g}")}) for v in values])
-    return [h if h is not None and h.dim == hypothesis.dim else None for h in tried]
+    shapes, hold = [kind(**{name: float(f"{v:.6g}")}) for v in values], examined.frame.hold
+    return [
+        h if h is not None and h.dim == hypothesis.dim and shape.possible(hold) else None
+        for h, shape in zip(examined.frame.hypotheses(shapes), shapes, strict=True)
+    ]
 
 
 def _completed(examined: ExaminedFit, shapes: EffectShapes) -> EffectShapes:
