@@ -140,8 +140,8 @@ def _sharpened(examined: ExaminedFit, chosen: Sequence[Hypothesis]) -> list[Hypo
         from scipy.optimize import minimize_scalar  # slow to import, and seldom needed
 
         values = [h.value for h in examined.candidates[start.name]]
-        low = max((v for v in values if v < start.value), default=start.value / BEYOND)
-        high = min((v for v in values if v > start.value), default=start.value * BEYOND)
+        outside = {min(values) / BEYOND, max(values) * BEYOND}
+        ends = (*outside, *values)
 
         def omega(log: float, k: int = k, start: Hypothesis = start) -> float:
             trial = shaped(examined, start, float(np.exp(log)))
@@ -150,9 +150,19 @@ def _sharpened(examined: ExaminedFit, chosen: Sequence[Hypothesis]) -> list[Hypo
             fit = refit(base, [*sharp[:k], trial, *sharp[k + 1 :]])
             return base.omega if fit is None else fit.omega
 
-        least = minimize_scalar(
-            omega, bounds=np.log([low, high]), method="bounded", options={"xatol": 1e-4}
-        )
+        at = start.value
+        while True:
+            low = max((v for v in ends if v < at), default=at)
+            high = min((v for v in ends if v > at), default=at)
+            least = minimize_scalar(
+                omega, bounds=np.log([low, high]), method="bounded", options={"xatol": 1e-4}
+            )
+            # To first order the least may seem to be a little to one side.
+            beside = {v: omega(float(np.log(v))) for v in (low, high) if v not in outside}
+            at = min(beside, key=beside.__getitem__, default=at)
+            outside |= {low, high}
+            if not beside or beside[at] >= least.fun:
+                break
         best = shaped(examined, start, float(np.exp(least.x)))
         if best is not None and least.fun < omega(float(np.log(start.value))):
             sharp[k] = best
