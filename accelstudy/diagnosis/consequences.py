@@ -39,7 +39,6 @@ from accelstudy.diagnosis.space.groups import LACK_OF_FIT, REPEAT, ROBOT, all_gr
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.shapes import Place
-from accelstudy.diagnosis.space.signatures import signature
 from accelstudy.diagnosis.visibility import UpperLimit, upper_limits
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import angles_of, tilt_slope, wrapped
@@ -270,7 +269,7 @@ def parameter_changes(problem: Problem, finding: Finding, variance: float) -> tu
         return ()
     base, final, frame = problem.base.solution, finding.frame.solution, problem.frame
     u, residuals = base.model.n_parameters, Residuals.of(base)
-    shown = [signature(e, frame.sensed, frame.angles, base.gravity, frame.hold) for e in effects]
+    shown = [frame.signature(effect) for effect in effects]
     rows = np.concatenate([residuals.whitened(one) for one in shown], axis=1)
     shift = np.linalg.lstsq(base.design, rows, rcond=None)[0][:u]
     added = slice(u, u + rows.shape[1])

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import permutations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -159,10 +160,10 @@ def _chosen_alike(
 ) -> tuple[Sequence[Choice], bool]:
     """Explanation of the credible set that a part chooses, and whether it would choose another."""
     chosen, credible = finding.chosen, finding.credible_set
-    if len(chosen) == 2:
+    if len(chosen) > 1:
         members = equivalents(part.examined, singles)
         pairs = weigh_pairs(part, singles, members, classes_of(singles, members))
-        pairs = [one for one in pairs if len(one.best) == 2]
+        pairs = [one for one in pairs if len(one.best) == len(chosen)]
         best = max(pairs, key=lambda one: one.log_weight, default=None)
         same = [one for one in credible if best and _same(one.classes, best.names)]
         if best is None or not same:
@@ -183,11 +184,11 @@ def _chosen_alike(
 
 
 def _same(classes: Sequence[Sequence[str]], names: Sequence[str]) -> bool:
-    """Whether two names are of two classes, in either order."""
-    if len(classes) != 2:
-        return False
-    (one, other), (a, b) = classes, names
-    return (a in one and b in other) or (b in one and a in other)
+    """Whether names are each of another one of some classes."""
+    return len(classes) == len(names) and any(
+        all(name in alike for name, alike in zip(order, classes, strict=True))
+        for order in permutations(names)
+    )
 
 
 def _refit(part: Problem, singles: Singles, chosen: Sequence[Choice]) -> Solution | str:

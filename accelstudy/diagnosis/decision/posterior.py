@@ -49,11 +49,11 @@ FIRST = 3
 
 @dataclass(frozen=True)
 class Explanation:
-    """One thing that is missing, or two together.
+    """One thing that is missing, or two together, or three of which two are bumped positions.
 
     Attributes
     ----------
-    names : tuple of str, one or two: effects, or a noise effect, "outlier_position" or "unknown"
+    names : tuple of str, one to three: effects, or a noise effect, "outlier_position" or "unknown"
     classes : tuple of tuple of str, the names that mean the same in this campaign, for each name
     posterior : float, probability given that something is missing
     """
@@ -79,7 +79,7 @@ class Weighed:
 
     Attributes
     ----------
-    names : tuple of str, one or two
+    names : tuple of str, one to three
     classes : tuple of tuple of str, the names that mean the same, for each
     log_weight : float, log of density times prior weight
     best : tuple of Hypothesis, shapes that explain most; empty for noise and for the unknown
@@ -123,15 +123,15 @@ class Posterior:
         single = {
             one.classes[0]: i for i, one in enumerate(self.all) if len(one.names) == 1 and one.best
         }
-        pairs = [i for i, one in enumerate(self.all) if len(one.names) == 2]
+        more = [i for i, one in enumerate(self.all) if len(one.names) > 1]
         p = self.probabilities
-        alone = sum(p[i] for i in single.values()) > sum(p[i] for i in pairs)
+        alone = sum(p[i] for i in single.values()) > sum(p[i] for i in more)
         counted = {i: float(one.log_weight) for i, one in enumerate(self.all)}
         for i, one in enumerate(self.all):
             into = None
             if one.names[0] in NOISES:
                 into = noise
-            elif len(one.names) == 2 and alone:
+            elif len(one.names) > 1 and alone:
                 into = min((single[c] for c in one.classes if c in single), default=None)
             if into is not None and into < i:
                 counted[into] = float(np.logaddexp(counted[into], counted.pop(i)))
@@ -190,7 +190,8 @@ class Weighing:
     members : dict of candidate to the names that mean the same
     classes : list of Class, candidates that mean the same together, strongest evidence first
     alone : list of Weighed, one effect, one bumped position, or something unknown
-    pairs : list of Weighed, two of them, or one of them beside something unknown
+    pairs : list of Weighed, two of them or with bumped positions three, or one of them beside
+        something unknown
     noises : list of Weighed, only the noise is wrong, in one of its kinds
     slow : float, probability that coloured noise, if it is that, lasts for some holds
     posterior : Posterior, of all of these
@@ -238,7 +239,9 @@ def weigh_pairs(
     members: Mapping[str, tuple[str, ...]],
     classes: Sequence[Class],
 ) -> list[Weighed]:
-    """Weigh two candidates together, and each of the strongest beside something unknown.
+    """Weigh candidates together, and each of the strongest beside something unknown.
+
+    Where one position was bumped, a further one is as probable as two effects rather than one.
 
     Parameters
     ----------
@@ -252,20 +255,21 @@ def weigh_pairs(
     called = {name: best.name for best, names in classes for name in names}
     residuals, evidence, densities = problem.residuals, problem.evidence, singles.densities
     weighed = []
-    for pair in all_pairs(singles.shapes, residuals, evidence):
-        one, other = sorted(pair.best, key=lambda h: -densities[h.name])
-        both = (members[one.name], members[other.name])
-        if both[0] != both[1] or one.effect is None:
-            names = tuple(called.get(h.name, h.name) for h in (one, other))
-            weighed.append(Weighed(names, both, pair.log_density + each, (one, other)))
+    for together in all_pairs(singles.shapes, residuals, evidence):
+        best = tuple(sorted(together.best, key=lambda h: -densities[h.name]))
+        alike = tuple(members[h.name] for h in best)
+        if len(best) > 2 or alike[0] != alike[1] or best[0].effect is None:
+            names = tuple(called.get(h.name, h.name) for h in best)
+            weight = together.log_density + each + (len(best) - 2) * np.log(priors.TWO)
+            weighed.append(Weighed(names, alike, weight, best))
     unknown = problem.field.unknown
-    for best, alike in classes[:FIRST] if unknown else ():
+    for first, same in classes[:FIRST] if unknown else ():
         assert unknown is not None
-        beside = unknown_beside(best, unknown, residuals, evidence)
+        beside = unknown_beside(first, unknown, residuals, evidence)
         if beside is not None:
-            total = densities[best.name] + beside - np.log(k)
+            total = densities[first.name] + beside - np.log(k)
             prior = np.log(priors.TWO * priors.UNKNOWN)
-            weighed.append(Weighed((best.name, UNKNOWN), (alike, (UNKNOWN,)), total + prior))
+            weighed.append(Weighed((first.name, UNKNOWN), (same, (UNKNOWN,)), total + prior))
     return weighed
 
 

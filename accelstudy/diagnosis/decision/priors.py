@@ -5,7 +5,8 @@ bumped position share it evenly. The probability that a given sigma is wrong is 
 """
 
 TWO = 0.15
-"""Two effects are missing: of the models that lack something one in eight lacks more."""
+"""Two effects are missing: of the models that lack something one in eight lacks more. Likewise
+another bumped position, where one was bumped."""
 UNKNOWN = 0.1
 """Something is missing that is not in the catalogue, which has the usual effects."""
 COLOUR = 0.06

@@ -12,7 +12,7 @@ from scipy import special
 
 from accelstudy.adjustment.quality import Solution
 from accelstudy.basics.levels import REFUTED
-from accelstudy.basics.wording import comma_list, p_value, words
+from accelstudy.basics.wording import comma_list, grouped, p_value
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision import priors
 from accelstudy.diagnosis.decision.posterior import (
@@ -23,8 +23,9 @@ from accelstudy.diagnosis.decision.posterior import (
     of_effects,
 )
 from accelstudy.diagnosis.decision.problem import Problem, pose
-from accelstudy.diagnosis.decision.refits import best_refit
+from accelstudy.diagnosis.decision.refits import best_refit, with_settings
 from accelstudy.diagnosis.decision.statement import statement
+from accelstudy.diagnosis.evidence.bounds import within_bounds
 from accelstudy.diagnosis.evidence.detection import Chance, Detection
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.hypotheses import equivalents, strongest, weigh_singles
@@ -47,6 +48,7 @@ from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.groups import LACK_OF_FIT, LackOfFit, clusters
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis, Spaces
 from accelstudy.diagnosis.space.residuals import Residuals
+from accelstudy.sensors.plausibility import impossible_parameters
 
 LARGE = 300.0
 """Noncentrality beyond which first order is not enough, and a refit judges an effect."""
@@ -121,6 +123,7 @@ class Named:
     rivals : tuple of (name, cosine)
     imitators : tuple of str, further names that could leave the same, and more
     parameters : tuple of (name, value, sigma, unit), SI
+    settings : tuple of the same, of those that were searched for
     position : int, of a bumped position
     """
 
@@ -132,6 +135,7 @@ class Named:
     rivals: tuple[tuple[str, float], ...] = ()
     imitators: tuple[str, ...] = ()
     parameters: tuple[tuple[str, float, float | None, str], ...] = ()
+    settings: tuple[tuple[str, float, float | None, str], ...] = ()
     position: int | None = None
 
 
@@ -152,10 +156,20 @@ def find(problem: Problem, weighing: Weighing) -> Finding:
     best, solution = fit
     left = _misfit(problem, solution)
     if left:
-        added = comma_list([words(name) for name in top.names])
-        reason = f"with {added} added, the residuals are still {left}"
+        reason = f"with {comma_list(grouped(top.names))} added, the residuals are still {left}"
+        return Finding("unknown", problem.frame, reason, posterior=posterior)
+    if impossible := _impossible(solution):
+        reason = f"with {comma_list(grouped(top.names))} added, no sensor has {impossible}"
         return Finding("unknown", problem.frame, reason, posterior=posterior)
     return _with_a_fit(problem, posterior, best, solution)
+
+
+def _impossible(solution: Solution) -> str:
+    """Parameters that are beyond their physical bounds; empty if none is."""
+    sigma = np.sqrt(np.diag(solution.cofactors) * max(1.0, solution.omega / solution.redundancy))
+    u = solution.model.n_parameters
+    effects = solution.model.effects
+    return comma_list(impossible_parameters(effects, solution.parameters[:u], sigma[:u]))
 
 
 def _with_a_fit(
@@ -198,7 +212,7 @@ def _without_a_fit(problem: Problem, posterior: Posterior) -> Finding:
     if UNKNOWN in first.names:
         reason = "no effect or pair of effects of the catalogue explains it"
     else:
-        second = comma_list([words(name) for name in posterior.explanations[1].names])
+        second = comma_list(grouped(posterior.explanations[1].names))
         reason = (
             f"{_explained(first.names)} it with a probability of {first.posterior:.2f} only, and "
             f"{second} with {posterior.explanations[1].posterior:.2f}"
@@ -226,8 +240,8 @@ def unless_weak(problem: Problem, detection: Detection, finding: Finding) -> Fin
 
 
 def _explained(names: Sequence[str]) -> str:
-    """One or two names with the verb that belongs to them."""
-    return f"{comma_list([words(name) for name in names])} explain{'s' if len(names) == 1 else ''}"
+    """Names with the verb that belongs to them."""
+    return f"{comma_list(grouped(names))} explain{'s' if len(names) == 1 else ''}"
 
 
 def _is_large(problem: Problem, top: Weighed) -> bool:
@@ -237,13 +251,15 @@ def _is_large(problem: Problem, top: Weighed) -> bool:
 
 
 def _judged_by_refits(problem: Problem, weighing: Weighing, single: Weighed) -> Posterior:
-    """Posterior where an effect is large: it alone, or with another one in what its refit leaves.
+    """Posterior where an effect is large: it alone, or with more in what its refit leaves.
 
     To first order a large effect leaves so much that anything would seem to be beside it.
     """
-    pairs = [one for one in weighing.pairs if len(one.best) == 2]
-    strongest_pair = sorted(pairs, key=lambda one: one.log_weight)[-1:]
-    refitted = [_refitted(problem, weighing, one) for one in (single, *strongest_pair)]
+    tried = [single]
+    for count in (2, 3):
+        together = [one for one in weighing.pairs if len(one.best) == count]
+        tried += sorted(together, key=lambda one: one.log_weight)[-1:]
+    refitted = [_refitted(problem, weighing, one) for one in tried]
     weighed = [one for one, _ in refitted]
     alone, solution = refitted[0]
     if solution is not None:
@@ -296,7 +312,8 @@ def _beside(problem: Problem, count: int, alone: Weighed, solution: Solution) ->
             continue
         other = strongest(inner.examined.candidates[name], z)
         both = (*alone.classes, members[name])
-        weight = log + float(np.log(priors.TWO / k))
+        within = float(within_bounds((other,), z, inner.evidence)[0])
+        weight = log + within + float(np.log(priors.TWO / k))
         weighed.append(Weighed((*alone.names, name), both, weight, (*alone.best, other)))
     return weighed
 
@@ -468,8 +485,11 @@ def describe(
         p = detection.p_value if worst is None else worst.p_value
         return (Named(name, name, (name,), p, posterior.of_noise),)
     solution = finding.frame.solution
-    sigma = np.sqrt(np.diag(solution.cofactors) * variance)
+    hypotheses = [choice.best for choice in finding.chosen]
+    cofactors = with_settings(problem.examined, solution, hypotheses)
+    sigma = np.sqrt(np.diag(cofactors) * variance)
     columns = {name: i for i, name in enumerate(solution.model.parameter_names)}
+    of_settings = iter(sigma[len(solution.parameters) :].tolist())
     named = []
     for choice in finding.chosen:
         best, p = choice.best, detection.p_family[choice.best.name]
@@ -481,6 +501,7 @@ def describe(
         assert best.shown is not None
         places = [(q, columns[q.name]) for q in best.shown.parameters]
         examined, members = problem.examined, choice.members
+        searched = [s for s in best.effect.takes if s.name == best.smooth]
         named.append(
             Named(
                 name=best.name,
@@ -497,6 +518,10 @@ def describe(
                 parameters=tuple(
                     (q.name, float(solution.parameters[i]), float(sigma[i]), q.unit)
                     for q, i in places
+                ),
+                settings=tuple(
+                    (s.name, best.value, best.value * of_log, s.unit)
+                    for s, of_log in zip(searched, of_settings, strict=False)
                 ),
             )
         )

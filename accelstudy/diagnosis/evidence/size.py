@@ -119,6 +119,12 @@ class Evidence:
             self._constants - half * logs - np.asarray(determinant, dtype=float)[..., None] / 2
         )
 
+    def variance(self, squares: float) -> float:
+        """Variance of unit weight that is expected where this much of ‖z‖² is left to the noise."""
+        nu, logs = np.array(self.level.freedoms), self.of_noise(squares)
+        weights = np.exp(logs - logs.max())
+        return float(weights @ ((nu + squares) / (nu + self.redundancy)) / weights.sum())
+
     def of_spaces(
         self, parts: Array, dims: NDArray[np.int_] | Sequence[int], squares: ArrayLike
     ) -> Array:

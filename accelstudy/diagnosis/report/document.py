@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -154,13 +155,20 @@ def _effect(named: Named) -> dict[str, Any]:
         "equivalence_class": list(named.equivalence_class),
         "p_value": json_number(named.p_value),
         "posterior": json_number(named.posterior),
-        "parameters": [
-            {"name": name, "value": json_number(value), "sigma": json_number(sigma), "unit": unit}
-            for name, value, sigma, unit in named.parameters
-        ],
+        "parameters": _estimates(named.parameters),
+        **({"settings": _estimates(named.settings)} if named.settings else {}),
         "imitators": list(named.imitators),
         "rivals": [{"name": name, "cosine": json_number(cosine)} for name, cosine in named.rivals],
     }
+
+
+def _estimates(
+    estimates: Iterable[tuple[str, float, float | None, str]],
+) -> list[dict[str, Any]]:
+    return [
+        {"name": name, "value": json_number(value), "sigma": json_number(sigma), "unit": unit}
+        for name, value, sigma, unit in estimates
+    ]
 
 
 def _gap(d: Diagnosis) -> dict[str, Any]:
@@ -209,7 +217,10 @@ def diagnosed_fit(diagnosis: Diagnosis) -> CampaignFit:
         model=d.extended,
         approach=d.approach,
         observed=observed,
-        adjustment=calibrate(d.extended, d.approach, observed),
+        # Its cofactors do not know of the settings that were searched for.
+        adjustment=replace(
+            calibrate(d.extended, d.approach, observed), cofactors=solution.cofactors[None]
+        ),
         estimability=campaign_estimability(campaign, d.extended, d.approach),
         judged=JudgedNoise(d.sigma_holds, d.unit_variance),
     )

@@ -7,7 +7,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 
 from accelstudy.basics.levels import ACCEPTED, UNCHECKED
-from accelstudy.basics.wording import comma_list, probability, words
+from accelstudy.basics.wording import comma_list, grouped, probability, words
 from accelstudy.diagnosis.decision.posterior import CREDIBLE, Explanation
 from accelstudy.diagnosis.decision.priors import SURE
 from accelstudy.diagnosis.decision.statement import (
@@ -265,7 +265,7 @@ def family_words(family: str) -> str:
 
 def explanation_words(explanation: Explanation) -> str:
     """Return an explanation as words: bias drift with quadratic scale."""
-    return " with ".join(map(name_words, explanation.names))
+    return " with ".join(grouped(explanation.names, name_words))
 
 
 def missing(credible_set: Sequence[Explanation]) -> str:
@@ -337,7 +337,7 @@ def question(positions: Sequence[NextPosition]) -> str:
     """Say what further positions would show of the two most probable explanations, if any would."""
     if not positions:
         return ""
-    first, second = (" with ".join(map(name_words, names)) for names in positions[0].separates)
+    first, second = (" with ".join(grouped(names, name_words)) for names in positions[0].separates)
     if first and second:
         return f"whether {first} or {second} is missing"
     return f"whether {first or second} is missing as well"
