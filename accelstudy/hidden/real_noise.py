@@ -26,9 +26,11 @@ from scipy import optimize, special
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.campaign.importing.logs import import_log, log_of
 from accelstudy.campaign.importing.public import import_settings, public_file
-from accelstudy.campaign.importing.settings import ImportReport, ImportSettings
+from accelstudy.campaign.importing.making import ImportReport
+from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.campaign.session import Campaign
 from accelstudy.config_names import ModelName
+from accelstudy.effects import get_effect
 from accelstudy.diagnosis.pipeline import judge
 from accelstudy.diagnosis.result import Verdict
 from accelstudy.files.reading import config_hash
@@ -493,6 +495,9 @@ def _estimated(
         return None
     found = next(one for one in verdict.extended.effects if one.name == effect.name)
     left, _ = shape_of(log, spans, atlas, effect, found.settings)
+    # Some of its parameters may be zero, as the positions do not show them.
+    names = [parameter.name for parameter in get_effect(effect.name).parameters]
+    left = left[[names.index(name) for name, *_ in named.parameters]]
     columns = [verdict.extended.parameter_names.index(name) for name, *_ in named.parameters]
     covariance = verdict.final.solution.cofactors[np.ix_(columns, columns)] * verdict.unit_variance
     return np.array([value for _, value, *_ in named.parameters]), left, covariance

@@ -53,12 +53,13 @@ def draw_segmentation(holds: DetectedHolds) -> Figure:
                 ax.axvspan(start, end, linewidth=0, zorder=0.5, **look)
         _number(above, holds)
         above.set_ylabel("specific force / (m/s²)")
-        below.set(yscale="log", xlabel="time / s", ylabel="window sd / (m/s²)")
+        what = "time / s" if holds.size is None else "sample"
+        below.set(yscale="log", xlabel=what, ylabel="window sd / (m/s²)")
         below.set_xlim(0, edges[-1])
         below.yaxis.set_minor_locator(NullLocator())
         handles, labels = above.get_legend_handles_labels()
         lines, texts = below.get_legend_handles_labels()
-        shades = [(Patch(color=_SHADE), counted(int(holds.used.sum()), "static hold"))]
+        shades = [(Patch(color=_SHADE), counted(int(holds.used.sum()), "static hold" if holds.size is None else "block"))]
         if holds.left_out:
             shades.append((Patch(linewidth=0, **_LEFT_OUT), f"{len(holds.left_out)} left out"))
         figure.legend(
