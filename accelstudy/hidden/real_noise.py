@@ -535,7 +535,9 @@ def table_of(rows: list[Row], own: Sequence[str]) -> pd.DataFrame:
 
 def _less(row: Row, own: Sequence[str]) -> Row:
     """An answer without what a log has by itself."""
-    found = [name for name in json.loads(row["found"]) if name not in own]
+    names, positions = json.loads(row["found"]), json.loads(row["positions"])
+    kept = [(name, place) for name, place in zip(names, positions, strict=True) if name not in own]
+    found = [name for name, _ in kept]
     explanations = [
         {**one, "names": [name for name in one["names"] if name not in own]}
         for one in json.loads(row["credible_set"])
@@ -543,6 +545,7 @@ def _less(row: Row, own: Sequence[str]) -> Row:
     only = own and row["verdict"] in ("named", "narrowed") and not found
     return row | {
         "found": json.dumps(found),
+        "positions": json.dumps([place for _, place in kept]),
         "verdict": "no_effect" if only else row["verdict"],
         "credible_set": json.dumps([one for one in explanations if one["names"]]),
     }
