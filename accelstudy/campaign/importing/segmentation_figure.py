@@ -59,7 +59,12 @@ def draw_segmentation(holds: DetectedHolds) -> Figure:
         below.yaxis.set_minor_locator(NullLocator())
         handles, labels = above.get_legend_handles_labels()
         lines, texts = below.get_legend_handles_labels()
-        shades = [(Patch(color=_SHADE), counted(int(holds.used.sum()), "static hold" if holds.size is None else "block"))]
+        shades = [
+            (
+                Patch(color=_SHADE),
+                counted(int(holds.used.sum()), "static hold" if holds.size is None else "block"),
+            )
+        ]
         if holds.left_out:
             shades.append((Patch(linewidth=0, **_LEFT_OUT), f"{len(holds.left_out)} left out"))
         figure.legend(
