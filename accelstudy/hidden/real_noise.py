@@ -140,11 +140,13 @@ class Case:
 
 
 def cases_of(config: RealNoiseConfig, log: Donor) -> Iterator[Case]:
-    """All that is put into a log."""
+    """All that is put into a log; beside an effect of its own, single ones of other names."""
     for number in range(config.nothing):
         yield Case(log.name, recorded=True if number else None, number=number)
     for effects in config.effects if log.redundancy >= FEWEST else ():
         names = tuple(effects.split("+"))
+        if log.own and (len(names) > 1 or names[0] in log.own):
+            continue
         needs = {need for name in names for need in PUT[name].needs}
         lacking = needs - ({"time"} if log.timed else set())
         both = (True, False) if len(names) == 1 else (True,)

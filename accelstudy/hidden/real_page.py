@@ -19,6 +19,7 @@ from accelstudy.hidden.real_noise import NEAR, NONE, RIGHT, SAID, RealNoiseConfi
 CLASSES = {"> 0.01": 1.0, "10⁻⁴ … 0.01": 1e-2, "< 10⁻⁴": 1e-4}
 """Classes of the p-value of the F test that knows the form, and their upper ends."""
 PLAIN = [*CLASSES][-1]
+P = "p of the F test"
 WITHIN = 3.0
 """Sigmas within which a size counts as right."""
 
@@ -57,23 +58,29 @@ def real_page(config: RealNoiseConfig, campaigns: pd.DataFrame, origin: Mapping[
     """
     put = campaigns[campaigns["set"] != "null"]
     put = put.assign(p=[_class_of(p) for p in put["p_known"]], column=put["recorded"].map(_column))
+    said = [one for one in SAID if one == RIGHT or (campaigns["said"] == one).any()]
     order = {what: i for i, what in enumerate(config.effects)}
     groups: list[tuple[Any, pd.DataFrame]] = [*put.groupby(["what", "column", "p"])]
     groups.sort(key=lambda item: (order[item[0][0]], item[0][1], [*CLASSES, ""].index(item[0][2])))
-    by_effect = [(words(what), column, p, *_counts(part)) for (what, column, p), part in groups]
-    heads = ["effect", "its column", "p of the F test", *COUNTED]
+    by_effect = [
+        (words(what), column, p, *_counts(part, said)) for (what, column, p), part in groups
+    ]
+    heads = ["effect", "its column", P, "n", *said, *BESIDE]
+    in_all = ["what", P, "n", RIGHT, "95 %", *said[1:], "oracle: name right"]
     parts = [
         "# Score of the study with real noise",
         "Written by `make real-noise`, not by hand; hidden-effects.md explains it.",
         f"{len(campaigns)} campaigns from {len(config.logs)} logs, configuration "
-        f"`{origin['config_hash']}`, seed {origin['seed']}, accelstudy {origin['version']}, commit "
+        f"`{config.fingerprint}`, seed {origin['seed']}, accelstudy {origin['version']}, commit "
         f"`{origin['commit'][:10]}`.",
         "## In all",
-        markdown(pd.DataFrame(_in_all(put), columns=["what", "campaigns", *SHARES])),
+        markdown(pd.DataFrame(_in_all(put, said), columns=in_all)),
         "## Each effect",
         markdown(pd.DataFrame(by_effect, columns=heads)),
         "## Nothing put in",
-        markdown(pd.DataFrame(_nothing(config, campaigns), columns=["log", "truth", "n", *SAID])),
+        markdown(
+            pd.DataFrame(_nothing(config, campaigns, said), columns=["log", "truth", "n", *said])
+        ),
         "## Plain, and said otherwise",
         PLAIN_TEXT,
         markdown(pd.DataFrame(_otherwise(put), columns=OTHERWISE)),
@@ -90,17 +97,20 @@ def _column(recorded: Any) -> str:
     return "–" if pd.isna(recorded) else "recorded" if recorded else "not recorded"
 
 
-COUNTED = ("n", *SAID, "size within 3σ", "the same of the F test", "oracle: name right")
+BESIDE = ("size within 3σ", "the same of the F test", "oracle: name right")
 
 
-def _counts(part: pd.DataFrame) -> Iterator[str]:
+def _counts(part: pd.DataFrame, said: Sequence[str]) -> Iterator[str]:
     """What is said of campaigns, counted, and how often sizes and the oracle are right."""
     yield str(len(part))
-    for said in SAID:
-        yield str(int((part["said"] == said).sum()))
+    yield from _said(part, said)
     for ratio, sigma in (("ratio", "ratio_sigma"), ("known_ratio", "known_sigma")):
         yield _of(abs(part[ratio] - 1) <= WITHIN * part[sigma], part[ratio])
     yield _of(part["oracle_right"].eq(True), part["oracle_right"])
+
+
+def _said(part: pd.DataFrame, said: Sequence[str]) -> list[str]:
+    return [str(int((part["said"] == one).sum())) for one in said]
 
 
 def _of(yes: pd.Series, asked: pd.Series) -> str:
@@ -109,47 +119,39 @@ def _of(yes: pd.Series, asked: pd.Series) -> str:
     return f"{int((yes & asked.notna()).sum())} of {n}" if n else "–"
 
 
-SHARES = (RIGHT, "95 %", f"or {NEAR}", "oracle: name right")
-
-
-def _in_all(put: pd.DataFrame) -> Iterator[tuple[str, ...]]:
+def _in_all(put: pd.DataFrame, said: Sequence[str]) -> Iterator[tuple[str, ...]]:
     """Shares over all effects, by what the F test says and whether the columns are there."""
-    recorded = put["column"] != "not recorded"
+    missing = put["column"] == "not recorded"
     kinds = {
-        "one effect, its column recorded or not needed": recorded & (put["set"] == "one"),
-        "one effect, its column not recorded": ~recorded,
-        "two effects": recorded & (put["set"] == "two"),
+        "one effect, with its column": ~missing & (put["set"] == "one"),
+        "one effect, without its column": missing,
+        "two effects": put["set"] == "two",
     }
     for title, chosen in kinds.items():
         for name in CLASSES:
             part = put[chosen & (put["p"] == name)]
-            n, right = len(part), int((part["said"] == RIGHT).sum())
-            if not n:
+            if not len(part):
                 continue
-            near = right + int((part["said"] == NEAR).sum())
-            low, high = clopper_pearson(np.array([right]), np.array([n]))
+            counts = np.array([(part["said"] == one).sum() for one in said])
+            low, high = clopper_pearson(counts[:1], np.array([len(part)]))
             ends = interval_text(float(low[0]), float(high[0]))
+            first, *others = (share_text(count / len(part)) for count in counts)
             oracle = _of(part["oracle_right"].eq(True), part["oracle_right"])
-            yield (
-                f"{title}, p {name}",
-                str(n),
-                share_text(right / n),
-                ends,
-                share_text(near / n),
-                oracle,
-            )
+            yield title, name, str(len(part)), first, ends, *others, oracle
 
 
-def _nothing(config: RealNoiseConfig, campaigns: pd.DataFrame) -> Iterator[tuple[str, ...]]:
+def _nothing(
+    config: RealNoiseConfig, campaigns: pd.DataFrame, said: Sequence[str]
+) -> Iterator[tuple[str, ...]]:
     """What is said of each log into which nothing was put, beside what it has by itself."""
     for name, log in config.logs.items():
         part = campaigns[(campaigns["set"] == "null") & (campaigns["design"] == name)]
-        yield name, log.note, str(len(part)), *(str(int((part["said"] == s).sum())) for s in SAID)
+        yield name, log.note, str(len(part)), *_said(part, said)
 
 
-OTHERWISE = ["campaign", "p of the F test", "said", "verdict", "found", "oracle"]
+OTHERWISE = ["campaign", P, "said", "verdict", "found", "oracle"]
 PLAIN_TEXT = (
-    f"Campaigns with p {PLAIN} that got neither the right name nor its family, or a set that holds "
+    f"Campaigns with p {PLAIN} that got neither the right name nor its family, nor a set that holds "
     "it, and the name that the oracle gives."
 )
 

@@ -11,19 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.wording import counted
 from accelstudy.campaign.importing.recording import Log
-from accelstudy.campaign.importing.segments import (
-    WANDERING,
-    Envelope,
-    GrowingHold,
-    Segment,
-    Segmentation,
-)
+from accelstudy.campaign.importing.segments import Envelope, GrowingHold, Segment, Segmentation
 from accelstudy.campaign.importing.windows import (
     Survey,
     Threshold,
-    choose_threshold,
     given_threshold,
     survey_log,
     windows,
@@ -32,48 +24,57 @@ from accelstudy.campaign.importing.windows import (
 Array = NDArray[np.float64]
 
 
+PARTS = 4
+"""Parts of a block whose means are compared; the noise within them averages out."""
+RESTLESS = 10.0
+"""Scatter of the parts of a block, as a multiple of that of a typical one, from which on the sensor
+moves: a hand that trembles makes some five of it, a turn by a few degrees dozens."""
+
+
 def segment_blocks(
     log: Log, size: int, threshold: float | None, full_range: float
 ) -> tuple[Survey, Threshold, Segmentation]:
-    """Make each block of a log a position; those with a move in them are to be left out.
-
-    The noise of the log tells what a move is, as where holds are found: of windows half as long as
-    a block most are at rest.
+    """Make each block of a log a position; those in which the sensor moves are to be left out.
 
     Parameters
     ----------
     log : Log
     size : int, samples of each position
-    threshold : float, m/s², standard deviation of a window up to which it is at rest; chosen from
+    threshold : float, m/s², scatter of the parts of a block up to which it is at rest; chosen from
         the data if None
     full_range : float, m/s², the sensor measures ± this
 
     Raises
     ------
     InputError
-        If the log does not end with a block, or most blocks hold a move or a saturated sensor.
+        If the log does not end with a block, or the sensor is saturated or moves in all of them.
     """
     survey = survey_log(log, (size // 2) | 1)
-    chosen = choose_threshold(survey, log) if threshold is None else given_threshold(threshold)
     envelope = Envelope(survey.span, survey.total)
     for _ in envelope.along(windows(log, survey.width)):
         pass
     segments: dict[int, Segment] = {}
-    left_out: dict[int, str] = {}
+    left_out, scatter = {}, {}
     for number, rows in enumerate(_blocks(log, size), 1):
         block = GrowingHold((number - 1) * size, 0, survey.extremes, full_range, 0)
         block.keep(rows)
-        segments[number] = segment = block.finish()
+        segments[number] = block.finish()
         if block.saturated():
             left_out[number] = "the sensor is saturated"
-        elif segment.variance > (WANDERING * chosen.sd) ** 2:
-            left_out[number] = f"the sensor moves: sd {np.sqrt(segment.variance):.2g} m/s²"
-    if len(left_out) > len(segments) / 2:
-        first, why = next(iter(left_out.items()))
-        raise InputError(
-            f"{log.path}: {len(left_out)} of {counted(len(segments), 'block')} of {size} samples "
-            f"are no positions (block {first}: {why}); is the number of samples (--block) right?"
-        )
+            continue
+        means = [part.mean(axis=0) for part in np.array_split(rows[:, 1:4], PARTS)]
+        scatter[number] = float(np.sqrt(np.linalg.norm(np.var(means, axis=0, ddof=1))))
+    if not scatter:
+        raise InputError(f"{log.path}: the sensor is saturated in all blocks of {size} samples")
+    if threshold is None:
+        usual = float(np.median([*scatter.values()]))
+        reason = f"{RESTLESS:g} times the scatter of the {PARTS} parts of a typical block"
+        chosen = Threshold(RESTLESS * usual, usual, reason)
+    else:
+        chosen = given_threshold(threshold)
+    for number, each in scatter.items():
+        if each > chosen.sd:
+            left_out[number] = f"the sensor moves: its parts scatter by {each:.2g} m/s²"
     return survey, chosen, Segmentation(segments, 0, 0, 0, envelope, left_out, size)
 
 

@@ -203,7 +203,8 @@ def detected_holds(
     left_out = {**segmentation.left_out, **_left_out(segments, selection)}
     used = [segment for number, segment in segments.items() if number not in left_out]
     if not used:
-        raise InputError(f"{log.path}: exclude: no hold is left")
+        why = f"exclude: no {'hold' if segmentation.size is None else 'block'} is left"
+        raise InputError(f"{log.path}: {why} ({next(iter(left_out.values()))})")
     holds = DetectedHolds(
         segments=segments,
         left_out=left_out,

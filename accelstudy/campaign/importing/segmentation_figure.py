@@ -45,8 +45,9 @@ def draw_segmentation(holds: DetectedHolds) -> Figure:
         for i, (name, colour) in enumerate(zip("xyz", _COLOURS, strict=True)):
             _band(above, middle, low[:, i], high[:, i], colour, f"$f_{name}$")
         _band(below, middle, low[:, 3], high[:, 3], INK, None)
-        label = f"threshold {holds.threshold.sd:.2g} m/s²"
-        below.axhline(holds.threshold.sd, color=_THRESHOLD, linestyle="--", label=label)
+        if holds.size is None:
+            label = f"threshold {holds.threshold.sd:.2g} m/s²"
+            below.axhline(holds.threshold.sd, color=_THRESHOLD, linestyle="--", label=label)
         for ax in (above, below):
             for start, end, used in zip(holds.t0, holds.t1, holds.used, strict=True):
                 look = {"color": _SHADE} if used else _LEFT_OUT
