@@ -151,8 +151,8 @@ def _nothing(
 
 OTHERWISE = ["campaign", P, "said", "verdict", "found", "oracle"]
 PLAIN_TEXT = (
-    f"Campaigns with p {PLAIN} that got neither the right name nor its family, nor a set that holds "
-    "it, and the name that the oracle gives."
+    f"Campaigns with p {PLAIN} that got neither the right name nor its family, nor a set that "
+    "holds it, and the name that the oracle gives."
 )
 
 
