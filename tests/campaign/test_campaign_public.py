@@ -110,7 +110,7 @@ def test_the_registry_knows_the_files(name):
 N_POSITIONS = {
     **{"xsens-mti": 38, "mpu9150-0": 23, "mpu9150-1": 23, "mpu9150-2": 23, "mpu6050": 10},
     **{"innalabs-24": 24, "innalabs-31": 31, "innalabs-49": 49, "ferraris-annotated": 6},
-    **{"mpu6050-static": 1},
+    **{"mpu6050-static": 1, "ck-explorer": 160},
 }
 
 
