@@ -90,7 +90,7 @@ def left(folder):
 def test_the_registry_says_how_a_file_is_read(name):
     known = public_data()[name]
     assert known.url.startswith("https://raw.githubusercontent.com/")
-    assert known.licence in ("MIT", "BSD-2-Clause")
+    assert known.licence in ("MIT", "BSD-2-Clause", "Apache-2.0")
     settings = known.settings
     if settings is not None:
         assert {*settings.columns} == {"fx", "fy", "fz"}

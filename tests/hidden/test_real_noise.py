@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 from places import DATA, ROOT, needs_data
 from scipy import optimize, stats
+from snakemake_helpers import snakemake
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.importing.logs import import_log
@@ -219,3 +220,18 @@ def test_two_cases_of_a_real_log(tmp_path):
     assert warm["said"] == "right name"
     assert warm["p_known"] < 1e-6
     assert abs(warm["ratio"] - 1) < 4 * warm["ratio_sigma"]
+
+
+def test_the_score_is_that_of_the_study():
+    """Of this configuration and, where the study was run here, of this very run."""
+    score = (ROOT / "docs/guides/real-noise-score.md").read_text(encoding="utf-8")
+    assert f"configuration `{CONFIG.fingerprint}`, seed {CONFIG.seed}" in score
+    made = ROOT / "results/real-noise/score.md"
+    assert not made.exists() or made.read_text(encoding="utf-8") == score
+
+
+def test_the_workflow_makes_each_log_and_the_score(tmp_path):
+    words = ["--snakefile", ROOT / "workflow/real_noise.smk", "--dry-run", "--configfile"]
+    text = snakemake(tmp_path, *words, ROOT / "config/real-noise.yaml").stdout
+    assert f"real_noise_log          {len(CONFIG.logs)}" in text
+    assert "real_noise_score        1" in text
