@@ -3,8 +3,8 @@
 Where it lives: the share of the excess χ² that each group of regressors takes up. A group of k
 regressors takes up k of r redundant conditions. Of residuals that have nothing to do with it, it
 has a part of Beta(k/2, (r − k)/2) by chance, k/r on average. Of an excess E above the noise, r + E
-in all, the group has nearly all if it has k + 0.9 E. Where chance often gives that, as it does where
-the redundancy or the excess is small, the share says nothing, and is not told.
+in all, the group has nearly all if it has k + 0.9 E. Where chance often gives that, as it does with
+little redundancy or excess, the share says nothing, and is not told.
 
 What it changed: an effect with the signature S (whitened, by its parameters p) that a model with
 the design Ã lacks shifts the estimates of the model by −(ÃᵀÃ)⁻¹ Ãᵀ S p (omitted-variable bias).
@@ -16,7 +16,6 @@ What it is worth: the tilt error of a calibrated sensor without and with it.
 
 from __future__ import annotations
 
-from collections import defaultdict
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -38,7 +37,6 @@ from accelstudy.diagnosis.space.examined import ExaminedFit, Frame
 from accelstudy.diagnosis.space.groups import LACK_OF_FIT, REPEAT, ROBOT, all_groups
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
 from accelstudy.diagnosis.space.residuals import Residuals
-from accelstudy.diagnosis.space.shapes import Place
 from accelstudy.diagnosis.visibility import UpperLimit, upper_limits
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import angles_of, tilt_slope, wrapped
@@ -183,11 +181,10 @@ def like_shapes(problem: Problem, posterior: Posterior | None) -> tuple[LikeShap
         z = z - beside.basis @ (beside.basis.T @ z)
         evidence = replace(evidence, redundancy=evidence.redundancy - beside.dim)
         unknown = Unknown(unknown.shapes.beside(beside.basis))
-    logs = unknown.densities(evidence, unknown.parts(z[None]), np.array([z @ z]))[0]
-    total: dict[Place, float] = defaultdict(float)
-    for place, p in zip(unknown.places, special.softmax(logs).tolist(), strict=True):
-        total[place] += p
-    return tuple(LikeShape(*place, p) for place, p in sorted(total.items(), key=lambda i: -i[1]))
+    places = unknown.by_place(evidence, z)
+    shares = special.softmax([*places.values()]).tolist()
+    like = [LikeShape(*place, p) for place, p in zip(places, shares, strict=True)]
+    return tuple(sorted(like, key=lambda one: -one.posterior))
 
 
 def limits_of_others(problem: Problem, finding: Finding, known: bool) -> tuple[UpperLimit, ...]:

@@ -28,7 +28,7 @@ from accelstudy.diagnosis.evidence.hypotheses import (
     unknown_beside,
     weigh_singles,
 )
-from accelstudy.diagnosis.evidence.noise_models import colour_densities, course_density
+from accelstudy.diagnosis.evidence.noise_models import colour_densities
 from accelstudy.diagnosis.evidence.noise_tests import (
     AXES,
     COLOUR,
@@ -273,9 +273,7 @@ def weigh_pairs(
     return weighed
 
 
-def _noises(
-    problem: Problem, detection: Detection, chance: Chance
-) -> tuple[list[Weighed], float]:
+def _noises(problem: Problem, detection: Detection, chance: Chance) -> tuple[list[Weighed], float]:
     """Weigh each kind of wrong noise, with nothing else missing; and how slow coloured noise is."""
     residuals, evidence, by_level = problem.residuals, problem.evidence, detection.noise
     nothing = float(np.logaddexp.reduce(by_level))
@@ -286,10 +284,11 @@ def _noises(
         unequal = float(by_level[0])
     tails = tail_test(residuals.positions, chance)
     # The kinds of coloured noise share its weight evenly; a smooth course is one of them.
-    processes, frame = colour_densities(residuals, evidence), problem.frame
+    processes, unknown = colour_densities(residuals, evidence), problem.field.unknown
     each = priors.COLOUR / (len(processes) + 1)
     of_course = each + (priors.UNRECORDED if problem.absent else 0.0)
-    course = np.log(of_course) + course_density(residuals, frame.hold.time, frame.forces, evidence)
+    course = np.log(of_course)
+    course += -np.inf if unknown is None else unknown.of_coordinate("time", evidence, residuals.z)
     fast, *lasting = np.log(each) + processes
     slow = float(np.logaddexp.reduce([*lasting, course]))
     logs = {

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from accelstudy.basics.wording import comma_list
 from accelstudy.diagnosis.decision import priors
 from accelstudy.diagnosis.decision.posterior import Posterior, Weighing
@@ -63,12 +61,10 @@ def with_unrecorded(problem: Problem, weighing: Weighing, finding: Finding) -> F
 def _of_courses(problem: Problem, posterior: Posterior) -> float:
     """Probability of effects of time or temperature, and of something unknown like them."""
     courses = {name for name in effect_names() if get_effect(name).group in COURSES}
-    z, groups = problem.residuals.z, problem.groups
-    if groups:
-        parts = np.array([float(space.parts(z)[0]) for space in groups.values()])
-        dims = [int(space.dims[0]) for space in groups.values()]
-        strongest = int(np.argmax(problem.evidence.of_spaces(parts, dims, z @ z)))
-        if list(groups)[strongest] in COURSES:
+    unknown = problem.field.unknown
+    if unknown is not None:
+        places = unknown.by_place(problem.evidence, problem.residuals.z)
+        if max(places, key=places.__getitem__)[0] in ("time", "temperature"):
             courses.add(UNKNOWN)
     told = posterior.explanations
     return sum(one.posterior for one in told if courses.issuperset(one.names))

@@ -42,6 +42,14 @@ class Unknown:
         """Coordinate and target of each."""
         return (*self.shapes.places, *([OF_ATTITUDE] if self.attitude else []))
 
+    @cached_property
+    def weights(self) -> Array:
+        """Prior probability of each, which sum to 1; the attitude counts as one coordinate."""
+        if self.attitude is None:
+            return self.shapes.weights
+        count = len({coordinate for coordinate, _ in self.shapes.places}) + 1
+        return np.append(self.shapes.weights * (count - 1) / count, 1 / count)
+
     def parts(self, errors: Array) -> Array:
         """What `densities` needs of residuals (..., m), (..., p)."""
         squares = self.shapes.squares(errors)
@@ -59,16 +67,28 @@ class Unknown:
         squares : (b,) array, ‖z‖²
         """
         shapes, logs = self.shapes, []
-        coordinates = len({coordinate for coordinate, _ in shapes.places})
-        count = coordinates + (self.attitude is not None)
-        if coordinates:
+        if len(shapes):
             along = shapes.by_shape(parts[:, : shapes.vectors.shape[1]])
-            each = evidence.of_shapes(along, shapes.shares, squares)
-            logs.append(each + np.log(shapes.weights * coordinates / count))
+            logs.append(evidence.of_shapes(along, shapes.shares, squares))
         if self.attitude is not None:
-            alone = evidence.of_spaces(parts[:, -1:], self.attitude.dims, squares)
-            logs.append(alone - np.log(count))
-        return np.concatenate(logs, axis=1)
+            logs.append(evidence.of_spaces(parts[:, -1:], self.attitude.dims, squares))
+        return np.concatenate(logs, axis=1) + np.log(self.weights)
+
+    def by_place(self, evidence: Evidence, z: Array) -> dict[Place, float]:
+        """Log density of residuals z (m,) under the shapes of each place, times its prior."""
+        logs = self.densities(evidence, self.parts(z[None]), np.array([z @ z]))[0]
+        places: dict[Place, float] = {}
+        for place, log in zip(self.places, logs.tolist(), strict=True):
+            places[place] = float(np.logaddexp(places.get(place, -np.inf), log))
+        return places
+
+    def of_coordinate(self, coordinate: str, evidence: Evidence, z: Array) -> float:
+        """Log density of residuals under the shapes of one coordinate; that of none is −∞."""
+        own = np.array([name == coordinate for name, _ in self.places])
+        logs = [log for (name, _), log in self.by_place(evidence, z).items() if name == coordinate]
+        return (
+            float(np.logaddexp.reduce(logs) - np.log(self.weights[own].sum())) if logs else -np.inf
+        )
 
 
 @dataclass(frozen=True)

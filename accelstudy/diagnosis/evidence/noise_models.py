@@ -14,13 +14,6 @@ Coloured noise: successive holds are correlated, without matrices of holds by ho
 are those of `LENGTHS`: the first-order Gauss–Markov process of `coloured_noise`, whose τ counts
 holds here, and a random walk, min(i, j)/n. Their quadratic forms follow from a convolution and from
 sums, and a Kalman filter gives their exact likelihood.
-
-A smooth course: the biases, or the scales, follow something that changes smoothly over the session,
-such as a temperature that nobody recorded. It is a Gaussian process with a squared-exponential
-kernel in its Hilbert-space form (Solin & Särkkä 2020, Stat. Comput. 30, 419): sines w_j φ_j(t) with
-the prior variances S_j, the spectral density at the frequency of φ_j. With Φ the sines in the space
-of residuals and K = Φ diag(S) Φᵀ / tr(·), the covariance is I + λ K, and λ has the prior of every
-effect.
 """
 
 from __future__ import annotations
@@ -31,8 +24,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.diagnosis.evidence.size import SIZE_WEIGHTS, SIZES, Evidence, log_mean
-from accelstudy.diagnosis.space.residuals import ABSORBED, Residuals
+from accelstudy.diagnosis.evidence.size import Evidence, log_mean
+from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.noise_effects.coloured_noise import memory, renewed
 
 Array = NDArray[np.float64]
@@ -137,10 +130,6 @@ LENGTHS = (1.0, 3.0, 8.0, np.inf)
 """Correlation lengths in holds; infinite for the random walk."""
 STRENGTHS = (0.25, 1.0, 4.0, 16.0, 64.0, 256.0, 1024.0)
 """Variances of the process, with white noise of 1, over which the evidence is averaged."""
-SMOOTH = (1.0, 0.5, 0.25, 0.125)
-"""Lengths of a smooth course, in halves of the session."""
-SINES = 32
-"""Sines of a course, on a domain twice as long as the session: enough for the shortest."""
 
 
 def colour_densities(residuals: Residuals, evidence: Evidence) -> Array:
@@ -148,45 +137,6 @@ def colour_densities(residuals: Residuals, evidence: Evidence) -> Array:
     determinant, squares = restricted(residuals, STRENGTHS)
     logs = np.logaddexp.reduce(evidence.of_noise(squares, determinant), axis=-1)
     return log_mean(logs)
-
-
-def course_density(
-    residuals: Residuals, time: Array | None, forces: Array, evidence: Evidence
-) -> float:
-    """Log density of residuals with a smooth course of the biases, or of the scales.
-
-    It is the mean over both, over lengths and sizes.
-
-    Parameters
-    ----------
-    residuals : Residuals
-    time : (n,) array, of the holds; None where only their order is known
-    forces : (n, 3) array
-    evidence : Evidence
-    """
-    clock = np.arange(len(forces)) if time is None or np.ptp(time) == 0 else time
-    half = 2 * (clock - clock.min()) / np.ptp(clock) - 1
-    frequencies = np.pi * np.arange(1, min(SINES, len(clock)) + 1) / 4
-    sines = np.sin(frequencies * (half[:, None] + 2))
-    z, logs = residuals.z, []
-    for each in (residuals.force_noise, residuals.force_noise * forces[:, None]):
-        changes = np.einsum("nca,nk->ncka", each, sines).reshape(*each.shape[:2], -1)
-        columns = residuals.project(residuals.stacked(changes))
-        products, seen = columns.T @ columns, columns.T @ z
-        for length in SMOOTH:
-            weights = np.repeat(np.exp(-((frequencies * length) ** 2) / 4), 3)
-            weights = weights[weights > ABSORBED]
-            some = slice(len(weights))
-            values, vectors = np.linalg.eigh(weights[:, None] * products[some, some] * weights)
-            shown = values > ABSORBED**3 * values[-1]
-            values, vectors = values[shown], vectors[:, shown]
-            parts = (vectors.T @ (weights * seen[some])) ** 2 / values
-            grown = SIZES[:, None] * values / values.sum()
-            squares = z @ z - np.sum(grown / (1 + grown) * parts, axis=1)
-            determinant = np.sum(np.log1p(grown), axis=1)
-            of_sizes = np.logaddexp.reduce(evidence.of_noise(squares, determinant), axis=-1)
-            logs.append(log_mean(of_sizes, SIZE_WEIGHTS))
-    return float(log_mean(np.array(logs)))
 
 
 def quadratic_forms(v: Array) -> Array:
