@@ -10,7 +10,7 @@ from scipy import stats
 from accelstudy.diagnosis.evidence.size import SHAPE_SIZES, SHAPE_WEIGHTS, Evidence, Level
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.words import verdict_lines
-from accelstudy.diagnosis.space.shapes import LEAST, LearnedShapes
+from accelstudy.diagnosis.space.shapes import LEAST, LENGTHS, LearnedShapes
 from accelstudy.sensors.models import get_model
 
 R = 30
@@ -87,6 +87,21 @@ def test_a_shape_holds_any_smooth_function_of_its_coordinate(frame, shapes):
     # Few conditions leave room for chance: by gravity there are 21.
     if frame.solution.approach.uses_angles:
         assert max(s for place, s in share.items() if place != ("temperature", "bias")) < 0.8
+
+
+def test_a_course_of_time_has_the_covariance_of_its_kernel(frame, shapes):
+    """The biases follow a squared-exponential kernel, but near the ends of its domain."""
+    residuals, time = frame.residuals, frame.hold.time
+    t = 2 * (time - time[0]) / np.ptp(time) - 1
+    kept = [k for place, k in zip(shapes.places, covariances(shapes), strict=True)
+            if place == ("time", "bias")]  # fmt: skip
+    for length, found in zip(LENGTHS[:2], kept, strict=False):
+        kernel = np.exp(-((t[:, None] - t) ** 2) / 2 / length**2)
+        root = np.linalg.svd(kernel)[0] * np.sqrt(np.linalg.svd(kernel)[1])
+        change = np.einsum("nk,ab->nakb", root, np.eye(3)).reshape(len(t), 3, -1)
+        rows = residuals.project(residuals.stacked(residuals.by_observations[..., :3] @ change))
+        expected = rows @ rows.T / np.sum(rows**2)
+        assert np.linalg.norm(found - expected) < 0.15 * np.linalg.norm(expected)
 
 
 def test_beside_an_effect_a_shape_is_what_the_effect_leaves(shapes):

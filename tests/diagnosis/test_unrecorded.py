@@ -5,11 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, design, shuffled
+from diagnosis_helpers import NINE, G
 
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.evidence.noise_models import SMOOTH, course_density
-from accelstudy.diagnosis.evidence.size import SIZE_WEIGHTS, SIZES, Evidence, Level, log_mean
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.document import diagnosis_document
 from accelstudy.diagnosis.report.words import headline, verdict_lines
@@ -42,37 +40,6 @@ def session(course, seed=1, n=40, size=6.0, robot=True, sigma=0.002, **columns):
 def wandering(t):
     """A course that is no drift, no warm-up and no step."""
     return np.sin(2 * np.pi * (0.9 * t + 0.2)) + 0.5 * np.sin(2 * np.pi * (2.3 * t + 0.1))
-
-
-@pytest.mark.parametrize(("approach", "timed"), [(GRAVITY, True), (ROBOT, False)])
-def test_a_smooth_course_has_the_likelihood_of_its_kernel(approach, timed):
-    """Against whole covariance matrices of squared-exponential kernels, biases and scales."""
-    n = 24
-    examined = design(shuffled("mclaren-24"), approach, seed=5)
-    residuals, forces = examined.frame.residuals, examined.frame.forces
-    evidence = Evidence(Level.given(), residuals.redundancy)
-    time = np.cumsum(np.random.default_rng(3).uniform(20, 60, n)) if timed else None
-    t = np.linspace(-1, 1, n) if time is None else 2 * (time - time[0]) / np.ptp(time) - 1
-    c = residuals.whitening.shape[1]
-    space = np.linalg.svd(residuals.design)[0][:, residuals.design.shape[1] :]
-    logs = []
-    for scaled in (False, True):
-        spread = np.zeros((len(residuals.design), 3, n))
-        for i in range(n):
-            part = residuals.force_noise[i] * (forces[i] if scaled else 1.0)
-            spread[i * c : (i + 1) * c, :, i] = part
-        for length in SMOOTH:
-            kernel = np.exp(-((t[:, None] - t) ** 2) / 2 / length**2)
-            covariance = np.einsum("man,nk,lak->ml", spread, kernel, spread)
-            values, vectors = np.linalg.eigh(space.T @ covariance @ space)
-            values = np.maximum(values, 0) / values.sum()
-            seen = (vectors.T @ space.T @ residuals.z) ** 2
-            grown = 1 + SIZES[:, None] * values
-            of_sizes = evidence.of_noise(np.sum(seen / grown, axis=1), np.log(grown).sum(axis=1))
-            logs.append(log_mean(np.logaddexp.reduce(of_sizes, axis=-1), SIZE_WEIGHTS))
-    found = course_density(residuals, time, forces, evidence)
-    # The sines stand for the kernel but near the ends of their domain.
-    assert found == pytest.approx(float(log_mean(np.array(logs))), abs=0.35)
 
 
 @pytest.mark.parametrize(("robot", "columns"), [
