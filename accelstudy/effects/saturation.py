@@ -37,8 +37,10 @@ class Saturation(Effect):
 
         def excess(f_i):
             e = xp.abs(f_i) - self.settings["knee"]
-            near = (xp.abs(e + ROUND) - xp.abs(e - ROUND)) / 2
-            return (near + ROUND) ** 2 / (4 * ROUND) + (e - ROUND + xp.abs(e - ROUND)) / 2
+            # Exactly zero below the knee, or an axis that never reaches it would seem to.
+            begun = (e + ROUND + xp.abs(e + ROUND)) / 2
+            near = (begun + 2 * ROUND - xp.abs(begun - 2 * ROUND)) / 2
+            return near**2 / (4 * ROUND) + (e - ROUND + xp.abs(e - ROUND)) / 2
 
         return tuple(-k * xp.sign(f_i) * excess(f_i) for k, f_i in zip(p, f, strict=True))
 

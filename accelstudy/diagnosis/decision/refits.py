@@ -20,6 +20,8 @@ from accelstudy.sensors.sensor import SensorModel
 
 SAME = 0.5
 """Difference of Ω within which two fits are equally good."""
+EDGE = 0.1
+"""Part of what is searched within which the least is at its end."""
 BEYOND = 1.6
 """Factor by which a setting may lie beyond the first and the last that are tried."""
 
@@ -140,8 +142,8 @@ def _sharpened(examined: ExaminedFit, chosen: Sequence[Hypothesis]) -> list[Hypo
         from scipy.optimize import minimize_scalar  # slow to import, and seldom needed
 
         values = [h.value for h in examined.candidates[start.name]]
-        outside = {min(values) / BEYOND, max(values) * BEYOND}
-        ends = (*outside, *values)
+        passed = {min(values) / BEYOND, max(values) * BEYOND}
+        ends = (*passed, *values)
 
         def omega(log: float, k: int = k, start: Hypothesis = start) -> float:
             trial = shaped(examined, start, float(np.exp(log)))
@@ -158,11 +160,11 @@ def _sharpened(examined: ExaminedFit, chosen: Sequence[Hypothesis]) -> list[Hypo
                 omega, bounds=np.log([low, high]), method="bounded", options={"xatol": 1e-4}
             )
             # To first order the least may seem to be a little to one side.
-            beside = {v: omega(float(np.log(v))) for v in (low, high) if v not in outside}
-            at = min(beside, key=beside.__getitem__, default=at)
-            outside |= {low, high}
-            if not beside or beside[at] >= least.fun:
+            near = min((low, high), key=lambda v: abs(least.x - np.log(v)))
+            inside = abs(least.x - np.log(near)) > EDGE * np.log(high / low)
+            if inside or near in passed or omega(float(np.log(near))) > least.fun:
                 break
+            at, passed = near, passed | {low, high}
         best = shaped(examined, start, float(np.exp(least.x)))
         if best is not None and least.fun < omega(float(np.log(start.value))):
             sharp[k] = best

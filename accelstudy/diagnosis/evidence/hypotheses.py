@@ -37,8 +37,12 @@ SAME = 0.25
 """Log evidence within which two effects are equally good."""
 COLLINEAR = 0.05
 """Two spaces are tried together only if this share of the second is left beside the first."""
-BOUNDED = 8
+BOUNDED = 5
 """Shapes of a pair of which bounds are evaluated."""
+WEIGHTY = 6.0
+"""Log evidence by which a pair may be weaker than the strongest one and still get its bounds."""
+STRONGEST = 6
+"""Effects beside a bumped position, the strongest of them, beside which a further one is tried."""
 FIRST = 2
 """Bumped positions beside each effect, and pairs of them, beside which a further one is tried."""
 POSITIONS = 100
@@ -273,31 +277,32 @@ def all_pairs(
     keys = number[one] * len(order) + number[other]
     sequence = np.argsort(keys, kind="stable")
     starts = np.flatnonzero(np.diff(keys[sequence], prepend=-1))
-    pairs = []
-    for alike in np.split(sequence, starts[1:]):
-        for k, beside in ((one, other), (other, one)):
-            if tried[k[alike[0]]].estimates is not None:
-                within = _within_bounds(
-                    tried, k[alike], beside[alike], weighted[alike], z, evidence
-                )
+    groups = np.split(sequence, starts[1:])
+    totals = np.logaddexp.reduceat(weighted[sequence], starts)
+    top, pairs = -np.inf, dict[int, Together]()
+    for k in np.argsort(-totals, kind="stable").tolist():
+        alike = groups[k]
+        a, b = one[alike], other[alike]
+        for some, beside in ((a, b), (b, a)):
+            # What bounds do to pairs of no weight does not matter.
+            if tried[some[0]].estimates is not None and totals[k] > top - WEIGHTY:
+                within = _within_bounds(tried, some, beside, weighted[alike], z, evidence)
                 logs[alike] += within
                 weighted[alike] += within
-        best = alike[np.argmax(logs[alike])]
-        twice = np.log(2.0) if number[one[best]] == number[other[best]] else 0.0
+        best = int(np.argmax(logs[alike]))
+        twice = np.log(2.0) if number[a[best]] == number[b[best]] else 0.0
         total = float(np.logaddexp.reduce(weighted[alike]) + twice)
-        pairs.append(Together((tried[one[best]], tried[other[best]]), total))
+        top = max(top, total)
+        pairs[k] = Together((tried[a[best]], tried[b[best]]), total)
+    found = [pairs[k] for k in range(len(groups))]
     if OUTLIER not in order:
-        return pairs
+        return found
     bumped = np.flatnonzero(number == order[OUTLIER])
+    # Positions are the last candidate, so the second of a pair is one wherever any is.
     with_bump = np.isin(other, bumped)
     rows = one[with_bump], other[with_bump], logs[with_bump], weighted[with_bump]
-    # Positions are the last candidate, so the second of a pair is one wherever any is.
-    return [
-        *pairs,
-        *_with_another_bump(
-            tried, number, bumped, float(weights[bumped[0]]), rows, products, z, evidence
-        ),
-    ]
+    weight = float(weights[bumped[0]])
+    return [*found, *_with_another_bump(tried, number, bumped, weight, rows, products, z, evidence)]
 
 
 def _within_bounds(
@@ -345,31 +350,43 @@ def _with_another_bump(
     evidence : Evidence
     """
     one, place, logs, weighted = rows
+    if not len(one):
+        return []
+    # Of two bumps each row is a set of positions; of an effect it is one of many shapes.
+    twice = number[one] == number[bumped[0]]
+    keys = np.stack([np.where(twice, one, -1 - number[one]), place])
+    _, group = np.unique(keys, axis=1, return_inverse=True)
+    group = group.ravel()
+    totals = np.full(group.max() + 1, -np.inf)
+    np.logaddexp.at(totals, group, weighted)
+    order = np.argsort(-totals[group], kind="stable")
+    # The strongest places of each candidate, and of these candidates the strongest.
+    chosen: dict[int, list[int]] = {}
+    seen = set[int]()
+    for row in order.tolist():
+        if group[row] not in seen:
+            seen.add(int(group[row]))
+            chosen.setdefault(int(number[one[row]]), []).append(row)
+    bumps = chosen.pop(int(number[bumped[0]]), [])
+    first = [*list(chosen.values())[:STRONGEST], bumps]
     found: list[Together] = []
-    for candidate in np.unique(number[one]):
-        own = np.flatnonzero(number[one] == candidate)
-        twice = candidate == number[bumped[0]]
-        # Of two bumps each row is a set of positions; of an effect it is one of many shapes.
-        groups = own if twice else place[own]
-        keys, group = np.unique(groups, return_inverse=True)
-        totals = np.full(len(keys), -np.inf)
-        np.logaddexp.at(totals, group, weighted[own])
+    for mine in first:
         sets: dict[tuple[int, ...], tuple[float, tuple[int, ...]]] = {}
-        for k in np.argsort(-totals, kind="stable")[:FIRST]:
-            alike = own[group == k]
+        for row in mine[:FIRST]:
+            alike = np.flatnonzero(group == group[row])
             best = alike[np.argmax(logs[alike])]
             pair = int(one[best]), int(place[best])
             third = np.setdiff1d(bumped, pair)
             part, independent = products.of_third(pair, third)
-            dims = [tried[i].dim for i in third]
-            dims = np.array(dims) + tried[pair[0]].dim + tried[pair[1]].dim
-            seen = independent & (dims < evidence.redundancy)
-            if not seen.any():
+            dims = products.dims[third] + products.dims[list(pair)].sum()
+            fits = independent & (dims < evidence.redundancy)
+            if not fits.any():
                 continue
-            three = evidence.of_spaces(part[seen], dims[seen], float(z @ z))
-            three += totals[k] - logs[best] + np.log((6 if twice else 2) * weight)
-            for i, log in zip(third[seen].tolist(), three.tolist(), strict=True):
-                key = tuple(sorted((*pair, i) if twice else (pair[1], i)))
+            three = evidence.of_spaces(part[fits], dims[fits], float(z @ z))
+            orders = 6 if twice[row] else 2
+            three += totals[group[row]] - logs[best] + np.log(orders * weight)
+            for i, log in zip(third[fits].tolist(), three.tolist(), strict=True):
+                key = tuple(sorted((*pair, i) if twice[row] else (pair[1], i)))
                 sets[key] = max(sets.get(key, (-np.inf, ())), (log, (*pair, i)))
         if not sets:
             continue

@@ -175,6 +175,7 @@ def _write_report(
         confirmation=wording.confirmation(diagnosis),
         advice=wording.advice(diagnosis),
         equation=lambda effect: get_effect(effect["spec"]).equation,
+        possible=lambda effect: wording.possible(effect["spec"]),
         is_effect=lambda name: name in effect_names(),
         figures=drawn,
         changed=wording.changed(diagnosis),

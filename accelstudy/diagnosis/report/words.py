@@ -7,7 +7,8 @@ from collections import defaultdict
 from collections.abc import Sequence
 
 from accelstudy.basics.levels import ACCEPTED, UNCHECKED
-from accelstudy.basics.wording import comma_list, grouped, probability, words
+from accelstudy.basics.units import display_unit
+from accelstudy.basics.wording import amount, comma_list, grouped, probability, words
 from accelstudy.diagnosis.decision.posterior import CREDIBLE, Explanation
 from accelstudy.diagnosis.decision.priors import SURE
 from accelstudy.diagnosis.decision.statement import (
@@ -234,6 +235,16 @@ def described(name: str) -> str:
     if name not in effect_names():
         return ""
     return get_effect(name).summary
+
+
+def possible(spec: str) -> str:
+    """Say between which bounds the parameters of an effect are; nothing if it has no bounds."""
+    effect = get_effect(spec)
+    if not all(map(math.isfinite, effect.bounds)):
+        return ""
+    unit = effect.parameters[0].unit
+    low, high = (amount(bound, unit) for bound in effect.bounds)
+    return f"{low} … {high} {display_unit(unit)}"
 
 
 FAMILIES = {
