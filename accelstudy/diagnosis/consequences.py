@@ -3,8 +3,8 @@
 Where it lives: the share of the excess χ² that each group of regressors takes up. A group of k
 regressors takes up k of r redundant conditions. Of residuals that have nothing to do with it, it
 has a part of Beta(k/2, (r − k)/2) by chance, k/r on average. Of an excess E above the noise, r + E
-in all, the group has nearly all if it has k + 0.9 E. Where chance often gives that, as it does where
-the redundancy or the excess is small, the share says nothing, and is not told.
+in all, the group has nearly all if it has k + 0.9 E. Where chance often gives that, as it does
+where the redundancy or the excess is small, the share says nothing, and is not told.
 
 What it changed: an effect with the signature S (whitened, by its parameters p) that a model with
 the design Ã lacks shifts the estimates of the model by −(ÃᵀÃ)⁻¹ Ãᵀ S p (omitted-variable bias).
