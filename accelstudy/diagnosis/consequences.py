@@ -59,6 +59,8 @@ ABSENT = {
 """Why nothing is known of groups that need no column of a name."""
 NEARLY_ALL = 0.9
 """Share that would seem to say where a pattern lives."""
+ROUNDING = 1e-6
+"""Excess per redundant condition that rounding errors may leave."""
 SELDOM = 0.05
 """Probability with which any pattern may have such a share in one of the groups by chance."""
 
@@ -127,6 +129,8 @@ def locate(problem: Problem, chance: Chance, finding: Finding, variance: float) 
             untestable[name] = _absent(name, problem.frame.hold)
         elif int(groups[name].dims.max()) == 0:
             untestable[name] = "the parameters of the model absorb all of it"
+        elif excess < ROUNDING * r:
+            untestable[name] = "the residuals have no more than the noise that is assumed"
         elif nearly_all[name] > SELDOM / len(groups):
             untestable[name] = (
                 f"with a redundancy of {r} and residuals of this size, nearly all of any pattern "
@@ -136,8 +140,7 @@ def locate(problem: Problem, chance: Chance, finding: Finding, variance: float) 
     for name, space in groups.items():
         if name not in untestable:
             part = float(space.parts(z).max()) / variance
-            share = np.clip((part - expected[name]) / excess, 0.0, 1.0) if excess > 0 else 0.0
-            shares[name] = float(share)
+            shares[name] = float(np.clip((part - expected[name]) / excess, 0.0, 1.0))
     return Location(shares, {name: usual[name] for name in shares}, untestable)
 
 
