@@ -3,8 +3,8 @@
 Where it lives: the share of the excess χ² that each group of regressors takes up. A group of k
 regressors takes up k of r redundant conditions. Of residuals that have nothing to do with it, it
 has a part of Beta(k/2, (r − k)/2) by chance, k/r on average. Of an excess E above the noise, r + E
-in all, the group has nearly all if it has k + 0.9 E. Where chance often gives that, as it does with
-little redundancy or excess, the share says nothing, and is not told.
+in all, the group has nearly all if it has k + 0.9 E. Where chance often gives that, as it does
+where the redundancy or the excess is small, the share says nothing, and is not told.
 
 What it changed: an effect with the signature S (whitened, by its parameters p) that a model with
 the design Ã lacks shifts the estimates of the model by −(ÃᵀÃ)⁻¹ Ãᵀ S p (omitted-variable bias).
@@ -60,6 +60,8 @@ ABSENT = {
 """Why nothing is known of groups that need no column of a name."""
 NEARLY_ALL = 0.9
 """Share that would seem to say where a pattern lives."""
+ROUNDING = 1e-6
+"""Excess per redundant condition that rounding errors may leave."""
 SELDOM = 0.05
 """Probability with which any pattern may have such a share in one of the groups by chance."""
 
@@ -128,6 +130,8 @@ def locate(problem: Problem, chance: Chance, finding: Finding, variance: float) 
             untestable[name] = _absent(name, problem.frame.hold)
         elif int(groups[name].dims.max()) == 0:
             untestable[name] = "the parameters of the model absorb all of it"
+        elif excess < ROUNDING * r:
+            untestable[name] = "the residuals have no more than the noise that is assumed"
         elif nearly_all[name] > SELDOM / len(groups):
             untestable[name] = (
                 f"with a redundancy of {r} and residuals of this size, nearly all of any pattern "
@@ -137,8 +141,7 @@ def locate(problem: Problem, chance: Chance, finding: Finding, variance: float) 
     for name, space in groups.items():
         if name not in untestable:
             part = float(space.parts(z).max()) / variance
-            share = np.clip((part - expected[name]) / excess, 0.0, 1.0) if excess > 0 else 0.0
-            shares[name] = float(share)
+            shares[name] = float(np.clip((part - expected[name]) / excess, 0.0, 1.0))
     return Location(shares, {name: usual[name] for name in shares}, untestable)
 
 

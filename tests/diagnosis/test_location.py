@@ -86,7 +86,7 @@ def test_a_share_is_told_where_chance_seldom_gives_nearly_all(diagnoses, name):
 
 @pytest.mark.parametrize("scheme", ["fibonacci-15", "fibonacci-18"])
 def test_noise_alone_lives_nowhere(scheme):
-    """With a redundancy of six or nine, hardly a set of noise is said to be nearly all of one kind."""
+    """With a redundancy of six or nine, noise is hardly said to be nearly all of one kind."""
     directions, told = shuffled(scheme), 0
     examined = design(directions, GRAVITY, some_holds(len(directions)), seed=4)
     problem = posed(GRAVITY, examined.frame.solution.observed, Level.given())

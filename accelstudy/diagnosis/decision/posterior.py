@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.special import softmax
+from scipy import special
 
 from accelstudy.diagnosis.decision import priors
 from accelstudy.diagnosis.decision.problem import Problem
@@ -38,6 +38,7 @@ from accelstudy.diagnosis.evidence.noise_tests import (
     most_evidence,
     tail_test,
 )
+from accelstudy.diagnosis.evidence.size import log_mean
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.effects import effect_names
 
@@ -169,7 +170,7 @@ class Posterior:
 
 def _shares(weighed: Sequence[Weighed]) -> tuple[float, ...]:
     """Probabilities of things that exclude each other."""
-    return tuple(softmax([one.log_weight for one in weighed]).tolist())
+    return tuple(special.softmax([one.log_weight for one in weighed]).tolist())
 
 
 def of_effects(explanation: Explanation) -> bool:
@@ -193,7 +194,7 @@ class Weighing:
     pairs : list of Weighed, two of them or with bumped positions three, or one of them beside
         something unknown
     noises : list of Weighed, only the noise is wrong, in one of its kinds
-    slow : float, probability that coloured noise, if it is that, lasts for some holds
+    slow : float, probability that the noise lasts for some holds, by the evidence alone
     posterior : Posterior, of all of these
     """
 
@@ -284,22 +285,26 @@ def _noises(problem: Problem, detection: Detection, chance: Chance) -> tuple[lis
         unequal = float(by_level[0])
     tails = tail_test(residuals.positions, chance)
     # The kinds of coloured noise share its weight evenly; a smooth course is one of them.
-    processes, unknown = colour_densities(residuals, evidence), problem.field.unknown
+    unknown = problem.field.unknown
+    processes, course = colour_densities(residuals, evidence), -np.inf
+    if unknown is not None:
+        course = unknown.of_coordinate("time", evidence, residuals.z)
     each = priors.COLOUR / (len(processes) + 1)
     of_course = each + (priors.UNRECORDED if problem.absent else 0.0)
-    course = np.log(of_course)
-    course += -np.inf if unknown is None else unknown.of_coordinate("time", evidence, residuals.z)
-    fast, *lasting = np.log(each) + processes
-    slow = float(np.logaddexp.reduce([*lasting, course]))
+    coloured = np.logaddexp(
+        np.log(each) + np.logaddexp.reduce(processes), np.log(of_course) + course
+    )
     logs = {
+        COLOUR: coloured,
         AXES: unequal,
         TAILS: nothing + np.log(priors.TAILS) + most_evidence(tails.p_value),
     }
-    if len(by_level) > 1 and evidence.level.known:
-        logs[LEVEL] = by_level[1]
-    elif len(by_level) > 1:
+    lasting, fast = log_mean(np.array([*processes[1:], course])), processes[0]
+    if len(by_level) > 1:
         # More noise than within the holds is an offset from hold to hold.
-        fast = np.logaddexp(fast, by_level[1])
-    logs[COLOUR] = np.logaddexp(slow, fast)
+        name = LEVEL if evidence.level.known else COLOUR
+        logs[name] = np.logaddexp(logs.get(name, -np.inf), by_level[1])
+        fast = max(fast, by_level[1] - np.log(evidence.level.weights[1]))
+    slow = float(special.expit(lasting - fast))
     weighed = [Weighed((name,), ((name,),), float(log)) for name, log in logs.items()]
-    return weighed, float(np.exp(slow - logs[COLOUR]))
+    return weighed, slow

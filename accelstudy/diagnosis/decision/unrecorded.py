@@ -44,14 +44,18 @@ def with_unrecorded(problem: Problem, weighing: Weighing, finding: Finding) -> F
         enough = slow + _of_courses(problem, posterior) >= priors.SURE
     if not enough:
         return finding
-    lasting = finding.verdict == "unknown" or slow >= coloured / 2
     of = "temperature or time" if "temperature" in absent else "time"
     asked = [ASKED[name] for name in absent]
     if REPEAT not in problem.groups:
         asked.append("repeats of one attitude in between")
+    if finding.verdict == "unknown" or weighing.slow >= priors.SURE:
+        noise = "slow noise"
+    elif weighing.slow <= 1 - priors.SURE:
+        noise = "noise that differs from hold to hold"
+    else:
+        noise = "noise that is slow or differs from hold to hold"
     clauses = (
-        f"{'slow noise' if lasting else 'noise that differs from hold to hold'}, or an effect of "
-        f"{of} that these columns cannot tell",
+        f"{noise}, or an effect of {of} that these columns cannot tell",
         finding.reason,
         f"{comma_list(asked)} would show which",
     )

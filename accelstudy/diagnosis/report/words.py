@@ -155,7 +155,10 @@ def advice(diagnosis: Diagnosis) -> list[str]:
     d = diagnosis
     hidden = [name for name in d.invisible if name != "gravity_error"]
     may_repeat = REPEAT not in d.groups and (d.verdict == "noise_model" or not d.sigma_known)
-    content = ([] if d.approach.uses_angles else hidden, "gravity_error" in d.invisible, may_repeat)
+    # What is slow and not told apart; where it is, the reason says what to record.
+    by_heat = d.coloured >= WORTH and not d.unrecorded and d.campaign.temperature is None
+    unseen = [] if d.approach.uses_angles else hidden
+    content = (unseen, "gravity_error" in d.invisible, may_repeat, by_heat)
     return lines(TEMPLATE, "advice", *content)
 
 
