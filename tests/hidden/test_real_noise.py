@@ -164,7 +164,10 @@ def said(verdict, found=(), true=("thermal_bias",), recorded=True, explanations=
     ("family or set", {"verdict": "named", "found": ["warm_up"], "recorded": False}),
     ("family or set", {"verdict": "unknown", "explanations": [
         {"names": ["thermal_bias", "lag"], "posterior": 0.5},
-        {"names": ["thermal_bias"], "posterior": 0.45}]}),
+        {"names": ["thermal_curve"], "posterior": 0.45}]}),
+    ("unknown", {"verdict": "unknown", "explanations": [
+        {"names": ["thermal_bias"], "posterior": 0.5},
+        {"names": ["hysteresis"], "posterior": 0.45}]}),
     ("other name", {"verdict": "named", "found": ["warm_up"]}),
     ("other name", {"verdict": "named", "found": ["cubic_scale"], "recorded": False}),
     ("other name", {"verdict": "gross_error", "found": [BUMPED]}),
