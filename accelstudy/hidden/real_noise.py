@@ -338,30 +338,30 @@ SAID = (RIGHT, NEAR, OTHER, "noise", "unknown", "learned", "nothing", NONE)
 def said_of(row: Row) -> str:
     """What an answer says of what was put in, one of `SAID`.
 
-    "family or set": of two effects one; a set that holds the right names; a verdict "unknown" with
-    one of them certain; or other names of the same families. Without its column, what a temperature
-    does is a slow change in time.
+    "family or set": of two effects one; a set that holds the right names; other names of the same
+    families; or a verdict "unknown" that leaves no doubt of such a family. Without its column, what
+    a temperature does is a slow change in time.
     """
     if not row["ok"]:
         return NONE
     if row["right"] or row["recognised"] is True:
         return RIGHT
-    true, explanations = json.loads(row["classes"]), json.loads(row["credible_set"])
-    certain = [
-        sum(one["posterior"] for one in explanations if name in one["names"])
-        for names in true
-        for name in names
+    families = [
+        [kin for name in names for kin in _kin(name, row["recorded"])]
+        for names in json.loads(row["classes"])
     ]
-    held = row["verdict"] == "narrowed" and row["set_holds"] is True
-    partly = row["verdict"] == "unknown" and max(certain, default=0.0) >= CREDIBLE
-    if held or partly or row["one_of_two"]:
+    if row["one_of_two"] or (row["verdict"] == "narrowed" and row["set_holds"] is True):
         return NEAR
     if row["verdict"] in ("named", "narrowed", "gross_error"):
         found = [[name] for name in json.loads(row["found"])]
-        families = [
-            [kin for name in names for kin in _kin(name, row["recorded"])] for names in true
-        ]
         return NEAR if families and all_true(found, families) else OTHER
+    explanations = json.loads(row["credible_set"])
+    certain = [
+        sum(one["posterior"] for one in explanations if set(one["names"]) & set(family))
+        for family in families
+    ]
+    if row["verdict"] == "unknown" and max(certain, default=0.0) >= CREDIBLE:
+        return NEAR
     verdict = str(row["verdict"])
     return {"no_effect": "nothing", "noise_model": "noise"}.get(verdict, verdict)
 

@@ -63,10 +63,11 @@ def real_page(config: RealNoiseConfig, campaigns: pd.DataFrame, origin: Mapping[
     groups: list[tuple[Any, pd.DataFrame]] = [*put.groupby(["what", "column", "p"])]
     groups.sort(key=lambda item: (order[item[0][0]], item[0][1], [*CLASSES, ""].index(item[0][2])))
     by_effect = [
-        (words(what), column, p, *_counts(part, said)) for (what, column, p), part in groups
+        (words(what), column, p, str(len(part)), *_said(part, said), *_beside(part))
+        for (what, column, p), part in groups
     ]
     heads = ["effect", "its column", P, "n", *said, *BESIDE]
-    in_all = ["what", P, "n", RIGHT, "95 %", *said[1:], "oracle: name right"]
+    in_all = ["what", P, "n", RIGHT, "95 %", *said[1:], *BESIDE]
     parts = [
         "# Score of the study with real noise",
         "Written by `make real-noise`, not by hand; hidden-effects.md explains it.",
@@ -100,10 +101,8 @@ def _column(recorded: Any) -> str:
 BESIDE = ("size within 3σ", "the same of the F test", "oracle: name right")
 
 
-def _counts(part: pd.DataFrame, said: Sequence[str]) -> Iterator[str]:
-    """What is said of campaigns, counted, and how often sizes and the oracle are right."""
-    yield str(len(part))
-    yield from _said(part, said)
+def _beside(part: pd.DataFrame) -> Iterator[str]:
+    """How often sizes are right, by the diagnosis and by the F test, and the oracle's names."""
     for ratio, sigma in (("ratio", "ratio_sigma"), ("known_ratio", "known_sigma")):
         yield _of(abs(part[ratio] - 1) <= WITHIN * part[sigma], part[ratio])
     yield _of(part["oracle_right"].eq(True), part["oracle_right"])
@@ -136,8 +135,7 @@ def _in_all(put: pd.DataFrame, said: Sequence[str]) -> Iterator[tuple[str, ...]]
             low, high = clopper_pearson(counts[:1], np.array([len(part)]))
             ends = interval_text(float(low[0]), float(high[0]))
             first, *others = (share_text(count / len(part)) for count in counts)
-            oracle = _of(part["oracle_right"].eq(True), part["oracle_right"])
-            yield title, name, str(len(part)), first, ends, *others, oracle
+            yield title, name, str(len(part)), first, ends, *others, *_beside(part)
 
 
 def _nothing(

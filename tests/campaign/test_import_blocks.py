@@ -71,11 +71,12 @@ def test_a_block_in_which_the_sensor_moves_is_left_out(tmp_path, samples):
     ({"--block": 39}, "560 samples are no multiple of the 39 of a block (--block): 546 or 585"),
     ({"--block": 80}, "blocks of 80 samples are no positions"),
     ({"--block": 3}, "block: must be at least 4"),
+    ({"--means": None}, "a table of means (--means) has a row for each position, no block"),
     ({"--exclude": "1s-2s:moved"}, "has no time; name blocks by their numbers, as 13:moved"),
 ])  # fmt: skip
 def test_what_is_no_log_of_blocks_is_refused_in_a_line(tmp_path, samples, change, says):
     options = {"--columns": "fx=u,fy=v,fz=w", "--block": SIZE, **change}
-    words = [word for option in options.items() for word in option]
+    words = [word for option in options.items() for word in option if word is not None]
     path = write(tmp_path, samples)
     assert says in refusal("import", path, *words, "--out", tmp_path / "out")
     assert not (tmp_path / "out").exists()

@@ -11,6 +11,7 @@ from snakemake_helpers import snakemake
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.importing.logs import import_log
+from accelstudy.campaign.importing.public import import_settings, public_file
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.files.reading import read_layer
 from accelstudy.files.tables import read_table
@@ -164,7 +165,10 @@ def said(verdict, found=(), true=("thermal_bias",), recorded=True, explanations=
     ("family or set", {"verdict": "named", "found": ["warm_up"], "recorded": False}),
     ("family or set", {"verdict": "unknown", "explanations": [
         {"names": ["thermal_bias", "lag"], "posterior": 0.5},
-        {"names": ["thermal_bias"], "posterior": 0.45}]}),
+        {"names": ["thermal_curve"], "posterior": 0.45}]}),
+    ("unknown", {"verdict": "unknown", "explanations": [
+        {"names": ["thermal_bias"], "posterior": 0.5},
+        {"names": ["hysteresis"], "posterior": 0.45}]}),
     ("other name", {"verdict": "named", "found": ["warm_up"]}),
     ("other name", {"verdict": "named", "found": ["cubic_scale"], "recorded": False}),
     ("other name", {"verdict": "gross_error", "found": [BUMPED]}),
@@ -220,6 +224,18 @@ def test_two_cases_of_a_real_log(tmp_path):
     assert warm["said"] == "right name"
     assert warm["p_known"] < 1e-6
     assert abs(warm["ratio"] - 1) < 4 * warm["ratio_sigma"]
+
+
+@needs_data
+def test_what_is_beside_a_large_effect_has_an_answer():
+    """It is found in what the refit leaves, whose slopes tell otherwise than those of the fit."""
+    name = "mpu9150-2"
+    path, settings = public_file(name, DATA), import_settings(name)
+    log = Donor.opened(name, path, settings, CONFIG.interval_s)
+    pair = ("thermal_bias", "cubic_scale")
+    row = answered(CONFIG, log, Case(name, pair, 400, recorded=True, number=4))
+    assert row["error"] == ""
+    assert "thermal_bias" in json.loads(row["found"])
 
 
 def test_the_score_is_that_of_the_study():

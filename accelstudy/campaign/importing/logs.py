@@ -59,6 +59,10 @@ def import_all(
         return import_sensors(paths, settings)
     if len(paths) > 1 or settings.sensors:
         raise InputError("a table of means is one file of one sensor")
+    if settings.block is not None:
+        raise InputError(
+            "a table of means (--means) has a row for each position, no block (--block)"
+        )
     return {"": import_means(paths[0], settings)}
 
 
