@@ -32,7 +32,7 @@ from accelstudy.diagnosis.consequences import (
 )
 from accelstudy.diagnosis.decision.posterior import weigh
 from accelstudy.diagnosis.decision.problem import Problem, fit_base, is_exact, pose
-from accelstudy.diagnosis.decision.statement import certain_of
+from accelstudy.diagnosis.decision.statement import with_purity
 from accelstudy.diagnosis.decision.verdict import (
     Finding,
     Named,
@@ -43,10 +43,10 @@ from accelstudy.diagnosis.decision.verdict import (
     sigma_holds,
     tests_of_noise,
     unit_variance,
+    without_the_refuted,
     worst_of,
 )
 from accelstudy.diagnosis.evidence.detection import SIMULATIONS, Chance, detect
-from accelstudy.diagnosis.evidence.noise_tests import NoiseTest
 from accelstudy.diagnosis.held_out import measured_gap, predicted_gap
 from accelstudy.diagnosis.result import Diagnosis, Verdict, level_of_effects
 from accelstudy.sensors.plausibility import implausible_parameters
@@ -86,7 +86,7 @@ def diagnose(
     effects = verdict.extended.effects
     return Diagnosis(
         **vars(verdict),
-        certain=certain_of(verdict.verdict, verdict.credible_set, problem.examined),
+        certain=with_purity(finding.certain, problem.examined),
         groups=tuple(problem.groups),
         location=location.shares,
         location_by_chance=location.by_chance,
@@ -138,31 +138,32 @@ def _judged(
     stated, frame = base.level.known, problem.frame
     level = level_of_effects(stated)
     finding, weighing = Finding("no_effect", frame), None
-    tests: tuple[NoiseTest, ...] = ()
     if is_exact(base.solution):
         reason = "the campaign is its own model: what is left are rounding errors"
         finding = Finding("no_effect", frame, reason)
     elif detection.p_value < level:
         weighing = weigh(problem, detection, chance)
         finding = find(problem, weighing)
-        tests = tests_of_noise(problem, finding.frame, campaign, chance)
     else:
-        tests = tests_of_noise(problem, frame, campaign, chance)
-        worst = worst_of(tests)
+        worst = worst_of(tests_of_noise(problem, frame, campaign, chance))
         if worst is not None:
             weighing = weigh(problem, detection, chance)
             finding = judge_noise(problem, weighing.posterior, worst)
 
-    variance = unit_variance(problem, finding.frame)
-    named = describe(problem, detection, finding, tests, campaign.positions, variance)
     gap = measured_gap(finding, base.solution)
-    if weighing is not None and finding.verdict in ("named", "narrowed"):
+    if weighing is not None and finding.chosen and finding.verdict != "gross_error":
         with stage("held-out positions"):
             beyond = detection.by_chance.beyond(level)
-            given = variance if stated else None
+            given = unit_variance(problem, finding.frame) if stated else None
             gap = predicted_gap(
                 gap, problem, weighing, finding, beyond, given, [seeds[k] for k in (1, 2, 4)]
             )
+        if gap.held_out is not None and gap.held_out.refutes:
+            finding = without_the_refuted(finding, frame, gap.held_out)
+            gap = measured_gap(finding, base.solution)
+    variance = unit_variance(problem, finding.frame)
+    tests = () if is_exact(base.solution) else tests_of_noise(problem, finding.frame, campaign, chance)
+    named = describe(problem, detection, finding, tests, campaign.positions, variance)
     reason, verdict = finding.reason, finding.verdict
     if recognised is not None:
         verdict, reason = "gross_error", recognised.reason

@@ -36,6 +36,8 @@ SPLITS = 300
 RESAMPLES = 1000
 SIGNIFICANT = 1.645
 """One-sided 5 % of the standard normal distribution."""
+REFUTES = 1.645
+"""Shortfall of a correction that a right model has in 5 % of cases."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,8 @@ class HeldOutGap:
     held : tuple of int, indices of the held-out positions
     misses : (tuple, tuple) of float, m/s², rms misclosure of each of them by either model
     needed : float, z beyond which the correction is right at 5 %, given that it has a name
+    short : float, what the correction falls short of, or is beyond, over its sigma: standard normal
+        if the extended model is right
     """
 
     before: float
@@ -61,11 +65,17 @@ class HeldOutGap:
     held: tuple[int, ...]
     misses: tuple[tuple[float, ...], tuple[float, ...]]
     needed: float = SIGNIFICANT
+    short: float = 0.0
 
     @property
     def significant(self) -> bool:
         """Whether the correction is right at 5 %."""
         return self.z > self.needed
+
+    @property
+    def refutes(self) -> bool:
+        """Whether the residuals do not shrink where those of the extended model would have to."""
+        return self.after >= self.before and self.short < -REFUTES
 
 
 def split_positions(
@@ -132,6 +142,9 @@ def held_out_gap(
     resampled = gain[rng.integers(len(gain), size=(RESAMPLES, len(gain)))].mean(axis=1)
     low, high = np.quantile(resampled, [0.025, 0.975])
     spread = np.einsum("mu,uv,mv->", second.slope, extended.cofactors, second.slope)
+    also = d @ second.slope
+    # What is left along the correction: the noise there, and that of the extended model.
+    spare = float(d @ d + also @ extended.cofactors @ also)
     return HeldOutGap(
         before=float(before.mean()),
         after=float(after.mean()),
@@ -140,6 +153,7 @@ def held_out_gap(
         z=float(d @ first.white / np.sqrt(size * variance)) if size > 0 else 0.0,
         held=tuple(int(i) for i in held),
         misses=(first.misses, second.misses),
+        short=float(d @ second.white / np.sqrt(spare * variance)) if spare > 0 else 0.0,
     )
 
 

@@ -146,10 +146,12 @@ class Posterior:
     @cached_property
     def explanations(self) -> tuple[Explanation, ...]:
         """What is told, most probable first."""
-        return tuple(
-            Explanation(one.names, one.classes, p)
-            for one, p in zip(self.told, _shares(self.told), strict=True)
-        )
+        return _explanations(self.told, _shares(self.told))
+
+    @property
+    def each(self) -> tuple[Explanation, ...]:
+        """All that were weighed, each by itself, most probable first."""
+        return _explanations(self.all, self.probabilities)
 
     @property
     def credible_set(self) -> tuple[Explanation, ...]:
@@ -165,6 +167,11 @@ class Posterior:
     def of_noise(self) -> float:
         """Probability that nothing is wrong but the noise."""
         return sum(one.posterior for one in self.explanations if one.names[0] in NOISES)
+
+
+def _explanations(weighed: Sequence[Weighed], p: Sequence[float]) -> tuple[Explanation, ...]:
+    """Weighed things with their probabilities."""
+    return tuple(Explanation(a.names, a.classes, b) for a, b in zip(weighed, p, strict=True))
 
 
 def _shares(weighed: Sequence[Weighed]) -> tuple[float, ...]:

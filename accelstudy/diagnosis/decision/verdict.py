@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from accelstudy.basics.wording import comma_list, words
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision import priors
 from accelstudy.diagnosis.decision.posterior import (
+    CREDIBLE,
     Explanation,
     Posterior,
     Weighed,
@@ -24,6 +26,7 @@ from accelstudy.diagnosis.decision.posterior import (
 )
 from accelstudy.diagnosis.decision.problem import Problem, pose
 from accelstudy.diagnosis.decision.refits import best_refit
+from accelstudy.diagnosis.decision.statement import Part, statement
 from accelstudy.diagnosis.evidence.detection import Chance, Detection
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.hypotheses import equivalents, strongest, weigh_singles
@@ -42,13 +45,20 @@ from accelstudy.diagnosis.evidence.noise_tests import (
     tail_test,
     within_hold_test,
 )
+from accelstudy.diagnosis.prediction import HeldOutGap
 from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.groups import LACK_OF_FIT, LackOfFit, clusters
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis, Spaces
 from accelstudy.diagnosis.space.residuals import Residuals
+from accelstudy.effects import effect_names
 
 LARGE = 300.0
 """Noncentrality beyond which first order is not enough, and a refit judges an effect."""
+PAIRS = 5
+"""Pairs that are refitted where the best explanation leaves a misfit."""
+NEARLY_ALL = 0.95
+"""Share of the disagreement that something outside of the catalogue hardly ever has in common with
+one effect of it."""
 LEVEL_NOISE = 0.01
 """Family-wise level of all tests of the noise but that of its level, which has `REFUTED`. With the
 test for anything that is missing they make 5 % false alarms."""
@@ -83,9 +93,11 @@ class Finding:
     verdict : str, "no_effect", "named", "narrowed", "gross_error", "noise_model" or "unknown"
     frame : Frame, of the fit with what was chosen, or of the base fit
     reason : str
-    chosen : tuple of Choice
+    chosen : tuple of Choice; of the unknown, what is certain
     posterior : Posterior or None, where something is missing
     says_the_level : bool, whether the reason says how large the residuals are
+    left_over : bool, whether the best explanation leaves more than noise
+    certain : tuple of Part, what is missing whatever else is open
     """
 
     verdict: str
@@ -94,6 +106,20 @@ class Finding:
     chosen: tuple[Choice, ...] = ()
     posterior: Posterior | None = None
     says_the_level: bool = False
+    left_over: bool = False
+    certain: tuple[Part, ...] = ()
+
+    @property
+    def alternatives(self) -> tuple[Explanation, ...]:
+        """Explanations any of which would be what was chosen."""
+        if self.verdict != "unknown":
+            return self.credible_set
+        added = {choice.members for choice in self.chosen}
+        parts = [part for part in self.certain if part.names[0].members in added]
+        return tuple(
+            Explanation(tuple(n.name for n in one), tuple(n.members for n in one), parts[0].posterior)
+            for one in product(*(part.names for part in parts))
+        )
 
     @property
     def credible_set(self) -> tuple[Explanation, ...]:
@@ -129,11 +155,23 @@ class Named:
 
 
 def find(problem: Problem, weighing: Weighing) -> Finding:
-    """Say what is missing, given that something is."""
+    """Say what is missing, given that something is, and add what is certain to the model."""
     posterior = weighing.posterior
     strongest = next((one for one in posterior.all if len(one.best) == 1), None)
     if strongest is not None and _is_large(problem, strongest):
-        posterior = _judged_by_refits(problem, weighing, strongest)
+        posterior = _judged_by_refits(problem, weighing, strongest, 1)
+    finding = _judged(problem, weighing, posterior)
+    if finding.left_over and strongest is not None:
+        # To first order the best explanation was enough; the others were not asked by their refits.
+        posterior = _judged_by_refits(problem, weighing, strongest, PAIRS)
+        finding = _judged(problem, weighing, posterior)
+    if finding.verdict == "unknown":
+        return _with_the_certain(problem, weighing, finding)
+    return replace(finding, certain=statement(finding.credible_set).certain)
+
+
+def _judged(problem: Problem, weighing: Weighing, posterior: Posterior) -> Finding:
+    """Judge the explanations of a posterior."""
     top = posterior.top
     if not top.best:
         return _without_a_fit(problem, posterior)
@@ -147,7 +185,7 @@ def find(problem: Problem, weighing: Weighing) -> Finding:
     if left:
         added = comma_list([words(name) for name in top.names])
         reason = f"with {added} added, the residuals are still {left}"
-        return Finding("unknown", problem.frame, reason, posterior=posterior)
+        return Finding("unknown", problem.frame, reason, posterior=posterior, left_over=True)
     return _with_a_fit(problem, posterior, best, solution)
 
 
@@ -204,25 +242,90 @@ def _explained(names: Sequence[str]) -> str:
     return f"{comma_list([words(name) for name in names])} explain{'s' if len(names) == 1 else ''}"
 
 
+def _with_the_certain(problem: Problem, weighing: Weighing, finding: Finding) -> Finding:
+    """Add what is certain, whatever else is missing.
+
+    What is in no catalogue may be imitated by an effect of it, though hardly ever as a whole. Where
+    more is missing than the catalogue explains, an effect is certain if it explains nearly all.
+    """
+    posterior = finding.posterior
+    assert posterior is not None
+    parts = statement(posterior.each).certain
+    chosen = []
+    for part in parts:
+        if (name := part.names[0]).name in effect_names():
+            shapes = (h for one in posterior.all for h in one.best if h.name == name.name)
+            best = next(shapes, weighing.singles.best[name.name])
+            chosen.append(Choice(best, name.members, part.posterior))
+    if not chosen:
+        return replace(finding, certain=parts)
+    fit = best_refit(problem.examined, weighing.singles, [(c.best, c.members) for c in chosen])
+    beyond = sum(one.posterior for one in posterior.each if UNKNOWN in one.names)
+    if fit is None or (
+        (finding.left_over or beyond > 1 - CREDIBLE) and _explained_by(problem, fit[1]) < NEARLY_ALL
+    ):
+        return finding
+    added = tuple(replace(c, best=best) for c, best in zip(chosen, fit[0], strict=True))
+    return replace(finding, frame=Frame.of(fit[1]), chosen=added, certain=parts)
+
+
+def without_the_refuted(finding: Finding, frame: Frame, held: HeldOutGap) -> Finding:
+    """What is said where the held-out positions refute what was chosen: nothing of it is certain.
+
+    Parameters
+    ----------
+    finding : Finding
+    frame : Frame, of the base fit
+    held : HeldOutGap
+    """
+    reason = finding.reason
+    if finding.verdict != "unknown":
+        named = comma_list([words(choice.best.name) for choice in finding.chosen])
+        reason = (
+            f"{named} fit{'s' * (len(finding.chosen) == 1)} all positions best, but predict"
+            f"{'s' * (len(finding.chosen) == 1)} those that were held out no better than nothing "
+            f"does: the mean square of their residuals goes from {held.before:.3g} to "
+            f"{held.after:.3g} times that of the noise"
+        )
+    return Finding("unknown", frame, reason, posterior=finding.posterior)
+
+
+def _explained_by(problem: Problem, solution: Solution) -> float:
+    """Share of the disagreement that a refit takes away; without a given sigma, of all residuals."""
+    base = problem.frame.solution
+    noise = float(problem.evidence.level.known)
+    before, after = (max(s.omega - s.redundancy * noise, 0.0) for s in (base, solution))
+    return 1 - after / before if before > 0 else 0.0
+
+
 def _is_large(problem: Problem, top: Weighed) -> bool:
     """Whether an effect is so large that its signature to first order is not enough."""
     z, basis = problem.residuals.z, top.best[0].basis
     return top.best[0].effect is not None and float(np.sum((z @ basis) ** 2)) > LARGE
 
 
-def _judged_by_refits(problem: Problem, weighing: Weighing, single: Weighed) -> Posterior:
-    """Posterior where an effect is large: it alone, or with another one in what its refit leaves.
+def _judged_by_refits(
+    problem: Problem, weighing: Weighing, single: Weighed, count: int
+) -> Posterior:
+    """Posterior by refits: an effect alone, with another one in what its refit leaves, and pairs.
 
     To first order a large effect leaves so much that anything would seem to be beside it.
+
+    Parameters
+    ----------
+    problem : Problem
+    weighing : Weighing
+    single : Weighed, the effect
+    count : int, pairs that are refitted, the most probable to first order
     """
     pairs = [one for one in weighing.pairs if len(one.best) == 2]
-    strongest_pair = sorted(pairs, key=lambda one: one.log_weight)[-1:]
-    refitted = [_refitted(problem, weighing, one) for one in (single, *strongest_pair)]
+    strongest_pairs = sorted(pairs, key=lambda one: -one.log_weight)[:count]
+    refitted = [_refitted(problem, weighing, one) for one in (single, *strongest_pairs)]
     weighed = [one for one, _ in refitted]
     alone, solution = refitted[0]
     if solution is not None:
         weighed += _beside(problem, len(weighing.classes), alone, solution)
-    others = [one for one in weighing.alone if one.best and one.names != single.names]
+    others = [one for one in weighing.alone if one.names != single.names]
     return Posterior.of([*weighed, *others, *weighing.noises])
 
 
