@@ -87,6 +87,7 @@ def diagnose(
     return Diagnosis(
         **vars(verdict),
         certain=with_purity(finding.certain, problem.examined),
+        open=finding.open,
         groups=tuple(problem.groups),
         location=location.shares,
         location_by_chance=location.by_chance,
@@ -162,7 +163,9 @@ def _judged(
             finding = without_the_refuted(finding, frame, gap.held_out)
             gap = measured_gap(finding, base.solution)
     variance = unit_variance(problem, finding.frame)
-    tests = () if is_exact(base.solution) else tests_of_noise(problem, finding.frame, campaign, chance)
+    tests = (
+        () if is_exact(base.solution) else tests_of_noise(problem, finding.frame, campaign, chance)
+    )
     named = describe(problem, detection, finding, tests, campaign.positions, variance)
     reason, verdict = finding.reason, finding.verdict
     if recognised is not None:

@@ -129,6 +129,8 @@ class Diagnosis(Verdict):
     Attributes
     ----------
     certain : tuple of Part, what is missing whatever else is open
+    open : tuple of Explanation, what may be missing beside that, most probable first; one without
+        names stands for nothing
     groups : tuple of str, groups of regressors that the campaign can show
     location : dict of group to the share of the excess χ², where it tells
     location_by_chance : dict of these groups to the share that any pattern has on average
@@ -142,6 +144,7 @@ class Diagnosis(Verdict):
     """
 
     certain: tuple[Part, ...]
+    open: tuple[Explanation, ...]
     groups: tuple[str, ...]
     location: Mapping[str, float]
     location_by_chance: Mapping[str, float]

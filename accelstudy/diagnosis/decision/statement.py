@@ -94,9 +94,7 @@ class Statement:
     open: tuple[Explanation, ...]
 
 
-def statement(
-    explanations: Iterable[Explanation], probability: float = CREDIBLE
-) -> Statement:
+def statement(explanations: Iterable[Explanation], probability: float = CREDIBLE) -> Statement:
     """Say what explanations leave no doubt of, and what they leave open.
 
     A name is certain if the explanations that have it hold enough together. A family is certain if

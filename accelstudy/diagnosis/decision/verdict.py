@@ -56,7 +56,7 @@ LARGE = 300.0
 """Noncentrality beyond which first order is not enough, and a refit judges an effect."""
 PAIRS = 5
 """Pairs that are refitted where the best explanation leaves a misfit."""
-NEARLY_ALL = 0.95
+NEARLY_ALL = 0.9
 """Share of the disagreement that something outside of the catalogue hardly ever has in common with
 one effect of it."""
 LEVEL_NOISE = 0.01
@@ -98,6 +98,7 @@ class Finding:
     says_the_level : bool, whether the reason says how large the residuals are
     left_over : bool, whether the best explanation leaves more than noise
     certain : tuple of Part, what is missing whatever else is open
+    open : tuple of Explanation, what may be missing beside that
     """
 
     verdict: str
@@ -108,6 +109,7 @@ class Finding:
     says_the_level: bool = False
     left_over: bool = False
     certain: tuple[Part, ...] = ()
+    open: tuple[Explanation, ...] = ()
 
     @property
     def alternatives(self) -> tuple[Explanation, ...]:
@@ -117,7 +119,9 @@ class Finding:
         added = {choice.members for choice in self.chosen}
         parts = [part for part in self.certain if part.names[0].members in added]
         return tuple(
-            Explanation(tuple(n.name for n in one), tuple(n.members for n in one), parts[0].posterior)
+            Explanation(
+                tuple(n.name for n in one), tuple(n.members for n in one), parts[0].posterior
+            )
             for one in product(*(part.names for part in parts))
         )
 
@@ -167,7 +171,8 @@ def find(problem: Problem, weighing: Weighing) -> Finding:
         finding = _judged(problem, weighing, posterior)
     if finding.verdict == "unknown":
         return _with_the_certain(problem, weighing, finding)
-    return replace(finding, certain=statement(finding.credible_set).certain)
+    says = statement(finding.credible_set)
+    return replace(finding, certain=says.certain, open=says.open)
 
 
 def _judged(problem: Problem, weighing: Weighing, posterior: Posterior) -> Finding:
@@ -250,15 +255,14 @@ def _with_the_certain(problem: Problem, weighing: Weighing, finding: Finding) ->
     """
     posterior = finding.posterior
     assert posterior is not None
-    parts = statement(posterior.each).certain
-    chosen = []
-    for part in parts:
+    says, chosen = statement(posterior.each), []
+    for part in says.certain:
         if (name := part.names[0]).name in effect_names():
             shapes = (h for one in posterior.all for h in one.best if h.name == name.name)
             best = next(shapes, weighing.singles.best[name.name])
             chosen.append(Choice(best, name.members, part.posterior))
     if not chosen:
-        return replace(finding, certain=parts)
+        return replace(finding, certain=says.certain, open=says.open)
     fit = best_refit(problem.examined, weighing.singles, [(c.best, c.members) for c in chosen])
     beyond = sum(one.posterior for one in posterior.each if UNKNOWN in one.names)
     if fit is None or (
@@ -266,7 +270,8 @@ def _with_the_certain(problem: Problem, weighing: Weighing, finding: Finding) ->
     ):
         return finding
     added = tuple(replace(c, best=best) for c, best in zip(chosen, fit[0], strict=True))
-    return replace(finding, frame=Frame.of(fit[1]), chosen=added, certain=parts)
+    frame = Frame.of(fit[1])
+    return replace(finding, frame=frame, chosen=added, certain=says.certain, open=says.open)
 
 
 def without_the_refuted(finding: Finding, frame: Frame, held: HeldOutGap) -> Finding:
