@@ -296,7 +296,7 @@ def without_the_refuted(finding: Finding, frame: Frame, held: HeldOutGap) -> Fin
 
 
 def _explained_by(problem: Problem, solution: Solution) -> float:
-    """Share of the disagreement that a refit takes away; without a given sigma, of all residuals."""
+    """Share of the disagreement that a refit takes away; of all of Ω where no sigma is given."""
     base = problem.frame.solution
     noise = float(problem.evidence.level.known)
     before, after = (max(s.omega - s.redundancy * noise, 0.0) for s in (base, solution))

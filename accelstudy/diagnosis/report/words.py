@@ -33,6 +33,7 @@ GROUPS = {
     "repeat": "between repeats of the same attitude",
     "slow_time": "slowly with time",
     "temperature": "with temperature",
+    "temperature_rate": "with the rate of temperature",
     "previous_position": "with the position before",
     "single_position": "in one single position",
 }
