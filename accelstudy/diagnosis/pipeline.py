@@ -43,6 +43,7 @@ from accelstudy.diagnosis.decision.verdict import (
     sigma_holds,
     tests_of_noise,
     unit_variance,
+    with_what_is_certain,
     without_the_refuted,
     worst_of,
 )
@@ -150,6 +151,8 @@ def _judged(
         if worst is not None:
             weighing = weigh(problem, detection, chance)
             finding = judge_noise(problem, weighing.posterior, worst)
+    if weighing is not None:
+        finding = with_what_is_certain(problem, weighing, finding)
 
     gap = measured_gap(finding, base.solution)
     if weighing is not None and finding.chosen and finding.verdict != "gross_error":

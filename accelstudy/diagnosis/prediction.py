@@ -157,7 +157,7 @@ def held_out_gap(
         z=float(d @ first.white / np.sqrt(size * variance)) if size > 0 else 0.0,
         held=tuple(int(i) for i in held),
         misses=(first.misses, second.misses),
-        short=missed / np.sqrt(noise) if noise > 0 else 0.0,
+        short=float(missed / np.sqrt(noise)) if noise > 0 else 0.0,
     )
 
 

@@ -94,7 +94,7 @@ class Statement:
     open: tuple[Explanation, ...]
 
 
-def statement(explanations: Iterable[Explanation], probability: float = CREDIBLE) -> Statement:
+def statement(explanations: Sequence[Explanation], probability: float = CREDIBLE) -> Statement:
     """Say what explanations leave no doubt of, and what they leave open.
 
     A name is certain if the explanations that have it hold enough together. A family is certain if
@@ -110,13 +110,20 @@ def statement(explanations: Iterable[Explanation], probability: float = CREDIBLE
     while (part := _certain(left, probability)) is not None:
         certain.append(part)
         left = [_without(one, [name.name for name in part.names]) for one in left]
+    return Statement(tuple(certain), beside(explanations, certain))
+
+
+def beside(explanations: Sequence[Explanation], parts: Iterable[Part]) -> tuple[Explanation, ...]:
+    """What explanations have beside some parts, most probable first; empty if they have nothing."""
+    left = list(explanations)
+    for part in parts:
+        left = [_without(one, [name.name for name in part.names]) for one in left]
     rest: dict[Names, Explanation] = {}
     for one in left:
         same = rest.get(one.names)
         p = one.posterior + (0.0 if same is None else same.posterior)
         rest[one.names] = replace(one, posterior=p)
-    beside = sorted(rest.values(), key=lambda one: -one.posterior)
-    return Statement(tuple(certain), tuple(beside) if any(rest) else ())
+    return tuple(sorted(rest.values(), key=lambda one: -one.posterior)) if any(rest) else ()
 
 
 def _certain(explanations: Sequence[Explanation], probability: float) -> Part | None:

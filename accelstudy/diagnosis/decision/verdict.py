@@ -159,7 +159,7 @@ class Named:
 
 
 def find(problem: Problem, weighing: Weighing) -> Finding:
-    """Say what is missing, given that something is, and add what is certain to the model."""
+    """Say what is missing, given that something is."""
     posterior = weighing.posterior
     strongest = next((one for one in posterior.all if len(one.best) == 1), None)
     if strongest is not None and _is_large(problem, strongest):
@@ -169,10 +169,7 @@ def find(problem: Problem, weighing: Weighing) -> Finding:
         # To first order the best explanation was enough; the others were not asked by their refits.
         posterior = _judged_by_refits(problem, weighing, strongest, PAIRS)
         finding = _judged(problem, weighing, posterior)
-    if finding.verdict == "unknown":
-        return _with_the_certain(problem, weighing, finding)
-    says = statement(finding.credible_set)
-    return replace(finding, certain=says.certain, open=says.open)
+    return finding
 
 
 def _judged(problem: Problem, weighing: Weighing, posterior: Posterior) -> Finding:
@@ -247,31 +244,72 @@ def _explained(names: Sequence[str]) -> str:
     return f"{comma_list([words(name) for name in names])} explain{'s' if len(names) == 1 else ''}"
 
 
-def _with_the_certain(problem: Problem, weighing: Weighing, finding: Finding) -> Finding:
-    """Add what is certain, whatever else is missing.
-
-    What is in no catalogue may be imitated by an effect of it, though hardly ever as a whole. Where
-    more is missing than the catalogue explains, an effect is certain if it explains nearly all.
-    """
+def with_what_is_certain(problem: Problem, weighing: Weighing, finding: Finding) -> Finding:
+    """Say what is certain, and add it to the fit whatever else is missing."""
+    if finding.verdict != "unknown":
+        says = statement(finding.credible_set)
+        return replace(finding, certain=says.certain, open=says.open)
     posterior = finding.posterior
     assert posterior is not None
-    says, chosen = statement(posterior.each), []
-    for part in says.certain:
+    beyond = sum(one.posterior for one in posterior.each if UNKNOWN in one.names)
+    if finding.left_over or beyond > 1 - CREDIBLE:
+        posterior = posterior.doubting(_perhaps_imitations(problem, weighing, posterior))
+    says = statement(posterior.each)
+    finding = replace(finding, posterior=posterior, certain=says.certain, open=says.open)
+    chosen = [choice for _, choice in _certain_effects(weighing, posterior)]
+    if not chosen:
+        return finding
+    fit = _fit_of(problem, weighing, chosen)
+    if fit is None:
+        return replace(finding, certain=(), open=())
+    added = tuple(replace(c, best=best) for c, best in zip(chosen, fit[0], strict=True))
+    return replace(finding, frame=Frame.of(fit[1]), chosen=added)
+
+
+def _certain_effects(weighing: Weighing, posterior: Posterior) -> list[tuple[Part, Choice]]:
+    """Effects and families of effects that are certain, each with its most probable member."""
+    chosen = []
+    for part in statement(posterior.each).certain:
         if (name := part.names[0]).name in effect_names():
             shapes = (h for one in posterior.all for h in one.best if h.name == name.name)
             best = next(shapes, weighing.singles.best[name.name])
-            chosen.append(Choice(best, name.members, part.posterior))
+            chosen.append((part, Choice(best, name.members, part.posterior)))
+    return chosen
+
+
+def _perhaps_imitations(problem: Problem, weighing: Weighing, posterior: Posterior) -> set[str]:
+    """Names of what seems certain, and yet does not explain nearly all that is left without it.
+
+    More is missing than the catalogue explains. An effect of it may imitate what is in none, though
+    hardly ever nearly all of that.
+    """
+    seeming = _certain_effects(weighing, posterior)
+    chosen, names = [choice for _, choice in seeming], set[str]()
+    after = _disagreement(problem, _fit_of(problem, weighing, chosen))
+    for i, (part, _) in enumerate(seeming):
+        without = _fit_of(problem, weighing, [*chosen[:i], *chosen[i + 1 :]])
+        if after > (1 - NEARLY_ALL) * _disagreement(problem, without):
+            names |= {name.name for name in part.names}
+    return names
+
+
+def _fit_of(
+    problem: Problem, weighing: Weighing, chosen: Sequence[Choice]
+) -> tuple[list[Hypothesis], Solution] | None:
+    """Fit with what was chosen, the base fit if that is nothing; None if it has no solution."""
     if not chosen:
-        return replace(finding, certain=says.certain, open=says.open)
-    fit = best_refit(problem.examined, weighing.singles, [(c.best, c.members) for c in chosen])
-    beyond = sum(one.posterior for one in posterior.each if UNKNOWN in one.names)
-    if fit is None or (
-        (finding.left_over or beyond > 1 - CREDIBLE) and _explained_by(problem, fit[1]) < NEARLY_ALL
-    ):
-        return finding
-    added = tuple(replace(c, best=best) for c, best in zip(chosen, fit[0], strict=True))
-    frame = Frame.of(fit[1])
-    return replace(finding, frame=frame, chosen=added, certain=says.certain, open=says.open)
+        return [], problem.frame.solution
+    classes = [(choice.best, choice.members) for choice in chosen]
+    return best_refit(problem.examined, weighing.singles, classes)
+
+
+def _disagreement(problem: Problem, fit: tuple[list[Hypothesis], Solution] | None) -> float:
+    """Ω beyond that of the given noise, all of it if none is given; infinite without a solution."""
+    if fit is None:
+        return np.inf
+    solution = fit[1]
+    noise = solution.redundancy * float(problem.evidence.level.known)
+    return max(solution.omega - noise, 1e-9)
 
 
 def without_the_refuted(finding: Finding, frame: Frame, held: HeldOutGap) -> Finding:
@@ -292,15 +330,11 @@ def without_the_refuted(finding: Finding, frame: Frame, held: HeldOutGap) -> Fin
             f"does: the mean square of their residuals goes from {held.before:.3g} to "
             f"{held.after:.3g} times that of the noise"
         )
-    return Finding("unknown", frame, reason, posterior=finding.posterior)
-
-
-def _explained_by(problem: Problem, solution: Solution) -> float:
-    """Share of the disagreement that a refit takes away; of all of Ω where no sigma is given."""
-    base = problem.frame.solution
-    noise = float(problem.evidence.level.known)
-    before, after = (max(s.omega - s.redundancy * noise, 0.0) for s in (base, solution))
-    return 1 - after / before if before > 0 else 0.0
+    assert finding.posterior is not None
+    names = [name for choice in finding.chosen for name in choice.members]
+    posterior = finding.posterior.doubting(names)
+    open_now = statement(posterior.each).open
+    return Finding("unknown", frame, reason, posterior=posterior, open=open_now)
 
 
 def _is_large(problem: Problem, top: Weighed) -> bool:

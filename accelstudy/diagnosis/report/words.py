@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from accelstudy.basics.wording import comma_list, probability, words
 from accelstudy.diagnosis.decision.posterior import CREDIBLE, Explanation, of_effects
-from accelstudy.diagnosis.decision.priors import SURE
+from accelstudy.diagnosis.decision.priors import MANY, SURE
 from accelstudy.diagnosis.decision.statement import (
     Name,
     Part,
@@ -231,7 +231,7 @@ def without_a_name(set_says: Statement, beside: str = "something else") -> str:
     lacks = f"The model lacks {comma_list([_part(part) for part in effects])}"
     more = [one for one in set_says.open if one.names and one.posterior >= WORTH]
     surely = len(effects) < len(set_says.certain) or _surely_more(set_says, CREDIBLE)
-    if any(map(of_effects, more)):
+    if any(map(of_effects, more)) and len(more) <= MANY:
         return f"{lacks}, and {'' if surely else 'perhaps '}{beside}: {_or(more)}."
     if surely:
         return f"{lacks}; what is missing beside it has no name here."
