@@ -5,7 +5,8 @@
 3. The total evidence that anything is missing is compared with noise alone (`detect`).
 4. If anything is, every hypothesis and every pair is weighed, which gives the verdict (`weigh`,
    `find`). If not, the tests of the noise decide (`tests_of_noise`, `judge_noise`).
-5. Positions that were not used confirm an effect, or do not (`predicted_gap`).
+5. What is certain is added, even if the whole has no name (`with_what_is_certain`).
+6. Positions that were not used confirm an effect, or do not (`predicted_gap`), or refute it.
 
 That is all that `judge` does. `diagnose` adds what follows from the verdict: where the disagreement
 lives, what it changed and is worth, what is excluded, and where to measure next.
@@ -30,6 +31,7 @@ from accelstudy.diagnosis.consequences import (
     parameter_changes,
     separating_positions,
 )
+from accelstudy.diagnosis.decision.certain import with_what_is_certain, without_the_refuted
 from accelstudy.diagnosis.decision.posterior import weigh
 from accelstudy.diagnosis.decision.problem import Problem, fit_base, is_exact, pose
 from accelstudy.diagnosis.decision.statement import with_purity
@@ -43,8 +45,6 @@ from accelstudy.diagnosis.decision.verdict import (
     sigma_holds,
     tests_of_noise,
     unit_variance,
-    with_what_is_certain,
-    without_the_refuted,
     worst_of,
 )
 from accelstudy.diagnosis.evidence.detection import SIMULATIONS, Chance, detect

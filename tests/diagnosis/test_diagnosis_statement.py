@@ -161,7 +161,11 @@ def test_the_unknown_is_said_by_families():
 
 def test_purity_is_the_least_cosine_of_two_names():
     """Of two names it is that of the shapes that are most alike."""
-    turned = {"quadratic_scale": (0.1, 0.7), "scale_asymmetry": (0.4,), "cross_coupling": (1.3, 1.5)}
+    turned = {
+        "quadratic_scale": (0.1, 0.7),
+        "scale_asymmetry": (0.4,),
+        "cross_coupling": (1.3, 1.5),
+    }
     shapes = {
         name: [SimpleNamespace(ideal=np.array([[np.cos(a)], [np.sin(a)]])) for a in angles]
         for name, angles in turned.items()

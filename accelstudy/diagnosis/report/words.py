@@ -229,7 +229,8 @@ def without_a_name(set_says: Statement, beside: str = "something else") -> str:
     if not effects:
         return "Something is missing from the model, and it has no name here."
     lacks = f"The model lacks {comma_list([_part(part) for part in effects])}"
-    more = [one for one in set_says.open if one.names and one.posterior >= WORTH]
+    worth = [one for one in set_says.open if one.names and one.posterior >= WORTH]
+    more = sorted(worth, key=lambda one: not of_effects(one))
     surely = len(effects) < len(set_says.certain) or _surely_more(set_says, CREDIBLE)
     if any(map(of_effects, more)) and len(more) <= MANY:
         return f"{lacks}, and {'' if surely else 'perhaps '}{beside}: {_or(more)}."
