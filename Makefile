@@ -49,9 +49,9 @@ test-processors: $(READY) ## run all tests with the instructions of other proces
 	  echo "$$other"; env "$$other" $(TEST) || exit; done
 
 test-processors-part: $(READY) ## run a few tests with the instructions of an old processor
-	OPENBLAS_CORETYPE=Nehalem $(OLD_NUMPY) $(TEST) $(addprefix tests/,commands/test_walk.py \
-	  repository/test_examples.py design/test_schemes.py planning/test_plan.py \
-	  planning/test_pole.py simulation/test_simulation.py)
+	OPENBLAS_CORETYPE=Nehalem $(OLD_NUMPY) $(TEST) $(addprefix tests/,planning/test_plan.py \
+	  repository/test_examples.py design/test_schemes.py planning/test_pole.py \
+	  simulation/test_simulation.py)
 
 test-cluster: $(READY) ## run the small configuration by a SLURM on this machine, and compare
 	python tests/helpers/cluster.py

@@ -13,8 +13,9 @@ os.environ.pop("ACCELSTUDY_ANGLE_UNIT", None)
 
 
 LONGEST = (
-    "test_campaign_batch.py", "test_workflow.py", "test_every_path.py", "test_diagnosis.py",
-    "test_walk.py", "test_diagnosis_output.py", "test_diagnosis_hidden.py", "test_figures.py",
+    "test_campaign_batch.py", "test_plan.py", "test_workflow.py", "test_every_path.py",
+    "test_optimal.py", "test_walk.py", "test_examples.py", "test_hidden_documents.py",
+    "test_diagnosis.py", "test_designs.py", "test_diagnosis_workflow.py", "test_any_model.py",
 )  # fmt: skip
 """The longest first."""
 

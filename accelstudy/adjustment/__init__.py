@@ -5,7 +5,6 @@ from accelstudy.adjustment.equations import CalibrationEquations
 from accelstudy.adjustment.gauss_helmert import (
     Adjustment,
     ConditionEquations,
-    FunctionConditions,
     Linearisation,
     adjust,
 )
@@ -15,7 +14,6 @@ __all__ = [
     "Adjustment",
     "CalibrationEquations",
     "ConditionEquations",
-    "FunctionConditions",
     "Linearisation",
     "Observations",
     "adjust",

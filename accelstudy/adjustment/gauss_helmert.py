@@ -12,7 +12,7 @@ convergence, so its result does not depend on the others.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, Protocol
 
@@ -57,27 +57,6 @@ class ConditionEquations(Protocol):
 
     def linearise(self, parameters: Array, adjusted: Array, latent: Any) -> Linearisation:
         """Linearise at parameters (u, R) and adjusted observations (o, R, n)."""
-
-
-@dataclass(frozen=True)
-class FunctionConditions:
-    """Condition equations given as functions of parameters (R, u) and observations (R, n, o).
-
-    psi -> (R, n, c), jac_parameters A -> (R, n, c, u), jac_observations B -> (R, n, c, o).
-    """
-
-    psi: Callable[[Array, Array], Array]
-    jac_parameters: Callable[[Array, Array], Array]
-    jac_observations: Callable[[Array, Array], Array]
-
-    def linearise(self, parameters: Array, adjusted: Array, latent: Any) -> Linearisation:
-        """Evaluate the three functions."""
-        x, l_hat = np.moveaxis(parameters, 0, -1), np.moveaxis(adjusted, 0, -1)
-        return Linearisation(
-            np.moveaxis(self.psi(x, l_hat), -1, 0),
-            np.moveaxis(self.jac_parameters(x, l_hat), (-2, -1), (0, 1)),
-            np.moveaxis(self.jac_observations(x, l_hat), (-2, -1), (0, 1)),
-        )
 
 
 @dataclass(frozen=True)

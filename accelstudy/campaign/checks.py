@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,56 +81,66 @@ def check_size(raw: Array, forces: Array, header: Header, path: Path) -> None:
         )
 
 
-def likely_fault(given: float, norm: float, unit: str, gravity: float) -> str | None:
-    """Say why forces of the size `norm`, m/s², are not those of a sensor at rest.
+class Fault(NamedTuple):
+    """What is wrong with forces, if they are not as large as gravity.
+
+    Attributes
+    ----------
+    cause : str, "gravity" if its value is wrong, the unit that would be right, or "unknown"; None
+        if nothing is wrong
+    given : float, usual norm in the unit of the file
+    norm : float, m/s², usual norm
+    """
+
+    cause: str | None
+    given: float
+    norm: float
+
+
+def likely_fault(raw: Array, forces: Array, unit: str, gravity: float) -> Fault:
+    """Say why forces are not those of a sensor at rest.
 
     Even bad sensors are wrong by some tenths only, so a factor of two has another cause.
 
     Parameters
     ----------
-    given : float, size in the unit of the file
-    norm : float, m/s²
+    raw : (n, 3) array, in the unit of the file
+    forces : (n, 3) array, m/s²
     unit : str, of the file
     gravity : float, m/s²
-
-    Returns
-    -------
-    str
-        "gravity" if its value is wrong, the unit that would be right, or "unknown"; None if nothing
-        is wrong.
     """
+    norm, given = usual_norm(forces), usual_norm(raw)
 
     def near(size: float, gravity: float) -> bool:
         return gravity / 2 < size < gravity * 2
 
     if near(norm, gravity):
-        return None
+        return Fault(None, given, norm)
     if near(norm, STANDARD_GRAVITY):
-        return "gravity"
+        return Fault("gravity", given, norm)
     sizes = UNITS["m/s^2"]
     better = [u for u in ("m/s^2", "g") if u != unit and near(given * sizes[u], gravity)]
     if not better and unit != "counts" and given > 100:
         better = ["counts"]
-    return better[0] if better else "unknown"
+    return Fault(better[0] if better else "unknown", given, norm)
 
 
 def check_norm(raw: Array, forces: Array, header: Header, path: Path) -> None:
     """Check that forces are roughly as large as gravity; the error names the unit that fits."""
     gravity, unit = header.gravity.value_mps2, header.unit
-    norm, given = usual_norm(forces), usual_norm(raw)
-    fault = likely_fault(given, norm, unit, gravity)
-    if fault is None:
+    cause, given, norm = likely_fault(raw, forces, unit, gravity)
+    if cause is None:
         return
     what = f"fx, fy, fz: their norm is about {given:.3g} {unit}"
     if unit == "counts":
         what = f"{what}, by `nominal` {norm:.3g} m/s^2"
-    if fault == "gravity":
+    if cause == "gravity":
         raise InputError(
             f"{path.with_name(HEADER)}: gravity.value_mps2: {gravity:g} does not fit the forces, "
             f"whose norm is about {norm:.3g} m/s^2; expected some 9.8"
         )
-    if fault != "unknown":
-        advice = f"looks like {fault}, not {unit}; correct `unit` in {HEADER}"
+    if cause != "unknown":
+        advice = f"looks like {cause}, not {unit}; correct `unit` in {HEADER}"
     else:
         advice = f"nowhere near gravity, {gravity:g} m/s^2; correct the unit" + (
             " or `nominal`" if unit == "counts" else " or the columns"

@@ -26,7 +26,8 @@ from accelstudy.commands.options import (
 )
 
 if TYPE_CHECKING:
-    from accelstudy.campaign.importing.settings import ImportReport, ImportSettings
+    from accelstudy.campaign.importing.making import ImportReport
+    from accelstudy.campaign.importing.settings import ImportSettings
     from accelstudy.campaign.session import Campaign
 
 _RANGE = re.compile(r"\s*([0-9.eE+-]+)\s*(.*?)\s*")

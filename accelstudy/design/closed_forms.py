@@ -20,7 +20,7 @@ COVERED_EFFECTS = ({"bias", "scale"}, {"bias", "scale", "nonorthogonality"})
 """Compositions of effects to which the closed forms apply."""
 
 
-def has_octahedral_moments(directions: Array, tolerance: float = 1e-6) -> bool:
+def has_octahedral_moments(directions: Array) -> bool:
     """Whether `directions` (n, 3) have the moments of a cube's symmetry through degree 4."""
     fourth = np.mean(directions[:, 0] ** 4)
     m = np.mean(directions[:, 0] ** 2 * directions[:, 1] ** 2)
@@ -28,7 +28,7 @@ def has_octahedral_moments(directions: Array, tolerance: float = 1e-6) -> bool:
         for axes in combinations_with_replacement(range(3), degree):
             counts = sorted(axes.count(i) for i in set(axes))
             expected = {(2,): 1 / 3, (4,): fourth, (2, 2): m}.get(tuple(counts), 0.0)
-            if abs(np.mean(np.prod(directions[:, axes], axis=1)) - expected) > tolerance:
+            if abs(np.mean(np.prod(directions[:, axes], axis=1)) - expected) > 1e-6:
                 return False
     return True
 
@@ -58,12 +58,6 @@ def gravity_sigma(
         "scale": relative * np.sqrt((1 - 3 * m) / (n * (1 / 3 - 3 * m))),
         "nonorthogonality": relative / np.sqrt(n * m) if m > 0 else np.inf,
     }
-
-
-def gravity_scale_correlation(directions: Array) -> float:
-    """Correlation of two scales in the gravity-based calibration, −3m / (1 − 3m)."""
-    m = float(np.mean(directions[:, 0] ** 2 * directions[:, 1] ** 2))
-    return -3 * m / (1 - 3 * m)
 
 
 def perfect_robot_ratio(directions: Array) -> dict[str, float]:

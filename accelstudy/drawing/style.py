@@ -221,14 +221,14 @@ def spread(places: NDArray[np.float64], apart: float) -> list[int]:
     return chosen
 
 
-def legend_columns(labels: Iterable[str], width_mm: float = 170.0) -> int:
+def legend_columns(labels: Iterable[str]) -> int:
     """Number of columns in which the longest label of a legend fits the width of a figure."""
     from matplotlib.textpath import TextPath
 
     size = STYLE["legend.fontsize"]
     longest = max(TextPath((0, 0), label, size=size).get_extents().width for label in labels)
     # Handle and spaces take about as much as seven letters m.
-    return max(1, int(width_mm / (longest * 25.4 / 72 + 7 * size * 25.4 / 72)))
+    return max(1, int(170.0 / (longest * 25.4 / 72 + 7 * size * 25.4 / 72)))
 
 
 def say_empty(ax: Axes, text: str = "no estimable cell") -> None:

@@ -88,16 +88,6 @@ def _digest(case: Case, *numbers: int) -> bytes:
     return hashlib.sha256(text.encode()).digest()
 
 
-def cell_of(name: str) -> Cell:
-    """Return the cell of a name, with one campaign; the reverse of `Cell.name`."""
-    set_, *hidden, design, approach, sigma = name.split("/")
-    what, size = [*hidden, "", ""][:2]
-    kinds = {set_: what} if set_ in ("noise", "gross") else {}
-    effects = () if kinds or not what else tuple(what.split("+"))
-    lam = (float(size),) * len(effects) if size else ()
-    return Cell(Case(set_, design, approach, sigma == "sigma given", effects, lam, **kinds), 1)
-
-
 @cache
 def family_of(name: str) -> tuple[str, ...]:
     """Effects of the family of an effect, itself included."""

@@ -103,21 +103,21 @@ def write_page(path: Path, template: str, fallback: str, **content: Any) -> None
         part.write_text(page, encoding="utf-8")
 
 
-def lines(template: str, part: str, *content: Any) -> list[str]:
+def lines(template: str, part: str, *content: Any, **named: Any) -> list[str]:
     """Say something in plain text, one sentence or row a line.
 
     Parameters
     ----------
     template : str, path of the template within the package; it is made of macros
     part : str, the macro that says it
-    content : its arguments
+    content, named : its arguments
 
     Returns
     -------
     list of str, without empty lines
     """
     macro = getattr(_environment(False).get_template(template).module, part)
-    return [line for line in map(str.rstrip, macro(*content).splitlines()) if line]
+    return [line for line in map(str.rstrip, macro(*content, **named).splitlines()) if line]
 
 
 @cache

@@ -38,7 +38,7 @@ def compare_sensors(
     save(figure, outputs["svg"], outputs["png"], "Sensors", DPI)
 
 
-def front_table(sensors: Sequence[str], tilt_range: float = TILT_RANGE) -> pd.DataFrame:
+def front_table(sensors: Sequence[str]) -> pd.DataFrame:
     """Candidates that leave less error than all quicker ones, for each sensor and equipment.
 
     They come from linear theory, for schemes that have a name. Columns are in the units in their
@@ -49,7 +49,7 @@ def front_table(sensors: Sequence[str], tilt_range: float = TILT_RANGE) -> pd.Da
     for name in sensors:
         sheet = get_sensor(name)
         holds = HOLDS if sheet.position_sigma is None else ()
-        question = Question(1.0, tilt_range, sheet, holds=holds, schemes=optimal)
+        question = Question(1.0, TILT_RANGE, sheet, holds=holds, schemes=optimal)
         compared = candidates(question)
         for equipment in question.equipment:
             best = np.inf

@@ -77,7 +77,7 @@ class Simulated:
 
 
 def study_of(
-    question: Question, chosen: Sequence[Candidate], seed: int, replicates: int, name: str = "plan"
+    question: Question, chosen: Sequence[Candidate], seed: int, replicates: int
 ) -> dict[str, Any]:
     """Configuration of a study whose cells are the chosen candidates.
 
@@ -90,7 +90,7 @@ def study_of(
     of_files = {name: held(name) for name in names}
     has = [effect for effect in planned if any(sensor[effect]["value"])]
     return {
-        "study": name,
+        "study": "plan",
         "seed": seed,
         "gravity_mps2": STANDARD_GRAVITY,
         "noise": {

@@ -80,12 +80,10 @@ def together(parts: Sequence[Contribution]) -> Contribution:
     )
 
 
-def situation_at(
-    setup: Setup, sensor: CalibratedSensor, tilts: Array, directions: int = DIRECTIONS
-) -> Situation:
+def situation_at(setup: Setup, sensor: CalibratedSensor, tilts: Array) -> Situation:
     """All tilts (rad) in all directions of leaning; the direction varies fastest."""
-    around = np.arange(directions) * 2 * np.pi / directions
-    return Situation(setup, sensor, np.repeat(tilts, directions), np.tile(around, len(tilts)))
+    around = np.arange(DIRECTIONS) * 2 * np.pi / DIRECTIONS
+    return Situation(setup, sensor, np.repeat(tilts, DIRECTIONS), np.tile(around, len(tilts)))
 
 
 @dataclass(frozen=True)

@@ -41,20 +41,6 @@ class Prior:
     rows: Array | None = None
 
     @classmethod
-    def of_sigmas(cls, mean: ArrayLike, sigma: ArrayLike) -> Prior:
-        """Return the prior of a data sheet: values (u,) with sigmas (u,), infinite where unknown.
-
-        Raises
-        ------
-        InputError
-            If a sigma is not positive.
-        """
-        sigma = np.asarray(sigma, dtype=float)
-        if not np.all(sigma > 0):
-            raise InputError("a sigma that is known beforehand must be greater than 0")
-        return cls(np.asarray(mean, dtype=float), np.diag(1 / sigma)[np.isfinite(sigma)])
-
-    @classmethod
     def of_covariance(cls, mean: ArrayLike, covariance: ArrayLike) -> Prior:
         """Return the prior of an earlier calibration: values (u,) and covariance matrix (u, u).
 

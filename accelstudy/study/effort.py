@@ -94,17 +94,14 @@ def study_effort(study: StudyConfig, cells: Sequence[Cell]) -> Effort:
             f"sensitivity: takes about {hours:.2g} h on one core, and {MOST_HOURS} h is the most; "
             "lower base_samples or resamples, or take fewer attitudes"
         )
+    or_sum = ", or keep: summary" if _keeps(study) else ""
     if hours > MOST_HOURS or effort.disk > MOST_DISK:
         raise InputError(
             f"grids: {effort.calibrations} calibrations take about {hours:.2g} h on one core and "
             f"{_size(effort.disk)} on disk; {MOST_HOURS} h and {_size(MOST_DISK)} are the most: "
-            f"lower replicates, or take fewer cells{_without_keeping(study)}"
+            f"lower replicates, or take fewer cells{or_sum}"
         )
     return effort
-
-
-def _without_keeping(study: StudyConfig) -> str:
-    return ", or keep: summary" if _keeps(study) else ""
 
 
 def _keeps(study: StudyConfig) -> bool:

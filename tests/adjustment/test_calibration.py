@@ -10,19 +10,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from function_conditions import FunctionConditions
 from hypothesis import given
 from hypothesis import strategies as st
 from quality_helpers import BOTH, GRAVITY, NINE, ROBOT, STANDARD_ERRORS, one
+from scheme_helpers import gravity_scale_correlation
 from scipy.spatial.transform import Rotation
 from scipy.stats import kstest, norm, t
 from study_helpers import PAPER_TRUTH
 
-from accelstudy.adjustment import CalibrationEquations, FunctionConditions, adjust, calibrate
+from accelstudy.adjustment import CalibrationEquations, adjust, calibrate
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY
 from accelstudy.design.closed_forms import (
-    gravity_scale_correlation,
     gravity_sigma,
     perfect_robot_ratio,
 )

@@ -7,8 +7,9 @@ the adjustment promises of batches, cofactor matrices, observed parameters and f
 
 import numpy as np
 import pytest
+from function_conditions import FunctionConditions
 
-from accelstudy.adjustment import FunctionConditions, adjust, gauss_helmert
+from accelstudy.adjustment import adjust, gauss_helmert
 from accelstudy.basics.errors import InputError
 
 

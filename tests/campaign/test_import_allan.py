@@ -5,10 +5,10 @@ import pytest
 from test_import_holds import shared
 
 from accelstudy.campaign.importing.allan import (
-    AllanSums,
     accuracy_of_mean,
     allan_moments,
     averaging_factors,
+    pooled_deviation,
 )
 
 N = 2**16
@@ -29,9 +29,7 @@ def flicker(seed=1, n=N):
 
 def allan_deviation(values, step):
     """Allan deviation of one record, (n,) or (n, channels)."""
-    sums = AllanSums(values.reshape(len(values), -1).shape[1])
-    sums.add(allan_moments(values))
-    return sums.deviation(step)
+    return pooled_deviation([allan_moments(values)], step)
 
 
 def slope(curve, low, high):
@@ -65,25 +63,21 @@ def test_random_walk_and_flicker():
 
 
 def test_records_are_pooled():
-    sums = AllanSums()
-    for seed in range(20):
-        sums.add(allan_moments(white(seed, 3 * 500).reshape(-1, 3) + seed))
-    curve = sums.deviation(STEP)
+    records = [allan_moments(white(seed, 3 * 500).reshape(-1, 3) + seed) for seed in range(20)]
+    curve = pooled_deviation(records, STEP)
     assert curve.deviation.shape == (len(curve.tau), 3)
     assert curve.tau[-1] <= 2.5
     assert curve.differences[0] == 20 * 499
     assert curve.pooled[0] == pytest.approx(0.02, rel=0.02)
-    sums.add(allan_moments(np.zeros((1, 3))))
-    np.testing.assert_array_equal(sums.deviation(STEP).differences, curve.differences)
+    with_short = pooled_deviation([*records, allan_moments(np.zeros((1, 3)))], STEP)
+    np.testing.assert_array_equal(with_short.differences, curve.differences)
 
 
 @pytest.mark.parametrize("duration", [0.5, 2.0, 5.0])
 def test_white_noise_is_found_white(duration):
-    sums = AllanSums()
-    for seed in range(30):
-        sums.add(allan_moments(white(seed, 3 * 500).reshape(-1, 3)))
+    records = [allan_moments(white(seed, 3 * 500).reshape(-1, 3)) for seed in range(30)]
     n = round(duration / STEP)
-    accuracy = accuracy_of_mean(sums.deviation(STEP), duration, 0.02, n)
+    accuracy = accuracy_of_mean(pooled_deviation(records, STEP), duration, 0.02, n)
     assert accuracy.white == pytest.approx(0.02 / np.sqrt(n))
     assert accuracy.ratio == pytest.approx(1, abs=0.2)
     assert (accuracy.slope is None) == (duration < 2.15)

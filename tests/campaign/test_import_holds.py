@@ -6,7 +6,7 @@ import pytest
 from places import SHARED
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.importing.detection import find_joint_holds
+from accelstudy.campaign.importing.logs import find_joint_holds
 from accelstudy.campaign.importing.recording import open_log
 from accelstudy.campaign.importing.windows import windows
 

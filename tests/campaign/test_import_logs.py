@@ -15,7 +15,7 @@ from scipy.io import loadmat, savemat
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.importing import sources
-from accelstudy.campaign.importing.detection import find_joint_holds
+from accelstudy.campaign.importing.logs import find_joint_holds
 from accelstudy.campaign.importing.recording import open_log
 
 N = 50

@@ -16,7 +16,7 @@ from accelstudy.campaign.importing.allan import allan_moments, slope_sigmas
 from accelstudy.campaign.importing.logs import import_log, import_sensors, import_to
 from accelstudy.campaign.importing.means import import_means
 from accelstudy.campaign.importing.recording import open_log
-from accelstudy.campaign.importing.segments import Moments, Segment
+from accelstudy.campaign.importing.segments import Moments
 from accelstudy.campaign.importing.settings import ImportSettings, parse_settings
 from accelstudy.commands.importing import files_of
 from accelstudy.leveling.angles import specific_force
@@ -213,19 +213,16 @@ def test_the_slope_of_a_long_hold_is_no_better_known_than_it_is():
         spectrum = np.fft.rfft(rng.standard_normal((ends[-1], 3)), axis=0)
         flicker = np.fft.irfft(spectrum / np.sqrt(frequency)[:, None], ends[-1], axis=0)
         samples = rng.standard_normal(flicker.shape) + 0.1 * flicker
-        segments = []
+        slopes, residuals, n_samples, variances = [], [], [], []
         for forces in np.split(samples, ends[:-1]):
             time = np.arange(len(forces)) / RATE
             moments = Moments.of(np.column_stack([time, forces]))
-            slope = moments.products[0, 1:] / moments.products[0, 0]
-            line = (time - time.mean())[:, None] * slope
-            segments.append(
-                Segment(
-                    *(0, len(forces), 0.0, time[-1], moments, np.zeros((3, 0))),
-                    (allan_moments(forces),), (allan_moments(forces - line),),
-                )
-            )  # fmt: skip
-        first.append(segments[0].slope / slope_sigmas(segments, 1 / RATE)[0])
+            slopes.append(moments.products[0, 1:] / moments.products[0, 0])
+            line = (time - time.mean())[:, None] * slopes[-1]
+            residuals.append((allan_moments(forces - line),))
+            n_samples.append(len(forces))
+            variances.append(np.var(forces, axis=0, ddof=1))
+        first.append(slopes[0] / slope_sigmas(residuals, n_samples, variances, 1 / RATE)[0])
     assert np.sqrt(np.mean(np.square(first))) < 2
 
 

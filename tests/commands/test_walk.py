@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from page_helpers import assert_told_alike
 from places import ROOT
 from study_helpers import PROVENANCE
 
@@ -19,12 +18,12 @@ from accelstudy.commands.main import main
 from accelstudy.files.tables import write_table
 from accelstudy.schemes import get_scheme
 
-README, HOME = ROOT / "README.md", ROOT / "docs/index.md"
+README = ROOT / "README.md"
 PAGES = {
     page.name: page
     for page in (
         README,
-        HOME,
+        ROOT / "docs/index.md",
         ROOT / "docs/guides/your-sensor.md",
         ROOT / "docs/guides/missing.md",
         ROOT / "docs/reference/api/first_steps.py",
@@ -133,16 +132,6 @@ def test_the_pages_have_what_a_reader_needs(steps):
         assert any(s["command"].startswith(f"accelstudy {command} ") for s in run), command
     (python,) = (s for s in run if s["source"] == "first_steps.py")
     assert len(re.findall(r"\d", python["output"])) > 50  # three arrays of numbers
-
-
-@pytest.mark.parametrize("page", [README, HOME], ids=["README", "home"])
-def test_the_answer_that_a_page_quotes_is_the_commands_own(steps, page):
-    text = page.read_text(encoding="utf-8").partition("accelstudy plan ")[2]
-    quoted = re.search(r"```[^\n]*\n(.*?)```", text, re.DOTALL)[1]
-    (plan, *_) = (s for s in steps if s["command"].startswith("accelstudy plan --tilt"))
-    lines = plan["output"].splitlines(keepends=True)
-    assert lines.pop(0).startswith("comparing ")  # on standard error
-    assert_told_alike("".join(lines[: quoted.count("\n")]), quoted)
 
 
 def test_each_help_has_an_example(steps):

@@ -4,13 +4,12 @@ from itertools import permutations, product
 
 import numpy as np
 import pytest
-from scheme_helpers import KNOWN
+from scheme_helpers import KNOWN, gravity_scale_correlation
 
 from accelstudy.adjustment import calibrate
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import MGON
 from accelstudy.design.closed_forms import (
-    gravity_scale_correlation,
     gravity_sigma,
     has_octahedral_moments,
     perfect_robot_ratio,

@@ -23,6 +23,7 @@ SKIPPED = {
     "make": "needs the repository, and minutes",
     "snakemake": "needs the repository, and minutes",
     "accelstudy public [a-z-]+": "downloads",
+    "accelstudy plan": "takes long; test_plan.py asks the same",
     r".*(zsh|fish)_source": "is for another shell",
 }
 """Beginnings of commands that are not run -> why."""

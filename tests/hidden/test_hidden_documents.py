@@ -11,7 +11,7 @@ from accelstudy.files.reading import read_layer
 from accelstudy.files.tables import read_table
 from accelstudy.hidden.baselines import METHODS
 from accelstudy.hidden.campaigns import TABLES
-from accelstudy.hidden.cells import cell_of
+from accelstudy.hidden.cells import Case, Cell
 from accelstudy.hidden.config import SETS, parse_hidden
 from accelstudy.hidden.diagnosing import run_chunk
 from accelstudy.hidden.figures import figures
@@ -94,6 +94,16 @@ def test_the_score_is_that_of_the_code(tmp_path):
         f"{len(changed)} of {len(told)} campaigns of the sample get another answer; {RENEWED}:\n"
         + "\n".join(changed)
     )
+
+
+def cell_of(name):
+    """The cell of a name, with one campaign; the reverse of `Cell.name`."""
+    set_, *hidden, design, approach, sigma = name.split("/")
+    what, size = [*hidden, "", ""][:2]
+    kinds = {set_: what} if set_ in ("noise", "gross") else {}
+    effects = () if kinds or not what else tuple(what.split("+"))
+    lam = (float(size),) * len(effects) if size else ()
+    return Cell(Case(set_, design, approach, sigma == "sigma given", effects, lam, **kinds), 1)
 
 
 def alike(old, new):

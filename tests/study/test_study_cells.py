@@ -182,10 +182,15 @@ BASE = {"grids": [grid(["bias-scale", NINE], ["mclaren-24", "faces-6"], 60)]}
 BIGGER = {
     "grids": [
         grid(NINE, ["rings-24", "faces-6", "mclaren-24"], 60, approaches=["robot", "gravity"]),
-        grid("all", "mclaren-24", 90, sensor_sigma_mps2=[0.001, 0.002]),
+        grid(
+            ["bias-scale", NINE, f"{NINE}-cubic"],
+            "mclaren-24",
+            90,
+            sensor_sigma_mps2=[0.001, 0.002],
+        ),
         grid("bias-scale", ["faces-6"], 700),
     ],
-    "presets": {"replicates": 10},
+    "presets": {"replicates": 10, "approaches": "robot"},
     "study": "other",
 }
 

@@ -20,7 +20,7 @@ from accelstudy.campaign.calibration.applying import MARGIN, Calibration, Watch
 from accelstudy.campaign.calibration.readings import Readings, readings_of
 from accelstudy.campaign.calibration.tables import chunk_writer, column_names, is_parquet, numbers
 from accelstudy.campaign.checks import likely_fault
-from accelstudy.campaign.importing.columns import AXES
+from accelstudy.campaign.importing.recording import AXES
 from accelstudy.campaign.importing.sources import CHUNK
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import near_pole
@@ -203,7 +203,7 @@ class Account:
     def __init__(self, calibration: Calibration, readings: Readings) -> None:
         self._calibration, self._readings = calibration, readings
         self._watch = Watch(calibration.ranges)
-        self._norms = np.empty(0)
+        self._first_forces = np.empty((0, 3))
         self._usable = self._far = self._after = self._near = 0
         self._first_empty: tuple[int, str | None] = (0, None)
         self.rows = self.empty = 0
@@ -233,12 +233,13 @@ class Account:
         self.empty += int(lost.sum())
         self._near += int(near.sum())
         norms = np.linalg.norm(forces, axis=1)
-        norms = norms[np.isfinite(norms)]
+        measured = np.isfinite(norms)
+        norms = norms[measured]
         # Even bad sensors are wrong by some tenths only; larger differences come from motion.
         gravity = self._calibration.gravity
         self._far += int(np.sum((norms < gravity / 2) | (norms > gravity * 2)))
         if not self._usable and len(norms):
-            self._norms = norms
+            self._first_forces = forces[measured]
             if self._far == len(norms):
                 raise self._wrong_unit()
         self._usable += len(norms)
@@ -331,15 +332,14 @@ class Account:
 
     def _wrong_unit(self) -> InputError:
         readings, gravity = self._readings, self._calibration.gravity
-        norm = float(np.median(self._norms))
-        given = norm / abs(float(readings.conversion.scale[0]))
-        fault = likely_fault(given, norm, readings.unit, gravity)
-        looks = f"these look like {fault}; give --unit {fault}"
+        raw = self._first_forces / abs(float(readings.conversion.scale[0]))
+        fault = likely_fault(raw, self._first_forces, readings.unit, gravity)
+        looks = f"these look like {fault.cause}; give --unit {fault.cause}"
         return InputError(
-            f"{readings.source.path}: the readings are about {given:.3g} {readings.unit}: "
+            f"{readings.source.path}: the readings are about {fault.given:.3g} {readings.unit}: "
             + (
                 looks
-                if fault in ("m/s^2", "g")
+                if fault.cause in ("m/s^2", "g")
                 else "nowhere near gravity, "
                 f"{gravity:.3g} m/s²; give the --unit or the --columns of this log"
             )

@@ -17,7 +17,7 @@ from accelstudy.campaign.calibration.applying import Calibration
 from accelstudy.campaign.calibration.export import campaign_conversion, mending
 from accelstudy.campaign.calibration.tables import column_names, numbers, read_chunks
 from accelstudy.campaign.header import LogLayout
-from accelstudy.campaign.importing.columns import AXES, locate
+from accelstudy.campaign.importing.recording import AXES, locate
 from accelstudy.campaign.importing.sources import CHUNK, Source, open_source
 from accelstudy.effects import Course, HoldConditions
 from accelstudy.files.validation import checked

@@ -20,17 +20,20 @@ def verdict_lines(assessment: Assessment) -> list[str]:
     """Say how good the calibration is, for what, and what limits it; the verdict comes first."""
     fit, state, shares = assessment.fit, assessment.state, assessment.tilt_shares
     says_tilt = state != IMPLAUSIBLE and np.isfinite(assessment.tilt).all()
-    suspects = sorted(assessment.suspects, key=lambda suspect: suspect.position)
+    suspects = {
+        int(fit.campaign.positions[suspect.position]): suspect.p_value
+        for suspect in sorted(assessment.suspects, key=lambda suspect: suspect.position)
+    }
     return lines(
         "campaign/calibration/wording.txt.j2",
         "verdict",
-        assessment,
-        {int(fit.campaign.positions[suspect.position]): suspect.p_value for suspect in suspects},
-        max(shares, key=lambda name: float(shares[name].max())) if says_tilt else "",
-        MAX_TILT_GON * GON,
-        USUAL_CAUSE,
-        state in (REJECTED, IMPLAUSIBLE) or bool(suspects),
-        "" if fit.approach.uses_angles else BLIND,
+        assessment=assessment,
+        suspects=suspects,
+        limit=max(shares, key=lambda name: float(shares[name].max())) if says_tilt else "",
+        max_tilt=MAX_TILT_GON * GON,
+        usual_cause=USUAL_CAUSE,
+        diagnose=state in (REJECTED, IMPLAUSIBLE) or bool(suspects),
+        blind="" if fit.approach.uses_angles else BLIND,
     )
 
 

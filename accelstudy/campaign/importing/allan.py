@@ -9,13 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-
-if TYPE_CHECKING:
-    from accelstudy.campaign.importing.segments import Segment
 
 Array = NDArray[np.float64]
 
@@ -99,33 +95,30 @@ def allan_moments(samples: ArrayLike) -> AllanMoments:
     return AllanMoments(tuple(factors), squares, n + 1 - 2 * averaged, n // averaged - 1)
 
 
-class AllanSums:
-    """Sums over the records of one sensor for its Allan variance; records may be short."""
+def pooled_deviation(
+    records: Sequence[AllanMoments], step: float, frames: Sequence[Array] | None = None
+) -> AllanDeviation:
+    """Allan deviation of all records of one sensor together; records may be short.
 
-    def __init__(self, channels: int = 3) -> None:
-        self._squares: dict[int, Array] = {}
-        self._terms: dict[int, int] = {}
-        self._independent: dict[int, int] = {}
-        self._channels = channels
-
-    def add(self, record: AllanMoments, frame: Array | None = None) -> None:
-        """Add a record; its channels are turned to the columns of `frame`, (c, c), if given."""
-        turned = record.squares if frame is None else frame.T @ record.squares @ frame
-        for i, m in enumerate(record.factors):
-            squares = np.diagonal(turned[i])
-            self._squares[m] = self._squares.get(m, np.zeros(self._channels)) + squares
-            self._terms[m] = self._terms.get(m, 0) + int(record.terms[i])
-            self._independent[m] = self._independent.get(m, 0) + int(record.independent[i])
-
-    def deviation(self, step: float) -> AllanDeviation:
-        """Allan deviation of all records together; `step` is the time between samples, s."""
-        factors = sorted(self._terms)
-        variance = [self._squares[m] / self._terms[m] for m in factors]
-        return AllanDeviation(
-            tau=step * np.array(factors, dtype=float),
-            deviation=np.sqrt(np.array(variance).reshape(len(factors), self._channels)),
-            differences=np.array([self._independent[m] for m in factors], dtype=int),
-        )
+    Parameters
+    ----------
+    records : sequence of AllanMoments
+    step : float, s, between samples
+    frames : sequence of (c, c) arrays, optional
+        For each record, to the columns of which its channels are turned.
+    """
+    # The averaging times of a short record are the first ones of a long one.
+    factors = max((record.factors for record in records), key=len)
+    squares = np.zeros((len(factors), records[0].squares.shape[1]))
+    terms, independent = np.zeros((2, len(factors)), dtype=int)
+    for i, record in enumerate(records):
+        k = len(record.factors)
+        turned = record.squares if frames is None else frames[i].T @ record.squares @ frames[i]
+        squares[:k] += np.diagonal(turned, axis1=1, axis2=2)
+        terms[:k] += record.terms
+        independent[:k] += record.independent
+    deviation = np.sqrt(squares / terms[:, None])
+    return AllanDeviation(step * np.array(factors, dtype=float), deviation, independent)
 
 
 def averaging_factors(largest: int) -> list[int]:
@@ -162,7 +155,7 @@ class MeanAccuracy:
         return self.allan / self.white
 
 
-def accuracy_of_mean(curve: AllanDeviation, duration: float, sd: float, n: int) -> MeanAccuracy:
+def accuracy_of_mean(curve: AllanDeviation, duration: float, sd: ArrayLike, n: int) -> MeanAccuracy:
     """Standard deviation of a mean over `duration`, averaged over the channels.
 
     Beyond the largest averaging time with at least `RELIABLE` independent differences the curve is
@@ -173,10 +166,10 @@ def accuracy_of_mean(curve: AllanDeviation, duration: float, sd: float, n: int) 
     ----------
     curve : AllanDeviation
     duration : float, s
-    sd : float, of the samples within a hold
+    sd : number or array, of the samples within a hold, of each channel
     n : int, samples in `duration`
     """
-    white = sd / np.sqrt(n)
+    white = float(np.sqrt(np.mean(np.square(sd)))) / np.sqrt(n)
     usable = (curve.differences >= RELIABLE) & (curve.pooled > 0)
     if not usable.any():
         return MeanAccuracy(duration, white, white, 0.0, None)
@@ -197,7 +190,12 @@ def accuracy_of_mean(curve: AllanDeviation, duration: float, sd: float, n: int) 
     )
 
 
-def slope_sigmas(segments: Sequence[Segment], step: float) -> Array:
+def slope_sigmas(
+    residuals: Sequence[Sequence[AllanMoments]],
+    n_samples: Sequence[int],
+    variances: Array,
+    step: float,
+) -> Array:
     """Standard deviations of the slopes of the axes in holds, (n, 3), m/s²/s.
 
     The slope over a time T depends on the difference between its two halves. For white noise the
@@ -211,23 +209,22 @@ def slope_sigmas(segments: Sequence[Segment], step: float) -> Array:
 
     Parameters
     ----------
-    segments : sequence of Segment
+    residuals : for each hold, AllanMoments of its uninterrupted parts about the line
+    n_samples : sequence of int, samples in each hold
+    variances : (n, 3) array, of the samples within each hold, (m/s²)²
     step : float, s, between samples
     """
-    sums = AllanSums()
-    for segment in segments:
-        for record in segment.wobble:
-            sums.add(record.up_to(segment.n / SHARE))
-    curve = sums.deviation(step)
-    variances = np.mean([np.diag(segment.covariance) for segment in segments], axis=0)
-    sigma = np.empty((len(segments), 3))
-    for i, segment in enumerate(segments):
+    records = [
+        record.up_to(n / SHARE)
+        for parts, n in zip(residuals, n_samples, strict=True)
+        for record in parts
+    ]
+    curve = pooled_deviation(records, step)
+    sd = np.sqrt(np.mean(variances, axis=0))
+    sigma = np.empty((len(residuals), 3))
+    for i, n in enumerate(n_samples):
         for axis in range(3):
-            half = accuracy_of_mean(
-                curve.channels(slice(axis, axis + 1)),
-                segment.n * step / 2,
-                float(np.sqrt(variances[axis])),
-                max(1, segment.n // 2),
-            )
-            sigma[i, axis] = np.sqrt(6.0) * half.allan / (segment.n * step)
+            channel = curve.channels(slice(axis, axis + 1))
+            half = accuracy_of_mean(channel, n * step / 2, sd[axis], max(1, n // 2))
+            sigma[i, axis] = np.sqrt(6.0) * half.allan / (n * step)
     return sigma

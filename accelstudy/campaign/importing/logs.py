@@ -1,4 +1,4 @@
-"""From raw logs to campaigns."""
+"""The way from raw logs to campaigns, stage by stage."""
 
 from __future__ import annotations
 
@@ -7,33 +7,22 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import display_unit, to_display
 from accelstudy.campaign.format import write_campaign
-from accelstudy.campaign.importing.allan import MeanAccuracy, accuracy_of_mean
-from accelstudy.campaign.importing.columns import AXES
-from accelstudy.campaign.importing.detection import DetectedHolds, find_joint_holds
+from accelstudy.campaign.importing.holds import DetectedHolds, detected_holds
+from accelstudy.campaign.importing.making import ImportReport, campaign_of_holds
 from accelstudy.campaign.importing.means import import_means
-from accelstudy.campaign.importing.recording import Log, LogSeries, Recording, open_log
+from accelstudy.campaign.importing.recording import AXES, Log, LogSeries, Recording, open_log
+from accelstudy.campaign.importing.segments import segment_logs
 from accelstudy.campaign.importing.settings import (
-    ImportReport,
     ImportSettings,
-    default_name,
-    far_from_gravity,
-    imported_campaign,
-    layout_of,
-    shown,
+    Selection,
+    named_after,
+    parse_selection,
 )
+from accelstudy.campaign.importing.windows import surveyed
 from accelstudy.campaign.session import Campaign
-from accelstudy.sensors.conversion import conversion_of
-
-Array = NDArray[np.float64]
-
-TURNING = 1.5
-"""Noise across gravity, as a multiple of that along it, from which on a warning says that the
-sensor turns within its holds."""
 
 
 def log_of(path: str | Path, settings: ImportSettings) -> Log:
@@ -95,7 +84,7 @@ def import_sensors(
     InputError
         If a log cannot be read or has no static hold.
     """
-    chosen = _settings_of_sensors(settings, default_name(paths))
+    chosen = _settings_of_sensors(named_after(settings, paths))
     logs = {name: _recording(paths, each) for name, each in chosen.items()}
     detected = find_joint_holds(
         list(logs.values()),
@@ -104,22 +93,71 @@ def import_sensors(
         trim=settings.trim_s,
         shortest=settings.shortest_s,
         full_range=_full_range(settings),
-        selection=settings.selection,
+        selection=parse_selection(settings.exclude, settings.join),
         one_each=len(paths) > 1,
     )
     return {
-        name: _campaign(paths, each, logs[name], holds)
+        name: campaign_of_holds(paths, each, logs[name], holds)
         for (name, each), holds in zip(chosen.items(), detected, strict=True)
     }
 
 
+def find_joint_holds(
+    logs: Sequence[Recording],
+    *,
+    window: float = 1.0,
+    threshold: float | None = None,
+    trim: float = 0.2,
+    shortest: float = 1.0,
+    full_range: float = np.inf,
+    selection: Selection | None = None,
+    one_each: bool = False,
+) -> list[DetectedHolds]:
+    """Find the static holds of sensors that were turned together.
+
+    The sensors are on one body. So a hold is where all of them rest, and has the same number for
+    all.
+
+    Parameters
+    ----------
+    logs : sequence of Recording, one for each sensor, of simultaneous samples
+    window : float, s, length of the sliding window; a hold begins and ends half a window inside
+        the samples at rest
+    threshold : float, m/s², standard deviation of a window up to which it is at rest; chosen from
+        the data of each sensor if omitted
+    trim : float, s, cut off in addition at both ends of a hold
+    shortest : float, s, least length of what is left
+    full_range : float, m/s², the sensors measure ± this
+    selection : Selection, holds that a person leaves out or joins
+    one_each : bool, whether the logs have several recordings with one position each: the longest
+        hold, which gets the number of the recording
+
+    Returns
+    -------
+    list of DetectedHolds
+        For each sensor; a hold in which one sensor is saturated is missing for that one only.
+
+    Raises
+    ------
+    InputError
+        If a log cannot be read, is shorter than a window, nothing in it is at rest, or the sensor
+        was never still.
+    """
+    surveys = surveyed(logs, window, threshold)
+    segmentations = segment_logs(logs, surveys, trim, shortest, full_range, one_each)
+    return [
+        detected_holds(log, *survey, segmentation, selection or Selection(), window, shortest)
+        for log, survey, segmentation in zip(logs, surveys, segmentations, strict=True)
+    ]
+
+
 def import_to(
-    folder: str | Path, path: str | Path, settings: ImportSettings, figure: bool = True
+    folder: str | Path, path: str | Path, settings: ImportSettings
 ) -> tuple[Campaign, ImportReport]:
     """Import a file of one sensor and write the campaign to a folder; see `import_each`."""
     if settings.sensors:
         raise InputError("sensors: several sensors make several campaigns; only one fits here")
-    return import_each({"": Path(folder)}, [path], settings, figure)[""]
+    return import_each({"": Path(folder)}, [path], settings)[""]
 
 
 def import_each(
@@ -154,8 +192,8 @@ def import_each(
     return campaigns
 
 
-def _settings_of_sensors(settings: ImportSettings, default: str) -> dict[str, ImportSettings]:
-    """Settings of each sensor, as if it were the only one; `default` names a campaign."""
+def _settings_of_sensors(settings: ImportSettings) -> dict[str, ImportSettings]:
+    """Settings of each sensor, as if it were the only one."""
     if settings.robot is not None:
         raise InputError("robot: its angles go with a table of means (--means)")
     if not settings.sensors:
@@ -166,7 +204,7 @@ def _settings_of_sensors(settings: ImportSettings, default: str) -> dict[str, Im
         name: settings.model_copy(
             update={
                 "columns": {**dict(zip(AXES, places, strict=True)), **settings.columns},
-                "name": f"{settings.name or default}-{name}",
+                "name": f"{settings.name}-{name}",
                 "sensor": settings.sensor or name,
             }
         )
@@ -181,116 +219,8 @@ def _recording(paths: Sequence[str | Path], settings: ImportSettings) -> Recordi
     return LogSeries([replace(part, lively=False) for part in parts])
 
 
-def _campaign(
-    paths: Sequence[str | Path], settings: ImportSettings, log: Recording, holds: DetectedHolds
-) -> tuple[Campaign, ImportReport]:
-    """Make the campaign of the holds of one sensor, and its report."""
-    accuracy, warnings = _accuracy(holds, settings.gravity.value_mps2)
-    notes = [] if settings.frame == "frd" else [_frame_note(settings)]
-    forces = holds.mean
-    if settings.unit == "counts" and settings.offset is None:
-        settings, offset, note = _with_offset(settings, holds)
-        forces, holds = forces - offset, replace(holds, envelope=holds.envelope.less(offset))
-        notes += note
-    first, time = log, (holds.t0 + holds.t1) / 2
-    if isinstance(log, LogSeries):
-        first = log.parts[0]
-        notes.append(
-            f"files: {len(log.parts)}, with the longest hold of each as one position; what is "
-            "before and after it does not count"
-            + ("" if log.timed else "; the times of the files do not tell that of a position")
-        )
-        missing = [i for i in range(1, len(paths) + 1) if i not in holds.segments]
-        warnings += [f"{paths[i - 1]}: no static hold; position {i} is missing" for i in missing]
-    assert isinstance(first, Log)
-    columns = {}
-    for name, values in holds.conditions.items():
-        if np.isfinite(values).all():
-            columns[name] = values
-        else:
-            hold = holds.number[np.argmin(np.isfinite(values))]
-            warnings.append(f"hold {hold} has no {name}; the column is left out")
-    warnings += far_from_gravity(settings, forces)
-    campaign = imported_campaign(
-        paths,
-        settings,
-        forces,
-        positions=holds.number,
-        sigma_force=accuracy.allan,
-        n_samples=holds.n_samples,
-        sd=holds.of_each("sd"),
-        slope=holds.of_each("slope"),
-        sd_slope=holds.slope_sigmas(),
-        time=None if isinstance(log, LogSeries) and not log.timed else time,
-        log=layout_of(settings, first.source, first.places),
-        warnings=tuple(warnings),
-        **columns,
-    ).without(holds.left_out)
-    report = ImportReport(
-        len(holds), accuracy, float(accuracy.white), holds, tuple(notes), tuple(warnings)
-    )
-    return campaign, report
-
-
-def _accuracy(holds: DetectedHolds, gravity: float) -> tuple[MeanAccuracy, list[str]]:
-    """How well the mean over a typical hold is known, and warnings about the holds."""
-    noise, typical = holds.noise, int(np.median(holds.n_samples[holds.used]))
-
-    def accuracy_in(channels: slice) -> MeanAccuracy:
-        sd = float(np.sqrt(np.mean(noise.sd[channels] ** 2)))
-        return accuracy_of_mean(noise.allan.channels(channels), typical * holds.step, sd, typical)
-
-    accuracy = accuracy_in(noise.of_sensor)
-    warnings = list(holds.warnings)
-    if not noise.directed:
-        warnings.append(
-            "the norms of the means differ too much for specific forces (is an offset missing?); "
-            "sigma is taken over all axes"
-        )
-    elif (across := accuracy_in(slice(1, 3)).allan) > TURNING * accuracy.allan:
-        turned = f"{to_display(across / gravity, 'rad'):.0f} {display_unit('rad')}"
-        warnings.append(
-            f"across gravity the means vary by {shown(across)}, more than along it: the sensor "
-            f"turns by some {turned} within holds"
-        )
-    if accuracy.slope is not None:
-        warnings.append(
-            f"the Allan deviation is known up to {accuracy.tau:.2g} s, and extrapolated from there "
-            f"to the {accuracy.duration:.2g} s of a hold with slope {accuracy.slope:.2f}"
-        )
-    return accuracy, warnings
-
-
-def _with_offset(
-    settings: ImportSettings, holds: DetectedHolds
-) -> tuple[ImportSettings, Array, list[str]]:
-    """Offset of counts, from the positions, unless it is zero apart from the sensor's bias.
-
-    Returns
-    -------
-    settings : ImportSettings, with the offset
-    offset : (3,) array, m/s², in forward, right, down; zero if the settings stay
-    notes : list of str
-    """
-    noise, frame = holds.noise, settings.axes
-    if not (noise.directed and np.linalg.norm(noise.center) > holds.radius / 2):
-        return settings, np.zeros(3), []
-    scale = conversion_of("counts", settings.scale).scale
-    offset = np.round(frame.from_frd(noise.center) / scale)
-    note = (
-        f"offset: {', '.join(f'{x:.0f}' for x in offset)} counts, from the positions, as none was "
-        "given"
-    )
-    settings = settings.model_copy(update={"offset": offset.tolist()})
-    return settings, frame.to_frd(offset * scale), [note]
-
-
 def _full_range(settings: ImportSettings) -> float:
     """Range of the sensor; infinite if it is unknown, or if the offset of counts is."""
     if settings.range_mps2 is None or (settings.unit == "counts" and settings.offset is None):
         return np.inf
     return settings.range_mps2
-
-
-def _frame_note(settings: ImportSettings) -> str:
-    return f"axes: {settings.frame} in the log, turned to frd (forward, right, down) here"

@@ -12,14 +12,14 @@ from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import MGON, ROBOT_UNITS, UNITS
 from accelstudy.campaign.checks import clearly_worse, misfit_of_angles
 from accelstudy.campaign.header import LogLayout
-from accelstudy.campaign.importing.columns import AXES, locate, read_columns
-from accelstudy.campaign.importing.settings import (
+from accelstudy.campaign.importing.making import (
     ImportReport,
-    ImportSettings,
     far_from_gravity,
     imported_campaign,
 )
-from accelstudy.campaign.importing.sources import Source, open_source
+from accelstudy.campaign.importing.recording import AXES, locate
+from accelstudy.campaign.importing.settings import ImportSettings, named_after
+from accelstudy.campaign.importing.sources import Source, open_source, read_columns
 from accelstudy.campaign.session import Campaign
 from accelstudy.sensors.conversion import conversion_of
 
@@ -58,7 +58,7 @@ def import_means(
     InputError
         If the table cannot be read.
     """
-    settings = settings or ImportSettings()
+    settings = named_after(settings or ImportSettings(), [path])
     conversion = conversion_of(settings.unit, settings.scale, settings.offset)
     source = open_source(path, settings.variable)
     values, warnings = _columns(source, settings)
@@ -81,7 +81,7 @@ def import_means(
     forces = frame.to_frd(conversion.to_si(np.column_stack([values[axis] for axis in AXES])))
     warnings += far_from_gravity(settings, forces)
     campaign = imported_campaign(
-        [path],
+        path,
         settings,
         forces,
         sigma_force=sigma,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import failure
 from accelstudy.basics.wording import counted
-from accelstudy.campaign.importing.detection import DetectedHolds
+from accelstudy.campaign.importing.holds import DetectedHolds
 from accelstudy.drawing.saving import save
 from accelstudy.drawing.style import DPI, FULL, INK, STYLE, new_figure
 

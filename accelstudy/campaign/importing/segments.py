@@ -1,31 +1,120 @@
-"""Runs of windows at rest, collected into holds while a log is read, and left out or joined.
+"""Runs of windows at rest, collected into the segments of a log while it is read a second time.
 
 Of the samples of a hold only sums are kept, so that its length does not matter.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from copy import copy
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.basics.errors import InputError
+from accelstudy.basics.progress import stage
 from accelstudy.campaign.importing.allan import AllanMoments, allan_moments
-from accelstudy.campaign.importing.windows import Windows
+from accelstudy.campaign.importing.recording import Recording
+from accelstudy.campaign.importing.windows import Survey, Threshold, Windows, windows
 
 Array = NDArray[np.float64]
 
+SPANS = 1200
+"""Spans of time of an envelope, about as many as a page can show."""
 LONGEST_RECORD = 2**20
 """Samples of a hold that are used for the Allan deviation; later ones count for the mean only."""
 SATURATED = 0.05
 """A hold is useless if more than this share of its samples is at the end of the scale."""
+WANDERING = 2.0
+"""A hold whose standard deviation is more than this many thresholds of a window is none."""
 
-_BY_NUMBER = re.compile(r"\s*(\d{1,9})\s*:\s*(\S.*?)\s*")
-_SPAN = re.compile(r"\s*(\d+(?:\.\d*)?)\s*s?\s*-\s*(\d+(?:\.\d*)?)\s*s\s*")
-_BY_TIME = re.compile(_SPAN.pattern + r":\s*(\S.*?)\s*")
+
+@dataclass(frozen=True)
+class Segmentation:
+    """What one of several sensors shows in the second reading.
+
+    Attributes
+    ----------
+    segments : mapping of int to Segment, by the numbers that figures and options use
+    saturated, wandering, short : int, runs at rest that are no holds: the sensor is saturated, it
+        turns slowly, or they are too short
+    envelope : Envelope, of the log, for its figure
+    """
+
+    segments: Mapping[int, Segment]
+    saturated: int
+    wandering: int
+    short: int
+    envelope: Envelope
+
+
+def segment_logs(
+    logs: Sequence[Recording],
+    surveys: Sequence[tuple[Survey, Threshold]],
+    trim: float,
+    shortest: float,
+    full_range: float,
+    one_each: bool,
+) -> list[Segmentation]:
+    """Segments in which all sensors rest, of logs with simultaneous samples.
+
+    Parameters
+    ----------
+    logs, surveys : sequences, one for each sensor, as of `surveyed`
+    trim : float, s, cut off at both ends of a run
+    shortest : float, s, least length of what is left
+    full_range : float, m/s², the sensors measure ± this
+    one_each : bool, whether the logs have several recordings with one position each: the longest
+        segment, which gets the number of the recording
+    """
+    step, width = logs[0].step, surveys[0][0].width
+    cut, least = round(trim / step), max(2, round(shortest / step))
+    envelopes = [Envelope(survey.span, survey.total) for survey, _ in surveys]
+    streams = [
+        envelope.along(windows(log, width)) for envelope, log in zip(envelopes, logs, strict=True)
+    ]
+    largest = [threshold.sd**2 for _, threshold in surveys]
+    extremes = [survey.extremes for survey, _ in surveys]
+    groups: list[tuple[int, list[Segment | None]]] = []
+    saturated, wandering, short = [0] * len(logs), [0] * len(logs), 0
+    with stage("holds", surveys[0][0].total) as advance:
+        for group in runs_at_rest(streams, largest, cut, extremes, full_range, advance):
+            if group[0].n < least:
+                short += 1
+                continue
+            kept: list[Segment | None] = []
+            for i, hold in enumerate(group):
+                full, segment = hold.saturated(), hold.finish()
+                # A sensor that turns slowly is nearly still in each window, yet has no constant
+                # attitude: its force changes over the run by more than within each of them.
+                wanders_off = not full and segment.variance > (WANDERING * surveys[i][1].sd) ** 2
+                saturated[i] += full
+                wandering[i] += wanders_off
+                kept.append(None if full or wanders_off else segment)
+            if any(kept):
+                groups.append((group[0].recording, kept))
+    numbered = _numbered(groups, one_each)
+    return [
+        Segmentation(
+            {n: part for n, group in numbered.items() if (part := group[i]) is not None},
+            saturated[i],
+            wandering[i],
+            short,
+            envelope,
+        )
+        for i, envelope in enumerate(envelopes)
+    ]
+
+
+def _numbered(
+    groups: Sequence[tuple[int, list[Segment | None]]], one_each: bool
+) -> dict[int, list[Segment | None]]:
+    """Number the holds: in order, or the longest of each recording by the recording's number."""
+    if not one_each:
+        return {number: group for number, (_, group) in enumerate(groups, 1)}
+    by_length = sorted(groups, key=lambda group: max(part.n for part in group[1] if part))
+    longest = {recording + 1: group for recording, group in by_length}
+    return dict(sorted(longest.items()))
 
 
 @dataclass(frozen=True)
@@ -221,8 +310,8 @@ def runs_at_rest(
     largest: Sequence[float],
     cut: int,
     extremes: Sequence[Array],
-    full_range: float = np.inf,
-    advance: Callable[[float], None] = lambda done: None,
+    full_range: float,
+    advance: Callable[[float], None],
 ) -> Iterator[list[GrowingHold]]:
     """Runs of windows in which all sensors rest, cut at both ends; a run may have no samples left.
 
@@ -274,128 +363,38 @@ def runs_at_rest(
         yield holds
 
 
-@dataclass(frozen=True)
-class Selection:
-    """Holds to leave out and to join, by the numbers that the detector gave them.
+class Envelope:
+    """Least and largest values of a log in spans of time, collected as its windows go by.
+
+    Parameters
+    ----------
+    span : (float, float), s, times of the first and of the last window
+    total : int, windows of the log
 
     Attributes
     ----------
-    numbers : mapping of int to str, holds that are left out, with the reason
-    spans : tuple of (from, to, reason), s since the start of the log; holds in them are left out
-    joined : tuple of tuples of int, holds that are one hold
-    joined_spans : tuple of (from, to), s since the start of the log; holds in one are one hold
+    edges : (k + 1,) array, s, of the spans
+    low, high : (k, 4) arrays, of fx, fy, fz and of the standard deviation of the windows, m/s²;
+        NaN in a gap
     """
 
-    numbers: Mapping[int, str] = field(default_factory=dict)
-    spans: tuple[tuple[float, float, str], ...] = ()
-    joined: tuple[tuple[int, ...], ...] = ()
-    joined_spans: tuple[tuple[float, float], ...] = ()
+    def __init__(self, span: tuple[float, float], total: int) -> None:
+        count = max(1, min(SPANS, total // 4))
+        self.edges = np.linspace(*span, count + 1)
+        self.low, self.high = np.full((2, count, 4), np.nan)
 
-    def join(self, segments: Mapping[int, Segment], alike: float) -> dict[int, Segment]:
-        """Join holds; they keep the number of the first.
+    def along(self, batches: Iterator[Windows]) -> Iterator[Windows]:
+        """Pass windows on, and widen the envelope to hold them."""
+        for batch in batches:
+            values = np.column_stack([batch.forces, np.sqrt(batch.variance)])
+            span = np.searchsorted(self.edges, batch.time, side="right") - 1
+            span = np.clip(span, 0, len(self.low) - 1)
+            np.fmin.at(self.low, span, values)
+            np.fmax.at(self.high, span, values)
+            yield batch
 
-        Parameters
-        ----------
-        segments : mapping of int to Segment
-        alike : float, m/s², by which the means of holds in one attitude may differ
-
-        Raises
-        ------
-        InputError
-            If there is no such hold, a span of time has fewer than two, others lie between, or
-            their attitudes differ.
-        """
-        holds = dict(segments)
-        groups = list(self.joined)
-        for start, end in self.joined_spans:
-            groups.append(tuple(_within(holds, start, end)))
-            if len(groups[-1]) < 2:
-                raise InputError(f"join: {start:g}s-{end:g}s: fewer than two holds lie there")
-        for group in groups:
-            for number in group:
-                _check(number, holds, "join")
-            between = [n for n in holds if group[0] < n < group[-1] and n not in group]
-            if between:
-                raise InputError(f"join: {_names(group)}: hold {between[0]} lies between them")
-            for number in group[1:]:
-                step = float(np.linalg.norm(holds[number].mean - holds[group[0]].mean))
-                if step > alike:
-                    raise InputError(
-                        f"join: holds {group[0]} and {number} differ by {step:.2g} m/s²: the "
-                        "sensor was turned between them"
-                    )
-                holds[group[0]] = holds[group[0]] + holds.pop(number)
-        return holds
-
-    def left_out(self, holds: Mapping[int, Segment]) -> dict[int, str]:
-        """Holds that are left out, with the reason.
-
-        Raises
-        ------
-        InputError
-            If there is no such hold, or none in a span of time.
-        """
-        for number in self.numbers:
-            _check(number, holds, "exclude")
-        reasons = dict(self.numbers)
-        for start, end, reason in self.spans:
-            inside = _within(holds, start, end)
-            if not inside:
-                raise InputError(f"exclude: {start:g}s-{end:g}s: no hold lies there")
-            reasons |= {n: reason for n in inside if n not in reasons}
-        return reasons
-
-
-def parse_selection(exclude: Sequence[str], join: Sequence[str]) -> Selection:
-    """Selection from ``13:moved`` or ``120s-135s:moved``, and from ``4,5`` or ``120s-135s``.
-
-    Raises
-    ------
-    InputError
-        If something is neither.
-    """
-    numbers: dict[int, str] = {}
-    spans = []
-    for text in exclude:
-        if match := _BY_NUMBER.fullmatch(text):
-            numbers[int(match[1])] = match[2]
-        elif (match := _BY_TIME.fullmatch(text)) and float(match[1]) < float(match[2]):
-            spans.append((float(match[1]), float(match[2]), match[3]))
-        else:
-            raise InputError(
-                f"exclude: expected a hold or a time, and why, as 13:moved or 120s-135s:moved, "
-                f"not {text!r}"
-            )
-    joined, joined_spans = [], []
-    for text in join:
-        if (match := _SPAN.fullmatch(text)) and float(match[1]) < float(match[2]):
-            joined_spans.append((float(match[1]), float(match[2])))
-            continue
-        parts = [part.strip() for part in text.split(",")]
-        if len(parts) < 2 or not all(re.fullmatch(r"\d{1,9}", part) for part in parts):
-            raise InputError(
-                f"join: expected numbers of holds or a time, as 4,5 or 120s-135s, not {text!r}"
-            )
-        joined.append(tuple(sorted({int(part) for part in parts})))
-    return Selection(numbers, tuple(spans), tuple(joined), tuple(joined_spans))
-
-
-def _within(holds: Mapping[int, Segment], start: float, end: float) -> list[int]:
-    """Numbers of the holds that lie in a span of time, if only in part."""
-    return sorted(n for n, hold in holds.items() if hold.t0 <= end and hold.t1 >= start)
-
-
-def _check(number: int, holds: Mapping[int, Segment], key: str) -> None:
-    if number not in holds:
-        raise InputError(f"{key}: there is no hold {number}; they are {_names(list(holds))}")
-
-
-def _names(numbers: Sequence[int]) -> str:
-    """Numbers in one line, runs of them by their ends."""
-    runs: list[list[int]] = []
-    for number in sorted(numbers):
-        if runs and number == runs[-1][-1] + 1:
-            runs[-1].append(number)
-        else:
-            runs.append([number])
-    return ", ".join(f"{r[0]} to {r[-1]}" if len(r) > 2 else ", ".join(map(str, r)) for r in runs)
+    def less(self, offset: Array) -> Envelope:
+        """Envelope of the forces less an offset, (3,), m/s²."""
+        shifted = copy(self)
+        shifted.low, shifted.high = (values - [*offset, 0.0] for values in (self.low, self.high))
+        return shifted

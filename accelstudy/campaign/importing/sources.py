@@ -8,7 +8,7 @@ import re
 import warnings
 import zlib
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from io import TextIOWrapper
 from itertools import islice
@@ -26,8 +26,7 @@ from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.wording import one_line
 from accelstudy.files.parquet import whole_parquet
 from accelstudy.files.reading import readable
-
-__all__ = ["CHUNK", "MatlabSource", "ParquetSource", "Source", "TextSource", "open_source"]
+from accelstudy.sensors.conversion import LARGEST
 
 Array = NDArray[np.float64]
 
@@ -429,3 +428,38 @@ def since(values: NDArray[Any], zero: Any) -> Array:
     if values.dtype.kind in "iu" and isinstance(zero, np.integer):
         return (values.astype(np.int64) - zero.astype(np.int64)).astype(float)
     return values.astype(float) - float(zero)
+
+
+def check_numbers(
+    source: Source, places: Mapping[str, int], raw: Array, row: int = 0, gaps: Sequence[str] = ()
+) -> None:
+    """Raise `InputError` at the first value that is no usable number.
+
+    Parameters
+    ----------
+    source : Source
+    places : mapping of key to column, in the order of the columns of `raw`
+    raw : (k, len(places)) array
+    row : int, number of rows before these
+    gaps : sequence of str, columns that may have cells without a number
+    """
+    bad = ~(np.abs(raw) <= LARGEST)
+    bad &= ~(np.isnan(raw) & np.isin(list(places), gaps))
+    if bad.any():
+        i, j = (int(k) for k in np.argwhere(bad)[0])
+        key, column = list(places.items())[j]
+        where, cell = source.look_up(row + i, column)
+        raise InputError(
+            f"{source.path}: {where}, column {source.names[column]} ({key}): "
+            f"{cell}, not a usable number"
+        )
+
+
+def read_columns(source: Source, places: Mapping[str, int], clock: int | None = None) -> Array:
+    """All rows of some columns, (n, len(places)), for small tables; `clock` as in `Source`."""
+    chunks = list(source.read(list(places.values()), CHUNK, clock))
+    if not chunks:
+        raise InputError(f"{source.path}: no row of numbers")
+    values = np.concatenate(chunks)
+    check_numbers(source, places, values)
+    return values

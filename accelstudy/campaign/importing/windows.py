@@ -1,9 +1,8 @@
-"""Windows that slide over a log, and the threshold up to which the forces in one are at rest."""
+"""Windows that slide over a log: its noise, and the threshold up to which one is at rest."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from copy import copy
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -14,13 +13,10 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import track
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.basics.wording import counted
 from accelstudy.campaign.importing.recording import GAP, Recording
 
 Array = NDArray[np.float64]
 
-SPANS = 1200
-"""Spans of time of an envelope, about as many as a page can show."""
 _SMALLEST, _LARGEST = 8, 10**6  # samples
 FACTOR = 3.0
 """Threshold over noise floor; it leaves room for noise that differs between attitudes."""
@@ -28,6 +24,30 @@ QUIET_FACTOR, QUIET = 10.0, 0.003 * STANDARD_GRAVITY
 """The same for a quiet sensor, and the largest threshold that it may give, m/s²."""
 
 _BINS = np.linspace(-40.0, 40.0, 4001)  # decades of variance
+
+
+def surveyed(
+    logs: Sequence[Recording], window: float, threshold: float | None
+) -> list[tuple[Survey, Threshold]]:
+    """Read logs of simultaneous samples once, each for its noise and for what is at rest in it.
+
+    Parameters
+    ----------
+    logs : sequence of Recording
+    window : float, s
+    threshold : float, m/s², standard deviation of a window up to which it is at rest; chosen from
+        the data of each log if None
+
+    Raises
+    ------
+    InputError
+        If a log cannot be read, or no threshold can be told from it.
+    """
+    width = samples_in(logs[0], window)
+    surveys = [survey_log(log, width) for log in logs]
+    if threshold is not None:
+        return [(survey, given_threshold(threshold)) for survey in surveys]
+    return [(s, choose_threshold(s, log)) for s, log in zip(surveys, logs, strict=True)]
 
 
 def samples_in(log: Recording, window: float) -> int:
@@ -101,43 +121,6 @@ def windows(log: Recording, width: int) -> Iterator[Windows]:
             times, values = times[centred:], values[centred:]
 
 
-class Envelope:
-    """Least and largest values of a log in spans of time, collected as its windows go by.
-
-    Parameters
-    ----------
-    span : (float, float), s, times of the first and of the last window
-    total : int, windows of the log
-
-    Attributes
-    ----------
-    edges : (k + 1,) array, s, of the spans
-    low, high : (k, 4) arrays, of fx, fy, fz and of the standard deviation of the windows, m/s²;
-        NaN in a gap
-    """
-
-    def __init__(self, span: tuple[float, float], total: int) -> None:
-        count = max(1, min(SPANS, total // 4))
-        self.edges = np.linspace(*span, count + 1)
-        self.low, self.high = np.full((2, count, 4), np.nan)
-
-    def along(self, batches: Iterator[Windows]) -> Iterator[Windows]:
-        """Pass windows on, and widen the envelope to hold them."""
-        for batch in batches:
-            values = np.column_stack([batch.forces, np.sqrt(batch.variance)])
-            span = np.searchsorted(self.edges, batch.time, side="right") - 1
-            span = np.clip(span, 0, len(self.low) - 1)
-            np.fmin.at(self.low, span, values)
-            np.fmax.at(self.high, span, values)
-            yield batch
-
-    def less(self, offset: Array) -> Envelope:
-        """Envelope of the forces less an offset, (3,), m/s²."""
-        shifted = copy(self)
-        shifted.low, shifted.high = (values - [*offset, 0.0] for values in (self.low, self.high))
-        return shifted
-
-
 def _spread(forces: Array, width: int) -> tuple[Array, NDArray[np.bool_]]:
     """Norm of the variances of the axes in each window, and whether an axis does not change."""
     # Running sums of large numbers lose digits.
@@ -174,9 +157,10 @@ class Threshold:
 
 
 class Survey:
-    """Noise and extremes of a log, collected in a first pass over its windows."""
+    """Noise and extremes of a log, collected in a first pass over windows of `width` samples."""
 
-    def __init__(self) -> None:
+    def __init__(self, width: int) -> None:
+        self.width = width
         self.counts = np.zeros(len(_BINS) - 1, dtype=int)
         self.total = self.frozen = self.gaps = 0
         self.span = (np.nan, np.nan)
@@ -196,18 +180,10 @@ class Survey:
         self.extremes[0] = _two_lowest(self.extremes[0], batch.forces)
         self.extremes[1] = -_two_lowest(-self.extremes[1], -batch.forces)
 
-    def quietest(self, share: float = 0.01) -> float:
-        """Standard deviation that this share of the windows does not exceed, m/s²."""
-        rank = np.searchsorted(np.cumsum(self.counts), share * self.counts.sum())
+    def quietest(self) -> float:
+        """Standard deviation that a hundredth of the windows does not exceed, m/s²."""
+        rank = np.searchsorted(np.cumsum(self.counts), 0.01 * self.counts.sum())
         return float(10.0 ** (_BINS[min(rank, len(_BINS) - 2) + 1] / 2))
-
-    def warnings(self) -> Iterator[str]:
-        """What the user should know about the log."""
-        if self.gaps:
-            yield f"{counted(self.gaps, 'gap')} in time; no hold spans one"
-        if self.frozen:
-            share = 100 * self.frozen / self.total
-            yield f"a channel does not change over a window in {share:.2g} % of the log; left out"
 
 
 def _two_lowest(before: Array, forces: Array) -> Array:
@@ -219,7 +195,7 @@ def _two_lowest(before: Array, forces: Array) -> Array:
 
 def survey_log(log: Recording, width: int) -> Survey:
     """Read a log once, in windows of `width` samples."""
-    survey = Survey()
+    survey = Survey(width)
     for batch in track(windows(log, width), f"noise of {log.path.name}"):
         survey.add(batch)
     if not survey.total:

@@ -165,10 +165,9 @@ def _joints(directions: Array) -> Array:
     return np.column_stack([np.arctan2(-y + 0.0, -z + 0.0), np.arctan2(x, np.hypot(y, z))])
 
 
-def _by_hand(directions: Array, rng: np.random.Generator, sigma: float = 0.03) -> Array:
+def _by_hand(directions: Array, rng: np.random.Generator) -> Array:
     """Directions as a hand meets them, some degrees beside."""
-    aside: Array = sigma * rng.standard_normal(directions.shape)
-    return rotated(directions, aside)
+    return rotated(directions, 0.03 * rng.standard_normal(directions.shape))
 
 
 def _times(n: int, hold: float, pause: float) -> Array:

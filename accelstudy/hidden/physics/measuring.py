@@ -30,9 +30,9 @@ def flange_force(
     return in_turned_frame(in_turned_frame(turned, 2, skew), 0, joints[..., 0])
 
 
-def level_force(joints: Array, gravity: Array | float = GRAVITY) -> Array:
+def level_force(joints: Array) -> Array:
     """Specific force in a flange at roll and pitch (..., 2) on a level base, (..., 3)."""
-    return flange_force(joints, 0.0, gravity * np.array([0.0, 0.0, -1.0]))
+    return flange_force(joints, 0.0, GRAVITY * np.array([0.0, 0.0, -1.0]))
 
 
 @dataclass(frozen=True)

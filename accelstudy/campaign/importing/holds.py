@@ -1,0 +1,394 @@
+"""What the static holds of a log are, and what they have in common: their noise, their zero point.
+
+The detector is that of Tedaldi, Pretto and Menegatti (ICRA 2014): it compares the norm of the
+variances of the three axes in a window with a threshold, which comes from the data. The log is read
+twice, first for the threshold (`windows`), then for the holds and the envelope that a figure shows
+(`segments`), and only a chunk of it is in memory at a time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.basics.wording import counted
+from accelstudy.campaign.importing.allan import (
+    RELIABLE,
+    AllanDeviation,
+    MeanAccuracy,
+    accuracy_of_mean,
+    pooled_deviation,
+    slope_sigmas,
+)
+from accelstudy.campaign.importing.recording import Recording
+from accelstudy.campaign.importing.segments import Envelope, Segment, Segmentation
+from accelstudy.campaign.importing.settings import Selection
+from accelstudy.campaign.importing.windows import Survey, Threshold
+from accelstudy.leveling.angles import usual_norm
+
+Array = NDArray[np.float64]
+
+_ALIKE = 1.5  # largest over smallest norm of the means of one sensor in gravity
+_SPREAD = 0.25  # rms of the means along their thinnest direction, over gravity; of a sphere 0.58
+RESTLESS = 0.02
+"""Noise of windows, as a share of gravity, from which on it may be motion and not the sensor's."""
+SLOW = 2.0
+"""Allan deviation, as a multiple of that of white noise, from which on a motion is slow, such as
+that of a hand."""
+SHORTEST = 0.2
+"""Seconds; quicker motions are vibrations, which do not harm a mean."""
+
+
+@dataclass(frozen=True)
+class HoldNoise:
+    """Noise of the samples within all holds of a log together, in three channels.
+
+    The first channel is along the mean specific force of a hold, the other two are across it.
+
+    Attributes
+    ----------
+    allan : AllanDeviation, of the channels
+    sd : (3,) array, m/s², root mean square sd of the samples within holds in the channels
+    center : (3,) array, m/s², zero point of the specific forces; zero if the holds determine none
+    directed : bool, whether the means are close enough to forces for "along" to have a meaning
+    of_sensor : slice, channels with the noise of the sensor: those without what moves it, if there
+        are any
+    accuracy : MeanAccuracy, of the mean over a typical hold in the channels of the sensor
+    across : float, m/s², standard deviation of such a mean across gravity
+    """
+
+    allan: AllanDeviation
+    sd: Array
+    center: Array
+    directed: bool
+    of_sensor: slice
+    accuracy: MeanAccuracy
+    across: float
+
+
+@dataclass(frozen=True)
+class DetectedHolds:
+    """Static holds of a log, n of them, in order of time.
+
+    Attributes
+    ----------
+    segments : mapping of int to Segment, by the numbers that figures and options use
+    left_out : mapping of int to str, numbers of holds that are left out, with the reason
+    conditions : mapping of "temperature" and "vibration" to (n,) arrays, °C (mean) and m/s² (rms);
+        NaN where nothing is known
+    noise : HoldNoise, of the holds that are not left out
+    sd_slope : (n, 3) array, m/s²/s, standard deviations of the slopes of the samples
+    threshold : Threshold
+    step : float, s, usual time between samples
+    envelope : Envelope, of the log, for its figure
+    warnings : tuple of str
+    """
+
+    segments: Mapping[int, Segment]
+    left_out: Mapping[int, str]
+    conditions: Mapping[str, Array]
+    noise: HoldNoise
+    sd_slope: Array
+    threshold: Threshold
+    step: float
+    envelope: Envelope
+    warnings: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.segments)
+
+    def of_each(self, attribute: str) -> NDArray[Any]:
+        """Attribute of `Segment` for each hold, (n,) or (n, 3)."""
+        return np.array([getattr(segment, attribute) for segment in self.segments.values()])
+
+    @property
+    def number(self) -> NDArray[np.int_]:
+        """Numbers of the holds, (n,)."""
+        return np.array(list(self.segments))
+
+    @property
+    def used(self) -> NDArray[np.bool_]:
+        """Which holds are not left out, (n,)."""
+        return ~np.isin(self.number, list(self.left_out))
+
+    @property
+    def t0(self) -> Array:
+        """Times of the first samples since the first of the log, (n,), s."""
+        return self.of_each("t0")
+
+    @property
+    def t1(self) -> Array:
+        """Times of the last samples, (n,), s."""
+        return self.of_each("t1")
+
+    @property
+    def n_samples(self) -> NDArray[np.int_]:
+        """Numbers of samples, (n,)."""
+        return self.of_each("n")
+
+    @property
+    def mean(self) -> Array:
+        """Mean specific forces, (n, 3), m/s²."""
+        return self.of_each("mean")
+
+    @property
+    def radius(self) -> float:
+        """Usual distance of the means from the zero point of the specific forces, m/s²."""
+        return usual_norm(self.mean - self.noise.center)
+
+
+def detected_holds(
+    log: Recording,
+    survey: Survey,
+    threshold: Threshold,
+    segmentation: Segmentation,
+    selection: Selection,
+    window: float,
+    shortest: float,
+) -> DetectedHolds:
+    """Collect the holds of one sensor, as its log was read with these settings.
+
+    Raises
+    ------
+    InputError
+        If nothing is at rest, a person leaves all of it out, or the sensor was never still.
+    """
+
+    def never_still(why: str) -> InputError:
+        return InputError(
+            f"{log.path}: the sensor was never still: {why}; the quietest hundredth of its windows "
+            f"of {window:g} s varies by {survey.quietest():.3g} m/s². Lay it down for some seconds "
+            "in each of ten or more attitudes, on a table or in a fixture"
+        )
+
+    warnings = []
+    if survey.gaps:
+        warnings.append(f"{counted(survey.gaps, 'gap')} in time; no hold spans one")
+    if survey.frozen:
+        share = 100 * survey.frozen / survey.total
+        warnings.append(
+            f"a channel does not change over a window in {share:.2g} % of the log; left out"
+        )
+    if segmentation.saturated:
+        warnings.append(
+            f"{counted(segmentation.saturated, 'hold')} left out: the sensor is saturated there"
+        )
+    if segmentation.wandering:
+        warnings.append(
+            f"{counted(segmentation.wandering, 'hold')} left out: the force changes there by more "
+            "than its noise, since the sensor turns slowly"
+        )
+    if not segmentation.segments:
+        if segmentation.wandering:
+            raise never_still("it turns slowly in all that looks like a hold")
+        raise InputError(
+            f"{log.path}: no static hold of {shortest:g} s or more "
+            f"({counted(segmentation.short, 'shorter one')}; a window is at rest up to "
+            f"{threshold.sd:.3g} m/s²)" + "".join(f"; {warning}" for warning in warnings)
+        )
+    segments = _joined(segmentation.segments, selection, threshold.sd)
+    left_out = _left_out(segments, selection)
+    used = [segment for number, segment in segments.items() if number not in left_out]
+    if not used:
+        raise InputError(f"{log.path}: exclude: no hold is left")
+    holds = DetectedHolds(
+        segments=segments,
+        left_out=left_out,
+        conditions=_conditions(list(segments.values()), log.conditions),
+        noise=_noise(used, log.step),
+        sd_slope=_slope_sigmas(list(segments.values()), log.step),
+        threshold=threshold,
+        step=log.step,
+        envelope=segmentation.envelope,
+        warnings=tuple(warnings),
+    )
+    if _moves(holds):
+        raise never_still(
+            f"what looks like rest varies by {threshold.floor:.3g} m/s², slowly like a hand, "
+            "not like the noise of a sensor"
+        )
+    return holds
+
+
+def _joined(
+    segments: Mapping[int, Segment], selection: Selection, alike: float
+) -> dict[int, Segment]:
+    """Join holds; they keep the number of the first.
+
+    Parameters
+    ----------
+    segments : mapping of int to Segment
+    selection : Selection
+    alike : float, m/s², by which the means of holds in one attitude may differ
+
+    Raises
+    ------
+    InputError
+        If there is no such hold, a span of time has fewer than two, others lie between, or
+        their attitudes differ.
+    """
+    holds = dict(segments)
+    groups = list(selection.joined)
+    for start, end in selection.joined_spans:
+        groups.append(tuple(_within(holds, start, end)))
+        if len(groups[-1]) < 2:
+            raise InputError(f"join: {start:g}s-{end:g}s: fewer than two holds lie there")
+    for group in groups:
+        for number in group:
+            _check(number, holds, "join")
+        between = [n for n in holds if group[0] < n < group[-1] and n not in group]
+        if between:
+            raise InputError(f"join: {_names(group)}: hold {between[0]} lies between them")
+        for number in group[1:]:
+            step = float(np.linalg.norm(holds[number].mean - holds[group[0]].mean))
+            if step > alike:
+                raise InputError(
+                    f"join: holds {group[0]} and {number} differ by {step:.2g} m/s²: the "
+                    "sensor was turned between them"
+                )
+            holds[group[0]] = holds[group[0]] + holds.pop(number)
+    return holds
+
+
+def _left_out(holds: Mapping[int, Segment], selection: Selection) -> dict[int, str]:
+    """Holds that are left out, with the reason.
+
+    Raises
+    ------
+    InputError
+        If there is no such hold, or none in a span of time.
+    """
+    for number in selection.numbers:
+        _check(number, holds, "exclude")
+    reasons = dict(selection.numbers)
+    for start, end, reason in selection.spans:
+        inside = _within(holds, start, end)
+        if not inside:
+            raise InputError(f"exclude: {start:g}s-{end:g}s: no hold lies there")
+        reasons |= {n: reason for n in inside if n not in reasons}
+    return reasons
+
+
+def _within(holds: Mapping[int, Segment], start: float, end: float) -> list[int]:
+    """Numbers of the holds that lie in a span of time, if only in part."""
+    return sorted(n for n, hold in holds.items() if hold.t0 <= end and hold.t1 >= start)
+
+
+def _check(number: int, holds: Mapping[int, Segment], key: str) -> None:
+    if number not in holds:
+        raise InputError(f"{key}: there is no hold {number}; they are {_names(list(holds))}")
+
+
+def _names(numbers: Sequence[int]) -> str:
+    """Numbers in one line, runs of them by their ends."""
+    runs: list[list[int]] = []
+    for number in sorted(numbers):
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    return ", ".join(f"{r[0]} to {r[-1]}" if len(r) > 2 else ", ".join(map(str, r)) for r in runs)
+
+
+def _noise(segments: Sequence[Segment], step: float) -> HoldNoise:
+    """Turn the samples of each hold to its channels, and add them up."""
+    center, directed = _center(np.array([segment.mean for segment in segments]))
+    frames = [_frame(segment.mean - center) for segment in segments]
+    variances = [
+        np.diag(frame.T @ segment.covariance @ frame)
+        for segment, frame in zip(segments, frames, strict=True)
+    ]
+    sd = np.sqrt(np.mean(variances, axis=0))
+    records = [(r, f) for s, f in zip(segments, frames, strict=True) for r in s.noise]
+    allan = pooled_deviation([r for r, _ in records], step, [f for _, f in records])
+    typical = int(np.median([segment.n for segment in segments]))
+    of_sensor = slice(0, 1 if directed else 3)
+    accuracy, across = (
+        accuracy_of_mean(allan.channels(channels), typical * step, sd[channels], typical)
+        for channels in (of_sensor, slice(1, 3))
+    )
+    return HoldNoise(allan, sd, center, directed, of_sensor, accuracy, across.allan)
+
+
+def _slope_sigmas(segments: Sequence[Segment], step: float) -> Array:
+    """Standard deviations of the slopes of the samples in holds, (n, 3), m/s²/s."""
+    variances = np.array([np.diag(segment.covariance) for segment in segments])
+    residuals, n_samples = [s.wobble for s in segments], [s.n for s in segments]
+    return slope_sigmas(residuals, n_samples, variances, step)
+
+
+def _conditions(segments: Sequence[Segment], names: Sequence[str]) -> dict[str, Array]:
+    """Mean temperature and rms vibration of holds."""
+    count, total, squares = np.array([s.conditions for s in segments]).transpose(1, 0, 2)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        values = {"temperature": total / count, "vibration": np.sqrt(squares / count)}
+    return {name: values[name][:, i] for i, name in enumerate(names)}
+
+
+def _center(means: Array) -> tuple[Array, bool]:
+    """Point from which all means of holds are equally far, and whether there is one.
+
+    The offset of counts may be unknown; with a large one no mean points along gravity. If the
+    attitudes differ enough, the sphere through the means shows it.
+    """
+    centers = [np.zeros(3)]
+    if len(means) > 5 and (sphere := fit_sphere(means)) is not None:
+        center, radius = sphere
+        thinnest = np.linalg.svd(means - means.mean(axis=0), compute_uv=False)[-1]
+        if thinnest > _SPREAD * radius * np.sqrt(len(means)):
+            centers.insert(0, center)
+    for center in centers:
+        norms = np.linalg.norm(means - center, axis=1)
+        if norms.max() <= _ALIKE * norms.min():
+            return center, True
+    return np.zeros(3), False
+
+
+def _frame(force: Array) -> Array:
+    """Orthonormal columns, the first of them along `force`.
+
+    A sensor that settles or is nudged turns a little. That moves the force across its mean, and
+    along it in the second order only. So the scatter along the mean is the sensor's own noise.
+    """
+    size = float(np.linalg.norm(force))
+    if size == 0:
+        return np.eye(3)
+    return np.linalg.svd(force[:, None] / size)[0]
+
+
+def fit_sphere(forces: Array) -> tuple[Array, float] | None:
+    """Centre (3,) and radius of the sphere that fits points (n, 3) best; None if there is none.
+
+    |f − c|² = r² is linear in c and in r² − |c|².
+    """
+    # Relative to their mean, so that a large offset costs no digits.
+    middle = forces.mean(axis=0)
+    points = forces - middle
+    design = np.column_stack([2 * points, np.ones(len(points))])
+    solution, _, rank, _ = np.linalg.lstsq(design, np.sum(points**2, axis=1), rcond=1e-6)
+    square = solution[3] + solution[:3] @ solution[:3]
+    if rank < 4 or square <= 0:
+        return None
+    return middle + solution[:3], float(np.sqrt(square))
+
+
+def _moves(holds: DetectedHolds) -> bool:
+    """Whether the windows "at rest" show motion: large compared with gravity, and slow.
+
+    The noise of a sensor at rest is below a few hundredths of gravity. The vibration of a machine
+    may be larger, but it is quick and averages out like white noise. A human body moves slowly.
+    """
+    if not holds.threshold.floor > RESTLESS * min(holds.radius, STANDARD_GRAVITY):
+        return False
+    curve, sd = holds.noise.allan, float(np.sqrt(np.mean(holds.noise.sd**2)))
+    reliable = (curve.differences >= RELIABLE) & (curve.tau >= SHORTEST)
+    if not reliable.any():
+        return True
+    white = sd * np.sqrt(holds.step / curve.tau[reliable])
+    return bool(np.max(curve.pooled[reliable] / white) > SLOW)

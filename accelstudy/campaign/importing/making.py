@@ -1,0 +1,264 @@
+"""What every import makes: a campaign and a report."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import display_unit, to_display
+from accelstudy.basics.wording import counted
+from accelstudy.campaign.checks import likely_fault
+from accelstudy.campaign.header import LogLayout, Place
+from accelstudy.campaign.importing.allan import MeanAccuracy
+from accelstudy.campaign.importing.holds import DetectedHolds, HoldNoise
+from accelstudy.campaign.importing.recording import Log, LogSeries, Recording
+from accelstudy.campaign.importing.settings import ImportSettings
+from accelstudy.campaign.importing.sources import Source
+from accelstudy.campaign.session import Campaign
+from accelstudy.leveling.angles import usual_norm
+from accelstudy.sensors.conversion import Conversion, conversion_of
+from accelstudy.sensors.plausibility import LARGEST
+
+Array = NDArray[np.float64]
+
+TURNING = 1.5
+"""Noise across gravity, as a multiple of that along it, from which on a warning says that the
+sensor turns within its holds."""
+
+
+@dataclass(frozen=True)
+class ImportReport:
+    """The report of an import.
+
+    Attributes
+    ----------
+    n_holds : int
+    accuracy : MeanAccuracy, of the mean of a typical hold; None from a table of means
+    sigma_white : float, m/s², sd of a mean if the noise were white; None if unknown
+    holds : DetectedHolds, None from a table of means
+    notes : tuple of str, assumptions of the import
+    warnings : tuple of str
+    """
+
+    n_holds: int
+    accuracy: MeanAccuracy | None
+    sigma_white: float | None
+    holds: DetectedHolds | None
+    notes: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+    def lines(self) -> list[str]:
+        """Return the report as lines of text."""
+        if self.holds is None or self.accuracy is None:
+            sigma = "unknown" if self.sigma_white is None else shown(self.sigma_white)
+            return [f"{self.n_holds} positions; sigma of a mean: {sigma}", *self.notes]
+        holds, accuracy = self.holds, self.accuracy
+        lengths, edges = holds.n_samples * holds.step, holds.envelope.edges
+        lines = [
+            f"log: {edges[-1] - edges[0]:.1f} s at {1 / holds.step:.6g} per second",
+            *self.notes,
+            f"threshold: {holds.threshold.sd:.3g} m/s², {holds.threshold.reason}",
+            f"holds: {len(holds)}, of {lengths.min():.1f} to {lengths.max():.1f} s",
+        ]
+        if holds.left_out:
+            each = ", ".join(f"{n} ({why})" for n, why in sorted(holds.left_out.items()))
+            lines.append(f"left out: {counted(len(holds.left_out), 'hold')}: {each}")
+        return [
+            *lines,
+            f"sigma of a mean over {accuracy.duration:.1f} s: {shown(accuracy.allan)} (Allan), "
+            f"{shown(accuracy.white)} if the noise were white; ratio {accuracy.ratio:.2f}",
+        ]
+
+
+def shown(sigma: float) -> str:
+    """Standard deviation of a force, m/s², for people."""
+    return f"{1e3 * sigma:.3g} mm/s²"
+
+
+def campaign_of_holds(
+    paths: Sequence[str | Path], settings: ImportSettings, log: Recording, holds: DetectedHolds
+) -> tuple[Campaign, ImportReport]:
+    """Make the campaign of the holds of one sensor, and its report."""
+    accuracy = holds.noise.accuracy
+    warnings = [*holds.warnings, *_doubts(holds.noise, settings.gravity.value_mps2)]
+    notes = []
+    if settings.frame != "frd":
+        notes.append(
+            f"axes: {settings.frame} in the log, turned to frd (forward, right, down) here"
+        )
+    forces = holds.mean
+    if settings.unit == "counts" and settings.offset is None:
+        settings, offset, note = _with_offset(settings, holds)
+        forces, holds = forces - offset, replace(holds, envelope=holds.envelope.less(offset))
+        notes += note
+    first, time = log, (holds.t0 + holds.t1) / 2
+    if isinstance(log, LogSeries):
+        first = log.parts[0]
+        notes.append(
+            f"files: {len(log.parts)}, with the longest hold of each as one position; what is "
+            "before and after it does not count"
+            + ("" if log.timed else "; the times of the files do not tell that of a position")
+        )
+        missing = [i for i in range(1, len(paths) + 1) if i not in holds.segments]
+        warnings += [f"{paths[i - 1]}: no static hold; position {i} is missing" for i in missing]
+    assert isinstance(first, Log)
+    columns = {}
+    for name, values in holds.conditions.items():
+        if np.isfinite(values).all():
+            columns[name] = values
+        else:
+            hold = holds.number[np.argmin(np.isfinite(values))]
+            warnings.append(f"hold {hold} has no {name}; the column is left out")
+    warnings += far_from_gravity(settings, forces)
+    campaign = imported_campaign(
+        paths[0],
+        settings,
+        forces,
+        positions=holds.number,
+        sigma_force=accuracy.allan,
+        n_samples=holds.n_samples,
+        sd=holds.of_each("sd"),
+        slope=holds.of_each("slope"),
+        sd_slope=holds.sd_slope,
+        time=None if isinstance(log, LogSeries) and not log.timed else time,
+        log=layout_of(settings, first.source, first.places),
+        warnings=tuple(warnings),
+        **columns,
+    ).without(holds.left_out)
+    report = ImportReport(
+        len(holds), accuracy, float(accuracy.white), holds, tuple(notes), tuple(warnings)
+    )
+    return campaign, report
+
+
+def _doubts(noise: HoldNoise, gravity: float) -> Iterator[str]:
+    """What the user should know about the accuracy of the mean over a typical hold."""
+    accuracy = noise.accuracy
+    if not noise.directed:
+        yield (
+            "the norms of the means differ too much for specific forces (is an offset missing?); "
+            "sigma is taken over all axes"
+        )
+    elif noise.across > TURNING * accuracy.allan:
+        turned = f"{to_display(noise.across / gravity, 'rad'):.0f} {display_unit('rad')}"
+        yield (
+            f"across gravity the means vary by {shown(noise.across)}, more than along it: the "
+            f"sensor turns by some {turned} within holds"
+        )
+    if accuracy.slope is not None:
+        yield (
+            f"the Allan deviation is known up to {accuracy.tau:.2g} s, and extrapolated from there "
+            f"to the {accuracy.duration:.2g} s of a hold with slope {accuracy.slope:.2f}"
+        )
+
+
+def _with_offset(
+    settings: ImportSettings, holds: DetectedHolds
+) -> tuple[ImportSettings, Array, list[str]]:
+    """Offset of counts, from the positions, unless it is zero apart from the sensor's bias.
+
+    Returns
+    -------
+    settings : ImportSettings, with the offset
+    offset : (3,) array, m/s², in forward, right, down; zero if the settings stay
+    notes : list of str
+    """
+    noise, frame = holds.noise, settings.axes
+    if not (noise.directed and np.linalg.norm(noise.center) > holds.radius / 2):
+        return settings, np.zeros(3), []
+    scale = conversion_of("counts", settings.scale).scale
+    offset = np.round(frame.from_frd(noise.center) / scale)
+    note = (
+        f"offset: {', '.join(f'{x:.0f}' for x in offset)} counts, from the positions, as none was "
+        "given"
+    )
+    settings = settings.model_copy(update={"offset": offset.tolist()})
+    return settings, frame.to_frd(offset * scale), [note]
+
+
+def imported_campaign(
+    path: str | Path, settings: ImportSettings, forces: Array, **columns: Any
+) -> Campaign:
+    """Make a campaign of forces (n, 3) in m/s², in forward, right, down, as the settings say.
+
+    Raises
+    ------
+    InputError
+        If the forces are nowhere near gravity; it names the options that would mend that.
+    """
+    conversion = conversion_of(settings.unit, settings.scale, settings.offset)
+    frame = settings.axes
+    raw = conversion.from_si(frame.from_frd(forces))
+    nominal = None
+    if settings.unit == "counts":
+        scale = frame.rearranged(conversion.scale) * frame.signs
+        nominal = Conversion(scale, frame.rearranged(conversion.offset))
+    _check_size(path, settings, raw, forces)
+    return Campaign(
+        **{
+            "name": settings.name,
+            "positions": np.arange(1, len(forces) + 1),
+            "forces": forces,
+            "gravity": settings.gravity.value_mps2,
+            "sigma_gravity": settings.gravity.sigma_mps2,
+            "unit": settings.unit,
+            "sensor": settings.sensor,
+            "nominal": nominal,
+            "full_range": settings.range_mps2,
+            **columns,
+        }
+    )
+
+
+def _check_size(path: str | Path, settings: ImportSettings, raw: Array, forces: Array) -> None:
+    """Check that forces are roughly as large as gravity; the error names the options to change."""
+    gravity, unit = settings.gravity.value_mps2, settings.unit
+    cause, given, norm = likely_fault(raw, forces, unit, gravity)
+    if cause is None:
+        return
+    at_rest = f"{path}: at rest the forces are about {given:.3g} {unit}"
+    if cause == "gravity":
+        raise InputError(
+            f"{at_rest}, which does not fit a gravity of {gravity:g} m/s²; give --gravity"
+        )
+    if cause == "counts":
+        raise InputError(f"{at_rest}: these look like counts; give --unit counts and --scale")
+    if cause != "unknown":
+        raise InputError(f"{at_rest}: these look like {cause}; give --unit {cause}")
+    advice = "--scale and --offset" if unit == "counts" else "--unit or --columns"
+    converted = f", by --scale and --offset {norm:.3g} m/s²," if unit == "counts" else ","
+    raise InputError(f"{at_rest}{converted} which is nowhere near gravity; give other {advice}")
+
+
+def far_from_gravity(settings: ImportSettings, forces: Array) -> list[str]:
+    """Warn if forces (n, 3), m/s², at rest differ from gravity by more than a scale error can."""
+    norm, gravity = usual_norm(forces), settings.gravity.value_mps2
+    share = norm / gravity - 1
+    if abs(share) <= LARGEST["scale"]:
+        return []
+    options = "--scale and --offset" if settings.unit == "counts" else "--unit"
+    return [
+        f"at rest the forces are about {norm:.3g} m/s², {100 * abs(share):.0f} % "
+        f"{'more' if share > 0 else 'less'} than gravity, {gravity:g} m/s²: no accelerometer is so "
+        f"far off; check {options}, and --gravity"
+    ]
+
+
+def layout_of(settings: LogLayout, source: Source, places: Mapping[str, int]) -> LogLayout:
+    """How a log was read, with all its columns, by name if it has names."""
+
+    def column(key: str) -> Place:
+        place = places[key]
+        name = source.names[place]
+        return name if source.named and name and source.names.count(name) == 1 else place
+
+    layout = settings.model_dump(include=set(LogLayout.model_fields))
+    time = column("time") if "time" in places else None
+    columns = {key: column(key) for key in places if key != "time"}
+    return LogLayout.model_validate({**layout, "columns": columns, "time": time})
