@@ -49,7 +49,7 @@ SINGLE = "single_position"
 GROUPS = (
     "direction", ROBOT, REPEAT, "slow_time", "temperature", "previous_position", SINGLE,
 )  # fmt: skip
-"""All groups."""
+"""Groups of which every campaign is told whether it shows them."""
 ABSENT = {
     "direction": "the model has all effects of the direction",
     ROBOT: "gravity alone does not tell the angles of a robot",
@@ -125,7 +125,7 @@ def locate(problem: Problem, chance: Chance, finding: Finding, variance: float) 
         enough = (expected[SINGLE] + NEARLY_ALL * excess) / (r + excess)
         nearly_all[SINGLE] = float(np.mean(largest >= enough * total))
     untestable = {}
-    for name in GROUPS:
+    for name in dict.fromkeys((*GROUPS, *groups)):
         if name not in groups:
             untestable[name] = _absent(name, problem.frame.hold)
         elif int(groups[name].dims.max()) == 0:

@@ -107,7 +107,7 @@ def predicted_gap(
     ----------
     gap : Gap, on the positions to which the models were fitted
     problem, weighing : Problem, Weighing, of all positions
-    finding : Finding, named or narrowed
+    finding : Finding, with what was chosen
     beyond : float, total evidence from which on something counted as missing
     known : float, variance of unit weight; None takes that of the fit to the part
     seeds : of the split, the resampling, and the simulation
@@ -159,7 +159,7 @@ def _chosen_alike(
     part: Problem, singles: Singles, finding: Finding
 ) -> tuple[Sequence[Choice], bool]:
     """Explanation of the credible set that a part chooses, and whether it would choose another."""
-    chosen, credible = finding.chosen, finding.credible_set
+    chosen, credible = finding.chosen, finding.alternatives
     if len(chosen) > 1:
         members = equivalents(part.examined, singles)
         pairs = weigh_pairs(part, singles, members, classes_of(singles, members))

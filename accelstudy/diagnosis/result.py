@@ -55,7 +55,7 @@ class Verdict:
     unrecorded : bool, whether the reason says so
     weak : bool, whether there is evidence that something is missing, too weak for a verdict
     credible_set : tuple of Explanation, most probable first; empty if nothing is missing
-    found : tuple of Named
+    found : tuple of Named; of the unknown, what is certain all the same
     base : Solution, of the base model with equal axes
     frame : Frame, of the base fit with unequal axes weighted
     final : Frame, of the extended fit, or the same
@@ -106,6 +106,11 @@ class Verdict:
         return ~np.isin(self.campaign.positions, bumped)
 
     @property
+    def effects(self) -> tuple[Named, ...]:
+        """What the verdict names; nothing if that is unknown."""
+        return () if self.verdict == "unknown" else self.found
+
+    @property
     def level(self) -> float:
         """Level of the test for anything that is missing."""
         return level_of_effects(self.sigma_known)
@@ -129,7 +134,9 @@ class Diagnosis(Verdict):
 
     Attributes
     ----------
-    certain : tuple of Part, what the credible set leaves no doubt of
+    certain : tuple of Part, what is missing whatever else is open
+    open : tuple of Explanation, what may be missing beside that, most probable first; one without
+        names stands for nothing
     groups : tuple of str, groups of regressors that the campaign can show
     location : dict of group to the share of the excess χ², where it tells
     location_by_chance : dict of these groups to the share that any pattern has on average
@@ -144,6 +151,7 @@ class Diagnosis(Verdict):
     """
 
     certain: tuple[Part, ...]
+    open: tuple[Explanation, ...]
     groups: tuple[str, ...]
     location: Mapping[str, float]
     location_by_chance: Mapping[str, float]

@@ -63,11 +63,11 @@ def outcome(d: Verdict) -> Row:
     test, held = d.global_test, d.gap.held_out
     return {
         "verdict": d.verdict,
-        "found": json.dumps([one.name for one in d.found]),
-        "specs": json.dumps([one.spec for one in d.found]),
-        "found_classes": json.dumps([list(one.equivalence_class) for one in d.found]),
-        "positions": json.dumps([one.position for one in d.found]),
-        "posteriors": json.dumps([_rounded(one.posterior) for one in d.found]),
+        "found": json.dumps([one.name for one in d.effects]),
+        "specs": json.dumps([one.spec for one in d.effects]),
+        "found_classes": json.dumps([list(one.equivalence_class) for one in d.effects]),
+        "positions": json.dumps([one.position for one in d.effects]),
+        "posteriors": json.dumps([_rounded(one.posterior) for one in d.effects]),
         "credible_set": json.dumps(
             [
                 {

@@ -8,7 +8,7 @@ one, too small to be seen, is missing as well.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -42,6 +42,9 @@ from accelstudy.diagnosis.evidence.size import log_mean
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.effects import effect_names
 
+IMITATED = 0.5
+"""Probability that an effect beside something unknown only imitates a part of that; in simulations
+without any such effect as many seem certain as in those with one."""
 CREDIBLE = 0.9
 """Posterior probability that a credible set reaches."""
 FIRST = 3
@@ -147,15 +150,32 @@ class Posterior:
     @cached_property
     def explanations(self) -> tuple[Explanation, ...]:
         """What is told, most probable first."""
-        return tuple(
-            Explanation(one.names, one.classes, p)
-            for one, p in zip(self.told, _shares(self.told), strict=True)
-        )
+        return _explanations(self.told, _shares(self.told))
+
+    @property
+    def each(self) -> tuple[Explanation, ...]:
+        """All that were weighed, each by itself, most probable first."""
+        return _explanations(self.all, self.probabilities)
 
     @property
     def credible_set(self) -> tuple[Explanation, ...]:
         """Smallest set of explanations that holds the truth with a probability of 0.9."""
         return credible_set(self.explanations)
+
+    def doubting(self, names: Collection[str]) -> Posterior:
+        """Share what has some names with something unknown that they may only imitate."""
+        shared: list[Weighed] = []
+        for one in self.all:
+            others = [members for members in one.classes if members != (UNKNOWN,)]
+            kept = [members for members in others if not {*members} & {*names}]
+            if len(kept) == len(others):
+                shared.append(one)
+                continue
+            real, imitated = (one.log_weight + np.log(p) for p in (1 - IMITATED, IMITATED))
+            named = tuple(n for n, c in zip(one.names, one.classes, strict=True) if c in kept)
+            unknown = Weighed((*named, UNKNOWN), (*kept, (UNKNOWN,)), float(imitated))
+            shared += [replace(one, log_weight=float(real)), unknown]
+        return Posterior.of(shared)
 
     @property
     def top(self) -> Weighed:
@@ -166,6 +186,11 @@ class Posterior:
     def of_noise(self) -> float:
         """Probability that nothing is wrong but the noise."""
         return sum(one.posterior for one in self.explanations if one.names[0] in NOISES)
+
+
+def _explanations(weighed: Sequence[Weighed], p: Sequence[float]) -> tuple[Explanation, ...]:
+    """Weighed things with their probabilities."""
+    return tuple(Explanation(a.names, a.classes, b) for a, b in zip(weighed, p, strict=True))
 
 
 def _shares(weighed: Sequence[Weighed]) -> tuple[float, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ from accelstudy.diagnosis.decision.posterior import (
 )
 from accelstudy.diagnosis.decision.problem import Problem, pose
 from accelstudy.diagnosis.decision.refits import best_refit, with_settings
-from accelstudy.diagnosis.decision.statement import statement
+from accelstudy.diagnosis.decision.statement import Part
 from accelstudy.diagnosis.evidence.bounds import within_bounds
 from accelstudy.diagnosis.evidence.detection import Chance, Detection
 from accelstudy.diagnosis.evidence.field import UNKNOWN
@@ -52,6 +53,8 @@ from accelstudy.sensors.plausibility import impossible_parameters
 
 LARGE = 300.0
 """Noncentrality beyond which first order is not enough, and a refit judges an effect."""
+PAIRS = 5
+"""Pairs that are refitted where the best explanation leaves a misfit."""
 LEVEL_NOISE = 0.01
 """Family-wise level of all tests of the noise but that of its level, which has `REFUTED`. With the
 test for anything that is missing they make 5 % false alarms."""
@@ -86,12 +89,15 @@ class Finding:
     verdict : str, "no_effect", "named", "narrowed", "gross_error", "noise_model" or "unknown"
     frame : Frame, of the fit with what was chosen, or of the base fit
     reason : str
-    chosen : tuple of Choice
+    chosen : tuple of Choice; of the unknown, what is certain
     posterior : Posterior or None, where something is missing
     says_the_level : bool, whether the reason says how large the residuals are
     coloured : float, probability of coloured noise that may be an effect of an absent column
     unrecorded : bool, whether the reason says so
     weak : bool, whether there is evidence that something is missing, too weak for a verdict
+    left_over : bool, whether the best explanation leaves more than noise
+    certain : tuple of Part, what is missing whatever else is open
+    open : tuple of Explanation, what may be missing beside that
     """
 
     verdict: str
@@ -103,6 +109,23 @@ class Finding:
     coloured: float = 0.0
     unrecorded: bool = False
     weak: bool = False
+    left_over: bool = False
+    certain: tuple[Part, ...] = ()
+    open: tuple[Explanation, ...] = ()
+
+    @property
+    def alternatives(self) -> tuple[Explanation, ...]:
+        """Explanations any of which would be what was chosen."""
+        if self.verdict != "unknown":
+            return self.credible_set
+        added = {choice.members for choice in self.chosen}
+        parts = [part for part in self.certain if part.names[0].members in added]
+        return tuple(
+            Explanation(
+                tuple(n.name for n in one), tuple(n.members for n in one), parts[0].posterior
+            )
+            for one in product(*(part.names for part in parts))
+        )
 
     @property
     def credible_set(self) -> tuple[Explanation, ...]:
@@ -144,7 +167,17 @@ def find(problem: Problem, weighing: Weighing) -> Finding:
     posterior = weighing.posterior
     strongest = next((one for one in posterior.all if len(one.best) == 1), None)
     if strongest is not None and _is_large(problem, strongest):
-        posterior = _judged_by_refits(problem, weighing, strongest)
+        posterior = _judged_by_refits(problem, weighing, strongest, 1)
+    finding = _judged(problem, weighing, posterior)
+    if finding.left_over and strongest is not None:
+        # To first order the best explanation was enough; the others were not asked by their refits.
+        posterior = _judged_by_refits(problem, weighing, strongest, PAIRS)
+        finding = _judged(problem, weighing, posterior)
+    return finding
+
+
+def _judged(problem: Problem, weighing: Weighing, posterior: Posterior) -> Finding:
+    """Judge the explanations of a posterior."""
     top = posterior.top
     if not top.best:
         return _without_a_fit(problem, posterior)
@@ -157,7 +190,7 @@ def find(problem: Problem, weighing: Weighing) -> Finding:
     left = _misfit(problem, solution)
     if left:
         reason = f"with {comma_list(grouped(top.names))} added, the residuals are still {left}"
-        return Finding("unknown", problem.frame, reason, posterior=posterior)
+        return Finding("unknown", problem.frame, reason, posterior=posterior, left_over=True)
     if impossible := _impossible(solution):
         reason = f"with {comma_list(grouped(top.names))} added, no sensor has {impossible}"
         return Finding("unknown", problem.frame, reason, posterior=posterior)
@@ -230,7 +263,7 @@ def unless_weak(problem: Problem, detection: Detection, finding: Finding) -> Fin
     refuted_sigma = problem.evidence.level.known and test.p_value < REFUTED
     if finding.verdict != "unknown" or detection.p_value < REFUTED or refuted_sigma:
         return finding
-    if any(part.is_effect for part in statement(finding.credible_set).certain):
+    if any(part.is_effect for part in finding.certain):
         return finding
     reason = (
         f"the evidence that something is missing is weak ({p_value(detection.p_value)}), and "
@@ -250,21 +283,30 @@ def _is_large(problem: Problem, top: Weighed) -> bool:
     return top.best[0].effect is not None and float(np.sum((z @ basis) ** 2)) > LARGE
 
 
-def _judged_by_refits(problem: Problem, weighing: Weighing, single: Weighed) -> Posterior:
-    """Posterior where an effect is large: it alone, or with more in what its refit leaves.
+def _judged_by_refits(
+    problem: Problem, weighing: Weighing, single: Weighed, count: int
+) -> Posterior:
+    """Posterior by refits: an effect alone, with more in what its refit leaves, pairs and triples.
 
     To first order a large effect leaves so much that anything would seem to be beside it.
+
+    Parameters
+    ----------
+    problem : Problem
+    weighing : Weighing
+    single : Weighed, the effect
+    count : int, pairs that are refitted, the most probable to first order
     """
     tried = [single]
-    for count in (2, 3):
-        together = [one for one in weighing.pairs if len(one.best) == count]
-        tried += sorted(together, key=lambda one: one.log_weight)[-1:]
+    for size in (2, 3):
+        together = [one for one in weighing.pairs if len(one.best) == size]
+        tried += sorted(together, key=lambda one: -one.log_weight)[:count]
     refitted = [_refitted(problem, weighing, one) for one in tried]
     weighed = [one for one, _ in refitted]
     alone, solution = refitted[0]
     if solution is not None:
         weighed += _beside(problem, len(weighing.classes), alone, solution)
-    others = [one for one in weighing.alone if one.best and one.names != single.names]
+    others = [one for one in weighing.alone if one.names != single.names]
     return Posterior.of([*weighed, *others, *weighing.noises])
 
 

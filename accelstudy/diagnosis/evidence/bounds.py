@@ -51,7 +51,7 @@ def within_bounds(
         alike = np.flatnonzero(dims == d)
         means, covariances, sizes = (np.zeros((len(alike), *[d] * n)) for n in (1, 2, 0))
         for row, i in enumerate(alike):
-            one = hypotheses[i]
+            one = hypotheses[int(i)]
             information, seen, part, dim = np.eye(d), one.basis.T @ z, 0.0, d
             if others:
                 # What is left of it, and of the residuals, beside the other one.

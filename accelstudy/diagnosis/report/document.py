@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -15,7 +15,7 @@ from accelstudy.adjustment import calibrate
 from accelstudy.adjustment.quality import Solution, position_tests
 from accelstudy.basics.names import LONGEST
 from accelstudy.basics.units import GON, MGON
-from accelstudy.basics.wording import amount
+from accelstudy.basics.wording import amount, comma_list, words
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.document import (
     calibration_document,
@@ -24,6 +24,7 @@ from accelstudy.campaign.calibration.document import (
 )
 from accelstudy.campaign.calibration.fit import CampaignFit, JudgedNoise, campaign_estimability
 from accelstudy.campaign.session import Campaign
+from accelstudy.diagnosis.decision.statement import Part
 from accelstudy.diagnosis.decision.verdict import Named
 from accelstudy.diagnosis.report.words import explanation_words, keep_base, missing
 from accelstudy.diagnosis.result import Diagnosis
@@ -86,16 +87,8 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
             }
             for one in d.credible_set
         ],
-        "certain": [
-            {
-                "family": part.family,
-                "names": [name.name for name in part.names],
-                "posterior": json_number(part.posterior),
-                "purity": json_number(part.purity),
-            }
-            for part in d.certain
-        ],
-        "effects": [_effect(named) for named in d.found],
+        "certain": [_certain(part, d.found) for part in d.certain],
+        "effects": [effect_document(named) for named in d.effects],
         "suspects": [{"position": label, "p_value": json_number(p)} for label, p in d.suspects],
         "location": {name: json_number(share) for name, share in d.location.items()},
         "location_by_chance": {n: json_number(p) for n, p in d.location_by_chance.items()},
@@ -147,7 +140,22 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _effect(named: Named) -> dict[str, Any]:
+def _certain(part: Part, found: Sequence[Named]) -> dict[str, Any]:
+    """Describe what is certain, with what stands for it in the extended model, if anything does."""
+    names = [name.name for name in part.names]
+    added = next((one for one in found if one.name in names and one.parameters), None)
+    return {
+        "family": part.family,
+        "names": names,
+        "posterior": json_number(part.posterior),
+        "purity": json_number(part.purity),
+        "spec": None if added is None else added.spec,
+        "parameters": [] if added is None else _estimates(added.parameters),
+    }
+
+
+def effect_document(named: Named) -> dict[str, Any]:
+    """Describe an effect, a noise effect or a gross error that was found."""
     return {
         "name": named.name,
         "spec": named.spec,
@@ -251,6 +259,12 @@ def diagnosed_calibration(diagnosis: Diagnosis) -> dict[str, Any]:
             f"What is missing is {missing(diagnosis.credible_set)}. The calibration "
             f"takes {explanation_words(diagnosis.credible_set[0])}, and its sigmas do not know of "
             "the others."
+        )
+    if diagnosis.verdict == "unknown" and diagnosis.found:
+        added = comma_list([words(one.name) for one in diagnosis.found])
+        warnings.append(
+            f"The calibration takes {added}, which is certain. Its sigmas do not know of what is "
+            "missing besides."
         )
     warnings += keep_base(diagnosis)
     weights = np.asarray(fit.observed.sigma_force)

@@ -27,6 +27,7 @@ from accelstudy.diagnosis.report import words as wording
 from accelstudy.diagnosis.report.document import (
     diagnosed_calibration,
     diagnosis_document,
+    effect_document,
     positions_table,
     study_overlay,
 )
@@ -166,6 +167,7 @@ def _write_report(
         " ".join(lines),
         d=diagnosis,
         doc=document,
+        effects=[effect_document(named) for named in diagnosis.found],
         groups=wording.GROUPS,
         verdict=wording.badge(diagnosis),
         headline=lines[0],
@@ -174,6 +176,7 @@ def _write_report(
         described=wording.described,
         confirmation=wording.confirmation(diagnosis),
         advice=wording.advice(diagnosis),
+        stands_for=wording.stands_for(diagnosis),
         equation=lambda effect: get_effect(effect["spec"]).equation,
         possible=lambda effect: wording.possible(effect["spec"]),
         is_effect=lambda name: name in effect_names(),

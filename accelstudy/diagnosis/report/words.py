@@ -9,15 +9,14 @@ from collections.abc import Sequence
 from accelstudy.basics.levels import ACCEPTED, UNCHECKED
 from accelstudy.basics.units import display_unit
 from accelstudy.basics.wording import amount, comma_list, grouped, probability, words
-from accelstudy.diagnosis.decision.posterior import CREDIBLE, Explanation
-from accelstudy.diagnosis.decision.priors import SURE
+from accelstudy.diagnosis.decision.posterior import CREDIBLE, Explanation, of_effects
+from accelstudy.diagnosis.decision.priors import MANY, SURE
 from accelstudy.diagnosis.decision.statement import (
     Name,
     Part,
     Statement,
     effects_and_others,
     family_of,
-    refuted,
     statement,
 )
 from accelstudy.diagnosis.decision.verdict import Named
@@ -36,6 +35,7 @@ GROUPS = {
     "repeat": "between repeats of the same attitude",
     "slow_time": "slowly with time",
     "temperature": "with temperature",
+    "temperature_rate": "with the rate of temperature",
     "previous_position": "with the position before",
     "single_position": "in one single position",
 }
@@ -71,7 +71,7 @@ def headline(diagnosis: Diagnosis) -> str:
     if d.unrecorded or d.weak:
         return sentence(d.reason.split("; ")[0])
     if kind == "unknown":
-        return without_a_name(d.credible_set)
+        return without_a_name(Statement(d.certain, d.open), _beside(d))
     if kind == "narrowed":
         names = missing(d.credible_set)
     else:
@@ -133,8 +133,9 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
         "residuals_over_noise": _residuals_over_noise(d),
         "weights": _weights(d),
         "suspects": {label: p for label, p in sorted(d.suspects) if label not in bumped},
-        "most_probable": most_probable(d.credible_set),
+        "most_probable": most_probable(Statement(d.certain, d.open), d.credible_set),
         "like": like(d),
+        "stands_for": stands_for(d),
         "location": _location(d),
         "effects": [
             (f, effect.equation, effect.group in COURSES)
@@ -289,26 +290,42 @@ def missing(credible_set: Sequence[Explanation]) -> str:
     return _missing(_if_it_is_an_effect(effects)) + f", unless it is {unless}" * bool(unless)
 
 
-def without_a_name(credible_set: Sequence[Explanation]) -> str:
-    """Say in a sentence what is certain of something that has no name as a whole."""
-    set_says = statement(credible_set)
-    parts = comma_list([_part(part) for part in set_says.certain if part.is_effect])
-    if not parts:
+def without_a_name(set_says: Statement, beside: str = "something else") -> str:
+    """Say in a sentence what is certain of something that has no name as a whole.
+
+    Parameters
+    ----------
+    set_says : Statement
+    beside : str, what that which is open is called
+    """
+    effects = [part for part in set_says.certain if part.is_effect]
+    if not effects:
         return "Something is missing from the model, and it has no name here."
-    if refuted(credible_set):
-        return f"What is missing from the model is much like {parts}, and yet it has no name here."
-    if _surely_more(set_says, CREDIBLE):
-        return f"The model lacks {parts}; what is missing beside it has no name here."
-    return f"The model lacks {parts}; whether more is missing, and what, is open."
+    lacks = f"The model lacks {comma_list([_part(part) for part in effects])}"
+    worth = [one for one in set_says.open if one.names and one.posterior >= WORTH]
+    more = sorted(worth, key=lambda one: not of_effects(one))
+    surely = len(effects) < len(set_says.certain) or _surely_more(set_says, CREDIBLE)
+    if any(map(of_effects, more)) and len(more) <= MANY:
+        return f"{lacks}, and {'' if surely else 'perhaps '}{beside}: {_or(more)}."
+    if surely:
+        return f"{lacks}; what is missing beside it has no name here."
+    return f"{lacks}; whether more is missing, and what, is open."
 
 
-def most_probable(credible_set: Sequence[Explanation]) -> str:
+def _beside(diagnosis: Diagnosis) -> str:
+    """Call what is open smaller, if what is certain takes most of the disagreement away."""
+    gap, noise = diagnosis.gap, float(diagnosis.sigma_known)
+    if gap.after is not None and gap.before - gap.after > 2 * (gap.after - noise):
+        return "something smaller"
+    return "something else"
+
+
+def most_probable(set_says: Statement, credible_set: Sequence[Explanation]) -> str:
     """Say what something without a name is most like, by families; nothing if that is open.
 
     If something is certain, it is said of what is beside it.
     """
-    set_says = statement(credible_set)
-    certain = bool(set_says.certain) and not refuted(credible_set)
+    certain = any(part.is_effect for part in set_says.certain)
     kinds: dict[str, float] = defaultdict(float)
     for one in set_says.open if certain else credible_set:
         named = zip(one.names, one.classes, strict=True)
@@ -316,6 +333,17 @@ def most_probable(credible_set: Sequence[Explanation]) -> str:
             kinds[kind] += one.posterior
     worth = sorted(((k, p) for k, p in kinds.items() if p >= WORTH), key=lambda item: -item[1])
     return f"Most probable{' beside it' if certain else ''}: {_listed(worth)}." if worth else ""
+
+
+def stands_for(diagnosis: Diagnosis) -> list[str]:
+    """Say of each certain family which of its members the model has."""
+    d, said = diagnosis, []
+    for part in d.certain if d.verdict == "unknown" else ():
+        added = [f.name for f in d.found if f.name in {name.name for name in part.names}]
+        if added and len(part.names) > 1:
+            others = _names([n for n in part.names if n.name not in added])
+            said.append(f"In the model {words(added[0])} stands for {others} as well.")
+    return said
 
 
 def _kind(name: str, members: tuple[str, ...]) -> str:
