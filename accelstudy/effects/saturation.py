@@ -5,6 +5,8 @@ import numpy as np
 from accelstudy.basics.registry import Setting
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects.base import Effect, per_axis, register
+from accelstudy.effects.components import Number
+from accelstudy.effects.hold_conditions import HoldConditions
 
 FIRST = 0.25
 """Part of a stated range up to which a sensor certainly does not saturate."""
@@ -35,7 +37,7 @@ class Saturation(Effect):
     def output(self, f, p, g, hold, xp):
         """Return −k sign(f) max(0, |f| − c), the corner rounded."""
 
-        def excess(f_i):
+        def excess(f_i: Number) -> Number:
             e = xp.abs(f_i) - self.settings["knee"]
             # Exactly zero below the knee, or an axis that never reaches it would seem to.
             begun = (e + ROUND + xp.abs(e + ROUND)) / 2
@@ -51,7 +53,7 @@ class Saturation(Effect):
         tried = (Saturation(knee=knee) for knee in knees)
         return tuple(effect for effect in tried if effect.possible(hold))
 
-    def possible(self, hold):
+    def possible(self, hold: HoldConditions) -> bool:
         """Return whether the knee is within a stated range, and not far within it."""
         full, knee = hold.full_range, self.settings["knee"]
         return full is None or FIRST * full <= knee <= full

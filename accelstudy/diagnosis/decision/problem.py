@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -136,7 +137,9 @@ def pose(base: BaseFit) -> Problem:
             mean = np.mean(np.sqrt(first.variances[:, :3]))
             shaped = np.broadcast_to(mean * sigma / np.mean(sigma), (len(first.variances), 3))
             observed = replace(first.observed, sigma_force=shaped)
-            examined = examine(solve(first.model, first.approach, observed))
+            # With other weights a sensor that clips may have no solution.
+            with suppress(InputError):
+                examined = examine(solve(first.model, first.approach, observed))
     shown = groups(examined)
     evidence = Evidence(base.level, examined.frame.residuals.redundancy)
     field = Field(examined.candidates, examined.frame, shown.get(LACK_OF_FIT))

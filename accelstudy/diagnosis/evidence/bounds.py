@@ -50,8 +50,10 @@ def within_bounds(
     for d in np.unique(dims[dims > 0]):
         alike = np.flatnonzero(dims == d)
         means, covariances, sizes = (np.zeros((len(alike), *[d] * n)) for n in (1, 2, 0))
-        for row, i in enumerate(alike):
-            one = hypotheses[int(i)]
+        for row, i in enumerate(alike.tolist()):
+            one, effect = hypotheses[i], hypotheses[i].effect
+            assert effect is not None
+            assert one.estimates is not None
             information, seen, part, dim = np.eye(d), one.basis.T @ z, 0.0, d
             if others:
                 # What is left of it, and of the residuals, beside the other one.
@@ -64,7 +66,7 @@ def within_bounds(
             means[row] = one.estimates @ covariance @ seen
             covariances[row] = variance * one.estimates @ covariance @ one.estimates.T
             sizes[row] = max(part / variance, SIZES[0]) / dim
-        bounds = hypotheses[alike[0]].effect.bounds
+        bounds = effect.bounds
         less = sizes / (1 + sizes)
         after = box_probability(less[:, None] * means, less[:, None, None] * covariances, *bounds)
         before = box_probability(0 * means, sizes[:, None, None] * covariances, *bounds)

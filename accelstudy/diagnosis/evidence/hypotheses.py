@@ -97,7 +97,7 @@ def weigh_singles(examined: ExaminedFit, field: Field, evidence: Evidence) -> Si
     each = np.split(evidence.of_spaces(np.concatenate([*parts.values()]), dims, z @ z), ends)
     logs = dict(zip(shapes, each, strict=True))
     for name, own in shapes.items():
-        if isinstance(own, EffectShapes) and own[0].estimates is not None:
+        if isinstance(own, EffectShapes) and own[0].estimates is not None and first[name] > least:
             within = within_bounds(own, z, evidence)
             logs[name] = logs[name] + within
             parts[name] = parts[name] + 2 * within

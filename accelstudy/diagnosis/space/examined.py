@@ -175,12 +175,12 @@ class Frame:
 
 
 def _estimates(hypothesis: Hypothesis, columns: Array) -> Array:
-    """Turn products of a basis with residuals into parameters; columns (m, k) of all of these."""
-    assert hypothesis.effect is not None
-    assert hypothesis.shown is not None
-    shown = hypothesis.shown.parameters
-    kept = [i for i, q in enumerate(hypothesis.effect.parameters) if q in shown]
-    return np.asarray(np.linalg.inv(hypothesis.basis.T @ columns[:, kept]))
+    """Turn products of a basis with residuals into the parameters that show; columns (m, k)."""
+    from scipy.linalg import qr  # slow to import, and seldom needed
+
+    shown = hypothesis.basis.T @ columns
+    most = qr(shown, mode="r", pivoting=True)[1][: hypothesis.dim]
+    return np.asarray(np.linalg.inv(shown[:, most]))
 
 
 def implied_hold(solution: Solution, angles: Array) -> HoldConditions:

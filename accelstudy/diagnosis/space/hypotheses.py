@@ -82,8 +82,8 @@ class Hypothesis:
     basis : (m, l) array, orthonormal, of the space of its signature in the residuals
     ideal : (m, l) array, likewise for an ideal sensor, at which equal effects are exactly equal
     place : int, index of the position that was bumped; None for an effect
-    estimates : (l, l) array, turns products of the basis with residuals into the parameters of
-        `shown`; None for effects whose parameters have no bounds
+    estimates : (l, l) array, turns products of the basis with residuals into the l parameters that
+        show most; None for effects whose parameters have no bounds
     """
 
     name: str
