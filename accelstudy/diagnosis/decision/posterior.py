@@ -18,7 +18,7 @@ from scipy import special
 from accelstudy.diagnosis.decision import priors
 from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.evidence.detection import Chance, Detection
-from accelstudy.diagnosis.evidence.field import UNKNOWN
+from accelstudy.diagnosis.evidence.field import UNKNOWN, Unknown
 from accelstudy.diagnosis.evidence.hypotheses import (
     Class,
     Singles,
@@ -40,6 +40,7 @@ from accelstudy.diagnosis.evidence.noise_tests import (
 )
 from accelstudy.diagnosis.evidence.size import log_mean
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
+from accelstudy.diagnosis.space.shapes import LearnedShapes
 from accelstudy.effects import effect_names
 
 IMITATED = 0.5
@@ -310,10 +311,12 @@ def _noises(problem: Problem, detection: Detection, chance: Chance) -> tuple[lis
         unequal = float(by_level[0])
     tails = tail_test(residuals.positions, chance)
     # The kinds of coloured noise share its weight evenly; a smooth course is one of them.
-    unknown = problem.field.unknown
-    processes, course = colour_densities(residuals, evidence), -np.inf
-    if unknown is not None:
-        course = unknown.of_coordinate("time", evidence, residuals.z)
+    # As noise it leaves the slopes within the holds as they are.
+    courses = Unknown(LearnedShapes.of(problem.frame, "time", rates=False))
+    course = float(
+        np.logaddexp.reduce([-np.inf, *courses.by_place(evidence, residuals.z).values()])
+    )
+    processes = colour_densities(residuals, evidence)
     each = priors.COLOUR / (len(processes) + 1)
     of_course = each + (priors.UNRECORDED if problem.absent else 0.0)
     coloured = np.logaddexp(

@@ -82,14 +82,6 @@ class Unknown:
             places[place] = float(np.logaddexp(places.get(place, -np.inf), log))
         return places
 
-    def of_coordinate(self, coordinate: str, evidence: Evidence, z: Array) -> float:
-        """Log density of residuals under the shapes of one coordinate; that of none is −∞."""
-        own = np.array([name == coordinate for name, _ in self.places])
-        logs = [log for (name, _), log in self.by_place(evidence, z).items() if name == coordinate]
-        return (
-            float(np.logaddexp.reduce(logs) - np.log(self.weights[own].sum())) if logs else -np.inf
-        )
-
 
 @dataclass(frozen=True)
 class Field:

@@ -67,11 +67,18 @@ class LearnedShapes:
     shares: tuple[Array, ...]
 
     @classmethod
-    def of(cls, frame: Frame) -> LearnedShapes:
-        """All shapes that the coordinates of a session allow, and that its model leaves."""
+    def of(cls, frame: Frame, only: str = "", rates: bool = True) -> LearnedShapes:
+        """All shapes that the coordinates of a session allow, and that its model leaves.
+
+        Parameters
+        ----------
+        frame : Frame
+        only : str, a coordinate; all by default
+        rates : bool, whether a function of time changes the slopes within the holds, too
+        """
         places: list[Place] = []
         covariances: list[Array] = []
-        for place, rows, priors in _functions(frame):
+        for place, rows, priors in _functions(frame, only, rates):
             projected = frame.residuals.project(rows)
             left, whole = np.sum(projected**2, axis=0), np.sum(rows**2, axis=0)
             for prior in priors[priors @ left > SURVIVES * (priors @ whole)]:
@@ -145,7 +152,7 @@ class _Coordinate:
     priors: Array
 
 
-SLOW = ("bias", "scale", "common scale", "square", "reading", "tilt")
+SLOW = ("bias", "scale", "square", "reading", "tilt")
 """Targets of anything that changes from hold to hold, whatever the attitude."""
 
 
@@ -255,17 +262,19 @@ def _spectrum(omega: NDArray[Any]) -> Array:
 
 # --- targets ------------------------------------------------------------------------------------
 
-NAMES = {"common scale": "scale", "square": "scale", "bias of the others": "bias"}
-"""Targets of which more is tried: one function for all axes, of the square, of the other axes."""
+NAMES = {"square": "scale", "bias of the others": "bias"}
+"""Targets of which more is tried: a scale of the square, a bias by the forces of other axes."""
 PAIRS = tuple((i, j) for i in range(3) for j in range(3) if i != j)
 
 
-def _functions(frame: Frame) -> Iterator[tuple[Place, Array, Array]]:
+def _functions(frame: Frame, only: str, rates: bool) -> Iterator[tuple[Place, Array, Array]]:
     """Functions of all places: their rows of unit weight (m, k), and prior variances (p, k)."""
     residuals, f = frame.residuals, frame.sensed
     seen, now = residuals.by_observations, Moment(frame.hold)
     robot = frame.solution.approach.uses_angles
     for one in _coordinates(frame):
+        if only and one.name != only:
+            continue
         for target in one.targets:
             if not robot and target in ("reading", "tilt"):
                 continue
@@ -274,7 +283,7 @@ def _functions(frame: Frame) -> Iterator[tuple[Place, Array, Array]]:
                 rows = residuals.stacked(seen[..., 3:] @ angles)
             else:
                 change = partial(_change, one.course, target, f, frame)
-                rate = rate_of(change, frame.hold) if residuals.slopes else None
+                rate = rate_of(change, frame.hold) if rates and residuals.slopes else None
                 rows = residuals.stacked(seen[..., :3] @ change(now), rate)
             count = rows.shape[1] // one.priors.shape[1]
             place = (one.name, NAMES.get(target, target))
@@ -297,8 +306,6 @@ def _change(course: Course, target: str, f: Array, frame: Frame, now: Moment) ->
         return _each(h, 3) * f[..., None]
     if target == "square":
         return _each(h, 3) * f[..., None] ** 2
-    if target == "common scale":
-        return f[..., None] * h
     a, b, nothing = np.array([1.0, 0.0]), np.array([0.0, 1.0]), np.zeros(2)
     tilt = get_effect("base_tilt").output(
         (nothing, nothing, nothing), (a, b), frame.solution.gravity, _Beside(now), np
