@@ -163,7 +163,7 @@ def test_exchanged_angles_of_the_robot_are_recognised():
 
 
 def test_a_diagnosis_that_has_no_solution_does_not_advise_a_diagnosis():
-    """Of readings that have nothing to do with the attitudes, after gross errors were looked for."""
+    """Of readings that have nothing in common with the attitudes."""
     rng = np.random.default_rng(27)
     campaign, _ = session(24, rng, "robot")
     other, _ = session(24, rng)
