@@ -7,6 +7,7 @@ import pytest
 
 from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
+from accelstudy.basics.errors import InputError
 from accelstudy.campaign.gross_errors.recognition import recognise
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.decision.certain import without_the_refuted
@@ -159,3 +160,13 @@ def test_exchanged_angles_of_the_robot_are_recognised():
     found = recognise(replace(campaign, angles=campaign.angles[:, ::-1].copy()), ROBOT)
     assert found.reason == "roll and pitch of the robot are exchanged"
     np.testing.assert_array_equal(found.mended.angles, campaign.angles)
+
+
+def test_a_diagnosis_that_has_no_solution_does_not_advise_a_diagnosis():
+    """Of readings that have nothing in common with the attitudes."""
+    rng = np.random.default_rng(27)
+    campaign, _ = session(24, rng, "robot")
+    other, _ = session(24, rng)
+    with pytest.raises(InputError, match="does not converge") as error:
+        judge(replace(campaign, forces=other.forces), NINE)
+    assert "accelstudy diagnose" not in str(error.value)
