@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from accelstudy.adjustment.quality import Solution
+from accelstudy.adjustment.quality import Solution, global_test
 from accelstudy.basics.levels import REFUTED
 from accelstudy.basics.wording import comma_list, grouped, p_value
 from accelstudy.campaign.session import Campaign
@@ -259,9 +259,10 @@ def unless_weak(problem: Problem, detection: Detection, finding: Finding) -> Fin
     The evidence for something is wider than the test of the calibration, and its level less strict.
     What it finds beyond that level counts if something of it has a name, or is certain.
     """
-    test = level_test(Residuals.of(problem.base.solution))
-    refuted_sigma = problem.evidence.level.known and test.p_value < REFUTED
-    if finding.verdict != "unknown" or detection.p_value < REFUTED or refuted_sigma:
+    base = problem.base.solution
+    test = global_test(base.omega, base.redundancy) if problem.evidence.level.known else None
+    accepted = test is not None and test.accepted and not test.powerless
+    if finding.verdict != "unknown" or detection.p_value < REFUTED or not accepted:
         return finding
     if any(part.is_effect for part in finding.certain):
         return finding

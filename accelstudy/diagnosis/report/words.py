@@ -87,10 +87,9 @@ def headline(diagnosis: Diagnosis) -> str:
 
 def badge(diagnosis: Diagnosis) -> str:
     """Name the badge of a page: the verdict or, where there is none, the state of a calibration."""
-    if not diagnosis.weak:
-        return UNCHECKED if too_few(diagnosis) else diagnosis.verdict
-    test = diagnosis.global_test
-    return UNCHECKED if test is None or test.powerless else ACCEPTED
+    if diagnosis.weak:
+        return ACCEPTED
+    return UNCHECKED if too_few(diagnosis) else diagnosis.verdict
 
 
 def may_be_an_effect(diagnosis: Diagnosis) -> bool:
