@@ -254,12 +254,12 @@ def weigh_pairs(
     residuals, evidence, densities = problem.residuals, problem.evidence, singles.densities
     weighed = []
     for together in all_pairs(singles.shapes, residuals, evidence):
-        best = tuple(sorted(together.best, key=lambda h: -densities[h.name]))
-        alike = tuple(members[h.name] for h in best)
-        if len(best) > 2 or alike[0] != alike[1] or best[0].effect is None:
-            names = tuple(called.get(h.name, h.name) for h in best)
-            weight = together.log_density + each + (len(best) - 2) * np.log(priors.TWO)
-            weighed.append(Weighed(names, alike, weight, best))
+        shapes = tuple(sorted(together.best, key=lambda h: -densities[h.name]))
+        of_each = tuple(members[h.name] for h in shapes)
+        if len(shapes) > 2 or of_each[0] != of_each[1] or shapes[0].effect is None:
+            names = tuple(called.get(h.name, h.name) for h in shapes)
+            weight = together.log_density + each + (len(shapes) - 2) * np.log(priors.TWO)
+            weighed.append(Weighed(names, of_each, weight, shapes))
     for best, alike in classes[:FIRST]:
         beside = unknown_beside(best, problem.groups, residuals, evidence)
         if beside is not None:
