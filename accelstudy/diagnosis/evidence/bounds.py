@@ -51,8 +51,7 @@ def within_bounds(
         alike = np.flatnonzero(dims == d)
         means, covariances, sizes = (np.zeros((len(alike), *[d] * n)) for n in (1, 2, 0))
         for row, i in enumerate(alike.tolist()):
-            one, effect = hypotheses[i], hypotheses[i].effect
-            assert effect is not None
+            one = hypotheses[i]
             assert one.estimates is not None
             information, seen, part, dim = np.eye(d), one.basis.T @ z, 0.0, d
             if others:
@@ -66,7 +65,9 @@ def within_bounds(
             means[row] = one.estimates @ covariance @ seen
             covariances[row] = variance * one.estimates @ covariance @ one.estimates.T
             sizes[row] = max(part / variance, SIZES[0]) / dim
-        bounds = effect.bounds
+        first = hypotheses[int(alike[0])].effect
+        assert first is not None
+        bounds = first.bounds
         less = sizes / (1 + sizes)
         after = box_probability(less[:, None] * means, less[:, None, None] * covariances, *bounds)
         before = box_probability(0 * means, sizes[:, None, None] * covariances, *bounds)
