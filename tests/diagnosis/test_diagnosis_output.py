@@ -279,7 +279,7 @@ def test_noise_alone_is_blamed_only_where_it_is_probable():
     keys = {"scheme": "fibonacci-16", "approach": "gravity", "order": "random", "seed": 2}
     hold = {"temperature": (15, 40), "temperature_order": "random", "vibration": (0, 2)}
     drift = CampaignSettings(**keys, **hold, effects=("warm_up",), size=0.1)
-    noise = CampaignSettings(scheme="fibonacci-48", noise_effects=("noise_level(kappa=4)",))
+    noise = CampaignSettings(scheme="fibonacci-36", **hold, noise_effects=("noise_level(kappa=4)",))
     for settings, sure in ((drift, False), (noise, True)):
         found = diagnose(simulate_campaign(settings)[0], NINE)
         assert found.verdict == "noise_model"
