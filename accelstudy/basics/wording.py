@@ -7,7 +7,7 @@ is written as it was given.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from accelstudy.basics.units import attitude_unit, display_unit, to_attitude, to_display
 
@@ -124,6 +124,12 @@ def one_line(text: object, length: int = 100) -> str:
 def counted(number: int, noun: str) -> str:
     """Number and noun, in the plural unless the number is 1."""
     return f"{number} {noun}" + ("" if number == 1 else "s")
+
+
+def grouped(names: Sequence[str], said: Callable[[str], str] = words) -> list[str]:
+    """Return names of the catalogue as words, equal ones together: warm up, 2 outlier positions."""
+    many = ((names.count(name), said(name)) for name in dict.fromkeys(names))
+    return [counted(number, noun) if number > 1 else noun for number, noun in many]
 
 
 def short_list(names: Sequence[str], most: int = 20) -> str:

@@ -1,9 +1,10 @@
 """What follows from a finding: where it lives, what it changed, and what it is worth.
 
 Where it lives: the share of the excess χ² that each group of regressors takes up. A group of k
-regressors takes up k of r redundant conditions. Of a pattern that has nothing to do with it, it has
-a share of Beta(k/2, (r − k)/2) by chance, k/r on average. Where that is often nearly all of it, the
-share says nothing, and is not told.
+regressors takes up k of r redundant conditions. Of residuals that have nothing to do with it, it
+has a part of Beta(k/2, (r − k)/2) by chance, k/r on average. Of an excess E above the noise, r + E
+in all, the group has nearly all if it has k + 0.9 E. Where chance often gives that, as it does
+where the redundancy or the excess is small, the share says nothing, and is not told.
 
 What it changed: an effect with the signature S (whitened, by its parameters p) that a model with
 the design Ã lacks shifts the estimates of the model by −(ÃᵀÃ)⁻¹ Ãᵀ S p (omitted-variable bias).
@@ -15,7 +16,7 @@ What it is worth: the tilt error of a calibrated sensor without and with it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,16 +26,17 @@ from accelstudy.adjustment.quality import Solution, suspects
 from accelstudy.basics.progress import stage
 from accelstudy.basics.units import GON
 from accelstudy.campaign.calibration.assessment import SUSPECT
-from accelstudy.diagnosis.decision.posterior import of_effects
+from accelstudy.diagnosis.decision.posterior import Posterior, of_effects
 from accelstudy.diagnosis.decision.problem import Problem, is_exact
 from accelstudy.diagnosis.decision.verdict import Finding
 from accelstudy.diagnosis.evidence.detection import Chance
+from accelstudy.diagnosis.evidence.field import UNKNOWN, Unknown
+from accelstudy.diagnosis.evidence.hypotheses import strongest
 from accelstudy.diagnosis.next_positions import NextPosition, next_positions
 from accelstudy.diagnosis.space.examined import ExaminedFit, Frame
 from accelstudy.diagnosis.space.groups import LACK_OF_FIT, REPEAT, ROBOT, all_groups
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
 from accelstudy.diagnosis.space.residuals import Residuals
-from accelstudy.diagnosis.space.signatures import signature
 from accelstudy.diagnosis.visibility import UpperLimit, upper_limits
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import angles_of, tilt_slope, wrapped
@@ -47,7 +49,7 @@ SINGLE = "single_position"
 GROUPS = (
     "direction", ROBOT, REPEAT, "slow_time", "temperature", "previous_position", SINGLE,
 )  # fmt: skip
-"""All groups."""
+"""Groups of which every campaign is told whether it shows them."""
 ABSENT = {
     "direction": "the model has all effects of the direction",
     ROBOT: "gravity alone does not tell the angles of a robot",
@@ -58,8 +60,10 @@ ABSENT = {
 """Why nothing is known of groups that need no column of a name."""
 NEARLY_ALL = 0.9
 """Share that would seem to say where a pattern lives."""
+ROUNDING = 1e-6
+"""Excess per redundant condition that rounding errors may leave."""
 SELDOM = 0.05
-"""Probability with which any pattern may have such a share in a group by chance."""
+"""Probability with which any pattern may have such a share in one of the groups by chance."""
 
 
 @dataclass(frozen=True)
@@ -100,11 +104,12 @@ def locate(problem: Problem, chance: Chance, finding: Finding, variance: float) 
         left = [float((z @ z - space.parts(z)[0]) / (r - space.dims[0])) for space in spaces]
         variance = min([variance, *left])
     groups = {n: space for n, space in all_groups(examined).items() if n != LACK_OF_FIT}
-    nearly_all = {}
+    excess, nearly_all = max(float(z @ z) / variance - r, 0.0), {}
     expected = {name: float(space.dims[0]) for name, space in groups.items()}
     usual = {name: k / r for name, k in expected.items()}
     for name, k in expected.items():
-        by_chance = special.betainc((r - k) / 2, k / 2, 1 - NEARLY_ALL) if 0 < k < r else k >= r
+        part = (k + NEARLY_ALL * excess) / (r + excess)
+        by_chance = special.betainc((r - k) / 2, k / 2, 1 - part) if 0 < k < r else k >= r
         nearly_all[name] = float(by_chance)
     bumped = examined.candidates.get(OUTLIER)
     if bumped is not None:
@@ -117,23 +122,26 @@ def locate(problem: Problem, chance: Chance, finding: Finding, variance: float) 
         largest, total = chance.statistic(residuals, largest_part).T
         expected[SINGLE] = float(np.mean(largest))
         usual[SINGLE] = float(np.mean(largest / total))
-        nearly_all[SINGLE] = float(np.mean(largest >= NEARLY_ALL * total))
+        enough = (expected[SINGLE] + NEARLY_ALL * excess) / (r + excess)
+        nearly_all[SINGLE] = float(np.mean(largest >= enough * total))
     untestable = {}
-    for name in GROUPS:
+    for name in dict.fromkeys((*GROUPS, *groups)):
         if name not in groups:
             untestable[name] = _absent(name, problem.frame.hold)
         elif int(groups[name].dims.max()) == 0:
             untestable[name] = "the parameters of the model absorb all of it"
-        elif nearly_all[name] > SELDOM:
+        elif excess < ROUNDING * r:
+            untestable[name] = "the residuals have no more than the noise that is assumed"
+        elif nearly_all[name] > SELDOM / len(groups):
             untestable[name] = (
-                f"with a redundancy of {r}, nearly all of any pattern could be in it by chance"
+                f"with a redundancy of {r} and residuals of this size, nearly all of any pattern "
+                "could be in it by chance"
             )
-    excess, shares = float(z @ z) / variance - r, {}
+    shares = {}
     for name, space in groups.items():
         if name not in untestable:
             part = float(space.parts(z).max()) / variance
-            share = np.clip((part - expected[name]) / excess, 0.0, 1.0) if excess > 0 else 0.0
-            shares[name] = float(share)
+            shares[name] = float(np.clip((part - expected[name]) / excess, 0.0, 1.0))
     return Location(shares, {name: usual[name] for name in shares}, untestable)
 
 
@@ -146,6 +154,40 @@ def _absent(name: str, hold: HoldConditions) -> str:
     if columns[name] is None:
         return f"the campaign gives no {column}"
     return f"the {column} is the same in all positions"
+
+
+@dataclass(frozen=True)
+class LikeShape:
+    """Where something without a name may live: a target that is a function of a coordinate.
+
+    Attributes
+    ----------
+    coordinate, target : str
+    posterior : float, given that it is such a function, or one of the attitude alone
+    """
+
+    coordinate: str
+    target: str
+    posterior: float
+
+
+def like_shapes(problem: Problem, posterior: Posterior | None) -> tuple[LikeShape, ...]:
+    """Places of what has no name, most probable first, beside the effect that it comes with."""
+    unknown, z = problem.field.unknown, problem.residuals.z
+    told = () if posterior is None else posterior.credible_set
+    names = next((one.names for one in told if UNKNOWN in one.names), None)
+    if unknown is None or names is None:
+        return ()
+    evidence = problem.evidence
+    for name in names[: names.index(UNKNOWN)]:
+        beside = strongest(problem.examined.candidates[name], z)
+        z = z - beside.basis @ (beside.basis.T @ z)
+        evidence = replace(evidence, redundancy=evidence.redundancy - beside.dim)
+        unknown = Unknown(unknown.shapes.beside(beside.basis))
+    places = unknown.by_place(evidence, z)
+    shares = special.softmax([*places.values()]).tolist()
+    like = [LikeShape(*place, p) for place, p in zip(places, shares, strict=True)]
+    return tuple(sorted(like, key=lambda one: -one.posterior))
 
 
 def limits_of_others(problem: Problem, finding: Finding, known: bool) -> tuple[UpperLimit, ...]:
@@ -227,7 +269,7 @@ def parameter_changes(problem: Problem, finding: Finding, variance: float) -> tu
         return ()
     base, final, frame = problem.base.solution, finding.frame.solution, problem.frame
     u, residuals = base.model.n_parameters, Residuals.of(base)
-    shown = [signature(e, frame.sensed, frame.angles, base.gravity, frame.hold) for e in effects]
+    shown = [frame.signature(effect) for effect in effects]
     rows = np.concatenate([residuals.whitened(one) for one in shown], axis=1)
     shift = np.linalg.lstsq(base.design, rows, rcond=None)[0][:u]
     added = slice(u, u + rows.shape[1])

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import permutations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,7 +107,7 @@ def predicted_gap(
     ----------
     gap : Gap, on the positions to which the models were fitted
     problem, weighing : Problem, Weighing, of all positions
-    finding : Finding, named or narrowed
+    finding : Finding, with what was chosen
     beyond : float, total evidence from which on something counted as missing
     known : float, variance of unit weight; None takes that of the fit to the part
     seeds : of the split, the resampling, and the simulation
@@ -158,11 +159,11 @@ def _chosen_alike(
     part: Problem, singles: Singles, finding: Finding
 ) -> tuple[Sequence[Choice], bool]:
     """Explanation of the credible set that a part chooses, and whether it would choose another."""
-    chosen, credible = finding.chosen, finding.credible_set
-    if len(chosen) == 2:
+    chosen, credible = finding.chosen, finding.alternatives
+    if len(chosen) > 1:
         members = equivalents(part.examined, singles)
         pairs = weigh_pairs(part, singles, members, classes_of(singles, members))
-        pairs = [one for one in pairs if len(one.best) == 2]
+        pairs = [one for one in pairs if len(one.best) == len(chosen)]
         best = max(pairs, key=lambda one: one.log_weight, default=None)
         same = [one for one in credible if best and _same(one.classes, best.names)]
         if best is None or not same:
@@ -183,11 +184,11 @@ def _chosen_alike(
 
 
 def _same(classes: Sequence[Sequence[str]], names: Sequence[str]) -> bool:
-    """Whether two names are of two classes, in either order."""
-    if len(classes) != 2:
-        return False
-    (one, other), (a, b) = classes, names
-    return (a in one and b in other) or (b in one and a in other)
+    """Whether names are each of another one of some classes."""
+    return len(classes) == len(names) and any(
+        all(name in alike for name, alike in zip(order, classes, strict=True))
+        for order in permutations(names)
+    )
 
 
 def _refit(part: Problem, singles: Singles, chosen: Sequence[Choice]) -> Solution | str:
@@ -294,7 +295,7 @@ def _on_the_part(
     variance = np.ones(len(noise))
     if not part.evidence.level.known:
         variance = np.sum(left**2, axis=1) / (fitted.shape[1] - len(split.cofactors))
-    names, values = part.field.names, np.zeros(len(noise))
+    names, values = tuple(part.field.candidates), np.zeros(len(noise))
     for k in np.unique(candidate):
         if names[k] == OUTLIER:
             continue
@@ -315,14 +316,11 @@ def _on_the_part(
 
 def _choices(part: Problem, z: Array) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
     """Candidate that explains most, and which of its shapes, for each of residuals (b, m)."""
-    field = part.field
-    logs = part.evidence.of_spaces(field.parts(z), field.dims, np.sum(z**2, axis=-1))
-    total = field.combined(logs)
-    total[:, [k for k, name in enumerate(field.names) if name == UNKNOWN]] = -np.inf
-    candidate = np.argmax(total, axis=1)
+    field = part.field.named
+    logs = field.of_shapes(part.evidence, field.parts(z), np.sum(z**2, axis=-1))
+    candidate = np.argmax(field.combined(logs), axis=1)
     shape = np.zeros(len(z), dtype=int)
-    ends = [*field.starts[1:], len(field.dims)]
     for k in np.unique(candidate):
         rows = np.flatnonzero(candidate == k)
-        shape[rows] = np.argmax(logs[rows, field.starts[k] : ends[k]], axis=1)
+        shape[rows] = np.argmax(logs[rows, field.starts[k] : field.starts[k + 1]], axis=1)
     return candidate, shape

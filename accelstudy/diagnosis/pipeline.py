@@ -5,7 +5,8 @@
 3. The total evidence that anything is missing is compared with noise alone (`detect`).
 4. If anything is, every hypothesis and every pair is weighed, which gives the verdict (`weigh`,
    `find`). If not, the tests of the noise decide (`tests_of_noise`, `judge_noise`).
-5. Positions that were not used confirm an effect, or do not (`predicted_gap`).
+5. What is certain is added, even if the whole has no name (`with_what_is_certain`).
+6. Positions that were not used confirm an effect, or do not (`predicted_gap`), or refute it.
 
 That is all that `judge` does. `diagnose` adds what follows from the verdict: where the disagreement
 lives, what it changed and is worth, what is excluded, and where to measure next.
@@ -24,15 +25,18 @@ from accelstudy.campaign.gross_errors.recognition import recognise
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.consequences import (
     leveling_rms,
+    like_shapes,
     limits_of_others,
     locate,
     marked_positions,
     parameter_changes,
     separating_positions,
 )
+from accelstudy.diagnosis.decision.certain import with_what_is_certain, without_the_refuted
 from accelstudy.diagnosis.decision.posterior import weigh
 from accelstudy.diagnosis.decision.problem import Problem, fit_base, is_exact, pose
-from accelstudy.diagnosis.decision.statement import certain_of
+from accelstudy.diagnosis.decision.statement import with_purity
+from accelstudy.diagnosis.decision.unrecorded import with_unrecorded
 from accelstudy.diagnosis.decision.verdict import (
     Finding,
     Named,
@@ -43,10 +47,10 @@ from accelstudy.diagnosis.decision.verdict import (
     sigma_holds,
     tests_of_noise,
     unit_variance,
+    unless_weak,
     worst_of,
 )
 from accelstudy.diagnosis.evidence.detection import SIMULATIONS, Chance, detect
-from accelstudy.diagnosis.evidence.noise_tests import NoiseTest
 from accelstudy.diagnosis.held_out import measured_gap, predicted_gap
 from accelstudy.diagnosis.result import Diagnosis, Verdict, level_of_effects
 from accelstudy.sensors.plausibility import implausible_parameters
@@ -86,11 +90,13 @@ def diagnose(
     effects = verdict.extended.effects
     return Diagnosis(
         **vars(verdict),
-        certain=certain_of(verdict.verdict, verdict.credible_set, problem.examined),
+        certain=with_purity(finding.certain, problem.examined),
+        open=finding.open,
         groups=tuple(problem.groups),
         location=location.shares,
         location_by_chance=location.by_chance,
         not_located=location.untestable,
+        like=like_shapes(problem, finding.posterior) if verdict.verdict == "unknown" else (),
         leveling=leveling,
         changes=parameter_changes(problem, finding, variance),
         upper_limits=limits_of_others(problem, finding, verdict.sigma_holds),
@@ -138,31 +144,39 @@ def _judged(
     stated, frame = base.level.known, problem.frame
     level = level_of_effects(stated)
     finding, weighing = Finding("no_effect", frame), None
-    tests: tuple[NoiseTest, ...] = ()
     if is_exact(base.solution):
         reason = "the campaign is its own model: what is left are rounding errors"
         finding = Finding("no_effect", frame, reason)
-    elif detection.p_value < level:
-        weighing = weigh(problem, detection, chance)
-        finding = find(problem, weighing)
-        tests = tests_of_noise(problem, finding.frame, campaign, chance)
     else:
-        tests = tests_of_noise(problem, frame, campaign, chance)
-        worst = worst_of(tests)
-        if worst is not None:
+        if detection.p_value < level:
             weighing = weigh(problem, detection, chance)
-            finding = judge_noise(problem, weighing.posterior, worst)
+            finding = with_what_is_certain(problem, weighing, find(problem, weighing))
+            finding = unless_weak(problem, detection, finding)
+        if finding.verdict == "no_effect":
+            worst = worst_of(tests_of_noise(problem, frame, campaign, chance))
+            if worst is not None:
+                weighing = weighing or weigh(problem, detection, chance)
+                finding = judge_noise(problem, weighing.posterior, worst)
+                finding = with_what_is_certain(problem, weighing, finding)
 
-    variance = unit_variance(problem, finding.frame)
-    named = describe(problem, detection, finding, tests, campaign.positions, variance)
     gap = measured_gap(finding, base.solution)
-    if weighing is not None and finding.verdict in ("named", "narrowed"):
+    if weighing is not None and finding.chosen and finding.verdict != "gross_error":
         with stage("held-out positions"):
             beyond = detection.by_chance.beyond(level)
-            given = variance if stated else None
+            given = unit_variance(problem, finding.frame) if stated else None
             gap = predicted_gap(
                 gap, problem, weighing, finding, beyond, given, [seeds[k] for k in (1, 2, 4)]
             )
+        if gap.held_out is not None and gap.held_out.refutes:
+            finding = without_the_refuted(finding, frame, gap.held_out)
+            gap = measured_gap(finding, base.solution)
+    if weighing is not None:
+        finding = with_unrecorded(problem, weighing, finding)
+    variance = unit_variance(problem, finding.frame)
+    tests = (
+        () if is_exact(base.solution) else tests_of_noise(problem, finding.frame, campaign, chance)
+    )
+    named = describe(problem, detection, finding, tests, campaign.positions, variance)
     reason, verdict = finding.reason, finding.verdict
     if recognised is not None:
         verdict, reason = "gross_error", recognised.reason
@@ -180,6 +194,9 @@ def _judged(
             verdict=verdict,
             reason=reason,
             says_the_level=finding.says_the_level,
+            coloured=finding.coloured,
+            unrecorded=finding.unrecorded and recognised is None,
+            weak=finding.weak and recognised is None,
             credible_set=finding.credible_set,
             found=named,
             base=base.solution,

@@ -36,6 +36,8 @@ SPLITS = 300
 RESAMPLES = 1000
 SIGNIFICANT = 1.645
 """One-sided 5 % of the standard normal distribution."""
+REFUTES = 2.326
+"""Shortfall of a correction, over its sigma, that a right model has in 1 % of cases."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,8 @@ class HeldOutGap:
     held : tuple of int, indices of the held-out positions
     misses : (tuple, tuple) of float, m/s², rms misclosure of each of them by either model
     needed : float, z beyond which the correction is right at 5 %, given that it has a name
+    short : float, by how much less than expected the residuals agree with the correction, negative,
+        over its sigma: about standard normal if the extended model is right
     """
 
     before: float
@@ -61,11 +65,17 @@ class HeldOutGap:
     held: tuple[int, ...]
     misses: tuple[tuple[float, ...], tuple[float, ...]]
     needed: float = SIGNIFICANT
+    short: float = 0.0
 
     @property
     def significant(self) -> bool:
         """Whether the correction is right at 5 %."""
         return self.z > self.needed
+
+    @property
+    def refutes(self) -> bool:
+        """Whether the residuals do not shrink, and would have to if the model were right."""
+        return self.after >= self.before and self.short < -REFUTES
 
 
 def split_positions(
@@ -131,7 +141,14 @@ def held_out_gap(
     gain = np.mean(before - after, axis=1)
     resampled = gain[rng.integers(len(gain), size=(RESAMPLES, len(gain)))].mean(axis=1)
     low, high = np.quantile(resampled, [0.025, 0.975])
-    spread = np.einsum("mu,uv,mv->", second.slope, extended.cofactors, second.slope)
+    spread, usual = (
+        float(np.einsum("mu,uv,mv->", p.slope, fit.cofactors, p.slope))
+        for p, fit in ((second, extended), (first, base))
+    )
+    along = d @ second.slope
+    # The noise of its size makes a correction too large on average, and misses by it.
+    missed = float(d @ second.white) + (spread - usual) * variance
+    noise = float(d @ d + along @ extended.cofactors @ along) * variance
     return HeldOutGap(
         before=float(before.mean()),
         after=float(after.mean()),
@@ -140,6 +157,7 @@ def held_out_gap(
         z=float(d @ first.white / np.sqrt(size * variance)) if size > 0 else 0.0,
         held=tuple(int(i) for i in held),
         misses=(first.misses, second.misses),
+        short=float(missed / np.sqrt(noise)) if noise > 0 else 0.0,
     )
 
 

@@ -13,7 +13,7 @@ from accelstudy.approaches import Approach
 from accelstudy.basics.levels import REFUTED
 from accelstudy.campaign.gross_errors.recognition import Recognised
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.consequences import Change
+from accelstudy.diagnosis.consequences import Change, LikeShape
 from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.decision.statement import Part
 from accelstudy.diagnosis.decision.verdict import Named
@@ -51,8 +51,11 @@ class Verdict:
     verdict : str, "no_effect", "named", "narrowed", "unknown", "noise_model" or "gross_error"
     reason : str, why the verdict is what it is
     says_the_level : bool, whether the reason says how large the residuals are
+    coloured : float, probability of coloured noise that may be an effect of an absent column
+    unrecorded : bool, whether the reason says so
+    weak : bool, whether there is evidence that something is missing, too weak for a verdict
     credible_set : tuple of Explanation, most probable first; empty if nothing is missing
-    found : tuple of Named
+    found : tuple of Named; of the unknown, what is certain all the same
     base : Solution, of the base model with equal axes
     frame : Frame, of the base fit with unequal axes weighted
     final : Frame, of the extended fit, or the same
@@ -76,6 +79,9 @@ class Verdict:
     verdict: str
     reason: str
     says_the_level: bool
+    coloured: float
+    unrecorded: bool
+    weak: bool
     credible_set: tuple[Explanation, ...]
     found: tuple[Named, ...]
     base: Solution
@@ -98,6 +104,11 @@ class Verdict:
         """Which positions, (n,), the final fit uses: all but those that were found to be bumped."""
         bumped = [named.position for named in self.found if named.position is not None]
         return ~np.isin(self.campaign.positions, bumped)
+
+    @property
+    def effects(self) -> tuple[Named, ...]:
+        """What the verdict names; nothing if that is unknown."""
+        return () if self.verdict == "unknown" else self.found
 
     @property
     def level(self) -> float:
@@ -123,11 +134,14 @@ class Diagnosis(Verdict):
 
     Attributes
     ----------
-    certain : tuple of Part, what the credible set leaves no doubt of
+    certain : tuple of Part, what is missing whatever else is open
+    open : tuple of Explanation, what may be missing beside that, most probable first; one without
+        names stands for nothing
     groups : tuple of str, groups of regressors that the campaign can show
     location : dict of group to the share of the excess χ², where it tells
     location_by_chance : dict of these groups to the share that any pattern has on average
     not_located : dict of the other groups to the reason why nothing can be told of them
+    like : tuple of LikeShape, where something without a name may live, most probable first
     leveling : (float, float), tilt error without and with what was found, rad, or None
     changes : tuple of Change, of the parameters of the base model by effects that were added
     upper_limits : tuple of UpperLimit, of the effects that were not found
@@ -137,10 +151,12 @@ class Diagnosis(Verdict):
     """
 
     certain: tuple[Part, ...]
+    open: tuple[Explanation, ...]
     groups: tuple[str, ...]
     location: Mapping[str, float]
     location_by_chance: Mapping[str, float]
     not_located: Mapping[str, str]
+    like: tuple[LikeShape, ...]
     leveling: tuple[float, float] | None
     changes: tuple[Change, ...]
     upper_limits: tuple[UpperLimit, ...]

@@ -1,12 +1,13 @@
 """What an effect is, and the registry of effects.
 
-The sensor turns the specific force f_b (body frame) into its output f_s in two steps,
+The sensor turns the specific force f_b (body frame) into its output f_s in three steps,
 
     f_a = T⁻¹ f_b,        T = I + Σ axes(p),
-    f_s = f_a + Σ output(f_a, p),
+    f_o = f_a + Σ output(f_a, p),
+    f_s = f_o + Σ output(f_o, p) of the effects that act last,
 
 and a robot that carries it reads the angles (φ, θ) + Σ reading(φ, θ, p). Each effect says what it
-adds to one of the three sums; what it does not override is zero. The formulas are written in
+adds to one of these sums; what it does not override is zero. The formulas are written in
 components with ordinary arithmetic and functions of the namespace `xp`, so that one definition
 serves NumPy arrays, symbols to differentiate, and generated code.
 """
@@ -77,6 +78,8 @@ class Effect(WithSettings):
     typical : (float, float), usual size of a parameter from good to cheap equipment, SI; by default
         a size that changes a reading by 0.1 to 1 thousandth of g
     part : what causes the effect, the "sensor" or the "rig" that turns it
+    last : bool, whether it acts on the output that all other effects leave
+    bounds : (float, float), between which physics has its parameters, SI
     partial : bool, whether some of its parameters are left out
     drifts : bool, whether it grows in proportion to time, and is known within its session only
     """
@@ -86,6 +89,8 @@ class Effect(WithSettings):
     parameters: ClassVar[tuple[Parameter, ...]]
     part: ClassVar[Literal["sensor", "rig"]] = "sensor"
     drifts: ClassVar[bool] = False
+    last: ClassVar[bool] = False
+    bounds: ClassVar[tuple[float, float]] = (-np.inf, np.inf)
     partial: ClassVar[bool] = False
 
     @property
@@ -135,6 +140,10 @@ class Effect(WithSettings):
     ) -> Sequence[Effect]:
         """Shapes of the effect, that is, settings to try, for given holds with forces f (n, 3)."""
         return (self,)
+
+    def possible(self, hold: HoldConditions) -> bool:
+        """Whether its settings can be, as far as the holds tell."""
+        return True
 
     def between(self, other: Effect, hold: HoldConditions) -> Sequence[Effect]:
         """Shapes between two candidates, which were skipped because there are many positions."""
@@ -219,7 +228,8 @@ def formulas(effect: Effect) -> dict[str, Texts | list[Texts]]:
     -------
     dict
         "output" (3), "axes" (3 × 3) and "reading" (2), as far as they are not zero, of f_x, f_y,
-        f_z (m/s², along the sensitive axes), g, the parameters and the columns of `HoldConditions`.
+        f_z (m/s², along the sensitive axes; the output of all others for one that acts last), g,
+        the parameters and the columns of `HoldConditions`.
     """
     output, axes, reading = _expressions(effect)
     texts: dict[str, Texts | list[Texts]] = {}

@@ -43,7 +43,7 @@ def run_chunk(
     rows: dict[str, list[Row]] = {name: [] for name in outputs}
 
     def answer(campaign: Campaign) -> Row:
-        return _outcome(judge(campaign, model, seed=config.diagnosis_seed))
+        return outcome(judge(campaign, model, seed=config.diagnosis_seed))
 
     for cell, k in campaigns:
         campaign, truth = made(cell, k, config.seed)
@@ -58,16 +58,16 @@ def run_chunk(
         write_table(path, rows_table(name, rows[name]), provenance)
 
 
-def _outcome(d: Verdict) -> Row:
+def outcome(d: Verdict) -> Row:
     """Row of the table of outcomes."""
     test, held = d.global_test, d.gap.held_out
     return {
         "verdict": d.verdict,
-        "found": json.dumps([one.name for one in d.found]),
-        "specs": json.dumps([one.spec for one in d.found]),
-        "found_classes": json.dumps([list(one.equivalence_class) for one in d.found]),
-        "positions": json.dumps([one.position for one in d.found]),
-        "posteriors": json.dumps([_rounded(one.posterior) for one in d.found]),
+        "found": json.dumps([one.name for one in d.effects]),
+        "specs": json.dumps([one.spec for one in d.effects]),
+        "found_classes": json.dumps([list(one.equivalence_class) for one in d.effects]),
+        "positions": json.dumps([one.position for one in d.effects]),
+        "posteriors": json.dumps([_rounded(one.posterior) for one in d.effects]),
         "credible_set": json.dumps(
             [
                 {

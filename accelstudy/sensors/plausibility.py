@@ -57,8 +57,9 @@ def largest_tilt() -> float:
 def implausible_parameters(effects: Sequence[Effect], parameters: Array, sigma: Array) -> list[str]:
     """Describe each parameter that no sensor can have: its size, and what would be plausible.
 
-    A large estimate that the positions hardly determine says nothing of the sensor, so it counts
-    only if it is beyond the bound by `CLEARLY` of its standard deviations.
+    So does each that is beyond the bounds that physics sets. A large estimate that the positions
+    hardly determine says nothing of the sensor, so it counts only if it is beyond the bound by
+    `CLEARLY` of its standard deviations.
 
     Parameters
     ----------
@@ -68,7 +69,7 @@ def implausible_parameters(effects: Sequence[Effect], parameters: Array, sigma: 
     """
     doubt = CLEARLY * np.nan_to_num(np.asarray(sigma, dtype=float), posinf=0.0)
     values = iter(zip(np.asarray(parameters, dtype=float), doubt, strict=True))
-    descriptions = []
+    descriptions = impossible_parameters(effects, parameters, sigma)
     for effect in effects:
         bound = largest(effect)
         for parameter in effect.parameters:
@@ -78,6 +79,28 @@ def implausible_parameters(effects: Sequence[Effect], parameters: Array, sigma: 
                 unit = display_unit(parameter.unit)
                 descriptions.append(
                     f"{parameter.name} = {shown} {unit} (up to ± {most} is believed)"
+                )
+    return descriptions
+
+
+def impossible_parameters(effects: Sequence[Effect], parameters: Array, sigma: Array) -> list[str]:
+    """Describe each parameter that is clearly beyond its physical bounds.
+
+    Parameters
+    ----------
+    effects, parameters, sigma : as of `implausible_parameters`
+    """
+    values = iter(zip(parameters, CLEARLY * np.nan_to_num(sigma, posinf=0.0), strict=True))
+    descriptions = []
+    for effect in effects:
+        low, high = effect.bounds
+        for parameter in effect.parameters:
+            value, uncertain = next(values)
+            if not low - uncertain <= value <= high + uncertain:
+                shown, least, most = (amount(float(v), parameter.unit) for v in (value, low, high))
+                unit = display_unit(parameter.unit)
+                descriptions.append(
+                    f"{parameter.name} = {shown} {unit} ({least} … {most} is possible)"
                 )
     return descriptions
 

@@ -1,9 +1,11 @@
 """Sensor models: compositions of effects, evaluated forwards and backwards.
 
-    f_a = T⁻¹ f_b,   T = I + Σ axes(p),      f_s = f_a + Σ output(f_a, p)
+    f_a = T⁻¹ f_b,   T = I + Σ axes(p),
+    f_o = f_a + Σ output(f_a, p),
+    f_s = f_o + Σ output(f_o, p) of the effects that act last.
 
 With the effects bias, scale and non-orthogonality this is f_s = S T⁻¹ f_b + b (Thalmann & Neuner
-2018, eq. 5). The way back solves the second equation for f_a by Newton's method, so that an effect
+2018, eq. 5). The way back solves f_s for f_a by Newton's method, so that an effect
 needs no inverse of its own, and has f_b = T f_a in closed form.
 """
 
@@ -191,6 +193,18 @@ class SensorModel:
                 if not np.any(np.abs(step) > 1e-14 * STANDARD_GRAVITY):
                     break
         return np.where(np.abs(step) <= 1e-12 * STANDARD_GRAVITY, f_a, np.nan)
+
+    def slope_of_last(
+        self, f_a: NDArray[np.float64], parameters: ArrayLike, hold: HoldConditions | None
+    ) -> NDArray[np.float64]:
+        """Derivative of the output, by what the effects before the last ones leave, (n, 3, 3).
+
+        Parameters as in `sense`, with the force f_a (n, 3) in the sensitive axes.
+        """
+        f, x = np.asarray(f_a).T, np.asarray(parameters, dtype=float)
+        g = np.asarray(STANDARD_GRAVITY)
+        slope = self.trace.evaluate(self.trace.by_last, f, f, x, self.settings, g, hold)
+        return np.moveaxis(slope, (0, 1), (-2, -1))
 
     def axes_matrix(self, parameters: ArrayLike) -> NDArray[np.float64]:
         """Return T, (3, 3), which turns forces in the sensitive axes into the body frame."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache, cached_property
 from typing import Any
 
@@ -37,11 +38,19 @@ class SensorTrace:
         self.settings = tuple(symbol for effect in effects for symbol in effect.settings.values())
 
         self.t_matrix = sp.eye(3)
-        self.h = list(self.force)
         for effect, p in self._effects:
             self.t_matrix += sp.Matrix(effect.axes(p, symbolic))
-            added = effect.output(self.force, p, self.g, self._hold, symbolic)
-            self.h = [a + b for a, b in zip(self.h, added, strict=True)]
+        self._before_last = self._adding(self.force, last=False)
+        self.h = self._adding(self._before_last, last=True)
+
+    def _adding(self, force: Sequence[Any], last: bool) -> list[Any]:
+        """Add what effects make of a force, those that act last or the others."""
+        total = list(force)
+        for effect, p in self._effects:
+            if effect.last == last:
+                added = effect.output(tuple(force), p, self.g, self._hold, symbolic)
+                total = [a + b for a, b in zip(total, added, strict=True)]
+        return total
 
     @property
     def hold(self) -> dict[str, sp.Symbol]:
@@ -138,6 +147,13 @@ class SensorTrace:
     def output_jacobian(self) -> TracedFunction:
         """∂f_b/∂f_s, generated."""
         return TracedFunction(self.arguments, self.body_by_output)
+
+    @cached_property
+    def by_last(self) -> TracedFunction:
+        """∂f_s/∂f_o, generated: what the last effects make of a change that comes before them."""
+        slope = derivative(self._adding(self.force, last=True), self.force)
+        at = dict(zip(self.force, self._before_last, strict=True))
+        return TracedFunction(self.arguments, slope.xreplace(at))
 
     @cached_property
     def newton_step(self) -> TracedFunction:

@@ -48,6 +48,10 @@ def symbols(*names: str) -> tuple[sp.Symbol, ...]:
 def derivative(expressions: Sequence[Any], variables: Sequence[sp.Symbol]) -> sp.Matrix:
     """Jacobian matrix; the derivative of a step is zero, as it is almost everywhere."""
     matrix = sp.Matrix(list(expressions)).jacobian(list(variables))
+    # SymPy leaves that of a step as it is if it does not know what steps to be finite.
+    of_step = matrix.atoms(sp.Derivative)
+    assert all(isinstance(left.expr, sp.sign) for left in of_step)
+    matrix = matrix.xreplace(dict.fromkeys(of_step, sp.S.Zero))
     return matrix.replace(sp.DiracDelta, lambda *_: sp.S.Zero)
 
 

@@ -56,7 +56,7 @@ def examined(request):
 def test_noise_is_not_noise_with_an_effect(examined):
     """What is drawn with an effect is found, and its weight takes it out again."""
     residuals, rng = examined.frame.residuals, np.random.default_rng(3)
-    field = Field.of(examined.candidates, {})
+    field = Field(examined.candidates)
     changed = field.with_effects(np.zeros((400, len(residuals.design))), rng)
     noise = rng.standard_normal(changed.shape) + residuals.project(changed.T).T
     parts = field.parts(residuals.project(noise.T).T)

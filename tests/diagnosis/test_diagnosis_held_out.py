@@ -129,5 +129,5 @@ def test_an_imitator_leaves_nothing_of_what_it_imitates():
 def test_a_part_that_can_show_no_pair_chooses_none():
     """Positions that are too few for two effects at once would not have chosen these two."""
     part, none = SimpleNamespace(examined=None), Singles({}, {}, {}, {})
-    finding = SimpleNamespace(chosen=("one", "other"), credible_set=())
+    finding = SimpleNamespace(chosen=("one", "other"), alternatives=())
     assert held_out._chosen_alike(part, none, finding) == (("one", "other"), True)

@@ -30,9 +30,8 @@ from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.consequences import separating_positions
 from accelstudy.diagnosis.decision.posterior import Explanation, Posterior, Weighed
 from accelstudy.diagnosis.decision.priors import SURE
-from accelstudy.diagnosis.decision.statement import certain_of
+from accelstudy.diagnosis.decision.statement import statement, with_purity
 from accelstudy.diagnosis.decision.verdict import Finding
-from accelstudy.diagnosis.held_out import Gap
 from accelstudy.diagnosis.loop import CASES as CASES_OF_LOOP
 from accelstudy.diagnosis.loop import Loop, close_loop
 from accelstudy.diagnosis.pipeline import diagnose
@@ -198,7 +197,7 @@ def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
     finding = Finding("narrowed", named.final, posterior=Posterior.of(weighed))
     diagnosis = replace(
         named, verdict="narrowed", credible_set=finding.credible_set,
-        certain=certain_of("narrowed", finding.credible_set, examined),
+        certain=with_purity(statement(finding.credible_set).certain, examined),
         gap=replace(named.gap, names=()), next_positions=separating_positions(named.frame, finding),
     )  # fmt: skip
     content, text = told(diagnosis, tmp_path)
@@ -222,19 +221,28 @@ def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
 
 
 @pytest.mark.usefixtures("not_rendered")
-def test_what_is_certain_of_the_unknown_is_its_headline(named, tmp_path):
+def test_what_is_certain_of_the_unknown_is_told_and_in_the_model(named, tmp_path):
+    """With its parameters, as the headline, in the calibration; the verdict has no effects."""
     others = ("hysteresis", "settling", "saturation", "cubic_scale", "quadratic_scale")
-    known = explained(*(("thermal_bias", name, 0.19) for name in others))
+    says = statement(explained(*(("thermal_bias", name, 0.19) for name in others)))
     diagnosis = replace(
-        named,
-        **{"verdict": "unknown", "found": (), "gap": Gap(named.gap.before), "leveling": None},
-        **{"extended": named.model, "final": named.frame, "reason": "too much is open"},
-        **{"credible_set": known, "changes": (), "next_positions": ()},
-        certain=certain_of("unknown", known, examine(named.frame.solution)),
-    )
+        named, verdict="unknown", reason="too much is open", certain=says.certain, open=says.open,
+        credible_set=explained(*(("thermal_bias", name, 0.19) for name in others)),
+        next_positions=(),
+    )  # fmt: skip
     content, text = told(diagnosis, tmp_path)
-    assert [part["names"] for part in content["certain"]] == [["thermal_bias"]]
+    (part,), (found,) = content["certain"], named.found
+    assert part["names"] == ["thermal_bias"]
+    assert part["spec"] == found.spec
+    assert [(q["name"], q["value"]) for q in part["parameters"]] == [
+        (name, value) for name, value, *_ in found.parameters
+    ]
+    assert content["effects"] == []
     assert "The model lacks thermal bias; what is missing beside it has no name here." in text
+    assert "What of it is certain?" in text
+    assert "The calibration takes thermal bias, which is certain." in text
+    calibration = json.loads((tmp_path / "calibration.json").read_text(encoding="utf-8"))
+    assert "b_T_x" in str(calibration["parameters"])
 
 
 @pytest.mark.usefixtures("not_rendered")
@@ -271,7 +279,7 @@ def test_noise_alone_is_blamed_only_where_it_is_probable():
     keys = {"scheme": "fibonacci-16", "approach": "gravity", "order": "random", "seed": 2}
     hold = {"temperature": (15, 40), "temperature_order": "random", "vibration": (0, 2)}
     drift = CampaignSettings(**keys, **hold, effects=("warm_up",), size=0.1)
-    noise = CampaignSettings(scheme="fibonacci-36", noise_effects=("noise_level(kappa=4)",))
+    noise = CampaignSettings(scheme="fibonacci-36", **hold, noise_effects=("noise_level(kappa=4)",))
     for settings, sure in ((drift, False), (noise, True)):
         found = diagnose(simulate_campaign(settings)[0], NINE)
         assert found.verdict == "noise_model"

@@ -6,17 +6,23 @@ import numpy as np
 import pytest
 from diagnosis_helpers import GRAVITY, NINE, ROBOT, campaign, design, shuffled
 
+from accelstudy.basics.levels import REFUTED
+from accelstudy.campaign.calibration.assessment import assess
+from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.calibration.wording import verdict_lines as calibrated_lines
 from accelstudy.diagnosis import pipeline
 from accelstudy.diagnosis.evidence.detection import Chance, detect, tail, total_odds
 from accelstudy.diagnosis.evidence.field import Field
 from accelstudy.diagnosis.evidence.size import Evidence, Level
-from accelstudy.diagnosis.pipeline import diagnose
+from accelstudy.diagnosis.pipeline import judge
+from accelstudy.diagnosis.report.words import TEMPLATE, badge, headline
 from accelstudy.diagnosis.result import level_of_effects
-from accelstudy.diagnosis.space.groups import groups
+from accelstudy.diagnosis.space.groups import LACK_OF_FIT, groups
+from accelstudy.pages import lines
 
 GIVEN, NOT_GIVEN = 0.03, 0.04
 """How often noise alone may count as something missing, where sigma is given and where not."""
-RUNS, SETS = 24, 400
+RUNS, SETS = 28, 400
 """Null simulations, and sets of noise that are judged by each."""
 STANDARD_ERRORS = 4
 
@@ -37,7 +43,7 @@ def test_noise_alone_counts_as_often_as_the_level_says(designs, approach, level,
     """Each null simulation has a seed of its own, so that the rates scatter as they really do."""
     examined, rng = designs[approach], np.random.default_rng([1, 2])
     residuals = examined.frame.residuals
-    field = Field.of(examined.candidates, groups(examined))
+    field = Field(examined.candidates, examined.frame, groups(examined).get(LACK_OF_FIT))
     evidence = Evidence(level, residuals.redundancy)
     rates, seen, weights = [], [], []
     for seed in range(RUNS):
@@ -64,11 +70,26 @@ def test_noise_alone_counts_as_often_as_the_level_says(designs, approach, level,
 
 
 @pytest.mark.parametrize(("known", "level"), [(True, GIVEN), (False, NOT_GIVEN)])
-@pytest.mark.parametrize("side", [-1, 1])
-def test_a_diagnosis_decides_at_this_level(monkeypatch, known, level, side):
-    """Noise alone, of which the test says that it is just below or just above the level."""
-    monkeypatch.setattr(
-        pipeline, "detect", lambda *given: replace(detect(*given), p_value=level + side * 1e-6)
-    )
-    found = diagnose(campaign(1, scheme="mclaren-24", sigma_known=known)[0], NINE)
-    assert (found.verdict == "no_effect") == (side > 0)
+def test_a_diagnosis_decides_at_the_levels(monkeypatch, known, level):
+    """Noise alone, of which the test says that it is on either side of a level.
+
+    What has no name counts at the level of a calibration that accepts the fit, and both say the
+    same of it; without a stated sigma, a calibration cannot accept any.
+    """
+    measured = campaign(1, scheme="mclaren-24", sigma_known=known)[0]
+    says = calibrated_lines(assess(fit_campaign(measured, NINE, ROBOT)))
+    for p, verdict, weak in (
+        (level + 1e-6, "no_effect", False),
+        (level - 1e-6, "no_effect" if known else "unknown", known),
+        (REFUTED + 1e-6, "no_effect" if known else "unknown", known),
+        (REFUTED - 1e-6, "unknown", False),
+    ):
+        monkeypatch.setattr(
+            pipeline, "detect", lambda *given, p=p: replace(detect(*given), p_value=p)
+        )
+        found = judge(measured, NINE)
+        assert (found.verdict, found.weak) == (verdict, weak)
+        assert badge(found) == ("accepted" if weak else verdict)
+        if weak:
+            assert "weak" in headline(found)
+            assert lines(TEMPLATE, "agreement", found)[0] in says

@@ -1,11 +1,16 @@
 """Where a disagreement lives: what is told, and what a campaign cannot tell."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from diagnosis_helpers import NINE
+from diagnosis_helpers import GRAVITY, NINE, design, most, posed, shuffled, some_holds
 
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis import consequences as location
+from accelstudy.diagnosis.decision.verdict import Finding
+from accelstudy.diagnosis.evidence.detection import Chance
+from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.words import GROUPS
 from accelstudy.diagnosis.space.examined import examine
@@ -32,7 +37,10 @@ def diagnoses():
 @pytest.mark.parametrize("name", CAMPAIGNS)
 def test_every_group_is_told_or_has_a_reason(diagnoses, name):
     found = diagnoses[name]
-    assert {*found.location, *found.not_located} == set(location.GROUPS) == set(GROUPS)
+    rate = {"temperature_rate"}  # told where there are temperatures
+    assert set(location.GROUPS) == set(GROUPS) - rate
+    told = {*found.location, *found.not_located}
+    assert told == set(GROUPS) - (rate if found.campaign.temperature is None else set())
     assert not {*found.location} & {*found.not_located}
     assert all(found.not_located.values())
 
@@ -43,7 +51,7 @@ def test_what_a_campaign_lacks_is_the_reason(diagnoses):
                            (none, {"slow_time": "time", "repeat": "twice"})):  # fmt: skip
         for group, word in missing.items():
             assert word in found.not_located[group]
-    assert set(full.location) == set(location.GROUPS)
+    assert set(full.location) == set(GROUPS)
     assert max(full.location, key=full.location.get) == "temperature"
 
 
@@ -56,22 +64,44 @@ def test_six_redundant_conditions_locate_nothing(diagnoses):
 
 @pytest.mark.parametrize("name", CAMPAIGNS)
 def test_a_share_is_told_where_chance_seldom_gives_nearly_all(diagnoses, name):
-    """Of white noise, in which every direction of the residual space is as likely."""
-    examined = examine(diagnoses[name].frame.solution)
+    """Of residuals as large as these, in which every direction of their space is as likely."""
+    found = diagnoses[name]
+    examined = examine(found.frame.solution)
     residuals, rng = examined.frame.residuals, np.random.default_rng(8)
     noise = residuals.project(rng.standard_normal((len(residuals.design), 4000))).T
-    total = np.sum(noise**2, axis=1)
-    for group, space in all_groups(examined).items():
-        if group == LACK_OF_FIT or not space.dims[0]:
-            continue
-        often = np.mean(space.parts(noise)[:, 0] >= location.NEARLY_ALL * total)
-        error = 4 * np.sqrt(location.SELDOM * (1 - location.SELDOM) / len(noise))
-        if abs(often - location.SELDOM) > error:
-            assert (group in diagnoses[name].location) == (often < location.SELDOM)
-        if group in diagnoses[name].location:
-            share = diagnoses[name].location_by_chance[group]
-            shares = space.parts(noise)[:, 0] / total
-            assert share == pytest.approx(shares.mean(), abs=4 * shares.std() / len(noise) ** 0.5)
+    r = residuals.redundancy
+    excess = float(residuals.z @ residuals.z) - r
+    assert excess > 0
+    noise *= np.sqrt((r + excess) / np.sum(noise**2, axis=1))[:, None]
+    groups = {n: g for n, g in all_groups(examined).items() if n != LACK_OF_FIT and g.dims[0]}
+    seldom = location.SELDOM / (len(all_groups(examined).keys() - {LACK_OF_FIT}) + 1)
+    for group, space in groups.items():
+        parts = space.parts(noise)[:, 0]
+        often = np.mean(parts - space.dims[0] >= location.NEARLY_ALL * excess)
+        error = 4 * np.sqrt(seldom * (1 - seldom) / len(noise))
+        if abs(often - seldom) > error:
+            assert (group in found.location) == (often < seldom), group
+        if group in found.location:
+            shares = parts / (r + excess)
+            usual = found.location_by_chance[group]
+            assert usual == pytest.approx(shares.mean(), abs=4 * shares.std() / len(noise) ** 0.5)
+
+
+@pytest.mark.parametrize("scheme", ["fibonacci-15", "fibonacci-18"])
+def test_noise_alone_lives_nowhere(scheme):
+    """With a redundancy of six or nine, noise is hardly said to be nearly all of one kind."""
+    directions, told = shuffled(scheme), 0
+    examined = design(directions, GRAVITY, some_holds(len(directions)), seed=4)
+    problem = posed(GRAVITY, examined.frame.solution.observed, Level.given())
+    residuals, rng = problem.residuals, np.random.default_rng(9)
+    chance = Chance(np.random.SeedSequence(1), len(residuals.design), 200)
+    for _ in range(100):
+        errors = rng.standard_normal(len(residuals.design))
+        frame = replace(problem.frame, residuals=replace(residuals, errors=errors))
+        drawn = replace(problem, examined=replace(problem.examined, frame=frame))
+        found = location.locate(drawn, chance, Finding("unknown", frame), 1.0)
+        told += any(share > location.NEARLY_ALL for share in found.shares.values())
+    assert told <= most(100, location.SELDOM, 1e-4)
 
 
 def test_a_share_is_that_of_the_excess(diagnoses):

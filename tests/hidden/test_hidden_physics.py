@@ -299,3 +299,16 @@ def test_the_oracle_tells_two_effects():
     truth = generate(case, seeded(17))[1].to_dict()
     assert [set(one) for one in truth["oracle"]["best"]] == [{"hysteresis"}, {"encoder_offset"}]
     assert [effect["lam"] for effect in truth["effects"]] == [300.0, 300.0]
+
+
+def test_a_sensor_clips_what_it_would_read():
+    """With its bias and scale and another effect, whichever comes first."""
+    own, scale = session("spread-24"), np.array([0.03, 0, -0.02])
+    sensor = Sensor(np.array([0.3, -0.2, 0.1]), scale)
+    square = Cause(EFFECTS["quadratic_scale"], {}, np.full((1, 3), 5e-3))
+    clipping = Cause(EFFECTS["saturation"], {"knee": 8.0}, np.ones((1, 3)))
+    free = observe(own, sensor, [square])[0]
+    assert np.sum(abs(free) > 8) > 5
+    for causes in ([square, clipping], [clipping, square]):
+        found = observe(own, sensor, causes)[0]
+        np.testing.assert_allclose(found, np.clip(free, -8, 8), rtol=0, atol=1e-14)

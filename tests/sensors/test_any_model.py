@@ -169,7 +169,8 @@ def test_a_diagnosis_writes_the_calibration_of_what_it_found(made, diagnosed):
     assert list(found) == list(again)
     for name, (value, sigma) in found.items():
         assert again[name][0] == pytest.approx(value, abs=1e-6 * sigma)
-        assert again[name][1] == pytest.approx(sigma)
+        # The diagnosis searched for the settings, which the model states.
+        assert again[name][1] <= sigma * (1 + 1e-6)
     documents = [
         json.loads((made / folder / "calibration.json").read_text(encoding="utf-8"))
         for folder in ("d", "again")

@@ -18,6 +18,7 @@ from accelstudy.diagnosis.decision.statement import family_of
 from accelstudy.diagnosis.report.words import GROUPS
 from accelstudy.effects import Course, HoldConditions, effect_names, get_effect
 from accelstudy.effects.hold_conditions import STILL
+from accelstudy.effects.saturation import ROUND
 from accelstudy.leveling.angles import roll_pitch, specific_force
 from accelstudy.noise_effects import get_noise_effect
 from accelstudy.schemes import get_scheme
@@ -231,6 +232,23 @@ def test_base_tilt_turns_with_the_same_matrix_as_gravity():
 def test_settings_shape_an_effect(spec, expected):
     p = np.array([1.0, -2.0, 0.5])
     np.testing.assert_allclose(added(get_effect(spec), p).output, expected(p), rtol=0, atol=1e-13)
+
+
+def test_a_sensor_clips_what_it_reads():
+    """With its bias, its scale and all else, wherever the saturation stands in the model."""
+    names = ("saturation(knee=9)", "bias", "scale", "nonorthogonality", "quadratic_scale")
+    values = {"b_x": 0.3, "b_z": -0.2, "s_x": 0.03, "s_y": -0.02, "alpha_yz": 0.01, "k2_y": 5e-3}
+    free, clipping = SensorModel.of("free", names[1:]), SensorModel.of("clipping", names)
+    read = free.sense(FORCES, free.vector(values), G)
+    sharp = np.all(np.abs(np.abs(read) - 9) > ROUND, axis=1)
+    assert sharp.sum() > 20
+    assert np.sum(np.abs(read[sharp]) > 9) > 5
+    hard = {**values, **dict.fromkeys(("k_sat_x", "k_sat_y", "k_sat_z"), 1.0)}
+    made = clipping.sense(FORCES, clipping.vector(hard), G)
+    np.testing.assert_allclose(made[sharp], np.clip(read, -9, 9)[sharp], rtol=0, atol=1e-12)
+    soft = clipping.vector({**hard, "k_sat_x": 0.4, "k_sat_y": 0.1, "k_sat_z": 0.7})
+    back = clipping.correct(clipping.sense(FORCES, soft, G), soft, G)
+    np.testing.assert_allclose(back, FORCES, rtol=0, atol=1e-11)
 
 
 def test_axes_that_are_not_perpendicular_show_where_the_roll_axis_is_vertical():

@@ -136,7 +136,11 @@ class Calibration:
                     np.stack(effect.output(f, p, self.gravity, HoldConditions(time=t), np), axis=-1)
                     for t in (time, kept)
                 )
-                forces = forces + (then - end)
+                change = (then - end)[..., None]
+                if any(later.last for later in self.model.effects):
+                    f_a = self.model.sensitive_force(forces, self.parameters, self.gravity, hold)
+                    change = self.model.slope_of_last(f_a, self.parameters, hold) @ change
+                forces = forces + change[..., 0]
                 share[:, 0, columns] = np.divide(
                     kept, time, out=np.ones_like(time), where=time != 0
                 )[:, None]

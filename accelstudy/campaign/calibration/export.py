@@ -25,8 +25,9 @@ FORMS = ("json", "yaml", "c", "matrix")
 
 STEPS = (
     "f_s = mending · to_frd · ((raw − offset) · scale), m/s²",
-    "f_a from f_s = f_a + Σ output, where output is that at f_a = (f_x, f_y, f_z): repeat "
-    "f_a ← f_s − Σ output, from f_a = f_s on, until it settles",
+    "f_a from f_s = f_a + Σ output, where output is that at f_a = (f_x, f_y, f_z) or, of an effect "
+    "that acts last, at f_a + Σ output of all others: repeat f_a ← f_s − Σ output, from f_a = f_s "
+    "on, until it settles",
     "f_b = (I + Σ axes) · f_a",
     "result = to_frdᵀ · f_b, m/s², in the axes of the readings",
 )
@@ -154,7 +155,7 @@ def _whole(calibration: Mapping[str, Any]) -> dict[str, Any]:
 
 def _effect(effect: Effect, parameters: list[Any]) -> dict[str, Any]:
     """Formulas of an effect, and its parameters in SI."""
-    notes = []
+    notes = ["acts last: on f_a + Σ output of all other effects"] if effect.last else []
     if effect.part == "rig":
         notes.append("belongs to the rig: do not apply it to readings away from the rig")
     if effect.drifts:

@@ -228,7 +228,9 @@ def check_columns(campaign: Campaign, model: SensorModel) -> None:
                 )
 
 
-def fit_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> CampaignFit:
+def fit_campaign(
+    campaign: Campaign, model: SensorModel, approach: Approach, diagnosing: bool = False
+) -> CampaignFit:
     """Calibrate a campaign.
 
     Parameters
@@ -236,6 +238,7 @@ def fit_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> 
     campaign : Campaign
     model : SensorModel
     approach : Approach
+    diagnosing : bool, whether gross errors were looked for, and mended, already
 
     Raises
     ------
@@ -264,7 +267,7 @@ def fit_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> 
     if not adjustment.converged[0]:
         raise InputError(
             f"{campaign.name}: the adjustment of the model {model.name!r} does not converge; "
-            f"{_cause(campaign, theory)}"
+            f"{_cause(campaign, theory, diagnosing)}"
         )
     return CampaignFit(campaign, model, approach, observed, adjustment, theory)
 
@@ -285,10 +288,12 @@ def campaign_estimability(
     )
 
 
-def _cause(campaign: Campaign, theory: Estimability) -> str:
+def _cause(campaign: Campaign, theory: Estimability, diagnosing: bool) -> str:
     """Say what may keep an adjustment from converging."""
     gross = recognise(campaign, usual_approach(campaign))
-    more = "`accelstudy diagnose` looks for more"
+    more = "none is recognised here" if diagnosing else "`accelstudy diagnose` looks for more"
+    if diagnosing and gross is not None:
+        return f"beside what was mended this looks wrong ({words(gross.name)}): {gross.reason}"
     if gross is not None:
         return f"this looks like a gross error ({words(gross.name)}): {gross.reason}; {more}"
     if theory.condition > HARDLY:

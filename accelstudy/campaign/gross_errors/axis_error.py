@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import permutations, product
 from typing import Self
 
@@ -19,7 +20,7 @@ from accelstudy.campaign.gross_errors.base import (
     register,
     with_readings,
 )
-from accelstudy.campaign.gross_errors.real_sensor import RealSensor
+from accelstudy.campaign.gross_errors.real_sensor import RealSensor, attitude_forces
 from accelstudy.campaign.session import Campaign
 
 SIGNED_PERMUTATIONS = tuple(
@@ -68,16 +69,21 @@ class AxisError(GrossError):
         """Undo each of the 47 that are likely; without a robot none of them shows."""
         if sensor.expected is None:
             return
-        # An ideal sensor is near enough to compare all 48 quickly.
+        ideal = attitude_forces(campaign)
+        # An ideal sensor with any bias is near enough to compare all 48 quickly.
         misses = {}
         for axes in SIGNED_PERMUTATIONS:
-            distance = np.linalg.norm(campaign.forces @ _matrix(axes) - sensor.expected, axis=1)
+            error = campaign.forces @ _matrix(axes) - ideal
+            distance = np.linalg.norm(error - np.median(error, axis=0), axis=1)
             misses[axes] = float(np.mean(np.minimum(distance, campaign.gravity)))
         least = min(misses.values())
         near = [axes for axes in SIGNED_PERMUTATIONS[1:] if misses[axes] < NEAR * least]
         for axes in sorted(near, key=_changes):
             matrix = _matrix(axes).T
             yield Mending(_reason(matrix), _turned(campaign, matrix), matrix)
+        assert campaign.angles is not None
+        exchanged = replace(campaign, angles=campaign.angles[:, ::-1].copy())
+        yield Mending("roll and pitch of the robot are exchanged", exchanged)
 
 
 def _matrix(shown: Sequence[float]) -> Array:

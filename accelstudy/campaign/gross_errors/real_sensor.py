@@ -43,12 +43,15 @@ class RealSensor:
     distance : (n,) array, m/s², of each reading from what it should be
     gravity : float, m/s²
     tells : bool, whether there are enough positions to say which of them are wrong
+    mirrored : bool, whether its axes are left-handed, as those of no sensor are, however mounted;
+        only of one that may be mounted in any attitude
     """
 
     expected: Array | None
     distance: Array
     gravity: float
     tells: bool
+    mirrored: bool = False
 
     @property
     def usual(self) -> float:
@@ -91,7 +94,8 @@ class RealSensor:
         design, lacking = np.stack(columns, axis=1), (campaign.forces - ideal) / g
         expected = ideal + g * _robust(design, lacking, share)
         distance = np.linalg.norm(campaign.forces - expected, axis=1)
-        return cls(expected, distance, g, _tells(design))
+        mirrored = mounted and _left_handed(design, expected / g, float(np.median(distance)) / g)
+        return cls(expected, distance, g, _tells(design), mirrored)
 
 
 def attitude_forces(campaign: Campaign) -> Array:
@@ -99,6 +103,18 @@ def attitude_forces(campaign: Campaign) -> Array:
     assert campaign.angles is not None
     roll, pitch = campaign.angles.T
     return np.column_stack(specific_force(roll, pitch, campaign.gravity))
+
+
+def _left_handed(design: Array, expected: Array, noise: float) -> bool:
+    """Whether what a sensor reads is a mirror image of the forces, the first columns of a design.
+
+    Each axis has to show clearly, or its direction would be one of noise.
+    """
+    inverse = np.linalg.pinv(design)
+    matrix = (inverse @ expected)[:3]
+    error = noise * np.linalg.norm(inverse[:3], ord=2)
+    least = np.linalg.svd(matrix, compute_uv=False)[-1]
+    return bool(np.linalg.det(matrix) < 0 and least > CLEARLY * error)
 
 
 def _tells(design: Array) -> bool:

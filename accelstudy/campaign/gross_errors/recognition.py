@@ -125,13 +125,14 @@ def _errors(
     kind = [error for error in map(get_gross_error, gross_error_names()) if error.rank == rank]
     sensor = RealSensor.of(campaign, attitude, mounted)
     while len(errors) < TOGETHER:
+        if rank == EVERYWHERE and sensor.distance.max() < GROSS * sensor.gravity:
+            break
         helps = []
+        mirrored = rank == EVERYWHERE and RealSensor.of(campaign, attitude, mounted=True).mirrored
         for error in kind:
-            if rank == EVERYWHERE and sensor.distance.max() < GROSS * sensor.gravity:
-                continue
             for mending in error.mendings(campaign, sensor):
                 after = RealSensor.of(mending.campaign, attitude, mounted)
-                if _clear(mending, sensor, after):
+                if _clear(mending, sensor, after, mirrored):
                     helps.append((error.name, mending, after))
         if not helps:
             break
@@ -150,12 +151,16 @@ def _is_mounted(campaign: Campaign, attitude: bool) -> bool:
     return CLEARLY * RealSensor.of(campaign, attitude, mounted=True).usual < sensor.usual
 
 
-def _clear(mending: Mending, before: RealSensor, after: RealSensor) -> bool:
-    """Whether a mending clearly improves what was clearly wrong."""
+def _clear(mending: Mending, before: RealSensor, after: RealSensor, mirrored: bool) -> bool:
+    """Whether a mending clearly improves what was clearly wrong; no sensor is mirrored."""
     if mending.left_out:
         return True
     if mending.changed is None:
-        return before.misfit > CLEARLY * after.misfit
+        if mirrored and mending.matrix is not None and np.linalg.det(mending.matrix) < 0:
+            return after.misfit < before.misfit
+        # Single positions may be wrong as well: it is enough that most others fit then.
+        gained = before.misfit > CLEARLY * after.misfit
+        return bool(gained or before.usual > CLEARLY * after.usual)
     was, now = (np.median(sensor.distance[mending.changed]) for sensor in (before, after))
     return bool(was > max(CLEARLY * now, CLEARLY**2 * after.usual, SHOWS * before.gravity))
 

@@ -8,17 +8,17 @@ one, too small to be seen, is missing as well.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.special import softmax
+from scipy import special
 
 from accelstudy.diagnosis.decision import priors
 from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.evidence.detection import Chance, Detection
-from accelstudy.diagnosis.evidence.field import UNKNOWN
+from accelstudy.diagnosis.evidence.field import UNKNOWN, Unknown
 from accelstudy.diagnosis.evidence.hypotheses import (
     Class,
     Singles,
@@ -28,7 +28,7 @@ from accelstudy.diagnosis.evidence.hypotheses import (
     unknown_beside,
     weigh_singles,
 )
-from accelstudy.diagnosis.evidence.noise_models import colour_density
+from accelstudy.diagnosis.evidence.noise_models import colour_densities
 from accelstudy.diagnosis.evidence.noise_tests import (
     AXES,
     COLOUR,
@@ -38,22 +38,27 @@ from accelstudy.diagnosis.evidence.noise_tests import (
     most_evidence,
     tail_test,
 )
+from accelstudy.diagnosis.evidence.size import log_mean
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
+from accelstudy.diagnosis.space.shapes import LearnedShapes
 from accelstudy.effects import effect_names
 
+IMITATED = 0.5
+"""Probability that an effect beside something unknown only imitates a part of that; in simulations
+without any such effect as many seem certain as in those with one."""
 CREDIBLE = 0.9
 """Posterior probability that a credible set reaches."""
-FIRST = 5
+FIRST = 3
 """Effects beside which something unknown is looked for."""
 
 
 @dataclass(frozen=True)
 class Explanation:
-    """One thing that is missing, or two together.
+    """One thing that is missing, or two together, or three of which two are bumped positions.
 
     Attributes
     ----------
-    names : tuple of str, one or two: effects, or a noise effect, "outlier_position" or "unknown"
+    names : tuple of str, one to three: effects, or a noise effect, "outlier_position" or "unknown"
     classes : tuple of tuple of str, the names that mean the same in this campaign, for each name
     posterior : float, probability given that something is missing
     """
@@ -79,7 +84,7 @@ class Weighed:
 
     Attributes
     ----------
-    names : tuple of str, one or two
+    names : tuple of str, one to three
     classes : tuple of tuple of str, the names that mean the same, for each
     log_weight : float, log of density times prior weight
     best : tuple of Hypothesis, shapes that explain most; empty for noise and for the unknown
@@ -123,15 +128,15 @@ class Posterior:
         single = {
             one.classes[0]: i for i, one in enumerate(self.all) if len(one.names) == 1 and one.best
         }
-        pairs = [i for i, one in enumerate(self.all) if len(one.names) == 2]
+        more = [i for i, one in enumerate(self.all) if len(one.names) > 1]
         p = self.probabilities
-        alone = sum(p[i] for i in single.values()) > sum(p[i] for i in pairs)
+        alone = sum(p[i] for i in single.values()) > sum(p[i] for i in more)
         counted = {i: float(one.log_weight) for i, one in enumerate(self.all)}
         for i, one in enumerate(self.all):
             into = None
             if one.names[0] in NOISES:
                 into = noise
-            elif len(one.names) == 2 and alone:
+            elif len(one.names) > 1 and alone:
                 into = min((single[c] for c in one.classes if c in single), default=None)
             if into is not None and into < i:
                 counted[into] = float(np.logaddexp(counted[into], counted.pop(i)))
@@ -146,15 +151,32 @@ class Posterior:
     @cached_property
     def explanations(self) -> tuple[Explanation, ...]:
         """What is told, most probable first."""
-        return tuple(
-            Explanation(one.names, one.classes, p)
-            for one, p in zip(self.told, _shares(self.told), strict=True)
-        )
+        return _explanations(self.told, _shares(self.told))
+
+    @property
+    def each(self) -> tuple[Explanation, ...]:
+        """All that were weighed, each by itself, most probable first."""
+        return _explanations(self.all, self.probabilities)
 
     @property
     def credible_set(self) -> tuple[Explanation, ...]:
         """Smallest set of explanations that holds the truth with a probability of 0.9."""
         return credible_set(self.explanations)
+
+    def doubting(self, names: Collection[str]) -> Posterior:
+        """Share what has some names with something unknown that they may only imitate."""
+        shared: list[Weighed] = []
+        for one in self.all:
+            others = [members for members in one.classes if members != (UNKNOWN,)]
+            kept = [members for members in others if not {*members} & {*names}]
+            if len(kept) == len(others):
+                shared.append(one)
+                continue
+            real, imitated = (one.log_weight + np.log(p) for p in (1 - IMITATED, IMITATED))
+            named = tuple(n for n, c in zip(one.names, one.classes, strict=True) if c in kept)
+            unknown = Weighed((*named, UNKNOWN), (*kept, (UNKNOWN,)), float(imitated))
+            shared += [replace(one, log_weight=float(real)), unknown]
+        return Posterior.of(shared)
 
     @property
     def top(self) -> Weighed:
@@ -167,9 +189,14 @@ class Posterior:
         return sum(one.posterior for one in self.explanations if one.names[0] in NOISES)
 
 
+def _explanations(weighed: Sequence[Weighed], p: Sequence[float]) -> tuple[Explanation, ...]:
+    """Weighed things with their probabilities."""
+    return tuple(Explanation(a.names, a.classes, b) for a, b in zip(weighed, p, strict=True))
+
+
 def _shares(weighed: Sequence[Weighed]) -> tuple[float, ...]:
     """Probabilities of things that exclude each other."""
-    return tuple(softmax([one.log_weight for one in weighed]).tolist())
+    return tuple(special.softmax([one.log_weight for one in weighed]).tolist())
 
 
 def of_effects(explanation: Explanation) -> bool:
@@ -190,8 +217,10 @@ class Weighing:
     members : dict of candidate to the names that mean the same
     classes : list of Class, candidates that mean the same together, strongest evidence first
     alone : list of Weighed, one effect, one bumped position, or something unknown
-    pairs : list of Weighed, two of them, or one of them beside something unknown
+    pairs : list of Weighed, two of them or with bumped positions three, or one of them beside
+        something unknown
     noises : list of Weighed, only the noise is wrong, in one of its kinds
+    slow : float, probability that the noise lasts for some holds, by the evidence alone
     posterior : Posterior, of all of these
     """
 
@@ -201,6 +230,7 @@ class Weighing:
     alone: list[Weighed]
     pairs: list[Weighed]
     noises: list[Weighed]
+    slow: float
     posterior: Posterior
 
 
@@ -225,9 +255,9 @@ def weigh(problem: Problem, detection: Detection, chance: Chance) -> Weighing:
     if unknown is not None:
         alone.append(Weighed((UNKNOWN,), ((UNKNOWN,),), unknown + np.log(priors.UNKNOWN)))
     pairs = weigh_pairs(problem, singles, members, classes)
-    noises = _noises(problem, detection, chance)
+    noises, slow = _noises(problem, detection, chance)
     posterior = Posterior.of([*alone, *pairs, *noises])
-    return Weighing(singles, members, classes, alone, pairs, noises, posterior)
+    return Weighing(singles, members, classes, alone, pairs, noises, slow, posterior)
 
 
 def weigh_pairs(
@@ -236,7 +266,9 @@ def weigh_pairs(
     members: Mapping[str, tuple[str, ...]],
     classes: Sequence[Class],
 ) -> list[Weighed]:
-    """Weigh two candidates together, and each of the strongest beside something unknown.
+    """Weigh candidates together, and each of the strongest beside something unknown.
+
+    Where one position was bumped, a further one is as probable as two effects rather than one.
 
     Parameters
     ----------
@@ -250,23 +282,26 @@ def weigh_pairs(
     called = {name: best.name for best, names in classes for name in names}
     residuals, evidence, densities = problem.residuals, problem.evidence, singles.densities
     weighed = []
-    for pair in all_pairs(singles.shapes, residuals, evidence):
-        one, other = sorted(pair.best, key=lambda h: -densities[h.name])
-        both = (members[one.name], members[other.name])
-        if both[0] != both[1] or one.effect is None:
-            names = tuple(called.get(h.name, h.name) for h in (one, other))
-            weighed.append(Weighed(names, both, pair.log_density + each, (one, other)))
-    for best, alike in classes[:FIRST]:
-        beside = unknown_beside(best, problem.groups, residuals, evidence)
+    for together in all_pairs(singles.shapes, residuals, evidence):
+        best = tuple(sorted(together.best, key=lambda h: -densities[h.name]))
+        alike = tuple(members[h.name] for h in best)
+        if len(best) > 2 or alike[0] != alike[1] or best[0].effect is None:
+            names = tuple(called.get(h.name, h.name) for h in best)
+            weight = together.log_density + each + (len(best) - 2) * np.log(priors.TWO)
+            weighed.append(Weighed(names, alike, weight, best))
+    unknown = problem.field.unknown
+    for first, same in classes[:FIRST] if unknown else ():
+        assert unknown is not None
+        beside = unknown_beside(first, unknown, residuals, evidence)
         if beside is not None:
-            total = densities[best.name] + beside - np.log(k)
+            total = densities[first.name] + beside - np.log(k)
             prior = np.log(priors.TWO * priors.UNKNOWN)
-            weighed.append(Weighed((best.name, UNKNOWN), (alike, (UNKNOWN,)), total + prior))
+            weighed.append(Weighed((first.name, UNKNOWN), (same, (UNKNOWN,)), total + prior))
     return weighed
 
 
-def _noises(problem: Problem, detection: Detection, chance: Chance) -> list[Weighed]:
-    """Weigh each kind of wrong noise, with nothing else missing."""
+def _noises(problem: Problem, detection: Detection, chance: Chance) -> tuple[list[Weighed], float]:
+    """Weigh each kind of wrong noise, with nothing else missing; and how slow coloured noise is."""
     residuals, evidence, by_level = problem.residuals, problem.evidence, detection.noise
     nothing = float(np.logaddexp.reduce(by_level))
     assert problem.axes is not None
@@ -275,13 +310,29 @@ def _noises(problem: Problem, detection: Detection, chance: Chance) -> list[Weig
     if problem.frame.solution is not problem.base.solution:
         unequal = float(by_level[0])
     tails = tail_test(residuals.positions, chance)
+    # The kinds of coloured noise share its weight evenly; a smooth course is one of them.
+    # As noise it leaves the slopes within the holds as they are.
+    courses = Unknown(LearnedShapes.of(problem.frame, "time", rates=False))
+    course = float(
+        np.logaddexp.reduce([-np.inf, *courses.by_place(evidence, residuals.z).values()])
+    )
+    processes = colour_densities(residuals, evidence)
+    each = priors.COLOUR / (len(processes) + 1)
+    of_course = each + (priors.UNRECORDED if problem.absent else 0.0)
+    coloured = np.logaddexp(
+        np.log(each) + np.logaddexp.reduce(processes), np.log(of_course) + course
+    )
     logs = {
-        COLOUR: np.log(priors.COLOUR) + colour_density(residuals, evidence),
+        COLOUR: coloured,
         AXES: unequal,
         TAILS: nothing + np.log(priors.TAILS) + most_evidence(tails.p_value),
     }
+    lasting, fast = log_mean(np.array([*processes[1:], course])), processes[0]
     if len(by_level) > 1:
         # More noise than within the holds is an offset from hold to hold.
         name = LEVEL if evidence.level.known else COLOUR
         logs[name] = np.logaddexp(logs.get(name, -np.inf), by_level[1])
-    return [Weighed((name,), ((name,),), float(log)) for name, log in logs.items()]
+        fast = max(fast, by_level[1] - np.log(evidence.level.weights[1]))
+    slow = float(special.expit(lasting - fast))
+    weighed = [Weighed((name,), ((name,),), float(log)) for name, log in logs.items()]
+    return weighed, slow

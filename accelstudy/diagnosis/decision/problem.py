@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +18,7 @@ from accelstudy.diagnosis.evidence.field import Field
 from accelstudy.diagnosis.evidence.noise_models import UnequalAxes
 from accelstudy.diagnosis.evidence.size import Evidence, Level
 from accelstudy.diagnosis.space.examined import ExaminedFit, Frame, examine
-from accelstudy.diagnosis.space.groups import groups
+from accelstudy.diagnosis.space.groups import LACK_OF_FIT, groups
 from accelstudy.diagnosis.space.hypotheses import Spaces
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.sensors.sensor import SensorModel
@@ -58,7 +59,7 @@ def fit_base(campaign: Campaign, model: SensorModel, approach: Approach) -> Base
     stated, measured = campaign.sigma_force is not None, campaign
     # Without a sigma the weights of forces and angles need one: that of the residuals.
     for _ in range(1 if stated else 3):
-        fit = fit_campaign(measured, model, approach)
+        fit = fit_campaign(measured, model, approach, diagnosing=True)
         if fit.adjustment.redundancy <= 0:
             raise InputError(
                 f"{campaign.name}: {campaign.n_positions} positions leave no redundancy beside "
@@ -114,6 +115,11 @@ class Problem:
         """Those of the fit."""
         return self.examined.frame.residuals
 
+    @property
+    def absent(self) -> tuple[str, ...]:
+        """Columns that would tell what changes slowly, and that the campaign lacks."""
+        return tuple(n for n in ("temperature", "time") if getattr(self.frame.hold, n) is None)
+
 
 def pose(base: BaseFit) -> Problem:
     """Set all that the model of a fit may lack side by side.
@@ -131,10 +137,13 @@ def pose(base: BaseFit) -> Problem:
             mean = np.mean(np.sqrt(first.variances[:, :3]))
             shaped = np.broadcast_to(mean * sigma / np.mean(sigma), (len(first.variances), 3))
             observed = replace(first.observed, sigma_force=shaped)
-            examined = examine(solve(first.model, first.approach, observed))
+            # With other weights a sensor that clips may have no solution.
+            with suppress(InputError):
+                examined = examine(solve(first.model, first.approach, observed))
     shown = groups(examined)
     evidence = Evidence(base.level, examined.frame.residuals.redundancy)
-    return Problem(base, examined, axes, shown, Field.of(examined.candidates, shown), evidence)
+    field = Field(examined.candidates, examined.frame, shown.get(LACK_OF_FIT))
+    return Problem(base, examined, axes, shown, field, evidence)
 
 
 def is_exact(fit: Solution) -> bool:
@@ -144,7 +153,7 @@ def is_exact(fit: Solution) -> bool:
 
 def _best_odds(examined: ExaminedFit, evidence: Evidence) -> float:
     """Log odds of the most probable single effect against nothing, at least 0."""
-    field, z = Field.of(examined.candidates, {}), examined.frame.residuals.z
+    field, z = Field(examined.candidates), examined.frame.residuals.z
     if not field.names:
         return 0.0
     nothing = np.logaddexp.reduce(evidence.of_noise(z @ z))

@@ -7,7 +7,9 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
+from accelstudy.adjustment.calibration import CalibrationProblem
 from accelstudy.adjustment.quality import Solution, solve
 from accelstudy.basics.errors import InputError
 from accelstudy.diagnosis.evidence.hypotheses import Class, Singles, shaped
@@ -18,6 +20,8 @@ from accelstudy.sensors.sensor import SensorModel
 
 SAME = 0.5
 """Difference of Ω within which two fits are equally good."""
+EDGE = 0.1
+"""Part of what is searched within which the least is at its end."""
 BEYOND = 1.6
 """Factor by which a setting may lie beyond the first and the last that are tried."""
 
@@ -77,7 +81,56 @@ def best_refit(
         return None
     least = min(fit.omega for _, fit in solved)
     # Fits that differ by less count as equal: rounding errors must not choose the name.
-    return next(item for item in solved if item[1].omega <= least + SAME)
+    best, fit = next(item for item in solved if item[1].omega <= least + SAME)
+    u = len(fit.parameters)
+    return best, replace(fit, cofactors=with_settings(examined, fit, best)[:u, :u])
+
+
+STEP = 1e-4
+"""Change of the logarithm of a setting for a derivative by it."""
+
+
+def with_settings(
+    examined: ExaminedFit, fit: Solution, chosen: Sequence[Hypothesis]
+) -> NDArray[np.float64]:
+    """Cofactors of a fit, with those of the settings that were searched for.
+
+    The derivatives of the conditions by a setting are a further column of the design, and the
+    range in which it was searched for is an observation of it.
+
+    Parameters
+    ----------
+    examined : ExaminedFit, of the base fit
+    fit : Solution, with what was chosen
+    chosen : hypotheses
+
+    Returns
+    -------
+    (u + s, u + s) array, of the parameters and of the logarithms of the settings
+    """
+    model, columns, weights = fit.model, [fit.design], [np.zeros(fit.design.shape[1])]
+    problem = CalibrationProblem.of(model, fit.approach, fit.observed)
+    at = problem.observations[0] + fit.residuals
+    for one in chosen:
+        if one.smooth is None:
+            continue
+        shown, name, value = one.shown, one.smooth, one.value
+        assert shown is not None
+        psi = []
+        for step in (-STEP, STEP):
+            changed = type(shown)(**{**shown.settings, name: value * np.exp(step)})
+            effects = tuple(changed if e.name == one.name else e for e in model.effects)
+            trial = SensorModel(model.name, effects)
+            problem = CalibrationProblem.of(trial, fit.approach, fit.observed)
+            psi.append(problem.linearised(fit.parameters, at).psi[:, 0].T)
+        slope = np.linalg.solve(fit.whitening, (psi[1] - psi[0])[..., None] / (2 * STEP)).ravel()
+        columns.append(np.pad(slope, (0, len(fit.design) - len(slope)))[:, None])
+        tried = [h.value for h in examined.candidates[one.name]]
+        weights.append(12 / np.log([max(tried) / min(tried)]) ** 2)
+    design = np.concatenate(columns, axis=1)
+    if design.shape[1] == len(fit.parameters) or not np.isfinite(design).all():
+        return fit.cofactors
+    return np.asarray(np.linalg.inv(design.T @ design + np.diag(np.concatenate(weights))))
 
 
 def _sharpened(examined: ExaminedFit, chosen: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -89,8 +142,8 @@ def _sharpened(examined: ExaminedFit, chosen: Sequence[Hypothesis]) -> list[Hypo
         from scipy.optimize import minimize_scalar  # slow to import, and seldom needed
 
         values = [h.value for h in examined.candidates[start.name]]
-        low = max((v for v in values if v < start.value), default=start.value / BEYOND)
-        high = min((v for v in values if v > start.value), default=start.value * BEYOND)
+        passed = {min(values) / BEYOND, max(values) * BEYOND}
+        ends = (*passed, *values)
 
         def omega(log: float, k: int = k, start: Hypothesis = start) -> float:
             trial = shaped(examined, start, float(np.exp(log)))
@@ -99,9 +152,19 @@ def _sharpened(examined: ExaminedFit, chosen: Sequence[Hypothesis]) -> list[Hypo
             fit = refit(base, [*sharp[:k], trial, *sharp[k + 1 :]])
             return base.omega if fit is None else fit.omega
 
-        least = minimize_scalar(
-            omega, bounds=np.log([low, high]), method="bounded", options={"xatol": 1e-4}
-        )
+        at = start.value
+        while True:
+            low = max((v for v in ends if v < at), default=at)
+            high = min((v for v in ends if v > at), default=at)
+            least = minimize_scalar(
+                omega, bounds=np.log([low, high]), method="bounded", options={"xatol": 1e-4}
+            )
+            # To first order the least may seem to be a little to one side.
+            near = min((low, high), key=lambda v: abs(least.x - np.log(v)))
+            inside = abs(least.x - np.log(near)) > EDGE * np.log(high / low)
+            if inside or near in passed or omega(float(np.log(near))) > least.fun:
+                break
+            at, passed = near, passed | {low, high}
         best = shaped(examined, start, float(np.exp(least.x)))
         if best is not None and least.fun < omega(float(np.log(start.value))):
             sharp[k] = best

@@ -15,7 +15,7 @@ from itertools import combinations, product
 
 from accelstudy.campaign.gross_errors import get_gross_error, gross_error_names
 from accelstudy.diagnosis.decision.posterior import CREDIBLE, Explanation
-from accelstudy.diagnosis.decision.priors import MANY, SURE
+from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.space.examined import ExaminedFit
 from accelstudy.diagnosis.space.hypotheses import cosines
 from accelstudy.effects import effect_names, get_effect
@@ -79,6 +79,11 @@ class Part:
     posterior: float
     purity: float | None = None
 
+    @property
+    def is_effect(self) -> bool:
+        """Whether it is an effect or a gross error: no noise, and nothing unknown."""
+        return self.family != "noise" and self.names[0].name != UNKNOWN
+
 
 @dataclass(frozen=True)
 class Statement:
@@ -95,41 +100,39 @@ class Statement:
     open: tuple[Explanation, ...]
 
 
-def statement(
-    credible_set: Iterable[Explanation],
-    cosine: Callable[[str, str], float] | None = None,
-    probability: float = CREDIBLE,
-) -> Statement:
-    """Say what a credible set leaves no doubt of, and what it leaves open.
+def statement(explanations: Sequence[Explanation], probability: float = CREDIBLE) -> Statement:
+    """Say what explanations leave no doubt of, and what they leave open.
 
     A name is certain if the explanations that have it hold enough together. A family is certain if
-    those that have one of its effects do. A set does not hold all explanations, so these
-    probabilities are lower bounds.
+    those that have one of its effects do. Of a credible set, which does not hold all explanations,
+    these probabilities are lower bounds.
 
     Parameters
     ----------
-    credible_set : explanations that exclude each other
-    cosine : largest canonical cosine of two effects in this campaign, optional
+    explanations : Explanations that exclude each other
     probability : float, that is enough to be certain
     """
-    left, certain = list(credible_set), []
-    while (part := _certain(left, cosine, probability)) is not None:
+    left, certain = list(explanations), []
+    while (part := _certain(left, probability)) is not None:
         certain.append(part)
+        left = [_without(one, [name.name for name in part.names]) for one in left]
+    return Statement(tuple(certain), beside(explanations, certain))
+
+
+def beside(explanations: Sequence[Explanation], parts: Iterable[Part]) -> tuple[Explanation, ...]:
+    """What explanations have beside some parts, most probable first; empty if they have nothing."""
+    left = list(explanations)
+    for part in parts:
         left = [_without(one, [name.name for name in part.names]) for one in left]
     rest: dict[Names, Explanation] = {}
     for one in left:
         same = rest.get(one.names)
         p = one.posterior + (0.0 if same is None else same.posterior)
         rest[one.names] = replace(one, posterior=p)
-    beside = sorted(rest.values(), key=lambda one: -one.posterior)
-    return Statement(tuple(certain), tuple(beside) if any(rest) else ())
+    return tuple(sorted(rest.values(), key=lambda one: -one.posterior)) if any(rest) else ()
 
 
-def _certain(
-    explanations: Sequence[Explanation],
-    cosine: Callable[[str, str], float] | None,
-    probability: float,
-) -> Part | None:
+def _certain(explanations: Sequence[Explanation], probability: float) -> Part | None:
     """The most specific thing that is certain: a name or, if none is, a family."""
     members: dict[str, Names] = {}
     names: dict[str, float] = defaultdict(float)
@@ -148,12 +151,10 @@ def _certain(
         chosen, p = sorted(chosen, key=lambda name: -names[name]), families[kind]
     else:
         return None
-    pairs = combinations(chosen, 2)
     return Part(
         family=family_of(*members[chosen[0]]),
         names=tuple(Name(name, members[name], names[name]) for name in chosen),
         posterior=p,
-        purity=None if cosine is None else min((cosine(*pair) for pair in pairs), default=None),
     )
 
 
@@ -186,24 +187,14 @@ def cosine_in(examined: ExaminedFit) -> Callable[[str, str], float]:
     return cosine
 
 
-def certain_of(
-    verdict: str, credible_set: Sequence[Explanation], examined: ExaminedFit
-) -> tuple[Part, ...]:
-    """What a verdict leaves no doubt of, with the purity of each part in a campaign."""
-    if verdict == "unknown" and refuted(credible_set):
-        return ()
-    return statement(credible_set, cosine=cosine_in(examined)).certain
-
-
-def refuted(credible_set: Sequence[Explanation]) -> bool:
-    """Whether a set would have been an answer if no test had refuted it.
-
-    Added to the model, it left a misfit, say. It may imitate what is missing; nothing is certain.
-    """
-    effects, _ = effects_and_others(credible_set)
-    named = any(one.posterior >= SURE for one in effects)
-    narrowed = len(credible_set) <= MANY and sum(one.posterior for one in effects) >= SURE
-    return named or narrowed
+def with_purity(parts: Iterable[Part], examined: ExaminedFit) -> tuple[Part, ...]:
+    """What is certain, with the purity of each part in a campaign."""
+    cosine = cosine_in(examined)
+    pairs = [(part, combinations([name.name for name in part.names], 2)) for part in parts]
+    return tuple(
+        replace(part, purity=min((cosine(*pair) for pair in of), default=None))
+        for part, of in pairs
+    )
 
 
 def effects_and_others(

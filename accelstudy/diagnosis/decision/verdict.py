@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from accelstudy.adjustment.quality import Solution
+from accelstudy.adjustment.quality import Solution, global_test
 from accelstudy.basics.levels import REFUTED
-from accelstudy.basics.wording import comma_list, words
+from accelstudy.basics.wording import comma_list, grouped, p_value
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision import priors
 from accelstudy.diagnosis.decision.posterior import (
@@ -23,7 +24,9 @@ from accelstudy.diagnosis.decision.posterior import (
     of_effects,
 )
 from accelstudy.diagnosis.decision.problem import Problem, pose
-from accelstudy.diagnosis.decision.refits import best_refit
+from accelstudy.diagnosis.decision.refits import best_refit, with_settings
+from accelstudy.diagnosis.decision.statement import Part
+from accelstudy.diagnosis.evidence.bounds import within_bounds
 from accelstudy.diagnosis.evidence.detection import Chance, Detection
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.hypotheses import equivalents, strongest, weigh_singles
@@ -46,9 +49,12 @@ from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.groups import LACK_OF_FIT, LackOfFit, clusters
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis, Spaces
 from accelstudy.diagnosis.space.residuals import Residuals
+from accelstudy.sensors.plausibility import impossible_parameters
 
 LARGE = 300.0
 """Noncentrality beyond which first order is not enough, and a refit judges an effect."""
+PAIRS = 5
+"""Pairs that are refitted where the best explanation leaves a misfit."""
 LEVEL_NOISE = 0.01
 """Family-wise level of all tests of the noise but that of its level, which has `REFUTED`. With the
 test for anything that is missing they make 5 % false alarms."""
@@ -83,9 +89,15 @@ class Finding:
     verdict : str, "no_effect", "named", "narrowed", "gross_error", "noise_model" or "unknown"
     frame : Frame, of the fit with what was chosen, or of the base fit
     reason : str
-    chosen : tuple of Choice
+    chosen : tuple of Choice; of the unknown, what is certain
     posterior : Posterior or None, where something is missing
     says_the_level : bool, whether the reason says how large the residuals are
+    coloured : float, probability of coloured noise that may be an effect of an absent column
+    unrecorded : bool, whether the reason says so
+    weak : bool, whether there is evidence that something is missing, too weak for a verdict
+    left_over : bool, whether the best explanation leaves more than noise
+    certain : tuple of Part, what is missing whatever else is open
+    open : tuple of Explanation, what may be missing beside that
     """
 
     verdict: str
@@ -94,6 +106,26 @@ class Finding:
     chosen: tuple[Choice, ...] = ()
     posterior: Posterior | None = None
     says_the_level: bool = False
+    coloured: float = 0.0
+    unrecorded: bool = False
+    weak: bool = False
+    left_over: bool = False
+    certain: tuple[Part, ...] = ()
+    open: tuple[Explanation, ...] = ()
+
+    @property
+    def alternatives(self) -> tuple[Explanation, ...]:
+        """Explanations any of which would be what was chosen."""
+        if self.verdict != "unknown":
+            return self.credible_set
+        added = {choice.members for choice in self.chosen}
+        parts = [part for part in self.certain if part.names[0].members in added]
+        return tuple(
+            Explanation(
+                tuple(n.name for n in one), tuple(n.members for n in one), parts[0].posterior
+            )
+            for one in product(*(part.names for part in parts))
+        )
 
     @property
     def credible_set(self) -> tuple[Explanation, ...]:
@@ -114,6 +146,7 @@ class Named:
     rivals : tuple of (name, cosine)
     imitators : tuple of str, further names that could leave the same, and more
     parameters : tuple of (name, value, sigma, unit), SI
+    settings : tuple of the same, of those that were searched for
     position : int, of a bumped position
     """
 
@@ -125,6 +158,7 @@ class Named:
     rivals: tuple[tuple[str, float], ...] = ()
     imitators: tuple[str, ...] = ()
     parameters: tuple[tuple[str, float, float | None, str], ...] = ()
+    settings: tuple[tuple[str, float, float | None, str], ...] = ()
     position: int | None = None
 
 
@@ -133,7 +167,17 @@ def find(problem: Problem, weighing: Weighing) -> Finding:
     posterior = weighing.posterior
     strongest = next((one for one in posterior.all if len(one.best) == 1), None)
     if strongest is not None and _is_large(problem, strongest):
-        posterior = _judged_by_refits(problem, weighing, strongest)
+        posterior = _judged_by_refits(problem, weighing, strongest, 1)
+    finding = _judged(problem, weighing, posterior)
+    if finding.left_over and strongest is not None:
+        # To first order the best explanation was enough; the others were not asked by their refits.
+        posterior = _judged_by_refits(problem, weighing, strongest, PAIRS)
+        finding = _judged(problem, weighing, posterior)
+    return finding
+
+
+def _judged(problem: Problem, weighing: Weighing, posterior: Posterior) -> Finding:
+    """Judge the explanations of a posterior."""
     top = posterior.top
     if not top.best:
         return _without_a_fit(problem, posterior)
@@ -145,10 +189,20 @@ def find(problem: Problem, weighing: Weighing) -> Finding:
     best, solution = fit
     left = _misfit(problem, solution)
     if left:
-        added = comma_list([words(name) for name in top.names])
-        reason = f"with {added} added, the residuals are still {left}"
+        reason = f"with {comma_list(grouped(top.names))} added, the residuals are still {left}"
+        return Finding("unknown", problem.frame, reason, posterior=posterior, left_over=True)
+    if impossible := _impossible(solution):
+        reason = f"with {comma_list(grouped(top.names))} added, no sensor has {impossible}"
         return Finding("unknown", problem.frame, reason, posterior=posterior)
     return _with_a_fit(problem, posterior, best, solution)
+
+
+def _impossible(solution: Solution) -> str:
+    """Parameters that are beyond their physical bounds; empty if none is."""
+    sigma = np.sqrt(np.diag(solution.cofactors) * max(1.0, solution.omega / solution.redundancy))
+    u = solution.model.n_parameters
+    effects = solution.model.effects
+    return comma_list(impossible_parameters(effects, solution.parameters[:u], sigma[:u]))
 
 
 def _with_a_fit(
@@ -191,7 +245,7 @@ def _without_a_fit(problem: Problem, posterior: Posterior) -> Finding:
     if UNKNOWN in first.names:
         reason = "no effect or pair of effects of the catalogue explains it"
     else:
-        second = comma_list([words(name) for name in posterior.explanations[1].names])
+        second = comma_list(grouped(posterior.explanations[1].names))
         reason = (
             f"{_explained(first.names)} it with a probability of {first.posterior:.2f} only, and "
             f"{second} with {posterior.explanations[1].posterior:.2f}"
@@ -199,9 +253,29 @@ def _without_a_fit(problem: Problem, posterior: Posterior) -> Finding:
     return Finding("unknown", problem.frame, reason, posterior=posterior)
 
 
+def unless_weak(problem: Problem, detection: Detection, finding: Finding) -> Finding:
+    """Take back that something is missing, where the calibration is right to accept its fit.
+
+    The evidence for something is wider than the test of the calibration, and its level less strict.
+    What it finds beyond that level counts if something of it has a name, or is certain.
+    """
+    base = problem.base.solution
+    test = global_test(base.omega, base.redundancy) if problem.evidence.level.known else None
+    accepted = test is not None and test.accepted and not test.powerless
+    if finding.verdict != "unknown" or detection.p_value < REFUTED or not accepted:
+        return finding
+    if any(part.is_effect for part in finding.certain):
+        return finding
+    reason = (
+        f"the evidence that something is missing is weak ({p_value(detection.p_value)}), and "
+        f"nothing of it is certain; more positions, and repeats of these, would show it"
+    )
+    return Finding("no_effect", problem.frame, reason, weak=True)
+
+
 def _explained(names: Sequence[str]) -> str:
-    """One or two names with the verb that belongs to them."""
-    return f"{comma_list([words(name) for name in names])} explain{'s' if len(names) == 1 else ''}"
+    """Names with the verb that belongs to them."""
+    return f"{comma_list(grouped(names))} explain{'s' if len(names) == 1 else ''}"
 
 
 def _is_large(problem: Problem, top: Weighed) -> bool:
@@ -210,19 +284,30 @@ def _is_large(problem: Problem, top: Weighed) -> bool:
     return top.best[0].effect is not None and float(np.sum((z @ basis) ** 2)) > LARGE
 
 
-def _judged_by_refits(problem: Problem, weighing: Weighing, single: Weighed) -> Posterior:
-    """Posterior where an effect is large: it alone, or with another one in what its refit leaves.
+def _judged_by_refits(
+    problem: Problem, weighing: Weighing, single: Weighed, count: int
+) -> Posterior:
+    """Posterior by refits: an effect alone, with more in what its refit leaves, pairs and triples.
 
     To first order a large effect leaves so much that anything would seem to be beside it.
+
+    Parameters
+    ----------
+    problem : Problem
+    weighing : Weighing
+    single : Weighed, the effect
+    count : int, pairs that are refitted, the most probable to first order
     """
-    pairs = [one for one in weighing.pairs if len(one.best) == 2]
-    strongest_pair = sorted(pairs, key=lambda one: one.log_weight)[-1:]
-    refitted = [_refitted(problem, weighing, one) for one in (single, *strongest_pair)]
+    tried = [single]
+    for size in (2, 3):
+        together = [one for one in weighing.pairs if len(one.best) == size]
+        tried += sorted(together, key=lambda one: -one.log_weight)[:count]
+    refitted = [_refitted(problem, weighing, one) for one in tried]
     weighed = [one for one, _ in refitted]
     alone, solution = refitted[0]
     if solution is not None:
         weighed += _beside(problem, len(weighing.classes), alone, solution)
-    others = [one for one in weighing.alone if one.best and one.names != single.names]
+    others = [one for one in weighing.alone if one.names != single.names]
     return Posterior.of([*weighed, *others, *weighing.noises])
 
 
@@ -270,7 +355,8 @@ def _beside(problem: Problem, count: int, alone: Weighed, solution: Solution) ->
             continue
         other = strongest(inner.examined.candidates[name], z)
         both = (*alone.classes, members[name])
-        weight = log + float(np.log(priors.TWO / k))
+        within = float(within_bounds((other,), z, inner.evidence)[0])
+        weight = log + within + float(np.log(priors.TWO / k))
         weighed.append(Weighed((*alone.names, name), both, weight, (*alone.best, other)))
     return weighed
 
@@ -434,12 +520,19 @@ def describe(
         worst, posterior = worst_of(tests), finding.posterior
         assert posterior is not None
         top = next(e.names[0] for e in posterior.explanations if e.names[0] in NOISES)
-        name = top if worst is None else worst.name
+        # Of larger residuals the level says least; what they are, the evidence says.
+        if worst is None or (worst.name == LEVEL and posterior.of_noise >= priors.SURE):
+            name = top
+        else:
+            name = worst.name
         p = detection.p_value if worst is None else worst.p_value
         return (Named(name, name, (name,), p, posterior.of_noise),)
     solution = finding.frame.solution
-    sigma = np.sqrt(np.diag(solution.cofactors) * variance)
+    hypotheses = [choice.best for choice in finding.chosen]
+    cofactors = with_settings(problem.examined, solution, hypotheses)
+    sigma = np.sqrt(np.diag(cofactors) * variance)
     columns = {name: i for i, name in enumerate(solution.model.parameter_names)}
+    of_settings = iter(sigma[len(solution.parameters) :].tolist())
     named = []
     for choice in finding.chosen:
         best, p = choice.best, detection.p_family[choice.best.name]
@@ -451,6 +544,9 @@ def describe(
         assert best.shown is not None
         places = [(q, columns[q.name]) for q in best.shown.parameters]
         examined, members = problem.examined, choice.members
+        searched = [s for s in best.effect.takes if s.name == best.smooth]
+        # What is beside a large effect was found in what its refit leaves, with other slopes.
+        here = examined.hypothesis(best.effect)
         named.append(
             Named(
                 name=best.name,
@@ -460,13 +556,21 @@ def describe(
                 posterior=choice.probability,
                 rivals=tuple(
                     (name, cosine)
-                    for name, cosine in examined.nearest(best)
+                    for name, cosine in (() if here is None else examined.nearest(here))
                     if cosine >= RIVAL and name not in members
                 ),
-                imitators=tuple(n for n in examined.imitators(best) if n not in members),
+                imitators=tuple(
+                    name
+                    for name in (() if here is None else examined.imitators(here))
+                    if name not in members
+                ),
                 parameters=tuple(
                     (q.name, float(solution.parameters[i]), float(sigma[i]), q.unit)
                     for q, i in places
+                ),
+                settings=tuple(
+                    (s.name, best.value, best.value * of_log, s.unit)
+                    for s, of_log in zip(searched, of_settings, strict=False)
                 ),
             )
         )

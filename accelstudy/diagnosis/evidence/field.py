@@ -7,71 +7,134 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from accelstudy.diagnosis.evidence.size import Evidence, log_mean
-from accelstudy.diagnosis.space.hypotheses import (
-    Bases,
-    BumpedPositions,
-    EffectShapes,
-    Shapes,
-    Spaces,
-)
+from accelstudy.diagnosis.evidence.size import Evidence, log_mean, log_sum
+from accelstudy.diagnosis.space.examined import Frame
+from accelstudy.diagnosis.space.hypotheses import Bases, EffectShapes, Shapes, Spaces
+from accelstudy.diagnosis.space.shapes import LearnedShapes, Place
 
 Array = NDArray[np.float64]
 
 UNKNOWN = "unknown"
-"""Something in one of the groups of regressors that is none of the effects."""
+"""Something of one of the learned shapes, or of the attitude alone, that is none of the effects."""
+OF_ATTITUDE = ("force", "bias")
+"""Place of anything that repeated positions of one attitude have in common."""
 PROPOSED = np.array([12.0, 25.0, 50.0])
 """Noncentralities of the simulated effects: where tests at the usual levels decide."""
 
 
 @dataclass(frozen=True)
-class Field:
-    """Candidates, each with spaces that are alternatives.
+class Unknown:
+    """Something without a name: one of the learned shapes, or anything of the attitude alone.
 
     Attributes
     ----------
-    names : tuple of str, K candidates
-    spaces : tuple of tuple of Spaces, of each
-    weights : tuple of arrays, prior probabilities of the spaces of each, which sum to 1
+    shapes : LearnedShapes
+    attitude : Spaces or None, everything but the differences of repeated positions
     """
 
-    names: tuple[str, ...]
-    spaces: tuple[tuple[Spaces, ...], ...]
-    weights: tuple[Array, ...]
+    shapes: LearnedShapes
+    attitude: Spaces | None = None
 
-    @classmethod
-    def of(cls, candidates: Mapping[str, Shapes], groups: Mapping[str, Spaces]) -> Field:
-        """Candidates and, as the last of them, something unknown in a group of regressors."""
-        names: list[str] = []
-        spaces: list[tuple[Spaces, ...]] = []
-        weights: list[Array] = []
-        for name, shapes in candidates.items():
-            names.append(name)
-            spaces.append((shapes,))
-            weights.append(shape_weights(shapes))
-        if groups:
-            names.append(UNKNOWN)
-            spaces.append(tuple(groups.values()))
-            weights.append(np.full(len(groups), 1 / len(groups)))
-        return cls(tuple(names), tuple(spaces), tuple(weights))
+    @property
+    def places(self) -> tuple[Place, ...]:
+        """Coordinate and target of each."""
+        return (*self.shapes.places, *([OF_ATTITUDE] if self.attitude else []))
+
+    @cached_property
+    def weights(self) -> Array:
+        """Prior probability of each, which sum to 1; the attitude counts as one coordinate."""
+        if self.attitude is None:
+            return self.shapes.weights
+        count = len({coordinate for coordinate, _ in self.shapes.places}) + 1
+        return np.append(self.shapes.weights * (count - 1) / count, 1 / count)
+
+    def parts(self, errors: Array) -> Array:
+        """What `densities` needs of residuals (..., m), (..., p)."""
+        squares = self.shapes.squares(errors)
+        if self.attitude is None:
+            return squares
+        return np.concatenate([squares, self.attitude.parts(errors)], axis=-1)
+
+    def densities(self, evidence: Evidence, parts: Array, squares: Array) -> Array:
+        """Log density of residuals under each of `places`, times its prior weight, (b, s).
+
+        Parameters
+        ----------
+        evidence : Evidence
+        parts : (b, p) array
+        squares : (b,) array, ‖z‖²
+        """
+        shapes, logs = self.shapes, []
+        if len(shapes):
+            along = shapes.by_shape(parts[:, : shapes.vectors.shape[1]])
+            logs.append(evidence.of_shapes(along, shapes.shares, squares))
+        if self.attitude is not None:
+            logs.append(evidence.of_spaces(parts[:, -1:], self.attitude.dims, squares))
+        return np.concatenate(logs, axis=1) + np.log(self.weights)
+
+    def by_place(self, evidence: Evidence, z: Array) -> dict[Place, float]:
+        """Log density of residuals z (m,) under the shapes of each place, times its prior."""
+        logs = self.densities(evidence, self.parts(z[None]), np.array([z @ z]))[0]
+        places: dict[Place, float] = {}
+        for place, log in zip(self.places, logs.tolist(), strict=True):
+            places[place] = float(np.logaddexp(places.get(place, -np.inf), log))
+        return places
+
+
+@dataclass(frozen=True)
+class Field:
+    """Candidates, each with spaces that are alternatives, and something without a name.
+
+    Attributes
+    ----------
+    candidates : dict of name to shapes
+    frame : Frame, in which something without a name is looked for; None for the candidates alone
+    attitude : Spaces or None, as in `Unknown`
+    """
+
+    candidates: Mapping[str, Shapes]
+    frame: Frame | None = None
+    attitude: Spaces | None = None
+
+    @cached_property
+    def unknown(self) -> Unknown | None:
+        """Something without a name; None where nothing but the candidates shows."""
+        if self.frame is None or not self.candidates:
+            return None
+        unknown = Unknown(LearnedShapes.of(self.frame), self.attitude)
+        return unknown if unknown.places else None
+
+    @cached_property
+    def named(self) -> Field:
+        """The candidates alone."""
+        return Field(self.candidates)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """All candidates, K; the unknown is the last one."""
+        return (*self.candidates, *([UNKNOWN] if self.unknown else []))
+
+    @cached_property
+    def weights(self) -> list[Array]:
+        """Prior probabilities of the shapes of each candidate with a name, which sum to 1."""
+        return [shape_weights(shapes) for shapes in self.candidates.values()]
 
     @cached_property
     def dims(self) -> NDArray[np.int_]:
-        """Dimensions of all spaces, (s,)."""
-        parts = [space.dims for spaces in self.spaces for space in spaces]
-        return np.concatenate(parts) if parts else np.zeros(0, dtype=int)
+        """Dimensions of all their shapes, (s,)."""
+        return np.concatenate([np.zeros(0, int), *(c.dims for c in self.candidates.values())])
 
     @cached_property
     def starts(self) -> NDArray[np.int_]:
-        """Where the spaces of each candidate begin, (K,)."""
-        return np.concatenate([[0], np.cumsum([len(w) for w in self.weights])[:-1]]).astype(int)
+        """Where the shapes of each of them begin, and where the last ones end."""
+        return np.cumsum([0, *map(len, self.candidates.values())])
 
     @cached_property
     def _together(self) -> Bases:
         """Bases of all candidates that have one, side by side."""
-        bases = [s for spaces in self.spaces for s in spaces if isinstance(s, Bases)]
+        bases = [one for one in self.candidates.values() if isinstance(one, Bases)]
         if not bases:
             return Bases(np.zeros((0, 0)), np.zeros(0, dtype=int))
         return Bases(
@@ -80,34 +143,47 @@ class Field:
         )
 
     def parts(self, errors: Array) -> Array:
-        """Squares of what residuals (..., m) have in each space, (..., s)."""
-        squares, first = [], 0
+        """Squares of what residuals (..., m) have in each shape, (..., s), then of the unknown."""
+        squares, first = [np.zeros((*errors.shape[:-1], 0))], 0
         together = self._together
         seen = together.parts(errors) if len(together.dims) else None
-        for spaces in self.spaces:
-            for space in spaces:
-                if isinstance(space, Bases):
-                    assert seen is not None
-                    squares.append(seen[..., first : first + len(space.dims)])
-                    first += len(space.dims)
-                else:
-                    squares.append(space.parts(errors))
+        for shapes in self.candidates.values():
+            if isinstance(shapes, Bases):
+                assert seen is not None
+                squares.append(seen[..., first : first + len(shapes)])
+                first += len(shapes)
+            else:
+                squares.append(shapes.parts(errors))
+        if self.unknown is not None:
+            squares.append(self.unknown.parts(errors))
         return np.concatenate(squares, axis=-1)
+
+    def of_shapes(self, evidence: Evidence, parts: Array, squares: ArrayLike) -> Array:
+        """Log density of residuals under each shape of the candidates with a name, (..., s)."""
+        return evidence.of_spaces(parts[..., : len(self.dims)], self.dims, squares)
 
     def densities(self, evidence: Evidence, errors: Array) -> Array:
         """Log density of residuals (..., m) under each candidate, over its shapes, (..., K)."""
-        return self.combined(
-            evidence.of_spaces(self.parts(errors), self.dims, np.sum(errors**2, axis=-1))
-        )
+        return self.of_parts(evidence, self.parts(errors), np.sum(errors**2, axis=-1))
+
+    def of_parts(self, evidence: Evidence, parts: Array, squares: ArrayLike) -> Array:
+        """Return the same by the `parts` of residuals and ‖z‖²."""
+        logs = [self.combined(self.of_shapes(evidence, parts, squares))]
+        if self.unknown is not None:
+            sets, squares = np.atleast_2d(parts), np.atleast_1d(squares)
+            each = self.unknown.densities(evidence, sets[:, len(self.dims) :], squares)
+            logs.append(log_sum(each).reshape(*parts.shape[:-1], 1))
+        return np.concatenate(logs, axis=-1)
 
     def combined(self, logs: Array) -> Array:
-        """Log of the mean over the shapes of each candidate, (..., K), of logs (..., s)."""
-        weighted = logs + np.log(np.concatenate(self.weights))
+        """Log of the mean over the shapes of each candidate with a name, of logs (..., s)."""
+        if not self.candidates:
+            return logs
+        weighted, starts = logs + np.log(np.concatenate(self.weights)), self.starts[:-1]
         # `numpy.logaddexp.reduceat` goes one by one, which takes eight times as long.
-        top = np.maximum.reduceat(weighted, self.starts, axis=-1)
-        counts = [len(weights) for weights in self.weights]
-        weighted -= np.repeat(top, counts, axis=-1)
-        sums = np.add.reduceat(np.exp(weighted), self.starts, axis=-1)
+        top = np.maximum.reduceat(weighted, starts, axis=-1)
+        weighted -= np.repeat(top, np.diff(self.starts), axis=-1)
+        sums = np.add.reduceat(np.exp(weighted), starts, axis=-1)
         return np.asarray(top + np.log(sums))
 
     def odds(self, evidence: Evidence, parts: Array, squares: Array) -> Array:
@@ -116,42 +192,34 @@ class Field:
         Parameters
         ----------
         evidence : Evidence
-        parts : (b, s) array, of `parts`
+        parts : (b, ...) array, of `parts`
         squares : (b,) array, ‖z‖²
         """
-        logs = self.combined(evidence.of_spaces(parts, self.dims, squares))
+        logs = self.of_parts(evidence, parts, squares)
         return logs - np.logaddexp.reduce(evidence.of_noise(squares), axis=-1)[:, None]
 
     # --- simulated effects ----------------------------------------------------------------------
 
     @cached_property
-    def _proposed(self) -> tuple[NDArray[np.int_], Array]:
-        """Spaces in which effects can be drawn, (p,), and how often each is."""
-        able = [
-            isinstance(space, EffectShapes | BumpedPositions)
-            for spaces in self.spaces
-            for space in spaces
-            for _ in space.dims
-        ]
-        weights = np.concatenate([w / len(self.names) for w in self.weights])
-        chosen = np.flatnonzero(able)
-        return chosen, weights[chosen] / weights[chosen].sum()
+    def _proposed(self) -> Array:
+        """How often an effect is drawn in each shape, (s,)."""
+        return np.concatenate(self.weights) / len(self.candidates)
 
     def with_effects(self, noise: Array, rng: np.random.Generator) -> Array:
         """Add a random effect to each of sets of noise (b, m)."""
-        chosen, weights = self._proposed
-        drawn = rng.choice(chosen, size=len(noise), p=weights)
+        drawn = rng.choice(len(self.dims), size=len(noise), p=self._proposed)
         sizes = rng.choice(PROPOSED, size=len(noise))
         dims = self.dims[drawn]
         amounts = rng.standard_normal(dims.sum()) * np.repeat(np.sqrt(sizes / dims), dims)
         candidate = np.searchsorted(self.starts, drawn, side="right") - 1
+        of_candidate = list(self.candidates.values())
         of_amount = np.repeat(candidate, dims)
         changed = noise.copy()
         for k in np.unique(candidate):
             rows = np.flatnonzero(candidate == k)
-            shapes = self.spaces[k][0]
-            assert isinstance(shapes, EffectShapes | BumpedPositions)
-            changed[rows] += shapes.drawn(drawn[rows] - self.starts[k], amounts[of_amount == k])
+            changed[rows] += of_candidate[k].drawn(
+                drawn[rows] - self.starts[k], amounts[of_amount == k]
+            )
         return changed
 
     def proposal(self, parts: Array) -> Array:
@@ -159,16 +227,14 @@ class Field:
 
         Parameters
         ----------
-        parts : (b, s) array
+        parts : (b, ...) array, of `parts`
         """
-        chosen, weights = self._proposed
-        dims = self.dims[chosen]
-        seen, sums = parts[:, chosen], []
+        seen, sums = parts[:, : len(self.dims)], []
         for size in PROPOSED:
-            g = size / dims
+            g = size / self.dims
             logs = seen * (g / (1 + g) / 2)
-            logs += np.log(weights) - dims / 2 * np.log1p(g)
-            sums.append(log_mean(logs) + np.log(len(chosen)))
+            logs += np.log(self._proposed) - self.dims / 2 * np.log1p(g)
+            sums.append(log_sum(logs))
         return np.asarray(log_mean(np.stack(sums, axis=-1)))
 
 

@@ -9,19 +9,18 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.diagnosis.evidence.field import Field, shape_weights
-from accelstudy.diagnosis.evidence.size import Evidence, log_mean
+from accelstudy.diagnosis.evidence.bounds import within_bounds
+from accelstudy.diagnosis.evidence.field import Field, Unknown, shape_weights
+from accelstudy.diagnosis.evidence.size import Evidence, log_mean, log_sum
 from accelstudy.diagnosis.space.examined import ExaminedFit
 from accelstudy.diagnosis.space.hypotheses import (
     OUTLIER,
-    Bases,
     BumpedPositions,
     EffectShapes,
     Hypothesis,
     Shapes,
-    Spaces,
 )
-from accelstudy.diagnosis.space.residuals import ABSORBED, Residuals
+from accelstudy.diagnosis.space.residuals import Residuals
 
 Array = NDArray[np.float64]
 
@@ -38,6 +37,14 @@ SAME = 0.25
 """Log evidence within which two effects are equally good."""
 COLLINEAR = 0.05
 """Two spaces are tried together only if this share of the second is left beside the first."""
+BOUNDED = 5
+"""Shapes of a pair of which bounds are evaluated."""
+WEIGHTY = 6.0
+"""Log evidence by which a pair may be weaker than the strongest one and still get its bounds."""
+STRONGEST = 6
+"""Effects beside a bumped position, the strongest of them, beside which a further one is tried."""
+FIRST = 2
+"""Bumped positions beside each effect, and pairs of them, beside which a further one is tried."""
 POSITIONS = 100
 """Bumped positions that are tried in pairs, at most."""
 ROWS = 4096
@@ -77,7 +84,8 @@ def weigh_singles(examined: ExaminedFit, field: Field, evidence: Evidence) -> Si
     z = examined.frame.residuals.z
     if not examined.candidates:
         return Singles({}, {}, {}, {})
-    first = dict(zip(field.names, field.densities(evidence, z).tolist(), strict=True))
+    densities = field.named.densities(evidence, z)
+    first = dict(zip(field.candidates, densities.tolist(), strict=True))
     least = max(first.values()) - WORTH
     shapes = {
         name: refined(examined, tried) if first[name] > least else tried
@@ -88,6 +96,11 @@ def weigh_singles(examined: ExaminedFit, field: Field, evidence: Evidence) -> Si
     ends = np.cumsum([len(one) for one in shapes.values()])[:-1]
     each = np.split(evidence.of_spaces(np.concatenate([*parts.values()]), dims, z @ z), ends)
     logs = dict(zip(shapes, each, strict=True))
+    for name, own in shapes.items():
+        if isinstance(own, EffectShapes) and own[0].estimates is not None and first[name] > least:
+            within = within_bounds(own, z, evidence)
+            logs[name] = logs[name] + within
+            parts[name] = parts[name] + 2 * within
     return Singles(
         shapes=shapes,
         logs=logs,
@@ -158,12 +171,18 @@ def shaped(examined: ExaminedFit, hypothesis: Hypothesis, value: float) -> Hypot
 def _all_shaped(
     examined: ExaminedFit, hypothesis: Hypothesis, values: Iterable[float]
 ) -> list[Hypothesis | None]:
-    """Return one hypothesis per value of the smooth setting; None where less of it shows."""
+    """Return one hypothesis per value of the smooth setting; None where less of it shows.
+
+    None stands for settings that cannot be, too.
+    """
     assert hypothesis.effect is not None
     assert hypothesis.smooth is not None
     kind, name = type(hypothesis.effect), hypothesis.smooth
-    tried = examined.frame.hypotheses([kind(**{name: float(f"{v:.6g}")}) for v in values])
-    return [h if h is not None and h.dim == hypothesis.dim else None for h in tried]
+    shapes, hold = [kind(**{name: float(f"{v:.6g}")}) for v in values], examined.frame.hold
+    return [
+        h if h is not None and h.dim == hypothesis.dim and shape.possible(hold) else None
+        for h, shape in zip(examined.frame.hypotheses(shapes), shapes, strict=True)
+    ]
 
 
 def _completed(examined: ExaminedFit, shapes: EffectShapes) -> EffectShapes:
@@ -188,50 +207,38 @@ def _completed(examined: ExaminedFit, shapes: EffectShapes) -> EffectShapes:
 
 
 def unknown_beside(
-    hypothesis: Hypothesis, groups: Mapping[str, Spaces], residuals: Residuals, evidence: Evidence
+    hypothesis: Hypothesis, unknown: Unknown, residuals: Residuals, evidence: Evidence
 ) -> float | None:
     """Log evidence of something unknown beside a hypothesis, against the hypothesis alone.
 
-    None where no group has a direction of its own beside it.
+    None where no shape has anything of its own beside it.
     """
     q = hypothesis.basis
     left = residuals.z - q @ (q.T @ residuals.z)
     rest = Evidence(evidence.level, residuals.redundancy - hypothesis.dim)
-    alone = np.logaddexp.reduce(rest.of_noise(left @ left))
-    parts: list[float] = []
-    dims: list[int] = []
-    for space in groups.values():
-        if not isinstance(space, Bases):
-            continue
-        # The squares of what is left of each direction beside the hypothesis.
-        common = q.T @ space.together
-        squares, directions = np.linalg.eigh(np.eye(common.shape[1]) - common.T @ common)
-        seen = squares > ABSORBED
-        if 0 < np.count_nonzero(seen) < rest.redundancy:
-            along = left @ space.together @ directions[:, seen]
-            parts.append(float(np.sum(along**2 / squares[seen])))
-            dims.append(int(np.count_nonzero(seen)))
-    if not parts:
+    beside = Unknown(unknown.shapes.beside(q))
+    if not beside.places:
         return None
-    logs = rest.of_spaces(np.array(parts), dims, left @ left) - alone
-    return float(log_mean(logs))
+    each = beside.densities(rest, beside.parts(left[None]), np.array([left @ left]))
+    return float(log_sum(each[0]) - np.logaddexp.reduce(rest.of_noise(left @ left)))
 
 
 @dataclass(frozen=True)
-class Pair:
-    """Two candidates in their best shapes, and the log density of the residuals with both."""
+class Together:
+    """Candidates in their best shapes, and the log density of the residuals with all of them."""
 
-    best: tuple[Hypothesis, Hypothesis]
+    best: tuple[Hypothesis, ...]
     log_density: float
 
 
 def all_pairs(
     candidates: Mapping[str, Shapes], residuals: Residuals, evidence: Evidence
-) -> list[Pair]:
-    """Evidence for all pairs of candidates, over all shapes of both.
+) -> list[Together]:
+    """Evidence for all pairs of candidates, over all shapes of both, and for bumps beside them.
 
     Of the bumped positions only the `POSITIONS` that explain most by themselves are tried; pairs
-    with the others count as pairs without any evidence.
+    with the others count as pairs without any evidence. Three together are a pair of an effect and
+    a bumped position, or of two of these, with one more position.
 
     Parameters
     ----------
@@ -270,14 +277,126 @@ def all_pairs(
     keys = number[one] * len(order) + number[other]
     sequence = np.argsort(keys, kind="stable")
     starts = np.flatnonzero(np.diff(keys[sequence], prepend=-1))
+    groups = np.split(sequence, starts[1:])
     totals = np.logaddexp.reduceat(weighted[sequence], starts)
-    pairs = []
-    for k, total in enumerate(totals):
-        alike = sequence[starts[k] : starts[k + 1] if k + 1 < len(starts) else None]
-        best = alike[np.argmax(logs[alike])]
-        twice = np.log(2.0) if number[one[best]] == number[other[best]] else 0.0
-        pairs.append(Pair((tried[one[best]], tried[other[best]]), float(total + twice)))
-    return pairs
+    top, pairs = -np.inf, dict[int, Together]()
+    for k in np.argsort(-totals, kind="stable").tolist():
+        alike = groups[k]
+        a, b = one[alike], other[alike]
+        for some, beside in ((a, b), (b, a)):
+            # What bounds do to pairs of no weight does not matter.
+            if tried[some[0]].estimates is not None and totals[k] > top - WEIGHTY:
+                within = _within_bounds(tried, some, beside, weighted[alike], z, evidence)
+                logs[alike] += within
+                weighted[alike] += within
+        best = int(np.argmax(logs[alike]))
+        twice = np.log(2.0) if number[a[best]] == number[b[best]] else 0.0
+        total = float(np.logaddexp.reduce(weighted[alike]) + twice)
+        top = max(top, total)
+        pairs[k] = Together((tried[a[best]], tried[b[best]]), total)
+    found = [pairs[k] for k in range(len(groups))]
+    if OUTLIER not in order:
+        return found
+    bumped = np.flatnonzero(number == order[OUTLIER])
+    # Positions are the last candidate, so the second of a pair is one wherever any is.
+    with_bump = np.isin(other, bumped)
+    rows = one[with_bump], other[with_bump], logs[with_bump], weighted[with_bump]
+    weight = float(weights[bumped[0]])
+    return [*found, *_with_another_bump(tried, number, bumped, weight, rows, products, z, evidence)]
+
+
+def _within_bounds(
+    tried: Sequence[Hypothesis],
+    some: NDArray[np.int_],
+    beside: NDArray[np.int_],
+    weighted: Array,
+    z: Array,
+    evidence: Evidence,
+) -> Array:
+    """Factors of bounds on shapes of one effect beside others, (j,), as logs.
+
+    They are those of the pairs with the most evidence; for all others the least of these stands.
+    """
+    most = np.argsort(-weighted, kind="stable")[:BOUNDED]
+    found = within_bounds(
+        [tried[i] for i in some[most]], z, evidence, [tried[i].basis for i in beside[most]]
+    )
+    within = np.full(len(some), found.min())
+    within[most] = found
+    return within
+
+
+def _with_another_bump(
+    tried: Sequence[Hypothesis],
+    number: NDArray[np.int_],
+    bumped: NDArray[np.int_],
+    weight: float,
+    rows: tuple[NDArray[np.int_], NDArray[np.int_], Array, Array],
+    products: _Products,
+    z: Array,
+    evidence: Evidence,
+) -> list[Together]:
+    """Evidence for one more bumped position beside the strongest pairs that have one.
+
+    Parameters
+    ----------
+    tried : h hypotheses
+    number : (h,) int array, the candidate of each
+    bumped : (b,) int array, which of them are bumped positions
+    weight : float, prior probability of each position
+    rows : (j,) arrays of pairs: one, a bumped position, log density without and with weights
+    products : _Products, of all that were tried
+    z : (m,) array
+    evidence : Evidence
+    """
+    one, place, logs, weighted = rows
+    if not len(one):
+        return []
+    # Of two bumps each row is a set of positions; of an effect it is one of many shapes.
+    twice = number[one] == number[bumped[0]]
+    keys = np.stack([np.where(twice, one, -1 - number[one]), place])
+    _, group = np.unique(keys, axis=1, return_inverse=True)
+    group = group.ravel()
+    totals = np.full(group.max() + 1, -np.inf)
+    np.logaddexp.at(totals, group, weighted)
+    order = np.argsort(-totals[group], kind="stable")
+    # The strongest places of each candidate, and of these candidates the strongest.
+    chosen: dict[int, list[int]] = {}
+    seen = set[int]()
+    for row in order.tolist():
+        if group[row] not in seen:
+            seen.add(int(group[row]))
+            chosen.setdefault(int(number[one[row]]), []).append(row)
+    bumps = chosen.pop(int(number[bumped[0]]), [])
+    first = [*list(chosen.values())[:STRONGEST], bumps]
+    found: list[Together] = []
+    for mine in first:
+        sets: dict[tuple[int, ...], tuple[float, tuple[int, ...]]] = {}
+        for row in mine[:FIRST]:
+            alike = np.flatnonzero(group == group[row])
+            best = alike[np.argmax(logs[alike])]
+            pair = int(one[best]), int(place[best])
+            third = np.setdiff1d(bumped, pair)
+            part, independent = products.of_third(pair, third)
+            dims = products.dims[third] + products.dims[list(pair)].sum()
+            fits = independent & (dims < evidence.redundancy)
+            if not fits.any():
+                continue
+            three = evidence.of_spaces(part[fits], dims[fits], float(z @ z))
+            orders = 6 if twice[row] else 2
+            three += totals[group[row]] - logs[best] + np.log(orders * weight)
+            for i, log in zip(third[fits].tolist(), three.tolist(), strict=True):
+                key = tuple(sorted((*pair, i) if twice[row] else (pair[1], i)))
+                sets[key] = max(sets.get(key, (-np.inf, ())), (log, (*pair, i)))
+        if not sets:
+            continue
+        total = float(np.logaddexp.reduce([log for log, _ in sets.values()]))
+        best_three = tuple(tried[i] for i in max(sets.values())[1])
+        if best_three[0].estimates is not None:
+            beside = np.linalg.qr(np.concatenate([h.basis for h in best_three[1:]], axis=1))[0]
+            total += float(within_bounds(best_three[:1], z, evidence, [beside])[0])
+        found.append(Together(best_three, total))
+    return found
 
 
 def _tried(candidates: Mapping[str, Shapes], z: Array) -> tuple[list[Hypothesis], Array]:
@@ -345,3 +464,23 @@ class _Products:
         part = np.sum(self.seen[a] ** 2, axis=1)
         part += np.sum(along / np.maximum(values, COLLINEAR), axis=1)
         return part, values[:, 0] > COLLINEAR
+
+    def of_third(
+        self, pair: tuple[int, int], third: NDArray[np.int_]
+    ) -> tuple[Array, NDArray[np.bool_]]:
+        """Likewise for third spaces (j,) together with those of a pair."""
+        a = np.concatenate([self.starts[i] + np.arange(self.dims[i]) for i in pair])
+        inverse = np.linalg.inv(self.gram[np.ix_(a, a)])
+        taken = inverse @ self.seen[a]
+        part, apart = np.full(len(third), taken @ self.seen[a]), np.zeros(len(third), dtype=bool)
+        for dim in np.unique(self.dims[third]):
+            some = np.flatnonzero(self.dims[third] == dim)
+            b = self.starts[third[some]][:, None] + np.arange(dim)
+            cross = np.moveaxis(self.gram[a[:, None, None], b], 0, 1)
+            left = np.eye(dim) - np.swapaxes(cross, 1, 2) @ inverse @ cross
+            values, vectors = np.linalg.eigh(left)
+            rest = self.seen[b] - np.einsum("jab,a->jb", cross, taken)
+            along = np.einsum("jab,ja->jb", vectors, rest) ** 2
+            part[some] += np.sum(along / np.maximum(values, COLLINEAR), axis=1)
+            apart[some] = values[:, 0] > COLLINEAR
+        return part, apart

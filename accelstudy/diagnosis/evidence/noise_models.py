@@ -128,15 +128,15 @@ def _restricted(residuals: Residuals, ratios: Array) -> tuple[Array, Array]:
 
 LENGTHS = (1.0, 3.0, 8.0, np.inf)
 """Correlation lengths in holds; infinite for the random walk."""
-STRENGTHS = (0.25, 1.0, 4.0, 16.0, 64.0)
+STRENGTHS = (0.25, 1.0, 4.0, 16.0, 64.0, 256.0, 1024.0)
 """Variances of the process, with white noise of 1, over which the evidence is averaged."""
 
 
-def colour_density(residuals: Residuals, evidence: Evidence) -> float:
-    """Log density of residuals with coloured noise, mean over correlation lengths and strengths."""
+def colour_densities(residuals: Residuals, evidence: Evidence) -> Array:
+    """Log densities of residuals with coloured noise, (k,), by length; means over strengths."""
     determinant, squares = restricted(residuals, STRENGTHS)
     logs = np.logaddexp.reduce(evidence.of_noise(squares, determinant), axis=-1)
-    return float(log_mean(logs.ravel()))
+    return log_mean(logs)
 
 
 def quadratic_forms(v: Array) -> Array:

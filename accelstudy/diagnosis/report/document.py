@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from accelstudy.adjustment import calibrate
 from accelstudy.adjustment.quality import Solution, position_tests
 from accelstudy.basics.names import LONGEST
 from accelstudy.basics.units import GON, MGON
-from accelstudy.basics.wording import amount
+from accelstudy.basics.wording import amount, comma_list, words
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.document import (
     calibration_document,
@@ -23,6 +24,7 @@ from accelstudy.campaign.calibration.document import (
 )
 from accelstudy.campaign.calibration.fit import CampaignFit, JudgedNoise, campaign_estimability
 from accelstudy.campaign.session import Campaign
+from accelstudy.diagnosis.decision.statement import Part
 from accelstudy.diagnosis.decision.verdict import Named
 from accelstudy.diagnosis.report.words import explanation_words, keep_base, missing
 from accelstudy.diagnosis.result import Diagnosis
@@ -85,20 +87,13 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
             }
             for one in d.credible_set
         ],
-        "certain": [
-            {
-                "family": part.family,
-                "names": [name.name for name in part.names],
-                "posterior": json_number(part.posterior),
-                "purity": json_number(part.purity),
-            }
-            for part in d.certain
-        ],
-        "effects": [_effect(named) for named in d.found],
+        "certain": [_certain(part, d.found) for part in d.certain],
+        "effects": [effect_document(named) for named in d.effects],
         "suspects": [{"position": label, "p_value": json_number(p)} for label, p in d.suspects],
         "location": {name: json_number(share) for name, share in d.location.items()},
         "location_by_chance": {n: json_number(p) for n, p in d.location_by_chance.items()},
         "location_untestable": dict(d.not_located),
+        "like": [asdict(place) for place in d.like],
         "gap": _gap(d),
         "parameter_changes": [
             {
@@ -145,7 +140,22 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _effect(named: Named) -> dict[str, Any]:
+def _certain(part: Part, found: Sequence[Named]) -> dict[str, Any]:
+    """Describe what is certain, with what stands for it in the extended model, if anything does."""
+    names = [name.name for name in part.names]
+    added = next((one for one in found if one.name in names and one.parameters), None)
+    return {
+        "family": part.family,
+        "names": names,
+        "posterior": json_number(part.posterior),
+        "purity": json_number(part.purity),
+        "spec": None if added is None else added.spec,
+        "parameters": [] if added is None else _estimates(added.parameters),
+    }
+
+
+def effect_document(named: Named) -> dict[str, Any]:
+    """Describe an effect, a noise effect or a gross error that was found."""
     return {
         "name": named.name,
         "spec": named.spec,
@@ -153,13 +163,20 @@ def _effect(named: Named) -> dict[str, Any]:
         "equivalence_class": list(named.equivalence_class),
         "p_value": json_number(named.p_value),
         "posterior": json_number(named.posterior),
-        "parameters": [
-            {"name": name, "value": json_number(value), "sigma": json_number(sigma), "unit": unit}
-            for name, value, sigma, unit in named.parameters
-        ],
+        "parameters": _estimates(named.parameters),
+        **({"settings": _estimates(named.settings)} if named.settings else {}),
         "imitators": list(named.imitators),
         "rivals": [{"name": name, "cosine": json_number(cosine)} for name, cosine in named.rivals],
     }
+
+
+def _estimates(
+    estimates: Iterable[tuple[str, float, float | None, str]],
+) -> list[dict[str, Any]]:
+    return [
+        {"name": name, "value": json_number(value), "sigma": json_number(sigma), "unit": unit}
+        for name, value, sigma, unit in estimates
+    ]
 
 
 def _gap(d: Diagnosis) -> dict[str, Any]:
@@ -208,7 +225,10 @@ def diagnosed_fit(diagnosis: Diagnosis) -> CampaignFit:
         model=d.extended,
         approach=d.approach,
         observed=observed,
-        adjustment=calibrate(d.extended, d.approach, observed),
+        # Its cofactors do not know of the settings that were searched for.
+        adjustment=replace(
+            calibrate(d.extended, d.approach, observed), cofactors=solution.cofactors[None]
+        ),
         estimability=campaign_estimability(campaign, d.extended, d.approach),
         judged=JudgedNoise(d.sigma_holds, d.unit_variance),
     )
@@ -239,6 +259,12 @@ def diagnosed_calibration(diagnosis: Diagnosis) -> dict[str, Any]:
             f"What is missing is {missing(diagnosis.credible_set)}. The calibration "
             f"takes {explanation_words(diagnosis.credible_set[0])}, and its sigmas do not know of "
             "the others."
+        )
+    if diagnosis.verdict == "unknown" and diagnosis.found:
+        added = comma_list([words(one.name) for one in diagnosis.found])
+        warnings.append(
+            f"The calibration takes {added}, which is certain. Its sigmas do not know of what is "
+            "missing besides."
         )
     warnings += keep_base(diagnosis)
     weights = np.asarray(fit.observed.sigma_force)

@@ -6,22 +6,23 @@ import math
 from collections import defaultdict
 from collections.abc import Sequence
 
-from accelstudy.basics.wording import comma_list, probability, words
-from accelstudy.diagnosis.decision.posterior import CREDIBLE, Explanation
-from accelstudy.diagnosis.decision.priors import SURE
+from accelstudy.basics.levels import ACCEPTED, UNCHECKED
+from accelstudy.basics.units import display_unit
+from accelstudy.basics.wording import amount, comma_list, grouped, probability, words
+from accelstudy.diagnosis.decision.posterior import CREDIBLE, Explanation, of_effects
+from accelstudy.diagnosis.decision.priors import MANY, SURE
 from accelstudy.diagnosis.decision.statement import (
     Name,
     Part,
     Statement,
     effects_and_others,
     family_of,
-    refuted,
     statement,
 )
 from accelstudy.diagnosis.decision.verdict import Named
 from accelstudy.diagnosis.next_positions import NextPosition
 from accelstudy.diagnosis.result import Diagnosis
-from accelstudy.diagnosis.space.groups import REPEAT
+from accelstudy.diagnosis.space.groups import COURSES, REPEAT
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.pages import lines
 from accelstudy.sensors.plausibility import USUAL_CAUSE
@@ -34,10 +35,29 @@ GROUPS = {
     "repeat": "between repeats of the same attitude",
     "slow_time": "slowly with time",
     "temperature": "with temperature",
+    "temperature_rate": "with the rate of temperature",
     "previous_position": "with the position before",
     "single_position": "in one single position",
 }
 """How a residual of each group of regressors varies."""
+
+COORDINATES = {
+    "dT/dt": "the rate of the temperature",
+    "force": "the force",
+    "previous": "the force in the position before",
+    "next": "the step to the next position",
+    "angle": "roll and pitch",
+    "yaw": "the yaw",
+    "move": "the last move of the robot",
+}
+"""Coordinates of a function without a name; others are called as they are."""
+TARGETS = {
+    "bias": "a bias",
+    "scale": "a scale",
+    "reading": "an error of the robot's readings",
+    "tilt": "a tilt of the base",
+}
+"""What may be such a function."""
 
 
 def too_few(diagnosis: Diagnosis) -> bool:
@@ -48,8 +68,10 @@ def too_few(diagnosis: Diagnosis) -> bool:
 def headline(diagnosis: Diagnosis) -> str:
     """Say the verdict in one sentence."""
     d, kind = diagnosis, diagnosis.verdict
+    if d.unrecorded or d.weak:
+        return sentence(d.reason.split("; ")[0])
     if kind == "unknown":
-        return without_a_name(d.credible_set)
+        return without_a_name(Statement(d.certain, d.open), _beside(d))
     if kind == "narrowed":
         names = missing(d.credible_set)
     else:
@@ -58,17 +80,34 @@ def headline(diagnosis: Diagnosis) -> str:
         names = comma_list([_title(f, {named.name for named in found}) for f in found])
     if too_few(d):
         kind = "too few"
-    elif _may_be_an_effect(d):
+    elif may_be_an_effect(d):
         kind = "noise or effect"
     return lines(TEMPLATE, "headline", kind, names)[0]
 
 
-def _may_be_an_effect(diagnosis: Diagnosis) -> bool:
+def badge(diagnosis: Diagnosis) -> str:
+    """Name the badge of a page: the verdict or, where there is none, the state of a calibration."""
+    if diagnosis.weak:
+        return ACCEPTED
+    return UNCHECKED if too_few(diagnosis) else diagnosis.verdict
+
+
+def may_be_an_effect(diagnosis: Diagnosis) -> bool:
     """Whether a test of the noise fails, and yet it is not sure that only the noise is wrong."""
-    if diagnosis.verdict != "noise_model":
-        return False
-    posterior = diagnosis.found[0].posterior
-    return posterior is not None and posterior < SURE
+    return diagnosis.verdict == "noise_model" and _noise_only(diagnosis) < SURE
+
+
+def _noise_only(diagnosis: Diagnosis) -> float:
+    """Probability that only the noise is wrong, and that nothing unrecorded makes it so."""
+    return (diagnosis.found[0].posterior or 0.0) - diagnosis.coloured
+
+
+def _reasons(diagnosis: Diagnosis) -> list[str]:
+    """Clauses of the reason that the headline does not say."""
+    d = diagnosis
+    if d.unrecorded or d.weak:
+        return d.reason.split("; ")[1:]
+    return [d.reason] if d.reason else []
 
 
 def _title(named: Named, titled: set[str]) -> str:
@@ -87,15 +126,22 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
         "headline": headline(d),
         "not_told_apart": not_told_apart(d.credible_set),
         "explanation": explanation_words(d.credible_set[0]) if d.credible_set else "",
-        "reason": sentence(d.reason) if d.reason else "",
-        "noise_only": d.found[0].posterior if _may_be_an_effect(d) else None,
+        "reasons": [sentence(part) for part in _reasons(d)],
+        "noise_only": _noise_only(d) if may_be_an_effect(d) and not d.unrecorded else None,
         "usual_cause": USUAL_CAUSE,
         "residuals_over_noise": _residuals_over_noise(d),
         "weights": _weights(d),
         "suspects": {label: p for label, p in sorted(d.suspects) if label not in bumped},
-        "most_probable": most_probable(d.credible_set),
+        "most_probable": most_probable(Statement(d.certain, d.open), d.credible_set),
+        "like": like(d),
+        "stands_for": stands_for(d),
         "location": _location(d),
-        "effects": [(f, get_effect(f.spec).equation) for f in d.found if _is_effect(f)],
+        "effects": [
+            (f, effect.equation, effect.group in COURSES)
+            for f in d.found
+            if _is_effect(f)
+            for effect in [get_effect(f.spec)]
+        ],
         "positions": bumped,
         "changed": changed(d),
         "keep_base": keep_base(d),
@@ -109,7 +155,10 @@ def advice(diagnosis: Diagnosis) -> list[str]:
     d = diagnosis
     hidden = [name for name in d.invisible if name != "gravity_error"]
     may_repeat = REPEAT not in d.groups and (d.verdict == "noise_model" or not d.sigma_known)
-    content = ([] if d.approach.uses_angles else hidden, "gravity_error" in d.invisible, may_repeat)
+    # What is slow and not told apart; where it is, the reason says what to record.
+    by_heat = d.coloured >= WORTH and not d.unrecorded and d.campaign.temperature is None
+    unseen = [] if d.approach.uses_angles else hidden
+    content = (unseen, "gravity_error" in d.invisible, may_repeat, by_heat)
     return lines(TEMPLATE, "advice", *content)
 
 
@@ -159,10 +208,24 @@ def _weights(d: Diagnosis) -> list[float]:
     return (variances / variances.mean()).tolist()
 
 
-def _location(d: Diagnosis) -> list[tuple[str, float]]:
-    """Groups with the largest shares of the excess, in words, and these shares."""
+def _location(d: Diagnosis) -> list[tuple[str, float, float]]:
+    """Groups with the largest shares of the excess, in words, these shares, and those by chance."""
     ranked = sorted(d.location.items(), key=lambda item: -item[1])[:3]
-    return [(GROUPS.get(name, words(name)), share) for name, share in ranked if share > 0]
+    chance = d.location_by_chance
+    return [(GROUPS.get(n, words(n)), share, chance[n]) for n, share in ranked if share > 0]
+
+
+def like(diagnosis: Diagnosis) -> str:
+    """Say of what something without a name may be a function; nothing where that is open."""
+    worth = [one for one in diagnosis.like if one.posterior >= WORTH]
+    return _listed(
+        [
+            (f"{TARGETS[o.target]} that varies with {COORDINATES.get(o.coordinate, o.coordinate)}",
+             o.posterior)
+            for o in worth
+        ],
+        "or",
+    )  # fmt: skip
 
 
 def sentence(text: str) -> str:
@@ -175,6 +238,16 @@ def described(name: str) -> str:
     if name not in effect_names():
         return ""
     return get_effect(name).summary
+
+
+def possible(spec: str) -> str:
+    """Say between which bounds the parameters of an effect are; nothing if it has no bounds."""
+    effect = get_effect(spec)
+    if not all(map(math.isfinite, effect.bounds)):
+        return ""
+    unit = effect.parameters[0].unit
+    low, high = (amount(bound, unit) for bound in effect.bounds)
+    return f"{low} … {high} {display_unit(unit)}"
 
 
 FAMILIES = {
@@ -206,7 +279,7 @@ def family_words(family: str) -> str:
 
 def explanation_words(explanation: Explanation) -> str:
     """Return an explanation as words: bias drift with quadratic scale."""
-    return " with ".join(map(name_words, explanation.names))
+    return " with ".join(grouped(explanation.names, name_words))
 
 
 def missing(credible_set: Sequence[Explanation]) -> str:
@@ -216,26 +289,42 @@ def missing(credible_set: Sequence[Explanation]) -> str:
     return _missing(_if_it_is_an_effect(effects)) + f", unless it is {unless}" * bool(unless)
 
 
-def without_a_name(credible_set: Sequence[Explanation]) -> str:
-    """Say in a sentence what is certain of something that has no name as a whole."""
-    set_says = statement(credible_set)
-    parts = comma_list([_part(part) for part in set_says.certain if _part_is_effect(part)])
-    if not parts:
+def without_a_name(set_says: Statement, beside: str = "something else") -> str:
+    """Say in a sentence what is certain of something that has no name as a whole.
+
+    Parameters
+    ----------
+    set_says : Statement
+    beside : str, what that which is open is called
+    """
+    effects = [part for part in set_says.certain if part.is_effect]
+    if not effects:
         return "Something is missing from the model, and it has no name here."
-    if refuted(credible_set):
-        return f"What is missing from the model is much like {parts}, and yet it has no name here."
-    if _surely_more(set_says, CREDIBLE):
-        return f"The model lacks {parts}; what is missing beside it has no name here."
-    return f"The model lacks {parts}; whether more is missing, and what, is open."
+    lacks = f"The model lacks {comma_list([_part(part) for part in effects])}"
+    worth = [one for one in set_says.open if one.names and one.posterior >= WORTH]
+    more = sorted(worth, key=lambda one: not of_effects(one))
+    surely = len(effects) < len(set_says.certain) or _surely_more(set_says, CREDIBLE)
+    if any(map(of_effects, more)) and len(more) <= MANY:
+        return f"{lacks}, and {'' if surely else 'perhaps '}{beside}: {_or(more)}."
+    if surely:
+        return f"{lacks}; what is missing beside it has no name here."
+    return f"{lacks}; whether more is missing, and what, is open."
 
 
-def most_probable(credible_set: Sequence[Explanation]) -> str:
+def _beside(diagnosis: Diagnosis) -> str:
+    """Call what is open smaller, if what is certain takes most of the disagreement away."""
+    gap, noise = diagnosis.gap, float(diagnosis.sigma_known)
+    if gap.after is not None and gap.before - gap.after > 2 * (gap.after - noise):
+        return "something smaller"
+    return "something else"
+
+
+def most_probable(set_says: Statement, credible_set: Sequence[Explanation]) -> str:
     """Say what something without a name is most like, by families; nothing if that is open.
 
     If something is certain, it is said of what is beside it.
     """
-    set_says = statement(credible_set)
-    certain = bool(set_says.certain) and not refuted(credible_set)
+    certain = any(part.is_effect for part in set_says.certain)
     kinds: dict[str, float] = defaultdict(float)
     for one in set_says.open if certain else credible_set:
         named = zip(one.names, one.classes, strict=True)
@@ -243,6 +332,17 @@ def most_probable(credible_set: Sequence[Explanation]) -> str:
             kinds[kind] += one.posterior
     worth = sorted(((k, p) for k, p in kinds.items() if p >= WORTH), key=lambda item: -item[1])
     return f"Most probable{' beside it' if certain else ''}: {_listed(worth)}." if worth else ""
+
+
+def stands_for(diagnosis: Diagnosis) -> list[str]:
+    """Say of each certain family which of its members the model has."""
+    d, said = diagnosis, []
+    for part in d.certain if d.verdict == "unknown" else ():
+        added = [f.name for f in d.found if f.name in {name.name for name in part.names}]
+        if added and len(part.names) > 1:
+            others = _names([n for n in part.names if n.name not in added])
+            said.append(f"In the model {words(added[0])} stands for {others} as well.")
+    return said
 
 
 def _kind(name: str, members: tuple[str, ...]) -> str:
@@ -278,7 +378,7 @@ def question(positions: Sequence[NextPosition]) -> str:
     """Say what further positions would show of the two most probable explanations, if any would."""
     if not positions:
         return ""
-    first, second = (" with ".join(map(name_words, names)) for names in positions[0].separates)
+    first, second = (" with ".join(grouped(names, name_words)) for names in positions[0].separates)
     if first and second:
         return f"whether {first} or {second} is missing"
     return f"whether {first or second} is missing as well"
@@ -325,7 +425,3 @@ def _if_it_is_an_effect(effects: Sequence[Explanation]) -> Statement:
 def _surely_more(set_says: Statement, probability: float) -> bool:
     """Whether something is missing beside what is certain."""
     return sum(one.posterior for one in set_says.open if one.names) >= probability
-
-
-def _part_is_effect(part: Part) -> bool:
-    return part.family != "noise" and part.names[0].name not in NOT_AN_EFFECT

@@ -46,6 +46,7 @@ class Frame:
     ideal : Residuals, of an ideal sensor in the same positions
     forces : (n, 3) array, m/s², of the ideal sensor
     sensed : (n, 3) array, m/s², the same along the sensitive axes as the base fit finds them
+    output : (n, 3) array, m/s², adjusted readings, on which effects act that act last
     angles : (n, 2) array, rad, attitude as the robot reads it, else as the forces show it
     moments : Moments, of the holds, completed with what is implied
     """
@@ -55,6 +56,7 @@ class Frame:
     ideal: Residuals
     forces: Array
     sensed: Array
+    output: Array
     angles: Array
     moments: Moments
 
@@ -79,6 +81,7 @@ class Frame:
             ideal=ideal,
             forces=forces,
             sensed=np.asarray(np.linalg.solve(t, forces.T).T),
+            output=observed.forces[0] + solution.residuals[:, :3],
             angles=angles,
             moments=Moments(implied_hold(solution, angles), rates=observed.slope is not None),
         )
@@ -90,8 +93,14 @@ class Frame:
 
     def signatures(self, shapes: Sequence[Effect], ideal: bool = False) -> Signature:
         """Signatures of shapes of an effect of the sensor, or of an ideal one, side by side."""
-        forces = self.forces if ideal else self.sensed
-        return signatures(shapes, forces, self.angles, self.solution.gravity, self.moments)
+        forces = self.forces if ideal else self.output if shapes[0].last else self.sensed
+        shown = signatures(shapes, forces, self.angles, self.solution.gravity, self.moments)
+        model = self.solution.model
+        if ideal or shapes[0].last or not any(effect.last for effect in model.effects):
+            return shown
+        p = self.solution.parameters[: model.n_parameters]
+        slope = model.slope_of_last(self.sensed, p, self.hold)
+        return replace(shown, force=slope @ shown.force, rate=slope @ shown.rate)
 
     def with_slopes(self) -> Frame:
         """Add the slopes within the holds where they tell more than the means."""
@@ -145,7 +154,7 @@ class Frame:
         for i in np.flatnonzero(rank < seen):
             directions[i] = directions[i] @ also[i]
             ideal[i] = spans((projected[i] @ directions[i])[None], None, ROUNDING)[1][0]
-        return [
+        found = [
             Hypothesis(
                 name=effect.name,
                 effect=effect,
@@ -157,6 +166,21 @@ class Frame:
             else None
             for i, effect in enumerate(shapes)
         ]
+        if not np.isfinite(shapes[0].bounds).any():
+            return found
+        return [
+            None if one is None else replace(one, estimates=_estimates(one, columns[i]))
+            for i, one in enumerate(found)
+        ]
+
+
+def _estimates(hypothesis: Hypothesis, columns: Array) -> Array:
+    """Turn products of a basis with residuals into the parameters that show; columns (m, k)."""
+    from scipy.linalg import qr  # slow to import, and seldom needed
+
+    shown = hypothesis.basis.T @ columns
+    most = qr(shown, mode="r", pivoting=True)[1][: hypothesis.dim]
+    return np.asarray(np.linalg.inv(shown[:, most]))
 
 
 def implied_hold(solution: Solution, angles: Array) -> HoldConditions:

@@ -66,6 +66,9 @@ def all_groups(examined: ExaminedFit) -> dict[str, Spaces]:
         add("slow_time", _slow_course(hold, examined.frame.forces))
     if hold.temperature is not None and np.ptp(hold.temperature) > 0:
         add("temperature", _thermal_course(hold, examined.frame.forces))
+        if hold.time is not None and np.ptp(rate := _rate_of_ramps(hold.time, hold.temperature)):
+            # As gradients of the temperature within a sensor make them.
+            add("temperature_rate", lambda _: _per_axis(rate[:, None] / np.ptp(rate)))
     labels = clusters(examined.frame.forces)
     if len(np.unique(labels)) < n:
         same = LackOfFit.of(residuals, labels)
@@ -103,6 +106,20 @@ def _thermal_course(hold: HoldConditions, forces: Array) -> Callable[[Moment], A
         return np.concatenate([_per_axis(np.column_stack([t, t**2])), *scales], axis=2)
 
     return course
+
+
+def _rate_of_ramps(time: Array, values: Array) -> Array:
+    """Rate of values (n,) in each hold, (n,): the smaller of those before and after it.
+
+    Where a ramp begins or ends beside a hold, the mean of the two would be half a rate in a rest.
+    """
+    at = np.unique(time, return_index=True)[1]
+    if len(at) < 2:
+        return np.zeros(len(time))
+    rates = np.diff(values[at]) / np.diff(time[at])
+    before, after = np.append(rates[:1], rates), np.append(rates, rates[-1:])
+    smaller = np.where(np.abs(before) < np.abs(after), before, after)
+    return np.interp(time, time[at], np.where(before * after > 0, smaller, 0.0))
 
 
 def _between(values: Array) -> Callable[[Array], Array]:

@@ -82,6 +82,8 @@ class Hypothesis:
     basis : (m, l) array, orthonormal, of the space of its signature in the residuals
     ideal : (m, l) array, likewise for an ideal sensor, at which equal effects are exactly equal
     place : int, index of the position that was bumped; None for an effect
+    estimates : (l, l) array, turns products of the basis with residuals into the l parameters that
+        show most; None for effects whose parameters have no bounds
     """
 
     name: str
@@ -90,6 +92,7 @@ class Hypothesis:
     basis: Array
     ideal: Array
     place: int | None = None
+    estimates: Array | None = None
 
     @property
     def dim(self) -> int:

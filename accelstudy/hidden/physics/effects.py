@@ -66,6 +66,7 @@ class Effect:
     needs : tuple of str, attributes of a session without which it cannot be seen
     in_time : bool, whether it changes within a hold
     loses : bool, whether its parameters can only be positive
+    of_output : bool, whether it acts on what the sensor would read, with all other effects
     draw : callable, random settings
     grid : callable, settings that cover all there may be
     """
@@ -78,6 +79,7 @@ class Effect:
     needs: tuple[str, ...] = ()
     in_time: bool = False
     loses: bool = False
+    of_output: bool = False
     draw: Draw = lambda session, rng: {}
     grid: Grid = lambda session: [{}]
 
@@ -292,17 +294,31 @@ EFFECTS: dict[str, Effect] = {
         Effect("scale_asymmetry", 3, 3e-4, sensor=_asymmetry),
         Effect("cross_coupling", 6, 3e-4, sensor=_products),
         Effect(
-            "thermal_bias", 3, 2e-3, None, _thermal_bias, _WARM, True, False, _any_lag, _all_lags
+            "thermal_bias",
+            3,
+            2e-3,
+            None,
+            _thermal_bias,
+            _WARM,
+            True,
+            False,
+            False,
+            _any_lag,
+            _all_lags,
         ),
         Effect("thermal_curve", 3, 2e-4, None, _thermal_curve, _WARM, True),
         Effect("thermal_scale", 3, 1e-4, None, _thermal_scale, _WARM, True),
-        Effect("warm_up", 3, 2e-2, None, _warm_up, _TIME, True, False, _any_tau, _all_taus),
+        Effect("warm_up", 3, 2e-2, None, _warm_up, _TIME, True, False, False, _any_tau, _all_taus),
         Effect("bias_drift", 3, 1e-6, None, _drift, _TIME, True),
-        Effect("bias_jump", 3, 2e-2, None, _jump, _TIME, False, False, _any_moment, _all_moments),
+        Effect(
+            "bias_jump", 3, 2e-2, None, _jump, _TIME, False, False, False, _any_moment, _all_moments
+        ),
         Effect("hysteresis", 3, 2e-3, sensor=_hysteresis),
         Effect("settling", 1, 3e-4, sensor=_tail),
         Effect("vibration_rectification", 3, 1e-3, None, _rectified, ("vibration",)),
-        Effect("saturation", 3, 5e-2, None, _clipping, (), False, True, _any_knee, _all_knees),
+        Effect(
+            "saturation", 3, 5e-2, None, _clipping, (), False, True, True, _any_knee, _all_knees
+        ),
         Effect("gravity_error", 1, 3e-3, rig=_gravity),
         Effect("base_tilt", 2, 5e-4, rig=_tilt),
         Effect("encoder_offset", 2, 2e-4, rig=_encoder_offset),
@@ -310,7 +326,19 @@ EFFECTS: dict[str, Effect] = {
         Effect("encoder_eccentricity", 4, 2e-4, _eccentricity, draw=_any_order, grid=_all_orders),
         Effect("axis_nonperpendicularity", 1, 3e-4, rig=_skew),
         Effect("joint_compliance", 2, 5e-4, rig=_compliance),
-        Effect("mounting_slip", 3, 1e-3, _slip, None, (), False, False, _any_moment, _all_moments),
+        Effect(
+            "mounting_slip",
+            3,
+            1e-3,
+            _slip,
+            None,
+            (),
+            False,
+            False,
+            False,
+            _any_moment,
+            _all_moments,
+        ),
     )
 }
 """Name -> effect."""

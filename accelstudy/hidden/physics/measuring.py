@@ -91,10 +91,12 @@ def observe(session: Session, sensor: Sensor, causes: Sequence[Cause]) -> tuple[
     force = flange_force(session.joints + rig.deflection, session.yaw, base, rig.skew)
     along = rotated(force, rig.mounting) @ sensor.axes.T
     output = (1 + sensor.scale) * along + sensor.bias
-    for cause in causes:
+    # What clips, clips what all else has made of the force.
+    for cause in sorted(causes, key=lambda cause: cause.effect.of_output):
         if cause.effect.sensor is not None:
+            force = output if cause.effect.of_output else along
             output = output + cause.effect.sensor(
-                along, cause.parameters[:, None, :], cause.settings, session
+                force, cause.parameters[:, None, :], cause.settings, session
             )
     return output, session.joints + rig.reading + np.zeros((len(output), 1, 1))
 

@@ -1,0 +1,124 @@
+"""What is certain, whatever else is open: it is added to the model even where a part has no name.
+
+Explanations that share an effect may leave no doubt of it, while none of them is probable enough to
+be the answer, or all of them leave a misfit. But where more is missing than the catalogue explains,
+an effect of it may only imitate what has no name. That is hardly ever so well done that the effect
+explains nearly all there is; what explains less is doubted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from accelstudy.adjustment.quality import Solution
+from accelstudy.basics.wording import comma_list, words
+from accelstudy.diagnosis.decision.posterior import CREDIBLE, Posterior, Weighing
+from accelstudy.diagnosis.decision.problem import Problem
+from accelstudy.diagnosis.decision.refits import best_refit
+from accelstudy.diagnosis.decision.statement import Part, statement
+from accelstudy.diagnosis.decision.verdict import Choice, Finding
+from accelstudy.diagnosis.evidence.field import UNKNOWN
+from accelstudy.diagnosis.prediction import HeldOutGap
+from accelstudy.diagnosis.space.examined import Frame
+from accelstudy.diagnosis.space.hypotheses import Hypothesis
+from accelstudy.effects import effect_names
+
+NEARLY_ALL = 0.9
+"""Share of the disagreement that something outside of the catalogue hardly ever has in common with
+one effect of it."""
+
+
+def with_what_is_certain(problem: Problem, weighing: Weighing, finding: Finding) -> Finding:
+    """Say what is certain, and add it to the fit whatever else is missing."""
+    if finding.verdict != "unknown":
+        says = statement(finding.credible_set)
+        return replace(finding, certain=says.certain, open=says.open)
+    posterior = finding.posterior
+    assert posterior is not None
+    beyond = sum(one.posterior for one in posterior.each if UNKNOWN in one.names)
+    if finding.left_over or beyond > 1 - CREDIBLE:
+        posterior = posterior.doubting(_perhaps_imitations(problem, weighing, posterior))
+    says = statement(posterior.each)
+    finding = replace(finding, posterior=posterior, certain=says.certain, open=says.open)
+    chosen = [choice for _, choice in _certain_effects(weighing, posterior)]
+    if not chosen:
+        return finding
+    fit = _fit_of(problem, weighing, chosen)
+    if fit is None:
+        return replace(finding, certain=(), open=())
+    added = tuple(replace(c, best=best) for c, best in zip(chosen, fit[0], strict=True))
+    return replace(finding, frame=Frame.of(fit[1]), chosen=added)
+
+
+def _certain_effects(weighing: Weighing, posterior: Posterior) -> list[tuple[Part, Choice]]:
+    """Effects and families of effects that are certain, each with its most probable member."""
+    chosen = []
+    for part in statement(posterior.each).certain:
+        if (name := part.names[0]).name in effect_names():
+            shapes = (h for one in posterior.all for h in one.best if h.name == name.name)
+            best = next(shapes, weighing.singles.best[name.name])
+            chosen.append((part, Choice(best, name.members, part.posterior)))
+    return chosen
+
+
+def _perhaps_imitations(problem: Problem, weighing: Weighing, posterior: Posterior) -> set[str]:
+    """Names of what seems certain, and yet does not explain nearly all that is left without it.
+
+    More is missing than the catalogue explains. An effect of it may imitate what is in none, though
+    hardly ever nearly all of that.
+    """
+    seeming = _certain_effects(weighing, posterior)
+    chosen, names = [choice for _, choice in seeming], set[str]()
+    after = _disagreement(problem, _fit_of(problem, weighing, chosen))
+    for i, (part, _) in enumerate(seeming):
+        without = _fit_of(problem, weighing, [*chosen[:i], *chosen[i + 1 :]])
+        if after > (1 - NEARLY_ALL) * _disagreement(problem, without):
+            names |= {name.name for name in part.names}
+    return names
+
+
+def _fit_of(
+    problem: Problem, weighing: Weighing, chosen: Sequence[Choice]
+) -> tuple[list[Hypothesis], Solution] | None:
+    """Fit with what was chosen, the base fit if that is nothing; None if it has no solution."""
+    if not chosen:
+        return [], problem.frame.solution
+    classes = [(choice.best, choice.members) for choice in chosen]
+    return best_refit(problem.examined, weighing.singles, classes)
+
+
+def _disagreement(problem: Problem, fit: tuple[list[Hypothesis], Solution] | None) -> float:
+    """Ω beyond that of the given noise, all of it if none is given; infinite without a solution."""
+    if fit is None:
+        return np.inf
+    solution = fit[1]
+    noise = solution.redundancy * float(problem.evidence.level.known)
+    return max(solution.omega - noise, 1e-9)
+
+
+def without_the_refuted(finding: Finding, frame: Frame, held: HeldOutGap) -> Finding:
+    """What is said where the held-out positions refute what was chosen: nothing of it is certain.
+
+    Parameters
+    ----------
+    finding : Finding
+    frame : Frame, of the base fit
+    held : HeldOutGap
+    """
+    reason = finding.reason
+    if finding.verdict != "unknown":
+        named = comma_list([words(choice.best.name) for choice in finding.chosen])
+        reason = (
+            f"{named} fit{'s' * (len(finding.chosen) == 1)} all positions best, but predict"
+            f"{'s' * (len(finding.chosen) == 1)} those that were held out no better than nothing "
+            f"does: the mean square of their residuals goes from {held.before:.3g} to "
+            f"{held.after:.3g} times that of the noise"
+        )
+    assert finding.posterior is not None
+    names = [name for choice in finding.chosen for name in choice.members]
+    posterior = finding.posterior.doubting(names)
+    open_now = statement(posterior.each).open
+    return Finding("unknown", frame, reason, posterior=posterior, open=open_now)

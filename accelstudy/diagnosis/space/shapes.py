@@ -1,0 +1,335 @@
+"""Shapes: what is missing as a smooth function of a coordinate, whether it has a name or not.
+
+A shape is a coordinate of the holds, a target that depends on it, and a smoothness. Its function is
+a Gaussian process in its Hilbert-space form (Solin & Särkkä 2020, Stat. Comput. 30, 419): h(c) =
+Σ_j w_j φ_j(c), with sines φ_j, or harmonics of an angle, and w_j ~ N(0, S_j), S_j the spectral
+density of a squared exponential at the frequency of φ_j. In the space of residuals it has the
+covariance λ K, K = Φ S Φᵀ scaled to the trace 1, with Φ what the model leaves of the functions. An
+effect of the catalogue is the case K = Q Qᵀ/d.
+
+Because S falls with the frequency, a shape does not pay for all of its dimensions.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
+
+from accelstudy.diagnosis.space.examined import Frame
+from accelstudy.diagnosis.space.signatures import Moment, rate_of
+from accelstudy.effects import get_effect
+from accelstudy.leveling.angles import wrapped
+
+Array = NDArray[np.float64]
+
+LENGTHS = (0.25, 0.6, 1.5)
+"""Length scales, of a coordinate that goes from −1 to 1, of an angle in rad, or of a direction."""
+SINES, EDGE = 12, 1.5
+"""Sines of a coordinate; they vanish this far from its middle."""
+HARMONICS = 4
+"""Harmonics of an angle."""
+CYCLES = np.arange(1.0, 5.01, 0.25)
+"""Cycles of a periodic function of time in a session."""
+DIRECTIONS, SOME = 12, 60
+"""Functions of the direction of gravity for each axis, and directions that they are made of."""
+SURVIVES = 3e-3
+"""Share of a shape that the model must leave, or the shape is not seen."""
+KEPT, LEAST = 24, 2e-3
+"""Directions of a shape that are kept at most, and the least share of the trace of each."""
+
+Place: TypeAlias = tuple[str, str]
+"""A coordinate, and the target that depends on it."""
+
+
+@dataclass(frozen=True)
+class LearnedShapes:
+    """Shapes, each with a covariance K in the space of residuals.
+
+    Attributes
+    ----------
+    places : tuple of Place, s
+    weights : (s,) array, prior probabilities: even over the coordinates, then over their targets,
+        then over what is tried of each
+    vectors : (m, Σ k) array, eigenvectors of K, one shape beside the other
+    shares : tuple of s arrays (k,), eigenvalues of K, which sum to 1
+    """
+
+    places: tuple[Place, ...]
+    weights: Array
+    vectors: Array
+    shares: tuple[Array, ...]
+
+    @classmethod
+    def of(cls, frame: Frame, only: str = "", rates: bool = True) -> LearnedShapes:
+        """All shapes that the coordinates of a session allow, and that its model leaves.
+
+        Parameters
+        ----------
+        frame : Frame
+        only : str, a coordinate; all by default
+        rates : bool, whether a function of time changes the slopes within the holds, too
+        """
+        places: list[Place] = []
+        covariances: list[Array] = []
+        for place, rows, priors in _functions(frame, only, rates):
+            projected = frame.residuals.project(rows)
+            left, whole = np.sum(projected**2, axis=0), np.sum(rows**2, axis=0)
+            for prior in priors[priors @ left > SURVIVES * (priors @ whole)]:
+                used = prior > LEAST * prior.max()
+                places.append(place)
+                covariances.append(projected[:, used] * np.sqrt(prior[used]))
+        each, targets = Counter(places), Counter(c for c, _ in dict.fromkeys(places))
+        weights = [1 / (len(targets) * targets[p[0]] * each[p]) for p in places]
+        return cls._of(places, np.array(weights), covariances, len(frame.residuals.design))
+
+    @classmethod
+    def _of(
+        cls, places: Sequence[Place], weights: Array, roots: Sequence[Array], m: int
+    ) -> LearnedShapes:
+        """Decompose covariances C Cᵀ, given by C (m, l), scaled to the trace 1."""
+        vectors, shares = [np.zeros((m, 0))], []
+        for root in roots:
+            values, turned = np.linalg.eigh(root.T @ root)
+            kept = np.flatnonzero(values > LEAST * values.sum())[-KEPT:]
+            vectors.append(root @ turned[:, kept] / np.sqrt(values[kept]))
+            shares.append(values[kept] / values[kept].sum())
+        return cls(tuple(places), weights, np.concatenate(vectors, axis=1), tuple(shares))
+
+    def beside(self, basis: Array) -> LearnedShapes:
+        """What is left of the shapes beside a space with an orthonormal basis (m, l)."""
+        left = self.vectors - basis @ (basis.T @ self.vectors)
+        roots = self.by_shape(left * np.sqrt(np.concatenate([np.zeros(0), *self.shares])))
+        seen = [i for i, root in enumerate(roots) if np.sum(root**2) > SURVIVES]
+        weights = self.weights[seen]
+        return self._of(
+            [self.places[i] for i in seen],
+            weights / weights.sum(),
+            [roots[i] for i in seen],
+            len(basis),
+        )
+
+    def __len__(self) -> int:
+        return len(self.places)
+
+    def squares(self, errors: Array) -> Array:
+        """Squares of residuals (..., m) along the eigenvectors, (..., Σ k)."""
+        return np.asarray((errors @ self.vectors) ** 2)
+
+    def by_shape(self, along: Array) -> list[Array]:
+        """Divide what there is of each eigenvector, (..., Σ k), by shape."""
+        ends = np.cumsum([len(share) for share in self.shares])
+        return np.split(along, ends[:-1], axis=-1) if len(ends) else []
+
+
+# --- coordinates --------------------------------------------------------------------------------
+
+Course: TypeAlias = Callable[[Moment], Array]
+"""Functions of a coordinate at a moment of each hold, (n, a, k): of a arguments, k each."""
+
+
+@dataclass(frozen=True)
+class _Coordinate:
+    """Functions of a coordinate of the holds.
+
+    Attributes
+    ----------
+    name : str
+    targets : tuple of str, what may depend on it
+    course : Course
+    priors : (p, k) array, prior variances of their weights by smoothness
+    """
+
+    name: str
+    targets: tuple[str, ...]
+    course: Course
+    priors: Array
+
+
+SLOW = ("bias", "scale", "square", "reading", "tilt")
+"""Targets of anything that changes from hold to hold, whatever the attitude."""
+
+
+def _coordinates(frame: Frame) -> Iterator[_Coordinate]:
+    """Coordinates of a session that vary."""
+    hold, f, now = frame.hold, frame.sensed, Moment(frame.hold)
+    order = "order" if hold.time is None else "time"
+
+    def smooth(name: str, targets: tuple[str, ...], at: Course) -> Iterator[_Coordinate]:
+        values = at(now)
+        if np.ptp(values, axis=0).max() > 0:
+            yield _Coordinate(name, targets, *_sines(at, values))
+
+    yield from smooth("force", ("bias", "bias of the others"), lambda at: f)
+    yield _Coordinate("force", ("bias",), *_on_the_sphere(f))
+    yield _Coordinate("angle", ("reading",), *_harmonics(lambda at: frame.angles))
+    if hold.yaw is not None and np.ptp(hold.yaw) > 0:
+        course, priors = _harmonics(lambda at: at.yaw[:, None])
+        yield _Coordinate("yaw", ("bias", "reading", "tilt"), course, priors)
+    if hold.vibration is not None:
+        yield from smooth(
+            "vibration", ("bias", "scale", "reading", "tilt"), lambda at: at.vibration[:, None]
+        )
+    if hold.temperature is not None:
+        yield from smooth("temperature", SLOW, lambda at: at.temperature[:, None])
+    if getattr(hold, order) is None or np.ptp(hold.column(order)) == 0:
+        return
+    when = hold.column(order)
+    yield from smooth("time", SLOW, lambda at: getattr(at, order)[:, None])
+    yield _Coordinate("time", ("bias",), *_waves(order, when))
+    before = np.concatenate([f[:1], f[:-1]])
+    yield from smooth("previous", ("bias",), lambda at: before)
+    yield from smooth("next", ("bias",), lambda at: np.append(f[1:], f[-1:], 0) - f)
+    moved = wrapped(np.diff(frame.angles, axis=0, prepend=frame.angles[:1]))
+    yield from smooth("move", ("reading",), lambda at: moved)
+    if hold.temperature is not None and np.all(np.diff(when) > 0):
+        rates = np.diff(hold.temperature) / np.diff(when)
+        last = np.append(rates[:1], rates)
+        for rate in (last, (last + np.append(rates, rates[-1:])) / 2):
+            yield from smooth("dT/dt", ("bias", "scale"), partial(_as_it_is, rate[:, None]))
+
+
+def _as_it_is(values: Array, now: Moment) -> Array:
+    """Values that do not change within a hold."""
+    return values
+
+
+def _sines(at: Course, values: Array) -> tuple[Course, Array]:
+    """Sines of a coordinate (n, a), and their prior variances."""
+    low, high = values.min(axis=0), values.max(axis=0)
+    half = np.where(high > low, (high - low) / 2, 1.0)
+    omega = np.pi / (2 * EDGE) * np.arange(1, SINES + 1)
+
+    def course(now: Moment) -> Array:
+        scaled = (at(now) - (low + high) / 2) / half
+        return np.asarray(np.sin(omega * (scaled[..., None] + EDGE)))
+
+    return course, _spectrum(omega)
+
+
+def _harmonics(at: Course) -> tuple[Course, Array]:
+    """Harmonics of angles (n, a)."""
+    k = np.arange(1, HARMONICS + 1)
+
+    def course(now: Moment) -> Array:
+        turn = k * at(now)[..., None]
+        return np.concatenate([np.sin(turn), np.cos(turn)], axis=-1)
+
+    return course, np.tile(_spectrum(k), 2)
+
+
+def _waves(order: str, when: Array) -> tuple[Course, Array]:
+    """Sines and cosines of time, one number of cycles at a time."""
+    first, turn = when.min(), 2 * np.pi * CYCLES / np.ptp(when)
+
+    def course(now: Moment) -> Array:
+        phase = turn * (getattr(now, order)[:, None] - first)
+        return np.concatenate([np.sin(phase), np.cos(phase)], axis=1)[:, None]
+
+    return course, np.tile(np.eye(len(CYCLES)), 2)
+
+
+def _on_the_sphere(f: Array) -> tuple[Course, Array]:
+    """Functions of the direction of forces (n, 3), smooth by any of two lengths."""
+    unit = f / np.linalg.norm(f, axis=1, keepdims=True)
+    # Of many directions some will do: the functions are smooth (Nyström).
+    some = unit[np.unique(np.linspace(0, len(unit) - 1, SOME).round().astype(int))]
+    features, weights = [], []
+    for length in LENGTHS[1:]:
+        values, vectors = np.linalg.eigh(_alike(some, some, length))
+        kept = values[-DIRECTIONS:]
+        features.append(_alike(unit, some, length) @ vectors[:, -DIRECTIONS:] / kept)
+        weights.append(kept)
+    functions = np.concatenate(features, axis=1)[:, None]
+    return lambda now: functions, np.asarray(block_diag(*weights))
+
+
+def _alike(one: Array, other: Array, length: float) -> Array:
+    """Covariance of a smooth function at unit vectors, by the squares of their chords."""
+    return np.asarray(np.exp((one @ other.T - 1) / length**2))
+
+
+def _spectrum(omega: NDArray[Any]) -> Array:
+    """Spectral density of a squared exponential, by the length scale, (3, k)."""
+    return np.asarray(np.exp(-(np.multiply.outer(LENGTHS, omega) ** 2) / 2))
+
+
+# --- targets ------------------------------------------------------------------------------------
+
+NAMES = {"square": "scale", "bias of the others": "bias"}
+"""Targets of which more is tried: a scale of the square, a bias by the forces of other axes."""
+PAIRS = tuple((i, j) for i in range(3) for j in range(3) if i != j)
+
+
+def _functions(frame: Frame, only: str, rates: bool) -> Iterator[tuple[Place, Array, Array]]:
+    """Functions of all places: their rows of unit weight (m, k), and prior variances (p, k)."""
+    residuals, f = frame.residuals, frame.sensed
+    seen, now = residuals.by_observations, Moment(frame.hold)
+    robot = frame.solution.approach.uses_angles
+    for one in _coordinates(frame):
+        if only and one.name != only:
+            continue
+        for target in one.targets:
+            if not robot and target in ("reading", "tilt"):
+                continue
+            if target == "reading":
+                angles = _each(one.course(now), 2)
+                rows = residuals.stacked(seen[..., 3:] @ angles)
+            else:
+                change = partial(_change, one.course, target, f, frame)
+                rate = rate_of(change, frame.hold) if rates and residuals.slopes else None
+                rows = residuals.stacked(seen[..., :3] @ change(now), rate)
+            count = rows.shape[1] // one.priors.shape[1]
+            place = (one.name, NAMES.get(target, target))
+            # Only a bias is tried that changes as fast as that.
+            rough = target != "bias" and len(one.priors) == len(LENGTHS)
+            yield place, rows, np.tile(one.priors[rough:], count)
+
+
+def _change(course: Course, target: str, f: Array, frame: Frame, now: Moment) -> Array:
+    """Change of the output, (n, 3, l), by functions of a target."""
+    h = course(now)
+    if target == "bias":
+        return _each(h, 3)
+    if target == "bias of the others":
+        parts = np.zeros((len(f), 3, len(PAIRS), h.shape[2]))
+        for k, (i, j) in enumerate(PAIRS):
+            parts[:, i, k] = h[:, j]
+        return parts.reshape(len(f), 3, -1)
+    if target == "scale":
+        return _each(h, 3) * f[..., None]
+    if target == "square":
+        return _each(h, 3) * f[..., None] ** 2
+    a, b, nothing = np.array([1.0, 0.0]), np.array([0.0, 1.0]), np.zeros(2)
+    tilt = get_effect("base_tilt").output(
+        (nothing, nothing, nothing), (a, b), frame.solution.gravity, _Beside(now), np
+    )
+    return np.einsum("nac,nk->nack", np.stack(tilt, axis=1), h[:, 0]).reshape(len(f), 3, -1)
+
+
+class _Beside:
+    """Columns of the holds (n, 1), beside the parameters of an effect."""
+
+    def __init__(self, now: Moment) -> None:
+        self._now = now
+
+    def __getattr__(self, name: str) -> Array:
+        return getattr(self._now, name)[:, None]
+
+
+def _each(h: Array, count: int) -> Array:
+    """Give each of so many components functions (n, a, k) of its own, (n, count, count k).
+
+    They are of its own argument or, where there is one argument for all, of that.
+    """
+    n, _, k = h.shape
+    parts = np.zeros((n, count, count, k))
+    for i in range(count):
+        parts[:, i, i] = h[:, i if h.shape[1] == count else 0]
+    return parts.reshape(n, count, -1)

@@ -1,0 +1,172 @@
+"""What is certain beside what is open: on sessions made here, by formulas of this file."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from accelstudy.adjustment.quality import solve
+from accelstudy.approaches import get_approach
+from accelstudy.basics.errors import InputError
+from accelstudy.campaign.gross_errors.recognition import recognise
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
+from accelstudy.diagnosis.decision.certain import without_the_refuted
+from accelstudy.diagnosis.decision.posterior import Posterior, Weighed
+from accelstudy.diagnosis.decision.problem import fit_base, pose
+from accelstudy.diagnosis.decision.refits import refit
+from accelstudy.diagnosis.decision.verdict import Choice, Finding
+from accelstudy.diagnosis.pipeline import diagnose, judge
+from accelstudy.diagnosis.prediction import held_out_gap
+from accelstudy.diagnosis.report.words import headline
+from accelstudy.diagnosis.space.examined import examine
+from accelstudy.effects import get_effect
+from accelstudy.leveling.angles import specific_force
+from accelstudy.sensors.models import get_model
+
+NINE = get_model("bias-scale-nonorthogonality")
+GRAVITY, ROBOT = get_approach("gravity"), get_approach("robot")
+G = 9.80665
+
+
+def session(n, rng, approach="gravity"):
+    """A session of n random attitudes, a minute each, of a sensor with usual errors."""
+    settings = CampaignSettings(scheme=f"random-{n}", order="random", approach=approach, sigma=1e-3)
+    campaign = simulate_campaign(settings)[0]
+    up = rng.standard_normal((n, 3))
+    up *= G / np.linalg.norm(up, axis=1, keepdims=True)
+    if campaign.angles is not None:
+        up = np.column_stack(specific_force(*campaign.angles.T, G))
+    axes = np.eye(3) + 0.01 * np.triu(rng.uniform(-1, 1, (3, 3)))
+    return replace(campaign, forces=up @ axes.T + rng.uniform(-0.3, 0.3, 3)), up
+
+
+def test_a_warm_up_is_certain_whatever_is_open_beside_it():
+    """Large, of two time constants, beside a small even term, in more noise than is stated."""
+    rng = np.random.default_rng([21, 2])
+    campaign, up = session(36, rng)
+    w, k = rng.standard_normal((2, 3))
+    w *= 0.06 / np.linalg.norm(w)
+    course = 0.85 * np.exp(-campaign.time / 280) + 0.15 * np.exp(-campaign.time / 900)
+    forces = campaign.forces + np.outer(course, w) + 1.5e-3 * k / np.linalg.norm(k) * up**2 / G
+    found = diagnose(replace(campaign, forces=forces + 1.5e-3 * rng.standard_normal((36, 3))), NINE)
+    assert found.verdict == "unknown"
+    assert found.effects == ()
+    assert [name.name for name in found.certain[0].names] == ["warm_up"]
+    assert "warm_up" in [effect.name for effect in found.extended.effects]
+    assert found.gap.before > 5 * found.gap.after
+    assert found.gap.confirmed
+    before, after = found.leveling
+    assert after < before / 3
+    assert {change.parameter for change in found.changes} >= {"b_x", "s_z"}
+    assert "The model lacks warm up, and" in headline(found)
+    assert "something smaller: " in headline(found)
+
+
+def test_what_an_effect_only_imitates_is_not_certain():
+    """Of a ripple, which is in no catalogue, no effect explains nearly all."""
+    for seed in range(2):
+        rng = np.random.default_rng([22, seed])
+        campaign, up = session(36, rng, "robot")
+        ripple = 0.02 * np.sin(3 * np.pi * up / G + rng.uniform(0, 2 * np.pi, 3))
+        forces = campaign.forces + ripple + 1e-3 * rng.standard_normal((36, 3))
+        found = judge(replace(campaign, forces=forces), NINE)
+        assert found.verdict == "unknown"
+        assert found.extended is found.model
+
+
+def predicted(campaign):
+    """How a quadratic scale that is fitted to two thirds of a session predicts the others."""
+    first = fit_base(campaign, NINE, GRAVITY).solution
+    n = len(campaign.forces)
+    held = np.arange(0, n, 3)
+    base = solve(first.model, GRAVITY, first.observed.take(np.setdiff1d(np.arange(n), held)))
+    extended = refit(base, [examine(base).hypothesis(get_effect("quadratic_scale"))])
+    rng = np.random.default_rng(1)
+    return held_out_gap(base, extended, first.observed.take(held), held, 1.0, rng)
+
+
+def test_the_held_out_positions_refute_an_effect_that_is_not_there():
+    """One that is in all positions falls short of what is expected by no more than by chance."""
+    short, rng = [], np.random.default_rng(26)
+    campaign, up = session(36, rng)
+    effect = np.array([1.2e-3, -1e-3, 8e-4]) * up**2 / G
+    for _ in range(30):
+        forces = campaign.forces + 1e-3 * rng.standard_normal((36, 3))
+        gap = predicted(replace(campaign, forces=forces + effect))
+        short.append(gap.short)
+        assert not gap.refutes
+    assert abs(np.mean(short)) < 4 / np.sqrt(30)
+    assert 0.5 < np.std(short) < 1.5
+    effect[::3] *= -1
+    gap = predicted(replace(campaign, forces=forces + effect))
+    assert gap.refutes
+    problem = pose(fit_base(campaign, NINE, GRAVITY))
+    best = problem.examined.candidates["quadratic_scale"][0]
+    weighed = Weighed((best.name,), ((best.name,),), 0.0, (best,))
+    finding = Finding(
+        "named", problem.frame, chosen=(Choice(best, (best.name,), 1.0),),
+        posterior=Posterior.of([weighed]),
+    )  # fmt: skip
+    said = without_the_refuted(finding, problem.frame, gap)
+    assert said.verdict == "unknown"
+    assert f"goes from {gap.before:.3g} to {gap.after:.3g} times" in said.reason
+    assert [one.posterior for one in said.credible_set] == pytest.approx([0.5, 0.5])
+
+
+def with_ramp(campaign, first, last):
+    """The session with a temperature that rises between two holds, and its rate in each of them."""
+    n = len(campaign.forces)
+    temperature = np.interp(np.arange(n), [first, last], [20.0, 40.0])
+    inside = (np.arange(n) > first) & (np.arange(n) < last)
+    return replace(campaign, temperature=temperature), np.where(inside, 1.0, 0.0)
+
+
+@pytest.mark.parametrize("approach", ["gravity", "robot"])
+def test_what_a_rate_of_temperature_does_is_no_bumped_position(approach):
+    for seed in range(2):
+        rng = np.random.default_rng([23, seed])
+        campaign, _ = session(36, rng, approach)
+        campaign, rate = with_ramp(campaign, 14, 18)
+        bias = rng.standard_normal(3)
+        bias *= 0.03 / np.linalg.norm(bias)
+        forces = campaign.forces + np.outer(rate, bias) + 1e-3 * rng.standard_normal((36, 3))
+        found = judge(replace(campaign, forces=forces), NINE)
+        assert found.verdict == "unknown"
+        assert found.credible_set[0].names[-1] == "unknown"
+
+
+SPOILS = {
+    "hand-placed": lambda forces, rng: forces + 0.3 * rng.standard_normal(forces.shape),
+    "hysteresis": lambda forces, _: (
+        forces + 0.4 * np.sign(np.diff(forces, axis=0, prepend=forces[:1]))
+    ),
+    "rows": lambda forces, rng: forces[np.r_[3, 1, 2, 0, 7, 5, 6, 4, 8 : len(forces)]],
+}
+
+
+@pytest.mark.parametrize("spoil", SPOILS)
+@pytest.mark.parametrize("axes", [(1, 0, 2), (2, 1, 0), (1, 2, 0)])
+def test_exchanged_axes_are_recognised_in_poor_data(spoil, axes):
+    rng = np.random.default_rng([24, *axes])
+    campaign, _ = session(24, rng, "robot")
+    poor = SPOILS[spoil](campaign.forces, rng)
+    assert "axis_error" not in str(recognise(replace(campaign, forces=poor), ROBOT))
+    found = recognise(replace(campaign, forces=poor[:, axes]), ROBOT)
+    np.testing.assert_array_equal(found.matrix, np.eye(3)[:, axes])
+
+
+def test_exchanged_angles_of_the_robot_are_recognised():
+    campaign, _ = session(24, np.random.default_rng(25), "robot")
+    found = recognise(replace(campaign, angles=campaign.angles[:, ::-1].copy()), ROBOT)
+    assert found.reason == "roll and pitch of the robot are exchanged"
+    np.testing.assert_array_equal(found.mended.angles, campaign.angles)
+
+
+def test_a_diagnosis_that_has_no_solution_does_not_advise_a_diagnosis():
+    """Of readings that have nothing in common with the attitudes."""
+    rng = np.random.default_rng(27)
+    campaign, _ = session(24, rng, "robot")
+    other, _ = session(24, rng)
+    with pytest.raises(InputError, match="does not converge") as error:
+        judge(replace(campaign, forces=other.forces), NINE)
+    assert "accelstudy diagnose" not in str(error.value)

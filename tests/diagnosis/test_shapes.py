@@ -1,0 +1,132 @@
+"""Smooth functions without a name: their covariances, their evidence, and what is said of them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosis_helpers import GRAVITY, ROBOT, campaign, design, shuffled, some_holds
+from scipy import stats
+
+from accelstudy.diagnosis.evidence.size import SHAPE_SIZES, SHAPE_WEIGHTS, Evidence, Level
+from accelstudy.diagnosis.pipeline import diagnose
+from accelstudy.diagnosis.report.words import verdict_lines
+from accelstudy.diagnosis.space.shapes import LEAST, LENGTHS, LearnedShapes
+from accelstudy.sensors.models import get_model
+
+R = 30
+LEVELS = {"given": Level.given(), "not given": Level((1.0,), (0.5,), known=False)}
+
+
+@pytest.mark.parametrize("known", LEVELS)
+def test_densities_are_those_of_gaussian_processes(known):
+    """Mixtures of multivariate t distributions with the covariances of the shapes."""
+    rng = np.random.default_rng(1)
+    level, evidence = LEVELS[known], Evidence(LEVELS[known], R)
+    bases = [np.linalg.qr(rng.standard_normal((R, k)))[0] for k in (2, 5)]
+    shares = [np.array([0.3, 0.7]), np.array([0.02, 0.05, 0.13, 0.3, 0.5])]
+    z = rng.standard_normal((3, R)) * np.array([[0.5], [1.0], [2.0]]) + 5 * bases[1][:, -1]
+    expected = np.full((3, 2), -np.inf)
+    for i, (basis, share) in enumerate(zip(bases, shares, strict=True)):
+        for size, weight in zip(SHAPE_SIZES, SHAPE_WEIGHTS, strict=True):
+            shape = np.eye(R) + size * (basis * share) @ basis.T
+            for p, nu in zip(level.weights, level.freedoms, strict=True):
+                log = stats.multivariate_t.logpdf(z, shape=shape, df=nu)
+                expected[:, i] = np.logaddexp(expected[:, i], log + np.log(weight * p))
+    along, total = [(z @ basis) ** 2 for basis in bases], np.sum(z**2, axis=1)
+    at_once = evidence.of_shapes(along, shares, total)
+    one = evidence.of_shapes([a[:1] for a in along], shares, total[:1])
+    nothing = np.logaddexp.reduce(evidence.of_noise(total), axis=-1)
+    white = np.logaddexp.reduce(
+        [
+            stats.multivariate_t.logpdf(z, shape=np.eye(R), df=nu) + np.log(p)
+            for p, nu in zip(level.weights, level.freedoms, strict=True)
+        ],
+        axis=0,
+    )
+    assert at_once - nothing[:, None] == pytest.approx(expected - white[:, None], abs=1e-3)
+    assert one - nothing[0] == pytest.approx(expected[:1] - white[0], abs=1e-9)
+
+
+@pytest.fixture(scope="module", params=[ROBOT, GRAVITY], ids=lambda approach: approach.name)
+def frame(request):
+    directions = shuffled("fibonacci-30")
+    return design(directions, request.param, hold=some_holds(30), seed=7).frame
+
+
+@pytest.fixture(scope="module")
+def shapes(frame):
+    return LearnedShapes.of(frame)
+
+
+def covariances(shapes):
+    pairs = zip(shapes.by_shape(shapes.vectors), shapes.shares, strict=True)
+    return [(vectors * share) @ vectors.T for vectors, share in pairs]
+
+
+def test_shapes_live_in_the_space_of_the_residuals(frame, shapes):
+    assert shapes.weights.sum() == pytest.approx(1)
+    assert np.abs(frame.residuals.design.T @ shapes.vectors).max() < 1e-8
+    for vectors, share in zip(shapes.by_shape(shapes.vectors), shapes.shares, strict=True):
+        assert share.sum() == pytest.approx(1)
+        assert vectors.T @ vectors == pytest.approx(np.eye(len(share)), abs=1e-6)
+    targets = {target for _, target in shapes.places}
+    assert ("tilt" in targets) == ("reading" in targets) == frame.solution.approach.uses_angles
+
+
+def test_a_shape_holds_any_smooth_function_of_its_coordinate(frame, shapes):
+    """A bump in the temperature of a bias lies nearly all in one shape, and in no other place."""
+    hold, residuals = frame.hold, frame.residuals
+    bump = np.exp(-(((hold.temperature - 22) / 6) ** 2))
+    change = np.einsum("n,a->na", bump, [1.0, -0.4, 0.7])[..., None]
+    row = residuals.project(residuals.stacked(residuals.by_observations[..., :3] @ change))
+    row /= np.linalg.norm(row)
+    share = {}
+    for place, vectors in zip(shapes.places, shapes.by_shape(shapes.vectors), strict=True):
+        share[place] = max(share.get(place, 0.0), float(np.sum((row.T @ vectors) ** 2)))
+    assert share["temperature", "bias"] > 0.95
+    # Few conditions leave room for chance: by gravity there are 21.
+    if frame.solution.approach.uses_angles:
+        assert max(s for place, s in share.items() if place != ("temperature", "bias")) < 0.8
+
+
+def test_a_course_of_time_has_the_covariance_of_its_kernel(frame, shapes):
+    """The biases follow a squared-exponential kernel, but near the ends of its domain."""
+    residuals, time = frame.residuals, frame.hold.time
+    t = 2 * (time - time[0]) / np.ptp(time) - 1
+    kept = [k for place, k in zip(shapes.places, covariances(shapes), strict=True)
+            if place == ("time", "bias")]  # fmt: skip
+    for length, found in zip(LENGTHS[:2], kept, strict=False):
+        kernel = np.exp(-((t[:, None] - t) ** 2) / 2 / length**2)
+        root = np.linalg.svd(kernel)[0] * np.sqrt(np.linalg.svd(kernel)[1])
+        change = np.einsum("nk,ab->nakb", root, np.eye(3)).reshape(len(t), 3, -1)
+        rows = residuals.project(residuals.stacked(residuals.by_observations[..., :3] @ change))
+        expected = rows @ rows.T / np.sum(rows**2)
+        assert np.linalg.norm(found - expected) < 0.15 * np.linalg.norm(expected)
+
+
+def test_beside_an_effect_a_shape_is_what_the_effect_leaves(shapes):
+    rng = np.random.default_rng(2)
+    basis = np.linalg.qr(shapes.vectors @ rng.standard_normal((shapes.vectors.shape[1], 3)))[0]
+    left = np.eye(len(basis)) - basis @ basis.T
+    beside = shapes.beside(basis)
+    assert len(beside.places) == len(shapes.places)
+    for before, after in zip(covariances(shapes), covariances(beside), strict=True):
+        expected = left @ before @ left
+        # Directions with a share of less than LEAST are dropped.
+        off = np.linalg.norm(after - expected / np.trace(expected))
+        assert off < 20 * LEAST
+
+
+def test_physics_that_is_not_in_the_catalogue_is_told_by_its_place():
+    """A scale that swings in time: no effect of the catalogue does, and no name is given."""
+    clean, _ = campaign(seed=5)
+    swing = np.sin(2 * np.pi * np.asarray(clean.time) / 1100.0)[:, None]
+    changed = replace(clean, forces=clean.forces * (1 + 1.5e-3 * swing))
+    diagnosis = diagnose(changed, get_model("bias-scale-nonorthogonality"))
+    assert diagnosis.verdict == "unknown"
+    first = diagnosis.like[0]
+    assert (first.coordinate, first.target) == ("time", "scale")
+    assert first.posterior > 0.7
+    assert any("like a scale that varies with time" in line for line in verdict_lines(diagnosis))
+    nothing = diagnose(clean, get_model("bias-scale-nonorthogonality"))
+    assert nothing.like == ()

@@ -1,0 +1,79 @@
+"""A cause that nobody recorded: what is said where a thermometer or a clock is absent."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosis_helpers import NINE, G
+
+from accelstudy.campaign.session import Campaign
+from accelstudy.diagnosis.pipeline import diagnose
+from accelstudy.diagnosis.report.document import diagnosis_document
+from accelstudy.diagnosis.report.words import headline, verdict_lines
+
+CANNOT = "slow noise, or an effect of temperature or time that these columns cannot tell"
+
+
+def session(course, seed=1, n=40, size=6.0, robot=True, sigma=0.002, **columns):
+    """A session of own formulas: an affine sensor whose biases follow a course of the time.
+
+    Parameters
+    ----------
+    course : function of the time from 0 to 1, with values of about one
+    size : float, change of the biases in sigmas
+    columns : of the campaign, beside the time, which is there unless it is None
+    """
+    rng = np.random.default_rng([17, seed])
+    directions = rng.standard_normal((n, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    time = 40.0 * np.arange(n) + rng.uniform(0, 10, n)
+    moved = size * sigma * course(time / time[-1])[:, None] * np.array([1.0, -0.7, 0.5])
+    x, y, z = force = G * directions.T
+    angles = np.column_stack([np.arctan2(-y, -z), np.arctan2(x, np.hypot(y, z))])
+    read = 1.004 * force.T + [0.1, -0.05, 0.2] + moved + sigma * rng.standard_normal((n, 3))
+    rig = {"angles": angles, "sigma_angle": 1e-6} if robot else {}
+    columns = {"time": time, "sigma_force": sigma, **rig, **columns}
+    return Campaign("wanders", np.arange(1, n + 1), read, G, **columns)
+
+
+def wandering(t):
+    """A course that is no drift, no warm-up and no step."""
+    return np.sin(2 * np.pi * (0.9 * t + 0.2)) + 0.5 * np.sin(2 * np.pi * (2.3 * t + 0.1))
+
+
+@pytest.mark.parametrize(("robot", "columns"), [
+    (True, {}), (False, {"sigma_force": None}), (True, {"time": None}),
+])  # fmt: skip
+def test_what_nobody_recorded_is_no_adequate_model(robot, columns):
+    found = diagnose(session(wandering, robot=robot, **columns), NINE)
+    assert found.verdict == "noise_model"
+    assert found.found[0].name == "coloured_noise"
+    said = " ".join(verdict_lines(found))
+    assert headline(found).lower().startswith(CANNOT)
+    assert "adequate" not in said
+    assert "temperature at the sensor" in said
+    assert ("time of each hold" in said) == ("time" in columns)
+    assert CANNOT in json.dumps(diagnosis_document(found))
+
+
+def test_a_course_that_a_thermometer_shows_is_an_effect():
+    """The same session, with its temperature."""
+    measured = session(wandering)
+    t = measured.time / measured.time[-1]
+    found = diagnose(replace(measured, temperature=20 + 3 * wandering(t)), NINE)
+    assert (found.verdict, found.found[0].name) == ("named", "thermal_bias")
+    assert not found.unrecorded
+    assert found.coloured == 0
+
+
+@pytest.mark.parametrize(("name", "course"), [
+    ("bias_drift", lambda t: t),
+    ("warm_up", lambda t: np.exp(-t / 0.12)),
+    ("bias_jump", lambda t: 1.0 * (t > 0.44)),
+])  # fmt: skip
+def test_an_exact_form_keeps_its_name(name, course):
+    """Its form fits better than a course that wanders, whatever nobody recorded."""
+    found = diagnose(session(course, size=20.0, n=48), NINE)
+    assert (found.verdict, found.found[0].name) == ("named", name)
+    assert any("temperature was not recorded" in line for line in verdict_lines(found))
