@@ -96,7 +96,7 @@ def impossible_parameters(effects: Sequence[Effect], parameters: Array, sigma: A
         low, high = effect.bounds
         for parameter in effect.parameters:
             value, uncertain = next(values)
-            if not low - uncertain <= value <= high + uncertain:
+            if value < low - uncertain or value > high + uncertain:
                 shown, least, most = (amount(float(v), parameter.unit) for v in (value, low, high))
                 unit = display_unit(parameter.unit)
                 descriptions.append(

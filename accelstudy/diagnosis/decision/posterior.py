@@ -48,6 +48,8 @@ IMITATED = 0.5
 without any such effect as many seem certain as in those with one."""
 CREDIBLE = 0.9
 """Posterior probability that a credible set reaches."""
+SLOW = (("time", "bias"), ("time", "scale"))
+"""Places of what follows something that was not recorded, and that slow noise may be, too."""
 FIRST = 3
 """Effects beside which something unknown is looked for."""
 
@@ -312,7 +314,7 @@ def _noises(problem: Problem, detection: Detection, chance: Chance) -> tuple[lis
     tails = tail_test(residuals.positions, chance)
     # The kinds of coloured noise share its weight evenly; a smooth course is one of them.
     # As noise it leaves the slopes within the holds as they are.
-    courses = Unknown(LearnedShapes.of(problem.frame, "time", rates=False))
+    courses = Unknown(LearnedShapes.of(problem.frame, SLOW, rates=False))
     course = float(
         np.logaddexp.reduce([-np.inf, *courses.by_place(evidence, residuals.z).values()])
     )

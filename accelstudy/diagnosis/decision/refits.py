@@ -130,7 +130,10 @@ def with_settings(
     design = np.concatenate(columns, axis=1)
     if design.shape[1] == len(fit.parameters) or not np.isfinite(design).all():
         return fit.cofactors
-    return np.asarray(np.linalg.inv(design.T @ design + np.diag(np.concatenate(weights))))
+    # Parameters of very different units: of columns of unit length the inverse is exact enough.
+    size = np.linalg.norm(design, axis=0)
+    normal = (design / size).T @ (design / size) + np.diag(np.concatenate(weights) / size**2)
+    return np.asarray(np.linalg.inv(normal) / np.outer(size, size))
 
 
 def _sharpened(examined: ExaminedFit, chosen: Sequence[Hypothesis]) -> list[Hypothesis]:

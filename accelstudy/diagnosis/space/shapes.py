@@ -13,7 +13,7 @@ Because S falls with the frequency, a shape does not pay for all of its dimensio
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeAlias
@@ -56,7 +56,7 @@ class LearnedShapes:
     ----------
     places : tuple of Place, s
     weights : (s,) array, prior probabilities: even over the coordinates, then over their targets,
-        then over what is tried of each
+        over the kinds of functions that are tried of each, and over their smoothness
     vectors : (m, Σ k) array, eigenvectors of K, one shape beside the other
     shares : tuple of s arrays (k,), eigenvalues of K, which sum to 1
     """
@@ -67,26 +67,33 @@ class LearnedShapes:
     shares: tuple[Array, ...]
 
     @classmethod
-    def of(cls, frame: Frame, only: str = "", rates: bool = True) -> LearnedShapes:
+    def of(cls, frame: Frame, only: Collection[Place] = (), rates: bool = True) -> LearnedShapes:
         """All shapes that the coordinates of a session allow, and that its model leaves.
 
         Parameters
         ----------
         frame : Frame
-        only : str, a coordinate; all by default
+        only : places; all by default
         rates : bool, whether a function of time changes the slopes within the holds, too
         """
         places: list[Place] = []
+        kinds: list[int] = []
         covariances: list[Array] = []
-        for place, rows, priors in _functions(frame, only, rates):
+        for kind, (place, rows, priors) in enumerate(_functions(frame, only, rates)):
             projected = frame.residuals.project(rows)
             left, whole = np.sum(projected**2, axis=0), np.sum(rows**2, axis=0)
             for prior in priors[priors @ left > SURVIVES * (priors @ whole)]:
                 used = prior > LEAST * prior.max()
                 places.append(place)
+                kinds.append(kind)
                 covariances.append(projected[:, used] * np.sqrt(prior[used]))
-        each, targets = Counter(places), Counter(c for c, _ in dict.fromkeys(places))
-        weights = [1 / (len(targets) * targets[p[0]] * each[p]) for p in places]
+        targets = Counter(coordinate for coordinate, _ in dict.fromkeys(places))
+        of_place = Counter(dict(zip(kinds, places, strict=True)).values())
+        settings = Counter(kinds)
+        weights = [
+            1 / (len(targets) * targets[place[0]] * of_place[place] * settings[kind])
+            for place, kind in zip(places, kinds, strict=True)
+        ]
         return cls._of(places, np.array(weights), covariances, len(frame.residuals.design))
 
     @classmethod
@@ -267,29 +274,37 @@ NAMES = {"square": "scale", "bias of the others": "bias"}
 PAIRS = tuple((i, j) for i in range(3) for j in range(3) if i != j)
 
 
-def _functions(frame: Frame, only: str, rates: bool) -> Iterator[tuple[Place, Array, Array]]:
-    """Functions of all places: their rows of unit weight (m, k), and prior variances (p, k)."""
+def _functions(
+    frame: Frame, only: Collection[Place], rates: bool
+) -> Iterator[tuple[Place, Array, Array]]:
+    """Functions of all places: their rows of unit weight (m, k), and prior variances (p, k).
+
+    Their means over the holds are zero: what is the same in all of them is no function.
+    """
     residuals, f = frame.residuals, frame.sensed
     seen, now = residuals.by_observations, Moment(frame.hold)
     robot = frame.solution.approach.uses_angles
     for one in _coordinates(frame):
-        if only and one.name != only:
-            continue
+        course = partial(_less_its_mean, one.course, one.course(now).mean(axis=0))
         for target in one.targets:
-            if not robot and target in ("reading", "tilt"):
+            place = (one.name, NAMES.get(target, target))
+            if (only and place not in only) or (target in ("reading", "tilt") and not robot):
                 continue
             if target == "reading":
-                angles = _each(one.course(now), 2)
-                rows = residuals.stacked(seen[..., 3:] @ angles)
+                rows = residuals.stacked(seen[..., 3:] @ _each(course(now), 2))
             else:
-                change = partial(_change, one.course, target, f, frame)
+                change = partial(_change, course, target, f, frame)
                 rate = rate_of(change, frame.hold) if rates and residuals.slopes else None
                 rows = residuals.stacked(seen[..., :3] @ change(now), rate)
             count = rows.shape[1] // one.priors.shape[1]
-            place = (one.name, NAMES.get(target, target))
             # Only a bias is tried that changes as fast as that.
             rough = target != "bias" and len(one.priors) == len(LENGTHS)
             yield place, rows, np.tile(one.priors[rough:], count)
+
+
+def _less_its_mean(course: Course, mean: Array, now: Moment) -> Array:
+    """Functions of a coordinate that are zero on average."""
+    return course(now) - mean
 
 
 def _change(course: Course, target: str, f: Array, frame: Frame, now: Moment) -> Array:
