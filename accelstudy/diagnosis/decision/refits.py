@@ -125,7 +125,7 @@ def with_settings(
             psi.append(problem.linearised(fit.parameters, at).psi[:, 0].T)
         slope = np.linalg.solve(fit.whitening, (psi[1] - psi[0])[..., None] / (2 * STEP)).ravel()
         columns.append(np.pad(slope, (0, len(fit.design) - len(slope)))[:, None])
-        tried = [h.value for h in examined.candidates[one.name]]
+        tried = _values(examined, one)
         weights.append(12 / np.log([max(tried) / min(tried)]) ** 2)
     design = np.concatenate(columns, axis=1)
     if design.shape[1] == len(fit.parameters) or not np.isfinite(design).all():
@@ -136,6 +136,12 @@ def with_settings(
     return np.asarray(np.linalg.inv(normal) / np.outer(size, size))
 
 
+def _values(examined: ExaminedFit, hypothesis: Hypothesis) -> list[float]:
+    """Values of the smooth setting of an effect that are tried at first."""
+    values = (h.value for h in examined.candidates[hypothesis.name])
+    return [value for value in values if not np.isnan(value)]
+
+
 def _sharpened(examined: ExaminedFit, chosen: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Search the settings of smooth effects by refits: a large effect is not of first order."""
     sharp, base = list(chosen), examined.frame.solution
@@ -144,7 +150,7 @@ def _sharpened(examined: ExaminedFit, chosen: Sequence[Hypothesis]) -> list[Hypo
             continue
         from scipy.optimize import minimize_scalar  # slow to import, and seldom needed
 
-        values = [h.value for h in examined.candidates[start.name]]
+        values = _values(examined, start)
         passed = {min(values) / BEYOND, max(values) * BEYOND}
         ends = (*passed, *values)
 
