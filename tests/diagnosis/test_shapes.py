@@ -11,6 +11,7 @@ from accelstudy.diagnosis.evidence.size import SHAPE_SIZES, SHAPE_WEIGHTS, Evide
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.words import verdict_lines
 from accelstudy.diagnosis.space.shapes import LEAST, LENGTHS, LearnedShapes
+from accelstudy.effects import get_effect
 from accelstudy.sensors.models import get_model
 
 R = 30
@@ -87,6 +88,19 @@ def test_a_shape_holds_any_smooth_function_of_its_coordinate(frame, shapes):
     # Few conditions leave room for chance: by gravity there are 21.
     if frame.solution.approach.uses_angles:
         assert max(s for place, s in share.items() if place != ("temperature", "bias")) < 0.8
+
+
+def test_what_is_the_same_in_all_positions_is_no_function(frame, shapes):
+    """A tilt of the base and offsets of its encoders are effects of the catalogue."""
+    if not frame.solution.approach.uses_angles:
+        return
+    residuals = frame.residuals
+    for name in ("base_tilt", "encoder_offset"):
+        rows = residuals.project(residuals.whitened(frame.signature(get_effect(name))))
+        basis = np.linalg.qr(rows)[0]
+        for place, vectors in zip(shapes.places, shapes.by_shape(shapes.vectors), strict=True):
+            if place[1] in ("tilt", "reading") and place[0] != "angle":
+                assert np.linalg.norm(basis.T @ vectors[:, -1]) < 0.75, place
 
 
 def test_a_course_of_time_has_the_covariance_of_its_kernel(frame, shapes):

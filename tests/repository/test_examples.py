@@ -180,7 +180,8 @@ def test_the_theory_of_evidence_has_the_priors_of_the_code():
     told = dict(re.findall(r"^\| ([a-z ]+) \| ([\d.]+) \|", text, re.MULTILINE))
     code = {"two effects": priors.TWO, "something unknown": priors.UNKNOWN}
     code |= {"coloured noise": priors.COLOUR, "unequal axes": priors.AXES}
-    code["heavy tails"] = priors.TAILS
+    code |= {"heavy tails": priors.TAILS}
+    code |= {"a slow cause that nobody recorded": priors.UNRECORDED}
     assert {name: float(value) for name, value in told.items()} == code
     assert f"from **{priors.SURE:g}** on" in text
     assert f"hold **{CREDIBLE:g}** together" in text

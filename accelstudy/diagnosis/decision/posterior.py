@@ -312,18 +312,14 @@ def _noises(problem: Problem, detection: Detection, chance: Chance) -> tuple[lis
     if problem.frame.solution is not problem.base.solution:
         unequal = float(by_level[0])
     tails = tail_test(residuals.positions, chance)
-    # The kinds of coloured noise share its weight evenly; a smooth course is one of them.
-    # As noise it leaves the slopes within the holds as they are.
-    courses = Unknown(LearnedShapes.of(problem.frame, SLOW, rates=False))
-    course = float(
-        np.logaddexp.reduce([-np.inf, *courses.by_place(evidence, residuals.z).values()])
-    )
-    processes = colour_densities(residuals, evidence)
-    each = priors.COLOUR / (len(processes) + 1)
-    of_course = each + (priors.UNRECORDED if problem.absent else 0.0)
-    coloured = np.logaddexp(
-        np.log(each) + np.logaddexp.reduce(processes), np.log(of_course) + course
-    )
+    processes, course = colour_densities(residuals, evidence), -np.inf
+    coloured = np.log(priors.COLOUR) + log_mean(processes)
+    if problem.absent:
+        # As noise it leaves the slopes within the holds as they are.
+        courses = Unknown(LearnedShapes.of(problem.frame, SLOW, rates=False))
+        of_places = courses.by_place(evidence, residuals.z).values()
+        course = float(np.logaddexp.reduce([-np.inf, *of_places]))
+        coloured = np.logaddexp(coloured, np.log(priors.UNRECORDED) + course)
     logs = {
         COLOUR: coloured,
         AXES: unequal,
