@@ -3,6 +3,7 @@ CORES ?= 2
 CONFIG ?= config/config.yaml
 CAMPAIGNS ?= config/campaigns.yaml
 HIDDEN ?= config/hidden-effects.yaml
+FOLDER ?= resources/public
 
 SHELL := bash
 ENV := .venv
@@ -26,7 +27,7 @@ export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: help env test coverage test-processors test-processors-part test-cluster test-faults test-breaks smoke reproduce anew unlock report campaigns diagnose-example plan-example hidden-effects hidden-docs optimal-schemes pictures benchmarks docs wheel lint lock clean
+.PHONY: help env test coverage test-processors test-processors-part test-cluster test-faults test-breaks smoke reproduce anew unlock report campaigns diagnose-example plan-example hidden-effects hidden-docs real-noise optimal-schemes pictures benchmarks docs wheel lint lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-18s%s\n", $$1, $$2 }' Makefile
@@ -100,6 +101,11 @@ hidden-docs: $(READY) ## study hidden effects, and take score and figures into d
 	for name in alarms naming methods sets calibration confusion outside limits; do \
 	  cp results/hidden-effects/figures/$$name.png docs/figures/hidden-$$name.png; done
 	python tests/helpers/pictures.py drawn hidden
+
+# Of the logs in FOLDER, or downloaded to it: make real-noise FOLDER=~/logs
+real-noise: $(READY) ## put known effects into public logs, find them again, and take the score into docs
+	snakemake --cores $(CORES) --snakefile workflow/real_noise.smk --config public_folder=$(FOLDER)
+	cp results/real-noise/score.md docs/guides/real-noise-score.md
 
 pictures: reproduce ## make the pictures of reports, studies and tutorials in docs anew
 	snakemake --cores $(CORES) --configfile config/smoke.yaml

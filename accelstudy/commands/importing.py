@@ -36,6 +36,7 @@ _SECTIONS = {
     "The log": ("columns", "sensor", "time", "time_unit", "rate"),
     "Its numbers": ("unit", "scale", "offset", "full_range", "frame"),
     "The holds": ("threshold", "exclude", "join", "figure"),
+    "A log of blocks instead": ("block",),
     "A table of means instead": ("means", "robot_sigma", "robot_unit"),
     "The campaign": ("out", "name", "gravity", "settings_path"),
 }
@@ -61,6 +62,9 @@ _SECTIONS = {
 )
 @click.option("--join", multiple=True, help="Holds that are one: 4,5 or 120s-135s.")
 @click.option("--figure/--no-figure", default=True, help="Draw the log with its holds.")
+@click.option(
+    "--block", type=int, help="Samples of each position, in a log without the moves between them."
+)
 @click.option("--means", is_flag=True, help="LOG is a table with the mean of each hold.")
 @click.option("--robot-sigma", type=float, help="Sd of the robot's roll and pitch, mgon.")
 @click.option("--robot-unit", help="Unit of the robot's angles: gon, deg, rad.  [default: gon]")

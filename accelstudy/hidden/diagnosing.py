@@ -43,7 +43,7 @@ def run_chunk(
     rows: dict[str, list[Row]] = {name: [] for name in outputs}
 
     def answer(campaign: Campaign) -> Row:
-        return _outcome(judge(campaign, model, seed=config.diagnosis_seed))
+        return outcome(judge(campaign, model, seed=config.diagnosis_seed))
 
     for cell, k in campaigns:
         campaign, truth = made(cell, k, config.seed)
@@ -58,7 +58,7 @@ def run_chunk(
         write_table(path, rows_table(name, rows[name]), provenance)
 
 
-def _outcome(d: Verdict) -> Row:
+def outcome(d: Verdict) -> Row:
     """Row of the table of outcomes."""
     test, held = d.global_test, d.gap.held_out
     return {

@@ -115,10 +115,10 @@ def figure_table(table: pd.DataFrame) -> str:
     """Each share or mean with its interval; targets with what is wanted, and whether it is met."""
     ends = zip(table["ci95_low"], table["ci95_high"], table["n"], strict=True)
     shown = table.assign(
-        measured=table["measured"].map(_value),
-        interval=[_interval(low, high) if n else "" for low, high, n in ends],
+        measured=table["measured"].map(share_text),
+        interval=[interval_text(low, high) if n else "" for low, high, n in ends],
     )
-    return _table(shown[[name for name in FIGURES if name in shown]].rename(columns=FIGURES))
+    return markdown(shown[[name for name in FIGURES if name in shown]].rename(columns=FIGURES))
 
 
 SHOWN = {
@@ -143,7 +143,7 @@ def size_table(shares: pd.DataFrame) -> str:
         (f"{size:g}", *(_share(shares, quantity, "one", size=size) for quantity in SHOWN.values()))
         for size in sorted(sizes.unique())
     ]
-    return _table(pd.DataFrame(rows, columns=["λ", *SHOWN]))
+    return markdown(pd.DataFrame(rows, columns=["λ", *SHOWN]))
 
 
 VERDICTS = ("alarm", "named", "narrowed", "unknown", "noise_model", "gross_error", "confirmed")
@@ -156,7 +156,7 @@ def verdict_table(shares: pd.DataFrame) -> str:
         for name, title in _SETS.items()
         if share_of(shares, "alarm", name) is not None
     ]
-    return _table(pd.DataFrame(rows, columns=["campaigns", *map(words, VERDICTS)]))
+    return markdown(pd.DataFrame(rows, columns=["campaigns", *map(words, VERDICTS)]))
 
 
 _SETS = {
@@ -185,10 +185,10 @@ def method_table(baselines: pd.DataFrame) -> str:
     }
     methods = dict.fromkeys(["diagnosis", "oracle", *baselines["method"]])
     rows = [
-        (method, *(_value(whole.get((method, *key), np.nan)) for key in columns.values()))
+        (method, *(share_text(whole.get((method, *key), np.nan)) for key in columns.values()))
         for method in methods
     ]
-    return _table(pd.DataFrame(rows, columns=["method", *columns]))
+    return markdown(pd.DataFrame(rows, columns=["method", *columns]))
 
 
 def shrink_table(campaigns: pd.DataFrame) -> str:
@@ -206,7 +206,7 @@ def shrink_table(campaigns: pd.DataFrame) -> str:
         for (name, size), part in chosen.groupby(["set", "size"])
     ]
     heads = ["campaigns", "λ", "confirmed", "σ₀² before", "σ₀² after", "ratio (medians)"]
-    return _table(pd.DataFrame(rows, columns=heads))
+    return markdown(pd.DataFrame(rows, columns=heads))
 
 
 def effect_table(shares: pd.DataFrame, limits: pd.DataFrame) -> str:
@@ -225,7 +225,7 @@ def effect_table(shares: pd.DataFrame, limits: pd.DataFrame) -> str:
             )
         )
     heads = ["effect", *asked, "found from the MDB on", "right from the MIB on"]
-    return _table(pd.DataFrame(rows, columns=heads))
+    return markdown(pd.DataFrame(rows, columns=heads))
 
 
 SAMPLE_TEXT = (
@@ -254,36 +254,38 @@ def sample_table(chosen: pd.DataFrame) -> str:
         }
         for row in chosen.to_dict("records")
     ]
-    return _table(pd.DataFrame(rows))
+    return markdown(pd.DataFrame(rows))
 
 
 def failure_table(failed: pd.DataFrame) -> str:
     """Errors that ended a diagnosis, and how often each did."""
     counts = failed["error"].value_counts()
-    return _table(counts.rename_axis("error").reset_index(name="campaigns"))
+    return markdown(counts.rename_axis("error").reset_index(name="campaigns"))
 
 
 def _weighted(part: pd.DataFrame, column: str, n: str) -> str:
     total = part[n].sum()
     if not total:
         return "–"
-    return _value(float((part[column].fillna(0) * part[n]).sum() / total))
+    return share_text(float((part[column].fillna(0) * part[n]).sum() / total))
 
 
 def _share(shares: pd.DataFrame, quantity: str, set_: str, **division: str | float) -> str:
     row = share_of(shares, quantity, set_, **division)
-    return "–" if row is None else _value(row["share"])
+    return "–" if row is None else share_text(row["share"])
 
 
-def _value(value: float) -> str:
+def share_text(value: float) -> str:
+    """Write a share to two digits, or three decimals."""
     return "–" if np.isnan(value) else f"{value:.3f}" if value < 0.0995 else f"{value:.2f}"
 
 
-def _interval(low: float, high: float) -> str:
-    return "–" if np.isnan(low) else f"{_value(low)} … {_value(high)}"
+def interval_text(low: float, high: float) -> str:
+    """Write an interval of a share."""
+    return "–" if np.isnan(low) else f"{share_text(low)} … {share_text(high)}"
 
 
-def _table(table: pd.DataFrame) -> str:
+def markdown(table: pd.DataFrame) -> str:
     """Write a table in Markdown."""
     rows: list[Iterable[object]] = [table.columns, ["---"] * table.shape[1]]
     rows += table.itertuples(index=False)

@@ -7,6 +7,7 @@ from accelstudy.campaign.batch.config import BatchConfig
 from accelstudy.diagnosis.round_trip import RoundTrip
 from accelstudy.field.config import FieldConfig
 from accelstudy.hidden.config import HiddenConfig
+from accelstudy.hidden.real_noise import RealNoiseConfig
 from accelstudy.plan.config import Example, PlanConfig
 from accelstudy.pole.config import PoleConfig
 from accelstudy.proposal.config import DesignsConfig
@@ -35,6 +36,7 @@ def configuration():
         blocks(BatchConfig.model_json_schema(), "A batch of campaigns", "batch: "),
         blocks(RoundTrip.model_json_schema(), "A hidden effect, found again", "round trip: "),
         blocks(HiddenConfig.model_json_schema(), "A study of hidden effects", "hidden: "),
+        blocks(RealNoiseConfig.model_json_schema(), "A study with real noise", "real noise: "),
         blocks(Example.model_json_schema(), "An example of plans"),
         *(
             blocks(config.model_json_schema(), f"Plans: `{name}`", f"{name}: ")

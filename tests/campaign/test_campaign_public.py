@@ -90,12 +90,13 @@ def left(folder):
 def test_the_registry_says_how_a_file_is_read(name):
     known = public_data()[name]
     assert known.url.startswith("https://raw.githubusercontent.com/")
-    assert known.licence in ("MIT", "BSD-2-Clause")
+    assert known.licence in ("MIT", "BSD-2-Clause", "Apache-2.0")
     settings = known.settings
     if settings is not None:
         assert {*settings.columns} == {"fx", "fy", "fz"}
         assert (settings.scale is not None) == (settings.unit == "counts")
-        assert settings.means or settings.rate_hz is not None or settings.time is not None
+        timed = settings.rate_hz is not None or settings.time is not None
+        assert settings.means or settings.block is not None or timed
 
 
 @needs_data
@@ -110,7 +111,7 @@ def test_the_registry_knows_the_files(name):
 N_POSITIONS = {
     **{"xsens-mti": 38, "mpu9150-0": 23, "mpu9150-1": 23, "mpu9150-2": 23, "mpu6050": 10},
     **{"innalabs-24": 24, "innalabs-31": 31, "innalabs-49": 49, "ferraris-annotated": 6},
-    **{"mpu6050-static": 1},
+    **{"mpu6050-static": 1, "ck-explorer": 160},
 }
 
 

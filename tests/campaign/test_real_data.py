@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 from places import DATA, ROOT, needs_data
+from scipy import optimize
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import shown_unit
@@ -27,6 +28,7 @@ pytestmark = needs_data
 
 WHITE, UNKNOWN = "white", "not given"
 DIAGNOSED = [
+    ("ck-explorer", ""),
     *((f"mpu9150-{i}", "") for i in range(3)),
     *(("xsens-mti", sigma) for sigma in ("", WHITE, UNKNOWN)),
     *((f"innalabs-{n}", "") for n in (24, 31, 49)),
@@ -92,6 +94,55 @@ def test_the_table_has_no_other_rows():
 
 def test_upper_limits():
     assert list(limit_rows()) == re.findall(r"^\| [a-z ]+ \| [\d.]+ .*\|$", PAGE, re.MULTILINE)
+
+
+def test_what_a_fit_of_its_own_says_of_the_even_nonlinearity():
+    """F tests of the norm, by a solver that shares nothing with the command."""
+    forces, g = imported("ck-explorer").forces, 9.80665
+
+    def squares(*forms):
+        def misclosures(p):
+            t = np.array([[p[0], p[1], p[2]], [0, p[3], p[4]], [0, 0, p[5]]])
+            felt = forces - p[6:9]
+            for k, form in enumerate(forms, 3):
+                felt = felt - p[3 * k : 3 * k + 3] * form
+            return np.linalg.norm(felt @ t.T, axis=1) - g
+
+        start = np.r_[1.0, 0, 0, 1, 0, 1, np.zeros(3 + 3 * len(forms))]
+        return 2 * optimize.least_squares(misclosures, start).cost
+
+    n, base = len(forces), squares()
+
+    def f_test(form):
+        return number((base / squares(form) - 1) * (n - 12) / 3)
+
+    even, asymmetric = forces**2 / g, 2 * np.maximum(forces, 0) - forces
+    terms = f"F = {f_test(even)}, three scale asymmetries {f_test(asymmetric)}"
+    assert f"three quadratic terms beside the nine parameters have {terms}" in FLAT
+    assert f"three cubic terms {f_test(forces**3 / g**2)}" in FLAT
+    before, after = (number(1e3 * float(np.sqrt(each / n))) for each in (base, squares(even)))
+    assert f"goes from {before} to {after} mm/s²" in FLAT
+    d = diagnosed("ck-explorer")
+    (y,) = (value for name, value, *_ in d.found[0].parameters if name == "k2_y")
+    assert f"the y axis reads {number(-1e3 * y * g)} mm/s² less" in FLAT
+    (part,) = d.certain
+    posteriors = {one.names: one.posterior for one in d.credible_set}
+    assert f"has a posterior of {number(posteriors['scale_asymmetry',])}" in FLAT
+    assert f"an even nonlinearity is certain ({number(part.posterior)})" in FLAT
+
+
+def test_how_firmly_the_blocks_were_held():
+    path = public_file("ck-explorer", DATA)
+    blocks = 9.80665 * np.loadtxt(path, delimiter=",", skiprows=1).reshape(160, 100, 3)
+    sd = np.sqrt(np.mean(blocks.var(axis=1, ddof=1), axis=1))
+    off = blocks - blocks.mean(axis=1, keepdims=True)
+    beside = np.sum(off[:, 1:] * off[:, :-1], axis=1) / np.sum(off**2, axis=1)
+    order, correlated = np.argsort(sd), beside.mean(axis=1)
+    assert f"an sd of {number(sd.min())} to {number(sd.max())} m/s²" in FLAT
+    assert f"correlated by {number(correlated[order[-20:]].mean())}, in" in FLAT
+    assert f"the 20 quietest by {number(correlated[order[:20]].mean())}" in FLAT
+    accuracy = import_log(path, import_settings("ck-explorer"))[1].accuracy
+    assert f"Allan deviation, {number(accuracy.ratio)} times" in FLAT
 
 
 def test_where_the_residuals_of_white_noise_live():

@@ -294,6 +294,7 @@ def test_truncated_estimates(finished):
     ("workflow/diagnose.smk", "diagnose-example"),
     ("workflow/hidden.smk", "hidden-effects"),
     ("workflow/plan.smk", "plan-example"),
+    ("workflow/real_noise.smk", "real-noise"),
 ])  # fmt: skip
 def test_lint(snakefile, config, tmp_path):
     """Jobs run where Snakemake does, with the package: no container has it."""

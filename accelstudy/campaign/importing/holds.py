@@ -85,9 +85,10 @@ class DetectedHolds:
     noise : HoldNoise, of the holds that are not left out
     sd_slope : (n, 3) array, m/s²/s, standard deviations of the slopes of the samples
     threshold : Threshold
-    step : float, s, usual time between samples
+    step : float, s, usual time between samples; 1 where the log does not tell it
     envelope : Envelope, of the log, for its figure
     warnings : tuple of str
+    size : int, samples of each block, if the log consists of blocks
     """
 
     segments: Mapping[int, Segment]
@@ -99,6 +100,7 @@ class DetectedHolds:
     step: float
     envelope: Envelope
     warnings: tuple[str, ...]
+    size: int | None = None
 
     def __len__(self) -> int:
         return len(self.segments)
@@ -161,6 +163,11 @@ def detected_holds(
     """
 
     def never_still(why: str) -> InputError:
+        if segmentation.size is not None:
+            return InputError(
+                f"{log.path}: blocks of {segmentation.size} samples are no positions: {why}; is "
+                "the number of samples (--block) right?"
+            )
         return InputError(
             f"{log.path}: the sensor was never still: {why}; the quietest hundredth of its windows "
             f"of {window:g} s varies by {survey.quietest():.3g} m/s². Lay it down for some seconds "
@@ -193,10 +200,11 @@ def detected_holds(
             f"{threshold.sd:.3g} m/s²)" + "".join(f"; {warning}" for warning in warnings)
         )
     segments = _joined(segmentation.segments, selection, threshold.sd)
-    left_out = _left_out(segments, selection)
+    left_out = {**segmentation.left_out, **_left_out(segments, selection)}
     used = [segment for number, segment in segments.items() if number not in left_out]
     if not used:
-        raise InputError(f"{log.path}: exclude: no hold is left")
+        why = f"exclude: no {'hold' if segmentation.size is None else 'block'} is left"
+        raise InputError(f"{log.path}: {why} ({next(iter(left_out.values()))})")
     holds = DetectedHolds(
         segments=segments,
         left_out=left_out,
@@ -207,6 +215,7 @@ def detected_holds(
         step=log.step,
         envelope=segmentation.envelope,
         warnings=tuple(warnings),
+        size=segmentation.size,
     )
     if _moves(holds):
         raise never_still(

@@ -10,6 +10,7 @@ import numpy as np
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.format import write_campaign
+from accelstudy.campaign.importing.blocks import segment_blocks
 from accelstudy.campaign.importing.holds import DetectedHolds, detected_holds
 from accelstudy.campaign.importing.making import ImportReport, campaign_of_holds
 from accelstudy.campaign.importing.means import import_means
@@ -32,6 +33,7 @@ def log_of(path: str | Path, settings: ImportSettings) -> Log:
         columns=settings.columns,
         time=settings.time,
         rate=settings.rate_hz,
+        untimed=settings.block is not None,
         unit=settings.unit,
         scale=settings.scale,
         offset=settings.offset,
@@ -57,6 +59,10 @@ def import_all(
         return import_sensors(paths, settings)
     if len(paths) > 1 or settings.sensors:
         raise InputError("a table of means is one file of one sensor")
+    if settings.block is not None:
+        raise InputError(
+            "a table of means (--means) has a row for each position, no block (--block)"
+        )
     return {"": import_means(paths[0], settings)}
 
 
@@ -85,6 +91,8 @@ def import_sensors(
         If a log cannot be read or has no static hold.
     """
     chosen = _settings_of_sensors(named_after(settings, paths))
+    if settings.block is not None:
+        return _import_blocks(paths, settings.block, chosen)
     logs = {name: _recording(paths, each) for name, each in chosen.items()}
     detected = find_joint_holds(
         list(logs.values()),
@@ -100,6 +108,27 @@ def import_sensors(
         name: campaign_of_holds(paths, each, logs[name], holds)
         for (name, each), holds in zip(chosen.items(), detected, strict=True)
     }
+
+
+def _import_blocks(
+    paths: Sequence[str | Path], size: int, chosen: Mapping[str, ImportSettings]
+) -> dict[str, tuple[Campaign, ImportReport]]:
+    """Make each block of so many samples a position of each sensor."""
+    if len(paths) > 1:
+        raise InputError(f"a log of blocks (--block) is one file, not {len(paths)}")
+    result = {}
+    for name, each in chosen.items():
+        log = log_of(paths[0], each)
+        selection = parse_selection(each.exclude, each.join)
+        if "time" not in log.places and (selection.spans or selection.joined_spans):
+            raise InputError(f"{log.path}: has no time; name blocks by their numbers, as 13:moved")
+        survey, threshold, blocks = segment_blocks(
+            log, size, each.threshold_mps2, _full_range(each)
+        )
+        window = survey.width * log.step
+        holds = detected_holds(log, survey, threshold, blocks, selection, window, 0.0)
+        result[name] = campaign_of_holds(paths, each, log, holds)
+    return result
 
 
 def find_joint_holds(

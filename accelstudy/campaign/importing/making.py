@@ -16,7 +16,7 @@ from accelstudy.basics.wording import counted
 from accelstudy.campaign.checks import likely_fault
 from accelstudy.campaign.header import LogLayout, Place
 from accelstudy.campaign.importing.allan import MeanAccuracy
-from accelstudy.campaign.importing.holds import DetectedHolds, HoldNoise
+from accelstudy.campaign.importing.holds import DetectedHolds
 from accelstudy.campaign.importing.recording import Log, LogSeries, Recording
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.campaign.importing.sources import Source
@@ -60,18 +60,26 @@ class ImportReport:
             return [f"{self.n_holds} positions; sigma of a mean: {sigma}", *self.notes]
         holds, accuracy = self.holds, self.accuracy
         lengths, edges = holds.n_samples * holds.step, holds.envelope.edges
+        mean = f"{accuracy.duration:.1f} s"
+        log = f"log: {edges[-1] - edges[0]:.1f} s at {1 / holds.step:.6g} per second"
+        found = f"holds: {len(holds)}, of {lengths.min():.1f} to {lengths.max():.1f} s"
+        if holds.size is not None:
+            mean = f"{holds.size} samples"
+            log = f"log: {len(holds) * holds.size} samples"
+            found = f"blocks: {len(holds)}, of {mean}, each a position"
         lines = [
-            f"log: {edges[-1] - edges[0]:.1f} s at {1 / holds.step:.6g} per second",
+            log,
             *self.notes,
             f"threshold: {holds.threshold.sd:.3g} m/s², {holds.threshold.reason}",
-            f"holds: {len(holds)}, of {lengths.min():.1f} to {lengths.max():.1f} s",
+            found,
         ]
         if holds.left_out:
             each = ", ".join(f"{n} ({why})" for n, why in sorted(holds.left_out.items()))
-            lines.append(f"left out: {counted(len(holds.left_out), 'hold')}: {each}")
+            kind = "hold" if holds.size is None else "block"
+            lines.append(f"left out: {counted(len(holds.left_out), kind)}: {each}")
         return [
             *lines,
-            f"sigma of a mean over {accuracy.duration:.1f} s: {shown(accuracy.allan)} (Allan), "
+            f"sigma of a mean over {mean}: {shown(accuracy.allan)} (Allan), "
             f"{shown(accuracy.white)} if the noise were white; ratio {accuracy.ratio:.2f}",
         ]
 
@@ -86,7 +94,7 @@ def campaign_of_holds(
 ) -> tuple[Campaign, ImportReport]:
     """Make the campaign of the holds of one sensor, and its report."""
     accuracy = holds.noise.accuracy
-    warnings = [*holds.warnings, *_doubts(holds.noise, settings.gravity.value_mps2)]
+    warnings = [*holds.warnings, *_doubts(holds, settings.gravity.value_mps2)]
     notes = []
     if settings.frame != "frd":
         notes.append(
@@ -108,7 +116,11 @@ def campaign_of_holds(
         missing = [i for i in range(1, len(paths) + 1) if i not in holds.segments]
         warnings += [f"{paths[i - 1]}: no static hold; position {i} is missing" for i in missing]
     assert isinstance(first, Log)
-    columns = {}
+    columns: dict[str, Any] = {}
+    if holds.size is None or "time" in first.places:
+        columns = {"slope": holds.of_each("slope"), "sd_slope": holds.sd_slope}
+        if not isinstance(log, LogSeries) or log.timed:
+            columns["time"] = time
     for name, values in holds.conditions.items():
         if np.isfinite(values).all():
             columns[name] = values
@@ -124,9 +136,6 @@ def campaign_of_holds(
         sigma_force=accuracy.allan,
         n_samples=holds.n_samples,
         sd=holds.of_each("sd"),
-        slope=holds.of_each("slope"),
-        sd_slope=holds.sd_slope,
-        time=None if isinstance(log, LogSeries) and not log.timed else time,
         log=layout_of(settings, first.source, first.places),
         warnings=tuple(warnings),
         **columns,
@@ -137,9 +146,9 @@ def campaign_of_holds(
     return campaign, report
 
 
-def _doubts(noise: HoldNoise, gravity: float) -> Iterator[str]:
+def _doubts(holds: DetectedHolds, gravity: float) -> Iterator[str]:
     """What the user should know about the accuracy of the mean over a typical hold."""
-    accuracy = noise.accuracy
+    noise, accuracy = holds.noise, holds.noise.accuracy
     if not noise.directed:
         yield (
             "the norms of the means differ too much for specific forces (is an offset missing?); "
@@ -152,9 +161,12 @@ def _doubts(noise: HoldNoise, gravity: float) -> Iterator[str]:
             f"sensor turns by some {turned} within holds"
         )
     if accuracy.slope is not None:
+        known, whole = f"{accuracy.tau:.2g} s", f"{accuracy.duration:.2g} s of a hold"
+        if holds.size is not None:
+            known, whole = f"{accuracy.tau / holds.step:.0f} samples", f"{holds.size} of a block"
         yield (
-            f"the Allan deviation is known up to {accuracy.tau:.2g} s, and extrapolated from there "
-            f"to the {accuracy.duration:.2g} s of a hold with slope {accuracy.slope:.2f}"
+            f"the Allan deviation is known up to {known}, and extrapolated from there to the "
+            f"{whole} with slope {accuracy.slope:.2f}"
         )
 
 

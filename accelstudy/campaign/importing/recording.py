@@ -104,6 +104,7 @@ def open_log(
     columns: Mapping[str, Column] | None = None,
     time: Column | None = None,
     rate: float | None = None,
+    untimed: bool = False,
     unit: str = "m/s^2",
     scale: ArrayLike | None = None,
     offset: ArrayLike | None = None,
@@ -121,6 +122,7 @@ def open_log(
         in the header if omitted, or the only three columns there are. The last two may be absent.
     time : column of time; by its name in the header if omitted
     rate : float, samples per second, instead of a column of time
+    untimed : bool, whether a log may have neither; its times are numbers of samples then
     unit : "m/s^2", "g" or "counts"
     scale, offset : number or (3,), with counts only: f = (raw − offset) · scale, in m/s²
     time_unit : "s", "ms", "us" or "ns"
@@ -153,9 +155,11 @@ def open_log(
         except InputError as error:
             if time is not None:
                 raise
-            raise InputError(
-                f"{error}; give the column of time (--time), or the rate (--rate)"
-            ) from None
+            if not untimed:
+                raise InputError(
+                    f"{error}; give the column of time (--time), or the rate (--rate)"
+                ) from None
+            rate = 1.0
     for key in CONDITIONS:
         wanted = {key: given[key]} if key in given else {}
         place = locate(source, wanted, (key,), needed=False)

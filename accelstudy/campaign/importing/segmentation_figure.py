@@ -45,20 +45,27 @@ def draw_segmentation(holds: DetectedHolds) -> Figure:
         for i, (name, colour) in enumerate(zip("xyz", _COLOURS, strict=True)):
             _band(above, middle, low[:, i], high[:, i], colour, f"$f_{name}$")
         _band(below, middle, low[:, 3], high[:, 3], INK, None)
-        label = f"threshold {holds.threshold.sd:.2g} m/s²"
-        below.axhline(holds.threshold.sd, color=_THRESHOLD, linestyle="--", label=label)
+        if holds.size is None:
+            label = f"threshold {holds.threshold.sd:.2g} m/s²"
+            below.axhline(holds.threshold.sd, color=_THRESHOLD, linestyle="--", label=label)
         for ax in (above, below):
             for start, end, used in zip(holds.t0, holds.t1, holds.used, strict=True):
                 look = {"color": _SHADE} if used else _LEFT_OUT
                 ax.axvspan(start, end, linewidth=0, zorder=0.5, **look)
         _number(above, holds)
         above.set_ylabel("specific force / (m/s²)")
-        below.set(yscale="log", xlabel="time / s", ylabel="window sd / (m/s²)")
+        what = "time / s" if holds.size is None else "sample"
+        below.set(yscale="log", xlabel=what, ylabel="window sd / (m/s²)")
         below.set_xlim(0, edges[-1])
         below.yaxis.set_minor_locator(NullLocator())
         handles, labels = above.get_legend_handles_labels()
         lines, texts = below.get_legend_handles_labels()
-        shades = [(Patch(color=_SHADE), counted(int(holds.used.sum()), "static hold"))]
+        shades = [
+            (
+                Patch(color=_SHADE),
+                counted(int(holds.used.sum()), "static hold" if holds.size is None else "block"),
+            )
+        ]
         if holds.left_out:
             shades.append((Patch(linewidth=0, **_LEFT_OUT), f"{len(holds.left_out)} left out"))
         figure.legend(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,8 @@ class Segmentation:
     saturated, wandering, short : int, runs at rest that are no holds: the sensor is saturated, it
         turns slowly, or they are too short
     envelope : Envelope, of the log, for its figure
+    left_out : mapping of int to str, segments that are no positions, and why
+    size : int, samples of each, if the log consists of blocks
     """
 
     segments: Mapping[int, Segment]
@@ -46,6 +48,8 @@ class Segmentation:
     wandering: int
     short: int
     envelope: Envelope
+    left_out: Mapping[int, str] = field(default_factory=dict)
+    size: int | None = None
 
 
 def segment_logs(
@@ -256,9 +260,10 @@ class GrowingHold:
         sure = max(0, len(rows) - self._cut)
         self._waiting = [rows[sure:]]
         if sure:
-            self._keep(rows[:sure])
+            self.keep(rows[:sure])
 
-    def _keep(self, rows: Array) -> None:
+    def keep(self, rows: Array) -> None:
+        """Keep samples (k, 4 + c) at once."""
         self.t0, self.t1 = (rows[0, 0] if not self.n else self.t0), rows[-1, 0]
         new = Moments.of(rows[:, :4])
         self._moments = new if self._moments is None else self._moments + new

@@ -53,6 +53,9 @@ class ImportSettings(LogLayout):
     """How a log is read, and what the campaign gets from it; the keys of a settings file."""
 
     means: bool = Field(False, description="the file is a table of means already")
+    block: int | None = Field(
+        None, ge=4, description="samples of each position, in a log without the moves between them"
+    )
     name: str | None = Field(None, description="name of the campaign; that of the file if absent")
     sensor: str | None = Field(None, description="what was calibrated")
     sensors: dict[PathName, Annotated[list[Place], Field(min_length=3, max_length=3)]] = Field(

@@ -451,6 +451,8 @@ def describe(
         assert best.shown is not None
         places = [(q, columns[q.name]) for q in best.shown.parameters]
         examined, members = problem.examined, choice.members
+        # What is beside a large effect was found in what its refit leaves, with other slopes.
+        here = examined.hypothesis(best.effect)
         named.append(
             Named(
                 name=best.name,
@@ -460,10 +462,14 @@ def describe(
                 posterior=choice.probability,
                 rivals=tuple(
                     (name, cosine)
-                    for name, cosine in examined.nearest(best)
+                    for name, cosine in (() if here is None else examined.nearest(here))
                     if cosine >= RIVAL and name not in members
                 ),
-                imitators=tuple(n for n in examined.imitators(best) if n not in members),
+                imitators=tuple(
+                    name
+                    for name in (() if here is None else examined.imitators(here))
+                    if name not in members
+                ),
                 parameters=tuple(
                     (q.name, float(solution.parameters[i]), float(sigma[i]), q.unit)
                     for q, i in places

@@ -117,6 +117,15 @@ class Shape:
     directions: Array
     basis: Array
 
+    @classmethod
+    def of(
+        cls, effect: Effect, settings: Mapping[str, float], left: Array, size: float
+    ) -> Shape | None:
+        """Shape of what each parameter leaves (k, m); None if that is too little of its size."""
+        u, values, vt = np.linalg.svd(left.T, full_matrices=False)
+        rank = int(np.sum(values > VISIBLE * size))
+        return cls(effect, settings, vt[:rank].T, u[:, :rank]) if rank else None
+
     @property
     def dim(self) -> int:
         """Number of dimensions in which it can be seen."""
@@ -149,9 +158,7 @@ class Atlas:
             np.sum((raw_force / self.session.sigma) ** 2)
             + np.sum((raw_angle * 9.8 / self.session.sigma) ** 2)
         ) / (2 * np.sqrt(effect.k))
-        u, values, vt = np.linalg.svd(left.T, full_matrices=False)
-        rank = int(np.sum(values > VISIBLE * size))
-        return Shape(effect, settings, vt[:rank].T, u[:, :rank]) if rank else None
+        return Shape.of(effect, settings, left, float(size))
 
     @cached_property
     def shapes(self) -> tuple[Shape, ...]:

@@ -159,8 +159,8 @@ def _three_circles() -> Array:
     return np.asarray(np.concatenate([np.roll(circle, shift, axis=1) for shift in range(3)]))
 
 
-def _joints(directions: Array) -> Array:
-    """Roll and pitch of directions of the specific force (n, 3), rad."""
+def joints_of(directions: Array) -> Array:
+    """Roll and pitch of the directions of specific forces (n, 3), as (n, 2), rad."""
     x, y, z = directions.T + 0.0  # no negative zeros, for which roll would turn by half a turn
     return np.column_stack([np.arctan2(-y + 0.0, -z + 0.0), np.arctan2(x, np.hypot(y, z))])
 
@@ -190,7 +190,7 @@ def _spread_24(rng: np.random.Generator) -> Session:
     directions = rng.permutation(_spiral(24, rng))
     time = _times(24, 30.0, 20.0)
     course = _smooth(time, lambda t: 21 + 7 * (1 - np.exp(-t / 500)) + 0.6 * np.sin(t / 170))
-    joints = _joints(directions)
+    joints = joints_of(directions)
     return Session(
         "spread-24", joints, np.zeros(24), 0.002, ANGLE_SIGMA, 3000, 30.0, time, course, slopes=True
     )
@@ -198,7 +198,7 @@ def _spread_24(rng: np.random.Generator) -> Session:
 
 def _abba_48(rng: np.random.Generator) -> Session:
     one = rng.permutation(_spiral(12, rng))
-    joints = _joints(np.concatenate([one, one[::-1], rng.permutation(one), rng.permutation(one)]))
+    joints = joints_of(np.concatenate([one, one[::-1], rng.permutation(one), rng.permutation(one)]))
     time = _times(48, 20.0, 20.0) + 900.0 * np.repeat(np.arange(4), 12)
     course = _blocks(time, (12.0, 34.0, 34.0, 12.0))
     yaw = rng.uniform(-np.pi, np.pi, 48)
@@ -208,19 +208,19 @@ def _abba_48(rng: np.random.Generator) -> Session:
 
 
 def _circles_24(rng: np.random.Generator) -> Session:
-    joints = _joints(_three_circles())
+    joints = joints_of(_three_circles())
     return Session(
         "circles-24", joints, np.zeros(24), 0.002, ANGLE_SIGMA, 500, 10.0, _times(24, 10.0, 15.0)
     )
 
 
 def _snub_24(rng: np.random.Generator) -> Session:
-    joints = _joints(rng.permutation(_snub_cube()))
+    joints = joints_of(rng.permutation(_snub_cube()))
     return Session("snub-24", joints, np.zeros(24), 0.002, ANGLE_SIGMA)
 
 
 def _hand_18(rng: np.random.Generator) -> Session:
-    joints = _joints(_by_hand(_faces_and_edges(), rng))
+    joints = joints_of(_by_hand(_faces_and_edges(), rng))
     return Session("hand-18", joints, rng.uniform(-0.5, 0.5, 18), 0.003, ANGLE_SIGMA, 400)
 
 
@@ -230,7 +230,7 @@ def _repeats_30(rng: np.random.Generator) -> Session:
     course = _smooth(time, lambda t: 24 - 3 * np.cos(2 * np.pi * t / 1900))
     return Session(
         "repeats-30",
-        _joints(directions),
+        joints_of(directions),
         rng.uniform(-np.pi, np.pi, 30),
         0.0005,
         ANGLE_SIGMA,
@@ -244,7 +244,7 @@ def _repeats_30(rng: np.random.Generator) -> Session:
 
 
 def _yaw_50(rng: np.random.Generator) -> Session:
-    joints = _joints(rng.permutation(_spiral(50, rng)))
+    joints = joints_of(rng.permutation(_spiral(50, rng)))
     yaw = rng.uniform(-np.pi, np.pi, 50)
     return Session(
         "yaw-50", joints, yaw, 0.003, ANGLE_SIGMA, 1000, 15.0, _times(50, 15.0, 12.0), slopes=True
@@ -257,7 +257,7 @@ def _long_60(rng: np.random.Generator) -> Session:
     course = _smooth(time, lambda t: 30 - 9 * np.exp(-t / 700) + 2.5 * np.sin(t / 310))
     return Session(
         "long-60",
-        _joints(directions),
+        joints_of(directions),
         rng.uniform(-np.pi, np.pi, 60),
         0.005,
         ANGLE_SIGMA,
@@ -272,7 +272,7 @@ def _long_60(rng: np.random.Generator) -> Session:
 
 def _two_warm_36(rng: np.random.Generator) -> Session:
     one = _spiral(18, rng)
-    joints = _joints(np.concatenate([rng.permutation(one), rng.permutation(one)]))
+    joints = joints_of(np.concatenate([rng.permutation(one), rng.permutation(one)]))
     time = _times(36, 25.0, 10.0) + 1200.0 * np.repeat(np.arange(2), 18)
     course = _blocks(time, (21.0, 38.0))
     return Session(

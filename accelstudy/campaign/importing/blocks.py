@@ -1,0 +1,95 @@
+"""Logs of equal blocks: so many samples of each position, without the moves between them.
+
+Nothing has to be found in them. But a block in which the sensor moved is no position.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.basics.errors import InputError
+from accelstudy.campaign.importing.recording import Log
+from accelstudy.campaign.importing.segments import Envelope, GrowingHold, Segment, Segmentation
+from accelstudy.campaign.importing.windows import (
+    Survey,
+    Threshold,
+    given_threshold,
+    survey_log,
+    windows,
+)
+
+Array = NDArray[np.float64]
+
+
+PARTS = 4
+"""Parts of a block whose means are compared; the noise within them averages out."""
+RESTLESS = 10.0
+"""Scatter of the parts of a block, as a multiple of that of a typical one, from which on the sensor
+moves: a hand that trembles makes some five of it, a turn by a few degrees dozens."""
+
+
+def segment_blocks(
+    log: Log, size: int, threshold: float | None, full_range: float
+) -> tuple[Survey, Threshold, Segmentation]:
+    """Make each block of a log a position; those in which the sensor moves are to be left out.
+
+    Parameters
+    ----------
+    log : Log
+    size : int, samples of each position
+    threshold : float, m/s², scatter of the parts of a block up to which it is at rest; chosen from
+        the data if None
+    full_range : float, m/s², the sensor measures ± this
+
+    Raises
+    ------
+    InputError
+        If the log does not end with a block, or the sensor is saturated or moves in all of them.
+    """
+    survey = survey_log(log, (size // 2) | 1)
+    envelope = Envelope(survey.span, survey.total)
+    for _ in envelope.along(windows(log, survey.width)):
+        pass
+    segments: dict[int, Segment] = {}
+    left_out, scatter = {}, {}
+    for number, rows in enumerate(_blocks(log, size), 1):
+        block = GrowingHold((number - 1) * size, 0, survey.extremes, full_range, 0)
+        block.keep(rows)
+        segments[number] = block.finish()
+        if block.saturated():
+            left_out[number] = "the sensor is saturated"
+            continue
+        means = [part.mean(axis=0) for part in np.array_split(rows[:, 1:4], PARTS)]
+        scatter[number] = float(np.sqrt(np.linalg.norm(np.var(means, axis=0, ddof=1))))
+    if not scatter:
+        raise InputError(f"{log.path}: the sensor is saturated in all blocks of {size} samples")
+    if threshold is None:
+        usual = float(np.median([*scatter.values()]))
+        reason = f"{RESTLESS:g} times the scatter of the {PARTS} parts of a typical block"
+        chosen = Threshold(RESTLESS * usual, usual, reason)
+    else:
+        chosen = given_threshold(threshold)
+    for number, each in scatter.items():
+        if each > chosen.sd:
+            left_out[number] = f"the sensor moves: its parts scatter by {each:.2g} m/s²"
+    return survey, chosen, Segmentation(segments, 0, 0, 0, envelope, left_out, size)
+
+
+def _blocks(log: Log, size: int) -> Iterator[Array]:
+    """Samples of each block: time, forces, conditions."""
+    left, total = np.empty((0, 4 + len(log.conditions))), 0
+    for rows in log.chunks():
+        total += len(rows.time)
+        left = np.concatenate([left, np.column_stack([rows.time, rows.forces, rows.conditions])])
+        whole = len(left) // size * size
+        yield from left[:whole].reshape(-1, size, left.shape[1])
+        left = left[whole:]
+    if len(left):
+        fewer = total - len(left)
+        raise InputError(
+            f"{log.path}: {total} samples are no multiple of the {size} of a block (--block): "
+            f"{fewer} or {fewer + size} would be {fewer // size} or {fewer // size + 1} positions"
+        )

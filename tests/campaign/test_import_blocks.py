@@ -1,0 +1,101 @@
+"""Logs of equal blocks: each is a position, unless the sensor moves within it."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from calling import refusal, succeed
+from places import DATA, needs_data
+
+from accelstudy.campaign.format import read_campaign
+from accelstudy.campaign.importing.logs import import_log
+from accelstudy.campaign.importing.settings import ImportSettings
+
+G, SIZE, COUNT, SIGMA = 9.80665, 40, 14, 0.03
+
+
+@pytest.fixture(scope="module")
+def samples():
+    """Readings of 14 attitudes, 40 of each, m/s²."""
+    rng = np.random.default_rng(8)
+    directions = rng.standard_normal((COUNT, 3))
+    forces = G * directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    return np.repeat(forces, SIZE, axis=0) + SIGMA * rng.standard_normal((COUNT * SIZE, 3))
+
+
+def write(folder, samples, unit=1.0, **columns):
+    path = folder / "log.csv"
+    table = pd.DataFrame(samples / unit, columns=["u", "v", "w"]).assign(**columns)
+    table.to_csv(path, index=False)
+    return path
+
+
+SETTINGS = {"columns": {"fx": "u", "fy": "v", "fz": "w"}, "block": SIZE}
+WORDS = ("--columns", "fx=u,fy=v,fz=w", "--block", SIZE)
+
+
+def test_each_block_is_a_position_without_a_time(tmp_path, samples):
+    path = write(tmp_path, samples, unit=G, temperature=np.linspace(20, 30, len(samples)))
+    succeed("import", path, *WORDS, "--unit", "g", "--out", tmp_path / "out")
+    campaign = read_campaign(tmp_path / "out")
+    blocks = samples.reshape(COUNT, SIZE, 3)
+    np.testing.assert_allclose(campaign.forces, blocks.mean(axis=1), atol=1e-6)
+    np.testing.assert_allclose(campaign.sd, blocks.std(axis=1, ddof=1), rtol=1e-6)
+    assert (campaign.n_samples == SIZE).all()
+    assert campaign.time is None
+    assert campaign.slope is None
+    assert np.diff(campaign.temperature) == pytest.approx(10 / COUNT, rel=0.01)
+    # White noise: one mean has σ/√40, by the Allan deviation to some 20 %.
+    assert campaign.sigma_force == pytest.approx(SIGMA / np.sqrt(SIZE), rel=0.3)
+    assert (tmp_path / "out/segmentation.png").exists()
+
+
+def test_a_column_of_time_tells_that_of_the_blocks(tmp_path, samples):
+    time = np.repeat(60.0 * np.arange(COUNT), SIZE) + np.tile(np.arange(SIZE) / 100, COUNT)
+    path = write(tmp_path, samples, time=time)
+    campaign, _ = import_log(path, ImportSettings(**SETTINGS))
+    assert np.diff(campaign.time) == pytest.approx(60.0)
+    assert campaign.slope is not None
+
+
+def test_a_block_in_which_the_sensor_moves_is_left_out(tmp_path, samples):
+    moved = samples.copy()
+    moved[5 * SIZE + 20 : 6 * SIZE] += [0.3, 0.0, 0.0]
+    campaign, report = import_log(write(tmp_path, moved), ImportSettings(**SETTINGS))
+    assert [*campaign.reasons] == [6]
+    assert campaign.reasons[6].startswith("the sensor moves: its parts scatter by 0.1")
+    assert campaign.positions.tolist() == [n for n in range(1, COUNT + 1) if n != 6]
+    assert any(line.startswith("left out: 1 block: 6 (the sensor moves") for line in report.lines())
+
+
+@pytest.mark.parametrize(("change", "says"), [
+    ({"--block": 39}, "560 samples are no multiple of the 39 of a block (--block): 546 or 585"),
+    ({"--block": 80}, "blocks of 80 samples are no positions"),
+    ({"--block": 3}, "block: must be at least 4"),
+    ({"--means": None}, "a table of means (--means) has a row for each position, no block"),
+    ({"--exclude": "1s-2s:moved"}, "has no time; name blocks by their numbers, as 13:moved"),
+])  # fmt: skip
+def test_what_is_no_log_of_blocks_is_refused_in_a_line(tmp_path, samples, change, says):
+    options = {"--columns": "fx=u,fy=v,fz=w", "--block": SIZE, **change}
+    words = [word for option in options.items() for word in option if word is not None]
+    path = write(tmp_path, samples)
+    assert says in refusal("import", path, *words, "--out", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_log_of_blocks_is_one_file(tmp_path, samples):
+    path = write(tmp_path, samples)
+    other = path.with_name("other.csv")
+    other.write_bytes(path.read_bytes())
+    line = refusal("import", path, other, *WORDS, "--out", tmp_path / "out")
+    assert "a log of blocks (--block) is one file, not 2" in line
+
+
+@needs_data
+def test_public_blocks_are_all_positions(tmp_path):
+    """Means and standard deviations are those of the samples of each block."""
+    succeed("public", "ck-explorer", "--folder", DATA, "--out", tmp_path / "out")
+    campaign = read_campaign(tmp_path / "out")
+    raw = np.loadtxt(DATA / "ck_explorer/acc_log.csv", delimiter=",", skiprows=1) * G
+    blocks = raw.reshape(160, 100, 3)
+    np.testing.assert_allclose(campaign.forces, blocks.mean(axis=1), atol=1e-9)
+    np.testing.assert_allclose(campaign.sd, blocks.std(axis=1, ddof=1), rtol=1e-9)

@@ -1,0 +1,253 @@
+"""Effects in public logs: what is put in is what was meant, and answers are judged by it."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from places import DATA, ROOT, needs_data
+from scipy import optimize, stats
+from snakemake_helpers import snakemake
+
+from accelstudy.basics.errors import InputError
+from accelstudy.campaign.importing.logs import import_log
+from accelstudy.campaign.importing.public import import_settings, public_file
+from accelstudy.campaign.importing.settings import ImportSettings
+from accelstudy.files.reading import read_layer
+from accelstudy.files.tables import read_table
+from accelstudy.hidden.physics.effects import EFFECTS
+from accelstudy.hidden.real_logs import BUMPED, PUT, Donor, Put, put
+from accelstudy.hidden.real_noise import (
+    Case,
+    RealNoiseConfig,
+    answered,
+    cases_of,
+    parse_real_noise,
+    run_log,
+    said_of,
+    table_of,
+)
+from accelstudy.hidden.real_page import real_page
+
+G, SIZE, COUNT, SIGMA = 9.80665, 20, 26, 0.01
+CONFIG = parse_real_noise(read_layer(ROOT / "config/real-noise.yaml"))
+OURS = RealNoiseConfig(
+    study="test",
+    seed=3,
+    logs={"log": {"note": "nothing is missing"}},
+    sizes=[300],
+    effects=["quadratic_scale", BUMPED, "thermal_bias", "quadratic_scale+bias_drift"],
+    nothing=2,
+)
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    """A log of 26 blocks by an imperfect sensor."""
+    rng = np.random.default_rng(21)
+    directions = rng.standard_normal((COUNT, 3))
+    forces = G * directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    output = forces * [1.01, 0.99, 1.005] + [0.1, -0.05, 0.02]
+    output[:, 0] += 0.004 * forces[:, 1]
+    samples = np.repeat(output, SIZE, axis=0) + SIGMA * rng.standard_normal((COUNT * SIZE, 3))
+    path = tmp_path_factory.mktemp("log") / "log.csv"
+    pd.DataFrame(samples, columns=["fx", "fy", "fz"]).to_csv(path, index=False)
+    return Donor.opened("log", path, ImportSettings(block=SIZE), 30.0)
+
+
+def test_the_sensor_of_a_log_is_found(log):
+    assert log.sensor.bias == pytest.approx([0.1, -0.05, 0.02], abs=0.01)
+    assert log.sensor.scale == pytest.approx([0.01, -0.01, 0.005], abs=1e-3)
+    assert log.sigma == pytest.approx(SIGMA / np.sqrt(SIZE), rel=0.5)
+    assert log.redundancy == COUNT - 9
+
+
+def test_an_effect_is_put_into_each_reading(log, tmp_path):
+    """k f² / g, at the force that the sensor felt then."""
+    k = np.array([1e-3, -2e-3, 5e-4])
+    one = Put(EFFECTS["quadratic_scale"], {}, k)
+    log.write(tmp_path / "log.parquet", [one], None, {})
+    written = pd.read_parquet(tmp_path / "log.parquet")[["fx", "fy", "fz"]].to_numpy()
+    felt = (log.forces - log.sensor.bias) / (1 + log.sensor.scale)
+    np.testing.assert_allclose(written - log.forces, k * felt**2 / G, atol=1e-12)
+
+
+def test_what_acts_from_hold_to_hold_is_constant_within_each(log):
+    for name, settings in (("hysteresis", {}), (BUMPED, {"row": 3.0})):
+        added = log.unit(PUT[name], settings, None).reshape(3, COUNT, SIZE, 3)
+        assert np.ptp(added, axis=2).max() == 0
+        assert abs(added).max() == 1
+
+
+def test_p_and_size_are_those_of_a_nested_fit(log, tmp_path):
+    """The misclosures of the norm, fitted without and with the form, by a solver of its own."""
+    case = Case("log", ("quadratic_scale",), 300)
+    row = answered(OURS, log, case)
+    one = put("quadratic_scale", 300, log, None, case.rng(OURS.seed))
+    settings = log.write(tmp_path / "log.parquet", [one], None, {})
+    means = import_log(tmp_path / "log.parquet", settings)[0].forces
+
+    def misclosures(p):
+        t = np.array([[p[0], p[1], p[2]], [0, p[3], p[4]], [0, 0, p[5]]])
+        felt = means - p[6:9]
+        felt = felt - p[9:] * felt**2 / G if len(p) > 9 else felt
+        return np.linalg.norm(felt @ t.T, axis=1) - G
+
+    start = [1.0, 0, 0, 1, 0, 1, 0, 0, 0]
+    base, full = (
+        optimize.least_squares(misclosures, p, xtol=1e-12) for p in (start, [*start, 0, 0, 0])
+    )
+    before, after = (2 * fit.cost for fit in (base, full))
+    f = (before - after) / 3 / (after / (COUNT - 12))
+    assert np.log10(row["p_known"]) == pytest.approx(
+        np.log10(stats.f.sf(f, 3, COUNT - 12)), abs=0.3
+    )
+    # λ is what the effect alone adds to the sum of squares: 300 of the log's own variance.
+    assert before / log.sigma**2 == pytest.approx(COUNT - 9 + 300, rel=0.3)
+    assert abs(row["known_ratio"] - 1) < 4 * row["known_sigma"]
+    sigma = np.sqrt(np.diag(np.linalg.inv(full.jac.T @ full.jac)) * after / (COUNT - 12))[9:]
+    assert (abs(full.x[9:] - one.parameters) < 4 * sigma).all()
+
+
+@pytest.fixture(scope="module")
+def table(log):
+    return table_of([answered(OURS, log, case) for case in cases_of(OURS, log)], [])
+
+
+def test_plain_effects_in_white_noise_are_found(table):
+    said = dict(zip(table["cell"], table["said"], strict=True))
+    assert said["log/nothing/nan/as it is"] == "nothing"
+    assert said["log/quadratic_scale/300/as it is"] in ("right name", "family or set")
+    assert said["log/outlier_position/300/as it is"] == "right name"
+    assert said["log/thermal_bias/300/recorded"] in ("right name", "family or set")
+    assert said["log/thermal_bias/300/not recorded"] != "right name"
+
+
+def test_sizes_are_those_that_were_put_in(table):
+    sized = table[table["ratio"].notna()]
+    assert len(sized) >= 2
+    assert (abs(sized["ratio"] - 1) < 4.5 * sized["ratio_sigma"]).all()
+    known = table[table["known_ratio"].notna()]
+    assert (abs(known["known_ratio"] - 1) < 4.5 * known["known_sigma"]).all()
+
+
+def test_with_and_without_its_column_it_is_the_same_session(table):
+    rows = table.set_index("cell")
+    with_it, without = (
+        json.loads(rows.loc[f"log/thermal_bias/300/{how}", "effects"])
+        for how in ("recorded", "not recorded")
+    )
+    assert with_it == without
+
+
+def test_the_page_counts_every_campaign_once(table):
+    page = real_page(OURS, table, {"seed": 3, "version": "0", "commit": "0" * 10})
+    part = page.partition("## Each effect")[2].partition("##")[0]
+    rows = [line.split("|")[4].strip() for line in part.splitlines() if line.startswith("| ")]
+    assert sum(int(n) for n in rows[2:]) == (table["set"] != "null").sum()
+    assert page.count("| log | nothing is missing | 2 |") == 1
+
+
+def said(verdict, found=(), true=("thermal_bias",), recorded=True, explanations=(), **judged):
+    row = {"ok": True, "right": False, "recognised": None, "set_holds": False, "one_of_two": False}
+    return said_of({
+        **row, "verdict": verdict, "recorded": recorded, "classes": json.dumps([[n] for n in true]),
+        "found": json.dumps(found), "credible_set": json.dumps(explanations), **judged,
+    })  # fmt: skip
+
+
+@pytest.mark.parametrize(("expected", "given"), [
+    ("no answer", {"verdict": None, "ok": False}),
+    ("right name", {"verdict": "named", "found": ["thermal_bias"], "right": True}),
+    ("right name", {"verdict": "gross_error", "found": [BUMPED], "true": [], "recognised": True}),
+    ("family or set", {"verdict": "narrowed", "found": ["warm_up"], "set_holds": True}),
+    ("family or set", {"verdict": "named", "found": ["thermal_scale"]}),
+    ("family or set", {"verdict": "named", "found": ["warm_up"], "recorded": False}),
+    ("family or set", {"verdict": "unknown", "explanations": [
+        {"names": ["thermal_bias", "lag"], "posterior": 0.5},
+        {"names": ["thermal_curve"], "posterior": 0.45}]}),
+    ("unknown", {"verdict": "unknown", "explanations": [
+        {"names": ["thermal_bias"], "posterior": 0.5},
+        {"names": ["hysteresis"], "posterior": 0.45}]}),
+    ("other name", {"verdict": "named", "found": ["warm_up"]}),
+    ("other name", {"verdict": "named", "found": ["cubic_scale"], "recorded": False}),
+    ("other name", {"verdict": "gross_error", "found": [BUMPED]}),
+    ("other name", {"verdict": "named", "found": ["warm_up"], "true": []}),
+    ("unknown", {"verdict": "unknown"}),
+    ("noise", {"verdict": "noise_model", "found": ["coloured_noise"]}),
+    ("learned", {"verdict": "learned", "found": ["learned"]}),
+    ("nothing", {"verdict": "no_effect"}),
+])  # fmt: skip
+def test_what_an_answer_says(expected, given):
+    assert said(**given) == expected
+
+
+def test_what_a_log_has_by_itself_is_neither_right_nor_wrong(log):
+    row = answered(OURS, log, Case("log", ("quadratic_scale",), 300))
+    row |= {"verdict": "named", "found": '["quadratic_scale"]', "positions": "[null]"}
+    row["classes"] = '[["bias_drift"]]'
+    assert table_of([row], [])["said"].item() == "other name"
+    assert table_of([row], ["quadratic_scale", "scale_asymmetry"])["said"].item() == "nothing"
+
+
+@pytest.mark.parametrize(("change", "says"), [
+    ({"effects": ["cubic_scale+wobble"]}, "effects: unknown effect 'wobble'"),
+    ({"effects": ["base_tilt"]}, "effects: unknown effect 'base_tilt'"),
+    ({"logs": {"mine": {"note": "?"}}}, "unknown public data 'mine'"),
+])  # fmt: skip
+def test_a_wrong_configuration_is_refused_in_a_line(change, says):
+    content = read_layer(ROOT / "config/real-noise.yaml")
+    with pytest.raises(InputError) as error:
+        parse_real_noise({**content, **change}, "config")
+    assert says in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_where_the_logs_are_changes_no_number():
+    moved = CONFIG.model_copy(update={"public_folder": "elsewhere"})
+    assert moved.fingerprint == CONFIG.fingerprint
+
+
+@needs_data
+def test_two_cases_of_a_real_log(tmp_path):
+    """In the noise of an MPU-9150: a warm-up that is plain gets its name, and nothing gets none."""
+    content = read_layer(ROOT / "config/real-noise.yaml")
+    logs = {"mpu9150-2": content["logs"]["mpu9150-2"]}
+    config = parse_real_noise(
+        {**content, "public_folder": str(DATA), "logs": logs, "sizes": [400], "nothing": 1,
+         "effects": ["warm_up"]}
+    )  # fmt: skip
+    output = tmp_path / "log.parquet"
+    run_log(config, "mpu9150-2", output, {"config_hash": config.fingerprint, "seed": config.seed})
+    nothing, warm = read_table(output).to_dict("records")
+    assert nothing["said"] == "nothing"
+    assert warm["said"] == "right name"
+    assert warm["p_known"] < 1e-6
+    assert abs(warm["ratio"] - 1) < 4 * warm["ratio_sigma"]
+
+
+@needs_data
+def test_what_is_beside_a_large_effect_has_an_answer():
+    """It is found in what the refit leaves, whose slopes tell otherwise than those of the fit."""
+    name = "mpu9150-2"
+    path, settings = public_file(name, DATA), import_settings(name)
+    log = Donor.opened(name, path, settings, CONFIG.interval_s)
+    pair = ("thermal_bias", "cubic_scale")
+    row = answered(CONFIG, log, Case(name, pair, 400, recorded=True, number=4))
+    assert row["error"] == ""
+    assert "thermal_bias" in json.loads(row["found"])
+
+
+def test_the_score_is_that_of_the_study():
+    """Of this configuration and, where the study was run here, of this very run."""
+    score = (ROOT / "docs/guides/real-noise-score.md").read_text(encoding="utf-8")
+    assert f"configuration `{CONFIG.fingerprint}`, seed {CONFIG.seed}" in score
+    made = ROOT / "results/real-noise/score.md"
+    assert not made.exists() or made.read_text(encoding="utf-8") == score
+
+
+def test_the_workflow_makes_each_log_and_the_score(tmp_path):
+    words = ["--snakefile", ROOT / "workflow/real_noise.smk", "--dry-run", "--configfile"]
+    text = snakemake(tmp_path, *words, ROOT / "config/real-noise.yaml").stdout
+    assert f"real_noise_log          {len(CONFIG.logs)}" in text
+    assert "real_noise_score        1" in text
