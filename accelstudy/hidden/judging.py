@@ -167,10 +167,7 @@ def _of(condition: Answers, answer: Answers) -> Answers:
 QUESTIONS: Mapping[str, Answers] = {
     "failed": lambda judged: ~judged["ok"].astype(bool),
     "alarm": _answer("alarm"),
-    **{
-        name: _verdict(name)
-        for name in ("named", "narrowed", "unknown", "noise_model", "gross_error")
-    },
+    **{name: _verdict(name) for name in (*EFFECTS_GIVEN, "unknown", "noise_model", "gross_error")},
     "answered": _answer("answered"),
     "right": _answer("right"),
     "wrong": _answer("wrong"),

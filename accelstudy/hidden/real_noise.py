@@ -42,7 +42,7 @@ from accelstudy.files.validation import (
 from accelstudy.hidden.campaigns import SCHEMA, Row, tried
 from accelstudy.hidden.cells import family_of
 from accelstudy.hidden.diagnosing import outcome
-from accelstudy.hidden.judging import all_true
+from accelstudy.hidden.judging import EFFECTS_GIVEN, all_true
 from accelstudy.hidden.judging import judge as judged
 from accelstudy.hidden.physics.designs import Course
 from accelstudy.hidden.physics.oracle import CREDIBLE, Oracle
@@ -209,10 +209,8 @@ def answered(config: RealNoiseConfig, log: Donor, case: Case) -> Row:
     with TemporaryDirectory() as folder:
         path = Path(folder) / f"{log.name}.parquet"
         campaign, report = import_log(path, log.write(path, puts, course, columns))
-    model, spans = (
-        get_model(config.logs[log.name].model or config.model),
-        spans_of(campaign, report),
-    )
+    model = get_model(config.logs[log.name].model or config.model)
+    spans = spans_of(campaign, report)
     row: Row = {
         **_named(case),
         "sigma": "given" if campaign.sigma_force else "not given",
@@ -321,7 +319,7 @@ def _less(row: Row, own: Sequence[str]) -> Row:
         {**one, "names": [name for name in one["names"] if name not in own]}
         for one in json.loads(row["credible_set"])
     ]
-    only = own and row["verdict"] in ("named", "narrowed") and not kept
+    only = own and row["verdict"] in EFFECTS_GIVEN and not kept
     return row | {
         "found": json.dumps([name for name, _ in kept]),
         "positions": json.dumps([place for _, place in kept]),
@@ -352,7 +350,7 @@ def said_of(row: Row) -> str:
     ]
     if row["one_of_two"] or (row["verdict"] == "narrowed" and row["set_holds"] is True):
         return NEAR
-    if row["verdict"] in ("named", "narrowed", "gross_error"):
+    if row["verdict"] in (*EFFECTS_GIVEN, "gross_error"):
         found = [[name] for name in json.loads(row["found"])]
         return NEAR if families and all_true(found, families) else OTHER
     explanations = json.loads(row["credible_set"])

@@ -547,6 +547,9 @@ def describe(
         searched = [s for s in best.effect.takes if s.name == best.smooth]
         # What is beside a large effect was found in what its refit leaves, with other slopes.
         here = examined.hypothesis(best.effect)
+        near, imitators = (
+            ((), ()) if here is None else (examined.nearest(here), examined.imitators(here))
+        )
         named.append(
             Named(
                 name=best.name,
@@ -556,14 +559,10 @@ def describe(
                 posterior=choice.probability,
                 rivals=tuple(
                     (name, cosine)
-                    for name, cosine in (() if here is None else examined.nearest(here))
+                    for name, cosine in near
                     if cosine >= RIVAL and name not in members
                 ),
-                imitators=tuple(
-                    name
-                    for name in (() if here is None else examined.imitators(here))
-                    if name not in members
-                ),
+                imitators=tuple(name for name in imitators if name not in members),
                 parameters=tuple(
                     (q.name, float(solution.parameters[i]), float(sigma[i]), q.unit)
                     for q, i in places
