@@ -180,9 +180,9 @@ _SETS = {
 
 KINDS_TEXT = (
     f"Campaigns of λ ≥ {LARGE:g} with a given sigma or repeated positions. The place is the "
-    "coordinate and the target; – is none. It can be right only where the campaign records the "
-    "coordinate, and each share is one of the campaigns of that kind but the last two: confirmed, and "
-    "the median of the share of λ that is explained, are of those whose place is right."
+    "coordinate and the target; – is none. Whether it is right is asked where the campaign records "
+    "the coordinate. Confirmed, and the median of the share of λ that is explained, are of those "
+    "whose place is right."
 )
 
 

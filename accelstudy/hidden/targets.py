@@ -103,9 +103,9 @@ def _targets(judged: pd.DataFrame) -> Iterator[Target]:
         yield _oracle("both of two right", cases, part, 0.10, BOTH.get(size))
     yield from _unnamed(plain(judged))
     yield _target("confirmed", "nothing missing", null, null["confirmed"], 0, 0.003)
-    given = null["answered"].eq(True) | null["learned"].eq(True)
-    yield _target("named, narrowed or learned", "nothing missing", null, given, 0, 0.013)
-    given = null[given]
+    said = null["answered"].eq(True) | null["learned"].eq(True)
+    yield _target("named, narrowed or learned", "nothing missing", null, said, 0, 0.013)
+    given = null[said]
     confirmed = _target("confirmed, given a name or a function", "nothing missing", given,
                         given["confirmed"], 0.02, 0.08)  # fmt: skip
     yield replace(confirmed, wanted=f"{confirmed.wanted}, n ≥ {FEWEST}", fewest=FEWEST)

@@ -17,7 +17,8 @@ from accelstudy.hidden.physics.effects import EFFECTS, Effect
 from accelstudy.hidden.physics.gross import GROSS
 from accelstudy.hidden.physics.measuring import NOISES, Cause, Noise, Sensor, observe
 from accelstudy.hidden.physics.oracle import Oracle, oracle
-from accelstudy.hidden.physics.outside import OUTSIDE, Outside, Place
+from accelstudy.hidden.physics.outside import OUTSIDE
+from accelstudy.hidden.physics.places import Outside, Place
 from accelstudy.hidden.physics.unforeseen import UNFORESEEN
 
 SETS = ("null", "noise", "one", "two", "removed", "outside", "unforeseen", "gross", "invisible")

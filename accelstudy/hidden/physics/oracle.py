@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc, logsumexp, softmax
 
 from accelstudy.hidden.physics.atlas import Atlas, Shape, atlas
-from accelstudy.hidden.physics.outside import OUTSIDE, Outside
+from accelstudy.hidden.physics.outside import OUTSIDE
+from accelstudy.hidden.physics.places import Outside
 from accelstudy.hidden.physics.unforeseen import UNFORESEEN
 
 Array = NDArray[np.float64]

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from accelstudy.hidden.physics.designs import GRAVITY, Session
-from accelstudy.hidden.physics.effects import Rig, Settings, column, steps_of
-from accelstudy.hidden.physics.outside import (
+from accelstudy.hidden.physics.effects import Rig, Settings, steps_of
+from accelstudy.hidden.physics.places import (
     Array,
     Outside,
     any_seed,
@@ -29,12 +29,12 @@ from accelstudy.hidden.physics.outside import (
 
 def _missing_code(f: Array, s: Settings) -> Array:
     # A bit of the converter is a little too heavy: above a level the output is higher.
-    return f / GRAVITY > s["level"]
+    return np.where(f / GRAVITY > s["level"], 1.0, 0.0)
 
 
 def _compressor(session: Session, s: Settings) -> Array:
     # A cooling machine in the next room runs a third of the time.
-    return (session.clock / s["period"] + s["phase"]) % 1 < 1 / 3
+    return np.where((session.clock / s["period"] + s["phase"]) % 1 < 1 / 3, 1.0, 0.0)
 
 
 def _any_compressor(session: Session, rng: np.random.Generator) -> dict[str, float]:
@@ -43,7 +43,7 @@ def _any_compressor(session: Session, rng: np.random.Generator) -> dict[str, flo
 
 def _brake(session: Session, s: Settings) -> Array:
     # Beyond an angle the brake of the roll joint drags.
-    return abs(session.joints[:, 0]) > s["from"]
+    return np.where(abs(session.joints[:, 0]) > s["from"], 1.0, 0.0)
 
 
 def _reference_warms_up(session: Session, s: Settings) -> Array:
@@ -129,7 +129,9 @@ def _hanging_cable(rig: Rig, p: Array, s: Settings, session: Session) -> None:
 
 def _two_back(f: Array, p: Array, s: Settings, session: Session) -> Array:
     # What it remembers is the position before the last, and how far it is from now.
-    return p * (f - before(before(f))) * column(np.arange(session.n) > 1) * abs(f) / GRAVITY**2
+    away = f - before(before(f))
+    away[:, :2] = 0
+    return p * away * abs(f) / GRAVITY**2
 
 
 UNFORESEEN: dict[str, Outside] = {
