@@ -70,10 +70,14 @@ def _stretched(session: Session, s: Settings) -> Array:
 
 # Without one.
 
+PLAY = 0.01
+"""rad, a move of a joint that is too small to change the flank."""
+
 
 def _backlash(rig: Rig, p: Array, s: Settings, session: Session) -> None:
     # The gear rests on the flank that it came from.
-    came = np.sign(np.diff(session.joints, axis=0, prepend=session.joints[:1]))
+    move = np.diff(session.joints, axis=0, prepend=session.joints[:1])
+    came = np.where(abs(move) > PLAY, np.sign(move), 0)
     rig.reading = rig.reading + p * came
 
 
