@@ -236,7 +236,7 @@ def outside(tables: Tables) -> Figure:
         _curve(ax, table, name, "unknown", label="unknown", **OTHERS["F test"])
         _curve(ax, table, name, "learned", label="learned", **OTHERS["known sigma"])
         _curve(ax, table, name, "wrong", label="wrong name", **OTHERS["BIC forward"])
-        _over_size(ax)
+        _over_size(ax, 0.45)
         ax.axvline(LARGE, color=INK, linewidth=0.6, linestyle=":")
         ax.set_title(title)
     _shares(axes[0])
@@ -265,7 +265,7 @@ def places(tables: Tables) -> Figure:
         if len(part):
             _fates(ax, part)
             ax.set_title(title)
-            ax.set_xlabel(f"share of campaigns, $\\lambda \\geq {LARGE:g}$")
+            ax.set_xlabel("share of campaigns")
     _legend(fig, 3)
     return fig
 
@@ -373,12 +373,12 @@ def _legend(fig: Figure, columns: int) -> None:
         fig.legend([*entries.values()], [*entries], loc="outside lower center", ncols=columns)
 
 
-def _over_size(ax: Axes) -> None:
-    """Make the abscissa one of sizes, with a tick at each simulated size."""
+def _over_size(ax: Axes, apart: float = 0.2) -> None:
+    """Make the abscissa one of sizes, with a tick at each simulated size that has room for it."""
     drawn = [np.asarray(curve[0].get_xdata(), dtype=float) for curve in ax.containers]
     sizes = np.unique(np.concatenate(drawn)) if drawn else np.array([25.0])
     ax.set_xscale("log")
-    ax.set_xticks(sizes[spread(np.log(sizes), 0.2)])
+    ax.set_xticks(sizes[spread(np.log(sizes), apart)])
     ax.xaxis.set_major_formatter("{x:g}")
     ax.minorticks_off()
     ax.set_xlabel(SIZE)

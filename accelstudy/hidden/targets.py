@@ -274,7 +274,7 @@ def _of_names(judged: pd.DataFrame) -> Iterator[Row]:
     for least in SURER:
         part = named[stated >= least]
         yield _share("named, and wrong", f"posterior from {least:g} on", part, part["wrong"])
-    single = named["found"].map(lambda names: len(json.loads(names)) == 1)
+    single = pd.Series([len(json.loads(names)) == 1 for names in named["found"]], named.index, bool)
     wrong = named[(named["set"] == "one") & named["wrong"].eq(True) & single]
     yield _share("the oracle wrong, too", "one effect, a wrong single name", wrong,
                  wrong["oracle_right"].eq(False))  # fmt: skip
