@@ -1,6 +1,7 @@
 """The score of hand-made truths and answers, of which all numbers are known."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -10,6 +11,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.shares import clopper_pearson
 from accelstudy.effects import effect_names
 from accelstudy.hidden.campaigns import SCHEMA
+from accelstudy.hidden.diagnosing import _fit
 from accelstudy.hidden.figures import figures
 from accelstudy.hidden.judging import all_true, judge, same_effects, share_of
 from accelstudy.hidden.page import score_page
@@ -230,6 +232,24 @@ def test_the_interval_of_a_median_holds_it():
     assert inside == pytest.approx(0.96, abs=4 * np.sqrt(0.96 * 0.04 / 400))
     assert np.isnan(_middle("", "", pd.Series(dtype=float), 0.5).measured)
     assert np.isnan(_middle("", "", pd.Series([1.0, 2.0]), 0.5).ci95_low)
+
+
+def test_what_noise_leaves_of_the_residuals_of_a_fit_with_a_prior():
+    """Least squares of noise alone, two of five parameters held by rows of their own."""
+    rng, rows = np.random.default_rng(4), 30
+    columns = rng.standard_normal((rows, 5))
+    held = np.diag([0, 0, 0, 3.0, 6.0])[3:]
+    design = np.concatenate([columns, held])
+    noise = np.concatenate([rng.standard_normal((rows, 4000)), np.zeros((2, 4000))])
+    left = noise - design @ np.linalg.lstsq(design, noise)[0]
+    sums = np.sum(left[:rows] ** 2, axis=0)
+    solution = SimpleNamespace(
+        design=design, misclosures=np.zeros((10, 3)), residuals=left[:rows, :1].reshape(10, 3)
+    )
+    fit = _fit(solution)
+    assert fit["noise"] == pytest.approx(sums.mean(), abs=4 * sums.std() / np.sqrt(4000))
+    assert rows - 5 < fit["noise"] < rows - 3
+    assert (fit["force"], fit["angle"]) == (pytest.approx(sums[0], rel=1e-5), 0)
 
 
 def test_the_place_of_what_is_learned(parts):
