@@ -246,7 +246,7 @@ def test_there_is_physics_outside_over_all_coordinates_and_targets_and_over_none
         assert sum(kind.place is None for kind in kinds.values()) >= 5
     shown = {
         name
-        for design in ("abba-48", "circles-24", "repeats-30", "long-60")
+        for design in ("abba-48", "repeats-30", "long-60")
         for name in (*visible_outside(design, "robot"), *visible_unforeseen(design, "robot"))
     }
     assert shown == {*OUTSIDE, *UNFORESEEN}
