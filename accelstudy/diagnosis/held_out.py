@@ -150,10 +150,10 @@ def predicted_gap(
     rng = np.random.default_rng(seeds[2])
     split = LinearSplit(frame, fitted, held)
     if place is None:
-        needed = threshold(problem, weighing.classes, beyond, part, split, rng)
+        least = threshold(problem, weighing.classes, beyond, part, split, rng)
     else:
-        needed = _exceeded(*simulated_places(problem, place, beyond, SETS, part, split, rng))
-    test = replace(test, needed=needed)
+        least = _exceeded(*simulated_places(problem, place, beyond, SETS, part, split, rng))
+    test = replace(test, needed=least)
     gap = replace(gap, held_out=test, confirmed=test.significant)
     alone = finding.verdict == "named" and len(finding.chosen) == 1
     if not gap.confirmed or not alone:

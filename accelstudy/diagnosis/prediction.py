@@ -167,7 +167,7 @@ def held_out_gap(
 
 def relative_variance(one: Solution, other: Solution) -> float:
     """Ratio of the variances of unit weight of two fits that take different sigmas."""
-    taken = [float(np.mean(fit.observed.sigma_force)) for fit in (one, other)]
+    taken = [float(np.mean(np.asarray(fit.observed.sigma_force))) for fit in (one, other)]
     return (taken[0] / taken[1]) ** 2
 
 
