@@ -36,8 +36,8 @@ SPLITS = 300
 RESAMPLES = 1000
 SIGNIFICANT = 1.645
 """One-sided 5 % of the standard normal distribution."""
-REFUTES = 2.326
-"""Shortfall of a correction, over its sigma, that a right model has in 1 % of cases."""
+REFUTES = 2.576
+"""Shortfall of a correction, over its sigma, that a right model has in 0.5 % of cases."""
 
 
 @dataclass(frozen=True)
