@@ -102,6 +102,7 @@ class Finding:
     certain : tuple of Part, what is missing whatever else is open
     open : tuple of Explanation, what may be missing beside that
     place : Place or None, coordinate and target of a learned function, which is the first chosen
+    unlearned : Finding or None, what is said without that function
     """
 
     verdict: str
@@ -117,6 +118,7 @@ class Finding:
     certain: tuple[Part, ...] = ()
     open: tuple[Explanation, ...] = ()
     place: Place | None = None
+    unlearned: Finding | None = None
 
     @property
     def alternatives(self) -> tuple[Explanation, ...]:
