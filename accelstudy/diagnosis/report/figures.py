@@ -14,16 +14,26 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
-from accelstudy.basics.units import display_unit, to_display
+from accelstudy.basics.units import display_unit, shown_unit, to_display
 from accelstudy.basics.wording import number, words
 from accelstudy.diagnosis.decision.posterior import CREDIBLE, Explanation
 from accelstudy.diagnosis.decision.statement import family_of
 from accelstudy.diagnosis.evidence.field import UNKNOWN
+from accelstudy.diagnosis.formulas import TARGETS, coordinate_of
 from accelstudy.diagnosis.loop import CASES, Loop
 from accelstudy.diagnosis.report.document import condition_sigma
 from accelstudy.diagnosis.report.words import GROUPS
 from accelstudy.diagnosis.result import Diagnosis
-from accelstudy.drawing.style import COLUMN, FULL, INK, MISSING, log_ticks, new_figure
+from accelstudy.diagnosis.shape import LearnedShape
+from accelstudy.drawing.style import (
+    ANGLE_COLOURS,
+    COLUMN,
+    FULL,
+    INK,
+    MISSING,
+    log_ticks,
+    new_figure,
+)
 
 Array = NDArray[np.float64]
 
@@ -45,6 +55,8 @@ def diagnosis_figures(
         figures["evidence"] = lambda: evidence_figure(d)
     if len(d.credible_set) > 1:
         figures["explanations"] = lambda: explanations_figure(d.credible_set)
+    if (shape := d.shape) is not None:
+        figures["shape"] = lambda: shape_figure(shape)
     if d.gap.held_out is not None:
         figures["gap"] = lambda: gap_figure(d, positions)
     # Without sigma, no size of the residuals is too large for noise.
@@ -275,6 +287,53 @@ def explanations_figure(explanations: tuple[Explanation, ...]) -> Figure:
 
 def _families(explanation: Explanation) -> list[str]:
     return [family_of(*members) for members in explanation.classes]
+
+
+COMPONENTS = {
+    **AXES,
+    **{name: (colour, "o") for name, colour in ANGLE_COLOURS.items()},
+    **{"a": ("#332288", "o"), "b": ("#CC79A7", "s")},
+}
+"""Colour and marker of what depends on the coordinate of a learned function."""
+BAND = 1.96
+"""Half of a band of 95 %, in sigmas."""
+PLAIN = 3
+"""Residuals whose noise is so many times that of the best are drawn small."""
+
+
+def shape_figure(shape: LearnedShape) -> Figure:
+    """Draw a learned function with its band over its coordinate, and the residuals upon it."""
+    axes = shape.ranking.axes
+    drawn = shape.components if len(shape.components) <= len(AXES) else axes[: len(AXES)]
+    figure = new_figure(COLUMN, 10 + 36 * len(drawn))
+    panels = figure.subplots(len(drawn), 1, sharex=True, squeeze=False)[:, 0]
+    of, target = coordinate_of(shape.kind[0]), TARGETS[shape.kind[1]]
+    for name, ax in zip(drawn, panels, strict=True):
+        colour, marker = COMPONENTS.get(name) or COMPONENTS[name[0]]
+        i = shape.components.index(name)
+        h, sigma, points = (
+            to_display(v[:, i], target.unit) for v in (shape.values, shape.sigmas, shape.residuals)
+        )
+        grid, at = shape.grid / of.size, shape.at[:, i] / of.size
+        ax.axhline(0, color=INK, linewidth=0.6)
+        ax.fill_between(grid, h - BAND * sigma, h + BAND * sigma, color=colour, alpha=0.25, lw=0)
+        ax.plot(grid, h, color=colour)
+        plain = shape.spreads[:, i] < PLAIN * np.nanmin(shape.spreads[:, i])
+        ax.plot(at[plain], points[plain], marker, color=colour, markersize=3.2)
+        limits = ax.get_ylim()
+        ax.plot(at[~plain], points[~plain], ".", color=OTHER, markersize=2.5)
+        ax.set_ylim(limits)
+        ax.set_ylabel(f"{shape.title(name)}\n{_per_unit(shown_unit(target.unit))}")
+        ax.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+        if name not in axes:
+            ax.set_title("no part in it shows", loc="right")
+    panels[-1].set_xlabel(f"{of.words.removeprefix('the ')} {_per_unit(of.unit)}")
+    return figure
+
+
+def _per_unit(unit: str) -> str:
+    """Unit as the label of an axis has it: / (mm/s²)."""
+    return f"/ ({unit})" if "/" in unit else f"/ {unit}" if unit else ""
 
 
 SIMULATION_COLOURS = {"old": "#999999", "new": "#56B4E9"}
