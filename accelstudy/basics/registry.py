@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from pkgutil import iter_modules
-from typing import Any, ClassVar, Generic, TypeVar
+from types import MappingProxyType
+from typing import Any, ClassVar, Generic, Self, TypeVar
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 
@@ -45,6 +46,14 @@ class Registry(Generic[Item]):
         """Class decorator: enter one object of a class into the registry under its name."""
         self.add(kind.name, kind())
         return kind
+
+    def unlisted(self, kind: Kind) -> Kind:
+        """Enter one object of a class, which `names` does not list."""
+        self._unlisted |= {kind.name}
+        return self.register(kind)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._items
 
     def get(self, name: str) -> Item:
         """Return the item of that name; raise `UnknownNameError` if there is none."""
@@ -102,12 +111,19 @@ class WithSettings:
         are none
     takes : tuple of Setting, the settings that it takes
     settings : dict of name to number, the settings that it has
+    words : dict of name to word, of what chooses its kind
     """
 
     kind: ClassVar[str]
     name: ClassVar[str]
     family: ClassVar[str] = ""
     takes: ClassVar[tuple[Setting, ...]] = ()
+    words: Mapping[str, str] = MappingProxyType({})
+
+    @classmethod
+    def chosen(cls, words: dict[str, str], settings: dict[str, float]) -> type[Self]:
+        """Return the kind that words and settings choose."""
+        return cls
 
     def __init__(self, **settings: float) -> None:
         takes = {setting.name: setting for setting in self.takes}
@@ -133,7 +149,8 @@ class WithSettings:
     @property
     def spec(self) -> str:
         """Name with its settings, ``warm_up(tau=300)``, except those that are open or `none`."""
-        fixed = [
+        fixed = [f"{name}={word}" for name, word in self.words.items()]
+        fixed += [
             f"{setting.name}={value:.12g}"
             for setting in self.takes
             if not math.isnan(value := self.settings[setting.name]) and value != setting.none
@@ -162,11 +179,15 @@ class RegistryWithSettings(Registry[ItemWithSettings]):
             return super().get(spec)
         item = super().get(match[1])
         settings: dict[str, float] = {}
+        words: dict[str, str] = {}
         for part in filter(None, map(str.strip, match[2].split(","))):
             key, _, value = part.partition("=")
             key = key.strip()
-            if key in settings:
+            if key in settings or key in words:
                 raise InputError(f"{self.kind} {spec!r}: {key} is given twice")
+            if key in item.words:
+                words[key] = value.strip()
+                continue
             try:
                 settings[key] = float(value)
             except ValueError:
@@ -174,7 +195,7 @@ class RegistryWithSettings(Registry[ItemWithSettings]):
                     f"{self.kind} {spec!r}: {part!r} is no setting; expected name=number"
                     + ("" if not item.takes else f", such as {item.takes[0].name}=300")
                 ) from None
-        return type(item)(**settings)
+        return type(item).chosen(words, settings)(**settings)
 
 
 def import_modules(package: str, path: Iterable[str]) -> None:

@@ -5,7 +5,8 @@
 3. The total evidence that anything is missing is compared with noise alone (`detect`).
 4. If anything is, every hypothesis and every pair is weighed, which gives the verdict (`weigh`,
    `find`). If not, the tests of the noise decide (`tests_of_noise`, `judge_noise`).
-5. What is certain is added, even if the whole has no name (`with_what_is_certain`).
+5. What is certain is added, even if the whole has no name (`with_what_is_certain`); and what has
+   none, but a plain place, is learned (`with_a_learned_shape`).
 6. Positions that were not used confirm an effect, or do not (`predicted_gap`), or refute it.
 
 That is all that `judge` does. `diagnose` adds what follows from the verdict: where the disagreement
@@ -33,6 +34,7 @@ from accelstudy.diagnosis.consequences import (
     separating_positions,
 )
 from accelstudy.diagnosis.decision.certain import with_what_is_certain, without_the_refuted
+from accelstudy.diagnosis.decision.learned import with_a_learned_shape
 from accelstudy.diagnosis.decision.posterior import weigh
 from accelstudy.diagnosis.decision.problem import Problem, fit_base, is_exact, pose
 from accelstudy.diagnosis.decision.statement import with_purity
@@ -152,6 +154,7 @@ def _judged(
             weighing = weigh(problem, detection, chance)
             finding = with_what_is_certain(problem, weighing, find(problem, weighing))
             finding = unless_weak(problem, detection, finding)
+            finding = with_a_learned_shape(problem, finding)
         if finding.verdict == "no_effect":
             worst = worst_of(tests_of_noise(problem, frame, campaign, chance))
             if worst is not None:
@@ -199,6 +202,7 @@ def _judged(
             weak=finding.weak and recognised is None,
             credible_set=finding.credible_set,
             found=named,
+            place=finding.place if recognised is None else None,
             base=base.solution,
             frame=frame,
             final=finding.frame,

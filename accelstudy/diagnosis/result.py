@@ -23,6 +23,7 @@ from accelstudy.diagnosis.held_out import Gap
 from accelstudy.diagnosis.next_positions import NextPosition
 from accelstudy.diagnosis.shape import LearnedShape
 from accelstudy.diagnosis.space.examined import Frame
+from accelstudy.diagnosis.space.shapes import Place
 from accelstudy.diagnosis.visibility import UpperLimit
 from accelstudy.sensors.sensor import SensorModel
 
@@ -49,7 +50,8 @@ class Verdict:
     campaign : Campaign, with a recognised gross error mended
     approach : Approach
     model, extended : SensorModel, without and with the effects that were found
-    verdict : str, "no_effect", "named", "narrowed", "unknown", "noise_model" or "gross_error"
+    verdict : str, "no_effect", "named", "narrowed", "learned", "unknown", "noise_model" or
+        "gross_error"
     reason : str, why the verdict is what it is
     says_the_level : bool, whether the reason says how large the residuals are
     coloured : float, probability of coloured noise that may be an effect of an absent column
@@ -57,6 +59,7 @@ class Verdict:
     weak : bool, whether there is evidence that something is missing, too weak for a verdict
     credible_set : tuple of Explanation, most probable first; empty if nothing is missing
     found : tuple of Named; of the unknown, what is certain all the same
+    place : Place or None, coordinate and target of a learned function, which is found first
     base : Solution, of the base model with equal axes
     frame : Frame, of the base fit with unequal axes weighted
     final : Frame, of the extended fit, or the same
@@ -85,6 +88,7 @@ class Verdict:
     weak: bool
     credible_set: tuple[Explanation, ...]
     found: tuple[Named, ...]
+    place: Place | None
     base: Solution
     frame: Frame
     final: Frame

@@ -10,7 +10,7 @@ from scipy import stats
 from accelstudy.diagnosis.evidence.size import SHAPE_SIZES, SHAPE_WEIGHTS, Evidence, Level
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.words import verdict_lines
-from accelstudy.diagnosis.space.shapes import LEAST, LENGTHS, LearnedShapes
+from accelstudy.diagnosis.space.shapes import LEAST, LearnedShapes
 from accelstudy.effects import get_effect
 from accelstudy.sensors.models import get_model
 

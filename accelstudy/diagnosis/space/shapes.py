@@ -1,11 +1,9 @@
 """Shapes: what is missing as a smooth function of a coordinate, whether it has a name or not.
 
 A shape is a coordinate of the holds, a target that depends on it, and a smoothness. Its function is
-a Gaussian process in its Hilbert-space form (Solin & Särkkä 2020, Stat. Comput. 30, 419): h(c) =
-Σ_j w_j φ_j(c), with sines φ_j, or harmonics of an angle, and w_j ~ N(0, S_j), S_j the spectral
-density of a squared exponential at the frequency of φ_j. In the space of residuals it has the
-covariance λ K, K = Φ S Φᵀ scaled to the trace 1, with Φ what the model leaves of the functions. An
-effect of the catalogue is the case K = Q Qᵀ/d.
+h(c) = Σ_j w_j φ_j(c), with the φ_j and the prior variances S_j of the w_j that `effects.smooth`
+has. In the space of residuals it has the covariance λ K, K = Φ S Φᵀ scaled to the trace 1, with Φ
+what the model leaves of the functions. An effect of the catalogue is the case K = Q Qᵀ/d.
 
 Because S falls with the frequency, a shape does not pay for all of its dimensions.
 """
@@ -16,7 +14,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,18 +23,19 @@ from scipy.linalg import block_diag
 from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.signatures import Moment, rate_of
 from accelstudy.effects import get_effect
+from accelstudy.effects.smooth import (
+    CYCLES,
+    LENGTHS,
+    OMEGA,
+    ORDERS,
+    harmonics,
+    sines,
+    spectrum,
+)
 from accelstudy.leveling.angles import wrapped
 
 Array = NDArray[np.float64]
 
-LENGTHS = (0.25, 0.6, 1.5)
-"""Length scales, of a coordinate that goes from −1 to 1, of an angle in rad, or of a direction."""
-SINES, EDGE = 12, 1.5
-"""Sines of a coordinate; they vanish this far from its middle."""
-HARMONICS = 4
-"""Harmonics of an angle."""
-CYCLES = np.arange(1.0, 5.01, 0.25)
-"""Cycles of a periodic function of time in a session."""
 DIRECTIONS, SOME = 12, 60
 """Functions of the direction of gravity for each axis, and directions that they are made of."""
 SURVIVES = 3e-3
@@ -211,24 +210,20 @@ def _sines(at: Course, values: Array) -> tuple[Course, Array]:
     """Sines of a coordinate (n, a), and their prior variances."""
     low, high = values.min(axis=0), values.max(axis=0)
     half = np.where(high > low, (high - low) / 2, 1.0)
-    omega = np.pi / (2 * EDGE) * np.arange(1, SINES + 1)
 
     def course(now: Moment) -> Array:
-        scaled = (at(now) - (low + high) / 2) / half
-        return np.asarray(np.sin(omega * (scaled[..., None] + EDGE)))
+        return np.stack(sines((at(now) - (low + high) / 2) / half, np), axis=-1)
 
-    return course, _spectrum(omega)
+    return course, spectrum(OMEGA, LENGTHS)
 
 
 def _harmonics(at: Course) -> tuple[Course, Array]:
     """Harmonics of angles (n, a)."""
-    k = np.arange(1, HARMONICS + 1)
 
     def course(now: Moment) -> Array:
-        turn = k * at(now)[..., None]
-        return np.concatenate([np.sin(turn), np.cos(turn)], axis=-1)
+        return np.stack(harmonics(at(now), np), axis=-1)
 
-    return course, np.tile(_spectrum(k), 2)
+    return course, np.tile(spectrum(ORDERS, LENGTHS), 2)
 
 
 def _waves(order: str, when: Array) -> tuple[Course, Array]:
@@ -260,11 +255,6 @@ def _on_the_sphere(f: Array) -> tuple[Course, Array]:
 def _alike(one: Array, other: Array, length: float) -> Array:
     """Covariance of a smooth function at unit vectors, by the squares of their chords."""
     return np.asarray(np.exp((one @ other.T - 1) / length**2))
-
-
-def _spectrum(omega: NDArray[Any]) -> Array:
-    """Spectral density of a squared exponential, by the length scale, (3, k)."""
-    return np.asarray(np.exp(-(np.multiply.outer(LENGTHS, omega) ** 2) / 2))
 
 
 # --- targets ------------------------------------------------------------------------------------
