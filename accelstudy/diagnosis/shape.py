@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.diagnosis.evidence.size import Evidence
-from accelstudy.diagnosis.formulas import TARGETS, Ranking, argument, of_each, ranked
+from accelstudy.diagnosis.decision.learned import space_of
+from accelstudy.diagnosis.decision.problem import Problem
+from accelstudy.diagnosis.decision.verdict import Finding
+from accelstudy.diagnosis.forms import TARGETS
+from accelstudy.diagnosis.formulas import Ranking, argument, ranked
 from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.shapes import function_rows
 from accelstudy.diagnosis.space.signatures import Moment
+from accelstudy.effects.learned import Learned
 
 Array = NDArray[np.float64]
 
@@ -31,12 +34,12 @@ class LearnedShape:
     Attributes
     ----------
     coordinate, target : str
-    kind : (str, str), the same more closely, as formulas have them
+    effect : Learned
     ranking : Ranking, what depends on what, and which formulas it may be
     components : tuple of str, c components that have a function
     grid : (k,) array, the coordinate, SI
     values, sigmas : (k, c) arrays, h and its sigma there, SI
-    at : (n, c) array, the coordinate of each component in the positions, SI
+    where : (n, c) array, the coordinate of each component in the positions, SI
     residuals, spreads : (n, c) arrays, h and what the final fit leaves of it in each position, as
         far as the position shows it, and the noise of that, SI
     least_known : tuple of float, values of the coordinate where positions would show most of it
@@ -44,81 +47,68 @@ class LearnedShape:
 
     coordinate: str
     target: str
-    kind: tuple[str, str]
+    effect: Learned
     ranking: Ranking
     components: tuple[str, ...]
     grid: Array
     values: Array
     sigmas: Array
-    at: Array
+    where: Array
     residuals: Array
     spreads: Array
     least_known: tuple[float, ...]
 
-    def title(self, component: str) -> str:
-        """Name a component of the target: bias of x."""
-        words = TARGETS[self.kind[1]].words.removeprefix("the ")
-        if self.kind[0] != "others":
-            return words.format(component)
-        return f"{words.format(component[0])} by the force along {component[1]}"
 
-
-def shape_of(
-    base: Frame,
-    final: Frame,
-    evidence: Evidence,
-    place: tuple[str, str],
-    kind: tuple[str, str],
-    function: Callable[[Array], tuple[Array, Array]],
-    variance: float,
-) -> LearnedShape:
-    """Describe a learned function.
+def shape_of(problem: Problem, finding: Finding, variance: float) -> LearnedShape | None:
+    """Describe the function that was learned; None if none was.
 
     Parameters
     ----------
-    base, final : Frame, of the fits without and with it
-    evidence : Evidence, of the first
-    place : (str, str), coordinate and target
-    kind : (str, str), the same as the function has them
-    function : callable, h and sigma of values of the coordinate (k,), (k, c) each, SI
+    problem : Problem
+    finding : Finding, whose first choice is the function
     variance : float, of unit weight
     """
-    ranking = ranked(base, evidence, kind)
-    now = Moment(final.hold)
-    at = argument(final, kind[0])(now)
+    if finding.place is None:
+        return None
+    learned, *others = (choice.best for choice in finding.chosen)
+    effect, frame, solution = learned.effect, finding.frame, finding.frame.solution
+    assert isinstance(effect, Learned)
+    beside = space_of(others, len(problem.residuals.z))
+    ranking = ranked(problem.frame, problem.evidence, effect, beside)
+    at = argument(frame, effect)(Moment(frame.hold))
     grid = np.linspace(at.min(), at.max(), POINTS)
-    values, sigmas = function(grid)
-    at = of_each(kind[0], at, values.shape[1])
-    left, spreads = _left(final, kind, values.shape[1], variance)
-    here = np.stack([np.interp(at[:, i], grid, h) for i, h in enumerate(values.T)], axis=1)
-    taking = [ranking.components.index(axis) for axis in ranking.axes]
+    names = list(solution.model.parameter_names)
+    own = [names.index(parameter.name) for parameter in effect.parameters]
+    parameters, cofactors = solution.parameters[own], solution.cofactors[np.ix_(own, own)]
+    values, sigmas = effect.function(grid, parameters, variance * cofactors)
+    here = [effect.function(at[:, min(i, at.shape[1] - 1)], parameters, cofactors)[0][:, i]
+            for i in range(values.shape[1])]  # fmt: skip
+    left, spreads = _left(frame, effect, variance)
+    components = TARGETS[effect.target].components
+    taking = [components.index(axis) for axis in ranking.axes]
     return LearnedShape(
-        *place,
-        kind,
+        *finding.place,
+        effect,
         ranking,
-        ranking.components,
+        components,
         grid,
         values,
         sigmas,
-        at,
-        here + left,
+        np.broadcast_to(at, left.shape),
+        np.stack(here, axis=1) + left,
         spreads,
         _least_known(grid, np.sqrt(np.mean(sigmas[:, taking] ** 2, axis=1))),
     )
 
 
-def _left(frame: Frame, kind: tuple[str, str], count: int, variance: float) -> tuple[Array, Array]:
+def _left(frame: Frame, effect: Learned, variance: float) -> tuple[Array, Array]:
     """What each position leaves of h by its residuals, and the noise of that, (n, c) each."""
-    n = len(frame.forces)
-    one = np.ones((n, 1 if kind[0] != "others" else 3, 1))
-    target = "bias of the others" if kind[0] == "others" else kind[1]
-    rows = function_rows(frame, target, lambda now: one, rates=False)
-    conditions = frame.residuals.whitening.shape[1]
-    seen = rows[: n * conditions].reshape(n, conditions, count)
+    n, conditions = frame.residuals.whitening.shape[:2]
+    rows = function_rows(frame, effect.target, lambda now: np.ones((n, 1, 1)), rates=False)
+    seen = rows[: n * conditions].reshape(n, conditions, -1)
     errors = frame.residuals.errors[: n * conditions].reshape(n, conditions, 1)
-    square = np.sum(seen**2, axis=1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.sum(seen * errors, axis=1) / square, np.sqrt(variance / square)
+    square = np.maximum(np.sum(seen**2, axis=1), np.finfo(float).tiny)
+    return np.sum(seen * errors, axis=1) / square, np.sqrt(variance / square)
 
 
 def _least_known(grid: Array, sigma: Array) -> tuple[float, ...]:

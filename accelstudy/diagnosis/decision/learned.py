@@ -217,7 +217,7 @@ def fit_of_place(
     Where no sigma is given, the prior of the function counts beside the noise that it leaves.
     """
     frame, evidence = problem.frame, problem.evidence
-    z, basis = frame.residuals.z, _space_of(beside, len(frame.residuals.z))
+    z, basis = frame.residuals.z, space_of(beside, len(frame.residuals.z))
     z = z - basis @ (basis.T @ z)
     evidence = replace(evidence, redundancy=evidence.redundancy - basis.shape[1])
     shapes = weighted_shapes(place, frame, basis, z[None], evidence)
@@ -239,7 +239,7 @@ def fit_of_place(
     return None if solution is None else (hypothesis, solution)
 
 
-def _space_of(beside: Sequence[Hypothesis], m: int) -> Array:
+def space_of(beside: Sequence[Hypothesis], m: int) -> Array:
     """Orthonormal basis of the spaces of some hypotheses."""
     columns: list[Array] = [np.zeros((m, 0)), *(one.basis for one in beside)]
     return np.linalg.qr(np.concatenate(columns, axis=1))[0]

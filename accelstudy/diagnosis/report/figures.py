@@ -19,7 +19,7 @@ from accelstudy.basics.wording import number, words
 from accelstudy.diagnosis.decision.posterior import CREDIBLE, Explanation
 from accelstudy.diagnosis.decision.statement import family_of
 from accelstudy.diagnosis.evidence.field import UNKNOWN
-from accelstudy.diagnosis.formulas import TARGETS, coordinate_of
+from accelstudy.diagnosis.forms import TARGETS, coordinate_of
 from accelstudy.diagnosis.loop import CASES, Loop
 from accelstudy.diagnosis.report.document import condition_sigma
 from accelstudy.diagnosis.report.words import GROUPS
@@ -303,37 +303,35 @@ PLAIN = 3
 
 def shape_figure(shape: LearnedShape) -> Figure:
     """Draw a learned function with its band over its coordinate, and the residuals upon it."""
-    axes = shape.ranking.axes
-    drawn = shape.components if len(shape.components) <= len(AXES) else axes[: len(AXES)]
-    figure = new_figure(COLUMN, 10 + 36 * len(drawn))
-    panels = figure.subplots(len(drawn), 1, sharex=True, squeeze=False)[:, 0]
-    of, target = coordinate_of(shape.kind[0]), TARGETS[shape.kind[1]]
-    for name, ax in zip(drawn, panels, strict=True):
-        colour, marker = COMPONENTS.get(name) or COMPONENTS[name[0]]
-        i = shape.components.index(name)
-        h, sigma, points = (
-            to_display(v[:, i], target.unit) for v in (shape.values, shape.sigmas, shape.residuals)
-        )
-        grid, at = shape.grid / of.size, shape.at[:, i] / of.size
+    figure = new_figure(COLUMN, 10 + 36 * len(shape.components))
+    panels = figure.subplots(len(shape.components), 1, sharex=True, squeeze=False)[:, 0]
+    of, target = coordinate_of(shape.effect.coordinate), TARGETS[shape.effect.target]
+    title, unit = target.words.removeprefix("the "), shown_unit(target.unit)
+    for i, (name, ax) in enumerate(zip(shape.components, panels, strict=True)):
+        colour, marker = COMPONENTS[name]
+        x, at = shape.where[:, i] / of.size, shape.grid
+        within = (at >= shape.where[:, i].min()) & (at <= shape.where[:, i].max())
+        h, sigma = (to_display(v[within, i], target.unit) for v in (shape.values, shape.sigmas))
+        points, grid = to_display(shape.residuals[:, i], target.unit), at[within] / of.size
         ax.axhline(0, color=INK, linewidth=0.6)
         ax.fill_between(grid, h - BAND * sigma, h + BAND * sigma, color=colour, alpha=0.25, lw=0)
         ax.plot(grid, h, color=colour)
-        plain = shape.spreads[:, i] < PLAIN * np.nanmin(shape.spreads[:, i])
-        ax.plot(at[plain], points[plain], marker, color=colour, markersize=3.2)
+        plain = shape.spreads[:, i] < PLAIN * shape.spreads[:, i].min()
+        ax.plot(x[plain], points[plain], marker, color=colour, markersize=3.2)
         limits = ax.get_ylim()
-        ax.plot(at[~plain], points[~plain], ".", color=OTHER, markersize=2.5)
+        ax.plot(x[~plain], points[~plain], ".", color=OTHER, markersize=2.5)
         ax.set_ylim(limits)
-        ax.set_ylabel(f"{shape.title(name)}\n{_per_unit(shown_unit(target.unit))}")
+        ax.set_ylabel(f"{title.format(name)}\n{_per_unit('h', unit)}")
         ax.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
-        if name not in axes:
+        if name not in shape.ranking.axes:
             ax.set_title("no part in it shows", loc="right")
-    panels[-1].set_xlabel(f"{of.words.removeprefix('the ')} {_per_unit(of.unit)}")
+    panels[-1].set_xlabel(_per_unit(of.words.removeprefix("the "), of.unit))
     return figure
 
 
-def _per_unit(unit: str) -> str:
-    """Unit as the label of an axis has it: / (mm/s²)."""
-    return f"/ ({unit})" if "/" in unit else f"/ {unit}" if unit else ""
+def _per_unit(what: str, unit: str) -> str:
+    """Label an axis: h / (mm/s²)."""
+    return f"{what} / {f'({unit})' if '/' in unit else unit}".removesuffix(" / ")
 
 
 SIMULATION_COLOURS = {"old": "#999999", "new": "#56B4E9"}
