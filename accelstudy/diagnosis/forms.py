@@ -33,7 +33,7 @@ CONSTANTS = np.geomspace(0.03, 1.0, 12)
 """Constants of an exponential, in ranges of its coordinate."""
 WIDTHS = np.linspace(0.1, 0.8, 8)
 """Widths of a dead band, as parts of the largest value."""
-BUMPS = {"narrow": 0.06, "wide": 0.15}
+BUMPS = (0.06, 0.15)
 """Standard deviations of a bump, in ranges of its coordinate."""
 
 # --- coordinates and targets --------------------------------------------------------------------
@@ -237,9 +237,9 @@ def _somewhere(of: Coordinate, values: Array) -> list[Form]:
              inner, of.at, 0.5, is_smooth=True),
         Form("in a straight line up to {}", lambda s, x: np.minimum(x[..., None] - s, 0),
              inner, of.at, 0.5, is_smooth=True),
-        *(Form(f"in a {words} bump at {{}}", partial(_bump, share * np.ptp(values)),
+        *(Form("in a bump at {}", partial(_bump, share * np.ptp(values)),
                np.linspace(values[0], values[-1], 25), of.at, 0.5, is_smooth=True)
-          for words, share in BUMPS.items()),
+          for share in BUMPS),
     ]  # fmt: skip
 
 

@@ -3,11 +3,12 @@
 A form, such as a parabola or a sine with a free period, is a few functions of the coordinate. With
 each of its settings, for some of the axes or alike in all of them, it is a space of residuals, and
 is weighed as all hypotheses of the diagnosis are (`accelstudy.diagnosis.evidence.size`). Beside the
-forms stands any other smooth function.
+forms stands any other smooth function, as probable at first as what no catalogue has.
 """
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -19,6 +20,7 @@ from scipy.special import softmax
 
 from accelstudy.basics.units import shown_unit
 from accelstudy.basics.wording import comma_list, estimate
+from accelstudy.diagnosis.decision.priors import UNKNOWN
 from accelstudy.diagnosis.evidence.size import Evidence
 from accelstudy.diagnosis.forms import TARGETS, Form, coordinate_of, forms, smooth
 from accelstudy.diagnosis.space.examined import Frame
@@ -32,8 +34,6 @@ Choice = tuple[int, ...]
 """Components that take part."""
 
 OTHER = "as another smooth function"
-SMOOTH = 0.25
-"""Prior probability that none of the forms is right."""
 SURE_OF = 0.9
 """Posterior from which on a component takes part."""
 ALIKE = 0.25
@@ -214,17 +214,19 @@ class _Library:
         """Rank all forms, and any other smooth function."""
         weighed = [(form, self.of_form(form)) for form in forms(self.effect.coordinate, self.c)]
         weighed = [(form, logs) for form, logs in weighed if np.isfinite(logs).any()]
-        total = sum(form.weight for form, _ in weighed) / (1 - SMOOTH)
+        total = sum(form.weight for form, _ in weighed) / (1 - UNKNOWN)
         logs = [each + np.log(form.weight / total) for form, each in weighed]
-        logs.append(self.of_smooth() + np.log(SMOOTH))
+        logs.append(self.of_smooth() + np.log(UNKNOWN))
         posterior = softmax([np.logaddexp.reduce(each, axis=None) for each in logs]).tolist()
-        taking = self._taking(logs)
-        best = max(range(len(weighed)), key=lambda i: posterior[i])
-        formulas = [
-            Formula(self._said(form, logs[i], taking), posterior[i])
-            for i, (form, _) in enumerate(weighed)
-            if posterior[i] >= WORTH or i == best
-        ]
+        taking, alike = self._taking(logs), defaultdict[str, list[int]](list)
+        for i, (form, _) in enumerate(weighed):
+            alike[form.words].append(i)
+        formulas = []
+        for some in alike.values():
+            best, together = max(some, key=posterior.__getitem__), sum(posterior[i] for i in some)
+            if together >= WORTH:
+                said = self._said(weighed[best][0], logs[best], taking)
+                formulas.append(Formula(said, together))
         formulas.append(Formula(OTHER, posterior[-1]))
         names = [self.components[i] for i in taking]
         which = "all axes" if len(names) == len("xyz") else comma_list(names)

@@ -181,6 +181,7 @@ def evidence_figure(diagnosis: Diagnosis) -> Figure:
         n for n in names if n not in shown and (probabilities.get(n, 0) > 0.05 or n == UNKNOWN)
     ]
     named = {name for f in diagnosis.found for name in (f.name, *f.equivalence_class)}
+    named |= set() if diagnosis.shape is None else {UNKNOWN}
     colours = [AFTER if name in named else OTHER for name in shown]
     place = np.arange(len(shown))[::-1]
 
@@ -304,9 +305,10 @@ PLAIN = 3
 def shape_figure(shape: LearnedShape) -> Figure:
     """Draw a learned function with its band over its coordinate, and the residuals upon it."""
     figure = new_figure(COLUMN, 10 + 36 * len(shape.components))
-    panels = figure.subplots(len(shape.components), 1, sharex=True, squeeze=False)[:, 0]
+    panels = figure.subplots(len(shape.components), 1, sharex=True, sharey=True)
     of, target = coordinate_of(shape.effect.coordinate), TARGETS[shape.effect.target]
-    title, unit = target.words.removeprefix("the "), shown_unit(target.unit)
+    shown = plain(shape)
+    title, unit = target.words.removeprefix("the ").removeprefix("robot's "), shown_unit(target.unit)
     for i, (name, ax) in enumerate(zip(shape.components, panels, strict=True)):
         colour, marker = COMPONENTS[name]
         x, at = shape.where[:, i] / of.size, shape.grid
@@ -316,10 +318,9 @@ def shape_figure(shape: LearnedShape) -> Figure:
         ax.axhline(0, color=INK, linewidth=0.6)
         ax.fill_between(grid, h - BAND * sigma, h + BAND * sigma, color=colour, alpha=0.25, lw=0)
         ax.plot(grid, h, color=colour)
-        plain = shape.spreads[:, i] < PLAIN * shape.spreads[:, i].min()
-        ax.plot(x[plain], points[plain], marker, color=colour, markersize=3.2)
+        ax.plot(x[shown[:, i]], points[shown[:, i]], marker, color=colour, markersize=3.2)
         limits = ax.get_ylim()
-        ax.plot(x[~plain], points[~plain], ".", color=OTHER, markersize=2.5)
+        ax.plot(x[~shown[:, i]], points[~shown[:, i]], ".", color=OTHER, markersize=2.5)
         ax.set_ylim(limits)
         ax.set_ylabel(f"{title.format(name)}\n{_per_unit('h', unit)}")
         ax.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
@@ -327,6 +328,11 @@ def shape_figure(shape: LearnedShape) -> Figure:
             ax.set_title("no part in it shows", loc="right")
     panels[-1].set_xlabel(_per_unit(of.words.removeprefix("the "), of.unit))
     return figure
+
+
+def plain(shape: LearnedShape) -> NDArray[np.bool_]:
+    """Residuals (n, c) whose noise is small enough to be drawn large."""
+    return np.asarray(shape.spreads < PLAIN * shape.spreads.min(axis=0))
 
 
 def _per_unit(what: str, unit: str) -> str:
