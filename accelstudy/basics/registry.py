@@ -9,7 +9,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from pkgutil import iter_modules
-from types import MappingProxyType
 from typing import Any, ClassVar, Generic, Self, TypeVar
 
 from accelstudy.basics.errors import InputError, UnknownNameError
@@ -111,14 +110,12 @@ class WithSettings:
         are none
     takes : tuple of Setting, the settings that it takes
     settings : dict of name to number, the settings that it has
-    words : dict of name to word, of what chooses its kind
     """
 
     kind: ClassVar[str]
     name: ClassVar[str]
     family: ClassVar[str] = ""
     takes: ClassVar[tuple[Setting, ...]] = ()
-    words: Mapping[str, str] = MappingProxyType({})
 
     @classmethod
     def chosen(cls, words: dict[str, str], settings: dict[str, float]) -> type[Self]:
@@ -140,6 +137,11 @@ class WithSettings:
                     + ("" if math.isnan(none) else f", or {none:g}")
                 )
         self.settings = {**{setting.name: setting.default for setting in self.takes}, **settings}
+
+    @property
+    def words(self) -> Mapping[str, str]:
+        """Words that choose its kind, by what they say."""
+        return {}
 
     @property
     def summary(self) -> str:

@@ -33,6 +33,7 @@ from accelstudy.diagnosis.decision.verdict import Finding
 from accelstudy.diagnosis.evidence.detection import Chance
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.next_positions import NextPosition, next_positions
+from accelstudy.diagnosis.prediction import relative_variance
 from accelstudy.diagnosis.space.examined import ExaminedFit, Frame
 from accelstudy.diagnosis.space.groups import LACK_OF_FIT, REPEAT, ROBOT, all_groups
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
@@ -307,7 +308,7 @@ def leveling_rms(
     ----------
     base, extended : Solution
     hold : HoldConditions, of the campaign
-    variance : float, of unit weight
+    variance : float, of unit weight of the extended fit
     """
     g = extended.gravity
     f_b, used = in_use(hold, g)
@@ -325,7 +326,8 @@ def leveling_rms(
         offset = wrapped(angles_of(corrected) - angles)
         slope = tilt_slope(model, p, output, corrected, g, used)[..., kept]
         cofactors = solution.cofactors[: len(p), : len(p)][np.ix_(kept, kept)]
-        formal = variance * np.einsum("kau,uv,kav->ka", slope, cofactors, slope)
+        taken = variance * relative_variance(extended, solution)
+        formal = taken * np.einsum("kau,uv,kav->ka", slope, cofactors, slope)
         squares.append(float(np.mean(offset**2 + formal)))
     if not np.all(np.isfinite(squares)):
         return None

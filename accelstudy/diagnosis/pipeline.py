@@ -54,6 +54,7 @@ from accelstudy.diagnosis.decision.verdict import (
 )
 from accelstudy.diagnosis.evidence.detection import SIMULATIONS, Chance, detect
 from accelstudy.diagnosis.held_out import measured_gap, predicted_gap
+from accelstudy.diagnosis.prediction import relative_variance
 from accelstudy.diagnosis.result import Diagnosis, Verdict, level_of_effects
 from accelstudy.diagnosis.shape import shape_of
 from accelstudy.sensors.plausibility import implausible_parameters
@@ -83,7 +84,8 @@ def diagnose(
     judged = _judged(campaign, model, approach, seed)
     verdict, problem, finding = judged.verdict, judged.problem, judged.finding
     base, final, variance = verdict.base, finding.frame.solution, verdict.unit_variance
-    location = locate(problem, judged.chance, finding, variance)
+    ratio = relative_variance(final, base)
+    location = locate(problem, judged.chance, finding, variance * ratio)
     leveling = None
     if finding.chosen:
         leveling = leveling_rms(base, final, problem.frame.hold, variance)
@@ -165,15 +167,18 @@ def _judged(
                 finding = with_what_is_certain(problem, weighing, finding)
 
     gap = measured_gap(finding, base.solution)
-    if weighing is not None and finding.chosen and finding.verdict != "gross_error":
-        with stage("held-out positions"):
-            beyond = detection.by_chance.beyond(level)
-            given = unit_variance(problem, finding.frame) if stated else None
-            gap = predicted_gap(
-                gap, problem, weighing, finding, beyond, given, [seeds[k] for k in (1, 2, 4)]
-            )
-        if gap.held_out is not None and gap.held_out.refutes:
-            finding = without_the_refuted(finding, frame, gap.held_out)
+    if weighing is not None and finding.verdict != "gross_error":
+        beyond = detection.by_chance.beyond(level)
+        while finding.chosen:
+            with stage("held-out positions"):
+                given = unit_variance(problem, finding.frame) if stated else None
+                gap = predicted_gap(
+                    gap, problem, weighing, finding, beyond, given, [seeds[k] for k in (1, 2, 4)]
+                )
+            if gap.held_out is None or not gap.held_out.refutes:
+                break
+            # Without a learned function, what is certain is left.
+            finding = finding.unlearned or without_the_refuted(finding, frame, gap.held_out)
             gap = measured_gap(finding, base.solution)
     if weighing is not None:
         finding = with_unrecorded(problem, weighing, finding)

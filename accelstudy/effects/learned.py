@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any, ClassVar
 
@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.registry import Setting
-from accelstudy.effects.base import Effect, Parameter, unlisted
-from accelstudy.effects.base_tilt import BaseTilt
+from accelstudy.effects.base import Effect, Parameter, get_effect, unlisted
 from accelstudy.effects.components import AXES, Number
 from accelstudy.effects.smooth import (
     EDGE,
@@ -74,7 +73,7 @@ class Learned(Effect):
         return kind_of(coordinate, target, _count(coordinate, settings.get("length", LENGTH)))
 
     @property
-    def words(self) -> dict[str, str]:
+    def words(self) -> Mapping[str, str]:
         """Coordinate and target, as the spec has them."""
         return {"coordinate": self.coordinate, "target": self.target}
 
@@ -156,7 +155,7 @@ class Learned(Effect):
             step = xp.abs(hold.step_x) + xp.abs(hold.step_y) + xp.abs(hold.step_z)
             h = [xp.sign(step) * h_i for h_i in h]
         if self.target == "tilt":
-            return BaseTilt().output(f, tuple(h), g, hold, xp)
+            return get_effect("base_tilt").output(f, tuple(h), g, hold, xp)
         power = {"bias": 0, "scale": 1, "square": 2}[self.target]
         return tuple(h_i * f_i**power for h_i, f_i in zip(h, f, strict=True))
 

@@ -43,9 +43,7 @@ def redundancy_numbers(solution: Solution) -> Redundancy:
     return Redundancy(
         observations=shares,
         positions=np.einsum("ncc->n", solution.blocks),
-        gravity=float(1 - np.sum(solution.basis[-1] ** 2))
-        if solution.observed.sigma_gravity > 0
-        else None,
+        gravity=float(1 - np.sum(solution.basis[-1] ** 2)) if observed else None,
     )
 
 

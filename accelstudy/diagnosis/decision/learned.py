@@ -60,6 +60,7 @@ def with_a_learned_shape(problem: Problem, finding: Finding) -> Finding:
         frame=Frame.of(solution),
         chosen=(learned, *finding.chosen),
         place=place,
+        unlearned=finding,
     )
 
 

@@ -257,6 +257,7 @@ def weigh(problem: Problem, detection: Detection, chance: Chance) -> Weighing:
     if unknown is not None:
         alone.append(Weighed((UNKNOWN,), ((UNKNOWN,),), unknown + np.log(priors.UNKNOWN)))
     pairs = weigh_pairs(problem, singles, members, classes)
+    pairs += weigh_beside(problem, singles, classes)
     noises, slow = _noises(problem, detection, chance)
     posterior = Posterior.of([*alone, *pairs, *noises])
     return Weighing(singles, members, classes, alone, pairs, noises, slow, posterior)
@@ -268,7 +269,7 @@ def weigh_pairs(
     members: Mapping[str, tuple[str, ...]],
     classes: Sequence[Class],
 ) -> list[Weighed]:
-    """Weigh candidates together, and each of the strongest beside something unknown.
+    """Weigh candidates together.
 
     Where one position was bumped, a further one is as probable as two effects rather than one.
 
@@ -291,12 +292,23 @@ def weigh_pairs(
             names = tuple(called.get(h.name, h.name) for h in best)
             weight = together.log_density + each + (len(best) - 2) * np.log(priors.TWO)
             weighed.append(Weighed(names, alike, weight, best))
-    unknown = problem.field.unknown
-    for first, same in classes[:FIRST] if unknown else ():
+    return weighed
+
+
+def weigh_beside(problem: Problem, singles: Singles, classes: Sequence[Class]) -> list[Weighed]:
+    """Weigh each of the strongest candidates beside something unknown.
+
+    Parameters
+    ----------
+    problem : Problem
+    singles, classes : as in `Weighing`
+    """
+    k, unknown, weighed = len(classes), problem.field.unknown, []
+    for first, same in classes[:FIRST] if unknown and k > 1 else ():
         assert unknown is not None
-        beside = unknown_beside(first, unknown, residuals, evidence)
+        beside = unknown_beside(first, unknown, problem.residuals, problem.evidence)
         if beside is not None:
-            total = densities[first.name] + beside - np.log(k)
+            total = singles.densities[first.name] + beside - np.log(k)
             prior = np.log(priors.TWO * priors.UNKNOWN)
             weighed.append(Weighed((first.name, UNKNOWN), (same, (UNKNOWN,)), total + prior))
     return weighed
@@ -315,9 +327,13 @@ def _noises(problem: Problem, detection: Detection, chance: Chance) -> tuple[lis
     processes, course = colour_densities(residuals, evidence), -np.inf
     coloured = np.log(priors.COLOUR) + log_mean(processes)
     if problem.absent:
-        # As noise it leaves the slopes within the holds as they are.
-        courses = Unknown(LearnedShapes.of(problem.frame, SLOW, rates=False))
-        of_places = courses.by_place(evidence, residuals.z).values()
+        unknown = problem.field.unknown
+        if unknown is None or residuals.slopes:
+            # As noise it leaves the slopes within the holds as they are.
+            courses = LearnedShapes.of(problem.frame, SLOW, rates=False)
+        else:
+            courses = unknown.shapes.at(SLOW)
+        of_places = Unknown(courses).by_place(evidence, residuals.z).values()
         course = float(np.logaddexp.reduce([-np.inf, *of_places]))
         coloured = np.logaddexp(coloured, np.log(priors.UNRECORDED) + course)
     logs = {

@@ -7,11 +7,11 @@ bumped position share it evenly. The probability that a given sigma is wrong is 
 TWO = 0.15
 """Two effects are missing: of the models that lack something one in eight lacks more. Likewise
 another bumped position, where one was bumped."""
-UNKNOWN = 0.1
+UNKNOWN = 0.06
 """Something is missing that is not in the catalogue, which has the usual effects."""
 COLOUR = 0.06
 """Nothing is missing but the noise has some colour, as all real noise has."""
-UNRECORDED = 0.3
+UNRECORDED = 0.15
 """Nothing of the catalogue is missing, but the sensor follows something that nobody recorded: a
 temperature, most often. Where it has no column, it is the commonest cause of all."""
 AXES = 0.03

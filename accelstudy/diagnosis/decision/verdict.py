@@ -102,6 +102,7 @@ class Finding:
     certain : tuple of Part, what is missing whatever else is open
     open : tuple of Explanation, what may be missing beside that
     place : Place or None, coordinate and target of a learned function, which is the first chosen
+    unlearned : Finding or None, what is said without that function
     """
 
     verdict: str
@@ -117,6 +118,7 @@ class Finding:
     certain: tuple[Part, ...] = ()
     open: tuple[Explanation, ...] = ()
     place: Place | None = None
+    unlearned: Finding | None = None
 
     @property
     def alternatives(self) -> tuple[Explanation, ...]:
@@ -301,12 +303,12 @@ def _judged_by_refits(
     problem : Problem
     weighing : Weighing
     single : Weighed, the effect
-    count : int, pairs that are refitted, the most probable to first order
+    count : int, pairs that are refitted, the most probable to first order, and half as many triples
     """
     tried = [single]
-    for size in (2, 3):
+    for size, some in ((2, count), (3, (count + 1) // 2)):
         together = [one for one in weighing.pairs if len(one.best) == size]
-        tried += sorted(together, key=lambda one: -one.log_weight)[:count]
+        tried += sorted(together, key=lambda one: -one.log_weight)[:some]
     refitted = [_refitted(problem, weighing, one) for one in tried]
     weighed = [one for one, _ in refitted]
     alone, solution = refitted[0]

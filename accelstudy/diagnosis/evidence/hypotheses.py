@@ -45,6 +45,8 @@ STRONGEST = 6
 """Effects beside a bumped position, the strongest of them, beside which a further one is tried."""
 FIRST = 2
 """Bumped positions beside each effect, and pairs of them, beside which a further one is tried."""
+NEVER = 30.0
+"""Log evidence by which a pair with a bumped position is so weak that a further one is no help."""
 POSITIONS = 100
 """Bumped positions that are tried in pairs, at most."""
 ROWS = 4096
@@ -349,9 +351,10 @@ def _with_another_bump(
     z : (m,) array
     evidence : Evidence
     """
-    one, place, logs, weighted = rows
-    if not len(one):
+    if not len(rows[0]):
         return []
+    likely = rows[3] > rows[3].max() - NEVER
+    one, place, logs, weighted = (row[likely] for row in rows)
     # Of two bumps each row is a set of positions; of an effect it is one of many shapes.
     twice = number[one] == number[bumped[0]]
     keys = np.stack([np.where(twice, one, -1 - number[one]), place])

@@ -31,6 +31,8 @@ where an effect would have been noticed without any test."""
 SHAPE_SIZES = np.geomspace(4.0, 4e6, 7)
 SHAPE_WEIGHTS = np.where(SHAPE_SIZES < 1500, 0.9 / 3, 0.1 / 4)
 """The same prior for a shape, whose density changes less with λ."""
+SIMULATED = 4
+"""The first of them, which are all that simulated residuals can have."""
 
 DOUBT = 0.15
 """Prior probability that a sigma that is given is wrong."""
@@ -165,12 +167,13 @@ class Evidence:
         -------
         (b, s) array
         """
-        # Of many sets at once seven digits will do, which takes a third of the time.
-        kind = np.float32 if len(total) > 1 else np.float64
-        sizes, ends = SHAPE_SIZES[:, None], np.cumsum([len(share) for share in shares])
+        # Many sets are simulated ones. They have small effects, and seven digits will do.
+        many = len(total) > 1
+        kind, count = (np.float32, SIMULATED) if many else (np.float64, len(SHAPE_SIZES))
+        sizes, ends = SHAPE_SIZES[:count, None], np.cumsum([len(share) for share in shares])
         g = sizes * np.concatenate(shares)
         kept, growth = (g / (1 + g)).astype(kind), np.add.reduceat(np.log1p(g), [0, *ends[:-1]], 1)
-        prior = (np.log(SHAPE_WEIGHTS)[:, None] - growth / 2).astype(kind)[..., None]
+        prior = (np.log(SHAPE_WEIGHTS[:count])[:, None] - growth / 2).astype(kind)[..., None]
         taken = np.empty((len(sizes), len(shares), len(total)), dtype=kind)
         for i, (along, some) in enumerate(zip(squares, np.split(kept, ends[:-1], 1), strict=True)):
             taken[:, i] = some @ along.T.astype(kind)

@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
@@ -100,11 +101,18 @@ class LearnedShapes:
         cls, places: Sequence[Place], weights: Array, roots: Sequence[Array], m: int
     ) -> LearnedShapes:
         """Decompose covariances C Cᵀ, given by C (m, l), scaled to the trace 1."""
+        decomposed: dict[int, tuple[Array, Array]] = {}
+        widths = np.array([root.shape[1] for root in roots])
+        for width in np.unique(widths):
+            alike = np.flatnonzero(widths == width)
+            # Together they take a third less time than one by one.
+            grams = np.stack([roots[i].T @ roots[i] for i in alike.tolist()])
+            decomposed |= zip(alike.tolist(), zip(*np.linalg.eigh(grams), strict=True), strict=True)
         vectors, shares = [np.zeros((m, 0))], []
-        for root in roots:
-            values, turned = np.linalg.eigh(root.T @ root)
+        for i, root in enumerate(roots):
+            values, turned = decomposed[i]
             kept = np.flatnonzero(values > LEAST * values.sum())[-KEPT:]
-            vectors.append(root @ turned[:, kept] / np.sqrt(values[kept]))
+            vectors.append(root @ (turned[:, kept] / np.sqrt(values[kept])))
             shares.append(values[kept] / values[kept].sum())
         return cls(tuple(places), weights, np.concatenate(vectors, axis=1), tuple(shares))
 
@@ -121,6 +129,17 @@ class LearnedShapes:
             len(basis),
         )
 
+    def at(self, places: Collection[Place]) -> LearnedShapes:
+        """Those of some places, whose weights sum to 1."""
+        some = [i for i, place in enumerate(self.places) if place in places]
+        vectors = self.by_shape(self.vectors)
+        return LearnedShapes(
+            tuple(self.places[i] for i in some),
+            self.weights[some] / self.weights[some].sum(),
+            np.concatenate([self.vectors[:, :0], *(vectors[i] for i in some)], axis=1),
+            tuple(self.shares[i] for i in some),
+        )
+
     def __len__(self) -> int:
         return len(self.places)
 
@@ -130,8 +149,8 @@ class LearnedShapes:
 
     def by_shape(self, along: Array) -> list[Array]:
         """Divide what there is of each eigenvector, (..., Σ k), by shape."""
-        ends = np.cumsum([len(share) for share in self.shares])
-        return np.split(along, ends[:-1], axis=-1) if len(ends) else []
+        ends = np.cumsum([0, *map(len, self.shares)]).tolist()
+        return [along[..., low:high] for low, high in pairwise(ends)]
 
 
 # --- coordinates --------------------------------------------------------------------------------
