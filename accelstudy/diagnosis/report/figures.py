@@ -308,7 +308,8 @@ def shape_figure(shape: LearnedShape) -> Figure:
     panels = figure.subplots(len(shape.components), 1, sharex=True, sharey=True)
     of, target = coordinate_of(shape.effect.coordinate), TARGETS[shape.effect.target]
     shown = plain(shape)
-    title, unit = target.words.removeprefix("the ").removeprefix("robot's "), shown_unit(target.unit)
+    title = target.words.removeprefix("the ").removeprefix("robot's ")
+    unit = shown_unit(target.unit)
     for i, (name, ax) in enumerate(zip(shape.components, panels, strict=True)):
         colour, marker = COMPONENTS[name]
         x, at = shape.where[:, i] / of.size, shape.grid
