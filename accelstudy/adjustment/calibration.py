@@ -67,7 +67,7 @@ def _calibrated(problem: CalibrationProblem) -> Adjustment:
         problem.observations,
         problem.cofactors,
         problem.initial,
-        parameter_observations=problem.initial,
+        parameter_observations=problem.direct,
         parameter_weights=problem.weights,
         latent=np.moveaxis(problem.observations[..., :3], -1, 0),
     )
@@ -102,6 +102,8 @@ class CalibrationProblem:
     """Observed sessions in the form in which `adjust` takes them.
 
     `observed` holds the forces (R, n, 3) and, if the approach uses them, the angles (R, n, 2).
+    `direct` holds what is known of the parameters directly, (R, u), and `weights` (u,) its weights:
+    gravity, and what effects know of their parameters a priori.
     """
 
     model: SensorModel
@@ -109,6 +111,7 @@ class CalibrationProblem:
     observed: tuple[Array, ...]
     cofactors: Array
     initial: Array
+    direct: Array
     weights: Array
 
     @classmethod
@@ -128,11 +131,12 @@ class CalibrationProblem:
         with_gravity = observed.sigma_gravity > 0
         equations = equations_of(model.trace, approach, with_gravity)
         initial = np.zeros((len(forces), len(equations.parameters)))
-        weights = np.zeros(len(equations.parameters))
+        direct, weights = np.zeros_like(initial), np.zeros(len(equations.parameters))
+        weights[: model.n_parameters] = model.prior_weights
         if observed.initial is not None:
             initial[:, : model.n_parameters] = observed.initial
         if with_gravity:
-            initial[:, -1] = observed.gravity
+            initial[:, -1] = direct[:, -1] = observed.gravity
             weights[-1] = observed.sigma_gravity**-2
         fixed = float(np.ravel(observed.gravity)[0])
         if not with_gravity and np.any(np.asarray(observed.gravity) != fixed):
@@ -146,8 +150,14 @@ class CalibrationProblem:
             observed=tuple(values),
             cofactors=np.concatenate(sigmas, axis=-1) ** 2,
             initial=initial,
+            direct=direct,
             weights=weights,
         )
+
+    @property
+    def with_gravity(self) -> bool:
+        """Whether gravity is observed, and the last of the parameters."""
+        return self.conditions.equations.estimates_gravity
 
     @cached_property
     def observations(self) -> Array:
@@ -159,7 +169,7 @@ class CalibrationProblem:
         forces, latent = adjusted[:, :3], adjusted[:, :3]
         if self.conditions.equations.known_force is None:
             p = parameters[: self.model.n_parameters]
-            g = parameters[-1] if self.weights.any() else self.conditions.gravity
+            g = parameters[-1] if self.with_gravity else self.conditions.gravity
             latent = self.model.sensitive_force(forces, p, g, self.conditions.hold)
         return self.conditions.linearise(
             parameters[:, None], adjusted.T[:, None], latent.T[:, None]

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from pkgutil import iter_modules
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, Self, TypeVar
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 
@@ -45,6 +45,14 @@ class Registry(Generic[Item]):
         """Class decorator: enter one object of a class into the registry under its name."""
         self.add(kind.name, kind())
         return kind
+
+    def unlisted(self, kind: Kind) -> Kind:
+        """Enter one object of a class, which `names` does not list."""
+        self._unlisted |= {kind.name}
+        return self.register(kind)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._items
 
     def get(self, name: str) -> Item:
         """Return the item of that name; raise `UnknownNameError` if there is none."""
@@ -109,6 +117,11 @@ class WithSettings:
     family: ClassVar[str] = ""
     takes: ClassVar[tuple[Setting, ...]] = ()
 
+    @classmethod
+    def chosen(cls, words: dict[str, str], settings: dict[str, float]) -> type[Self]:
+        """Return the kind that words and settings choose."""
+        return cls
+
     def __init__(self, **settings: float) -> None:
         takes = {setting.name: setting for setting in self.takes}
         for name, value in settings.items():
@@ -126,6 +139,11 @@ class WithSettings:
         self.settings = {**{setting.name: setting.default for setting in self.takes}, **settings}
 
     @property
+    def words(self) -> Mapping[str, str]:
+        """Words that choose its kind, by what they say."""
+        return {}
+
+    @property
     def summary(self) -> str:
         """First line of the docstring of the class; empty if it has none."""
         return next(iter((type(self).__doc__ or "").strip().splitlines()), "")
@@ -133,7 +151,8 @@ class WithSettings:
     @property
     def spec(self) -> str:
         """Name with its settings, ``warm_up(tau=300)``, except those that are open or `none`."""
-        fixed = [
+        fixed = [f"{name}={word}" for name, word in self.words.items()]
+        fixed += [
             f"{setting.name}={value:.12g}"
             for setting in self.takes
             if not math.isnan(value := self.settings[setting.name]) and value != setting.none
@@ -162,11 +181,15 @@ class RegistryWithSettings(Registry[ItemWithSettings]):
             return super().get(spec)
         item = super().get(match[1])
         settings: dict[str, float] = {}
+        words: dict[str, str] = {}
         for part in filter(None, map(str.strip, match[2].split(","))):
             key, _, value = part.partition("=")
             key = key.strip()
-            if key in settings:
+            if key in settings or key in words:
                 raise InputError(f"{self.kind} {spec!r}: {key} is given twice")
+            if key in item.words:
+                words[key] = value.strip()
+                continue
             try:
                 settings[key] = float(value)
             except ValueError:
@@ -174,7 +197,7 @@ class RegistryWithSettings(Registry[ItemWithSettings]):
                     f"{self.kind} {spec!r}: {part!r} is no setting; expected name=number"
                     + ("" if not item.takes else f", such as {item.takes[0].name}=300")
                 ) from None
-        return type(item)(**settings)
+        return type(item).chosen(words, settings)(**settings)
 
 
 def import_modules(package: str, path: Iterable[str]) -> None:

@@ -16,7 +16,7 @@ What it is worth: the tilt error of a calibrated sensor without and with it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,13 +26,14 @@ from accelstudy.adjustment.quality import Solution, suspects
 from accelstudy.basics.progress import stage
 from accelstudy.basics.units import GON
 from accelstudy.campaign.calibration.assessment import SUSPECT
+from accelstudy.diagnosis.decision.learned import shares_of_places
 from accelstudy.diagnosis.decision.posterior import Posterior, of_effects
 from accelstudy.diagnosis.decision.problem import Problem, is_exact
 from accelstudy.diagnosis.decision.verdict import Finding
 from accelstudy.diagnosis.evidence.detection import Chance
-from accelstudy.diagnosis.evidence.field import UNKNOWN, Unknown
-from accelstudy.diagnosis.evidence.hypotheses import strongest
+from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.next_positions import NextPosition, next_positions
+from accelstudy.diagnosis.prediction import relative_variance
 from accelstudy.diagnosis.space.examined import ExaminedFit, Frame
 from accelstudy.diagnosis.space.groups import LACK_OF_FIT, REPEAT, ROBOT, all_groups
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
@@ -173,20 +174,10 @@ class LikeShape:
 
 def like_shapes(problem: Problem, posterior: Posterior | None) -> tuple[LikeShape, ...]:
     """Places of what has no name, most probable first, beside the effect that it comes with."""
-    unknown, z = problem.field.unknown, problem.residuals.z
     told = () if posterior is None else posterior.credible_set
     names = next((one.names for one in told if UNKNOWN in one.names), None)
-    if unknown is None or names is None:
-        return ()
-    evidence = problem.evidence
-    for name in names[: names.index(UNKNOWN)]:
-        beside = strongest(problem.examined.candidates[name], z)
-        z = z - beside.basis @ (beside.basis.T @ z)
-        evidence = replace(evidence, redundancy=evidence.redundancy - beside.dim)
-        unknown = Unknown(unknown.shapes.beside(beside.basis))
-    places = unknown.by_place(evidence, z)
-    shares = special.softmax([*places.values()]).tolist()
-    like = [LikeShape(*place, p) for place, p in zip(places, shares, strict=True)]
+    shares = {} if names is None else shares_of_places(problem, names)
+    like = [LikeShape(*place, p) for place, p in shares.items()]
     return tuple(sorted(like, key=lambda one: -one.posterior))
 
 
@@ -317,7 +308,7 @@ def leveling_rms(
     ----------
     base, extended : Solution
     hold : HoldConditions, of the campaign
-    variance : float, of unit weight
+    variance : float, of unit weight of the extended fit
     """
     g = extended.gravity
     f_b, used = in_use(hold, g)
@@ -335,7 +326,8 @@ def leveling_rms(
         offset = wrapped(angles_of(corrected) - angles)
         slope = tilt_slope(model, p, output, corrected, g, used)[..., kept]
         cofactors = solution.cofactors[: len(p), : len(p)][np.ix_(kept, kept)]
-        formal = variance * np.einsum("kau,uv,kav->ka", slope, cofactors, slope)
+        taken = variance * relative_variance(extended, solution)
+        formal = taken * np.einsum("kau,uv,kav->ka", slope, cofactors, slope)
         squares.append(float(np.mean(offset**2 + formal)))
     if not np.all(np.isfinite(squares)):
         return None

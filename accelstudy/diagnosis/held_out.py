@@ -35,12 +35,14 @@ from accelstudy.diagnosis.evidence.hypotheses import (
     equivalents,
     weigh_singles,
 )
+from accelstudy.diagnosis.held_out_places import refit_of_place, simulated_places
 from accelstudy.diagnosis.prediction import (
     HELD_OUT,
     SIGNIFICANT,
     HeldOutGap,
     LinearSplit,
     held_out_gap,
+    relative_variance,
     split_positions,
 )
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
@@ -89,7 +91,7 @@ def measured_gap(finding: Finding, base: Solution) -> Gap:
     if not finding.chosen:
         return Gap(before)
     final = finding.frame.solution
-    return Gap(before, final.omega / final.redundancy)
+    return Gap(before, final.omega / final.redundancy * relative_variance(final, base))
 
 
 def predicted_gap(
@@ -131,18 +133,27 @@ def predicted_gap(
         return replace(gap, reason="the fitted positions do not determine the model")
     part = pose(replace(problem.base, solution=base))
     singles = weigh_singles(part.examined, part.field, part.evidence)
-    chosen, others = _chosen_alike(part, singles, finding)
-    refit = _refit(part, singles, chosen)
+    place = finding.place
+    if place is None:
+        chosen, others = _chosen_alike(part, singles, finding)
+        refit = _refit(part, singles, chosen)
+    else:
+        refit, others = refit_of_place(part, singles, place, finding.chosen[1:])
     if isinstance(refit, str):
         return replace(gap, reason=refit)
     rest, rng = first.observed.take(held), np.random.default_rng(seeds[1])
     test = held_out_gap(base, refit, rest, held, known, rng)
     if others:
-        reason = "the fitted positions alone would have chosen another effect"
+        another = "effect" if place is None else "coordinate or target"
+        reason = f"the fitted positions alone would have chosen another {another}"
         return replace(gap, held_out=test, reason=reason)
     rng = np.random.default_rng(seeds[2])
     split = LinearSplit(frame, fitted, held)
-    test = replace(test, needed=threshold(problem, weighing.classes, beyond, part, split, rng))
+    if place is None:
+        least = threshold(problem, weighing.classes, beyond, part, split, rng)
+    else:
+        least = _exceeded(*simulated_places(problem, place, beyond, SETS, part, split, rng))
+    test = replace(test, needed=least)
     gap = replace(gap, held_out=test, confirmed=test.significant)
     alone = finding.verdict == "named" and len(finding.chosen) == 1
     if not gap.confirmed or not alone:
@@ -258,6 +269,13 @@ def threshold(
     weights = np.exp(-field.proposal(parts[sets]))
     chosen, values = _on_the_part(part, split, noise[sets], rng)
     confirmed = np.array([label.get(name, -2) for name in chosen]) == top[sets]
+    return _exceeded(values, weights, confirmed)
+
+
+def _exceeded(values: Array, weights: Array, confirmed: NDArray[np.bool_]) -> float:
+    """Value that `confirmed` values (s,) with weights exceed with the probability `LEVEL`."""
+    if not len(values):
+        return SIGNIFICANT
     order = np.argsort(-values)
     rate = np.cumsum(np.where(confirmed, weights, 0.0)[order]) / weights.sum()
     place = min(int(np.searchsorted(rate, LEVEL)), len(order) - 1)

@@ -5,7 +5,8 @@
 3. The total evidence that anything is missing is compared with noise alone (`detect`).
 4. If anything is, every hypothesis and every pair is weighed, which gives the verdict (`weigh`,
    `find`). If not, the tests of the noise decide (`tests_of_noise`, `judge_noise`).
-5. What is certain is added, even if the whole has no name (`with_what_is_certain`).
+5. What is certain is added, even if the whole has no name (`with_what_is_certain`); and what has
+   none, but a plain place, is learned (`with_a_learned_shape`).
 6. Positions that were not used confirm an effect, or do not (`predicted_gap`), or refute it.
 
 That is all that `judge` does. `diagnose` adds what follows from the verdict: where the disagreement
@@ -33,6 +34,7 @@ from accelstudy.diagnosis.consequences import (
     separating_positions,
 )
 from accelstudy.diagnosis.decision.certain import with_what_is_certain, without_the_refuted
+from accelstudy.diagnosis.decision.learned import with_a_learned_shape
 from accelstudy.diagnosis.decision.posterior import weigh
 from accelstudy.diagnosis.decision.problem import Problem, fit_base, is_exact, pose
 from accelstudy.diagnosis.decision.statement import with_purity
@@ -52,7 +54,9 @@ from accelstudy.diagnosis.decision.verdict import (
 )
 from accelstudy.diagnosis.evidence.detection import SIMULATIONS, Chance, detect
 from accelstudy.diagnosis.held_out import measured_gap, predicted_gap
+from accelstudy.diagnosis.prediction import relative_variance
 from accelstudy.diagnosis.result import Diagnosis, Verdict, level_of_effects
+from accelstudy.diagnosis.shape import shape_of
 from accelstudy.sensors.plausibility import implausible_parameters
 from accelstudy.sensors.sensor import SensorModel
 
@@ -80,7 +84,8 @@ def diagnose(
     judged = _judged(campaign, model, approach, seed)
     verdict, problem, finding = judged.verdict, judged.problem, judged.finding
     base, final, variance = verdict.base, finding.frame.solution, verdict.unit_variance
-    location = locate(problem, judged.chance, finding, variance)
+    ratio = relative_variance(final, base)
+    location = locate(problem, judged.chance, finding, variance * ratio)
     leveling = None
     if finding.chosen:
         leveling = leveling_rms(base, final, problem.frame.hold, variance)
@@ -96,6 +101,7 @@ def diagnose(
         location=location.shares,
         location_by_chance=location.by_chance,
         not_located=location.untestable,
+        shape=shape_of(problem, finding, variance) if verdict.verdict == "learned" else None,
         like=like_shapes(problem, finding.posterior) if verdict.verdict == "unknown" else (),
         leveling=leveling,
         changes=parameter_changes(problem, finding, variance),
@@ -152,6 +158,7 @@ def _judged(
             weighing = weigh(problem, detection, chance)
             finding = with_what_is_certain(problem, weighing, find(problem, weighing))
             finding = unless_weak(problem, detection, finding)
+            finding = with_a_learned_shape(problem, finding)
         if finding.verdict == "no_effect":
             worst = worst_of(tests_of_noise(problem, frame, campaign, chance))
             if worst is not None:
@@ -160,15 +167,18 @@ def _judged(
                 finding = with_what_is_certain(problem, weighing, finding)
 
     gap = measured_gap(finding, base.solution)
-    if weighing is not None and finding.chosen and finding.verdict != "gross_error":
-        with stage("held-out positions"):
-            beyond = detection.by_chance.beyond(level)
-            given = unit_variance(problem, finding.frame) if stated else None
-            gap = predicted_gap(
-                gap, problem, weighing, finding, beyond, given, [seeds[k] for k in (1, 2, 4)]
-            )
-        if gap.held_out is not None and gap.held_out.refutes:
-            finding = without_the_refuted(finding, frame, gap.held_out)
+    if weighing is not None and finding.verdict != "gross_error":
+        beyond = detection.by_chance.beyond(level)
+        while finding.chosen:
+            with stage("held-out positions"):
+                given = unit_variance(problem, finding.frame) if stated else None
+                gap = predicted_gap(
+                    gap, problem, weighing, finding, beyond, given, [seeds[k] for k in (1, 2, 4)]
+                )
+            if gap.held_out is None or not gap.held_out.refutes:
+                break
+            # Without a learned function, what is certain is left.
+            finding = finding.unlearned or without_the_refuted(finding, frame, gap.held_out)
             gap = measured_gap(finding, base.solution)
     if weighing is not None:
         finding = with_unrecorded(problem, weighing, finding)
@@ -199,6 +209,7 @@ def _judged(
             weak=finding.weak and recognised is None,
             credible_set=finding.credible_set,
             found=named,
+            place=finding.place if recognised is None else None,
             base=base.solution,
             frame=frame,
             final=finding.frame,

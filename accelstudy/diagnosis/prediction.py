@@ -141,14 +141,18 @@ def held_out_gap(
     gain = np.mean(before - after, axis=1)
     resampled = gain[rng.integers(len(gain), size=(RESAMPLES, len(gain)))].mean(axis=1)
     low, high = np.quantile(resampled, [0.025, 0.975])
+    cofactors = extended.cofactors / relative_variance(extended, base)
     spread, usual = (
-        float(np.einsum("mu,uv,mv->", p.slope, fit.cofactors, p.slope))
-        for p, fit in ((second, extended), (first, base))
+        float(np.einsum("mu,uv,mv->", p.slope, q, p.slope))
+        for p, q in ((second, cofactors), (first, base.cofactors))
     )
     along = d @ second.slope
-    # The noise of its size makes a correction too large on average, and misses by it.
-    missed = float(d @ second.white) + (spread - usual) * variance
-    noise = float(d @ d + along @ extended.cofactors @ along) * variance
+    missed = float(d @ second.white)
+    if not extended.model.prior_weights.any():
+        # The noise of its size makes a correction too large on average, and misses by it. With a
+        # prior it is as much smaller.
+        missed += (spread - usual) * variance
+    noise = float(d @ d + along @ cofactors @ along) * variance
     return HeldOutGap(
         before=float(before.mean()),
         after=float(after.mean()),
@@ -159,6 +163,12 @@ def held_out_gap(
         misses=(first.misses, second.misses),
         short=float(missed / np.sqrt(noise)) if noise > 0 else 0.0,
     )
+
+
+def relative_variance(one: Solution, other: Solution) -> float:
+    """Ratio of the variances of unit weight of two fits that take different sigmas."""
+    taken = [float(np.mean(np.asarray(fit.observed.sigma_force))) for fit in (one, other)]
+    return (taken[0] / taken[1]) ** 2
 
 
 @dataclass(frozen=True)

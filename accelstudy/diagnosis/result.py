@@ -21,7 +21,9 @@ from accelstudy.diagnosis.evidence.detection import Detection
 from accelstudy.diagnosis.evidence.noise_tests import NoiseTest
 from accelstudy.diagnosis.held_out import Gap
 from accelstudy.diagnosis.next_positions import NextPosition
+from accelstudy.diagnosis.shape import LearnedShape
 from accelstudy.diagnosis.space.examined import Frame
+from accelstudy.diagnosis.space.shapes import Place
 from accelstudy.diagnosis.visibility import UpperLimit
 from accelstudy.sensors.sensor import SensorModel
 
@@ -48,7 +50,8 @@ class Verdict:
     campaign : Campaign, with a recognised gross error mended
     approach : Approach
     model, extended : SensorModel, without and with the effects that were found
-    verdict : str, "no_effect", "named", "narrowed", "unknown", "noise_model" or "gross_error"
+    verdict : str, "no_effect", "named", "narrowed", "learned", "unknown", "noise_model" or
+        "gross_error"
     reason : str, why the verdict is what it is
     says_the_level : bool, whether the reason says how large the residuals are
     coloured : float, probability of coloured noise that may be an effect of an absent column
@@ -56,6 +59,7 @@ class Verdict:
     weak : bool, whether there is evidence that something is missing, too weak for a verdict
     credible_set : tuple of Explanation, most probable first; empty if nothing is missing
     found : tuple of Named; of the unknown, what is certain all the same
+    place : Place or None, coordinate and target of a learned function, which is found first
     base : Solution, of the base model with equal axes
     frame : Frame, of the base fit with unequal axes weighted
     final : Frame, of the extended fit, or the same
@@ -84,6 +88,7 @@ class Verdict:
     weak: bool
     credible_set: tuple[Explanation, ...]
     found: tuple[Named, ...]
+    place: Place | None
     base: Solution
     frame: Frame
     final: Frame
@@ -141,6 +146,7 @@ class Diagnosis(Verdict):
     location : dict of group to the share of the excess χ², where it tells
     location_by_chance : dict of these groups to the share that any pattern has on average
     not_located : dict of the other groups to the reason why nothing can be told of them
+    shape : LearnedShape or None, the function that was learned
     like : tuple of LikeShape, where something without a name may live, most probable first
     leveling : (float, float), tilt error without and with what was found, rad, or None
     changes : tuple of Change, of the parameters of the base model by effects that were added
@@ -156,6 +162,7 @@ class Diagnosis(Verdict):
     location: Mapping[str, float]
     location_by_chance: Mapping[str, float]
     not_located: Mapping[str, str]
+    shape: LearnedShape | None
     like: tuple[LikeShape, ...]
     leveling: tuple[float, float] | None
     changes: tuple[Change, ...]

@@ -12,6 +12,7 @@ from accelstudy.effects.base import (
     effect_names,
     effects_without,
     get_effect,
+    is_effect,
     register,
 )
 from accelstudy.effects.hold_conditions import HoldConditions
@@ -26,6 +27,7 @@ __all__ = [
     "effect_names",
     "effects_without",
     "get_effect",
+    "is_effect",
     "register",
 ]
 

@@ -105,6 +105,11 @@ class Effect(WithSettings):
         return ", ".join(t.replace("**2", "²").replace("**3", "³").replace("*", " ") for t in texts)
 
     @property
+    def deviations(self) -> NDArray[np.float64]:
+        """Standard deviations of the parameters a priori, (k,), SI; infinite if unknown."""
+        return np.full(len(self.parameters), np.inf)
+
+    @property
     def typical(self) -> tuple[float, float]:
         """Usual size of a parameter from good to cheap equipment, SI."""
         g, some = STANDARD_GRAVITY, 0.5
@@ -192,7 +197,13 @@ def _part(kind: type[Effect], kept: tuple[int, ...]) -> type[Effect]:
 _registry: RegistryWithSettings[Effect] = RegistryWithSettings("effect")
 effect_names = _registry.names
 register = _registry.register
+unlisted = _registry.unlisted
 effects_without = _registry.without
+
+
+def is_effect(name: str) -> bool:
+    """Whether there is an effect of that name, listed or not."""
+    return name in _registry
 
 
 @cache

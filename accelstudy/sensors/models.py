@@ -15,7 +15,7 @@ from functools import cache
 from typing import Any
 
 from accelstudy.basics.errors import InputError, UnknownNameError
-from accelstudy.effects import Effect, effect_names, get_effect
+from accelstudy.effects import Effect, effect_names, get_effect, is_effect
 from accelstudy.files.reading import read_layer
 from accelstudy.sensors.sensor import SensorModel
 
@@ -111,7 +111,7 @@ def compose(name: str, effects: tuple[str, ...]) -> SensorModel:
 
 
 def _is_effect(text: str) -> bool:
-    return re.split(r"[(\[\s]", text)[0] in effect_names()
+    return is_effect(re.split(r"[(\[\s]", text)[0])
 
 
 def _composed(specs: Sequence[str], source: str) -> SensorModel:

@@ -73,6 +73,11 @@ class SensorModel:
         """Which parameters, (u,), belong to the sensor and not to the rig."""
         return np.array([e.part == "sensor" for e in self.effects for _ in e.parameters], bool)
 
+    @cached_property
+    def prior_weights(self) -> NDArray[np.float64]:
+        """Weights (u,) of the parameters, observed as zero a priori; 0 if nothing is known."""
+        return np.concatenate([np.zeros(0), *(effect.deviations**-2 for effect in self.effects)])
+
     def vector(self, values: Mapping[str, float]) -> NDArray[np.float64]:
         """Parameter vector (u,) in SI from a mapping; parameters that it does not name are zero."""
         return np.array([values.get(name, 0.0) for name in self.parameter_names], dtype=float)

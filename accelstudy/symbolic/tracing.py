@@ -47,12 +47,18 @@ def symbols(*names: str) -> tuple[sp.Symbol, ...]:
 
 def derivative(expressions: Sequence[Any], variables: Sequence[sp.Symbol]) -> sp.Matrix:
     """Jacobian matrix; the derivative of a step is zero, as it is almost everywhere."""
-    matrix = sp.Matrix(list(expressions)).jacobian(list(variables))
+    matrix = sp.Matrix([_slopes(sp.sympify(e), variables) for e in expressions])
     # SymPy leaves that of a step as it is if it does not know what steps to be finite.
     of_step = matrix.atoms(sp.Derivative)
     assert all(isinstance(left.expr, sp.sign) for left in of_step)
     matrix = matrix.xreplace(dict.fromkeys(of_step, sp.S.Zero))
     return matrix.replace(sp.DiracDelta, lambda *_: sp.S.Zero)
+
+
+def _slopes(expression: Any, variables: Sequence[sp.Symbol]) -> list[Any]:
+    """Derivatives of an expression; SymPy would look for each variable in each term of a sum."""
+    terms = [(term, term.free_symbols) for term in sp.Add.make_args(expression)]
+    return [sp.Add(*(t.diff(v) for t, free in terms if v in free)) for v in variables]
 
 
 def inverse(matrix: sp.Matrix) -> sp.Matrix:

@@ -10,8 +10,9 @@ from scipy import stats
 from accelstudy.diagnosis.evidence.size import SHAPE_SIZES, SHAPE_WEIGHTS, Evidence, Level
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.words import verdict_lines
-from accelstudy.diagnosis.space.shapes import LEAST, LENGTHS, LearnedShapes
+from accelstudy.diagnosis.space.shapes import LEAST, LearnedShapes
 from accelstudy.effects import get_effect
+from accelstudy.effects.smooth import LENGTHS
 from accelstudy.sensors.models import get_model
 
 R = 30

@@ -80,7 +80,7 @@ def held_out(model: SensorModel, approach: Approach, observed: Observations) -> 
     angles = None
     if observed.angles is not None and approach.uses_angles:
         p = x[:, : model.n_parameters]
-        g = x[:, -1] if problem.weights.any() else np.full(n, problem.conditions.gravity)
+        g = x[:, -1] if problem.with_gravity else np.full(n, problem.conditions.gravity)
         # Each position has parameters of its own, so they are sessions of one position.
         hold = None if observed.hold is None else observed.hold.take(np.arange(n)[:, None])
         f_b = model.correct(observed.forces[0][:, None], p, g, hold)[:, 0]
@@ -94,13 +94,16 @@ def _refitted(problem: CalibrationProblem, c: int) -> tuple[Array, Array, Array]
     """Parameters (n, u), misclosures (n, c) and their cofactors, each without one position."""
     n, u = problem.observations.shape[1], len(problem.weights)
     forces = np.repeat(np.moveaxis(problem.observations[..., :3], -1, 0), n, axis=1)
-    initial = np.repeat(np.pad(problem.initial, ((0, 0), (0, c))), n, axis=0)
+    initial, direct = (
+        np.repeat(np.pad(values, ((0, 0), (0, c))), n, axis=0)
+        for values in (problem.initial, problem.direct)
+    )
     result = adjust(
         _WithoutOne(problem.conditions, c),
         np.repeat(problem.observations, n, axis=0),
         problem.cofactors,
         initial,
-        parameter_observations=initial,
+        parameter_observations=direct,
         parameter_weights=np.pad(problem.weights, (0, c)),
         latent=np.concatenate([forces, np.eye(n)[None]]),
     )

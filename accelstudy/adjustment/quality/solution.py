@@ -51,8 +51,8 @@ class Solution:
     jac_parameters : (n, c, u) array, A
     jac_observations : (n, c, o) array, B
     misclosures : (n, c) array, w = ψ(l + v, x) − B v, m/s²; of the raw readings
-    prior : (k, u) array and (k,) array, rows of unit weight of Ã and of e for observed gravity;
-        k is 0 or 1
+    prior : (k, u) array and (k,) array, rows of unit weight of Ã and of e for what is known of
+        parameters directly: of those with a prior, and of observed gravity, which is the last
     omega : float, Ω
     redundancy : int, r
     """
@@ -156,7 +156,7 @@ def solve(
 
     problem = CalibrationProblem.of(model, approach, observed)
     x, v = result.parameters[0], result.residuals[0]
-    gravity = float(x[-1]) if problem.weights.any() else float(np.ravel(observed.gravity)[0])
+    gravity = float(x[-1]) if problem.with_gravity else float(np.ravel(observed.gravity)[0])
     at = problem.linearised(x, problem.observations[0] + v)
     b = np.moveaxis(at.jac_observations[:, :, 0], -1, 0)
     root_weight = np.sqrt(problem.weights)
@@ -173,7 +173,7 @@ def solve(
         jac_parameters=np.moveaxis(at.jac_parameters[:, :, 0], -1, 0),
         jac_observations=b,
         misclosures=at.psi[:, 0].T - np.einsum("nco,no->nc", b, v),
-        prior=(np.diag(root_weight)[seen], (root_weight * (x - problem.initial[0]))[seen]),
+        prior=(np.diag(root_weight)[seen], (root_weight * (x - problem.direct[0]))[seen]),
         omega=float(result.omega[0]),
         redundancy=result.redundancy,
     )

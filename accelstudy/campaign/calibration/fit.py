@@ -269,7 +269,16 @@ def fit_campaign(
             f"{campaign.name}: the adjustment of the model {model.name!r} does not converge; "
             f"{_cause(campaign, theory, diagnosing)}"
         )
-    return CampaignFit(campaign, model, approach, observed, adjustment, theory)
+    fit = CampaignFit(campaign, model, approach, observed, adjustment, theory)
+    if campaign.sigma_force is None and model.prior_weights.any() and adjustment.redundancy > 0:
+        # What is known a priori needs a sigma beside it: that of the residuals.
+        for _ in range(3):
+            sigma = max(fit.sigma_position_posteriori, 1e-9, least_sigma(campaign, approach))
+            observed = replace(observed, sigma_force=sigma)
+            adjustment = calibrate(model, approach, observed)
+            if adjustment.converged[0]:
+                fit = replace(fit, observed=observed, adjustment=adjustment)
+    return fit
 
 
 def campaign_estimability(

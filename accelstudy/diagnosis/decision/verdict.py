@@ -49,6 +49,8 @@ from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.groups import LACK_OF_FIT, LackOfFit, clusters
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis, Spaces
 from accelstudy.diagnosis.space.residuals import Residuals
+from accelstudy.diagnosis.space.shapes import Place
+from accelstudy.effects.learned import LEARNED
 from accelstudy.sensors.plausibility import impossible_parameters
 
 LARGE = 300.0
@@ -86,7 +88,8 @@ class Finding:
 
     Attributes
     ----------
-    verdict : str, "no_effect", "named", "narrowed", "gross_error", "noise_model" or "unknown"
+    verdict : str, "no_effect", "named", "narrowed", "learned", "gross_error", "noise_model" or
+        "unknown"
     frame : Frame, of the fit with what was chosen, or of the base fit
     reason : str
     chosen : tuple of Choice; of the unknown, what is certain
@@ -98,6 +101,8 @@ class Finding:
     left_over : bool, whether the best explanation leaves more than noise
     certain : tuple of Part, what is missing whatever else is open
     open : tuple of Explanation, what may be missing beside that
+    place : Place or None, coordinate and target of a learned function, which is the first chosen
+    unlearned : Finding or None, what is said without that function
     """
 
     verdict: str
@@ -112,6 +117,8 @@ class Finding:
     left_over: bool = False
     certain: tuple[Part, ...] = ()
     open: tuple[Explanation, ...] = ()
+    place: Place | None = None
+    unlearned: Finding | None = None
 
     @property
     def alternatives(self) -> tuple[Explanation, ...]:
@@ -187,17 +194,17 @@ def _judged(problem: Problem, weighing: Weighing, posterior: Posterior) -> Findi
         reason = f"{_explained(top.names)} most of it, but a model with it has no solution"
         return Finding("unknown", problem.frame, reason, posterior=posterior)
     best, solution = fit
-    left = _misfit(problem, solution)
+    left = misfit(problem, solution)
     if left:
         reason = f"with {comma_list(grouped(top.names))} added, the residuals are still {left}"
         return Finding("unknown", problem.frame, reason, posterior=posterior, left_over=True)
-    if impossible := _impossible(solution):
-        reason = f"with {comma_list(grouped(top.names))} added, no sensor has {impossible}"
+    if beyond := impossible(solution):
+        reason = f"with {comma_list(grouped(top.names))} added, no sensor has {beyond}"
         return Finding("unknown", problem.frame, reason, posterior=posterior)
     return _with_a_fit(problem, posterior, best, solution)
 
 
-def _impossible(solution: Solution) -> str:
+def impossible(solution: Solution) -> str:
     """Parameters that are beyond their physical bounds; empty if none is."""
     sigma = np.sqrt(np.diag(solution.cofactors) * max(1.0, solution.omega / solution.redundancy))
     u = solution.model.n_parameters
@@ -361,7 +368,7 @@ def _beside(problem: Problem, count: int, alone: Weighed, solution: Solution) ->
     return weighed
 
 
-def _misfit(problem: Problem, solution: Solution) -> str:
+def misfit(problem: Problem, solution: Solution) -> str:
     """Say how much larger than the noise the residuals still are; empty if they are not.
 
     The noise is the given sigma. Where none is given, or where repeated positions refute it even
@@ -535,7 +542,8 @@ def describe(
     of_settings = iter(sigma[len(solution.parameters) :].tolist())
     named = []
     for choice in finding.chosen:
-        best, p = choice.best, detection.p_family[choice.best.name]
+        best, name = choice.best, choice.best.name
+        p = detection.p_family[UNKNOWN if name == LEARNED else name]
         if best.place is not None:
             label = int(labels[best.place])
             named.append(Named(OUTLIER, OUTLIER, (OUTLIER,), p, choice.probability, position=label))
@@ -546,7 +554,7 @@ def describe(
         examined, members = problem.examined, choice.members
         searched = [s for s in best.effect.takes if s.name == best.smooth]
         # What is beside a large effect was found in what its refit leaves, with other slopes.
-        here = examined.hypothesis(best.effect)
+        here = None if name == LEARNED else examined.hypothesis(best.effect)
         near, imitators = (
             ((), ()) if here is None else (examined.nearest(here), examined.imitators(here))
         )
@@ -558,11 +566,11 @@ def describe(
                 p_value=p,
                 posterior=choice.probability,
                 rivals=tuple(
-                    (name, cosine)
-                    for name, cosine in near
-                    if cosine >= RIVAL and name not in members
+                    (other, cosine)
+                    for other, cosine in near
+                    if cosine >= RIVAL and other not in members
                 ),
-                imitators=tuple(name for name in imitators if name not in members),
+                imitators=tuple(other for other in imitators if other not in members),
                 parameters=tuple(
                     (q.name, float(solution.parameters[i]), float(sigma[i]), q.unit)
                     for q, i in places

@@ -33,7 +33,7 @@ AT_ONCE = 500_000
 
 
 SLOPES = 1
-"""Stream of the slopes, apart from all others of the same seed."""
+"""Stream of the slopes and of priors, apart from all others of the same seed."""
 KEPT = 16_000_000
 """Most numbers that are kept; more are drawn anew whenever they are needed."""
 
@@ -47,7 +47,7 @@ class Chance:
     Parameters
     ----------
     seed : SeedSequence
-    conditions : int, of the positions in the fit with the most
+    conditions : int, of the positions in the fit with the most; a prior of parameters adds some
     simulations : int
     """
 
@@ -80,10 +80,10 @@ class Chance:
         rng = np.random.default_rng(np.random.SeedSequence(self.seed.entropy, spawn_key=key))
         for drawn in track(self.kept or self.noise(), "null simulation", len(self.counts)):
             noise = drawn[:, :m]
-            if residuals.slopes:
+            more = m - noise.shape[1] + residuals.slopes
+            if more:
                 # From a stream of their own: the draws of the positions stay what they are.
-                slopes = rng.standard_normal((len(noise), residuals.slopes))
-                noise = np.concatenate([noise, slopes], axis=1)
+                noise = np.concatenate([noise, rng.standard_normal((len(noise), more))], axis=1)
             yield noise - (noise @ residuals.absorbed) @ residuals.absorbed.T
 
     def errors_with_effects(self, residuals: Residuals, field: Field) -> Iterator[Array]:

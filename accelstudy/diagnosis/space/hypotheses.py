@@ -103,10 +103,13 @@ class Hypothesis:
     def shown(self) -> Effect | None:
         """Return the effect with as many of its parameters as the positions can tell apart.
 
-        Those that no position shows are left out. Where only combinations show, the parameters that
-        are kept stand for them, and the others are zero.
+        Those that no position shows are left out, unless something is known of them a priori.
+        Where only combinations show, the parameters that are kept stand for them, and the others
+        are zero.
         """
         if self.effect is None or self.dim == len(self.effect.parameters):
+            return self.effect
+        if np.isfinite(self.effect.deviations).all():
             return self.effect
         from scipy.linalg import qr  # slow to import, and seldom needed
 

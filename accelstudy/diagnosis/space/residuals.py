@@ -224,7 +224,7 @@ def ideal_residuals(solution: Solution) -> tuple[Residuals, Array]:
         angles = angles_of(forces)
     problem = CalibrationProblem.of(model, approach, observed)
     x = np.zeros(problem.initial.shape[1])
-    if problem.weights.any():
+    if problem.with_gravity:
         x[-1] = g
     values = [forces, angles] if approach.uses_angles else [forces]
     at = problem.linearised(x, np.concatenate(values, axis=1))

@@ -1,11 +1,9 @@
 """Shapes: what is missing as a smooth function of a coordinate, whether it has a name or not.
 
 A shape is a coordinate of the holds, a target that depends on it, and a smoothness. Its function is
-a Gaussian process in its Hilbert-space form (Solin & Särkkä 2020, Stat. Comput. 30, 419): h(c) =
-Σ_j w_j φ_j(c), with sines φ_j, or harmonics of an angle, and w_j ~ N(0, S_j), S_j the spectral
-density of a squared exponential at the frequency of φ_j. In the space of residuals it has the
-covariance λ K, K = Φ S Φᵀ scaled to the trace 1, with Φ what the model leaves of the functions. An
-effect of the catalogue is the case K = Q Qᵀ/d.
+h(c) = Σ_j w_j φ_j(c), with the φ_j and the prior variances S_j of the w_j that `effects.smooth`
+has. In the space of residuals it has the covariance λ K, K = Φ S Φᵀ scaled to the trace 1, with Φ
+what the model leaves of the functions. An effect of the catalogue is the case K = Q Qᵀ/d.
 
 Because S falls with the frequency, a shape does not pay for all of its dimensions.
 """
@@ -17,7 +15,7 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,18 +24,19 @@ from scipy.linalg import block_diag
 from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.signatures import Moment, rate_of
 from accelstudy.effects import get_effect
+from accelstudy.effects.smooth import (
+    CYCLES,
+    LENGTHS,
+    OMEGA,
+    ORDERS,
+    harmonics,
+    sines,
+    spectrum,
+)
 from accelstudy.leveling.angles import wrapped
 
 Array = NDArray[np.float64]
 
-LENGTHS = (0.25, 0.6, 1.5)
-"""Length scales, of a coordinate that goes from −1 to 1, of an angle in rad, or of a direction."""
-SINES, EDGE = 12, 1.5
-"""Sines of a coordinate; they vanish this far from its middle."""
-HARMONICS = 4
-"""Harmonics of an angle."""
-CYCLES = np.arange(1.0, 5.01, 0.25)
-"""Cycles of a periodic function of time in a session."""
 DIRECTIONS, SOME = 12, 60
 """Functions of the direction of gravity for each axis, and directions that they are made of."""
 SURVIVES = 3e-3
@@ -230,24 +229,20 @@ def _sines(at: Course, values: Array) -> tuple[Course, Array]:
     """Sines of a coordinate (n, a), and their prior variances."""
     low, high = values.min(axis=0), values.max(axis=0)
     half = np.where(high > low, (high - low) / 2, 1.0)
-    omega = np.pi / (2 * EDGE) * np.arange(1, SINES + 1)
 
     def course(now: Moment) -> Array:
-        scaled = (at(now) - (low + high) / 2) / half
-        return np.asarray(np.sin(omega * (scaled[..., None] + EDGE)))
+        return np.stack(sines((at(now) - (low + high) / 2) / half, np), axis=-1)
 
-    return course, _spectrum(omega)
+    return course, spectrum(OMEGA, LENGTHS)
 
 
 def _harmonics(at: Course) -> tuple[Course, Array]:
     """Harmonics of angles (n, a)."""
-    k = np.arange(1, HARMONICS + 1)
 
     def course(now: Moment) -> Array:
-        turn = k * at(now)[..., None]
-        return np.concatenate([np.sin(turn), np.cos(turn)], axis=-1)
+        return np.stack(harmonics(at(now), np), axis=-1)
 
-    return course, np.tile(_spectrum(k), 2)
+    return course, np.tile(spectrum(ORDERS, LENGTHS), 2)
 
 
 def _waves(order: str, when: Array) -> tuple[Course, Array]:
@@ -281,11 +276,6 @@ def _alike(one: Array, other: Array, length: float) -> Array:
     return np.asarray(np.exp((one @ other.T - 1) / length**2))
 
 
-def _spectrum(omega: NDArray[Any]) -> Array:
-    """Spectral density of a squared exponential, by the length scale, (3, k)."""
-    return np.asarray(np.exp(-(np.multiply.outer(LENGTHS, omega) ** 2) / 2))
-
-
 # --- targets ------------------------------------------------------------------------------------
 
 NAMES = {"square": "scale", "bias of the others": "bias"}
@@ -300,28 +290,40 @@ def _functions(
 
     Their means over the holds are zero: what is the same in all of them is no function.
     """
-    residuals, f = frame.residuals, frame.sensed
-    seen, now = residuals.by_observations, Moment(frame.hold)
-    robot = frame.solution.approach.uses_angles
+    now, robot = Moment(frame.hold), frame.solution.approach.uses_angles
     for one in _coordinates(frame):
-        course = partial(_less_its_mean, one.course, one.course(now).mean(axis=0))
+        course = partial(less_its_mean, one.course, one.course(now).mean(axis=0))
         for target in one.targets:
             place = (one.name, NAMES.get(target, target))
             if (only and place not in only) or (target in ("reading", "tilt") and not robot):
                 continue
-            if target == "reading":
-                rows = residuals.stacked(seen[..., 3:] @ _each(course(now), 2))
-            else:
-                change = partial(_change, course, target, f, frame)
-                rate = rate_of(change, frame.hold) if rates and residuals.slopes else None
-                rows = residuals.stacked(seen[..., :3] @ change(now), rate)
+            rows = function_rows(frame, target, course, rates)
             count = rows.shape[1] // one.priors.shape[1]
             # Only a bias is tried that changes as fast as that.
             rough = target != "bias" and len(one.priors) == len(LENGTHS)
             yield place, rows, np.tile(one.priors[rough:], count)
 
 
-def _less_its_mean(course: Course, mean: Array, now: Moment) -> Array:
+def function_rows(frame: Frame, target: str, course: Course, rates: bool = True) -> Array:
+    """What functions of a coordinate do to the conditions of unit weight, by components, (m, l).
+
+    Parameters
+    ----------
+    frame : Frame
+    target : str
+    course : Course
+    rates : bool, whether a function of time changes the slopes within the holds, too
+    """
+    residuals, now = frame.residuals, Moment(frame.hold)
+    seen = residuals.by_observations
+    if target == "reading":
+        return residuals.stacked(seen[..., 3:] @ _each(course(now), 2))
+    change = partial(_change, course, target, frame.sensed, frame)
+    rate = rate_of(change, frame.hold) if rates and residuals.slopes else None
+    return residuals.stacked(seen[..., :3] @ change(now), rate)
+
+
+def less_its_mean(course: Course, mean: Array, now: Moment) -> Array:
     """Functions of a coordinate that are zero on average."""
     return course(now) - mean
 

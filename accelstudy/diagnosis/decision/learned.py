@@ -1,0 +1,246 @@
+"""What has no name, but a plain place: a smooth function of one coordinate, added to the model.
+
+It takes the place of the verdict "unknown" where one coordinate and target hold most of the
+posterior. Of the shapes of that place the most probable one is fitted.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from accelstudy.adjustment.quality import Solution
+from accelstudy.diagnosis.decision import priors
+from accelstudy.diagnosis.decision.posterior import Posterior
+from accelstudy.diagnosis.decision.problem import Problem
+from accelstudy.diagnosis.decision.refits import refit
+from accelstudy.diagnosis.decision.verdict import Choice, Finding, impossible, misfit
+from accelstudy.diagnosis.evidence.field import UNKNOWN, Unknown
+from accelstudy.diagnosis.evidence.hypotheses import strongest
+from accelstudy.diagnosis.evidence.size import Evidence
+from accelstudy.diagnosis.space.examined import Frame
+from accelstudy.diagnosis.space.hypotheses import Hypothesis
+from accelstudy.diagnosis.space.shapes import NAMES, SURVIVES, Place
+from accelstudy.effects import get_effect
+from accelstudy.effects.learned import LEARNED, Learned
+from accelstudy.effects.smooth import CYCLES, LENGTHS
+
+Array = NDArray[np.float64]
+
+SIZES = np.geomspace(4.0, 4e6, 61)
+"""λ of which the most probable one gives the amplitude."""
+LIKELY = 0.01
+"""Posterior from which on an explanation counts for a place."""
+FOLLOWS = (0.1, 1.0)
+"""Lags by which a rate of temperature is taken, as parts of the time between two holds."""
+
+
+def with_a_learned_shape(problem: Problem, finding: Finding) -> Finding:
+    """Learn the function where nothing has a name, and yet it is plain where it lives."""
+    posterior = finding.posterior
+    if finding.verdict != "unknown" or posterior is None:
+        return finding
+    place, probability = most_probable_place(problem, posterior)
+    if place is None or probability < priors.SURE:
+        return finding
+    beside = [choice.best for choice in finding.chosen]
+    fitted = fit_of_place(problem, place, beside)
+    if fitted is None or misfit(problem, fitted[1]) or impossible(fitted[1]):
+        return finding
+    hypothesis, solution = fitted
+    learned = Choice(hypothesis, (LEARNED,), probability)
+    return replace(
+        finding,
+        verdict=LEARNED,
+        frame=Frame.of(solution),
+        chosen=(learned, *finding.chosen),
+        place=place,
+        unlearned=finding,
+    )
+
+
+def most_probable_place(problem: Problem, posterior: Posterior) -> tuple[Place | None, float]:
+    """Coordinate and target that hold most of a posterior, and how much of all of it."""
+    totals: dict[Place, float] = defaultdict(float)
+    for one in posterior.each:
+        if UNKNOWN in one.names and one.posterior > LIKELY:
+            for place, share in shares_of_places(problem, one.names).items():
+                totals[place] += one.posterior * share
+    if not totals:
+        return None, 0.0
+    place = max(totals, key=totals.__getitem__)
+    return place, totals[place]
+
+
+def shares_of_places(problem: Problem, names: Sequence[str]) -> dict[Place, float]:
+    """Probabilities of the places of something unknown, beside effects with some names."""
+    unknown, z, evidence = problem.field.unknown, problem.residuals.z, problem.evidence
+    if unknown is None:
+        return {}
+    for name in names[: names.index(UNKNOWN)]:
+        beside = strongest(problem.examined.candidates[name], z)
+        z = z - beside.basis @ (beside.basis.T @ z)
+        evidence = replace(evidence, redundancy=evidence.redundancy - beside.dim)
+        unknown = Unknown(unknown.shapes.beside(beside.basis))
+    if not unknown.places:
+        return {}
+    places = unknown.by_place(evidence, z)
+    shares = special.softmax([*places.values()]).tolist()
+    return dict(zip(places, shares, strict=True))
+
+
+# --- the shapes of a place ----------------------------------------------------------------------
+
+
+def shapes_of(place: Place, frame: Frame) -> Iterator[Learned]:
+    """Shapes of a place as effects, with the amplitude 1; none where no effect can stand for it.
+
+    A step to the next hold is no cause, and a way that the robot moved is in no column.
+    """
+    coordinate, of = place
+    targets = [of, *(target for target, name in NAMES.items() if name == of and target == "square")]
+    lengths = LENGTHS if of == "bias" else LENGTHS[1:]
+    for target in targets:
+        for words in _coordinates(coordinate, frame):
+            for length in lengths:
+                yield _shape({**words, "target": target, "length": length})
+    if place == ("time", "bias"):
+        column = _course(frame)
+        for cycles in CYCLES:
+            period = np.ptp(frame.hold.column(column)) / cycles
+            yield _shape({"coordinate": f"{column} wave", "target": of, "period": period})
+
+
+def _coordinates(coordinate: str, frame: Frame) -> Iterator[dict[str, str | float]]:
+    """Coordinates of effects that stand for one of the session, with their ranges."""
+    hold, f = frame.hold, frame.sensed
+    if coordinate in ("angle", "yaw"):
+        yield {"coordinate": coordinate}
+    elif coordinate == "force":
+        yield {"coordinate": coordinate, **_range(f)}
+    elif coordinate == "previous":
+        steps = np.column_stack([hold.column(f"step_{axis}") for axis in "xyz"])
+        yield {"coordinate": coordinate, **_range(f - steps)}
+    elif coordinate == "dT/dt":
+        between = float(np.median(np.diff(hold.column("time")))) if hold.time is not None else 0.0
+        for lag in FOLLOWS if between > 0 else ():
+            tau = float(f"{lag * between:.4g}")
+            rate = (hold.column("temperature") - hold.lagged(tau)) / tau
+            yield {"coordinate": "temperature rate", **_range(rate), "tau": tau}
+    elif coordinate in ("time", "temperature", "vibration"):
+        column = _course(frame) if coordinate == "time" else coordinate
+        yield {"coordinate": column, **_range(hold.column(column))}
+
+
+def _course(frame: Frame) -> str:
+    """Column of the time, or of the order where there is none."""
+    return "order" if frame.hold.time is None else "time"
+
+
+def _range(values: Array) -> dict[str, float]:
+    return {"low": float(f"{values.min():.6g}"), "high": float(f"{values.max():.6g}")}
+
+
+def _shape(settings: dict[str, str | float]) -> Learned:
+    """Effect with some settings."""
+    texts = (f"{k}={v if isinstance(v, str) else f'{v:.6g}'}" for k, v in settings.items())
+    effect = get_effect(f"{LEARNED}({', '.join(texts)})")
+    assert isinstance(effect, Learned)
+    return effect
+
+
+# --- the fit ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Weighted:
+    """A shape, and how probable it is of each size.
+
+    Attributes
+    ----------
+    effect : Learned, with the amplitude 1
+    vectors, shares : (m, k) and (k,) arrays, eigenvectors and eigenvalues of K
+    trace : float, of the covariance of the residuals that the amplitude 1 makes
+    logs : (b, s) array, log density of each of b sets of residuals by `SIZES`
+    """
+
+    effect: Learned
+    vectors: Array
+    shares: Array
+    trace: float
+    logs: Array
+
+    @classmethod
+    def of(
+        cls, effect: Learned, frame: Frame, beside: Array, errors: Array, evidence: Evidence
+    ) -> Weighted | None:
+        """Weigh a shape by residuals (b, m), beside a space (m, l); None if too little shows."""
+        residuals = frame.residuals
+        rows = residuals.whitened(frame.signature(effect)) * effect.deviations
+        left = residuals.project(rows)
+        left -= beside @ (beside.T @ left)
+        trace = float(np.sum(left**2))
+        if not trace > SURVIVES * float(np.sum(rows**2)):
+            return None
+        values, turned = np.linalg.eigh(left.T @ left)
+        kept = values > 1e-6 * trace
+        vectors = left @ turned[:, kept] / np.sqrt(values[kept])
+        shares = values[kept] / trace
+        growth = SIZES[:, None] * shares
+        taken = (errors @ vectors) ** 2 @ (growth / (1 + growth)).T
+        total = np.sum(errors**2, axis=1)
+        noise, logs = evidence.of_noise(total), []
+        for level, nu in enumerate(evidence.level.freedoms):
+            rest = np.log1p(-taken / (nu + total)[:, None])
+            logs.append(noise[:, level, None] - (nu + evidence.redundancy) / 2 * rest)
+        each = np.logaddexp.reduce(logs) - np.sum(np.log1p(growth), axis=1) / 2
+        return cls(effect, vectors, shares, trace, each)
+
+
+def weighted_shapes(
+    place: Place, frame: Frame, beside: Array, errors: Array, evidence: Evidence
+) -> list[Weighted]:
+    """Shapes of a place, weighed by residuals (b, m) beside a space (m, l)."""
+    each = (Weighted.of(one, frame, beside, errors, evidence) for one in shapes_of(place, frame))
+    return [one for one in each if one is not None]
+
+
+def fit_of_place(
+    problem: Problem, place: Place, beside: Sequence[Hypothesis]
+) -> tuple[Hypothesis, Solution] | None:
+    """Fit with the most probable shape of a place beside effects; None if it has no solution.
+
+    Where no sigma is given, the prior of the function counts beside the noise that it leaves.
+    """
+    frame, evidence = problem.frame, problem.evidence
+    z, basis = frame.residuals.z, space_of(beside, len(frame.residuals.z))
+    z = z - basis @ (basis.T @ z)
+    evidence = replace(evidence, redundancy=evidence.redundancy - basis.shape[1])
+    shapes = weighted_shapes(place, frame, basis, z[None], evidence)
+    if not shapes:
+        return None
+    best = max(shapes, key=lambda one: float(np.logaddexp.reduce(one.logs[0])))
+    size = SIZES[int(np.argmax(best.logs[0]))]
+    growth, ratio, base = size * best.shares, 1.0, frame.solution
+    if not evidence.level.known:
+        taken = np.sum((z @ best.vectors) ** 2 * growth / (1 + growth))
+        ratio = float(np.sqrt(evidence.variance(float(z @ z - taken))))
+        sigma = np.asarray(base.observed.sigma_force) * ratio
+        base = replace(base, observed=replace(base.observed, sigma_force=sigma))
+    amplitude = float(f"{ratio * np.sqrt(size / best.trace):.4g}")
+    effect = type(best.effect)(**{**best.effect.settings, "amplitude": amplitude})
+    seen = best.vectors[:, growth > 1]
+    hypothesis = Hypothesis(LEARNED, effect, np.eye(len(effect.parameters)), seen, seen)
+    solution = refit(base, [*beside, hypothesis])
+    return None if solution is None else (hypothesis, solution)
+
+
+def space_of(beside: Sequence[Hypothesis], m: int) -> Array:
+    """Orthonormal basis of the spaces of some hypotheses."""
+    columns: list[Array] = [np.zeros((m, 0)), *(one.basis for one in beside)]
+    return np.linalg.qr(np.concatenate(columns, axis=1))[0]
