@@ -56,6 +56,7 @@ from accelstudy.diagnosis.evidence.detection import SIMULATIONS, Chance, detect
 from accelstudy.diagnosis.held_out import measured_gap, predicted_gap
 from accelstudy.diagnosis.prediction import relative_variance
 from accelstudy.diagnosis.result import Diagnosis, Verdict, level_of_effects
+from accelstudy.diagnosis.shape import shape_of
 from accelstudy.sensors.plausibility import implausible_parameters
 from accelstudy.sensors.sensor import SensorModel
 
@@ -100,6 +101,7 @@ def diagnose(
         location=location.shares,
         location_by_chance=location.by_chance,
         not_located=location.untestable,
+        shape=shape_of(problem, finding, variance) if verdict.verdict == "learned" else None,
         like=like_shapes(problem, finding.posterior) if verdict.verdict == "unknown" else (),
         leveling=leveling,
         changes=parameter_changes(problem, finding, variance),

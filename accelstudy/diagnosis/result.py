@@ -21,6 +21,7 @@ from accelstudy.diagnosis.evidence.detection import Detection
 from accelstudy.diagnosis.evidence.noise_tests import NoiseTest
 from accelstudy.diagnosis.held_out import Gap
 from accelstudy.diagnosis.next_positions import NextPosition
+from accelstudy.diagnosis.shape import LearnedShape
 from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.shapes import Place
 from accelstudy.diagnosis.visibility import UpperLimit
@@ -145,6 +146,7 @@ class Diagnosis(Verdict):
     location : dict of group to the share of the excess χ², where it tells
     location_by_chance : dict of these groups to the share that any pattern has on average
     not_located : dict of the other groups to the reason why nothing can be told of them
+    shape : LearnedShape or None, the function that was learned
     like : tuple of LikeShape, where something without a name may live, most probable first
     leveling : (float, float), tilt error without and with what was found, rad, or None
     changes : tuple of Change, of the parameters of the base model by effects that were added
@@ -160,6 +162,7 @@ class Diagnosis(Verdict):
     location: Mapping[str, float]
     location_by_chance: Mapping[str, float]
     not_located: Mapping[str, str]
+    shape: LearnedShape | None
     like: tuple[LikeShape, ...]
     leveling: tuple[float, float] | None
     changes: tuple[Change, ...]

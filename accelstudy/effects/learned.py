@@ -152,7 +152,7 @@ class Learned(Effect):
         """Return h, h f or h f², or what a tilt of h does."""
         if self.target == "reading":
             return super().output(f, p, g, hold, xp)
-        parts, arguments = self._parts(p), self._arguments(f, hold)
+        parts, arguments = self._parts(p), self.arguments(f, (), hold)
         h = [self._of(c, part, xp) for c, part in zip(arguments, parts, strict=False)]
         if self.coordinate == "previous":
             # Where nothing moved, or the position before is not known, it adds nothing.
@@ -163,13 +163,15 @@ class Learned(Effect):
         power = {"bias": 0, "scale": 1, "square": 2}[self.target]
         return tuple(h_i * f_i**power for h_i, f_i in zip(h, f, strict=True))
 
-    def _arguments(self, f: Sequence[Number], hold: Any) -> list[Number]:
-        """Coordinate of each axis."""
+    def arguments(self, f: Sequence[Number], angles: Sequence[Number], hold: Any) -> list[Number]:
+        """Coordinate of each component of the target."""
+        if self.coordinate == "angle":
+            return list(angles)
         if self.coordinate == "force":
             return list(f)
         if self.coordinate == "previous":
             return [a - b for a, b in zip(f, (hold.step_x, hold.step_y, hold.step_z), strict=True)]
-        return [self._column(hold)] * len(AXES)
+        return [self._column(hold)] * len(TARGETS[self.target][0])
 
     def _column(self, hold: Any) -> Number:
         """Coordinate of a hold."""
@@ -182,7 +184,7 @@ class Learned(Effect):
         """Return h of either angle, or of what both have in common."""
         if self.target != "reading":
             return super().reading(angles, p, hold, xp)
-        arguments = angles if self.coordinate == "angle" else [self._column(hold)] * len(ROBOT)
+        arguments = self.arguments((), angles, hold)
         return tuple(self._of(c, w, xp) for c, w in zip(arguments, self._parts(p), strict=True))
 
 

@@ -50,7 +50,7 @@ BADGES = {
     "no_effect": ("✓ NOTHING FOUND", "good"),
     "named": ("➜ NAMED", "found"),
     "narrowed": ("➜ NARROWED", "found"),
-    "learned": ("∿ LEARNED", "found"),
+    "learned": ("➜ LEARNED", "found"),
     "unknown": ("? UNKNOWN", "open"),
     "noise_model": ("≈ NOISE", "noise"),
     "gross_error": ("! GROSS ERROR", "wrong"),

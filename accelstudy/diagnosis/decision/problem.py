@@ -14,7 +14,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.fit import fit_campaign, least_sigma
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision import priors
-from accelstudy.diagnosis.evidence.field import Field
+from accelstudy.diagnosis.evidence.field import UNKNOWN, Field
 from accelstudy.diagnosis.evidence.noise_models import UnequalAxes
 from accelstudy.diagnosis.evidence.size import Evidence, Level
 from accelstudy.diagnosis.space.examined import ExaminedFit, Frame, examine
@@ -125,14 +125,15 @@ def pose(base: BaseFit) -> Problem:
     """Set all that the model of a fit may lack side by side.
 
     The axes are weighted by their noise where unequal axes explain the residuals better than equal
-    ones do, with nothing missing or with any single effect.
+    ones do, with nothing missing, with any single effect, or with something unknown.
     """
     first, examined, axes = base.solution, examine(base.solution), None
+    field, shown = _field(examined)
     if not is_exact(first):
         residuals = examined.frame.residuals
         evidence = Evidence(base.level, residuals.redundancy)
         axes = UnequalAxes.of(residuals, evidence, base.within)
-        if np.log(priors.AXES) + axes.log_evidence > _best_odds(examined, evidence):
+        if np.log(priors.AXES) + axes.log_evidence > _best_odds(field, evidence):
             sigma = np.sqrt(axes.ratios)
             mean = np.mean(np.sqrt(first.variances[:, :3]))
             shaped = np.broadcast_to(mean * sigma / np.mean(sigma), (len(first.variances), 3))
@@ -140,10 +141,15 @@ def pose(base: BaseFit) -> Problem:
             # With other weights a sensor that clips may have no solution.
             with suppress(InputError):
                 examined = examine(solve(first.model, first.approach, observed))
-    shown = groups(examined)
+                field, shown = _field(examined)
     evidence = Evidence(base.level, examined.frame.residuals.redundancy)
-    field = Field(examined.candidates, examined.frame, shown.get(LACK_OF_FIT))
     return Problem(base, examined, axes, shown, field, evidence)
+
+
+def _field(examined: ExaminedFit) -> tuple[Field, dict[str, Spaces]]:
+    """All candidates of a fit, and the groups of regressors."""
+    shown = groups(examined)
+    return Field(examined.candidates, examined.frame, shown.get(LACK_OF_FIT)), shown
 
 
 def is_exact(fit: Solution) -> bool:
@@ -151,11 +157,13 @@ def is_exact(fit: Solution) -> bool:
     return float(np.sqrt(np.mean(fit.misclosures**2))) < ROUNDING * fit.gravity
 
 
-def _best_odds(examined: ExaminedFit, evidence: Evidence) -> float:
-    """Log odds of the most probable single effect against nothing, at least 0."""
-    field, z = Field(examined.candidates), examined.frame.residuals.z
-    if not field.names:
+def _best_odds(field: Field, evidence: Evidence) -> float:
+    """Log odds of the most probable single thing that is missing against nothing, at least 0."""
+    if not field.names or field.frame is None:
         return 0.0
+    z = field.frame.residuals.z
+    prior = [
+        priors.UNKNOWN if name == UNKNOWN else 1 / len(field.candidates) for name in field.names
+    ]
     nothing = np.logaddexp.reduce(evidence.of_noise(z @ z))
-    odds = np.max(field.densities(evidence, z)) - np.log(len(field.names)) - nothing
-    return max(0.0, float(odds))
+    return max(0.0, float(np.max(field.densities(evidence, z) + np.log(prior)) - nothing))

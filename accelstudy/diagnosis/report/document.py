@@ -26,8 +26,10 @@ from accelstudy.campaign.calibration.fit import CampaignFit, JudgedNoise, campai
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.statement import Part
 from accelstudy.diagnosis.decision.verdict import Named
-from accelstudy.diagnosis.report.words import explanation_words, keep_base, missing
+from accelstudy.diagnosis.forms import TARGETS
+from accelstudy.diagnosis.report.words import beyond, explanation_words, keep_base, missing
 from accelstudy.diagnosis.result import Diagnosis
+from accelstudy.diagnosis.shape import LearnedShape
 from accelstudy.sensors.frames import FRD
 from accelstudy.sensors.models import MODELS, composition_name
 from accelstudy.sensors.sensor import SensorModel
@@ -93,6 +95,7 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
         "location": {name: json_number(share) for name, share in d.location.items()},
         "location_by_chance": {n: json_number(p) for n, p in d.location_by_chance.items()},
         "location_untestable": dict(d.not_located),
+        "shape": None if d.shape is None else shape_document(d.shape),
         "like": [asdict(place) for place in d.like],
         "gap": _gap(d),
         "parameter_changes": [
@@ -137,6 +140,29 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
         "redundancy": d.frame.residuals.redundancy,
         "n_positions": d.campaign.n_positions,
         "warnings": list(d.campaign.warnings),
+    }
+
+
+def shape_document(shape: LearnedShape) -> dict[str, Any]:
+    """Describe a learned function, SI."""
+    ranking = shape.ranking
+    each = list(zip(shape.components, shape.values.T, shape.sigmas.T, strict=True))
+    return {
+        "coordinate": shape.coordinate,
+        "target": shape.target,
+        "axes": list(ranking.axes),
+        "subject": ranking.subject,
+        "function": {
+            "unit": TARGETS[shape.effect.target].unit,
+            "coordinate": shape.grid.tolist(),
+            "value": {name: h.tolist() for name, h, _ in each},
+            "sigma": {name: sigma.tolist() for name, _, sigma in each},
+        },
+        "formulas": [
+            {"text": f"{ranking.subject}: {one.text}", "posterior": json_number(one.posterior)}
+            for one in ranking.formulas
+        ],
+        "least_known": list(shape.least_known),
     }
 
 
@@ -266,6 +292,8 @@ def diagnosed_calibration(diagnosis: Diagnosis) -> dict[str, Any]:
             f"The calibration takes {added}, which is certain. Its sigmas do not know of what is "
             "missing besides."
         )
+    if reach := beyond(diagnosis):
+        warnings.append(f"The function was learned from {reach}, and keeps its value beyond.")
     warnings += keep_base(diagnosis)
     weights = np.asarray(fit.observed.sigma_force)
     if weights.ndim:

@@ -14,16 +14,26 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
-from accelstudy.basics.units import display_unit, to_display
+from accelstudy.basics.units import display_unit, shown_unit, to_display
 from accelstudy.basics.wording import number, words
 from accelstudy.diagnosis.decision.posterior import CREDIBLE, Explanation
 from accelstudy.diagnosis.decision.statement import family_of
 from accelstudy.diagnosis.evidence.field import UNKNOWN
+from accelstudy.diagnosis.forms import TARGETS, coordinate_of
 from accelstudy.diagnosis.loop import CASES, Loop
 from accelstudy.diagnosis.report.document import condition_sigma
 from accelstudy.diagnosis.report.words import GROUPS
 from accelstudy.diagnosis.result import Diagnosis
-from accelstudy.drawing.style import COLUMN, FULL, INK, MISSING, log_ticks, new_figure
+from accelstudy.diagnosis.shape import LearnedShape
+from accelstudy.drawing.style import (
+    ANGLE_COLOURS,
+    COLUMN,
+    FULL,
+    INK,
+    MISSING,
+    log_ticks,
+    new_figure,
+)
 
 Array = NDArray[np.float64]
 
@@ -45,6 +55,8 @@ def diagnosis_figures(
         figures["evidence"] = lambda: evidence_figure(d)
     if len(d.credible_set) > 1:
         figures["explanations"] = lambda: explanations_figure(d.credible_set)
+    if (shape := d.shape) is not None:
+        figures["shape"] = lambda: shape_figure(shape)
     if d.gap.held_out is not None:
         figures["gap"] = lambda: gap_figure(d, positions)
     # Without sigma, no size of the residuals is too large for noise.
@@ -169,6 +181,7 @@ def evidence_figure(diagnosis: Diagnosis) -> Figure:
         n for n in names if n not in shown and (probabilities.get(n, 0) > 0.05 or n == UNKNOWN)
     ]
     named = {name for f in diagnosis.found for name in (f.name, *f.equivalence_class)}
+    named |= set() if diagnosis.shape is None else {UNKNOWN}
     colours = [AFTER if name in named else OTHER for name in shown]
     place = np.arange(len(shown))[::-1]
 
@@ -275,6 +288,57 @@ def explanations_figure(explanations: tuple[Explanation, ...]) -> Figure:
 
 def _families(explanation: Explanation) -> list[str]:
     return [family_of(*members) for members in explanation.classes]
+
+
+COMPONENTS = {
+    **AXES,
+    **{name: (colour, "o") for name, colour in ANGLE_COLOURS.items()},
+    **{"a": ("#332288", "o"), "b": ("#CC79A7", "s")},
+}
+"""Colour and marker of what depends on the coordinate of a learned function."""
+BAND = 1.96
+"""Half of a band of 95 %, in sigmas."""
+PLAIN = 3
+"""Residuals whose noise is so many times that of the best are drawn small."""
+
+
+def shape_figure(shape: LearnedShape) -> Figure:
+    """Draw a learned function with its band over its coordinate, and the residuals upon it."""
+    figure = new_figure(COLUMN, 10 + 36 * len(shape.components))
+    panels = figure.subplots(len(shape.components), 1, sharex=True, sharey=True)
+    of, target = coordinate_of(shape.effect.coordinate), TARGETS[shape.effect.target]
+    shown = plain(shape)
+    title = target.words.removeprefix("the ").removeprefix("robot's ")
+    unit = shown_unit(target.unit)
+    for i, (name, ax) in enumerate(zip(shape.components, panels, strict=True)):
+        colour, marker = COMPONENTS[name]
+        x, at = shape.where[:, i] / of.size, shape.grid
+        within = (at >= shape.where[:, i].min()) & (at <= shape.where[:, i].max())
+        h, sigma = (to_display(v[within, i], target.unit) for v in (shape.values, shape.sigmas))
+        points, grid = to_display(shape.residuals[:, i], target.unit), at[within] / of.size
+        ax.axhline(0, color=INK, linewidth=0.6)
+        ax.fill_between(grid, h - BAND * sigma, h + BAND * sigma, color=colour, alpha=0.25, lw=0)
+        ax.plot(grid, h, color=colour)
+        ax.plot(x[shown[:, i]], points[shown[:, i]], marker, color=colour, markersize=3.2)
+        limits = ax.get_ylim()
+        ax.plot(x[~shown[:, i]], points[~shown[:, i]], ".", color=OTHER, markersize=2.5)
+        ax.set_ylim(limits)
+        ax.set_ylabel(f"{title.format(name)}\n{_per_unit('h', unit)}")
+        ax.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+        if name not in shape.ranking.axes:
+            ax.set_title("no part in it shows", loc="right")
+    panels[-1].set_xlabel(_per_unit(of.words.removeprefix("the "), of.unit))
+    return figure
+
+
+def plain(shape: LearnedShape) -> NDArray[np.bool_]:
+    """Residuals (n, c) whose noise is small enough to be drawn large."""
+    return np.asarray(shape.spreads < PLAIN * shape.spreads.min(axis=0))
+
+
+def _per_unit(what: str, unit: str) -> str:
+    """Label an axis: h / (mm/s²)."""
+    return f"{what} / {f'({unit})' if '/' in unit else unit}".removesuffix(" / ")
 
 
 SIMULATION_COLOURS = {"old": "#999999", "new": "#56B4E9"}

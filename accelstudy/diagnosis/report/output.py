@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from accelstudy.basics import suggested
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.levels import REFUTED
 from accelstudy.basics.progress import stage
-from accelstudy.basics.wording import comma_list, words
+from accelstudy.basics.wording import comma_list
 from accelstudy.campaign.calibration.document import json_text
 from accelstudy.campaign.format import read_campaign
 from accelstudy.diagnosis.decision.posterior import CREDIBLE
@@ -31,7 +31,7 @@ from accelstudy.diagnosis.report.document import (
     positions_table,
     study_overlay,
 )
-from accelstudy.diagnosis.report.figures import diagnosis_figures
+from accelstudy.diagnosis.report.figures import diagnosis_figures, plain
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.diagnosis.space.examined import IMITATES
 from accelstudy.drawing.saving import save_all
@@ -180,7 +180,10 @@ def _write_report(
         equation=lambda effect: get_effect(effect["spec"]).equation,
         possible=lambda effect: wording.possible(effect["spec"]),
         is_effect=lambda name: name in effect_names(),
+        called=lambda effect: wording.called(effect["name"], effect["spec"]),
         figures=drawn,
+        beyond=wording.beyond(diagnosis),
+        small_dots=diagnosis.shape is not None and bool((~plain(diagnosis.shape)).any()),
         changed=wording.changed(diagnosis),
         keep_base=wording.keep_base(diagnosis),
         calibration=calibration,
@@ -220,7 +223,7 @@ def next_steps(
     if d.recognised is not None:
         command = suggested.calibrate(*chosen)
         steps.append(("Correct the campaign, and calibrate it then", command))
-    if d.verdict in ("narrowed", "unknown"):
+    if d.verdict in ("narrowed", "unknown", "learned"):
         which = "the next positions" if d.next_positions else "positions"
         what = f"Add {which} to the campaign, and diagnose it again"
         steps.append((what, suggested.diagnose(*chosen)))
@@ -234,9 +237,15 @@ def next_steps(
     inside = not_affine(d.extended)
     form, why = "c", ""
     if inside:
-        form, why = "json", f"; no matrix can hold {comma_list([words(name) for name in inside])}"
+        form, why = "json", f"; no matrix can hold {_held(d, inside)}"
     steps.append((f"Take it to a device{why}", suggested.export(form, result)))
     if d.extended is not d.model:
         command = suggested.calibrate("CAMPAIGN", Path(place) / "model.yaml", d.approach.name)
         steps.append(("Calibrate the next campaign with this model", command))
     return steps
+
+
+def _held(diagnosis: Diagnosis, names: Sequence[str]) -> str:
+    """Effects of some names of the extended model, as words."""
+    specs = {effect.name: effect.spec for effect in diagnosis.extended.effects}
+    return comma_list([wording.called(name, specs[name]) for name in names])

@@ -20,10 +20,12 @@ from accelstudy.diagnosis.decision.statement import (
     statement,
 )
 from accelstudy.diagnosis.decision.verdict import Named
+from accelstudy.diagnosis.forms import coordinate_of
 from accelstudy.diagnosis.next_positions import NextPosition
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.diagnosis.space.groups import COURSES, REPEAT
 from accelstudy.effects import effect_names, get_effect
+from accelstudy.effects.learned import LEARNED, Learned
 from accelstudy.pages import lines
 from accelstudy.sensors.plausibility import USUAL_CAUSE
 
@@ -60,6 +62,15 @@ TARGETS = {
 """What may be such a function."""
 
 
+def called(name: str, spec: str) -> str:
+    """Name what was found; a learned function by its coordinate."""
+    if name != LEARNED:
+        return words(name)
+    effect = get_effect(spec)
+    assert isinstance(effect, Learned)
+    return f"the function of {coordinate_of(effect.coordinate).words}"
+
+
 def too_few(diagnosis: Diagnosis) -> bool:
     """Whether nothing was found since nothing could be tested."""
     return diagnosis.verdict == "no_effect" and not diagnosis.screening.p_family
@@ -74,6 +85,9 @@ def headline(diagnosis: Diagnosis) -> str:
         return without_a_name(Statement(d.certain, d.open), _beside(d))
     if kind == "narrowed":
         names = missing(d.credible_set)
+    elif d.shape is not None:
+        named = [*(words(f.name) for f in d.found[1:]), "something that has no name here"]
+        names = f"{comma_list(named)}: {d.shape.ranking.subject}"
     else:
         # Effects beside a gross error are not its names.
         found = [f for f in d.found if kind != "gross_error" or not _is_effect(f)]
@@ -114,8 +128,8 @@ def _title(named: Named, titled: set[str]) -> str:
     """Name what was found, with all that would be the same, or with its position."""
     if named.position is not None:
         return f"{words(named.name)} {named.position}"
-    same = [name for name in named.equivalence_class if name not in titled]
-    return " or ".join(words(name) for name in (named.name, *same))
+    same = [words(name) for name in named.equivalence_class if name not in titled]
+    return " or ".join([called(named.name, named.spec), *same])
 
 
 def verdict_lines(diagnosis: Diagnosis) -> list[str]:
@@ -135,11 +149,13 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
         "most_probable": most_probable(Statement(d.certain, d.open), d.credible_set),
         "like": like(d),
         "stands_for": stands_for(d),
+        "formulas": formulas(d),
+        "beyond": beyond(d),
         "location": _location(d),
         "effects": [
             (f, effect.equation, effect.group in COURSES)
             for f in d.found
-            if _is_effect(f)
+            if _is_effect(f) and f.name != LEARNED
             for effect in [get_effect(f.spec)]
         ],
         "positions": bumped,
@@ -158,7 +174,7 @@ def advice(diagnosis: Diagnosis) -> list[str]:
     # What is slow and not told apart; where it is, the reason says what to record.
     by_heat = d.coloured >= WORTH and not d.unrecorded and d.campaign.temperature is None
     unseen = [] if d.approach.uses_angles else hidden
-    content = (unseen, "gravity_error" in d.invisible, may_repeat, by_heat)
+    content = (unseen, "gravity_error" in d.invisible, may_repeat, by_heat, more_of_it(d))
     return lines(TEMPLATE, "advice", *content)
 
 
@@ -177,12 +193,13 @@ def judged(diagnosis: Diagnosis) -> bool:
 def confirmation(diagnosis: Diagnosis) -> str:
     """Say which statement about the added effects held on positions that were not used."""
     effects = [_title(named, {named.name}) for named in diagnosis.found if _is_effect(named)]
-    return lines(TEMPLATE, "confirmation", diagnosis.gap, effects)[0]
+    learned = diagnosis.verdict == LEARNED
+    return lines(TEMPLATE, "confirmation", diagnosis.gap, effects, learned)[0]
 
 
 def changed(diagnosis: Diagnosis) -> str:
     """Say how the final fit differs: with what was added, and without what was left out."""
-    added = [words(named.name) for named in diagnosis.found if _is_effect(named)]
+    added = [called(f.name, f.spec) for f in diagnosis.found if _is_effect(f)]
     out = [str(named.position) for named in diagnosis.found if named.position is not None]
     changes = [f"with {comma_list(added)}"] if added else []
     return comma_list([*changes, *([f"without position {comma_list(out)}"] if out else [])])
@@ -226,6 +243,34 @@ def like(diagnosis: Diagnosis) -> str:
         ],
         "or",
     )  # fmt: skip
+
+
+def formulas(diagnosis: Diagnosis) -> str:
+    """Say which formulas a learned function may be; nothing if none was learned."""
+    if diagnosis.shape is None:
+        return ""
+    all_of_them = [(one.text, one.posterior) for one in diagnosis.shape.ranking.formulas]
+    return _listed([one for one in all_of_them if one[1] >= WORTH] or all_of_them[:1], "or")
+
+
+def beyond(diagnosis: Diagnosis) -> str:
+    """Say where a learned function is known; nothing if that is everywhere, or none was learned."""
+    shape = diagnosis.shape
+    if shape is None or not {"low", "high"} <= shape.effect.settings.keys():
+        return ""
+    of, settings = coordinate_of(shape.effect.coordinate), shape.effect.settings
+    return f"{of.at(settings['low'])} to {of.at(settings['high'])}"
+
+
+def more_of_it(diagnosis: Diagnosis) -> str:
+    """Say where positions would show more of a learned function; nothing if none was learned."""
+    shape = diagnosis.shape
+    if shape is None:
+        return ""
+    of = coordinate_of(shape.effect.coordinate)
+    places = comma_list([of.at(place) for place in shape.least_known], "or")
+    session = " in another session" if of.is_course else ""
+    return f"Positions{session} where {of.words} is near {places}"
 
 
 def sentence(text: str) -> str:

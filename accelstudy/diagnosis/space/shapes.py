@@ -290,28 +290,40 @@ def _functions(
 
     Their means over the holds are zero: what is the same in all of them is no function.
     """
-    residuals, f = frame.residuals, frame.sensed
-    seen, now = residuals.by_observations, Moment(frame.hold)
-    robot = frame.solution.approach.uses_angles
+    now, robot = Moment(frame.hold), frame.solution.approach.uses_angles
     for one in _coordinates(frame):
-        course = partial(_less_its_mean, one.course, one.course(now).mean(axis=0))
+        course = partial(less_its_mean, one.course, one.course(now).mean(axis=0))
         for target in one.targets:
             place = (one.name, NAMES.get(target, target))
             if (only and place not in only) or (target in ("reading", "tilt") and not robot):
                 continue
-            if target == "reading":
-                rows = residuals.stacked(seen[..., 3:] @ _each(course(now), 2))
-            else:
-                change = partial(_change, course, target, f, frame)
-                rate = rate_of(change, frame.hold) if rates and residuals.slopes else None
-                rows = residuals.stacked(seen[..., :3] @ change(now), rate)
+            rows = function_rows(frame, target, course, rates)
             count = rows.shape[1] // one.priors.shape[1]
             # Only a bias is tried that changes as fast as that.
             rough = target != "bias" and len(one.priors) == len(LENGTHS)
             yield place, rows, np.tile(one.priors[rough:], count)
 
 
-def _less_its_mean(course: Course, mean: Array, now: Moment) -> Array:
+def function_rows(frame: Frame, target: str, course: Course, rates: bool = True) -> Array:
+    """What functions of a coordinate do to the conditions of unit weight, by components, (m, l).
+
+    Parameters
+    ----------
+    frame : Frame
+    target : str
+    course : Course
+    rates : bool, whether a function of time changes the slopes within the holds, too
+    """
+    residuals, now = frame.residuals, Moment(frame.hold)
+    seen = residuals.by_observations
+    if target == "reading":
+        return residuals.stacked(seen[..., 3:] @ _each(course(now), 2))
+    change = partial(_change, course, target, frame.sensed, frame)
+    rate = rate_of(change, frame.hold) if rates and residuals.slopes else None
+    return residuals.stacked(seen[..., :3] @ change(now), rate)
+
+
+def less_its_mean(course: Course, mean: Array, now: Moment) -> Array:
     """Functions of a coordinate that are zero on average."""
     return course(now) - mean
 

@@ -1,0 +1,282 @@
+"""Forms that a learned function may have, each as a person would say it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from accelstudy.basics.units import attitude_unit, to_attitude
+from accelstudy.basics.wording import number
+from accelstudy.effects.learned import WAVES
+from accelstudy.effects.smooth import LENGTHS, OMEGA, ORDERS, harmonics, sines, spectrum
+
+Array = NDArray[np.float64]
+
+PLACES = 40
+"""Places of a step that are tried at most."""
+MOST_CYCLES, EACH = 10.0, 3
+"""Periods of a sine in the range of its coordinate at most; each needs as many different values."""
+TURNS = {1: "once per turn", 2: "twice per turn", 3: "three times per turn",
+         4: "four times per turn", 5: "five times per turn", 6: "six times per turn"}  # fmt: skip
+"""Harmonics of an angle."""
+POWERS = {1: "in proportion to it", 2: "with its square", 3: "with its cube",
+          4: "with its fourth power", 5: "with its fifth power"}  # fmt: skip
+"""Powers of a coordinate that has a zero."""
+POLYNOMIALS = {1: "in a straight line", 2: "as a parabola", 3: "as a cubic"}
+"""Of a coordinate that has none."""
+
+CONSTANTS = np.geomspace(0.03, 1.0, 12)
+"""Constants of an exponential, in ranges of its coordinate."""
+WIDTHS = np.linspace(0.1, 0.8, 8)
+"""Widths of a dead band, as parts of the largest value."""
+BUMPS = (0.06, 0.15)
+"""Standard deviations of a bump, in ranges of its coordinate."""
+
+# --- coordinates and targets --------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """How people see a coordinate.
+
+    Attributes
+    ----------
+    words : str
+    unit, step : str, of its values and of their differences
+    size : float, SI size of that unit
+    has_zero : bool, whether its zero means something
+    is_course : bool, whether it counts from a start on
+    """
+
+    words: str
+    unit: str
+    step: str
+    size: float = 1.0
+    has_zero: bool = False
+    is_course: bool = False
+
+    def at(self, value: float) -> str:
+        """Show a value."""
+        return f"{number(value / self.size)} {self.unit}"
+
+    def by(self, value: float) -> str:
+        """Show a difference of values."""
+        return f"{number(value / self.size)} {self.step}"
+
+
+def coordinate_of(name: str) -> Coordinate:
+    """Describe a coordinate of a learned effect."""
+    name = WAVES.get(name, name)
+    if name in ANGLES:
+        unit = attitude_unit()
+        return Coordinate(ANGLES[name], unit, unit, float(1 / to_attitude(1.0)))
+    return COORDINATES[name]
+
+
+ANGLES = {"angle": "the angle", "yaw": "the yaw"}
+RATE = ("K/min", "K/min", 1 / 60, True)
+FORCE = ("m/s²", "m/s²", 1.0, True)
+COORDINATES = {
+    "force": Coordinate("the force along the same axis", *FORCE),
+    "previous": Coordinate("the force in the position before", *FORCE),
+    "vibration": Coordinate("the vibration", *FORCE),
+    "temperature": Coordinate("the temperature", "°C", "K"),
+    "temperature rate": Coordinate(
+        "the rate of the temperature", "K/min", "K/min", 1 / 60, has_zero=True
+    ),
+    "time": Coordinate("the time", "min", "min", 60.0, is_course=True),
+    "order": Coordinate("the number of the position", "", "positions", is_course=True),
+}
+"""Coordinates that are no angles."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """What depends on a coordinate.
+
+    Attributes
+    ----------
+    words : str, with a place for the components
+    components : tuple of str
+    unit : str, SI
+    """
+
+    words: str
+    components: tuple[str, ...]
+    unit: str
+
+
+XYZ = ("x", "y", "z")
+TARGETS = {
+    "bias": Target("the bias of {}", XYZ, "m/s^2"),
+    "scale": Target("the scale of {}", XYZ, "1"),
+    "square": Target("the quadratic scale of {}", XYZ, "s^2/m"),
+    "reading": Target("the robot's reading of {}", ("roll", "pitch"), "rad"),
+    "tilt": Target("the tilt {} of the robot's base", ("a", "b"), "rad"),
+}
+
+
+# --- forms --------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Form:
+    """A form of functions h(c) = Σ_j a_j φ_j(c; s).
+
+    Attributes
+    ----------
+    words : str, with a place for the setting s if it has one
+    basis : callable, φ of s and of c (...), (..., k)
+    settings : (t,) array
+    shown : callable, shows a setting
+    weight : float, prior
+    is_sine : bool, of which the amplitude is told; of others it is how much they go up and down
+    is_smooth : bool, whether it changes smoothly with its setting
+    """
+
+    words: str
+    basis: Callable[[float, Array], Array]
+    settings: Array = field(default_factory=lambda: np.zeros(1))
+    shown: Callable[[float], str] = str
+    weight: float = 1.0
+    is_sine: bool = False
+    is_smooth: bool = False
+
+    def said(self, setting: float) -> str:
+        """Say it with a setting."""
+        return self.words.format(self.shown(setting))
+
+
+def forms(coordinate: str, c: Array) -> list[Form]:
+    """Forms that a function of a coordinate with the values c (n, a) may have."""
+    of, values = coordinate_of(coordinate), np.unique(c)
+    found = _of_an_angle() if coordinate in ANGLES else _of_a_range(of, values)
+    if of.has_zero:
+        found += [Form(words, partial(_power, p)) for p, words in POWERS.items()]
+        found += _about_zero(of, values) if values[0] < 0 < values[-1] else []
+    else:
+        ends = values[0], values[-1]
+        found += [Form(words, partial(_polynomial, p, ends)) for p, words in POLYNOMIALS.items()]
+    if coordinate in ("time", "order", "vibration"):
+        start = 0.0 if of.has_zero else values[0]
+        found.append(Form("with its square root", lambda _, x: np.sqrt(x[..., None] - start)))
+    return [*found, *_somewhere(of, values)]
+
+
+def _of_an_angle() -> list[Form]:
+    """Harmonics."""
+    found = [
+        Form(words, harmonic, np.array([k]), weight=1 / k, is_sine=True)
+        for k, words in TURNS.items()
+    ]
+    both = partial(harmonic, orders=(1, 2))
+    return [*found, Form("once and twice per turn", both, np.ones(1), weight=0.5)]
+
+
+def _of_a_range(of: Coordinate, values: Array) -> list[Form]:
+    """Sines and exponentials in the range of some values (n,)."""
+    low, high = values[0], values[-1]
+    cycles = np.arange(0.75, min(MOST_CYCLES, (len(values) - 1) / EACH) + 0.1, 0.25)
+    turns = 2 * np.pi * cycles / (high - low)
+
+    def period(turn: float) -> str:
+        return of.by(2 * np.pi / turn)
+
+    found = []
+    if len(turns):
+        found = [
+            Form("as a sine with a period of {}", harmonic, turns, period,
+                 is_sine=True, is_smooth=True),
+            Form("periodically every {}, in another form than a sine",
+                 partial(harmonic, orders=(1, 2, 3)), turns[cycles <= cycles[-1] / EACH + 1],
+                 period, is_smooth=True),
+        ]  # fmt: skip
+    constants = (high - low) * CONSTANTS
+    if of.is_course:
+        words = "decaying with a time constant of {}"
+        return [*found, Form(words, partial(_exp, low, -1), constants, of.by, is_smooth=True)]
+    for end, sign, verb in ((high, 1, "growing"), (low, -1, "decaying")):
+        words = verb + " by the factor e every {}"
+        found.append(Form(words, partial(_exp, end, sign), constants, of.by, 0.5, is_smooth=True))
+    return found
+
+
+def _about_zero(of: Coordinate, values: Array) -> list[Form]:
+    """Forms about the zero of a coordinate that has both signs."""
+    widths = WIDTHS * np.abs(values).max()
+    return [
+        Form("with its absolute value", lambda _, x: np.abs(x)[..., None]),
+        Form("by its sign alone", lambda _, x: np.sign(x)[..., None]),
+        Form("with its square and its sign", lambda _, x: (x * np.abs(x))[..., None]),
+        Form("beyond ±{} only", _beyond, widths, of.at, is_smooth=True),
+    ]
+
+
+def _somewhere(of: Coordinate, values: Array) -> list[Form]:
+    """Steps, bends and bumps at a free place among some values (n,)."""
+    between = (values[1:] + values[:-1]) / 2
+    some = np.unique(np.linspace(0, len(between) - 1, PLACES).round().astype(int))
+
+    def gap(place: float) -> str:
+        after = int(np.searchsorted(values, place))
+        return f"{of.at(values[after - 1])} and {of.at(values[after])}"
+
+    step = Form(
+        "in a step between {}", lambda s, x: (x > s)[..., None].astype(float), between[some], gap
+    )
+    if len(values) <= EACH:
+        return [step]
+    inner = np.linspace(values[0], values[-1], 13)[1:-1]
+    return [
+        step,
+        Form("in a straight line from {} on", lambda s, x: np.maximum(x[..., None] - s, 0),
+             inner, of.at, 0.5, is_smooth=True),
+        Form("in a straight line up to {}", lambda s, x: np.minimum(x[..., None] - s, 0),
+             inner, of.at, 0.5, is_smooth=True),
+        *(Form("in a bump at {}", partial(_bump, share * np.ptp(values)),
+               np.linspace(values[0], values[-1], 25), of.at, 0.5, is_smooth=True)
+          for share in BUMPS),
+    ]  # fmt: skip
+
+
+def _power(p: int, _: float, x: Array) -> Array:
+    return np.asarray(x[..., None] ** p)
+
+
+def _polynomial(p: int, ends: tuple[float, float], _: float, x: Array) -> Array:
+    return np.asarray(((2 * x[..., None] - sum(ends)) / (ends[1] - ends[0])) ** np.arange(1, p + 1))
+
+
+def _exp(end: float, sign: int, constant: float, x: Array) -> Array:
+    return np.exp(sign * (x[..., None] - end) / constant)
+
+
+def _beyond(width: float, x: Array) -> Array:
+    """What is beyond a dead band."""
+    return (np.sign(x) * np.maximum(np.abs(x) - width, 0))[..., None]
+
+
+def _bump(width: float, at: float, x: Array) -> Array:
+    return np.exp(-(((x[..., None] - at) / width) ** 2) / 2)
+
+
+def harmonic(turn: float, x: Array, orders: ArrayLike = 1) -> Array:
+    """Sines and cosines of an angle and of its multiples."""
+    phase = turn * x[..., None] * np.atleast_1d(orders)
+    return np.concatenate([np.sin(phase), np.cos(phase)], axis=-1)
+
+
+def smooth(coordinate: str, c: Array) -> tuple[Callable[[Array], Array], Array]:
+    """Functions of a coordinate with the values c (n, a), (..., k), and prior variances (p, k)."""
+    if coordinate in ANGLES:
+        return lambda x: np.stack(harmonics(x, np), -1), np.tile(spectrum(ORDERS, LENGTHS), 2)
+    low, high = float(c.min()), float(c.max())
+
+    def basis(x: Array) -> Array:
+        return np.stack(sines((2 * x - low - high) / (high - low), np), -1)
+
+    return basis, spectrum(OMEGA, LENGTHS)

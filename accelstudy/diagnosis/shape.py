@@ -1,0 +1,123 @@
+"""A learned function as people see it: its table, the residuals upon it, and what it may be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.diagnosis.decision.learned import space_of
+from accelstudy.diagnosis.decision.problem import Problem
+from accelstudy.diagnosis.decision.verdict import Finding
+from accelstudy.diagnosis.forms import TARGETS
+from accelstudy.diagnosis.formulas import Ranking, argument, ranked
+from accelstudy.diagnosis.space.examined import Frame
+from accelstudy.diagnosis.space.shapes import function_rows
+from accelstudy.diagnosis.space.signatures import Moment
+from accelstudy.effects.learned import Learned
+
+Array = NDArray[np.float64]
+
+POINTS = 121
+"""Values of the coordinate in the table of a function."""
+FEW, APART = 3, 0.15
+"""Places where a function is known least, and how far apart they are, in parts of the range."""
+KNOWN = 0.8
+"""Part of the largest sigma from which on a function is known least."""
+
+
+@dataclass(frozen=True)
+class LearnedShape:
+    """A function h of a coordinate that was learned, without a name in the catalogue.
+
+    Attributes
+    ----------
+    coordinate, target : str
+    effect : Learned
+    ranking : Ranking, what depends on what, and which formulas it may be
+    components : tuple of str, c components that have a function
+    grid : (k,) array, the coordinate, SI
+    values, sigmas : (k, c) arrays, h and its sigma there, SI
+    where : (n, c) array, the coordinate of each component in the positions, SI
+    residuals, spreads : (n, c) arrays, h and what the final fit leaves of it in each position, as
+        far as the position shows it, and the noise of that, SI
+    least_known : tuple of float, values of the coordinate where positions would show most of it
+    """
+
+    coordinate: str
+    target: str
+    effect: Learned
+    ranking: Ranking
+    components: tuple[str, ...]
+    grid: Array
+    values: Array
+    sigmas: Array
+    where: Array
+    residuals: Array
+    spreads: Array
+    least_known: tuple[float, ...]
+
+
+def shape_of(problem: Problem, finding: Finding, variance: float) -> LearnedShape | None:
+    """Describe the function that was learned; None if none was.
+
+    Parameters
+    ----------
+    problem : Problem
+    finding : Finding, whose first choice is the function
+    variance : float, of unit weight
+    """
+    if finding.place is None:
+        return None
+    learned, *others = (choice.best for choice in finding.chosen)
+    effect, frame, solution = learned.effect, finding.frame, finding.frame.solution
+    assert isinstance(effect, Learned)
+    beside = space_of(others, len(problem.residuals.z))
+    ranking = ranked(problem.frame, problem.evidence, effect, beside)
+    at = argument(frame, effect)(Moment(frame.hold))
+    grid = np.linspace(at.min(), at.max(), POINTS)
+    names = list(solution.model.parameter_names)
+    own = [names.index(parameter.name) for parameter in effect.parameters]
+    parameters, cofactors = solution.parameters[own], solution.cofactors[np.ix_(own, own)]
+    values, sigmas = effect.function(grid, parameters, variance * cofactors)
+    here = [effect.function(at[:, min(i, at.shape[1] - 1)], parameters, cofactors)[0][:, i]
+            for i in range(values.shape[1])]  # fmt: skip
+    left, spreads = _left(frame, effect, variance)
+    components = TARGETS[effect.target].components
+    taking = [components.index(axis) for axis in ranking.axes]
+    return LearnedShape(
+        *finding.place,
+        effect,
+        ranking,
+        components,
+        grid,
+        values,
+        sigmas,
+        np.broadcast_to(at, left.shape),
+        np.stack(here, axis=1) + left,
+        spreads,
+        _least_known(grid, np.sqrt(np.mean(sigmas[:, taking] ** 2, axis=1))),
+    )
+
+
+def _left(frame: Frame, effect: Learned, variance: float) -> tuple[Array, Array]:
+    """What each position leaves of h by its residuals, and the noise of that, (n, c) each."""
+    n, conditions = frame.residuals.whitening.shape[:2]
+    rows = function_rows(frame, effect.target, lambda now: np.ones((n, 1, 1)), rates=False)
+    seen = rows[: n * conditions].reshape(n, conditions, -1)
+    errors = frame.residuals.errors[: n * conditions].reshape(n, conditions, 1)
+    square = np.maximum(np.sum(seen**2, axis=1), np.finfo(float).tiny)
+    return np.sum(seen * errors, axis=1) / square, np.sqrt(variance / square)
+
+
+def _least_known(grid: Array, sigma: Array) -> tuple[float, ...]:
+    """Places where a function is known least, in order."""
+    places: list[float] = []
+    far = APART * (grid[-1] - grid[0])
+    for i in np.argsort(-sigma, kind="stable"):
+        if len(places) == FEW or sigma[i] < KNOWN * sigma.max():
+            break
+        if all(abs(grid[i] - other) > far for other in places):
+            places.append(float(grid[i]))
+    return tuple(sorted(places))
