@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from accelstudy.basics.units import attitude_unit, to_attitude
 from accelstudy.basics.wording import number
 from accelstudy.effects.learned import WAVES
-from accelstudy.effects.smooth import LENGTHS, OMEGA, ORDERS, harmonics, sines, spectrum
+from accelstudy.effects.smooth import LENGTHS, ORDERS, frequencies, harmonics, sines, spectrum
 
 Array = NDArray[np.float64]
 
@@ -279,4 +279,4 @@ def smooth(coordinate: str, c: Array) -> tuple[Callable[[Array], Array], Array]:
     def basis(x: Array) -> Array:
         return np.stack(sines((2 * x - low - high) / (high - low), np), -1)
 
-    return basis, spectrum(OMEGA, LENGTHS)
+    return basis, spectrum(frequencies(), LENGTHS)

@@ -15,8 +15,9 @@ from accelstudy.effects.base import Effect, Parameter, get_effect, unlisted
 from accelstudy.effects.components import AXES, Number
 from accelstudy.effects.smooth import (
     EDGE,
-    OMEGA,
     ORDERS,
+    WIDE,
+    frequencies,
     harmonics,
     sines,
     spectrum,
@@ -25,7 +26,7 @@ from accelstudy.effects.smooth import (
 Array = NDArray[np.float64]
 
 LEARNED = "learned"
-LEAST = 2e-3
+LEAST = 5e-3
 """Share of the largest prior variance below which a function is left out."""
 
 UNITS = {
@@ -64,13 +65,14 @@ class Learned(Effect):
     coordinate: ClassVar[str] = "temperature"
     target: ClassVar[str] = "bias"
     count: ClassVar[int] = 0
+    edge: ClassVar[float] = EDGE
 
     @classmethod
     def chosen(cls, words: dict[str, str], settings: dict[str, float]) -> type[Learned]:
         """Return the kind with some coordinate and target, and as many functions as it needs."""
         coordinate = words.get("coordinate", cls.coordinate)
         target = words.get("target", cls.target)
-        return kind_of(coordinate, target, _count(coordinate, settings.get("length", LENGTH)))
+        return kind_of(coordinate, target, *_needed(coordinate, settings.get("length", LENGTH)))
 
     @property
     def words(self) -> Mapping[str, str]:
@@ -98,7 +100,8 @@ class Learned(Effect):
         if self.coordinate in ANGLES:
             shares = spectrum(ORDERS[: self.count], length)
             return np.tile(shares / shares.sum(), 2)
-        return np.sqrt(2 * np.pi) * length / EDGE * spectrum(OMEGA[: self.count], length)
+        each = spectrum(frequencies(self.edge)[: self.count], length)
+        return np.sqrt(2 * np.pi) * length / self.edge * each
 
     def function(self, values: Array, parameters: Array, covariance: Array) -> tuple[Array, Array]:
         """Evaluate h on a grid of its coordinate.
@@ -129,10 +132,11 @@ class Learned(Effect):
         scaled = (2 * c - low - high) / (high - low)
         # Between −1 and 1: beyond its range a function keeps its value.
         scaled = (xp.abs(scaled + 1) - xp.abs(scaled - 1)) / 2
-        means = np.sin(OMEGA * EDGE) * np.sin(OMEGA) / OMEGA
-        # Of even sines the mean is zero, up to rounding.
-        means[1::2] = 0.0
-        all_of_them = zip(sines(scaled, xp, self.count), means.tolist(), strict=False)
+        omega = frequencies(self.edge)
+        # That of the even sines is zero.
+        means = np.where(np.arange(len(omega)) % 2, 0.0, np.sin(omega * self.edge))
+        means *= np.sin(omega) / omega
+        all_of_them = zip(sines(scaled, xp, self.count, self.edge), means.tolist(), strict=False)
         return [sine - mean if mean else sine for sine, mean in all_of_them]
 
     def _of(self, c: Number, p: Sequence[Number], xp: Any) -> Number:
@@ -188,18 +192,19 @@ LENGTH = 0.6
 """Length scale by default."""
 
 
-def _count(coordinate: str, length: float) -> int:
-    """Number of sines, or of harmonics, that a length scale needs."""
+def _needed(coordinate: str, length: float) -> tuple[int, float]:
+    """Number of sines, or of harmonics, that a length scale needs, and where sines vanish."""
     if coordinate in WAVES:
-        return 1
-    omega = ORDERS if coordinate in ANGLES else OMEGA
+        return 1, EDGE
+    edge = max(EDGE, float(f"{WIDE * length:.3g}"))
+    omega = ORDERS if coordinate in ANGLES else frequencies(edge)
     density = spectrum(omega, length)
-    return int(np.count_nonzero(density >= LEAST * density[0]))
+    return int(np.count_nonzero(density >= LEAST * density[0])), edge
 
 
 @cache
-def kind_of(coordinate: str, target: str, count: int) -> type[Learned]:
-    """Kind of a coordinate, a target, and a number of functions.
+def kind_of(coordinate: str, target: str, count: int, edge: float) -> type[Learned]:
+    """Kind of a coordinate, a target, and a number of functions, which vanish at an edge.
 
     Raises
     ------
@@ -220,6 +225,7 @@ def kind_of(coordinate: str, target: str, count: int) -> type[Learned]:
         "coordinate": coordinate,
         "target": target,
         "count": count,
+        "edge": edge,
         "takes": _takes(coordinate, unit),
         "part": "rig" if target in ("reading", "tilt") else "sensor",
         "parameters": tuple(
@@ -244,4 +250,4 @@ def _takes(coordinate: str, unit: str) -> tuple[Setting, ...]:
     return (Setting("low", of, -1.0), Setting("high", of, 1.0), *lag, length, amplitude)
 
 
-unlisted(kind_of(Learned.coordinate, Learned.target, _count(Learned.coordinate, LENGTH)))
+unlisted(kind_of(Learned.coordinate, Learned.target, *_needed(Learned.coordinate, LENGTH)))

@@ -23,15 +23,21 @@ HARMONICS = 4
 CYCLES = np.arange(1.0, 5.01, 0.25)
 """Cycles of a periodic function of time in a session."""
 
-OMEGA = np.pi / (2 * EDGE) * np.arange(1, SINES + 1)
-"""Frequencies of the sines."""
+WIDE = 3.2
+"""Length scales from the middle at which sines may vanish, so that they are a Gaussian process in
+all of the range (Riutort-Mayol et al. 2023, Stat. Comput. 33, 17)."""
 ORDERS = np.arange(1, HARMONICS + 1)
 """Frequencies of the harmonics."""
 
 
-def sines(scaled: Any, xp: Any, count: int = SINES) -> list[Any]:
+def frequencies(edge: float = EDGE) -> Array:
+    """Frequencies of sines that vanish at ± an edge, (k,)."""
+    return np.pi / (2 * edge) * np.arange(1, SINES + 1)
+
+
+def sines(scaled: Any, xp: Any, count: int = SINES, edge: float = EDGE) -> list[Any]:
     """Sines of a coordinate that goes from −1 to 1."""
-    return [xp.sin(omega * (scaled + EDGE)) for omega in OMEGA[:count].tolist()]
+    return [xp.sin(omega * (scaled + edge)) for omega in frequencies(edge)[:count].tolist()]
 
 
 def harmonics(angle: Any, xp: Any, count: int = HARMONICS) -> list[Any]:

@@ -35,12 +35,12 @@ SCHEMA: dict[str, dict[str, str]] = {
         "oracle_detected": _FLAG,
         **dict.fromkeys(("oracle_best", "oracle_told"), _TEXT),
         "oracle_alternatives": "Int64",
-        **dict.fromkeys(("left", "sensor", "seed", "failed"), _TEXT),
+        **dict.fromkeys(("left", "true_place", "sensor", "seed", "failed"), _TEXT),
     },
     "outcomes": {
         **_KEYS,
         **dict.fromkeys(("verdict", "found", "specs", "found_classes", "positions"), _TEXT),
-        **dict.fromkeys(("posteriors", "credible_set"), _TEXT),
+        **dict.fromkeys(("posteriors", "credible_set", "place", "fits"), _TEXT),
         "confirmed": _FLAG,
         "statement": _TEXT,
         **dict.fromkeys(("held_out_z", "sigma0_before", "sigma0_after", "p_size"), _NUMBER),
@@ -92,7 +92,9 @@ def _truth(cell: Cell, truth: Truth | None, error: str) -> Row:
     oracle = content.get("oracle") or {}
     gross = content.get("gross") or {}
     # No name is right for what a session cannot show or the catalogue lacks.
-    classes = [] if case.set in ("invisible", "outside") else content.get("classes", [])
+    classes = (
+        [] if case.set in ("invisible", "outside", "unforeseen") else content.get("classes", [])
+    )
     left = [[name for name in one if name not in cell.removed] for one in classes]
     return {
         "set": case.set,
@@ -111,6 +113,7 @@ def _truth(cell: Cell, truth: Truth | None, error: str) -> Row:
         "oracle_told": json.dumps(oracle.get("told", [])),
         "oracle_alternatives": oracle.get("alternatives"),
         "left": json.dumps(content.get("left", [])),
+        "true_place": json.dumps(content.get("place")),
         "sensor": json.dumps(content.get("sensor")),
         "seed": json.dumps(content.get("seed")),
         "failed": error,

@@ -25,6 +25,7 @@ from accelstudy.hidden.physics import (
     visible_effects,
     visible_gross,
     visible_outside,
+    visible_unforeseen,
 )
 from accelstudy.hidden.physics.atlas import atlas
 
@@ -167,6 +168,7 @@ SEEN: Mapping[str, Callable[[str, str], Collection[str]]] = {
     "one": visible_effects,
     "removed": visible_effects,
     "outside": visible_outside,
+    "unforeseen": visible_unforeseen,
     "gross": visible_gross,
     "invisible": invisible_effects,
 }

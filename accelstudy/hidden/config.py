@@ -21,7 +21,15 @@ from accelstudy.files.validation import (
     Seed,
     checked,
 )
-from accelstudy.hidden.physics import APPROACHES, DESIGNS, EFFECTS, GROSS, NOISES, OUTSIDE
+from accelstudy.hidden.physics import (
+    APPROACHES,
+    DESIGNS,
+    EFFECTS,
+    GROSS,
+    NOISES,
+    OUTSIDE,
+    UNFORESEEN,
+)
 from accelstudy.sensors.models import get_model
 
 Names = OneOrMore[str]
@@ -63,6 +71,7 @@ KNOWN: Mapping[str, Sequence[str]] = {
     "one": _EFFECTS,
     "removed": _EFFECTS,
     "outside": tuple(OUTSIDE),
+    "unforeseen": tuple(UNFORESEEN),
     "gross": tuple(GROSS),
     "invisible": _EFFECTS,
 }
@@ -94,6 +103,9 @@ class HiddenConfig(Block):
         None, description="one effect whose family the diagnosis does not know"
     )
     outside: Sized | None = Field(None, description="physics that was never in the catalogue")
+    unforeseen: Sized | None = Field(
+        None, description="the same, invented when what can be learned was fixed"
+    )
     gross: Kinds | None = Field(None, description="gross errors")
     invisible: Kinds | None = Field(None, description="effects that the session cannot show")
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from accelstudy.adjustment.quality import Solution, column_basis
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.pipeline import judge
 from accelstudy.diagnosis.result import Verdict
@@ -61,6 +62,7 @@ def run_chunk(
 def outcome(d: Verdict) -> Row:
     """Row of the table of outcomes."""
     test, held = d.global_test, d.gap.held_out
+    learned = d.verdict == "learned"
     return {
         "verdict": d.verdict,
         "found": json.dumps([one.name for one in d.effects]),
@@ -78,6 +80,8 @@ def outcome(d: Verdict) -> Row:
                 for one in d.credible_set
             ]
         ),
+        "place": json.dumps(getattr(d, "place", None)),
+        "fits": json.dumps([_fit(one) for one in (d.base, d.final.solution)] if learned else []),
         "confirmed": bool(d.gap.confirmed),
         "statement": d.gap.statement or "",
         "held_out_z": np.nan if held is None else float(held.z),
@@ -87,6 +91,24 @@ def outcome(d: Verdict) -> Row:
         "redundancy": d.base.redundancy,
         "positions_used": d.campaign.n_positions,
         "reason": d.reason,
+    }
+
+
+def _fit(solution: Solution) -> dict[str, Any]:
+    """Sums of squares of the residuals of a fit, by kind, and what white noise leaves of them.
+
+    With H = U Uᵀ of the conditions, U an orthonormal basis of the columns of Ã, residuals of unit
+    weight have the sum of squares tr (I − H)² on average. Rows of Ã beside the conditions, those of
+    parameters with a prior, only hold the parameters.
+    """
+    rows = solution.misclosures.size
+    basis = column_basis(solution.design)[:rows]
+    noise = rows - 2 * np.sum(basis**2) + np.sum((basis.T @ basis) ** 2)
+    squares = np.sum(solution.residuals**2, axis=0)
+    return {
+        "force": _rounded(float(np.sum(squares[:3]))),
+        "angle": _rounded(float(np.sum(squares[3:]))),
+        "noise": _rounded(float(noise)),
     }
 
 

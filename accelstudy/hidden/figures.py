@@ -11,6 +11,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from accelstudy.basics.wording import words
 from accelstudy.diagnosis.decision.posterior import CREDIBLE
 from accelstudy.drawing.style import (
     COLUMN,
@@ -25,8 +26,9 @@ from accelstudy.drawing.style import (
 )
 from accelstudy.hidden.judging import ALL
 from accelstudy.hidden.limits import EDGES, power_over
+from accelstudy.hidden.physics.generate import NOWHERE
 from accelstudy.hidden.scoring import VERDICTS
-from accelstudy.hidden.targets import LARGE, MOST_NAMES
+from accelstudy.hidden.targets import LARGE, MOST_NAMES, plain
 
 Tables = Mapping[str, pd.DataFrame]
 
@@ -54,6 +56,7 @@ def figures(tables: Tables) -> dict[str, Callable[[], Figure]]:
         "calibration": calibration,
         "confusion": confusion,
         "outside": outside,
+        "places": places,
         "limits": limits,
     }
     return {name: partial(draw, tables) for name, draw in drawn.items()}
@@ -221,19 +224,73 @@ def confusion(tables: Tables) -> Figure:
 def outside(tables: Tables) -> Figure:
     """What becomes of physics that the catalogue does not have."""
     fig = new_figure(FULL, 66)
-    axes = fig.subplots(1, 2, sharey=True)
-    titles = {"outside": "never in the catalogue", "removed": "its family is taken out"}
+    axes = fig.subplots(1, 3, sharey=True)
+    titles = {
+        "outside": "never in the catalogue",
+        "unforeseen": "unforeseen",
+        "removed": "its family is taken out",
+    }
     for ax, (name, title) in zip(axes, titles.items(), strict=True):
         table = tables["shares"]
         _curve(ax, table, name, "alarm", label="something found", **OURS)
         _curve(ax, table, name, "unknown", label="unknown", **OTHERS["F test"])
+        _curve(ax, table, name, "learned", label="learned", **OTHERS["known sigma"])
         _curve(ax, table, name, "wrong", label="wrong name", **OTHERS["BIC forward"])
-        _over_size(ax)
+        _over_size(ax, 0.45)
         ax.axvline(LARGE, color=INK, linewidth=0.6, linestyle=":")
         ax.set_title(title)
     _shares(axes[0])
+    _legend(fig, 4)
+    return fig
+
+
+FATES: Mapping[str, str] = {
+    "place right": "#009E73",
+    "learned, no or another place": "#8CD3BD",
+    "unknown": "#E69F00",
+    "noise, gross error or nothing": "#BBBBBB",
+    "wrong name": "#D55E00",
+}
+"""What becomes of a campaign, and its colour."""
+
+
+def places(tables: Tables) -> Figure:
+    """What becomes of each kind of physics that the catalogue does not have."""
+    fig = _wide_labels(new_figure(FULL, 150))
+    left, right = fig.subplots(1, 2)
+    campaigns = plain(tables["campaigns"])
+    for ax, name, title in ((left, "outside", "never in the catalogue"),
+                            (right, "unforeseen", "unforeseen")):  # fmt: skip
+        part = campaigns[campaigns["set"] == name]
+        if len(part):
+            _fates(ax, part)
+            ax.set_title(title)
+            ax.set_xlabel("share of campaigns")
     _legend(fig, 3)
     return fig
+
+
+def _fates(ax: Axes, part: pd.DataFrame) -> None:
+    """Draw a bar of each kind, those with a place first."""
+    fates = np.select(
+        [part["place_right"].eq(True), part["learned"].eq(True), part["verdict"].eq("unknown"),
+         part["wrong"].eq(True)],
+        ["place right", "learned, no or another place", "unknown", "wrong name"],
+        "noise, gross error or nothing",
+    )  # fmt: skip
+    counted = pd.crosstab(part["what"], fates, normalize="index").reindex(columns=[*FATES])
+    has_place = {kind: NOWHERE[kind].place for kind in counted.index if kind in NOWHERE}
+    order = sorted(counted.index, key=lambda kind: (not has_place.get(kind), kind))
+    shares = counted.fillna(0).loc[order]
+    start = np.zeros(len(order))
+    for fate, color in FATES.items():
+        ax.barh(range(len(order)), shares[fate], left=start, color=color, label=fate)
+        start += shares[fate].to_numpy()
+    names = [f"{words(kind)} ({', '.join(has_place.get(kind) or ('–',))})" for kind in order]
+    ax.set_yticks(range(len(order)), names, fontsize=6)
+    ax.set_ylim(len(order) - 0.4, -0.6)
+    ax.set_xlim(0, 1)
+    ax.grid(False)
 
 
 def limits(tables: Tables) -> Figure:
@@ -316,12 +373,12 @@ def _legend(fig: Figure, columns: int) -> None:
         fig.legend([*entries.values()], [*entries], loc="outside lower center", ncols=columns)
 
 
-def _over_size(ax: Axes) -> None:
-    """Make the abscissa one of sizes, with a tick at each simulated size."""
+def _over_size(ax: Axes, apart: float = 0.2) -> None:
+    """Make the abscissa one of sizes, with a tick at each simulated size that has room for it."""
     drawn = [np.asarray(curve[0].get_xdata(), dtype=float) for curve in ax.containers]
     sizes = np.unique(np.concatenate(drawn)) if drawn else np.array([25.0])
     ax.set_xscale("log")
-    ax.set_xticks(sizes[spread(np.log(sizes), 0.2)])
+    ax.set_xticks(sizes[spread(np.log(sizes), apart)])
     ax.xaxis.set_major_formatter("{x:g}")
     ax.minorticks_off()
     ax.set_xlabel(SIZE)

@@ -14,9 +14,12 @@ import numpy as np
 import pandas as pd
 
 from accelstudy.basics.shares import clopper_pearson
+from accelstudy.hidden.physics.designs import session
 
 EFFECTS_GIVEN = ("named", "narrowed")
 """Verdicts that give effects."""
+LEARNED = "learned"
+"""Verdict that gives a function of a coordinate in place of a name."""
 
 Class = Sequence[str]
 """Names that mean the same in a campaign."""
@@ -25,6 +28,7 @@ JUDGED = (
     "ok", "alarm", "answered", "right", "wrong", "one_of_two", "recognised",
     "set_given", "set_holds", "set_names", "set_explanations", "set_posterior",
     "top_posterior", "top_right", "oracle_right", "told_right",
+    "learned", "has_place", "place_right", "place_wrong", "explained",
 )  # fmt: skip
 """Columns that judging adds to a campaign."""
 
@@ -82,6 +86,7 @@ def _judged(row: dict[Any, Any]) -> dict[str, Any]:
         "recognised": _recognised(row) if row["gross_name"] else None,
         **judged_set,
         **_judged_oracle(row, true),
+        **_judged_place(row),
     }
 
 
@@ -121,6 +126,39 @@ def _judged_oracle(row: dict[Any, Any], true: Sequence[Class]) -> dict[str, Any]
         and same_effects(json.loads(row["oracle_best"]), true),
         "told_right": same_effects(json.loads(row["oracle_told"]), true),
     }
+
+
+def _judged_place(row: dict[Any, Any]) -> dict[str, Any]:
+    """Judge the coordinate and target of a function that was learned, which is no name."""
+    learned = not row["error"] and row["verdict"] == LEARNED
+    true, given = (json.loads(row[name] or "null") for name in ("true_place", "place"))
+    judged: dict[str, Any] = {"learned": learned, "has_place": true is not None}
+    if learned:
+        judged["explained"] = explained(json.loads(row["fits"]), row["design"])
+    if true is not None:
+        judged["place_right"] = learned and given == true
+        judged["place_wrong"] = learned and given != true
+    return judged
+
+
+def explained(fits: Sequence[Mapping[str, float]], design: str) -> float:
+    """Share of the noncentrality that a fit explains, 1 − (Ω₂ − ν₂)/(Ω₁ − ν₁).
+
+    Ω is the sum of squares of the residuals over the true σ² of forces and angles, whatever the
+    diagnosis takes for them, before (1) and after (2). ν is what noise alone leaves of it, on
+    average: the redundancy, if no parameter has a prior.
+
+    Parameters
+    ----------
+    fits : two mappings with force (m²/s⁴), angle (rad²) and noise (ν), before and after
+    design : str, of the session
+    """
+    true = session(design)
+    before, after = (
+        fit["force"] / true.sigma**2 + fit["angle"] / true.sigma_angle**2 - fit["noise"]
+        for fit in fits
+    )
+    return 1 - after / before
 
 
 ALL = "all"
@@ -167,7 +205,8 @@ def _of(condition: Answers, answer: Answers) -> Answers:
 QUESTIONS: Mapping[str, Answers] = {
     "failed": lambda judged: ~judged["ok"].astype(bool),
     "alarm": _answer("alarm"),
-    **{name: _verdict(name) for name in (*EFFECTS_GIVEN, "unknown", "noise_model", "gross_error")},
+    **{name: _verdict(name) for name in (*EFFECTS_GIVEN, LEARNED)},
+    **{name: _verdict(name) for name in ("unknown", "noise_model", "gross_error")},
     "answered": _answer("answered"),
     "right": _answer("right"),
     "wrong": _answer("wrong"),
@@ -177,6 +216,9 @@ QUESTIONS: Mapping[str, Answers] = {
     "wrong, of those named": _of(_verdict("named"), _answer("wrong")),
     "wrong, of those answered": _of(_answer("answered"), _answer("wrong")),
     "confirmed, of those answered": _of(_answer("answered"), _answer("confirmed")),
+    "place right": _answer("place_right"),
+    "place wrong": _answer("place_wrong"),
+    "confirmed, of places that are right": _of(_answer("place_right"), _answer("confirmed")),
     "set holds the truth": _answer("set_holds"),
     "explanation right": _of(
         lambda judged: judged["oracle_right"].notna(), lambda judged: judged["top_right"].eq(True)

@@ -18,8 +18,9 @@ from accelstudy.hidden.config import HiddenConfig
 from accelstudy.hidden.figures import figures
 from accelstudy.hidden.judging import ALL, share_of
 from accelstudy.hidden.limits import study_limits
+from accelstudy.hidden.physics.generate import NOWHERE
 from accelstudy.hidden.scoring import sample, score_tables
-from accelstudy.hidden.targets import further
+from accelstudy.hidden.targets import LARGE, further, plain
 
 PARTS = ("truths", "outcomes", "baselines", "seconds")
 """Tables that the chunks write."""
@@ -85,6 +86,9 @@ def score_page(tables: Tables, seconds: pd.DataFrame, origin: Mapping[str, Any])
         size_table(tables["shares"]),
         "## Verdicts",
         verdict_table(tables["shares"]),
+        "## What the catalogue lacks",
+        KINDS_TEXT,
+        kind_table(campaigns),
         "## Simpler methods on the same campaigns",
         method_table(tables["baselines"]),
         "## Confirmed: how far the residuals shrink",
@@ -146,7 +150,9 @@ def size_table(shares: pd.DataFrame) -> str:
     return markdown(pd.DataFrame(rows, columns=["λ", *SHOWN]))
 
 
-VERDICTS = ("alarm", "named", "narrowed", "unknown", "noise_model", "gross_error", "confirmed")
+VERDICTS = (
+    "alarm", "named", "narrowed", "learned", "unknown", "noise_model", "gross_error", "confirmed",
+)  # fmt: skip
 
 
 def verdict_table(shares: pd.DataFrame) -> str:
@@ -166,9 +172,52 @@ _SETS = {
     "two": "two effects",
     "removed": "family taken out",
     "outside": "never in the catalogue",
+    "unforeseen": "unforeseen",
     "gross": "gross errors",
     "invisible": "cannot be seen",
 }
+
+
+KINDS_TEXT = (
+    f"Campaigns of λ ≥ {LARGE:g} with a given sigma or repeated positions. The place is the "
+    "coordinate and the target; – is none. Whether it is right is asked where the campaign records "
+    "the coordinate. Confirmed, and the median of the share of λ that is explained, are of those "
+    "whose place is right."
+)
+
+
+def kind_table(campaigns: pd.DataFrame) -> str:
+    """What becomes of each kind of physics that the catalogue lacks."""
+    large = plain(campaigns)
+    rows = []
+    for name in ("outside", "unforeseen"):
+        for what, part in large[large["set"] == name].groupby("what"):
+            place = NOWHERE[str(what)].place if str(what) in NOWHERE else None
+            right = part[part["place_right"].eq(True)]
+            rows.append(
+                (
+                    _SETS[name],
+                    words(str(what)),
+                    ", ".join(place) if place else "–",
+                    len(part),
+                    *(
+                        share_text(float(part[one].astype(bool).mean()))
+                        for one in ("wrong", "learned")
+                    ),
+                    *(_share_of_placed(part[one]) for one in ("place_right", "place_wrong")),
+                    _share_of_placed(right["confirmed"]),
+                    share_text(float(right["explained"].astype(float).median())),
+                )
+            )
+    heads = ["campaigns", "kind", "place", "n", "wrong name", "learned", "place right",
+             "place wrong", "confirmed", "explained"]  # fmt: skip
+    return markdown(pd.DataFrame(rows, columns=heads))
+
+
+def _share_of_placed(values: pd.Series) -> str:
+    """Share of those to which a question applies."""
+    asked = values[values.notna()]
+    return share_text(float(asked.astype(bool).mean())) if len(asked) else "–"
 
 
 def method_table(baselines: pd.DataFrame) -> str:

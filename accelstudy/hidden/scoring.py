@@ -89,6 +89,7 @@ def family_name(name: str) -> str:
 
 VERDICTS = {
     "no_effect": "nothing",
+    "learned": "learned",
     "unknown": "unknown",
     "noise_model": "noise",
     "gross_error": "gross error",
@@ -203,7 +204,7 @@ def _reference_rows(row: Mapping[Any, Any]) -> list[dict[str, Any]]:
     return rows
 
 
-BY_KIND = ("noise", "one", "gross", "outside")
+BY_KIND = ("noise", "one", "gross")
 """Sets of which each kind has its campaign; of the others each size has one."""
 
 

@@ -12,6 +12,7 @@ from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.words import verdict_lines
 from accelstudy.diagnosis.space.shapes import LEAST, LearnedShapes
 from accelstudy.effects import get_effect
+from accelstudy.effects.smooth import LENGTHS
 from accelstudy.sensors.models import get_model
 
 R = 30

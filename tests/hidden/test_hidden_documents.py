@@ -150,7 +150,7 @@ FALSE, SETS_HOLD = "false alarm", "90 % set holds the truth"
 OUTSIDE, NEVER = "named or narrowed wrongly", "never in the catalogue"
 BOTH, NAMES, LONE = "both of two right", "names in a 90 % set", "one of the two alone"
 BEYOND = "names in a 90 % set beyond the oracle's"
-CONFIRMED = "confirmed, given a name"
+CONFIRMED = "confirmed, given a name or a function"
 
 
 def campaigns(s):
@@ -183,6 +183,12 @@ def larger(s, column):
     """Range of a share over the sizes from 10 on, percent."""
     values = s.of_size(column)[1:]
     return [100 * min(values), 100 * max(values)]
+
+
+def wrong_names(s, kind):
+    """Share of the campaigns of a kind outside the catalogue that get a wrong name."""
+    (row,) = (row for row in s.tables["What the catalogue lacks"] if row["kind"] == kind)
+    return float(row["wrong name"])
 
 
 QUOTES = {
@@ -237,7 +243,7 @@ QUOTES = {
         ],
         r"alone in another (\d+) %": lambda s: [s.percent(LONE, "λ = 25")],
         r"something is named in (\d+) %": lambda s: [s.percent(OUTSIDE, NEVER)],
-        r"like a tilted base\s+\((\d+) %\)": lambda s: [s.percent(OUTSIDE, "cable drag")],
+        r"like a tilted base\s+\((\d+) %\)": lambda s: [100 * wrong_names(s, "cable drag")],
         r"imitate it in (\d+) %": lambda s: [s.percent(OUTSIDE, "family taken out")],
         r"(\w+ of ten) of these are confirmed": lambda s: [
             s.percent("confirmed, of those wrong", "family taken out")

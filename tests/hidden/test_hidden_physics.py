@@ -17,18 +17,30 @@ from accelstudy.effects import effect_names, get_effect
 from accelstudy.hidden.physics import (
     APPROACHES,
     NOISES,
+    OUTSIDE,
+    UNFORESEEN,
     Case,
     generate,
     invisible_effects,
     visible_effects,
     visible_gross,
     visible_outside,
+    visible_unforeseen,
 )
 from accelstudy.hidden.physics.atlas import atlas
-from accelstudy.hidden.physics.designs import GRAVITY, in_turned_frame, rotated, session
-from accelstudy.hidden.physics.effects import EFFECTS
+from accelstudy.hidden.physics.designs import (
+    DESIGNS,
+    GRAVITY,
+    Course,
+    in_turned_frame,
+    joints_of,
+    rotated,
+    session,
+)
+from accelstudy.hidden.physics.effects import EFFECTS, Rig
 from accelstudy.hidden.physics.measuring import Cause, Noise, Sensor, observe
 from accelstudy.hidden.physics.oracle import oracle
+from accelstudy.hidden.physics.places import NEEDS, OF_ROBOT, TARGETS
 from accelstudy.sensors.models import get_model
 
 NINE = get_model("bias-scale-nonorthogonality")
@@ -139,6 +151,24 @@ def test_the_misfit_of_an_adjustment_is_the_noncentrality_that_was_asked_for(app
 
 
 @pytest.mark.parametrize("approach", APPROACHES)
+def test_physics_outside_is_as_large_as_was_asked_for(approach):
+    design, lam = "repeats-30", 100.0
+    for set_, kinds, shown in (
+        ("outside", OUTSIDE, visible_outside), ("unforeseen", UNFORESEEN, visible_unforeseen)
+    ):  # fmt: skip
+        for i, name in enumerate(shown(design, approach)):
+            case = Case(set_, design, approach, True, (name,), (lam,))
+            campaign, truth = generate(case, seeded(8, i))
+            (effect,), parts = truth.effects, truth.sensor
+            sensor = Sensor(*(np.array(parts[key]) for key in ("bias", "scale", "lean")))
+            cause = Cause(kinds[name], effect.settings, np.array([effect.parameters]))
+            forces, angles = observe(session(design), sensor, [cause])
+            robot = None if campaign.angles is None else angles[0]
+            value, _ = omega(replace(campaign, forces=forces[0], angles=robot), approach)
+            assert value == pytest.approx(lam, rel=0.03), name
+
+
+@pytest.mark.parametrize("approach", APPROACHES)
 @pytest.mark.parametrize("name", EFFECTS)
 def test_effects_leave_what_those_of_the_catalogue_leave(name, approach):
     """Two sets of formulas, written apart, say the same of small effects of an ideal sensor."""
@@ -184,12 +214,129 @@ def test_what_is_called_invisible_leaves_nothing_and_what_is_outside_no_effect_e
             left = own.conditions.seen(*observe(own.session, Sensor(), [cause]))
             assert np.sum(left**2) < 0.05, name
             assert effect.parameters != (0.0,) * EFFECTS[name].k
-        for name in visible_outside(design, approach):
-            case = Case("outside", design, approach, True, (name,), (200.0,))
-            truth = generate(case, seeded(10))[1]
-            assert not any(truth.classes)
-            one, two = truth.left
-            assert 200 > one > two > 20, name
+        shown = {
+            "outside": visible_outside(design, approach),
+            "unforeseen": visible_unforeseen(design, approach),
+        }
+        for set_, names in shown.items():
+            for name in names:
+                case = Case(set_, design, approach, True, (name,), (200.0,))
+                truth = generate(case, seeded(10))[1]
+                assert not any(truth.classes)
+                one, two = truth.left
+                assert 200 > one > two > 20, name
+                place = {**OUTSIDE, **UNFORESEEN}[name].place
+                recorded = place and (approach == "robot" or place[0] not in OF_ROBOT)
+                assert truth.place == (place if recorded else None), name
+
+
+# --- physics outside the catalogue ---------------------------------------------------------------
+
+PLACED = {k: v for k, v in {**OUTSIDE, **UNFORESEEN}.items() if v.place}
+
+
+def test_there_is_physics_outside_over_all_coordinates_and_targets_and_over_none():
+    assert len(OUTSIDE) >= 24
+    assert len(UNFORESEEN) >= 12
+    assert not {*OUTSIDE} & {*UNFORESEEN}
+    assert not {*OUTSIDE, *UNFORESEEN} & {*EFFECTS, *effect_names()}
+    assert {kind.place[0] for kind in OUTSIDE.values() if kind.place} == {*NEEDS}
+    assert {kind.place[1] for kind in OUTSIDE.values() if kind.place} == {*TARGETS}
+    for kinds in (OUTSIDE, UNFORESEEN):
+        assert sum(kind.place is None for kind in kinds.values()) >= 5
+    shown = {
+        name
+        for design in ("abba-48", "repeats-30", "long-60")
+        for name in (*visible_outside(design, "robot"), *visible_unforeseen(design, "robot"))
+    }
+    assert shown == {*OUTSIDE, *UNFORESEEN}
+
+
+def holds(rng, n=40):
+    """A session in which everything varies, and forces (1, n, 3)."""
+    directions = rng.standard_normal((n, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    time = np.cumsum(rng.uniform(30, 60, n))
+    knots = np.linspace(0, time[-1] + 60, 12)
+    own = replace(
+        session("long-60"), joints=joints_of(directions), yaw=rng.uniform(-3, 3, n), time=time,
+        course=Course(knots, 20 + 5 * rng.standard_normal(12)), vibration=0.5 + rng.random(n),
+    )  # fmt: skip
+    return own, GRAVITY * directions[None]
+
+
+def with_the_same(coordinate, own, forces, rng):
+    """Other holds that have one coordinate in common with those of a session."""
+    other, turned = holds(rng)
+    if coordinate in ("force", "previous", "next"):
+        return other, forces
+    kept = {
+        "angle": {"joints": own.joints},
+        "yaw": {"yaw": own.yaw},
+        "vibration": {"vibration": own.vibration},
+        "time": {"time": own.time},
+        # As warm at another time, and as fast at another temperature.
+        "temperature": {
+            "time": 2 * own.time, "course": Course(2 * own.course.times, own.course.values)
+        },
+        "dT/dt": {"time": own.time, "course": replace(own.course, values=own.course.values + 9)},
+        "move": {"joints": -own.joints, "yaw": -own.yaw},
+    }  # fmt: skip
+    return replace(other, **kept[coordinate]), turned
+
+
+def of_target(kind, settings, own, forces):
+    """What a kind with parameters of 1 changes in its target, (n, k)."""
+    p = np.ones((1, 1, kind.k))
+    if kind.sensor:
+        assert kind.place[1] in ("bias", "scale")
+        added = kind.sensor(forces, p, settings, own)[0]
+        return added / forces[0] if kind.place[1] == "scale" else added
+    rig, still = Rig(), Rig()
+    kind.rig(rig, p, settings, own)
+    changed = {name: np.asarray(value) for name, value in vars(rig).items()
+               if not np.array_equal(value, getattr(still, name))}  # fmt: skip
+    # To turn the flange is to misread the joints.
+    (name,) = changed
+    assert {"reading": "reading", "deflection": "reading", "tilt": "tilt"}[name] == kind.place[1]
+    return np.broadcast_to(changed[name], (1, own.n, changed[name].shape[-1]))[0]
+
+
+@pytest.mark.parametrize("name", PLACED)
+def test_a_place_is_what_the_physics_depends_on_and_what_it_changes(name):
+    """With its coordinate as it was, and all else another, it does the same; else it does not."""
+    kind, rng = PLACED[name], np.random.default_rng(18)
+    own, forces = holds(rng)
+    settings = kind.draw(own, rng)
+    assert kind.shows(own)
+    changed = of_target(kind, settings, own, forces)
+    assert np.max(np.ptp(changed, axis=0)) > 0.1
+    coordinate = kind.place[0]
+    other = with_the_same(coordinate, own, forces, rng)
+    np.testing.assert_allclose(of_target(kind, settings, *other), changed, rtol=1e-6, atol=1e-9)
+    elsewhere = of_target(kind, settings, *holds(rng))
+    assert np.max(abs(elsewhere - changed)) > 1e-3
+
+
+@pytest.mark.parametrize("name", [k for k, v in PLACED.items() if v.place[0] in
+                                  ("force", "previous", "next")])  # fmt: skip
+def test_a_force_acts_in_its_hold_the_one_before_it_or_the_one_after(name):
+    kind, rng = PLACED[name], np.random.default_rng(19)
+    own, forces = holds(rng)
+    settings, moved = kind.draw(own, rng), forces.copy()
+    moved[0, 20] = -moved[0, 20, ::-1]
+    p = np.ones((1, 1, 3))
+    apart = kind.sensor(moved, p, settings, own) - kind.sensor(forces, p, settings, own)
+    where = {*np.flatnonzero(np.any(apart[0] != 0, axis=-1))}
+    scaled = {20} if kind.place[1] == "scale" else set()
+    assert where <= {"force": {20}, "previous": {21} | scaled, "next": {19, 20}}[kind.place[0]]
+    assert where
+
+
+def test_designs_repeat_positions_or_not():
+    assert {name for name in DESIGNS if session(name).repeats} == {
+        "abba-48", "repeats-30", "long-60", "two-warm-36"
+    }  # fmt: skip
 
 
 def test_gross_errors_are_what_they_are_called():

@@ -27,8 +27,8 @@ from accelstudy.effects import get_effect
 from accelstudy.effects.smooth import (
     CYCLES,
     LENGTHS,
-    OMEGA,
     ORDERS,
+    frequencies,
     harmonics,
     sines,
     spectrum,
@@ -233,7 +233,7 @@ def _sines(at: Course, values: Array) -> tuple[Course, Array]:
     def course(now: Moment) -> Array:
         return np.stack(sines((at(now) - (low + high) / 2) / half, np), axis=-1)
 
-    return course, spectrum(OMEGA, LENGTHS)
+    return course, spectrum(frequencies(), LENGTHS)
 
 
 def _harmonics(at: Course) -> tuple[Course, Array]:

@@ -6,11 +6,13 @@ diagnosis imports nothing from here. So the study judges the diagnosis by indepe
 
 from accelstudy.hidden.physics.atlas import invisible_effects, visible_effects
 from accelstudy.hidden.physics.designs import APPROACHES, DESIGNS
-from accelstudy.hidden.physics.effects import EFFECTS, OUTSIDE
+from accelstudy.hidden.physics.effects import EFFECTS
 from accelstudy.hidden.physics.generate import SETS, Case, HiddenEffect, Truth, generate
 from accelstudy.hidden.physics.gross import GROSS, visible_gross
 from accelstudy.hidden.physics.measuring import NOISES
-from accelstudy.hidden.physics.oracle import visible_outside
+from accelstudy.hidden.physics.oracle import visible_outside, visible_unforeseen
+from accelstudy.hidden.physics.outside import OUTSIDE
+from accelstudy.hidden.physics.unforeseen import UNFORESEEN
 
 __all__ = [
     "APPROACHES",
@@ -20,6 +22,7 @@ __all__ = [
     "NOISES",
     "OUTSIDE",
     "SETS",
+    "UNFORESEEN",
     "Case",
     "HiddenEffect",
     "Truth",
@@ -28,4 +31,5 @@ __all__ = [
     "visible_effects",
     "visible_gross",
     "visible_outside",
+    "visible_unforeseen",
 ]

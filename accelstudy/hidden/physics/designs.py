@@ -103,6 +103,27 @@ class Session:
         return self.course.at(self.time)
 
     @cached_property
+    def warming(self) -> Array | None:
+        """Rate of the temperature in the holds, K/s; None where most of them have none."""
+        if self.course is None or self.time is None:
+            return None
+        ends = (self.course.at(self.time + by) for by in (self.length / 2, -self.length / 2))
+        change = np.subtract(*ends) / self.length
+        return change if np.mean(change != 0) > 0.5 else None
+
+    @cached_property
+    def way(self) -> Array:
+        """Way that the joints, yaw included, have moved to each hold, rad; 0 for the first."""
+        joints = np.column_stack([self.joints, self.yaw])
+        return np.sum(abs(np.diff(joints, axis=0, prepend=joints[:1])), axis=1)
+
+    @cached_property
+    def repeats(self) -> bool:
+        """Whether a third of the holds, or more, repeat the attitude of another one."""
+        directions = np.round(_unit_forces(self.joints), 2)
+        return len(np.unique(directions + 0.0, axis=0)) <= 2 * self.n / 3
+
+    @cached_property
     def clock(self) -> Array:
         """Time of each hold, or its number where there is no time."""
         return np.arange(1.0, self.n + 1) if self.time is None else self.time
@@ -163,6 +184,13 @@ def joints_of(directions: Array) -> Array:
     """Roll and pitch of the directions of specific forces (n, 3), as (n, 2), rad."""
     x, y, z = directions.T + 0.0  # no negative zeros, for which roll would turn by half a turn
     return np.column_stack([np.arctan2(-y + 0.0, -z + 0.0), np.arctan2(x, np.hypot(y, z))])
+
+
+def _unit_forces(joints: Array) -> Array:
+    """Directions (n, 3) of the specific force at roll and pitch (n, 2); undoes `joints_of`."""
+    roll, pitch = joints.T
+    level = np.cos(pitch)
+    return np.column_stack([np.sin(pitch), -level * np.sin(roll), -level * np.cos(roll)])
 
 
 def _by_hand(directions: Array, rng: np.random.Generator) -> Array:

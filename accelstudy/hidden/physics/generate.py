@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -12,12 +13,17 @@ from accelstudy.basics.errors import InputError
 from accelstudy.campaign.session import Campaign
 from accelstudy.hidden.physics.atlas import Atlas, Conditions, Shape
 from accelstudy.hidden.physics.designs import GRAVITY, Session
-from accelstudy.hidden.physics.effects import EFFECTS, OUTSIDE, Effect
+from accelstudy.hidden.physics.effects import EFFECTS, Effect
 from accelstudy.hidden.physics.gross import GROSS
 from accelstudy.hidden.physics.measuring import NOISES, Cause, Noise, Sensor, observe
 from accelstudy.hidden.physics.oracle import Oracle, oracle
+from accelstudy.hidden.physics.outside import OUTSIDE
+from accelstudy.hidden.physics.places import Outside, Place
+from accelstudy.hidden.physics.unforeseen import UNFORESEEN
 
-SETS = ("null", "noise", "one", "two", "removed", "outside", "gross", "invisible")
+SETS = ("null", "noise", "one", "two", "removed", "outside", "unforeseen", "gross", "invisible")
+NOWHERE: Mapping[str, Outside] = {**OUTSIDE, **UNFORESEEN}
+"""Effects that are not in the catalogue, by name."""
 
 
 @dataclass(frozen=True)
@@ -71,8 +77,10 @@ class Truth:
     gross : dict with name (empty for none) and settings
     sensor : dict with the parameters of the sensor
     oracle : dict with detected, best, told and alternatives
-    left : tuple of float, for the set "outside": how much of the noncentrality the best effect of
-        the catalogue leaves, and the best two
+    left : tuple of float, of an effect outside the catalogue: how much of its noncentrality the
+        best effect of the catalogue leaves, and the best two
+    place : tuple of str, coordinate and target of an effect outside the catalogue; None where it
+        has none, or where the campaign does not record its coordinate
     """
 
     set: str
@@ -87,6 +95,7 @@ class Truth:
     sensor: dict[str, Any]
     oracle: dict[str, Any]
     left: tuple[float, ...] = ()
+    place: Place | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """As plain values."""
@@ -148,7 +157,11 @@ def generate(case: Case, seed: np.random.SeedSequence) -> tuple[Campaign, Truth]
         campaign, gross["settings"] = GROSS[case.gross](campaign, session, conditions, rng)
         gross["name"] = case.gross
     verdict = knowing.judge(_left(of_design, sensor, forces, reading), case.lam)
-    left = knowing.left(_left(of_design, sensor, output, encoders)) if case.set == "outside" else ()
+    left: tuple[float, ...] = ()
+    place = None
+    if case.effect and (strange := NOWHERE.get(case.effect[0])):
+        left = knowing.left(_left(of_design, sensor, output, encoders))
+        place = strange.place if strange.has_place(case.approach == "robot") else None
     truth = Truth(
         set=case.set,
         design=case.design,
@@ -175,6 +188,7 @@ def generate(case: Case, seed: np.random.SeedSequence) -> tuple[Campaign, Truth]
             "alternatives": verdict.alternatives,
         },
         left=left,
+        place=place,
     )
     return campaign, truth
 
@@ -270,7 +284,7 @@ def drawn(
         If the design cannot see the effect.
     """
     of_design = knowing.atlas
-    effect = EFFECTS[name] if name in EFFECTS else OUTSIDE[name]
+    effect = EFFECTS.get(name) or NOWHERE[name]
     if not lam:
         return _of_usual_size(effect, session, rng), (name,)
     if effect.shows(of_design.session):

@@ -8,7 +8,8 @@ most probable answer, which no method beats on average.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import zlib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 
@@ -17,7 +18,9 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc, logsumexp, softmax
 
 from accelstudy.hidden.physics.atlas import Atlas, Shape, atlas
-from accelstudy.hidden.physics.effects import OUTSIDE
+from accelstudy.hidden.physics.outside import OUTSIDE
+from accelstudy.hidden.physics.places import Outside
+from accelstudy.hidden.physics.unforeseen import UNFORESEEN
 
 Array = NDArray[np.float64]
 Class = tuple[str, ...]
@@ -223,12 +226,22 @@ def oracle(design: str, approach: str) -> Oracle:
 @cache
 def visible_outside(design: str, approach: str) -> tuple[str, ...]:
     """Names of effects outside the catalogue that show, and that no two effects of it imitate."""
-    knowing, rng = oracle(design, approach), np.random.default_rng(0)
+    return _not_imitated(oracle(design, approach), OUTSIDE)
+
+
+@cache
+def visible_unforeseen(design: str, approach: str) -> tuple[str, ...]:
+    """As `visible_outside`, of those that were invented last."""
+    return _not_imitated(oracle(design, approach), UNFORESEEN)
+
+
+def _not_imitated(knowing: Oracle, effects: Mapping[str, Outside]) -> tuple[str, ...]:
     of_design, visible = knowing.atlas, []
-    for name, effect in OUTSIDE.items():
+    for name, effect in effects.items():
         if not effect.shows(of_design.session):
             continue
-        outside = 0
+        # No kind changes what another one draws.
+        rng, outside = np.random.default_rng(zlib.crc32(name.encode())), 0
         for _ in range(DRAWS):
             shape = of_design.shape(effect, effect.draw(of_design.session, rng))
             if shape is not None:

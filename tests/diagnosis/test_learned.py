@@ -1,0 +1,182 @@
+"""Learned functions: beside plain Gaussian processes, exported, and in campaigns that hide one."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosis_helpers import NINE, ROBOT, G, campaign, least, some_holds
+
+from accelstudy.adjustment import Observations, calibrate
+from accelstudy.basics.errors import InputError
+from accelstudy.campaign.calibration.applying import read_calibration
+from accelstudy.campaign.calibration.document import calibration_document
+from accelstudy.campaign.calibration.export import export
+from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
+from accelstudy.diagnosis.pipeline import judge
+from accelstudy.effects import effect_names, get_effect
+from accelstudy.leveling.angles import specific_force
+from accelstudy.sensors.models import get_model
+
+LOW, HIGH = 10.0, 40.0
+GRID = np.linspace(-1, 1, 101)
+SPEC = f"learned(coordinate=temperature, target=bias, low={LOW:g}, high={HIGH:g}"
+
+
+def kernel(one, other, length):
+    """Squared exponential of a coordinate from −1 to 1."""
+    return np.exp(-((one[:, None] - other) ** 2) / (2 * length**2))
+
+
+def observed(s, h, sigma, rng):
+    """Readings of sensors that know their attitude, of biases h (R, n, 3) at s (n,)."""
+    angles = np.column_stack([rng.uniform(-3, 3, len(s)), rng.uniform(-1.2, 1.2, len(s))])
+    force = np.column_stack(specific_force(*angles.T, G))
+    noise = sigma * rng.standard_normal(h.shape)
+    hold = some_holds(len(s), temperature=(LOW + HIGH) / 2 + (HIGH - LOW) / 2 * s)
+    return Observations(
+        force + h + noise, sigma, np.broadcast_to(angles, (len(h), *angles.shape)), hold=hold
+    )
+
+
+def learned_of(result, k, effect, grid):
+    """Function that a replicate has learned, and its sigma; its parameters follow the biases."""
+    own = slice(3, 3 + len(effect.parameters))
+    return effect.function(grid, result.parameters[k, own], result.cofactors[k, own, own])
+
+
+@pytest.mark.parametrize("length", [0.25, 0.6, 1.5])
+def test_a_learned_function_is_a_gaussian_process(length):
+    """Ordinary kriging by linear algebra, with the kernel itself."""
+    rng = np.random.default_rng(1)
+    s, sigma, amplitude = np.sort(rng.uniform(-1, 1, 40)), 1e-3, 4e-3
+    h = amplitude * np.sin(4 * s[:, None] + [0.0, 1.0, 2.0])
+    data = observed(s, h[None], sigma, rng)
+    effect = get_effect(f"{SPEC}, length={length}, amplitude={amplitude})")
+    result = calibrate(get_model(f"bias+{effect.spec}"), ROBOT, data)
+    got, sd = learned_of(result, 0, effect, (LOW + HIGH) / 2 + (HIGH - LOW) / 2 * GRID)
+
+    seen = data.forces[0] - np.column_stack(specific_force(*data.angles[0].T, G))
+    # A bias of which nothing is known.
+    whole = np.concatenate([s, GRID])
+    prior = amplitude**2 * kernel(whole, whole, length) + 1.0
+    n = len(s)
+    gain = prior[n:, :n] @ np.linalg.inv(prior[:n, :n] + sigma**2 * np.eye(n))
+    centred = np.eye(len(GRID)) - 1 / len(GRID)
+    covariance = centred @ (prior[n:, n:] - gain @ prior[:n, n:]) @ centred.T
+    np.testing.assert_allclose(got, centred @ gain @ seen, atol=0.03 * amplitude)
+    np.testing.assert_allclose(
+        sd, np.sqrt(np.diag(covariance))[:, None] * np.ones(3), atol=0.02 * amplitude
+    )
+
+
+def test_functions_are_within_their_bands():
+    """Functions of a Gaussian process are within 1.96 sigma in 95 % of the sessions."""
+    rng = np.random.default_rng(2)
+    count, length, amplitude, sigma = 400, 0.6, 3e-3, 1e-3
+    s = rng.uniform(-1, 1, 24)
+    whole = np.concatenate([s, GRID])
+    root = np.linalg.cholesky(kernel(whole, whole, length) + 1e-9 * np.eye(len(whole)))
+    drawn = amplitude * (root @ rng.standard_normal((count, len(whole), 3)))
+    effect = get_effect(f"{SPEC}, length={length}, amplitude={amplitude})")
+    result = calibrate(
+        get_model(f"bias+{effect.spec}"), ROBOT, observed(s, drawn[:, :24], sigma, rng)
+    )
+    truth = drawn[:, 24:] - drawn[:, 24:].mean(axis=1, keepdims=True)
+    places = [0, 30, 55, 100]
+    grid = (LOW + HIGH) / 2 + (HIGH - LOW) / 2 * GRID[places]
+    inside = np.zeros((count, len(places), 3), dtype=bool)
+    for k in range(count):
+        h, sd = learned_of(result, k, effect, grid)
+        inside[k] = np.abs(h - truth[k, places]) < 1.959964 * sd
+    for held in inside.transpose(1, 2, 0).reshape(-1, count):
+        assert least(count, 0.95) <= np.count_nonzero(held)
+    assert np.mean(inside) < 0.98
+
+
+def test_a_spec_holds_all_and_is_not_listed():
+    for spec, count in {
+        "learned(coordinate=yaw, target=reading, length=1.5, amplitude=0.001)": 2 * 2 * 2,
+        "learned(coordinate=time wave, target=bias, period=300, amplitude=0.01)": 2 * 3,
+        f"{SPEC}, length=0.25, amplitude=0.01)": 12 * 3,
+    }.items():
+        effect = get_effect(spec)
+        assert effect.spec == spec
+        assert len(effect.parameters) == len(effect.deviations) == count
+        assert get_model(f"bias-scale+{spec}").effects[-1].spec == spec
+    assert "learned" not in effect_names()
+    for spec, message in {
+        "learned(coordinate=colour, target=bias)": "coordinate=colour is none of force, previous,",
+        "learned(coordinate=angle, target=bias)": "no bias can depend on the angle",
+        "learned(coordinate=force, target=tilt)": "no tilt can depend on the force",
+        "learned(target=bias, target=scale)": "target is given twice",
+    }.items():
+        with pytest.raises(InputError, match=message):
+            get_effect(spec)
+
+
+def test_what_is_exported_corrects_as_the_calibration_does(tmp_path):
+    """Formulas of the export, evaluated by Python alone, also beyond the range."""
+    rng = np.random.default_rng(3)
+    spec = f"{SPEC}, length=0.6, amplitude=0.01)"
+    settings = CampaignSettings(
+        scheme="fibonacci-30", temperature=(LOW, HIGH), temperature_order="random", effects=(spec,)
+    )
+    fit = fit_campaign(simulate_campaign(settings)[0], get_model(f"{NINE.name}+{spec}"), ROBOT)
+    path = tmp_path / "calibration.json"
+    path.write_text(json.dumps(calibration_document(fit)))
+    calibration = read_calibration(path)
+    whole = json.loads(export(calibration.content, "json"))
+    forces, temperature = 9 * rng.standard_normal((8, 3)), np.linspace(0, 50, 8)
+    expected = calibration.correct(forces, some_holds(8, temperature=temperature))
+    names = {"sin": np.sin, "cos": np.cos, "Abs": np.abs, "sign": np.sign, "exp": np.exp}
+    values = {p["name"]: p["value"] for e in whole["effects"] for p in e["parameters"]}
+    for reading, warm, one in zip(forces, temperature, expected, strict=True):
+        f_a = reading
+        for _ in range(50):
+            known = {**names, **values, "temperature": warm, "g": G}
+            known |= dict(zip(("f_x", "f_y", "f_z"), f_a, strict=True))
+            f_a = reading - sum(
+                np.array([eval(text, known) for text in e["output"]])
+                for e in whole["effects"]
+                if "output" in e
+            )
+        axes = np.eye(3) + sum(
+            np.array([[eval(text, known) for text in row] for row in e["axes"]])
+            for e in whole["effects"]
+            if "axes" in e
+        )
+        np.testing.assert_allclose(axes @ f_a, one, atol=1e-10)
+
+
+@pytest.fixture(scope="module")
+def hidden():
+    """A campaign in which the biases of x and y turn with the yaw, and the angle of each axis."""
+    clean = campaign(seed=7, sigma=1e-3)[0]
+    turn = np.column_stack(
+        [8e-3 * np.cos(clean.yaw - 0.3), 6e-3 * np.cos(clean.yaw - 1.2), 0 * clean.yaw]
+    )
+    return judge(replace(clean, forces=clean.forces + turn), NINE)
+
+
+def test_a_function_without_a_name_is_learned(hidden):
+    assert hidden.verdict == "learned"
+    assert hidden.place == ("yaw", "bias")
+    (found,) = hidden.found
+    assert found.name == "learned"
+    assert found.posterior > 0.7
+    assert hidden.gap.confirmed
+    assert hidden.gap.after < 2 < hidden.gap.before
+    effect, u = hidden.extended.effects[-1], len(found.parameters)
+    assert effect.spec == found.spec
+    solution = hidden.final.solution
+    yaw = np.linspace(-3, 3, 25)
+    h, sd = effect.function(yaw, solution.parameters[-u:], solution.cofactors[-u:, -u:])
+    truth = np.column_stack([8e-3 * np.cos(yaw - 0.3), 6e-3 * np.cos(yaw - 1.2), 0 * yaw])
+    assert np.all(np.abs(h - truth) < 4.5 * sd)
+
+
+def test_nothing_is_learned_where_nothing_is_missing():
+    for seed in range(6):
+        assert judge(campaign(seed=seed, sigma=1e-3)[0], NINE).verdict != "learned"
