@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_helpers import G, NINE, ROBOT, least, most
+from diagnosis_helpers import NINE, ROBOT, G, least, most
 
 from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.session import Campaign
