@@ -38,6 +38,8 @@ SURE_OF = 0.9
 """Posterior from which on a component takes part."""
 ALIKE = 0.25
 """Prior probability that one function is that of all components; else each has its own."""
+AT_ONCE = 10_000_000
+"""Numbers in one block of work, about."""
 WORTH = 0.01
 """Posterior from which on a formula is worth a line."""
 KEPT = 1e-6
@@ -124,85 +126,86 @@ class _Library:
 
     # --- evidence -------------------------------------------------------------------------------
 
-    def rows(self, basis: Callable[[Array], Array]) -> tuple[Array, Array]:
+    def rows(self, form: Callable[[Array], Array]) -> tuple[Array, Array]:
         """What functions do to the conditions of unit weight, and to the residuals, (m, c, k)."""
 
         def course(now: Moment) -> Array:
-            return basis(self.at(now))
+            return form(self.at(now))
 
-        varying = partial(less_its_mean, course, basis(self.c).mean(axis=0))
+        varying = partial(less_its_mean, course, form(self.c).mean(axis=0))
         rows = function_rows(self.frame, self.effect.target, varying)
         left = self.frame.residuals.project(rows)
         left -= self.beside @ (self.beside.T @ left)
         shape = len(rows), len(self.components), -1
         return rows.reshape(shape), left.reshape(shape)
 
-    def products(self, left: Array, weights: Array) -> tuple[list[tuple[Array, Array]], Array]:
-        """Products of functions (m, c, k) with each other and with the residuals, by choices.
+    def products(self, shown: Array) -> tuple[list[tuple[Array, Array]], Array]:
+        """Products of sets of functions (t, m, c, k) with each other and with the residuals.
 
         Returns
         -------
-        list of ((l, l), (l,)) arrays, of the functions with some weights (c, k) : of each choice,
-            and of one function for all
-        (c,) array, square of what is left of each component
+        list of ((t, l, l), (t, l)) arrays, of each choice, and of one function for all
+        (t, c) array, square of what is left of each component
         """
-        m, c, k = left.shape
-        shown = (left * weights).reshape(m, -1)
-        gram, seen = shown.T @ shown, shown.T @ self.z
+        t, m, c, k = shown.shape
+        columns = shown.reshape(t, m, -1)
+        gram, seen = columns.swapaxes(1, 2) @ columns, self.z @ columns
         each = []
         for choice in self.choices:
             some = (np.array(choice)[:, None] * k + np.arange(k)).ravel()
-            each.append((gram[np.ix_(some, some)], seen[some]))
-        blocks = gram.reshape(c, k, c, k).sum(axis=(0, 2)), seen.reshape(c, k).sum(axis=0)
-        return [*each, blocks], np.diag(gram).reshape(c, k).sum(axis=1)
+            each.append((gram[:, some[:, None], some], seen[:, some]))
+        together = gram.reshape(t, c, k, c, k).sum(axis=(1, 3)), seen.reshape(t, c, k).sum(axis=1)
+        square = np.diagonal(gram, axis1=1, axis2=2).reshape(t, c, k).sum(axis=2)
+        return [*each, together], square
 
-    def spaces(self, basis: Callable[[Array], Array]) -> tuple[Array, NDArray[np.int_]]:
-        """Square of the residuals in the space of each choice, and its dimension, each (s,).
+    def spaces(self, form: Form, settings: Array) -> tuple[Array, NDArray[np.int_]]:
+        """Square of the residuals in the space of each choice, and its dimension, each (t, s).
 
-        The dimension is zero where the model absorbs one of its components.
+        The dimension is zero where the model absorbs one of the components.
         """
-        rows, left = self.rows(basis)
-        size = np.linalg.norm(rows, axis=0)
-        # One function for all has the same size in all.
-        size = np.where(size.any(), np.sqrt(np.mean(size**2, axis=0)), 1.0)
-        products, square = self.products(left, np.broadcast_to(1 / size, left.shape[1:]))
-        shown = square > SURVIVES * left.shape[2]
-        parts, dims = np.zeros(len(products)), np.zeros(len(products), dtype=int)
+        t = len(settings)
+        both = self.rows(lambda x: np.concatenate([form.basis(s, x) for s in settings], axis=-1))
+        rows, left = (np.moveaxis(one.reshape(*one.shape[:2], t, -1), 2, 0) for one in both)
+        # One size for all components: one function for all has the same in each.
+        size = np.sqrt(np.mean(np.sum(rows**2, axis=1, keepdims=True), axis=2, keepdims=True))
+        products, square = self.products(left / np.where(size > 0, size, 1.0))
+        shown = square > SURVIVES * left.shape[3]
+        parts, dims = np.zeros((2, t, len(products)))
         for i, (gram, seen) in enumerate(products):
-            if i < len(self.choices) and not shown[list(self.choices[i])].all():
-                continue
             values, vectors = np.linalg.eigh(gram)
             kept = values > VISIBLE**2
-            parts[i] = np.sum((seen @ vectors[:, kept]) ** 2 / values[kept])
-            dims[i] = np.count_nonzero(kept)
-        return parts, dims
+            along = np.einsum("tj,tjl->tl", seen, vectors) ** 2
+            parts[:, i] = np.sum(np.where(kept, along / np.where(kept, values, 1.0), 0.0), axis=1)
+            of_all = shown[:, list(self.choices[i])].all(axis=1) if i < len(self.choices) else True
+            dims[:, i] = np.where(of_all, np.count_nonzero(kept, axis=1), 0)
+        return parts, dims.astype(int)
 
     def of_form(self, form: Form) -> Array:
         """Log density of the residuals under each setting and choice, with its prior, (t, s)."""
-        found = [self.spaces(partial(form.basis, setting)) for setting in form.settings]
-        parts, dims = (np.stack(each) for each in zip(*found, strict=True))
-        logs = self.evidence.of_spaces(
-            parts.ravel(), np.maximum(dims, 1).ravel(), float(self.z @ self.z)
-        )
+        functions = form.basis(form.settings[0], self.c[:1]).shape[-1] * len(self.components)
+        count = -(-len(form.settings) * functions * len(self.z) // AT_ONCE)
+        found = [self.spaces(form, some) for some in np.array_split(form.settings, count)]
+        parts, dims = (np.concatenate(each) for each in zip(*found, strict=True))
+        square = float(self.z @ self.z)
+        logs = self.evidence.of_spaces(parts.ravel(), np.maximum(dims, 1).ravel(), square)
         logs = np.where(dims > 0, logs.reshape(dims.shape), -np.inf)
         return np.asarray(logs + self.prior - np.log(len(form.settings)))
 
     def of_smooth(self) -> Array:
         """The same under any smooth function, by its smoothness."""
-        basis, priors = smooth(self.effect.coordinate, self.c)
-        rows, left = self.rows(basis)
+        form, priors = smooth(self.effect.coordinate, self.c)
+        rows, left = self.rows(form)
+        products, square = self.products(left * np.sqrt(priors)[:, None, None])
+        shown = square > SURVIVES * np.einsum("mck,tk->tc", rows**2, priors)
         logs = np.full((len(priors), len(self.prior)), -np.inf)
-        for row, prior in zip(logs, priors, strict=True):
-            whole = np.einsum("mck,k->c", rows**2, prior)
-            products, square = self.products(left, np.broadcast_to(np.sqrt(prior), rows.shape[1:]))
+        for t, row in enumerate(logs):
             along, shares, places = [], [], []
             for i, (gram, seen) in enumerate(products):
-                some = list(self.choices[i]) if i < len(self.choices) else []
-                if not (square[some] > SURVIVES * whole[some]).all():
+                if i < len(self.choices) and not shown[t, list(self.choices[i])].all():
                     continue
-                values, vectors = np.linalg.eigh(gram)
+                values, vectors = np.linalg.eigh(gram[t])
                 kept = values > KEPT * values.sum()
-                along.append((seen @ vectors[:, kept])[None] ** 2 / values[kept])
+                along.append((seen[t] @ vectors[:, kept])[None] ** 2 / values[kept])
                 shares.append(values[kept] / values[kept].sum())
                 places.append(i)
             row[places] = self.evidence.of_shapes(along, shares, np.array([self.z @ self.z]))[0]
@@ -287,7 +290,7 @@ class _Library:
         from scipy.optimize import minimize_scalar  # slow to import, and seldom needed
 
         def lost(setting: float) -> float:
-            return -float(self.spaces(partial(form.basis, setting))[0][place])
+            return -float(self.spaces(form, np.array([setting]))[0][0, place])
 
         ends = settings[max(best - 1, 0)], settings[min(best + 1, len(settings) - 1)]
         least = minimize_scalar(lost, bounds=ends, method="bounded")

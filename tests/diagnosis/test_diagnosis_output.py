@@ -59,13 +59,15 @@ CASES = {
                             "cubic_scale: 0.006, 0.005, 0.006"),
                 "temperature": (20.0, 40.0),
                 "temperature_order": "random"},
+    "learned": {"yaw": "random", "temperature": (20.0, 40.0)},
     "noise_model": {"noise_effects": ("noise_level(kappa=4)",)},
     "gross_error": {"gross_errors": ("axis_error(x=2, y=1, z=3)", "row_order(first=3, second=9)")},
 }  # fmt: skip
 HEADLINES = {
     "named": "The model lacks thermal bias.", "clipped": "The model lacks saturation.",
     "gravity": "The model lacks", "no_effect": "Nothing that these data can show",
-    "unknown": "it has no name here", "noise_model": "its noise is not",
+    "unknown": "it has no name here", "learned": "the bias of x depends on the yaw",
+    "noise_model": "its noise is not",
     "gross_error": "The data have a gross error",
 }  # fmt: skip
 
@@ -78,11 +80,15 @@ SCHEMA = Draft202012Validator(
 def simulated(case, folder):
     settings = {"scheme": "fibonacci-36", "seed": 5, **CASES[case]}
     campaign, _ = simulate_campaign(CampaignSettings(name=case, **settings))
+    if case == "learned":
+        turn = np.sin(np.asarray(campaign.yaw))[:, None]
+        campaign = replace(campaign, forces=campaign.forces + turn * np.array([8e-3, 0, 0]))
     write_campaign(campaign, folder, plausible=False)
     return campaign
 
 
-RENDERED = {"named": ("residuals", "gap"), "unknown": ("evidence", "location")}
+RENDERED = {"named": ("residuals", "gap"), "unknown": ("evidence", "location"),
+            "learned": ("shape",)}  # fmt: skip
 """Figures that are rendered, by case; all others are only composed, which takes far less time."""
 render = saving.save
 

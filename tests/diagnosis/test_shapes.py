@@ -138,10 +138,8 @@ def test_physics_that_is_not_in_the_catalogue_is_told_by_its_place():
     swing = np.sin(2 * np.pi * np.asarray(clean.time) / 1100.0)[:, None]
     changed = replace(clean, forces=clean.forces * (1 + 1.5e-3 * swing))
     diagnosis = diagnose(changed, get_model("bias-scale-nonorthogonality"))
-    assert diagnosis.verdict == "unknown"
-    first = diagnosis.like[0]
-    assert (first.coordinate, first.target) == ("time", "scale")
-    assert first.posterior > 0.7
-    assert any("like a scale that varies with time" in line for line in verdict_lines(diagnosis))
+    assert (diagnosis.verdict, diagnosis.place) == ("learned", ("time", "scale"))
+    assert diagnosis.found[0].posterior > 0.7
+    assert "the scale of all axes depends on the time" in verdict_lines(diagnosis)[0]
     nothing = diagnose(clean, get_model("bias-scale-nonorthogonality"))
     assert nothing.like == ()

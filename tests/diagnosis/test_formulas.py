@@ -1,0 +1,156 @@
+"""A learned function: its formulas, its table, its figure, and what is said of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosis_helpers import NINE, ROBOT, G, least, most
+
+from accelstudy.basics.units import GON, MGON
+from accelstudy.campaign.session import Campaign
+from accelstudy.diagnosis.decision.problem import fit_base
+from accelstudy.diagnosis.evidence.size import Evidence
+from accelstudy.diagnosis.formulas import ranked
+from accelstudy.diagnosis.pipeline import diagnose
+from accelstudy.diagnosis.report.document import shape_document
+from accelstudy.diagnosis.report.figures import AXES, shape_figure
+from accelstudy.diagnosis.report.words import advice, headline, verdict_lines
+from accelstudy.diagnosis.space.examined import Frame
+from accelstudy.effects import get_effect
+
+SIGMA, N = 2e-3, 40
+
+
+def plain_campaign(rng):
+    """A session of a robot and an ideal sensor, by NumPy alone."""
+    golden = np.pi * (3 - np.sqrt(5)) * np.arange(N)
+    z = 1 - (2 * np.arange(N) + 1) / N
+    directions = np.column_stack([np.sqrt(1 - z**2) * np.cos(golden),
+                                  np.sqrt(1 - z**2) * np.sin(golden), z])  # fmt: skip
+    f = -G * rng.permutation(directions)
+    roll, pitch = np.arctan2(-f[:, 1], -f[:, 2]), np.arctan2(f[:, 0], np.hypot(f[:, 1], f[:, 2]))
+    sigma_angle = 10 * MGON
+    return Campaign(
+        name="plain",
+        positions=np.arange(1, N + 1),
+        forces=f + SIGMA * rng.standard_normal((N, 3)),
+        gravity=G,
+        sigma_force=SIGMA,
+        angles=np.column_stack([roll, pitch]) + sigma_angle * rng.standard_normal((N, 2)),
+        sigma_angle=sigma_angle,
+        time=60.0 * np.arange(N),
+        temperature=rng.uniform(10, 40, N),
+        yaw=rng.uniform(-np.pi, np.pi, N),
+    ), f
+
+
+def truths(campaign, f, rng):
+    """Functions of a coordinate, (n, 1) or (n, 3), with their effect and what is to be said."""
+    t, c, yaw = campaign.time[:, None], campaign.temperature[:, None], campaign.yaw[:, None]
+    phase, end = rng.uniform(0, 2 * np.pi), t.max()
+    temperature = f"coordinate=temperature, low={c.min()}, high={c.max()}"
+    time, force = f"coordinate=time, low=0, high={end}", f"coordinate=force, low={-G}, high={G}"
+    return [
+        (np.sin(2 * yaw + phase), "coordinate=yaw", "twice per turn"),
+        (np.exp(-t / rng.uniform(300, 600)), time, "decaying with a time constant"),
+        (np.sin(2 * np.pi * t / rng.uniform(500, 1100) + phase), time, "sine with a period"),
+        (c > rng.uniform(16, 34), temperature, "in a step between"),
+        (c, temperature, "in a straight line,"),
+        (np.sign(f) * np.maximum(np.abs(f) - rng.uniform(2, 6), 0), force, "beyond ±"),
+    ]
+
+
+def test_the_right_formula_comes_first():
+    """In most cases, at a noncentrality of 400; and hardly an axis is said to take part wrongly."""
+    right = wrong = tried = 0
+    for seed in range(2):
+        rng = np.random.default_rng(seed)
+        campaign, f = plain_campaign(rng)
+        for h, words, said in truths(campaign, f, rng):
+            sizes = rng.uniform(0.5, 1.5, 2) * rng.choice([-1, 1], 2)
+            change = (h - np.mean(h)) * np.insert(sizes, tried % 3, 0.0)
+            # Large enough that the parameters of the model cannot take up most of it.
+            change *= np.sqrt(500 / np.sum(change**2)) * SIGMA
+            base = fit_base(replace(campaign, forces=campaign.forces + change), NINE, ROBOT)
+            frame = Frame.of(base.solution)
+            ranking = ranked(
+                frame,
+                Evidence(base.level, frame.residuals.redundancy),
+                get_effect(f"learned({words}, target=bias)"),
+                np.zeros((len(frame.residuals.z), 0)),
+            )
+            assert sum(one.posterior for one in ranking.formulas) <= 1 + 1e-9
+            right += said in ranking.formulas[0].text
+            wrong += "xyz"[tried % 3] in ranking.axes
+            tried += 1
+    # Of 84 such campaigns 78 had the right one first, and none an axis that takes no part.
+    assert right >= least(tried, 0.9)
+    assert wrong <= most(tried, 0.1)
+
+
+# --- one campaign, and all that is said of it ---------------------------------------------------
+
+SWING, PHASE = 8e-3, 0.4
+
+
+@pytest.fixture(scope="module")
+def learned():
+    """The bias of x and y depends on the yaw, once per turn."""
+    campaign, _ = plain_campaign(np.random.default_rng(5))
+    turn = np.sin(np.asarray(campaign.yaw) + PHASE)[:, None]
+    changed = replace(campaign, forces=campaign.forces + turn * np.array([SWING, 0.7 * SWING, 0]))
+    return diagnose(changed, NINE)
+
+
+def test_the_table_is_the_function_of_the_model(learned):
+    document = shape_document(learned.shape)
+    effect = get_effect(learned.found[0].spec)
+    values = dict(zip(learned.extended.parameter_names, learned.final.solution.parameters,
+                      strict=False))  # fmt: skip
+    grid, table = np.array(document["function"]["coordinate"]), document["function"]
+    at = type("Hold", (), {"yaw": grid})
+    p = [values[parameter.name] for parameter in effect.parameters]
+    for axis, added in zip("xyz", effect.output((0, 0, 0), p, G, at, np), strict=True):
+        assert table["value"][axis] == pytest.approx(added, abs=1e-12)
+    for axis, size in zip("xyz", (SWING, 0.7 * SWING, 0.0), strict=True):
+        missed = table["value"][axis] - size * np.sin(grid + PHASE)
+        assert np.abs(missed / table["sigma"][axis]).max() < 4
+    assert table["unit"] == "m/s^2"
+
+
+def test_the_residuals_lie_upon_the_function(learned):
+    shape = learned.shape
+    h = np.column_stack([np.interp(shape.where[:, i], shape.grid, shape.values[:, i])
+                         for i in range(3)])  # fmt: skip
+    left = (shape.residuals - h) / shape.spreads
+    # χ² less the parameters; angles and forces take part in each.
+    assert 0.6 < np.mean(left**2) < 1.3
+    assert shape.spreads.min() >= SIGMA
+
+
+def test_what_was_learned_is_said(learned):
+    shape = learned.shape
+    assert headline(learned) == (
+        "The model lacks something that has no name here: the bias of x and y depends on the yaw."
+    )
+    assert shape.ranking.axes == ("x", "y")
+    first = shape.ranking.formulas[0]
+    assert first.text.startswith("once per turn, ")
+    said = [float(word) for word in first.text.replace("(", "").split() if word[0].isdigit()]
+    # σ of an amplitude from 40 positions is 0.45 mm/s².
+    assert said == pytest.approx([1e3 * SWING, 0.7e3 * SWING], abs=1.8)
+    text = " ".join(verdict_lines(learned))
+    assert f"As a formula: {first.text} (" in text
+    assert "mgon with the function of the yaw" in text
+    places = " gon or ".join(f"{place / GON:.3g}" for place in shape.least_known[-2:])
+    assert places.replace("-", "−") in " ".join(advice(learned))
+    widest = np.sqrt(np.mean(shape.sigmas[:, :2] ** 2, axis=1))
+    assert shape.grid[np.argmax(widest)] in shape.least_known
+
+
+def test_the_figure_has_units_and_the_colours_of_the_axes(learned):
+    panels = shape_figure(learned.shape).axes
+    assert [panel.lines[1].get_color() for panel in panels] == [AXES[i][0] for i in "xyz"]
+    assert [panel.get_ylabel() for panel in panels] == [f"bias of {i}\nh / (mm/s²)" for i in "xyz"]
+    assert panels[-1].get_xlabel() == "yaw / gon"
+    assert [panel.get_title(loc="right") for panel in panels] == ["", "", "no part in it shows"]
