@@ -102,11 +102,12 @@ class Target:
 
     Attributes
     ----------
-    words : str, with a place for the components
+    label, words : str, short and in a sentence, with a place for the components
     components : tuple of str
     unit : str, SI
     """
 
+    label: str
     words: str
     components: tuple[str, ...]
     unit: str
@@ -114,11 +115,11 @@ class Target:
 
 XYZ = ("x", "y", "z")
 TARGETS = {
-    "bias": Target("the bias of {}", XYZ, "m/s^2"),
-    "scale": Target("the scale of {}", XYZ, "1"),
-    "square": Target("the quadratic scale of {}", XYZ, "s^2/m"),
-    "reading": Target("the robot's reading of {}", ("roll", "pitch"), "rad"),
-    "tilt": Target("the tilt {} of the robot's base", ("a", "b"), "rad"),
+    "bias": Target("bias of {}", "the bias of {}", XYZ, "m/s^2"),
+    "scale": Target("scale of {}", "the scale of {}", XYZ, "1"),
+    "square": Target("quadratic scale of {}", "the quadratic scale of {}", XYZ, "s^2/m"),
+    "reading": Target("reading of {}", "the robot's reading of {}", ("roll", "pitch"), "rad"),
+    "tilt": Target("tilt {}", "the tilt {} of the robot's base", ("a", "b"), "rad"),
 }
 
 

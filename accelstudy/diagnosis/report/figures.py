@@ -308,8 +308,7 @@ def shape_figure(shape: LearnedShape) -> Figure:
     panels = figure.subplots(len(shape.components), 1, sharex=True, sharey=True)
     of, target = coordinate_of(shape.effect.coordinate), TARGETS[shape.effect.target]
     shown = plain(shape)
-    title = target.words.removeprefix("the ").removeprefix("robot's ")
-    unit = shown_unit(target.unit)
+    unit, hardly = shown_unit(target.unit), list[tuple[Axes, Array, Array]]()
     for i, (name, ax) in enumerate(zip(shape.components, panels, strict=True)):
         colour, marker = COMPONENTS[name]
         x, at = shape.where[:, i] / of.size, shape.grid
@@ -320,13 +319,16 @@ def shape_figure(shape: LearnedShape) -> Figure:
         ax.fill_between(grid, h - BAND * sigma, h + BAND * sigma, color=colour, alpha=0.25, lw=0)
         ax.plot(grid, h, color=colour)
         ax.plot(x[shown[:, i]], points[shown[:, i]], marker, color=colour, markersize=3.2)
-        limits = ax.get_ylim()
-        ax.plot(x[~shown[:, i]], points[~shown[:, i]], ".", color=OTHER, markersize=2.5)
-        ax.set_ylim(limits)
-        ax.set_ylabel(f"{title.format(name)}\n{_per_unit('h', unit)}")
+        hardly.append((ax, x[~shown[:, i]], points[~shown[:, i]]))
+        ax.set_ylabel(f"{target.label.format(name)}\n{_per_unit('h', unit)}")
         ax.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
         if name not in shape.ranking.axes:
-            ax.set_title("no part in it shows", loc="right")
+            ax.set_title("no part of it shows", loc="right")
+    # What hardly shows the function has no say in the scale.
+    limits = panels[0].get_ylim()
+    for ax, x, points in hardly:
+        ax.plot(x, points, ".", color=OTHER, markersize=2.5)
+    panels[0].set_ylim(limits)
     panels[-1].set_xlabel(_per_unit(of.words.removeprefix("the "), of.unit))
     return figure
 

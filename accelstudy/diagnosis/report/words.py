@@ -254,7 +254,7 @@ def formulas(diagnosis: Diagnosis) -> str:
     if ranked[0].text == OTHER and ranked[0].posterior >= SURE:
         return f"No formula of the library describes it ({probability(ranked[0].posterior)})."
     worth = [(one.text, one.posterior) for one in ranked if one.posterior >= WORTH]
-    return f"As a formula: {_listed(worth, 'or')}."
+    return f"It varies {_listed(worth, 'or')}."
 
 
 def beyond(diagnosis: Diagnosis) -> str:
