@@ -80,7 +80,7 @@ def outcome(d: Verdict) -> Row:
                 for one in d.credible_set
             ]
         ),
-        "place": json.dumps(getattr(d, "place", None)),
+        "place": json.dumps(d.place),
         "fits": json.dumps([_fit(one) for one in (d.base, d.final.solution)] if learned else []),
         "confirmed": bool(d.gap.confirmed),
         "statement": d.gap.statement or "",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -25,7 +25,13 @@ NAMED = {25.0: 0.66, 40.0: 0.81, 60.0: 0.86, 100.0: 0.89}
 """Share of single effects that are named rightly, at least, by λ; else it is the oracle's."""
 BOTH = {25.0: 0.42, 40.0: 0.60, 60.0: 0.70}
 """Share of two effects that are both named rightly, at least, by λ."""
-
+LEARNABLE: Mapping[str, Sequence[str]] = {
+    "bias": ("force", "previous", "next", "yaw", "vibration", "temperature", "dT/dt", "time"),
+    "scale": ("vibration", "temperature", "dT/dt", "time"),
+    "tilt": ("yaw", "vibration", "temperature", "time"),
+    "reading": ("angle", "yaw", "move", "vibration", "temperature", "time"),
+}
+"""Target -> coordinates of which the diagnosis can learn a function for it."""
 
 Row = dict[str, Any]
 
@@ -296,6 +302,13 @@ def _of_others(judged: pd.DataFrame) -> Iterator[Row]:
         cases = f"{cases}, {UNNAMED}"
         yield _share("named or narrowed wrongly", cases, part, part["wrong"])
         yield _share("learned", cases, part, part["learned"])
+    can = [json.dumps([one, target]) for target, names in LEARNABLE.items() for one in names]
+    placed = outside[outside["has_place"].eq(True)]
+    placed = placed[placed["true_place"].isin(can)]
+    cases = f"outside the catalogue, a place that can be learned, {UNNAMED}"
+    yield _share("named or narrowed wrongly", cases, placed, placed["wrong"])
+    for figure in ("place_right", "place_wrong"):
+        yield _share(words(figure), cases, placed, placed[figure])
     later = large[large["set"] == "unforeseen"]
     placed = later[later["has_place"].eq(True)]
     for figure in ("place_right", "place_wrong"):

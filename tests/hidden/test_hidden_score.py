@@ -9,15 +9,20 @@ import pytest
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.shares import clopper_pearson
+from accelstudy.campaign.calibration.fit import usual_approach
+from accelstudy.diagnosis.decision.problem import fit_base, pose
+from accelstudy.diagnosis.space.shapes import LearnedShapes
 from accelstudy.effects import effect_names
 from accelstudy.hidden.campaigns import SCHEMA
 from accelstudy.hidden.diagnosing import _fit
 from accelstudy.hidden.figures import figures
 from accelstudy.hidden.judging import all_true, judge, same_effects, share_of
 from accelstudy.hidden.page import score_page
+from accelstudy.hidden.physics import Case, generate
 from accelstudy.hidden.physics.designs import session
 from accelstudy.hidden.scoring import family_name, score_tables
-from accelstudy.hidden.targets import Target, _middle, further, targets
+from accelstudy.hidden.targets import LEARNABLE, Target, _middle, further, targets
+from accelstudy.sensors.models import get_model
 
 DRIFT, WARM, SQUARE, MOUNTED = (
     ["bias_drift"], ["warm_up"], ["quadratic_scale"],
@@ -252,6 +257,16 @@ def test_what_noise_leaves_of_the_residuals_of_a_fit_with_a_prior():
     assert (fit["force"], fit["angle"]) == (pytest.approx(sums[0], rel=1e-5), 0)
 
 
+def test_the_places_at_which_a_function_can_be_learned():
+    """Those of a session with all coordinates."""
+    case = Case("null", "repeats-30", "robot", True)
+    campaign, _ = generate(case, np.random.SeedSequence(1))
+    model = get_model("bias-scale-nonorthogonality")
+    frame = pose(fit_base(campaign, model, usual_approach(campaign))).frame
+    places = {(one, target) for target, names in LEARNABLE.items() for one in names}
+    assert places == set(LearnedShapes.of(frame).places)
+
+
 def test_the_place_of_what_is_learned(parts):
     judged = judge(parts["truths"].merge(parts["outcomes"])).query("set == 'outside'")
     told = judged[["learned", "has_place", "place_right", "place_wrong", "answered", "wrong"]]
@@ -385,6 +400,7 @@ def test_figures_of_much_and_of_nothing(tables):
     ("named or narrowed wrongly", "outside the catalogue, all", 2 / 6, 6),
     ("named or narrowed wrongly", "without a place", 1 / 2, 2),
     ("learned", "without a place", 1 / 2, 2),
+    ("place right", "can be learned", 2 / 4, 4),
     ("place right", "unforeseen", 1, 1),
     ("confirmed, of those wrong", "unforeseen", 0, 1),
     ("confirmed, of those wrong", "family taken out", np.nan, 0),

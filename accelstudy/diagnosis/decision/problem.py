@@ -133,7 +133,11 @@ def pose(base: BaseFit) -> Problem:
         residuals = examined.frame.residuals
         evidence = Evidence(base.level, residuals.redundancy)
         axes = UnequalAxes.of(residuals, evidence, base.within)
-        if np.log(priors.AXES) + axes.log_evidence > _best_odds(field, evidence):
+        noisier = float(np.log(priors.AXES) + axes.log_evidence)
+        # Something unknown is asked last, as it takes longest.
+        if noisier > _best_odds(field.named, evidence, residuals.z) and (
+            noisier > _best_odds(field, evidence, residuals.z)
+        ):
             sigma = np.sqrt(axes.ratios)
             mean = np.mean(np.sqrt(first.variances[:, :3]))
             shaped = np.broadcast_to(mean * sigma / np.mean(sigma), (len(first.variances), 3))
@@ -157,11 +161,10 @@ def is_exact(fit: Solution) -> bool:
     return float(np.sqrt(np.mean(fit.misclosures**2))) < ROUNDING * fit.gravity
 
 
-def _best_odds(field: Field, evidence: Evidence) -> float:
+def _best_odds(field: Field, evidence: Evidence, z: NDArray[np.float64]) -> float:
     """Log odds of the most probable single thing that is missing against nothing, at least 0."""
-    if not field.names or field.frame is None:
+    if not field.names:
         return 0.0
-    z = field.frame.residuals.z
     prior = [
         priors.UNKNOWN if name == UNKNOWN else 1 / len(field.candidates) for name in field.names
     ]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.hidden.physics.designs import Session
+from accelstudy.hidden.physics.designs import Course, Session
 from accelstudy.hidden.physics.effects import (
     Draw,
     Effect,
@@ -22,7 +22,6 @@ from accelstudy.hidden.physics.effects import (
     SensorAction,
     Settings,
     column,
-    warmth,
 )
 
 Array = NDArray[np.float64]
@@ -146,22 +145,20 @@ def vibration(session: Session) -> Array:
 
 def part_of_range(session: Session) -> Array:
     """Temperature of the holds as a part of the range of the session, 0 to 1, (n,)."""
-    return (warmth(session)[:, 0] - _coldest(session)) / _range(session)
+    values = _course(session).values
+    return (column(session.temperature)[:, 0] - values.min()) / np.ptp(values)
 
 
 def since_start(session: Session) -> Array:
     """Temperature of the holds less that at the start, over the range of the session, (n,)."""
+    values = _course(session).values
+    return (column(session.temperature)[:, 0] - values[0]) / np.ptp(values)
+
+
+def _course(session: Session) -> Course:
     if session.course is None:
         raise ValueError(f"{session.name}: has no temperature")
-    return (warmth(session)[:, 0] + 20.0 - session.course.values[0]) / _range(session)
-
-
-def _coldest(session: Session) -> float:
-    return float(session.course.values.min()) - 20.0 if session.course else 0.0
-
-
-def _range(session: Session) -> float:
-    return float(np.ptp(session.course.values)) if session.course else 1.0
+    return session.course
 
 
 def warming(session: Session) -> Array:
