@@ -21,6 +21,7 @@ from accelstudy.diagnosis.decision.statement import (
 )
 from accelstudy.diagnosis.decision.verdict import Named
 from accelstudy.diagnosis.forms import coordinate_of
+from accelstudy.diagnosis.formulas import OTHER
 from accelstudy.diagnosis.next_positions import NextPosition
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.diagnosis.space.groups import COURSES, REPEAT
@@ -249,8 +250,11 @@ def formulas(diagnosis: Diagnosis) -> str:
     """Say which formulas a learned function may be; nothing if none was learned."""
     if diagnosis.shape is None:
         return ""
-    all_of_them = [(one.text, one.posterior) for one in diagnosis.shape.ranking.formulas]
-    return _listed([one for one in all_of_them if one[1] >= WORTH] or all_of_them[:1], "or")
+    ranked = diagnosis.shape.ranking.formulas
+    if ranked[0].text == OTHER and ranked[0].posterior >= SURE:
+        return f"No formula of the library describes it ({probability(ranked[0].posterior)})."
+    worth = [(one.text, one.posterior) for one in ranked if one.posterior >= WORTH]
+    return f"It varies {_listed(worth, 'or')}."
 
 
 def beyond(diagnosis: Diagnosis) -> str:
