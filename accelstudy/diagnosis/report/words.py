@@ -236,6 +236,8 @@ def _location(d: Diagnosis) -> list[tuple[str, float, float]]:
 def like(diagnosis: Diagnosis) -> str:
     """Say of what something without a name may be a function; nothing where that is open."""
     worth = [one for one in diagnosis.like if one.posterior >= WORTH]
+    if diagnosis.shape is not None and len(worth) == 1:
+        return ""
     return _listed(
         [
             (f"{TARGETS[o.target]} that varies with {COORDINATES.get(o.coordinate, o.coordinate)}",
