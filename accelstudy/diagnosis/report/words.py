@@ -256,7 +256,8 @@ def formulas(diagnosis: Diagnosis) -> str:
     if ranked[0].text == OTHER and ranked[0].posterior >= SURE:
         return f"No formula of the library describes it ({probability(ranked[0].posterior)})."
     worth = [(one.text, one.posterior) for one in ranked if one.posterior >= WORTH]
-    return f"It varies {_listed(worth, 'or')}."
+    rest = " or otherwise" if len(worth) > MOST else ""
+    return f"It varies {_listed(worth[:MOST], 'or')}{rest}."
 
 
 def beyond(diagnosis: Diagnosis) -> str:
@@ -313,6 +314,8 @@ FAMILIES = {
 
 WORTH = 0.1
 """Posterior from which on something open is worth a word; the figure has all of it."""
+MOST = 3
+"""Formulas that are worth a word; the page lists all."""
 NOT_AN_EFFECT = {"unknown": "something that is not in the catalogue"}
 """Words for names that stand for no effect."""
 
