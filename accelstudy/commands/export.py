@@ -20,9 +20,9 @@ def export_command(calibration: Path, form: str) -> None:
 
     CALIBRATION is a calibration.json. json and yaml carry every effect: parameters with sigmas and
     units, and the formulas to implement. c and matrix hold M in force = M · (x, y, z, 1), with
-    readings and forces in the axes of the log. They carry what is linear in the force, such as
-    bias, scale and non-orthogonality. They carry no effect of time, temperature, vibration or the
-    position before.
+    readings and forces in the axes of the log. No matrix carries an effect that is not linear in
+    the force, or that depends on time, temperature, vibration or the position before; for these c
+    holds a function, which takes them.
     """
     from accelstudy.campaign.calibration.applying import read_calibration
     from accelstudy.campaign.calibration.export import export

@@ -32,7 +32,7 @@ from accelstudy.diagnosis.decision.problem import Problem, is_exact
 from accelstudy.diagnosis.decision.verdict import Finding
 from accelstudy.diagnosis.evidence.detection import Chance
 from accelstudy.diagnosis.evidence.field import UNKNOWN
-from accelstudy.diagnosis.next_positions import NextPosition, next_positions
+from accelstudy.diagnosis.next_positions import NextPosition, next_positions, positions_to_learn
 from accelstudy.diagnosis.prediction import relative_variance
 from accelstudy.diagnosis.space.examined import ExaminedFit, Frame
 from accelstudy.diagnosis.space.groups import LACK_OF_FIT, REPEAT, ROBOT, all_groups
@@ -40,6 +40,7 @@ from accelstudy.diagnosis.space.hypotheses import OUTLIER
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.visibility import UpperLimit, upper_limits
 from accelstudy.effects import HoldConditions
+from accelstudy.effects.learned import Learned
 from accelstudy.leveling.angles import angles_of, tilt_slope, wrapped
 from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON, cap_forces, holds_in_use
 
@@ -193,7 +194,18 @@ def limits_of_others(problem: Problem, finding: Finding, known: bool) -> tuple[U
 
 
 def separating_positions(frame: Frame, finding: Finding) -> tuple[NextPosition, ...]:
-    """Positions that tell the two most probable of the credible set apart."""
+    """Positions that tell the two most probable of the credible set apart, or that show a function.
+
+    Parameters
+    ----------
+    frame : Frame, of the base fit
+    finding : Finding
+    """
+    if finding.place is not None:
+        learned = finding.chosen[0].best.effect
+        assert isinstance(learned, Learned)
+        with stage("next positions"):
+            return tuple(positions_to_learn(finding.frame, learned))
     if finding.posterior is None or finding.verdict not in ("named", "narrowed", "unknown"):
         return ()
     weighed = zip(finding.credible_set, finding.posterior.told, strict=False)

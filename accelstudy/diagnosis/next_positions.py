@@ -1,4 +1,8 @@
-"""Where, how warm and when to measure next, to separate two explanations best."""
+"""Where, how warm and when to measure next, to separate two explanations best.
+
+Of a learned function, where to measure to know it better: a position with the whitened rows A turns
+the covariance Q of the parameters into Q − Q Aᵀ (I + A Q Aᵀ)⁻¹ A Q, and so its mean variance.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +14,9 @@ from numpy.typing import NDArray
 
 from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
-from accelstudy.diagnosis.space.signatures import signature
-from accelstudy.effects import HoldConditions
+from accelstudy.diagnosis.space.signatures import Signature, signature
+from accelstudy.effects import Effect, HoldConditions
+from accelstudy.effects.learned import Learned
 from accelstudy.leveling.angles import roll_pitch
 from accelstudy.positions.choice import TIED, first_best
 from accelstudy.schemes import get_scheme
@@ -45,7 +50,9 @@ class NextPosition:
     later : float or None, s after the last position; None where it does not matter
     anywhere : bool, whether other attitudes would do nearly as well; this one is the session's own
     separates : names that only the one, and that only the other explanation has
-    gain : float, in sigmas, root of what the position by itself adds to the separation
+    gain : float, in sigmas, root of what the position by itself adds to the separation; of a
+        learned function, the root of the share of its variance that the position takes away
+    yaw : float or None, rad; None where it does not matter
     """
 
     roll: float
@@ -55,6 +62,7 @@ class NextPosition:
     anywhere: bool
     separates: tuple[tuple[str, ...], tuple[str, ...]]
     gain: float
+    yaw: float | None = None
 
 
 def next_positions(frame: Frame, first: Explanation, second: Explanation) -> list[NextPosition]:
@@ -109,6 +117,70 @@ def next_positions(frame: Frame, first: Explanation, second: Explanation) -> lis
     ]
 
 
+LEARNABLE = ("force", "previous", "angle", "yaw", "temperature")
+"""Coordinates of which further positions can be chosen, whatever is past."""
+YAWS = np.arange(-3, 5) * np.pi / 4
+"""Yaws of the positions to choose from where one is a coordinate, rad."""
+VALUES = 121
+"""Values of the coordinate over which the variance of a function is taken."""
+
+
+def positions_to_learn(frame: Frame, learned: Learned) -> list[NextPosition]:
+    """Positions that show most of a learned function, one after the other.
+
+    Parameters
+    ----------
+    frame : Frame, of the fit with the function
+    learned : Learned, the function
+    """
+    if learned.coordinate not in LEARNABLE:
+        return []
+    model, g = frame.solution.model, frame.solution.gravity
+    needed = {*compose(learned.spec, (learned.spec,)).hold_columns}
+    attitudes = -g * get_scheme(GRID).directions
+    yaws = YAWS if "yaw" in needed else np.zeros(1)
+    u = model.n_parameters
+    cofactors, weights = frame.solution.cofactors[:u, :u], np.zeros((u, u))
+    own = [model.parameter_names.index(parameter.name) for parameter in learned.parameters]
+    weights[np.ix_(own, own)] = _mean_squares(learned)
+    whole, before, chosen = float(np.sum(weights * cofactors)), frame.forces[-1], []
+    for _ in range(COUNT):
+        forces, hold, _ = _grid(frame, attitudes, needed, before, yaws)
+        columns = _whitening(frame, forces) @ _derivatives(frame, (), forces, hold)
+        cross = columns @ cofactors
+        noise = np.eye(columns.shape[1]) + cross @ columns.swapaxes(1, 2)
+        seen = np.linalg.solve(noise, cross)
+        gains = np.einsum("kcu,uv,kcv->k", seen, weights, cross)
+        i = first_best(-gains, TIED * gains.max())
+        roll, pitch = hold.column("roll")[i], hold.column("pitch")[i]
+        chosen.append(
+            NextPosition(
+                roll=float(roll),
+                pitch=float(pitch),
+                temperature=(
+                    float(hold.column("temperature")[i]) if "temperature" in needed else None
+                ),
+                later=None,
+                anywhere=False,
+                separates=((learned.name,), ()),
+                gain=float(np.sqrt(gains[i] / whole)),
+                yaw=float(hold.column("yaw")[i]) if "yaw" in needed else None,
+            )
+        )
+        cofactors, before = cofactors - cross[i].T @ seen[i], forces[i]
+    return chosen
+
+
+def _mean_squares(learned: Learned) -> Array:
+    """Form of the parameters (k, k) that is the sum of the mean squares of all functions."""
+    low, high = (
+        learned.settings.get(end, turn) for end, turn in (("low", -np.pi), ("high", np.pi))
+    )
+    grid, k = np.linspace(low, high, VALUES), len(learned.parameters)
+    shown = [learned.function(grid, unit, np.zeros((k, k)))[0].ravel() for unit in np.eye(k)]
+    return np.asarray(np.array(shown) @ np.array(shown).T / VALUES)
+
+
 def _one_after_the_other(rivals: _Rivals, attitudes: Array, needed: set[str]) -> list[int]:
     """Places that add most to the separation, each after those before it, in other attitudes."""
     frame, separation = rivals.frame, rivals.separation
@@ -140,13 +212,15 @@ def _apart(forces: Array, order: Iterable[int], gravity: float) -> list[int]:
 
 
 def _grid(
-    frame: Frame, attitudes: Array, needed: set[str], before: Array
+    frame: Frame, attitudes: Array, needed: set[str], before: Array, yaws: Array | None = None
 ) -> tuple[Array, HoldConditions, Array | None]:
     """Forces (k, 3), holds and times after the session (k,) of the positions to choose from.
 
-    All attitudes stand together for each time and temperature. The times are None where there is
-    nothing to choose. Steps are those from the force `before`, (3,).
+    All attitudes, by all yaws, stand together for each time and temperature. The times are None
+    where there is nothing to choose. Steps are those from the force `before`, (3,).
     """
+    yaws = np.zeros(1) if yaws is None else yaws
+    yaw, attitudes = np.repeat(yaws, len(attitudes)), np.tile(attitudes, (len(yaws), 1))
     measured, n, m = frame.hold, len(frame.forces), len(attitudes)
     delays, levels, later = np.zeros(1), np.zeros(1), None
     if measured.time is not None:
@@ -173,7 +247,7 @@ def _grid(
         vibration=None if vibration is None else np.full(len(grid), np.median(vibration)),
         roll=roll,
         pitch=pitch,
-        yaw=np.zeros(len(grid)),
+        yaw=np.tile(yaw, rounds),
         step_x=step[:, 0],
         step_y=step[:, 1],
         step_z=step[:, 2],
@@ -268,33 +342,37 @@ class _Rivals:
 
     def columns(self, forces: Array, hold: HoldConditions) -> tuple[Array, Array]:
         """Derivatives of what candidates show, in units of their noise, (k, c, p) of either."""
-        angles = np.column_stack([hold.column("roll"), hold.column("pitch")])
         white = _whitening(self.frame, forces)
-        one, two = (_derivatives(self.frame, e, forces, angles, hold) for e in self.effects)
+        one, two = (_derivatives(self.frame, e, forces, hold) for e in self.effects)
         return np.asarray(white @ one), np.asarray(white @ two)
 
 
 def _fit(frame: Frame, explanation: Explanation) -> Explained:
     residuals = frame.residuals
-    shown = _derivatives(frame, explanation, frame.forces, frame.angles, frame.hold)
+    shown = _derivatives(frame, explanation, frame.forces, frame.hold)
     rows = residuals.rows(residuals.jac_observations[..., :3] @ shown)
     inverse = np.linalg.pinv(rows, rcond=1e-10)
     return Explained(inverse @ residuals.errors, inverse @ inverse.T)
 
 
 def _derivatives(
-    frame: Frame, explanation: Explanation, forces: Array, angles: Array, hold: HoldConditions
+    frame: Frame, explanation: Explanation, forces: Array, hold: HoldConditions
 ) -> Array:
     """Derivatives of the output by the parameters of the model and by those of the effects."""
-    g, model = frame.solution.gravity, frame.solution.model
-    base = [signature(effect, forces, angles, g, hold).force for effect in model.effects]
-    turning = _force_by_angles(forces, g)
-    added = []
+    g, turning = frame.solution.gravity, _force_by_angles(forces, frame.solution.gravity)
+    angles = np.column_stack([hold.column("roll"), hold.column("pitch")])
+
+    def shown(effect: Effect) -> Signature:
+        return signature(effect, forces, angles, g, hold)
+
+    all_of_them = [shown(effect) for effect in frame.solution.model.effects]
     for one in explanation:
         assert one.effect is not None
-        shown = signature(one.effect, forces, angles, g, hold).reduced(one.directions)
-        added.append(shown.force + np.einsum("nia,nak->nik", turning, shown.angles))
-    return np.concatenate([*base, *added], axis=2)
+        all_of_them.append(shown(one.effect).reduced(one.directions))
+    turned = [np.einsum("nia,nak->nik", turning, one.angles) for one in all_of_them]
+    return np.concatenate(
+        [one.force + change for one, change in zip(all_of_them, turned, strict=True)], axis=2
+    )
 
 
 def _whitening(frame: Frame, forces: Array) -> Array:

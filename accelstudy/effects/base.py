@@ -96,7 +96,7 @@ class Effect(WithSettings):
     @property
     def equation(self) -> str:
         """What the effect adds, for people."""
-        output, axes, reading = _expressions(self)
+        output, axes, reading = expressions(self)
         parts = (*output, *(part for row in axes for part in row), *reading)
         texts = [_text(part) for part in parts if part]
         if len(texts) == len(AXES):  # one formula if all axes have the same
@@ -242,7 +242,7 @@ def formulas(effect: Effect) -> dict[str, Texts | list[Texts]]:
         f_z (m/s², along the sensitive axes; the output of all others for one that acts last), g,
         the parameters and the columns of `HoldConditions`.
     """
-    output, axes, reading = _expressions(effect)
+    output, axes, reading = expressions(effect)
     texts: dict[str, Texts | list[Texts]] = {}
     if any(part != 0 for part in output):
         texts["output"] = [_text(part) for part in output]
@@ -253,7 +253,7 @@ def formulas(effect: Effect) -> dict[str, Texts | list[Texts]]:
     return texts
 
 
-def _expressions(effect: Effect) -> tuple[tuple[Any, ...], Matrix, tuple[Any, Any]]:
+def expressions(effect: Effect) -> tuple[tuple[Any, ...], Matrix, tuple[Any, Any]]:
     """Evaluate an effect with symbols for all but its settings, which stay numbers."""
     numbered = type(effect)()
     numbered.settings = {

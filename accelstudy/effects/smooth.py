@@ -32,7 +32,7 @@ ORDERS = np.arange(1, HARMONICS + 1)
 
 def frequencies(edge: float = EDGE) -> Array:
     """Frequencies of sines that vanish at ± an edge, (k,)."""
-    return np.pi / (2 * edge) * np.arange(1, SINES + 1)
+    return np.asarray(np.pi / (2 * edge) * np.arange(1, SINES + 1))
 
 
 def sines(scaled: Any, xp: Any, count: int = SINES, edge: float = EDGE) -> list[Any]:

@@ -1,6 +1,8 @@
 """Learned functions: beside plain Gaussian processes, exported, and in campaigns that hide one."""
 
+import ctypes
 import json
+import subprocess
 from dataclasses import replace
 
 import numpy as np
@@ -116,38 +118,59 @@ def test_a_spec_holds_all_and_is_not_listed():
             get_effect(spec)
 
 
-def test_what_is_exported_corrects_as_the_calibration_does(tmp_path):
-    """Formulas of the export, evaluated by Python alone, also beyond the range."""
-    rng = np.random.default_rng(3)
+@pytest.fixture(scope="module")
+def calibration(tmp_path_factory):
+    """Of a sensor with a learned function of the temperature."""
     spec = f"{SPEC}, length=0.6, amplitude=0.01)"
     settings = CampaignSettings(
         scheme="fibonacci-30", temperature=(LOW, HIGH), temperature_order="random", effects=(spec,)
     )
-    fit = fit_campaign(simulate_campaign(settings)[0], get_model(f"{NINE.name}+{spec}"), ROBOT)
-    path = tmp_path / "calibration.json"
+    model = get_model(f"{NINE.name}+{spec}")
+    fit = fit_campaign(simulate_campaign(settings)[0], model, ROBOT)
+    path = tmp_path_factory.mktemp("learned") / "calibration.json"
     path.write_text(json.dumps(calibration_document(fit)))
-    calibration = read_calibration(path)
+    return read_calibration(path)
+
+
+@pytest.fixture(scope="module")
+def readings():
+    """Readings, some of them beyond the range of the temperature."""
+    forces = 9 * np.random.default_rng(3).standard_normal((8, 3))
+    return forces, np.linspace(0, 50, 8)
+
+
+def test_exported_formulas_correct_as_the_calibration_does(calibration, readings):
+    """Evaluated by Python alone."""
     whole = json.loads(export(calibration.content, "json"))
-    forces, temperature = 9 * rng.standard_normal((8, 3)), np.linspace(0, 50, 8)
-    expected = calibration.correct(forces, some_holds(8, temperature=temperature))
-    names = {"sin": np.sin, "cos": np.cos, "Abs": np.abs, "sign": np.sign, "exp": np.exp}
+    expected = calibration.correct(readings[0], some_holds(8, temperature=readings[1]))
     values = {p["name"]: p["value"] for e in whole["effects"] for p in e["parameters"]}
-    for reading, warm, one in zip(forces, temperature, expected, strict=True):
+    for reading, warm, one in zip(*readings, expected, strict=True):
+        known = {"sin": np.sin, "Abs": np.abs, "temperature": warm, "g": G, **values}
+
+        def added(part, known=known):
+            texts = [e[part] for e in whole["effects"] if part in e]
+            return sum(np.vectorize(lambda text: eval(text, known), [float])(t) for t in texts)
+
         f_a = reading
         for _ in range(50):
-            known = {**names, **values, "temperature": warm, "g": G}
             known |= dict(zip(("f_x", "f_y", "f_z"), f_a, strict=True))
-            f_a = reading - sum(
-                np.array([eval(text, known) for text in e["output"]])
-                for e in whole["effects"]
-                if "output" in e
-            )
-        axes = np.eye(3) + sum(
-            np.array([[eval(text, known) for text in row] for row in e["axes"]])
-            for e in whole["effects"]
-            if "axes" in e
-        )
-        np.testing.assert_allclose(axes @ f_a, one, atol=1e-10)
+            f_a = reading - added("output")
+        np.testing.assert_allclose((np.eye(3) + added("axes")) @ f_a, one, atol=1e-10)
+
+
+def test_exported_c_corrects_as_the_calibration_does(calibration, readings, tmp_path):
+    code = export(calibration.content, "c")
+    (tmp_path / "all.c").write_text(code.replace("static void", "void"))
+    library = tmp_path / "all.so"
+    command = ["cc", "-Wall", "-Werror", "-shared", "-fPIC", "-o", library, tmp_path / "all.c"]
+    subprocess.run([*command, "-lm"], check=True)
+    function = ctypes.CDLL(str(library)).accelerometer_calibrate
+    three = ctypes.c_double * 3
+    expected = calibration.correct(readings[0], some_holds(8, temperature=readings[1]))
+    for reading, warm, one in zip(*readings, expected, strict=True):
+        got = three()
+        function(three(*reading), ctypes.c_double(warm), got)
+        np.testing.assert_allclose(list(got), one, atol=1e-10)
 
 
 @pytest.fixture(scope="module")

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.wording import comma_list
+from accelstudy.campaign.calibration.c_code import c_function
 from accelstudy.effects import Effect
 from accelstudy.effects.base import formulas
 from accelstudy.sensors.conversion import Conversion, conversion_of
@@ -60,7 +61,7 @@ def device_matrix(calibration: Mapping[str, Any]) -> Array:
     if unfit := not_affine(_model(calibration)):
         raise InputError(
             f"no matrix can hold {comma_list(list(unfit))} of the model {calibration['model']!r}; "
-            "the forms json and yaml carry all effects"
+            "the forms json, yaml and c carry all effects"
         )
     affine = calibration["affine"]
     if affine is None:
@@ -94,7 +95,8 @@ def export(calibration: Mapping[str, Any], form: str) -> str:
     """Text of a calibration in one of `FORMS`.
 
     "json" and "yaml" hold everything: parameters with sigmas, formulas of the effects and, if there
-    is one, the matrix. "c" is a header file with the matrix, "matrix" its plain 3 × 4 numbers.
+    is one, the matrix. "c" is a header file with the matrix or, where there is none, with a
+    function; "matrix" has its plain 3 × 4 numbers.
     """
     if form == "matrix":
         return "\n".join(_row(row, " ") for row in device_matrix(calibration)) + "\n"
@@ -158,8 +160,7 @@ def _effect(effect: Effect, parameters: list[Any]) -> dict[str, Any]:
     notes = ["acts last: on f_a + Σ output of all other effects"] if effect.last else []
     if effect.part == "rig":
         notes.append("belongs to the rig: do not apply it to readings away from the rig")
-    if effect.drifts:
-        notes.append("known within the session only: limit time to ranges.time_s")
+    notes += _notes(effect)
     return {
         "spec": effect.spec,
         "part": effect.part,
@@ -169,6 +170,11 @@ def _effect(effect: Effect, parameters: list[Any]) -> dict[str, Any]:
             {key: p[key] for key in ("name", "value", "sigma", "unit")} for p in parameters
         ],
     }
+
+
+def _notes(effect: Effect) -> list[str]:
+    """What somebody who applies an effect has to know."""
+    return ["known within the session only: limit time to ranges.time_s"] if effect.drifts else []
 
 
 def _unit(calibration: Mapping[str, Any]) -> str:
@@ -181,18 +187,47 @@ def _row(values: ArrayLike, separator: str) -> str:
 
 
 def _c_header(calibration: Mapping[str, Any]) -> str:
-    rows = ",\n".join(f"    {{{_row(row, ', ')}}}" for row in device_matrix(calibration))
-    _, frame = _readings(calibration)
-    lines = [
-        f"Accelerometer calibration of {calibration['campaign']}.",
-        f"Specific force in m/s^2 = M * (x, y, z, 1), with x, y, z in {_unit(calibration)}.",
-        f"Both are in the axes {frame.description}.",
-    ]
+    raw, frame = _readings(calibration)
+    lines = [f"Accelerometer calibration of {calibration['campaign']}."]
+    model = _model(calibration)
+    if not_affine(model):
+        values = iter(calibration["parameters"])
+        each = [(e, [next(values)["value"] for _ in e.parameters]) for e in model.effects]
+        stays = [(effect, p) for effect, p in each if effect.part == "sensor"]
+        linear = mending(calibration) @ frame.matrix * raw.scale
+        columns, code = c_function(
+            stays,
+            calibration["gravity_mps2"],
+            np.column_stack([linear, -linear @ raw.offset]),
+            frame.matrix,
+        )
+        code = f"#include <math.h>\n\n{code}"
+        lines.append(f"From raw readings in {_unit(calibration)} to the specific force in m/s^2.")
+        lines += [f"{name}: {SYMBOLS[_symbol(name)]}." for name in columns]
+        lines += [
+            f"{effect.name}: {'; '.join(notes)}."
+            for effect, _ in stays
+            if (notes := _notes(effect))
+        ]
+    else:
+        rows = ",\n".join(f"    {{{_row(row, ', ')}}}" for row in device_matrix(calibration))
+        code = f"static const double accelerometer_calibration[3][4] = {{\n{rows}\n}};"
+        lines.append(
+            f"Specific force in m/s^2 = M * (x, y, z, 1), with x, y, z in {_unit(calibration)}."
+        )
+    lines.append(f"Both are in the axes {frame.description}.")
     if (calibration.get("mended") or {}).get("matrix") is not None:
-        lines.append(f"M mends the readings, too: {calibration['mended']['reason']}.")
+        lines.append(f"It mends the readings, too: {calibration['mended']['reason']}.")
     comment = "\n * ".join(line.replace("*/", "* /") for line in lines)
     return (
         f"/* {comment} */\n"
         "#ifndef ACCELEROMETER_CALIBRATION_H\n#define ACCELEROMETER_CALIBRATION_H\n\n"
-        f"static const double accelerometer_calibration[3][4] = {{\n{rows}\n}};\n\n#endif\n"
+        f"{code}\n\n#endif\n"
     )
+
+
+def _symbol(name: str) -> str:
+    """Symbol that stands for a name, and for the likes of it."""
+    likes = {"step": "step_x", "yaw": "roll", "pitch": "roll", "temperature_lagged": name}
+    first = next((like for begin, like in likes.items() if name.startswith(begin)), name)
+    return "temperature_lagged" if first.startswith("temperature_lagged") else first

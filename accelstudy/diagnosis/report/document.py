@@ -131,6 +131,7 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
                     if position.temperature is None
                     else {"temperature_degC": position.temperature}
                 ),
+                **({} if position.yaw is None else {"yaw_gon": position.yaw / GON}),
                 **({} if position.later is None else {"later_s": json_number(position.later)}),
                 "any_attitude": position.anywhere,
                 "separates": [name for names in position.separates for name in names],

@@ -429,9 +429,11 @@ def _listed(alternatives: Sequence[tuple[str, float]], last: str = "and") -> str
 
 
 def question(positions: Sequence[NextPosition]) -> str:
-    """Say what further positions would show of the two most probable explanations, if any would."""
+    """Say what further positions would show, if any would."""
     if not positions:
         return ""
+    if LEARNED in positions[0].separates[0]:
+        return "what the learned function is like"
     first, second = (" with ".join(grouped(names, name_words)) for names in positions[0].separates)
     if first and second:
         return f"whether {first} or {second} is missing"
