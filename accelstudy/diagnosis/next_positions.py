@@ -121,6 +121,8 @@ LEARNABLE = ("force", "previous", "angle", "yaw", "temperature")
 """Coordinates of which further positions can be chosen, whatever is past."""
 YAWS = np.arange(-3, 5) * np.pi / 4
 """Yaws of the positions to choose from where one is a coordinate, rad."""
+TEMPERATURES = 13
+"""Temperatures to choose from where one is a coordinate."""
 VALUES = 121
 """Values of the coordinate over which the variance of a function is taken."""
 
@@ -138,14 +140,14 @@ def positions_to_learn(frame: Frame, learned: Learned) -> list[NextPosition]:
     model, g = frame.solution.model, frame.solution.gravity
     needed = {*compose(learned.spec, (learned.spec,)).hold_columns}
     attitudes = -g * get_scheme(GRID).directions
-    yaws = YAWS if "yaw" in needed else np.zeros(1)
+    yaws, by_heat = YAWS if "yaw" in needed else np.zeros(1), "temperature" in needed
     u = model.n_parameters
     cofactors, weights = frame.solution.cofactors[:u, :u], np.zeros((u, u))
     own = [model.parameter_names.index(parameter.name) for parameter in learned.parameters]
     weights[np.ix_(own, own)] = _mean_squares(learned)
     whole, before, chosen = float(np.sum(weights * cofactors)), frame.forces[-1], []
     for _ in range(COUNT):
-        forces, hold, _ = _grid(frame, attitudes, needed, before, yaws)
+        forces, hold, _ = _grid(frame, attitudes, needed, before, yaws, TEMPERATURES * by_heat)
         columns = _whitening(frame, forces) @ _derivatives(frame, (), forces, hold)
         cross = columns @ cofactors
         noise = np.eye(columns.shape[1]) + cross @ columns.swapaxes(1, 2)
@@ -157,9 +159,7 @@ def positions_to_learn(frame: Frame, learned: Learned) -> list[NextPosition]:
             NextPosition(
                 roll=float(roll),
                 pitch=float(pitch),
-                temperature=(
-                    float(hold.column("temperature")[i]) if "temperature" in needed else None
-                ),
+                temperature=(float(hold.column("temperature")[i]) if by_heat else None),
                 later=None,
                 anywhere=False,
                 separates=((learned.name,), ()),
@@ -212,12 +212,19 @@ def _apart(forces: Array, order: Iterable[int], gravity: float) -> list[int]:
 
 
 def _grid(
-    frame: Frame, attitudes: Array, needed: set[str], before: Array, yaws: Array | None = None
+    frame: Frame,
+    attitudes: Array,
+    needed: set[str],
+    before: Array,
+    yaws: Array | None = None,
+    temperatures: int = 0,
 ) -> tuple[Array, HoldConditions, Array | None]:
     """Forces (k, 3), holds and times after the session (k,) of the positions to choose from.
 
     All attitudes, by all yaws, stand together for each time and temperature. The times are None
-    where there is nothing to choose. Steps are those from the force `before`, (3,).
+    where there is nothing to choose. Steps are those from the force `before`, (3,). So many
+    temperatures lie evenly between the lowest and the highest; by default there are three of those
+    that were measured.
     """
     yaws = np.zeros(1) if yaws is None else yaws
     yaw, attitudes = np.repeat(yaws, len(attitudes)), np.tile(attitudes, (len(yaws), 1))
@@ -230,6 +237,8 @@ def _grid(
     if measured.temperature is not None:
         shares = [0.0, 0.5, 1.0] if "temperature" in needed else [0.5]
         levels = np.quantile(measured.temperature, shares)
+        if temperatures:
+            levels = np.linspace(levels[0], levels[-1], temperatures)
     rounds = len(delays) * len(levels)
     grid = np.tile(attitudes, (rounds, 1))
     delay = np.repeat(delays, len(levels) * m)

@@ -157,9 +157,10 @@ def _judged(
     else:
         if detection.p_value < level:
             weighing = weigh(problem, detection, chance)
-            finding = with_what_is_certain(problem, weighing, find(problem, weighing))
+            found = find(problem, weighing)
+            finding = with_what_is_certain(problem, weighing, found)
             finding = unless_weak(problem, detection, finding)
-            finding = with_a_learned_shape(problem, finding)
+            finding = with_a_learned_shape(problem, weighing, found.posterior, finding)
         if finding.verdict == "no_effect":
             worst = worst_of(tests_of_noise(problem, frame, campaign, chance))
             if worst is not None:

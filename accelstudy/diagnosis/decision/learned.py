@@ -16,7 +16,7 @@ from scipy import special
 
 from accelstudy.adjustment.quality import Solution
 from accelstudy.diagnosis.decision import priors
-from accelstudy.diagnosis.decision.posterior import Posterior
+from accelstudy.diagnosis.decision.posterior import Posterior, Weighing
 from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.decision.refits import refit
 from accelstudy.diagnosis.decision.verdict import Choice, Finding, impossible, misfit
@@ -40,41 +40,84 @@ FOLLOWS = (0.1, 1.0)
 """Lags by which a rate of temperature is taken, as parts of the time between two holds."""
 
 
-def with_a_learned_shape(problem: Problem, finding: Finding) -> Finding:
-    """Learn the function where nothing has a name, and yet it is plain where it lives."""
-    posterior = finding.posterior
+def with_a_learned_shape(
+    problem: Problem, weighing: Weighing, posterior: Posterior | None, finding: Finding
+) -> Finding:
+    """Learn the function where nothing has a name, and yet it is plain where it lives.
+
+    Beside it is what is certain or, where that leaves a misfit, all of the explanation that has it,
+    such as the mean of what it changes.
+
+    Parameters
+    ----------
+    problem : Problem
+    weighing : Weighing, of the same
+    posterior : Posterior, before any effect of it was doubted
+    finding : Finding
+    """
     if finding.verdict != "unknown" or posterior is None:
         return finding
-    place, probability = most_probable_place(problem, posterior)
-    if place is None or probability < priors.SURE:
+    found = most_probable_place(problem, posterior)
+    if found is None or found.probability < priors.SURE:
         return finding
-    beside = [choice.best for choice in finding.chosen]
-    fitted = fit_of_place(problem, place, beside)
-    if fitted is None or misfit(problem, fitted[1]) or impossible(fitted[1]):
+    certain = [choice for choice in finding.chosen if choice.best.name not in found.names]
+    doubted = [_choice(problem, weighing, posterior, name) for name in found.names]
+    # What is doubted may be the mean of what the function changes, or a part of the function.
+    for beside in (finding.chosen, (*certain, *doubted)):
+        fitted = fit_of_place(problem, found.place, [choice.best for choice in beside])
+        if fitted is not None and not misfit(problem, fitted[1]) and not impossible(fitted[1]):
+            break
+    else:
         return finding
     hypothesis, solution = fitted
-    learned = Choice(hypothesis, (LEARNED,), probability)
+    learned = Choice(hypothesis, (LEARNED,), found.probability)
     return replace(
         finding,
         verdict=LEARNED,
         frame=Frame.of(solution),
-        chosen=(learned, *finding.chosen),
-        place=place,
+        chosen=(learned, *beside),
+        place=found.place,
         unlearned=finding,
     )
 
 
-def most_probable_place(problem: Problem, posterior: Posterior) -> tuple[Place | None, float]:
-    """Coordinate and target that hold most of a posterior, and how much of all of it."""
+@dataclass(frozen=True)
+class FoundPlace:
+    """Where something without a name lives.
+
+    Attributes
+    ----------
+    place : Place
+    probability : float, of all of the posterior
+    names : tuple of str, of the effects beside it in the most probable explanation
+    """
+
+    place: Place
+    probability: float
+    names: tuple[str, ...]
+
+
+def most_probable_place(problem: Problem, posterior: Posterior) -> FoundPlace | None:
+    """Coordinate and target that hold most of a posterior; None if nothing unknown does."""
     totals: dict[Place, float] = defaultdict(float)
+    beside: dict[Place, tuple[float, tuple[str, ...]]] = {}
     for one in posterior.each:
         if UNKNOWN in one.names and one.posterior > LIKELY:
+            names = tuple(name for name in one.names if name != UNKNOWN)
             for place, share in shares_of_places(problem, one.names).items():
                 totals[place] += one.posterior * share
+                beside[place] = max(beside.get(place, (0.0, ())), (one.posterior * share, names))
     if not totals:
-        return None, 0.0
+        return None
     place = max(totals, key=totals.__getitem__)
-    return place, totals[place]
+    return FoundPlace(place, totals[place], beside[place][1])
+
+
+def _choice(problem: Problem, weighing: Weighing, posterior: Posterior, name: str) -> Choice:
+    """Effect that an explanation has beside a function, with its probability."""
+    having = [one.posterior for one in posterior.each if name in one.names]
+    best = strongest(problem.examined.candidates[name], problem.residuals.z)
+    return Choice(best, weighing.members[name], min(sum(having), 1.0))
 
 
 def shares_of_places(problem: Problem, names: Sequence[str]) -> dict[Place, float]:
