@@ -270,9 +270,9 @@ def beyond(diagnosis: Diagnosis) -> str:
 
 
 def more_of_it(diagnosis: Diagnosis) -> str:
-    """Say where positions would show more of a learned function; nothing if none was learned."""
+    """Say where a learned function is known least; nothing where further positions are given."""
     shape = diagnosis.shape
-    if shape is None:
+    if shape is None or diagnosis.next_positions:
         return ""
     of = coordinate_of(shape.effect.coordinate)
     places = comma_list([of.at(place) for place in shape.least_known], "or")
