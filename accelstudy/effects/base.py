@@ -82,6 +82,7 @@ class Effect(WithSettings):
     bounds : (float, float), between which physics has its parameters, SI
     partial : bool, whether some of its parameters are left out
     drifts : bool, whether it grows in proportion to time, and is known within its session only
+    informed : bool, whether something is known of its parameters a priori, see `deviations`
     """
 
     kind = "effect"
@@ -92,6 +93,7 @@ class Effect(WithSettings):
     last: ClassVar[bool] = False
     bounds: ClassVar[tuple[float, float]] = (-np.inf, np.inf)
     partial: ClassVar[bool] = False
+    informed: ClassVar[bool] = False
 
     @property
     def equation(self) -> str:

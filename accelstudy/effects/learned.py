@@ -62,6 +62,7 @@ class Learned(Effect):
     """
 
     name = LEARNED
+    informed = True
     coordinate: ClassVar[str] = "temperature"
     target: ClassVar[str] = "bias"
     count: ClassVar[int] = 0

@@ -9,6 +9,7 @@ ignored.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, TypeAlias
@@ -60,7 +61,8 @@ class KernelFunction:
         forces        (R, n, 3)
         angles        (R, n, 2)     if the approach uses them
         initial       (R, u)        of the parameters; the last is observed if it is gravity
-        weights       (u,)          of the observations of parameters: of gravity, or none
+        weights       (u,)          of the observations of parameters: of gravity, and of those that
+                                    have a prior, about zero
         work          (n, work, LANES)
         results       (2 u + 3, R') estimates, sigmas, Ω, iterations, converged (1 or 0); R' is R
                                     rounded up to a multiple of LANES
@@ -150,14 +152,16 @@ class _Writer:
         self.of = of
         self.u, self.o = of.unknowns, of.observed
         self.c = of.conditions
-        self.with_gravity = of.equations.estimates_gravity
+        self.weighted = [*of.equations.trace.informed]
+        if of.equations.estimates_gravity:
+            self.weighted.append(self.u - 1)
         self.code = code = Code(NAME, INTEGERS, POINTERS)
         self.stored: Rows = []
 
         padded = code.integer("add", "%replicates", LANES - 1)
         groups = code.integer("sdiv", padded, LANES)
         self.stride = code.integer("mul", groups, LANES)
-        self.weight = code.load_same("weights", str(self.u - 1)) if self.with_gravity else 0.0
+        self.weights = {k: code.load_same("weights", str(k)) for k in self.weighted}
         with code.loop(groups) as group:
             self.group(code.integer("mul", group, LANES))
 
@@ -197,7 +201,7 @@ class _Writer:
         numbers = code.of_integer(first) + code.lane_numbers()
         active = Variable(code, 1.0)
         with code.loop(str(MAX_ITERATIONS)) as iteration:
-            step = self.step(x, initial[-1])
+            step = self.step(x, initial)
             going = active.get() > 0.0
             converged = going & step.within(code, tolerance)
             number = code.of_integer(code.integer("add", iteration, 1))
@@ -237,7 +241,7 @@ class _Writer:
                 self.write(i, 2 * o, values[:3])
         return larger(largest.get() * (ROUNDING * np.finfo(float).eps), STEP_TOLERANCE)
 
-    def step(self, x: list[Variable], direct: Term) -> _Step:
+    def step(self, x: list[Variable], initial: Sequence[Term]) -> _Step:
         """Write one iteration; it changes x and, in `work`, v and f_a."""
         code, u = self.code, self.u
         at = [variable.get() for variable in x]
@@ -249,10 +253,12 @@ class _Writer:
 
         n = {key: variable.get() for key, variable in normal.items()}
         r: list[Term] = [variable.get() for variable in right]
-        if self.with_gravity:
-            prior_misclosure = direct - at[-1]
-            n[u - 1, u - 1] = n[u - 1, u - 1] + self.weight
-            r[-1] = fma(self.weight, prior_misclosure, r[-1])
+        misclosures: dict[int, Term] = {}
+        for k, weight in self.weights.items():
+            # Gravity is observed; a parameter with a prior is zero a priori.
+            misclosures[k] = -at[k] if k in self.of.equations.trace.informed else initial[k] - at[k]
+            n[k, k] = n[k, k] + weight
+            r[k] = fma(weight, misclosures[k], r[k])
         scale = [root(n[k, k]) for k in range(u)]
         unit = [1.0 / s for s in scale]
         scaled = [[n[i, j] * unit[i] * unit[j] for j in range(i + 1)] for i in range(u)]
@@ -263,9 +269,9 @@ class _Writer:
         with code.loop("%positions") as i:
             self.residuals(i, dx, size_v, omega)
         total: Term = omega.get()
-        if self.with_gravity:
-            rest = prior_misclosure - dx[-1]
-            total = fma(self.weight * rest, rest, total)
+        for k, weight in self.weights.items():
+            rest = misclosures[k] - dx[k]
+            total = fma(weight * rest, rest, total)
         for variable, present, change in zip(x, at, dx, strict=True):
             variable.set(present + change)
         size_x = root(dot(half, half))

@@ -62,6 +62,12 @@ class SensorTrace:
         """Symbols of temperatures behind a lag, by that of the lag."""
         return self._hold.lagged_by
 
+    @property
+    def informed(self) -> tuple[int, ...]:
+        """Which parameters, by number, have a prior."""
+        has = [effect.informed for effect, p in self._effects for _ in p]
+        return tuple(i for i, known in enumerate(has) if known)
+
     def lags(self, settings: NDArray[np.float64]) -> list[float]:
         """Lags of the temperatures of `lagged`, of settings (s,)."""
         values = dict(zip(self.settings, settings, strict=True))

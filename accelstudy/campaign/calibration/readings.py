@@ -151,6 +151,11 @@ def readings_of(
             "change them"
         ) from None
     for effect, condition in calibration.needs:
+        if condition not in OPTIONS and not condition.startswith("step_"):
+            raise InputError(
+                f"{log}: the effect {effect} needs the {condition} of each row, which no log has; "
+                "a calibration without this effect can be applied"
+            )
         is_given = condition in places or (condition == "time" and layout.rate_hz is not None)
         if condition in OPTIONS and not is_given:
             raise InputError(

@@ -107,9 +107,9 @@ class Hypothesis:
         Where only combinations show, the parameters that are kept stand for them, and the others
         are zero.
         """
-        if self.effect is None or self.dim == len(self.effect.parameters):
+        if self.effect is None or self.effect.informed:
             return self.effect
-        if np.isfinite(self.effect.deviations).all():
+        if self.dim == len(self.effect.parameters):
             return self.effect
         from scipy.linalg import qr  # slow to import, and seldom needed
 
