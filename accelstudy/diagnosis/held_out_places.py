@@ -18,14 +18,15 @@ from accelstudy.diagnosis.decision import priors
 from accelstudy.diagnosis.decision.learned import (
     SIZES,
     fit_of_place,
-    shares_of_places,
+    most_probable_place,
     weighted_shapes,
 )
+from accelstudy.diagnosis.decision.posterior import Posterior, Weighed, weigh_beside
 from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.decision.verdict import Choice
 from accelstudy.diagnosis.evidence.detection import total_odds
 from accelstudy.diagnosis.evidence.field import PROPOSED, UNKNOWN, Unknown
-from accelstudy.diagnosis.evidence.hypotheses import Singles
+from accelstudy.diagnosis.evidence.hypotheses import Singles, classes_of, equivalents
 from accelstudy.diagnosis.evidence.size import log_sum
 from accelstudy.diagnosis.prediction import LinearSplit
 from accelstudy.diagnosis.space.shapes import Place
@@ -54,8 +55,21 @@ def refit_of_place(
     fit = fit_of_place(part, place, beside)
     if fit is None:
         return "the fitted positions alone cannot show such a function", False
-    shares = shares_of_places(part, [*(one.name for one in beside), UNKNOWN])
-    return fit[1], max(shares, key=shares.__getitem__, default=place) != place
+    return fit[1], _place_of(part, singles) != place
+
+
+def _place_of(part: Problem, singles: Singles) -> Place | None:
+    """Place that a part chooses for something unknown, alone or beside an effect."""
+    unknown, z = part.field.unknown, part.residuals.z
+    if unknown is None:
+        return None
+    each = unknown.densities(part.evidence, unknown.parts(z[None]), np.array([z @ z]))
+    weight = float(log_sum(each[0]) + np.log(priors.UNKNOWN))
+    alone = Weighed((UNKNOWN,), ((UNKNOWN,),), weight)
+    classes = classes_of(singles, equivalents(part.examined, singles))
+    posterior = Posterior.of([alone, *weigh_beside(part, singles, classes)])
+    found = most_probable_place(part, posterior)
+    return None if found is None else found.place
 
 
 def simulated_places(

@@ -207,3 +207,12 @@ def test_which_cells_are_compiled(monkeypatch):
     (cell,) = make_cells(grid(approaches="gravity")).values()
     with pytest.raises(InputError, match=r"install accelstudy\[kernel\]"):
         next(blocks(replace(cell, compiled=True), 1, 0, 1))
+
+
+def test_parameters_with_a_prior():
+    """Few positions, so that the prior counts; gravity is observed, too."""
+    model = get_model("bias+learned(coordinate=time wave, target=bias, period=900, amplitude=3e-3)")
+    observed = drawn(model, Noise(sigma_force=1e-3, sigma_gravity=1e-4), 9, 3, "fibonacci-17")
+    found, expected = both(model, ROBOT, observed)
+    assert found.converged.all()
+    assert_same(found, expected)
