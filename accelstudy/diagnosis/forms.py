@@ -20,6 +20,8 @@ PLACES = 60
 """Places of a step that are tried at most."""
 MOST_CYCLES, EACH = 10.0, 3
 """Periods of a sine in the range of its coordinate at most; each needs as many different values."""
+APART = 100
+"""Parts of its range in which values of a coordinate count as one."""
 REPEATED = 1.5
 """Periods of what is no sine at least: it must come back."""
 TURNS = {1: "once per turn", 2: "twice per turn", 3: "three times per turn",
@@ -119,7 +121,7 @@ TARGETS = {
     "scale": Target("scale of {}", "the scale of {}", XYZ, "1"),
     "square": Target("quadratic scale of {}", "the quadratic scale of {}", XYZ, "s^2/m"),
     "reading": Target("reading of {}", "the robot's reading of {}", ("roll", "pitch"), "rad"),
-    "tilt": Target("tilt {}", "the tilt {} of the robot's base", ("a", "b"), "rad"),
+    "tilt": Target("tilt {}", "the tilt of the robot's base ({})", ("a", "b"), "rad"),
 }
 
 
@@ -156,18 +158,33 @@ class Form:
 
 def forms(coordinate: str, c: Array) -> list[Form]:
     """Forms that a function of a coordinate with the values c (n, a) may have."""
-    of, values = coordinate_of(coordinate), np.unique(c)
+    of, values = coordinate_of(coordinate), distinct(c)
+    polynomials = [
+        Form(words, partial(_polynomial, p, (values[0], values[-1])))
+        for p, words in POLYNOMIALS.items()
+        if p < len(values)
+    ]
+    if len(values) <= EACH:  # a line or a parabola is all that shows
+        return polynomials
     found = _of_an_angle() if coordinate in ANGLES else _of_a_range(of, values)
     if of.has_zero:
         found += [Form(words, partial(_power, p)) for p, words in POWERS.items()]
         found += _about_zero(of, values) if values[0] < 0 < values[-1] else []
     else:
-        ends = values[0], values[-1]
-        found += [Form(words, partial(_polynomial, p, ends)) for p, words in POLYNOMIALS.items()]
+        found += polynomials
     if coordinate in ("time", "order", "vibration"):
         start = 0.0 if of.has_zero else values[0]
         found.append(Form("with its square root", lambda _, x: np.sqrt(x[..., None] - start)))
     return [*found, *_somewhere(of, values)]
+
+
+def distinct(c: Array) -> Array:
+    """Values of a coordinate that differ by more than a small part of its range."""
+    values = np.unique(c)
+    part = np.floor((values - values[0]) / np.ptp(values) * APART * (1 - 1e-9))
+    chosen = values[np.diff(part, prepend=-1) > 0]
+    chosen[-1] = values[-1]
+    return chosen
 
 
 def _of_an_angle() -> list[Form]:
@@ -190,7 +207,7 @@ def _of_a_range(of: Coordinate, values: Array) -> list[Form]:
         return of.by(2 * np.pi / turn)
 
     found = []
-    if cycles[-1:] >= REPEATED:
+    if np.any(cycles >= REPEATED):
         found = [
             Form("as a sine with a period of {}", harmonic, turns, period,
                  is_sine=True, is_searched=True),
@@ -230,8 +247,6 @@ def _somewhere(of: Coordinate, values: Array) -> list[Form]:
 
     step = Form("in a step between {}", lambda s, x: (x > s)[..., None].astype(float),
                 between[some], gap, is_searched=True)  # fmt: skip
-    if len(values) <= EACH:
-        return [step]
     inner = np.linspace(values[0], values[-1], 13)[1:-1]
     return [
         step,

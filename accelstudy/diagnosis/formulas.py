@@ -288,11 +288,12 @@ class _Library:
         rest = self.z - left.reshape(m, -1) @ values
         freedom = max(self.evidence.redundancy - len(values), 1)
         cofactors = (inverse @ inverse.T).reshape(count, k, count, k) * (rest @ rest) / freedom
-        unit, sizes = TARGETS[self.effect.target].unit, []
-        for i, a in enumerate(values.reshape(count, k)):
-            by = self._size(form, setting, a, taking[i])
-            sigma = float(np.sqrt(by @ cofactors[i, :, i] @ by))
-            sizes.append(estimate(float(by @ a), sigma, unit)[0])
+        unit = TARGETS[self.effect.target].unit
+        by = [self._size(form, setting, a, i)
+              for a, i in zip(values.reshape(count, k), taking, strict=False)]  # fmt: skip
+        sigma = max(float(np.sqrt(d @ cofactors[i, :, i] @ d)) for i, d in enumerate(by))
+        how_far = [float(d @ a) for d, a in zip(by, values.reshape(count, k), strict=True)]
+        sizes = [estimate(size, sigma, unit)[0] for size in how_far]
         if len(set(sizes)) > 1:
             names = [self.components[i] for i in taking]
             sizes = [f"{size} ({name})" for size, name in zip(sizes, names, strict=True)]

@@ -236,6 +236,8 @@ def _location(d: Diagnosis) -> list[tuple[str, float, float]]:
 def like(diagnosis: Diagnosis) -> str:
     """Say of what something without a name may be a function; nothing where that is open."""
     worth = [one for one in diagnosis.like if one.posterior >= WORTH]
+    if diagnosis.shape is not None and len(worth) == 1:
+        return ""
     return _listed(
         [
             (f"{TARGETS[o.target]} that varies with {COORDINATES.get(o.coordinate, o.coordinate)}",
@@ -254,7 +256,8 @@ def formulas(diagnosis: Diagnosis) -> str:
     if ranked[0].text == OTHER and ranked[0].posterior >= SURE:
         return f"No formula of the library describes it ({probability(ranked[0].posterior)})."
     worth = [(one.text, one.posterior) for one in ranked if one.posterior >= WORTH]
-    return f"It varies {_listed(worth, 'or')}."
+    rest = " or otherwise" if len(worth) > MOST else ""
+    return f"It varies {_listed(worth[:MOST], 'or')}{rest}."
 
 
 def beyond(diagnosis: Diagnosis) -> str:
@@ -267,9 +270,9 @@ def beyond(diagnosis: Diagnosis) -> str:
 
 
 def more_of_it(diagnosis: Diagnosis) -> str:
-    """Say where positions would show more of a learned function; nothing if none was learned."""
+    """Say where a learned function is known least; nothing where further positions are given."""
     shape = diagnosis.shape
-    if shape is None:
+    if shape is None or diagnosis.next_positions:
         return ""
     of = coordinate_of(shape.effect.coordinate)
     places = comma_list([of.at(place) for place in shape.least_known], "or")
@@ -311,6 +314,8 @@ FAMILIES = {
 
 WORTH = 0.1
 """Posterior from which on something open is worth a word; the figure has all of it."""
+MOST = 3
+"""Formulas that are worth a word; the page lists all."""
 NOT_AN_EFFECT = {"unknown": "something that is not in the catalogue"}
 """Words for names that stand for no effect."""
 
