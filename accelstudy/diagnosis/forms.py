@@ -16,10 +16,14 @@ from accelstudy.effects.smooth import LENGTHS, ORDERS, frequencies, harmonics, s
 
 Array = NDArray[np.float64]
 
-PLACES = 40
+PLACES = 60
 """Places of a step that are tried at most."""
 MOST_CYCLES, EACH = 10.0, 3
 """Periods of a sine in the range of its coordinate at most; each needs as many different values."""
+APART = 100
+"""Parts of its range in which values of a coordinate count as one."""
+REPEATED = 1.5
+"""Periods of what is no sine at least: it must come back."""
 TURNS = {1: "once per turn", 2: "twice per turn", 3: "three times per turn",
          4: "four times per turn", 5: "five times per turn", 6: "six times per turn"}  # fmt: skip
 """Harmonics of an angle."""
@@ -100,11 +104,12 @@ class Target:
 
     Attributes
     ----------
-    words : str, with a place for the components
+    label, words : str, short and in a sentence, with a place for the components
     components : tuple of str
     unit : str, SI
     """
 
+    label: str
     words: str
     components: tuple[str, ...]
     unit: str
@@ -112,11 +117,11 @@ class Target:
 
 XYZ = ("x", "y", "z")
 TARGETS = {
-    "bias": Target("the bias of {}", XYZ, "m/s^2"),
-    "scale": Target("the scale of {}", XYZ, "1"),
-    "square": Target("the quadratic scale of {}", XYZ, "s^2/m"),
-    "reading": Target("the robot's reading of {}", ("roll", "pitch"), "rad"),
-    "tilt": Target("the tilt {} of the robot's base", ("a", "b"), "rad"),
+    "bias": Target("bias of {}", "the bias of {}", XYZ, "m/s^2"),
+    "scale": Target("scale of {}", "the scale of {}", XYZ, "1"),
+    "square": Target("quadratic scale of {}", "the quadratic scale of {}", XYZ, "s^2/m"),
+    "reading": Target("reading of {}", "the robot's reading of {}", ("roll", "pitch"), "rad"),
+    "tilt": Target("tilt {}", "the tilt of the robot's base ({})", ("a", "b"), "rad"),
 }
 
 
@@ -135,7 +140,7 @@ class Form:
     shown : callable, shows a setting
     weight : float, prior
     is_sine : bool, of which the amplitude is told; of others it is how much they go up and down
-    is_smooth : bool, whether it changes smoothly with its setting
+    is_searched : bool, whether settings between these are tried as well
     """
 
     words: str
@@ -144,7 +149,7 @@ class Form:
     shown: Callable[[float], str] = str
     weight: float = 1.0
     is_sine: bool = False
-    is_smooth: bool = False
+    is_searched: bool = False
 
     def said(self, setting: float) -> str:
         """Say it with a setting."""
@@ -153,18 +158,33 @@ class Form:
 
 def forms(coordinate: str, c: Array) -> list[Form]:
     """Forms that a function of a coordinate with the values c (n, a) may have."""
-    of, values = coordinate_of(coordinate), np.unique(c)
+    of, values = coordinate_of(coordinate), distinct(c)
+    polynomials = [
+        Form(words, partial(_polynomial, p, (values[0], values[-1])))
+        for p, words in POLYNOMIALS.items()
+        if p < len(values)
+    ]
+    if len(values) <= EACH:  # a line or a parabola is all that shows
+        return polynomials
     found = _of_an_angle() if coordinate in ANGLES else _of_a_range(of, values)
     if of.has_zero:
         found += [Form(words, partial(_power, p)) for p, words in POWERS.items()]
         found += _about_zero(of, values) if values[0] < 0 < values[-1] else []
     else:
-        ends = values[0], values[-1]
-        found += [Form(words, partial(_polynomial, p, ends)) for p, words in POLYNOMIALS.items()]
+        found += polynomials
     if coordinate in ("time", "order", "vibration"):
         start = 0.0 if of.has_zero else values[0]
         found.append(Form("with its square root", lambda _, x: np.sqrt(x[..., None] - start)))
     return [*found, *_somewhere(of, values)]
+
+
+def distinct(c: Array) -> Array:
+    """Values of a coordinate that differ by more than a small part of its range."""
+    values = np.unique(c)
+    part = np.floor((values - values[0]) / np.ptp(values) * APART * (1 - 1e-9))
+    chosen = values[np.diff(part, prepend=-1) > 0]
+    chosen[-1] = values[-1]
+    return chosen
 
 
 def _of_an_angle() -> list[Form]:
@@ -180,28 +200,28 @@ def _of_an_angle() -> list[Form]:
 def _of_a_range(of: Coordinate, values: Array) -> list[Form]:
     """Sines and exponentials in the range of some values (n,)."""
     low, high = values[0], values[-1]
-    cycles = np.arange(0.75, min(MOST_CYCLES, (len(values) - 1) / EACH) + 0.1, 0.25)
+    cycles = np.arange(1.0, min(MOST_CYCLES, (len(values) - 1) / EACH) + 0.1, 0.25)
     turns = 2 * np.pi * cycles / (high - low)
 
     def period(turn: float) -> str:
         return of.by(2 * np.pi / turn)
 
     found = []
-    if len(turns):
+    if np.any(cycles >= REPEATED):
         found = [
             Form("as a sine with a period of {}", harmonic, turns, period,
-                 is_sine=True, is_smooth=True),
+                 is_sine=True, is_searched=True),
             Form("periodically every {}, in another form than a sine",
-                 partial(harmonic, orders=(1, 2, 3)), turns[cycles <= cycles[-1] / EACH + 1],
-                 period, is_smooth=True),
+                 partial(harmonic, orders=(1, 2, 3)), turns[cycles >= REPEATED], period,
+                 is_searched=True),
         ]  # fmt: skip
     constants = (high - low) * CONSTANTS
     if of.is_course:
         words = "decaying with a time constant of {}"
-        return [*found, Form(words, partial(_exp, low, -1), constants, of.by, is_smooth=True)]
+        return [*found, Form(words, partial(_exp, low, -1), constants, of.by, is_searched=True)]
     for end, sign, verb in ((high, 1, "growing"), (low, -1, "decaying")):
         words = verb + " by the factor e every {}"
-        found.append(Form(words, partial(_exp, end, sign), constants, of.by, 0.5, is_smooth=True))
+        found.append(Form(words, partial(_exp, end, sign), constants, of.by, 0.5, is_searched=True))
     return found
 
 
@@ -212,7 +232,7 @@ def _about_zero(of: Coordinate, values: Array) -> list[Form]:
         Form("with its absolute value", lambda _, x: np.abs(x)[..., None]),
         Form("by its sign alone", lambda _, x: np.sign(x)[..., None]),
         Form("with its square and its sign", lambda _, x: (x * np.abs(x))[..., None]),
-        Form("beyond ±{} only", _beyond, widths, of.at, is_smooth=True),
+        Form("beyond ±{} only", _beyond, widths, of.at, is_searched=True),
     ]
 
 
@@ -225,20 +245,17 @@ def _somewhere(of: Coordinate, values: Array) -> list[Form]:
         after = int(np.searchsorted(values, place))
         return f"{of.at(values[after - 1])} and {of.at(values[after])}"
 
-    step = Form(
-        "in a step between {}", lambda s, x: (x > s)[..., None].astype(float), between[some], gap
-    )
-    if len(values) <= EACH:
-        return [step]
+    step = Form("in a step between {}", lambda s, x: (x > s)[..., None].astype(float),
+                between[some], gap, is_searched=True)  # fmt: skip
     inner = np.linspace(values[0], values[-1], 13)[1:-1]
     return [
         step,
         Form("in a straight line from {} on", lambda s, x: np.maximum(x[..., None] - s, 0),
-             inner, of.at, 0.5, is_smooth=True),
+             inner, of.at, 0.5, is_searched=True),
         Form("in a straight line up to {}", lambda s, x: np.minimum(x[..., None] - s, 0),
-             inner, of.at, 0.5, is_smooth=True),
+             inner, of.at, 0.5, is_searched=True),
         *(Form("in a bump at {}", partial(_bump, share * np.ptp(values)),
-               np.linspace(values[0], values[-1], 25), of.at, 0.5, is_smooth=True)
+               np.linspace(values[0], values[-1], 25), of.at, 0.5, is_searched=True)
           for share in BUMPS),
     ]  # fmt: skip
 

@@ -40,6 +40,8 @@ ALIKE = 0.25
 """Prior probability that one function is that of all components; else each has its own."""
 AT_ONCE = 10_000_000
 """Numbers in one block of work, about."""
+ROUNDS, FINER = 3, 4
+"""How often the settings about the best one are tried more closely, and by how much."""
 WORTH = 0.01
 """Posterior from which on a formula is worth a line."""
 KEPT = 1e-6
@@ -180,16 +182,39 @@ class _Library:
             dims[:, i] = np.where(of_all, np.count_nonzero(kept, axis=1), 0)
         return parts, dims.astype(int)
 
-    def of_form(self, form: Form) -> Array:
-        """Log density of the residuals under each setting and choice, with its prior, (t, s)."""
-        functions = form.basis(form.settings[0], self.c[:1]).shape[-1] * len(self.components)
-        count = -(-len(form.settings) * functions * len(self.z) // AT_ONCE)
-        found = [self.spaces(form, some) for some in np.array_split(form.settings, count)]
+    def of_form(self, form: Form) -> tuple[Array, Array]:
+        """Settings of a form, (t,), and the log density under each and each choice, (t, s).
+
+        The densities contain the prior, which is even over the settings of the form. More of them
+        are tried about the best one, which a large effect tells more closely.
+        """
+        count = len(form.settings)
+        places, logs = np.arange(float(count)), self.densities(form, form.settings)
+        step = 1.0
+        for _ in range(ROUNDS if form.is_searched and count > 1 else 0):
+            step /= FINER
+            around = np.arange(1 - FINER, FINER)
+            near = places[np.argmax(logs.max(axis=1))] + step * around[around != 0]
+            near = np.setdiff1d(near[(near >= 0) & (near <= count - 1)], places)
+            if not len(near):
+                break
+            settings = np.interp(near, np.arange(count), form.settings)
+            order = np.argsort(np.concatenate([places, near]))
+            logs = np.concatenate([logs, self.densities(form, settings)])[order]
+            places = np.concatenate([places, near])[order]
+        width = np.gradient(places)[:, None] if count > 1 else np.ones((1, 1))
+        settings = np.interp(places, np.arange(count), form.settings)
+        return settings, logs + self.prior + np.log(width / count)
+
+    def densities(self, form: Form, settings: Array) -> Array:
+        """Log density of the residuals under settings (t,) of a form and each choice, (t, s)."""
+        functions = form.basis(settings[0], self.c[:1]).shape[-1] * len(self.components)
+        blocks = -(-len(settings) * functions * len(self.z) // AT_ONCE)
+        found = [self.spaces(form, some) for some in np.array_split(settings, blocks)]
         parts, dims = (np.concatenate(each) for each in zip(*found, strict=True))
         square = float(self.z @ self.z)
         logs = self.evidence.of_spaces(parts.ravel(), np.maximum(dims, 1).ravel(), square)
-        logs = np.where(dims > 0, logs.reshape(dims.shape), -np.inf)
-        return np.asarray(logs + self.prior - np.log(len(form.settings)))
+        return np.where(dims > 0, logs.reshape(dims.shape), -np.inf)
 
     def of_smooth(self) -> Array:
         """The same under any smooth function, by its smoothness."""
@@ -215,20 +240,20 @@ class _Library:
 
     def ranking(self) -> Ranking:
         """Rank all forms, and any other smooth function."""
-        weighed = [(form, self.of_form(form)) for form in forms(self.effect.coordinate, self.c)]
-        weighed = [(form, logs) for form, logs in weighed if np.isfinite(logs).any()]
-        total = sum(form.weight for form, _ in weighed) / (1 - UNKNOWN)
-        logs = [each + np.log(form.weight / total) for form, each in weighed]
+        found = [(form, *self.of_form(form)) for form in forms(self.effect.coordinate, self.c)]
+        weighed = [one for one in found if np.isfinite(one[2]).any()]
+        total = sum(form.weight for form, _, _ in weighed) / (1 - UNKNOWN)
+        logs = [each + np.log(form.weight / total) for form, _, each in weighed]
         logs.append(self.of_smooth() + np.log(UNKNOWN))
         posterior = softmax([np.logaddexp.reduce(each, axis=None) for each in logs]).tolist()
         taking, alike = self._taking(logs), defaultdict[str, list[int]](list)
-        for i, (form, _) in enumerate(weighed):
+        for i, (form, _, _) in enumerate(weighed):
             alike[form.words].append(i)
         formulas = []
         for some in alike.values():
             best, together = max(some, key=posterior.__getitem__), sum(posterior[i] for i in some)
             if together >= WORTH:
-                said = self._said(weighed[best][0], logs[best], taking)
+                said = self._said(*weighed[best], taking)
                 formulas.append(Formula(said, together))
         formulas.append(Formula(OTHER, posterior[-1]))
         names = [self.components[i] for i in taking]
@@ -249,11 +274,11 @@ class _Library:
         sure = tuple(i for i in self.everything if each[i] >= SURE_OF)
         return sure or choices[int(np.argmax(by_choice))]
 
-    def _said(self, form: Form, logs: Array, taking: Choice) -> str:
+    def _said(self, form: Form, settings: Array, logs: Array, taking: Choice) -> str:
         """Say a form, with its best setting and its size."""
         alike = taking == self.everything and logs[:, -1].max() > logs[:, :-1].max()
         place = len(self.choices) if alike else self.choices.index(taking)
-        setting = self._sharpened(form, int(np.argmax(logs[:, place])), place)
+        setting = float(settings[np.argmax(logs[:, place])])
         left = self.rows(partial(form.basis, setting))[1][:, list(taking)]
         if alike:
             left = left.sum(axis=1, keepdims=True)
@@ -263,11 +288,12 @@ class _Library:
         rest = self.z - left.reshape(m, -1) @ values
         freedom = max(self.evidence.redundancy - len(values), 1)
         cofactors = (inverse @ inverse.T).reshape(count, k, count, k) * (rest @ rest) / freedom
-        unit, sizes = TARGETS[self.effect.target].unit, []
-        for i, a in enumerate(values.reshape(count, k)):
-            by = self._size(form, setting, a, taking[i])
-            sigma = float(np.sqrt(by @ cofactors[i, :, i] @ by))
-            sizes.append(estimate(float(by @ a), sigma, unit)[0])
+        unit = TARGETS[self.effect.target].unit
+        by = [self._size(form, setting, a, i)
+              for a, i in zip(values.reshape(count, k), taking, strict=False)]  # fmt: skip
+        sigma = max(float(np.sqrt(d @ cofactors[i, :, i] @ d)) for i, d in enumerate(by))
+        how_far = [float(d @ a) for d, a in zip(by, values.reshape(count, k), strict=True)]
+        sizes = [estimate(size, sigma, unit)[0] for size in how_far]
         if len(set(sizes)) > 1:
             names = [self.components[i] for i in taking]
             sizes = [f"{size} ({name})" for size, name in zip(sizes, names, strict=True)]
@@ -281,17 +307,3 @@ class _Library:
         phi = form.basis(setting, self.c[:, component if self.c.shape[1] > 1 else 0])
         h = phi @ a
         return np.asarray(phi[np.argmax(h)] - phi[np.argmin(h)])
-
-    def _sharpened(self, form: Form, best: int, place: int) -> float:
-        """Search the setting of a form between those beside the best one."""
-        settings = [float(setting) for setting in form.settings]
-        if not form.is_smooth:
-            return settings[best]
-        from scipy.optimize import minimize_scalar  # slow to import, and seldom needed
-
-        def lost(setting: float) -> float:
-            return -float(self.spaces(form, np.array([setting]))[0][0, place])
-
-        ends = settings[max(best - 1, 0)], settings[min(best + 1, len(settings) - 1)]
-        least = minimize_scalar(lost, bounds=ends, method="bounded")
-        return float(least.x) if least.fun < lost(settings[best]) else settings[best]

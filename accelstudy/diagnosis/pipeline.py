@@ -89,6 +89,7 @@ def diagnose(
     leveling = None
     if finding.chosen:
         leveling = leveling_rms(base, final, problem.frame.hold, variance)
+    nameless = verdict.verdict in ("unknown", "learned")
     marked = marked_positions(problem, sigma_holds(problem, problem.frame))
     u = verdict.extended.n_parameters
     sigma = np.sqrt(np.diag(final.cofactors)[:u] * variance)
@@ -102,7 +103,7 @@ def diagnose(
         location_by_chance=location.by_chance,
         not_located=location.untestable,
         shape=shape_of(problem, finding, variance) if verdict.verdict == "learned" else None,
-        like=like_shapes(problem, finding.posterior) if verdict.verdict == "unknown" else (),
+        like=like_shapes(problem, finding.posterior) if nameless else (),
         leveling=leveling,
         changes=parameter_changes(problem, finding, variance),
         upper_limits=limits_of_others(problem, finding, verdict.sigma_holds),

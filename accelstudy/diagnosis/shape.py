@@ -41,7 +41,7 @@ class LearnedShape:
     values, sigmas : (k, c) arrays, h and its sigma there, SI
     where : (n, c) array, the coordinate of each component in the positions, SI
     residuals, spreads : (n, c) arrays, h and what the final fit leaves of it in each position, as
-        far as the position shows it, and the noise of that, SI
+        far as the position shows it, and the noise of that, SI; NaN where it does not act
     least_known : tuple of float, values of the coordinate where positions would show most of it
     """
 
@@ -84,6 +84,10 @@ def shape_of(problem: Problem, finding: Finding, variance: float) -> LearnedShap
     here = [effect.function(at[:, min(i, at.shape[1] - 1)], parameters, cofactors)[0][:, i]
             for i in range(values.shape[1])]  # fmt: skip
     left, spreads = _left(frame, effect, variance)
+    if effect.coordinate == "previous":
+        # It acts where something moved: not in the first position.
+        steps = np.column_stack([frame.hold.column(f"step_{axis}") for axis in "xyz"])
+        spreads[~steps.any(axis=1)] = np.nan
     components = TARGETS[effect.target].components
     taking = [components.index(axis) for axis in ranking.axes]
     return LearnedShape(
@@ -95,7 +99,7 @@ def shape_of(problem: Problem, finding: Finding, variance: float) -> LearnedShap
         values,
         sigmas,
         np.broadcast_to(at, left.shape),
-        np.stack(here, axis=1) + left,
+        np.where(np.isnan(spreads), np.nan, np.stack(here, axis=1) + left),
         spreads,
         _least_known(grid, np.sqrt(np.mean(sigmas[:, taking] ** 2, axis=1))),
     )

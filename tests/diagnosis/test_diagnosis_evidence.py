@@ -8,7 +8,7 @@ from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, design, posed, shuffled
 from scipy import stats
 
 from accelstudy.diagnosis.decision.posterior import Explanation, Posterior, Weighed, credible_set
-from accelstudy.diagnosis.decision.verdict import _misfit
+from accelstudy.diagnosis.decision.verdict import misfit
 from accelstudy.diagnosis.evidence.field import Field
 from accelstudy.diagnosis.evidence.noise_models import UnequalAxes
 from accelstudy.diagnosis.evidence.noise_tests import NOISES, most_evidence
@@ -177,6 +177,6 @@ def test_a_fit_that_misses_more_than_the_noise_is_no_explanation(level, spread, 
     missed = np.tile(spread * rng.standard_normal((24, 3)), (2, 1))
     observed = replace(observed, forces=observed.forces + missed)
     problem = posed(GRAVITY, observed, level)
-    found = _misfit(problem, problem.base.solution)
+    found = misfit(problem, problem.base.solution)
     assert found.endswith(said)
     assert bool(found) == bool(said)

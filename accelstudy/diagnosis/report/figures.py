@@ -307,9 +307,8 @@ def shape_figure(shape: LearnedShape) -> Figure:
     figure = new_figure(COLUMN, 10 + 36 * len(shape.components))
     panels = figure.subplots(len(shape.components), 1, sharex=True, sharey=True)
     of, target = coordinate_of(shape.effect.coordinate), TARGETS[shape.effect.target]
-    shown = plain(shape)
-    title = target.words.removeprefix("the ").removeprefix("robot's ")
-    unit = shown_unit(target.unit)
+    faint = hardly_shown(shape)
+    unit, hardly = shown_unit(target.unit), list[tuple[Axes, Array, Array]]()
     for i, (name, ax) in enumerate(zip(shape.components, panels, strict=True)):
         colour, marker = COMPONENTS[name]
         x, at = shape.where[:, i] / of.size, shape.grid
@@ -319,21 +318,24 @@ def shape_figure(shape: LearnedShape) -> Figure:
         ax.axhline(0, color=INK, linewidth=0.6)
         ax.fill_between(grid, h - BAND * sigma, h + BAND * sigma, color=colour, alpha=0.25, lw=0)
         ax.plot(grid, h, color=colour)
-        ax.plot(x[shown[:, i]], points[shown[:, i]], marker, color=colour, markersize=3.2)
-        limits = ax.get_ylim()
-        ax.plot(x[~shown[:, i]], points[~shown[:, i]], ".", color=OTHER, markersize=2.5)
-        ax.set_ylim(limits)
-        ax.set_ylabel(f"{title.format(name)}\n{_per_unit('h', unit)}")
+        ax.plot(x[~faint[:, i]], points[~faint[:, i]], marker, color=colour, markersize=3.2)
+        hardly.append((ax, x[faint[:, i]], points[faint[:, i]]))
+        ax.set_ylabel(f"{target.label.format(name)}\n{_per_unit('h', unit)}")
         ax.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
         if name not in shape.ranking.axes:
-            ax.set_title("no part in it shows", loc="right")
+            ax.set_title("no part of it shows", loc="right")
+    # What hardly shows the function has no say in the scale.
+    limits = panels[0].get_ylim()
+    for ax, x, points in hardly:
+        ax.plot(x, points, ".", color=OTHER, markersize=2.5)
+    panels[0].set_ylim(limits)
     panels[-1].set_xlabel(_per_unit(of.words.removeprefix("the "), of.unit))
     return figure
 
 
-def plain(shape: LearnedShape) -> NDArray[np.bool_]:
-    """Residuals (n, c) whose noise is small enough to be drawn large."""
-    return np.asarray(shape.spreads < PLAIN * shape.spreads.min(axis=0))
+def hardly_shown(shape: LearnedShape) -> NDArray[np.bool_]:
+    """Which residuals, (n, c), have so much noise that they are drawn small."""
+    return np.asarray(shape.spreads > PLAIN * np.nanmin(shape.spreads, axis=0))
 
 
 def _per_unit(what: str, unit: str) -> str:

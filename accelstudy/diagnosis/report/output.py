@@ -31,7 +31,7 @@ from accelstudy.diagnosis.report.document import (
     positions_table,
     study_overlay,
 )
-from accelstudy.diagnosis.report.figures import diagnosis_figures, plain
+from accelstudy.diagnosis.report.figures import diagnosis_figures, hardly_shown
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.diagnosis.space.examined import IMITATES
 from accelstudy.drawing.saving import save_all
@@ -183,7 +183,7 @@ def _write_report(
         called=lambda effect: wording.called(effect["name"], effect["spec"]),
         figures=drawn,
         beyond=wording.beyond(diagnosis),
-        small_dots=diagnosis.shape is not None and bool((~plain(diagnosis.shape)).any()),
+        small_dots=diagnosis.shape is not None and bool(hardly_shown(diagnosis.shape).any()),
         changed=wording.changed(diagnosis),
         keep_base=wording.keep_base(diagnosis),
         calibration=calibration,

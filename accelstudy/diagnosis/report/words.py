@@ -21,6 +21,7 @@ from accelstudy.diagnosis.decision.statement import (
 )
 from accelstudy.diagnosis.decision.verdict import Named
 from accelstudy.diagnosis.forms import coordinate_of
+from accelstudy.diagnosis.formulas import OTHER
 from accelstudy.diagnosis.next_positions import NextPosition
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.diagnosis.space.groups import COURSES, REPEAT
@@ -235,6 +236,8 @@ def _location(d: Diagnosis) -> list[tuple[str, float, float]]:
 def like(diagnosis: Diagnosis) -> str:
     """Say of what something without a name may be a function; nothing where that is open."""
     worth = [one for one in diagnosis.like if one.posterior >= WORTH]
+    if diagnosis.shape is not None and len(worth) == 1:
+        return ""
     return _listed(
         [
             (f"{TARGETS[o.target]} that varies with {COORDINATES.get(o.coordinate, o.coordinate)}",
@@ -249,8 +252,12 @@ def formulas(diagnosis: Diagnosis) -> str:
     """Say which formulas a learned function may be; nothing if none was learned."""
     if diagnosis.shape is None:
         return ""
-    all_of_them = [(one.text, one.posterior) for one in diagnosis.shape.ranking.formulas]
-    return _listed([one for one in all_of_them if one[1] >= WORTH] or all_of_them[:1], "or")
+    ranked = diagnosis.shape.ranking.formulas
+    if ranked[0].text == OTHER and ranked[0].posterior >= SURE:
+        return f"No formula of the library describes it ({probability(ranked[0].posterior)})."
+    worth = [(one.text, one.posterior) for one in ranked if one.posterior >= WORTH]
+    rest = " or otherwise" if len(worth) > MOST else ""
+    return f"It varies {_listed(worth[:MOST], 'or')}{rest}."
 
 
 def beyond(diagnosis: Diagnosis) -> str:
@@ -263,9 +270,9 @@ def beyond(diagnosis: Diagnosis) -> str:
 
 
 def more_of_it(diagnosis: Diagnosis) -> str:
-    """Say where positions would show more of a learned function; nothing if none was learned."""
+    """Say where a learned function is known least; nothing where further positions are given."""
     shape = diagnosis.shape
-    if shape is None:
+    if shape is None or diagnosis.next_positions:
         return ""
     of = coordinate_of(shape.effect.coordinate)
     places = comma_list([of.at(place) for place in shape.least_known], "or")
@@ -307,6 +314,8 @@ FAMILIES = {
 
 WORTH = 0.1
 """Posterior from which on something open is worth a word; the figure has all of it."""
+MOST = 3
+"""Formulas that are worth a word; the page lists all."""
 NOT_AN_EFFECT = {"unknown": "something that is not in the catalogue"}
 """Words for names that stand for no effect."""
 
