@@ -37,7 +37,7 @@ CONSTANTS = np.geomspace(0.03, 1.0, 12)
 """Constants of an exponential, in ranges of its coordinate."""
 WIDTHS = np.linspace(0.1, 0.8, 8)
 """Widths of a dead band, as parts of the largest value."""
-BUMPS = (0.06, 0.15)
+BUMPS = np.geomspace(0.03, 0.2, 8)
 """Standard deviations of a bump, in ranges of its coordinate."""
 
 # --- coordinates and targets --------------------------------------------------------------------
@@ -175,7 +175,7 @@ def forms(coordinate: str, c: Array) -> list[Form]:
     if coordinate in ("time", "order", "vibration"):
         start = 0.0 if of.has_zero else values[0]
         found.append(Form("with its square root", lambda _, x: np.sqrt(x[..., None] - start)))
-    return [*found, *_somewhere(of, values)]
+    return [*found, *_somewhere(of, np.unique(c))]
 
 
 def distinct(c: Array) -> Array:
@@ -255,7 +255,7 @@ def _somewhere(of: Coordinate, values: Array) -> list[Form]:
         Form("in a straight line up to {}", lambda s, x: np.minimum(x[..., None] - s, 0),
              inner, of.at, 0.5, is_searched=True),
         *(Form("in a bump at {}", partial(_bump, share * np.ptp(values)),
-               np.linspace(values[0], values[-1], 25), of.at, 0.5, is_searched=True)
+               np.linspace(values[0], values[-1], 25), of.at, 0.5 / len(BUMPS), is_searched=True)
           for share in BUMPS),
     ]  # fmt: skip
 

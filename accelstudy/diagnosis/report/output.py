@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,6 @@ from accelstudy.basics import suggested
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.levels import REFUTED
 from accelstudy.basics.progress import stage
-from accelstudy.basics.wording import comma_list
 from accelstudy.campaign.calibration.document import json_text
 from accelstudy.campaign.format import read_campaign
 from accelstudy.diagnosis.decision.posterior import CREDIBLE
@@ -40,7 +39,6 @@ from accelstudy.files.outputs import DIAGNOSIS, result_folder, whole_file
 from accelstudy.files.parquet import write_frame
 from accelstudy.pages import write_page
 from accelstudy.sensors.models import get_model
-from accelstudy.sensors.sensor import not_affine
 
 
 def diagnose_folder(
@@ -234,18 +232,8 @@ def next_steps(
         return steps
     use = "Level a log with the calibration that is beside this page"
     steps.append((use, suggested.apply(result)))
-    inside = not_affine(d.extended)
-    form, why = "c", ""
-    if inside:
-        form, why = "json", f"; no matrix can hold {_held(d, inside)}"
-    steps.append((f"Take it to a device{why}", suggested.export(form, result)))
+    steps.append(("Take it to a device", suggested.export("c", result)))
     if d.extended is not d.model:
         command = suggested.calibrate("CAMPAIGN", Path(place) / "model.yaml", d.approach.name)
         steps.append(("Calibrate the next campaign with this model", command))
     return steps
-
-
-def _held(diagnosis: Diagnosis, names: Sequence[str]) -> str:
-    """Effects of some names of the extended model, as words."""
-    specs = {effect.name: effect.spec for effect in diagnosis.extended.effects}
-    return comma_list([wording.called(name, specs[name]) for name in names])
