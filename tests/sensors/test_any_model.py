@@ -286,11 +286,11 @@ def test_a_stranger_implements_an_exported_calibration(diagnosed):
     assert json.loads(text)["matrix_3x4"] is None
     assert set(json.loads(text)["symbols"]) == {"f_x", "g", "time", "temperature"}
     assert yaml.safe_load(run("export", path, "--form", "yaml")) == json.loads(text)
-    for form in ("c", "matrix"):
-        line = refusal("export", path, "--form", form)
-        assert "no matrix can hold thermal_bias and warm_up" in line
-        assert "json and yaml" in line
-        assert line.count("\n") == 1
+    assert "double temperature, double time, double force[3])" in run("export", path, "--form", "c")
+    line = refusal("export", path, "--form", "matrix")
+    assert "no matrix can hold thermal_bias and warm_up" in line
+    assert "json, yaml and c" in line
+    assert line.count("\n") == 1
 
 
 @pytest.mark.parametrize("frame", ["frd", "flu", "rfu"])
