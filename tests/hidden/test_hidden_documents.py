@@ -251,7 +251,7 @@ QUOTES = {
             s.percent(OUTSIDE, NEVER), s.percent(OUTSIDE, "unforeseen")
         ],
         r"The place is right in (\d+) % and wrong in ([\d.]+) %": places,
-        r"of those that are right (\d+) % are confirmed, and the function explains (\d+) %": learned,
+        r"that are right (\d+) % are confirmed, and the function explains (\d+) %": learned,
         r"that can be learned it is right in (\d+) %": lambda s: [
             s.percent("place right", "can be learned")
         ],
