@@ -142,8 +142,6 @@ def test_the_documents_name_every_figure_set_and_method():
 
 # --- sentences that quote the score ---------------------------------------------------------------
 
-WORDS = {"nine of ten": 90, "three quarters": 75, "half": 50}
-"""Shares in words, percent; each to 5."""
 BEST = "best name right, named or narrowed"
 WRONG, ONE_TWO = "named, and wrong", "one and two effects"
 FALSE, SETS_HOLD = "false alarm", "90 % set holds the truth"
@@ -215,10 +213,10 @@ QUOTES = {
         ],
         r"and ([\d.]+) more at 60": lambda s: [s.measured(BEYOND, "λ = 60")],
         r"is right in (\d+) % of the campaigns, and given in (\d+) %": withheld,
-        r"Of those withheld, ([\w ]+?) need more than four": lambda s: [
+        r"Of those withheld, (\d+) % need more than four": lambda s: [
             s.percent("more than 4 explanations, of those withheld", "λ = 25")
         ],
-        r"([\w ]+?) of the others have the noise in their set": lambda s: [
+        r"Of the others (\d+) % have the noise in their set": lambda s: [
             s.percent("noise in the set, of the others withheld", "λ = 25")
         ],
         r"at its limit now\s+\(([\d.]+) %, ([\d.]+) to ([\d.]+)\)": lambda s: [
@@ -330,9 +328,7 @@ def share_of_alarms(s):
 
 
 def off(said, value):
-    """Whether a number or a share in words differs from the score by more than it is rounded."""
-    if said.strip().lower() in WORDS:
-        return not abs(WORDS[said.strip().lower()] - value) <= 5
+    """Whether a number differs from the score by more than it is rounded."""
     digits = len(said.partition(".")[2])
     return not abs(float(said.replace(" ", "")) - value) <= 0.51 * 10**-digits
 
@@ -351,9 +347,13 @@ def test_a_page_quotes_the_score(page):
 
 
 def test_the_oracle_does_no_better_than_is_said():
-    """In hidden-effects.md, missing.md and evidence.md: finding within 0.01, naming within 0.03."""
+    """In hidden-effects.md, missing.md and evidence.md.
+
+    Finding within 0.01 from λ = 25 on and within 0.05 below, naming within 0.03.
+    """
     found, oracle = (np.array(SCORE.of_size(column)) for column in ("found", "oracle"))
-    np.testing.assert_allclose(found, oracle, atol=0.0101)
+    np.testing.assert_allclose(found[3:], oracle[3:], atol=0.0101)
+    assert np.all(np.abs(found - oracle)[:3] < 0.0501)
     right, oracle = (np.array(SCORE.of_size(f"{who} right")) for who in ("explanation", "oracle"))
     np.testing.assert_allclose(right, oracle, atol=0.0301)
 
