@@ -305,14 +305,9 @@ def _on_the_part(
     part: Problem, split: LinearSplit, noise: Array, rng: np.random.Generator
 ) -> tuple[list[str], Array]:
     """What the fitted positions choose of noise (b, m), and the held-out statistic, (b,)."""
-    fitted = noise[:, split.rows[0]]
-    slopes = rng.standard_normal((len(noise), part.residuals.slopes))
-    z = part.residuals.project(np.concatenate([fitted, slopes], axis=1).T).T
-    candidate, shape = _choices(part, z)
+    candidate, shape = _choices(part, split.residuals(part.residuals, noise, rng))
     left, missed = split.beside(noise)
-    variance = np.ones(len(noise))
-    if not part.evidence.level.known:
-        variance = np.sum(left**2, axis=1) / (fitted.shape[1] - len(split.cofactors))
+    variance = split.variances(left, part.evidence.level.known)
     names, values = tuple(part.field.candidates), np.zeros(len(noise))
     for k in np.unique(candidate):
         if names[k] == OUTLIER:
@@ -323,12 +318,7 @@ def _on_the_part(
         for i, (fit, rest) in enumerate(split.predictors(hypotheses)):
             some = rows[which == i]
             change = left[some] @ fit @ rest
-            slope = change @ split.designs[1]
-            size = np.sum(change**2, axis=1) + np.sum((slope @ split.cofactors) * slope, axis=1)
-            scale = np.sqrt(size * variance[some])
-            # An effect that does not show in the held-out positions says nothing there.
-            shown = scale > 0
-            values[some] = np.sum(change * missed[some], axis=1) / np.where(shown, scale, np.inf)
+            values[some] = split.statistic(change, missed[some], variance[some])
     return [names[k] for k in candidate], values
 
 

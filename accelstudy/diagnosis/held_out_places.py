@@ -119,9 +119,7 @@ def simulated_places(
     if not len(learned):
         return nothing, nothing, np.zeros(0, dtype=bool)
     weights = np.exp(-_proposal(unknown, place, z[learned]))
-    fitted = noise[learned][:, split.rows[0]]
-    slopes = rng.standard_normal((len(learned), part.residuals.slopes))
-    z = part.residuals.project(np.concatenate([fitted, slopes], axis=1).T).T
+    z = split.residuals(part.residuals, noise[learned], rng)
     logs = of_part.densities(part.evidence, of_part.parts(z), np.sum(z**2, axis=1))
     each = {
         one: log_sum(logs[:, [other == one for other in of_part.places]])
@@ -174,9 +172,7 @@ def _values(part: Problem, place: Place, z: Array, split: LinearSplit, noise: Ar
         return values
     best = np.argmax([log_sum(one.logs) for one in shapes], axis=0)
     left, missed = split.beside(noise)
-    variance = np.ones(len(noise))
-    if not part.evidence.level.known:
-        variance = np.sum(left**2, axis=1) / (left.shape[1] - len(split.cofactors))
+    variance = split.variances(left, part.evidence.level.known)
     positions = split.frame.residuals.positions
     for i, one in enumerate(shapes):
         shown = positions.whitened(split.frame.signature(one.effect)) * one.effect.deviations
@@ -187,8 +183,5 @@ def _values(part: Problem, place: Place, z: Array, split: LinearSplit, noise: Ar
             some = np.flatnonzero((best == i) & (sizes == size))
             prior = one.trace / SIZES[size] * np.eye(len(inner))
             change = left[some] @ fitted.T @ np.linalg.inv(inner + prior) @ rest
-            slope = change @ split.designs[1]
-            scale = np.sum(change**2, axis=1) + np.sum((slope @ split.cofactors) * slope, axis=1)
-            root = np.sqrt(scale * variance[some])
-            values[some] = np.sum(change * missed[some], axis=1) / np.where(root > 0, root, np.inf)
+            values[some] = split.statistic(change, missed[some], variance[some])
     return values

@@ -25,6 +25,7 @@ from accelstudy.adjustment.calibration import CalibrationProblem
 from accelstudy.adjustment.quality import Solution, whitening_of
 from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
+from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.effects import HoldConditions
 
 Array = NDArray[np.float64]
@@ -254,6 +255,34 @@ class LinearSplit:
             errors[:, self.rows[0]] - estimates @ a.T,
             errors[:, self.rows[1]] - estimates @ b.T,
         )
+
+    def residuals(self, part: Residuals, errors: Array, rng: np.random.Generator) -> Array:
+        """Residuals of the fit to the fitted part, with slopes of noise, (b, ...).
+
+        Parameters
+        ----------
+        part : Residuals, of the fitted part
+        errors : (b, m) array, of all positions
+        rng : Generator
+        """
+        slopes = rng.standard_normal((len(errors), part.slopes))
+        return part.project(np.concatenate([errors[:, self.rows[0]], slopes], axis=1).T).T
+
+    def variances(self, left: Array, known: bool) -> Array:
+        """Variance of unit weight, (b,), by what is left of the fitted part; 1 if it is known."""
+        if known:
+            return np.ones(len(left))
+        return np.asarray(np.sum(left**2, axis=1) / (left.shape[1] - len(self.cofactors)))
+
+    def statistic(self, change: Array, missed: Array, variance: Array) -> Array:
+        """Z of corrections and misclosures (b, h c) of the held-out part, (b,).
+
+        It is 0 where a correction does not show there, and so says nothing.
+        """
+        slope = change @ self.designs[1]
+        size = np.sum(change**2, axis=1) + np.sum((slope @ self.cofactors) * slope, axis=1)
+        scale = np.sqrt(size * variance)
+        return np.asarray(np.sum(change * missed, axis=1) / np.where(scale > 0, scale, np.inf))
 
     def corrections(self, hypothesis: Hypothesis, left: Array) -> Array:
         """Corrections of the prediction by an effect that is fitted, too, (b, h c).
