@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.basics.units import attitude_unit, to_attitude
 from accelstudy.basics.wording import number
+from accelstudy.effects import learned
 from accelstudy.effects.learned import WAVES
 from accelstudy.effects.smooth import LENGTHS, ORDERS, frequencies, harmonics, sines, spectrum
 
@@ -89,9 +90,7 @@ COORDINATES = {
     "previous": Coordinate("the force in the position before", *FORCE),
     "vibration": Coordinate("the vibration", *FORCE),
     "temperature": Coordinate("the temperature", "°C", "K"),
-    "temperature rate": Coordinate(
-        "the rate of the temperature", "K/min", "K/min", 1 / 60, has_zero=True
-    ),
+    "temperature rate": Coordinate("the rate of the temperature", *RATE),
     "time": Coordinate("the time", "min", "min", 60.0, is_course=True),
     "order": Coordinate("the number of the position", "", "positions", is_course=True),
 }
@@ -115,14 +114,14 @@ class Target:
     unit: str
 
 
-XYZ = ("x", "y", "z")
-TARGETS = {
-    "bias": Target("bias of {}", "the bias of {}", XYZ, "m/s^2"),
-    "scale": Target("scale of {}", "the scale of {}", XYZ, "1"),
-    "square": Target("quadratic scale of {}", "the quadratic scale of {}", XYZ, "s^2/m"),
-    "reading": Target("reading of {}", "the robot's reading of {}", ("roll", "pitch"), "rad"),
-    "tilt": Target("tilt {}", "the tilt of the robot's base ({})", ("a", "b"), "rad"),
+WORDS = {
+    "bias": ("bias of {}", "the bias of {}"),
+    "scale": ("scale of {}", "the scale of {}"),
+    "square": ("quadratic scale of {}", "the quadratic scale of {}"),
+    "reading": ("reading of {}", "the robot's reading of {}"),
+    "tilt": ("tilt {}", "the tilt of the robot's base ({})"),
 }
+TARGETS = {name: Target(*said, *learned.TARGETS[name]) for name, said in WORDS.items()}
 
 
 # --- forms --------------------------------------------------------------------------------------

@@ -20,6 +20,7 @@ from scipy.special import softmax
 
 from accelstudy.basics.units import shown_unit
 from accelstudy.basics.wording import comma_list, estimate
+from accelstudy.diagnosis.decision.learned import coordinate_values
 from accelstudy.diagnosis.decision.priors import UNKNOWN
 from accelstudy.diagnosis.evidence.size import Evidence
 from accelstudy.diagnosis.forms import TARGETS, Form, coordinate_of, forms, smooth
@@ -95,9 +96,7 @@ def argument(frame: Frame, effect: Learned) -> Course:
     """Return the coordinate of a learned effect as a function of the moment, (n, a)."""
     name = WAVES.get(effect.coordinate, effect.coordinate)
     if name in (*ANGLES, *OF_EACH, "temperature rate"):
-        values = np.stack(
-            effect.arguments(tuple(frame.sensed.T), tuple(frame.angles.T), frame.hold), axis=1
-        )
+        values = coordinate_values(effect, frame)
         values = values if name in (*OF_EACH, "angle") else values[:, :1]
         return lambda now: values
     return lambda now: getattr(now, name)[:, None]

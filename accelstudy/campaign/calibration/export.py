@@ -228,6 +228,6 @@ def _c_header(calibration: Mapping[str, Any]) -> str:
 
 def _symbol(name: str) -> str:
     """Symbol that stands for a name, and for the likes of it."""
-    likes = {"step": "step_x", "yaw": "roll", "pitch": "roll", "temperature_lagged": name}
-    first = next((like for begin, like in likes.items() if name.startswith(begin)), name)
-    return "temperature_lagged" if first.startswith("temperature_lagged") else first
+    if name.startswith("temperature_lagged"):
+        return "temperature_lagged"
+    return {"step_y": "step_x", "step_z": "step_x", "pitch": "roll", "yaw": "roll"}.get(name, name)

@@ -25,9 +25,9 @@ from accelstudy.diagnosis.evidence.hypotheses import strongest
 from accelstudy.diagnosis.evidence.size import Evidence
 from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
-from accelstudy.diagnosis.space.shapes import NAMES, SURVIVES, Place
+from accelstudy.diagnosis.space.shapes import SURVIVES, Place
 from accelstudy.effects import get_effect
-from accelstudy.effects.learned import LEARNED, Learned
+from accelstudy.effects.learned import ANGLES, LEARNED, UNITS, Learned
 from accelstudy.effects.smooth import CYCLES, LENGTHS
 
 Array = NDArray[np.float64]
@@ -146,12 +146,12 @@ def shapes_of(place: Place, frame: Frame) -> Iterator[Learned]:
     A step to the next hold is no cause, and a way that the robot moved is in no column.
     """
     coordinate, of = place
-    targets = [of, *(target for target, name in NAMES.items() if name == of and target == "square")]
     lengths = LENGTHS if of == "bias" else LENGTHS[1:]
-    for target in targets:
+    for target in (of, "square") if of == "scale" else (of,):
         for words in _coordinates(coordinate, frame):
+            within = _range(_shape({**words, "target": target}), frame)
             for length in lengths:
-                yield _shape({**words, "target": target, "length": length})
+                yield _shape({**words, **within, "target": target, "length": length})
     if place == ("time", "bias"):
         column = _course(frame)
         for cycles in CYCLES:
@@ -160,24 +160,16 @@ def shapes_of(place: Place, frame: Frame) -> Iterator[Learned]:
 
 
 def _coordinates(coordinate: str, frame: Frame) -> Iterator[dict[str, str | float]]:
-    """Coordinates of effects that stand for one of the session, with their ranges."""
-    hold, f = frame.hold, frame.sensed
-    if coordinate in ("angle", "yaw"):
-        yield {"coordinate": coordinate}
-    elif coordinate == "force":
-        yield {"coordinate": coordinate, **_range(f)}
-    elif coordinate == "previous":
-        steps = np.column_stack([hold.column(f"step_{axis}") for axis in "xyz"])
-        yield {"coordinate": coordinate, **_range(f - steps)}
-    elif coordinate == "dT/dt":
+    """Coordinates of effects that stand for one of the session."""
+    hold = frame.hold
+    if coordinate == "dT/dt":
         between = float(np.median(np.diff(hold.column("time")))) if hold.time is not None else 0.0
         for lag in FOLLOWS if between > 0 else ():
-            tau = float(f"{lag * between:.4g}")
-            rate = (hold.column("temperature") - hold.lagged(tau)) / tau
-            yield {"coordinate": "temperature rate", **_range(rate), "tau": tau}
-    elif coordinate in ("time", "temperature", "vibration"):
-        column = _course(frame) if coordinate == "time" else coordinate
-        yield {"coordinate": column, **_range(hold.column(column))}
+            yield {"coordinate": "temperature rate", "tau": float(f"{lag * between:.4g}")}
+    elif coordinate == "time":
+        yield {"coordinate": _course(frame)}
+    elif coordinate in (*UNITS, *ANGLES):
+        yield {"coordinate": coordinate}
 
 
 def _course(frame: Frame) -> str:
@@ -185,8 +177,18 @@ def _course(frame: Frame) -> str:
     return "order" if frame.hold.time is None else "time"
 
 
-def _range(values: Array) -> dict[str, float]:
+def _range(effect: Learned, frame: Frame) -> dict[str, float]:
+    """Range of the coordinate of an effect in a session; none of an angle."""
+    if effect.coordinate in ANGLES:
+        return {}
+    values = coordinate_values(effect, frame)
     return {"low": float(f"{values.min():.6g}"), "high": float(f"{values.max():.6g}")}
+
+
+def coordinate_values(effect: Learned, frame: Frame) -> Array:
+    """Coordinate of each component of the target of an effect in the positions, (n, c)."""
+    angles = tuple(frame.angles.T)
+    return np.stack(effect.arguments(tuple(frame.sensed.T), angles, frame.hold), axis=1)
 
 
 def _shape(settings: dict[str, str | float]) -> Learned:

@@ -304,8 +304,9 @@ def weigh_beside(problem: Problem, singles: Singles, classes: Sequence[Class]) -
     singles, classes : as in `Weighing`
     """
     k, unknown, weighed = len(classes), problem.field.unknown, []
-    for first, same in classes[:FIRST] if unknown and k > 1 else ():
-        assert unknown is not None
+    if unknown is None or k < 2:
+        return []
+    for first, same in classes[:FIRST]:
         beside = unknown_beside(first, unknown, problem.residuals, problem.evidence)
         if beside is not None:
             total = singles.densities[first.name] + beside - np.log(k)
