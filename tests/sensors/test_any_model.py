@@ -16,8 +16,9 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.batch.config import parse_batch
 from accelstudy.campaign.calibration.applying import read_calibration
+from accelstudy.campaign.calibration.c_code import c_function
 from accelstudy.campaign.calibration.document import calibration_document
-from accelstudy.campaign.calibration.export import export
+from accelstudy.campaign.calibration.export import SYMBOLS, _symbol, export
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.readings import readings_of
 from accelstudy.campaign.format import read_campaign
@@ -27,7 +28,7 @@ from accelstudy.diagnosis.report.document import diagnosed_calibration, study_ov
 from accelstudy.diagnosis.round_trip import parse_round_trip
 from accelstudy.drawing import saving
 from accelstudy.drawing.style import model_title
-from accelstudy.effects import HoldConditions
+from accelstudy.effects import HoldConditions, effect_names, get_effect
 from accelstudy.sensors.frames import parse_frame
 from accelstudy.sensors.models import get_model
 from accelstudy.study.cells import study_cells
@@ -291,6 +292,18 @@ def test_a_stranger_implements_an_exported_calibration(diagnosed):
     assert "no matrix can hold thermal_bias and warm_up" in line
     assert "json, yaml and c" in line
     assert line.count("\n") == 1
+
+
+@pytest.mark.parametrize("spec", [
+    *(name for name in effect_names() if get_effect(name).part == "sensor"),
+    "learned(coordinate=order, low=1, high=30)",
+    "learned(coordinate=yaw)",
+])  # fmt: skip
+def test_a_header_in_c_explains_all_that_its_function_takes(spec):
+    effect = get_effect(spec)
+    parameters = [1e-3] * len(effect.parameters)
+    columns, _ = c_function([(effect, parameters)], 9.80665, np.eye(3, 4), np.eye(3))
+    assert all(SYMBOLS[_symbol(name)] for name in columns)
 
 
 @pytest.mark.parametrize("frame", ["frd", "flu", "rfu"])

@@ -40,6 +40,7 @@ SYMBOLS = {
     "temperature_lagged": "°C, T with tau dT/dt = temperature − T, tau in s of the spec; at first "
     "T = temperature",
     "time": "s since the start of the session",
+    "order": "s since the start of the session or, without times, the number of the position",
     "vibration": "m/s², rms while the sensor stands still",
     "step_x": "m/s², f_a along x less that of the position before; likewise step_y, step_z",
     "roll": "rad, attitude of the rig; likewise pitch, yaw",
