@@ -19,6 +19,7 @@ from accelstudy.files.tables import write_table
 from accelstudy.hidden.campaigns import Row, made, rows_table, tried
 from accelstudy.hidden.cells import Cell
 from accelstudy.hidden.config import HiddenConfig
+from accelstudy.hidden.judging import LEARNED
 from accelstudy.sensors.models import get_model
 
 
@@ -62,7 +63,7 @@ def run_chunk(
 def outcome(d: Verdict) -> Row:
     """Row of the table of outcomes."""
     test, held = d.global_test, d.gap.held_out
-    learned = d.verdict == "learned"
+    learned = d.verdict == LEARNED
     return {
         "verdict": d.verdict,
         "found": json.dumps([one.name for one in d.effects]),

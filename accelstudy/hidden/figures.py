@@ -26,7 +26,7 @@ from accelstudy.drawing.style import (
 )
 from accelstudy.hidden.judging import ALL
 from accelstudy.hidden.limits import EDGES, power_over
-from accelstudy.hidden.physics.generate import NOWHERE
+from accelstudy.hidden.physics.generate import place_of
 from accelstudy.hidden.scoring import VERDICTS
 from accelstudy.hidden.targets import LARGE, MOST_NAMES, plain
 
@@ -279,14 +279,13 @@ def _fates(ax: Axes, part: pd.DataFrame) -> None:
         "noise, gross error or nothing",
     )  # fmt: skip
     counted = pd.crosstab(part["what"], fates, normalize="index").reindex(columns=[*FATES])
-    has_place = {kind: NOWHERE[kind].place for kind in counted.index if kind in NOWHERE}
-    order = sorted(counted.index, key=lambda kind: (not has_place.get(kind), kind))
+    order = sorted(counted.index, key=lambda kind: (not place_of(kind), kind))
     shares = counted.fillna(0).loc[order]
     start = np.zeros(len(order))
     for fate, color in FATES.items():
         ax.barh(range(len(order)), shares[fate], left=start, color=color, label=fate)
         start += shares[fate].to_numpy()
-    names = [f"{words(kind)} ({', '.join(has_place.get(kind) or ('–',))})" for kind in order]
+    names = [f"{words(kind)} ({', '.join(place_of(kind) or ('–',))})" for kind in order]
     ax.set_yticks(range(len(order)), names, fontsize=6)
     ax.set_ylim(len(order) - 0.4, -0.6)
     ax.set_xlim(0, 1)

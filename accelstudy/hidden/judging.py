@@ -205,8 +205,10 @@ def _of(condition: Answers, answer: Answers) -> Answers:
 QUESTIONS: Mapping[str, Answers] = {
     "failed": lambda judged: ~judged["ok"].astype(bool),
     "alarm": _answer("alarm"),
-    **{name: _verdict(name) for name in (*EFFECTS_GIVEN, LEARNED)},
-    **{name: _verdict(name) for name in ("unknown", "noise_model", "gross_error")},
+    **{
+        name: _verdict(name)
+        for name in (*EFFECTS_GIVEN, LEARNED, "unknown", "noise_model", "gross_error")
+    },
     "answered": _answer("answered"),
     "right": _answer("right"),
     "wrong": _answer("wrong"),

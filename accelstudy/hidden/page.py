@@ -18,7 +18,7 @@ from accelstudy.hidden.config import HiddenConfig
 from accelstudy.hidden.figures import figures
 from accelstudy.hidden.judging import ALL, share_of
 from accelstudy.hidden.limits import study_limits
-from accelstudy.hidden.physics.generate import NOWHERE
+from accelstudy.hidden.physics.generate import place_of
 from accelstudy.hidden.scoring import sample, score_tables
 from accelstudy.hidden.targets import LARGE, further, plain
 
@@ -192,7 +192,7 @@ def kind_table(campaigns: pd.DataFrame) -> str:
     rows = []
     for name in ("outside", "unforeseen"):
         for what, part in large[large["set"] == name].groupby("what"):
-            place = NOWHERE[str(what)].place if str(what) in NOWHERE else None
+            place = place_of(str(what))
             right = part[part["place_right"].eq(True)]
             rows.append(
                 (

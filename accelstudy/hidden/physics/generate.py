@@ -26,6 +26,11 @@ NOWHERE: Mapping[str, Outside] = {**OUTSIDE, **UNFORESEEN}
 """Effects that are not in the catalogue, by name."""
 
 
+def place_of(kind: str) -> Place | None:
+    """Coordinate and target of an effect that is not in the catalogue, if it has a place."""
+    return NOWHERE[kind].place if kind in NOWHERE else None
+
+
 @dataclass(frozen=True)
 class Case:
     """One kind of campaign.

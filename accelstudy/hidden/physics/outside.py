@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from accelstudy.hidden.physics.designs import GRAVITY, Session, in_turned_frame
+from accelstudy.hidden.physics.designs import GRAVITY, Session
 from accelstudy.hidden.physics.effects import Rig, Settings, column, steps_of, warmth
+from accelstudy.hidden.physics.measuring import flange_force
 from accelstudy.hidden.physics.places import (
     TARGETS,
     Array,
@@ -15,6 +16,7 @@ from accelstudy.hidden.physics.places import (
     any_seed,
     before,
     between,
+    cycle,
     of_bias,
     of_force,
     of_hold,
@@ -170,12 +172,6 @@ def _sinking(session: Session, s: Settings) -> Array:
     return np.log1p(parted(session) / s["knee"])
 
 
-def _cabinet_cycle(session: Session, s: Settings) -> Array:
-    # The cabinet of the electronics is cooled and warms up in turn; zeroed at the start.
-    part = 2 * np.pi * parted(session) * s["cycles"]
-    return np.sin(part + s["phase"]) - np.sin(s["phase"])
-
-
 # No place: several coordinates at once, none, or another target.
 
 
@@ -233,17 +229,10 @@ def _any_chirp(session: Session, rng: np.random.Generator) -> dict[str, float]:
     }
 
 
-def in_sensor(vector: Array, session: Session) -> Array:
-    """Components along the axes of a sensor, (n, 3), of a vector of the room."""
-    turned = in_turned_frame(np.broadcast_to(vector, (session.n, 3)), 2, session.yaw)
-    roll, pitch = session.joints.T
-    return in_turned_frame(in_turned_frame(turned, 1, pitch), 0, roll)
-
-
 def _room_magnet(f: Array, p: Array, s: Settings, session: Session) -> Array:
     # A magnetic field that dips into the ground.
     north = np.array([np.cos(s["dip"]), 0.0, np.sin(s["dip"])])
-    return p * in_sensor(north, session) + np.zeros(f.shape)
+    return p * flange_force(session.joints, session.yaw, north) + np.zeros(f.shape)
 
 
 _BIAS, _SCALE, _TILT, _READING = TARGETS
@@ -289,10 +278,11 @@ OUTSIDE: dict[str, Outside] = {
         of_hold("swing", ("time", _BIAS), _swing, _any_swing),
         of_hold("scale_drift", ("time", _SCALE), _scale_drift),
         of_hold("sinking_tripod", ("time", _TILT), _sinking, between(knee=(0.02, 0.3))),
+        # The cabinet of the electronics is cooled and warms up in turn; zeroed at the start.
         of_hold(
             "cabinet_cycle",
             ("time", _READING),
-            _cabinet_cycle,
+            cycle,
             between(cycles=(1.2, 3.0), phase=(0.0, 6.3)),
         ),
         Outside("triple_product", 3, 1e-3, sensor=_triple_product),

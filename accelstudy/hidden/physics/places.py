@@ -127,14 +127,12 @@ def of_hold(name: str, place: Place, h: OfHold, draw: Draw = no_settings) -> Out
 
 def of_force(name: str, place: Place, h: OfForce, draw: Draw = no_settings) -> Outside:
     """An effect on the bias or scale by a function of the forces of the holds, of about 1."""
-    k, typical = TARGETS[place[1]]
-    if place[1] == "bias":
-        return Outside(
-            name, k, typical, sensor=lambda f, p, s, _: p * h(f, s), draw=draw, place=place
-        )
-    return Outside(
-        name, k, typical, sensor=lambda f, p, s, _: p * h(f, s) * f, draw=draw, place=place
-    )
+    power = {"bias": 0, "scale": 1}[place[1]]
+
+    def act(f: Array, p: Array, s: Settings, session: Session) -> Array:
+        return p * h(f, s) * f**power
+
+    return Outside(name, *TARGETS[place[1]], sensor=act, draw=draw, place=place)
 
 
 def vibration(session: Session) -> Array:
@@ -169,6 +167,12 @@ def warming(session: Session) -> Array:
 def parted(session: Session) -> Array:
     """Time of the holds as a part of the length of the session, (n,)."""
     return session.clock / session.duration
+
+
+def cycle(session: Session, s: Settings) -> Array:
+    """Some cycles over the session, zero at its start, (n,)."""
+    angle = 2 * np.pi * parted(session) * s["cycles"]
+    return np.sin(angle + s["phase"]) - np.sin(s["phase"])
 
 
 def before(values: Array) -> Array:

@@ -15,6 +15,7 @@ from accelstudy.hidden.physics.places import (
     any_seed,
     before,
     between,
+    cycle,
     of_force,
     of_hold,
     part_of_range,
@@ -55,12 +56,6 @@ def _weather(session: Session, s: Settings) -> Array:
     steps = np.random.default_rng(int(s["seed"])).standard_normal(24)
     walk = np.cumsum(steps)
     return np.interp(parted(session), np.linspace(-0.1, 1.2, 24), walk - walk.mean())
-
-
-def _sunlit_pier(session: Session, s: Settings) -> Array:
-    # Sun and clouds; it is level at the start.
-    angle = 2 * np.pi * parted(session) * s["cycles"]
-    return np.sin(angle + s["phase"]) - np.sin(s["phase"])
 
 
 def _stretched(session: Session, s: Settings) -> Array:
@@ -147,10 +142,11 @@ UNFORESEEN: dict[str, Outside] = {
         of_hold(
             "reference_warm_up", ("time", "scale"), _reference_warms_up, between(part=(0.05, 0.4))
         ),
+        # Sun and clouds; it is level at the start.
         of_hold(
             "sunlit_pier",
             ("time", "tilt"),
-            _sunlit_pier,
+            cycle,
             between(cycles=(0.6, 2.5), phase=(0.0, 6.3)),
         ),
         of_hold("dragging_brake", ("angle", "reading"), _brake, between(**{"from": (0.8, 2.4)})),
