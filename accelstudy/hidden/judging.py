@@ -133,7 +133,7 @@ def _judged_place(row: dict[Any, Any]) -> dict[str, Any]:
     learned = not row["error"] and row["verdict"] == LEARNED
     true, given = (json.loads(row[name] or "null") for name in ("true_place", "place"))
     judged: dict[str, Any] = {"learned": learned, "has_place": true is not None}
-    if learned:
+    if learned and row["fits"]:  # of a real log, the true noise is not known
         judged["explained"] = explained(json.loads(row["fits"]), row["design"])
     if true is not None:
         judged["place_right"] = learned and given == true

@@ -325,6 +325,7 @@ def _less(row: Row, own: Sequence[str]) -> Row:
         "positions": json.dumps([place for _, place in kept]),
         "verdict": "no_effect" if only else row["verdict"],
         "credible_set": json.dumps([one for one in explanations if one["names"]]),
+        "fits": None,
     }
 
 

@@ -190,6 +190,16 @@ def test_what_a_log_has_by_itself_is_neither_right_nor_wrong(log):
     assert table_of([row], ["quadratic_scale", "scale_asymmetry"])["said"].item() == "nothing"
 
 
+def test_a_function_learned_in_a_real_log_is_told_as_learned(log):
+    row = answered(OURS, log, Case("log", ("quadratic_scale",), 300))
+    row |= {"verdict": "learned", "found": '["learned"]', "positions": "[null]"}
+    row["fits"] = '[{"force": 9, "angle": 0, "noise": 5}, {"force": 5, "angle": 0, "noise": 5}]'
+    judged = table_of([row], [])
+    assert judged["said"].item() == "learned"
+    # Its true noise is not known.
+    assert judged["explained"].isna().all()
+
+
 @pytest.mark.parametrize(("change", "says"), [
     ({"effects": ["cubic_scale+wobble"]}, "effects: unknown effect 'wobble'"),
     ({"effects": ["base_tilt"]}, "effects: unknown effect 'base_tilt'"),
