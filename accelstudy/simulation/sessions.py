@@ -55,6 +55,23 @@ def sigma_of_mean(sigma_sample: float, rate: float, duration: float) -> float:
 
 
 @dataclass(frozen=True)
+class Errors:
+    """Normal errors of R sessions, before noise effects act on them; None is not drawn.
+
+    force : (R, n, 3), m/s²; angle : (R, n, 2), rad; gravity : (R,), m/s²
+    """
+
+    force: Array
+    angle: Array | None = None
+    gravity: Array | None = None
+
+    def first(self, replicates: int) -> Errors:
+        """Return those of the first `replicates` sessions; all if there are fewer."""
+        drawn = (None if e is None else e[:replicates] for e in (self.angle, self.gravity))
+        return Errors(self.force[:replicates], *drawn)
+
+
+@dataclass(frozen=True)
 class Session:
     """A session before noise: what an ideal measurement of the sensor in the scheme would give.
 
@@ -94,20 +111,33 @@ class Session:
         that are not used are drawn all the same where other draws follow them. The adjustment does
         not know of the noise effects.
         """
+        return self.disturbed(self.errors(noise, replicates, rng, angles), noise, rng)
+
+    def errors(
+        self, noise: Noise, replicates: int, rng: np.random.Generator, angles: bool = True
+    ) -> Errors:
+        """Draw the normal errors of `replicates` sessions, as `draw` does first."""
         n = len(self.forces)
-        error = noise.sigma_force * rng.standard_normal((replicates, n, 3))
-        read = None
-        gravity = np.full(replicates, self.gravity + noise.gravity_error)
-        if angles or noise.sigma_gravity > 0 or noise.effects:
-            read = self.angles + noise.sigma_angle * rng.standard_normal((replicates, n, 2))
-            gravity += noise.sigma_gravity * rng.standard_normal(replicates)
+        force = noise.sigma_force * rng.standard_normal((replicates, n, 3))
+        if not (angles or noise.sigma_gravity > 0 or noise.effects):
+            return Errors(force)
+        angle = noise.sigma_angle * rng.standard_normal((replicates, n, 2))
+        return Errors(force, angle, noise.sigma_gravity * rng.standard_normal(replicates))
+
+    def disturbed(self, errors: Errors, noise: Noise, rng: np.random.Generator) -> Observations:
+        """Observations with given normal errors, on which the noise effects act."""
+        force = errors.force
         effects = [get_noise_effect(spec) for spec in noise.effects]
         for effect in effects:
-            error = effect.disturb(error, noise.sigma_force, self.hold, rng)
-        forces = self.forces + error
+            force = effect.disturb(force, noise.sigma_force, self.hold, rng)
+        forces = self.forces + force
         for effect in effects:
             forces = effect.read(forces)
-        return replace(self.observations(noise), forces=forces, angles=read, gravity=gravity)
+        gravity = np.full(len(forces), self.gravity + noise.gravity_error)
+        if errors.gravity is not None:
+            gravity += errors.gravity
+        angles = None if errors.angle is None else self.angles + errors.angle
+        return replace(self.observations(noise), forces=forces, angles=angles, gravity=gravity)
 
     def draw_blocks(
         self,
@@ -117,8 +147,8 @@ class Session:
         rng_of: Callable[[int], np.random.Generator],
         size: int,
         angles: bool = True,
-    ) -> Iterator[Observations]:
-        """Draw sessions block by block, so that memory does not grow with their number.
+    ) -> Iterator[tuple[Errors, Observations]]:
+        """Draw sessions and their normal errors block by block, so that memory does not grow.
 
         Each block has its own random numbers and is drawn in full. So a larger number of replicates
         extends a smaller one, and no block depends on which others are drawn.
@@ -132,8 +162,9 @@ class Session:
         size : int, sessions of a block
         """
         for block in blocks:
-            drawn = self.draw(noise, size, rng_of(block), angles)
-            yield drawn.first(replicates - block * size)
+            rng, rest = rng_of(block), replicates - block * size
+            errors = self.errors(noise, size, rng, angles)
+            yield errors.first(rest), self.disturbed(errors, noise, rng).first(rest)
 
 
 def session(

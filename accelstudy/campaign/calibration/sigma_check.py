@@ -66,7 +66,7 @@ def check_sigmas(fit: CampaignFit, replicates: int = 2000, seed: int = 1) -> pd.
         lambda block: np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(block,))),
         size,
     )
-    for observed in drawn:
+    for _, observed in drawn:
         result = calibrate(model, approach, replace(observed, initial=fit.parameters))
         estimates.append(result.parameters[result.converged, : model.n_parameters])
     errors = np.concatenate(estimates) - fit.parameters

@@ -1,0 +1,183 @@
+"""Distribution of the tilt error that calibrations leave, where their errors are normal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache, cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import special
+
+from accelstudy.leveling.error import TiltError
+
+Array = NDArray[np.float64]
+
+DIRECTIONS = 4096
+"""Directions over which a share is averaged."""
+BOTH_ERROR = 5e-4
+"""Bound of the relative error of a quantile of the larger of roll and pitch, by their number."""
+NODES = 28
+"""Nodes of the inverse Laplace transform; its error is below 1e-9."""
+CENTRAL = 1e-6
+"""Offsets below this share of the mean square count as none."""
+STEPS = 5
+"""Steps of the secant method for a quantile."""
+
+
+@dataclass(frozen=True)
+class TiltDistribution:
+    """The rms over attitudes of the errors of roll and of pitch, and the larger of the two.
+
+    Of normal errors the squares are quadratic forms in u standard normals y. In a fixed direction
+    of y, its length has a χ distribution, so that the share below a bound is known; the mean over
+    directions that are spread evenly is the share. Where the forms have no offset, the shares of
+    roll and pitch by themselves are computed to nine digits by the inverse of a Laplace transform
+    (fixed Talbot method; Abate & Valkó 2004), and correct the share of the larger.
+
+    Parameters
+    ----------
+    tilt : TiltError, about the mean of the estimates
+    covariance : (u, u) array, of the estimates
+    """
+
+    tilt: TiltError
+    covariance: Array
+
+    @cached_property
+    def mean_squares(self) -> Array:
+        """Mean of the squared errors of roll and of pitch, (2,), rad²."""
+        spread = np.einsum("auw,uw->a", self.tilt.quadratic, self.covariance)
+        return self.tilt.constant + spread
+
+    @cached_property
+    def chi_squared(self) -> tuple[Array, Array]:
+        """Factor and degrees of freedom, (2,), of the scaled χ² with equal mean and variance."""
+        forms, linear = self._forms
+        variance = 2 * np.einsum("aij,aij->a", forms, forms) + 4 * (linear**2).sum(axis=1)
+        return variance / (2 * self.mean_squares), 2 * self.mean_squares**2 / variance
+
+    def quantile(self, probabilities: ArrayLike) -> Array:
+        """Quantiles of roll, of pitch and of the larger, (3, k), rad."""
+        wanted = special.ndtri(np.asarray(probabilities, dtype=float))
+        at = np.log(self.approximate_quantile(special.ndtr(wanted)))
+        before, below = at - 0.1, special.ndtri(self.share_below(np.exp(at - 0.1)))
+        for _ in range(STEPS):
+            share = special.ndtri(self.share_below(np.exp(at)))
+            with np.errstate(invalid="ignore", divide="ignore"):
+                step = (wanted - share) * (at - before) / (share - below)
+            step = np.clip(np.where(np.isfinite(step), step, 0.0), -1.0, 1.0)
+            before, below, at = at, share, at + step
+        return np.exp(at)
+
+    def approximate_quantile(self, probabilities: ArrayLike) -> Array:
+        """Quantiles as of `quantile`, of the scaled χ²; for the larger, the larger quantile."""
+        factor, freedom = (each[:, None] for each in self.chi_squared)
+        beyond = 1 - np.asarray(probabilities, dtype=float)
+        each = np.sqrt(special.chdtri(freedom, beyond) * factor)
+        return np.vstack([each, each.max(axis=0)])
+
+    def share_below(self, bounds: Array) -> Array:
+        """Shares of the errors of roll, of pitch and of the larger that are below bounds.
+
+        Parameters
+        ----------
+        bounds : (3, k) array, rad
+
+        Returns
+        -------
+        (3, k) array
+        """
+        length = _lengths(len(self.covariance))
+        ends = {}
+        for angle, bound in ((0, bounds[0]), (1, bounds[1]), (2, bounds[2]), (3, bounds[2])):
+            constant, linear, square = (each[angle % 2] for each in self._along)
+            root = linear**2 - square * (constant - bound[:, None] ** 2)
+            half = np.sqrt(np.maximum(root, 0.0))
+            far = np.where(root > 0, (half - linear) / square, 0.0)
+            ends[angle] = np.maximum((-linear - half) / square, 0.0), far
+
+        def share(near: Array, far: Array) -> Array:
+            return np.maximum(length(far) - (length(near) if near.any() else 0.0), 0.0)
+
+        (near_roll, far_roll), (near_pitch, far_pitch) = ends[2], ends[3]
+        both = share(np.maximum(near_roll, near_pitch), np.minimum(far_roll, far_pitch))
+        if not self._central:
+            return np.array([share(*ends[a]).mean(axis=1) for a in (0, 1)] + [both.mean(axis=1)])
+        larger = both.mean(axis=1)
+        exact = [self._exact(a, bounds[2]) for a in (0, 1)]
+        for i, each in enumerate(both):
+            single = np.array([share(*(end[i] for end in ends[a])) for a in (2, 3)])
+            mean = single.mean(axis=1)
+            apart = single - mean[:, None]
+            slope = np.linalg.lstsq(apart @ apart.T, apart @ (each - larger[i]), rcond=1e-9)[0]
+            larger[i] += slope @ [exact[a][i] - mean[a] for a in (0, 1)]
+        return np.array([*(self._exact(a, bounds[a]) for a in (0, 1)), larger])
+
+    @cached_property
+    def _forms(self) -> tuple[Array, Array]:
+        """H (2, u, u) and g (2, u) of the squared errors constant + 2 g y + y H y."""
+        scale = np.sqrt(np.diagonal(self.covariance))
+        values, vectors = np.linalg.eigh(self.covariance / scale[:, None] / scale)
+        root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+        return root.T @ self.tilt.quadratic @ root, self.tilt.linear @ root
+
+    @cached_property
+    def _central(self) -> bool:
+        """Whether the squared errors have no offset."""
+        offset = self.tilt.constant + np.abs(self._forms[1]).sum(axis=1) ** 2 / self.mean_squares
+        return bool(np.all(offset < CENTRAL * self.mean_squares))
+
+    @cached_property
+    def _along(self) -> tuple[Array, Array, Array]:
+        """Constant (2,), linear and square (2, d) of the squared error over the length of y."""
+        forms, linear = self._forms
+        along = _directions(len(self.covariance))
+        square = np.stack([np.einsum("du,du->d", along @ form, along) for form in forms])
+        if self._central:
+            return np.zeros(2), np.zeros_like(square), np.maximum(square, np.finfo(float).tiny)
+        return self.tilt.constant, linear @ along.T, np.maximum(square, np.finfo(float).tiny)
+
+    def _exact(self, angle: int, bounds: Array) -> Array:
+        """Share below bounds (k,) of the error of one angle without offset."""
+        sizes = np.linalg.eigvalsh(self._forms[0][angle])
+        nodes, weights = _talbot()
+        p = nodes[:, None] / bounds**2
+        transform = 1 / p
+        for size in sizes[sizes > np.finfo(float).eps * sizes[-1]]:
+            transform /= np.sqrt(1 + 2 * size * p)
+        return np.clip((weights @ transform).real / bounds**2, 0.0, 1.0)
+
+
+@cache
+def _directions(u: int) -> Array:
+    """Directions in u dimensions, (d, u), from points that fill the unit cube evenly.
+
+    They are the points of Roberts' sequence: multiples, modulo 1, of powers of 1/φ, where φ solves
+    φ^(u+1) = φ + 1.
+    """
+    phi = 2.0
+    for _ in range(60):
+        phi = (1 + phi) ** (1 / (u + 1))
+    points = (0.5 + np.outer(np.arange(1, DIRECTIONS + 1), phi ** -np.arange(1.0, u + 1))) % 1
+    normal = special.ndtri(points)
+    return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
+
+
+@cache
+def _lengths(u: int) -> Callable[[Array], Array]:
+    """The share of standard normals in u dimensions whose length is below given ones."""
+    length = np.linspace(0.0, np.sqrt(u) + 9.0, 40_001)
+    below = special.gammainc(u / 2, length**2 / 2)
+    return lambda at: np.interp(at, length, below)
+
+
+@cache
+def _talbot() -> tuple[Array, Array]:
+    """Nodes and weights: f(t) is the real part of Σ weight F(node / t) / t."""
+    angle = np.arange(1, NODES) * np.pi / NODES
+    cot = 1 / np.tan(angle)
+    nodes = 2 * NODES / 5 * np.concatenate([[1.0], angle * (cot + 1j)])
+    weights = np.exp(nodes) * np.concatenate([[0.5], 1 + 1j * angle * (1 + cot**2) - 1j * cot])
+    return nodes, 2 / 5 * weights
