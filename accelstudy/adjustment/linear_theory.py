@@ -24,8 +24,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class LinearTheory:
-    """Errors of calibrations of one set-up by linear theory; u parameters, gravity the last if
-    observed.
+    """Errors of the calibrations of one set-up, by linear theory.
+
+    There are u parameters; gravity is the last if it is observed.
 
     Attributes
     ----------

@@ -65,14 +65,16 @@ class TiltError:
     linear: Array
     quadratic: Array
 
+    def squares(self, estimates: Array) -> Array:
+        """Mean over attitudes of the squared errors of roll and of pitch, (R, 2)."""
+        delta = estimates - self.reference
+        scattered = [np.einsum("ru,ru->r", delta @ q, delta) for q in self.quadratic]
+        square = self.constant + 2 * delta @ self.linear.T + np.stack(scattered, -1)
+        return np.asarray(np.maximum(square, 0.0))
+
     def rms(self, estimates: Array) -> Array:
         """Rms over attitudes of the errors of roll and of pitch, (R, 2), of estimates (R, u)."""
-        delta = estimates - self.reference
-        scattered = [
-            np.einsum("ru,uw,rw->r", delta, q, delta, optimize=True) for q in self.quadratic
-        ]
-        square = self.constant + 2 * delta @ self.linear.T + np.stack(scattered, -1)
-        return np.sqrt(np.maximum(square, 0.0))
+        return np.sqrt(self.squares(estimates))
 
     def rms_of_all(self, covariance: Array) -> Array:
         """Rms over attitudes and over calibrations whose mean is the reference, (2,)."""

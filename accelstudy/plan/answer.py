@@ -182,7 +182,8 @@ class Simulation:
     def of(self, candidate: Candidate) -> Simulated:
         """Simulated calibrations."""
         study = study_of(self.question, [candidate], self.seed, self.replicates)
-        return simulate(study)[0]
+        levels = [] if self.confidence is None else [self.confidence]
+        return simulate(study, levels)[0]
 
     def confirmed(self, candidate: Candidate, and_no_fewer: bool = True) -> Ranked | None:
         """The candidate, or one with a few more positions, that reaches the target in simulation.

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.adjustment.calibration import Block
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY, recorded_unit, to_recorded
 from accelstudy.effects import get_effect
 from accelstudy.leveling.error import ATTITUDES
@@ -18,16 +17,19 @@ from accelstudy.plan.candidates import Candidate
 from accelstudy.plan.optimised import is_best
 from accelstudy.plan.question import Question
 from accelstudy.schemes.files import held
-from accelstudy.study.cell import Cell
 from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study
-from accelstudy.study.monte_carlo.followed import cell_tilt_error
-from accelstudy.study.monte_carlo.simulate import blocks
+from accelstudy.study.monte_carlo.distributions import Controlled, simulated_distributions
+from accelstudy.study.monte_carlo.followed import ANGLES, TILT, TILTS
+from accelstudy.study.monte_carlo.statistics import Estimates
 
 Array = NDArray[np.float64]
 
 SIGNS = (1.0, -1.0, 1.0)
 """Signs of the parameters of the three axes of the simulated sensor; all have the usual size."""
+BOTH = TILTS[-1]
+USUAL = (0.025, 0.95, 0.975)
+"""Shares of the calibrations that a plan quotes."""
 ALWAYS = ("bias", "scale", "nonorthogonality")
 """Effects that every simulated sensor has."""
 
@@ -39,41 +41,43 @@ class Simulated:
     Attributes
     ----------
     cell : str, name of the cell in the study of the plan
-    rms : (2,) array, rad, over attitudes and calibrations
-    error : (2,) array, rad, standard error of `rms`
-    per_calibration : (R, 2) array, rad, rms over attitudes that each calibration left
-    simulated : int, calibrations, of which R converged
+    mean : Estimates, rms over attitudes and calibrations, (2,), rad
+    bounds : dict of `TILTS` to the distribution of the rms over attitudes, rad
+    simulated : int, calibrations
     """
 
     cell: str
-    rms: Array
-    error: Array
-    per_calibration: Array
+    mean: Estimates
+    bounds: dict[str, Controlled]
     simulated: int
+
+    @property
+    def rms(self) -> Array:
+        """Rms over attitudes and calibrations, (2,), rad."""
+        return self.mean.value
+
+    @property
+    def error(self) -> Array:
+        """Standard error of `rms`, (2,), rad."""
+        return self.mean.error
 
     def quantile(self, probability: float) -> Array:
         """Error of each angle by itself that this share of the calibrations stayed below, (2,)."""
-        return np.quantile(self.per_calibration, probability, axis=0)
+        return np.array([float(self.bounds[name].at(probability).value) for name in ANGLES])
 
     def of_both(self, probability: float) -> float:
         """Error that roll and pitch both stayed below in this share of the calibrations, rad."""
-        return float(np.quantile(self.per_calibration.max(axis=1), probability))
+        return float(self.bounds[BOTH].at(probability).value)
 
     def accuracy(self, confidence: float | None) -> float:
         """Tilt accuracy by the measure that is asked for, rad."""
         return float(self.rms.max()) if confidence is None else self.of_both(confidence)
 
     def uncertainty(self, confidence: float | None) -> float:
-        """Standard error of `accuracy`, rad, by the number of calibrations.
-
-        That of a quantile follows from the share that it may be wrong by: half the distance of the
-        quantiles that lie one standard deviation of this share below and above.
-        """
+        """Standard error of `accuracy`, rad, by the number of calibrations."""
         if confidence is None:
             return float(self.error[self.rms.argmax()])
-        step = np.sqrt(confidence * (1 - confidence) / len(self.per_calibration))
-        ends = np.clip(confidence + step * np.array([-1, 1]), 0, 1)
-        return float(np.ptp(np.quantile(self.per_calibration.max(axis=1), ends))) / 2
+        return float(self.bounds[BOTH].at(confidence).error)
 
 
 def study_of(
@@ -119,32 +123,26 @@ def study_of(
     }
 
 
-def simulate(config: dict[str, Any]) -> list[Simulated]:
+def simulate(config: dict[str, Any], levels: Sequence[float] = ()) -> list[Simulated]:
     """Simulate the cells of a study of `study_of`, in the order of its candidates.
 
-    The same cells give the same numbers in the workflow.
+    The same cells give the same numbers in the workflow. There are quantiles at some usual shares,
+    and at the `levels`.
     """
     study = parse_study(config)
-    leveling = study.leveling.model_dump()
+    leveling, shares = study.leveling.model_dump(), np.unique([*USUAL, *levels])
     by_cell: dict[str, Simulated] = {}
     order = []
     for grid in config["grids"]:
         (cell,) = study_cells(parse_study({**config, "grids": [grid]}))
         order.append(cell.name)
         if cell.name not in by_cell:
-            by_cell[cell.name] = _simulated(cell, study.seed, leveling)
+            found, distributions = simulated_distributions(cell, study.seed, leveling, shares)
+            bounds = {name: distributions[TILT, name] for name in TILTS}
+            by_cell[cell.name] = Simulated(
+                cell.name, found.tilt_rms, bounds, found.moments.simulated
+            )
     return [by_cell[name] for name in order]
-
-
-def _simulated(cell: Cell, seed: int, leveling: dict[str, Any]) -> Simulated:
-    block = Block.joined(blocks(cell, seed, 0, cell.n_blocks))
-    estimates = block.estimates[block.converged]
-    tilt = cell_tilt_error(cell, estimates.mean(axis=0), leveling)
-    per_calibration = tilt.rms(estimates)
-    square = per_calibration**2
-    rms = np.sqrt(square.mean(axis=0))
-    error = square.std(axis=0) / np.sqrt(len(square)) / (2 * rms)
-    return Simulated(cell.name, rms, error, per_calibration, len(block.converged))
 
 
 def _quantity(question: Question, effect: str) -> dict[str, Any]:

@@ -10,14 +10,19 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from accelstudy.adjustment.linear_theory import LinearTheory
 from accelstudy.approaches import Approach, get_approach
+from accelstudy.design.estimability import Estimability, estimability
 from accelstudy.effects import HoldConditions
 from accelstudy.schemes import Scheme, get_scheme
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.hold_plan import HoldPlan
-from accelstudy.simulation.sessions import BLOCK, Noise
+from accelstudy.simulation.sessions import BLOCK, Noise, Session, session
+
+Array = NDArray[np.float64]
 
 CHUNK = 20
 """Blocks that are held, summed up and written together; they limit the memory of a job."""
@@ -41,6 +46,7 @@ class Cell:
     holds : HoldPlan, conditions of the holds
     directions : tuple of (x, y, z), of a scheme that was read from a file; None of any other
     compiled : bool, whether compiled code calibrates it; see `accelstudy.study.compiling`
+    control : str, `linear` where linear theory is the control variate of its estimates, or `none`
     """
 
     name: str
@@ -56,6 +62,7 @@ class Cell:
     holds: HoldPlan
     compiled: bool = False
     directions: tuple[tuple[float, ...], ...] | None = None
+    control: str = "linear"
 
     @cached_property
     def estimated_model(self) -> SensorModel:
@@ -85,6 +92,42 @@ class Cell:
     def hold(self) -> HoldConditions:
         """Conditions of the holds, without columns that follow from their attitudes."""
         return self.holds.hold(self.positions.n_positions)
+
+    @cached_property
+    def ideal(self) -> Session:
+        """A session without noise."""
+        return session(
+            self.simulated_model,
+            self.simulated_model.vector(self.truth),
+            self.positions.directions,
+            self.gravity,
+            self.hold,
+        )
+
+    @cached_property
+    def estimability(self) -> Estimability:
+        """What the positions determine."""
+        return estimability(
+            self.positions,
+            self.estimated_model,
+            self.conditions,
+            self.noise,
+            self.estimated_model.vector(self.truth),
+            self.gravity,
+            self.hold,
+        )
+
+    @cached_property
+    def linear_theory(self) -> LinearTheory | None:
+        """Linear theory at the calibration of that session; None if it does not converge."""
+        observed = self.ideal.observations(self.noise)
+        return LinearTheory.of(self.estimated_model, self.conditions, observed)
+
+    @cached_property
+    def true_values(self) -> Array:
+        """True value of each parameter that is estimated, (u,), SI; 0 where the sensor has none."""
+        truth = {**self.truth, "g": self.gravity}
+        return np.array([truth.get(name, 0.0) for name in self.parameter_units])
 
     @cached_property
     def parameter_units(self) -> dict[str, str]:

@@ -87,6 +87,7 @@ def _grid_cells(study: StudyConfig, grid: Grid) -> Iterable[Cell]:
             truth=study.truth(dict.fromkeys([*effects, *simulated])),
             holds=study.hold_plan,
             directions=None if file is None else tuple(map(tuple, file["directions"])),
+            control=study.control,
         )
 
 

@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from accelstudy.basics.shares import Z95, sigmas_95, wilson
 from accelstudy.basics.units import GON, MGON, recorded_unit, to_recorded
 from accelstudy.design import closed_forms
-from accelstudy.design.estimability import Estimability, estimability
 from accelstudy.effects import get_effect
 from accelstudy.files.tables import parquet_writer, write_table
-from accelstudy.leveling.error import TiltError
 from accelstudy.study.cell import Cell
-from accelstudy.study.monte_carlo.distributions import Distribution, cell_distributions
+from accelstudy.study.monte_carlo.control import Control
+from accelstudy.study.monte_carlo.distributions import (
+    Controlled,
+    cell_distributions,
+    plain_sketches,
+)
 from accelstudy.study.monte_carlo.followed import (
     ANGLES,
     ERROR,
@@ -27,19 +30,17 @@ from accelstudy.study.monte_carlo.followed import (
     PRIORI,
     TILT,
     TILTS,
+    Distributed,
     cell_tilt_error,
 )
-from accelstudy.study.monte_carlo.moments import MOMENTS, moments_table
-from accelstudy.study.monte_carlo.sketch import RELATIVE_ERROR, SKETCHES, Key, Sketch, sketch_table
-from accelstudy.study.monte_carlo.statistics import Statistics, read_statistics
+from accelstudy.study.monte_carlo.moments import MOMENTS, PROBABILITIES, moments_table
+from accelstudy.study.monte_carlo.sketch import SKETCHES, Key, sketch_table
+from accelstudy.study.monte_carlo.statistics import Estimates, Statistics, read_trees
 from accelstudy.study.tables import TABLES
 
-Array = NDArray[np.float64]
-
-
-LOWER = (1e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.025, 0.05, 0.25)
-PROBABILITIES = np.array([*LOWER, 0.5, *(1 - p for p in reversed(LOWER))])
-"""Probabilities of the quantiles; the outermost only where there are enough calibrations."""
+COVERAGE = tuple(f"coverage_95{end}" for end in ("", "_se", "_gain", "_low", "_high"))
+VALUE = tuple(f"value{end}" for end in ("", "_se", "_gain", "_plain"))
+QUANTILES = ("quantity", "name", "unit", "probability", *VALUE, "relative_error")
 
 
 def summarise_batch(
@@ -60,7 +61,7 @@ def summarise_batch(
     provenance : see `accelstudy.files.tables.origin`
     """
     cells = [Cell.from_dict(data) for data in spec["cells"]]
-    by_cell = read_statistics(parts["moments"], cells)
+    trees = read_trees(parts["moments"], (cell.name for cell in cells))
     rows: dict[str, list[pd.DataFrame]] = {name: [] for name in TABLES}
     with ExitStack() as files:
         write_moments, write_sketches = (
@@ -68,36 +69,26 @@ def summarise_batch(
             for name, schema in (("moments", MOMENTS), ("sketches", SKETCHES))
         )
         for cell in cells:
-            theory = estimability(
-                cell.positions,
-                cell.estimated_model,
-                cell.conditions,
-                cell.noise,
-                cell.estimated_model.vector(cell.truth),
-                cell.gravity,
-                cell.hold,
-            )
-            statistics, tree = by_cell.get(cell.name, (Statistics.of_none(cell), None))
-            tilt: TiltError | None = None
-            distributions: Mapping[Key, Distribution] = {}
-            if tree is not None and statistics.converged:
-                mean = statistics.followed.truth + statistics.mean(ERROR)
-                tilt = cell_tilt_error(cell, mean, leveling)
-                distributions = cell_distributions(cell, parts, statistics, tilt)
-            if tree is not None:
+            statistics = Statistics.of_none(cell)
+            distributions: Mapping[Key, Controlled] = {}
+            if cell.name in trees:
+                tree, control = trees[cell.name], Control.of(cell, leveling)
+                tilt = cell_tilt_error(cell, leveling)
+                statistics = Statistics.of(cell, tree, control, tilt)
                 write_moments(moments_table(cell.name, tree))
-                sketches = {
-                    key: distribution
-                    for key, distribution in distributions.items()
-                    if isinstance(distribution, Sketch)
-                }
-                write_sketches(sketch_table(cell.name, sketches))
-            rows["cells"].append(_cell_row(cell, theory, statistics))
-            rows["summary"].append(_summary_rows(cell, theory, statistics))
+                if statistics.converged:
+                    redundancy = statistics.moments.redundancy
+                    distributed = Distributed(statistics.followed, redundancy, tilt)
+                    distributions = cell_distributions(
+                        parts, statistics, distributed, control, cell
+                    )
+                write_sketches(sketch_table(cell.name, plain_sketches(distributions)))
+            rows["cells"].append(_cell_row(cell, statistics))
+            rows["summary"].append(_summary_rows(cell, statistics))
             rows["correlations"].append(_correlation_rows(cell, statistics))
             rows["quantiles"].append(_quantile_rows(cell, statistics, distributions))
-            row = _leveling_row(cell, statistics, tilt, distributions)
-            rows["leveling"].append(row if theory.estimable else row[:0])
+            row = _leveling_row(cell, statistics, distributions)
+            rows["leveling"].append(row if cell.estimability.estimable else row[:0])
     for name in TABLES:
         write_table(outputs[name], pd.concat(rows[name], ignore_index=True), provenance)
 
@@ -116,7 +107,8 @@ def _labels(cell: Cell) -> dict[str, Any]:
     }
 
 
-def _cell_row(cell: Cell, theory: Estimability, statistics: Statistics) -> pd.DataFrame:
+def _cell_row(cell: Cell, statistics: Statistics) -> pd.DataFrame:
+    theory = cell.estimability
     return pd.DataFrame(
         {
             **_labels(cell),
@@ -132,27 +124,46 @@ def _cell_row(cell: Cell, theory: Estimability, statistics: Statistics) -> pd.Da
             "reason": theory.reason,
             "n_replicates": statistics.moments.simulated,
             "n_converged": statistics.converged,
+            "control": statistics.control,
+            **_columns("variance_factor", statistics.factor[0]),
         },
         index=[0],
     )
 
 
-def _summary_rows(cell: Cell, theory: Estimability, statistics: Statistics) -> pd.DataFrame:
+def _columns(
+    name: str, estimate: Estimates, short: str | None = None, plain: bool = False
+) -> dict[str, float]:
+    """Columns of an estimate: its value, its standard error, its gain, and the plain average."""
+    short = short or name
+    average = {f"{short}_plain": float(estimate.plain)} if plain else {}
+    return {
+        name: float(estimate.value),
+        f"{short}_se": float(estimate.error),
+        f"{short}_gain": float(estimate.gain),
+        **average,
+    }
+
+
+def _summary_rows(cell: Cell, statistics: Statistics) -> pd.DataFrame:
     """Statistics of each parameter, in the units shown to people; NaN where there are none."""
-    exact = _closed_forms(cell)
-    followed = statistics.followed
-    mean = {name: statistics.mean(name) for name in (ERROR, PRIORI, POSTERIORI)}
+    theory, exact, followed = cell.estimability, _closed_forms(cell), statistics.followed
+    bias, sd, priori = statistics.bias, statistics.sd, statistics.mean(PRIORI)
+    posteriori = statistics.mean(POSTERIORI)
     first = {name: statistics.first(name) for name in (ERROR, POSTERIORI)}
-    sd = {name: statistics.sd(name) for name in (ERROR, POSTERIORI)}
     n = statistics.converged
+    freedom = sigmas_95(n - 1) if n > 1 else np.nan
     rows = []
     for i, (name, unit) in enumerate(followed.units.items()):
+        factor = float(to_recorded(1.0, unit))
+
+        def shown(estimates: Estimates, i: int = i, factor: float = factor) -> Estimates:
+            return estimates[i].scaled(factor)
+
+        half = freedom * bias.error[i]
         in_si = {
-            "truth": followed.truth[i],
-            **_bias(n, mean[ERROR][i], sd[ERROR][i]),
-            "sd_empirical": sd[ERROR][i],
-            "sd_posteriori_mean": mean[POSTERIORI][i],
-            "sd_priori_mean": mean[PRIORI][i],
+            "bias_ci95_low": bias.value[i] - half,
+            "bias_ci95_high": bias.value[i] + half,
             "sd_linear": theory.sigma[i],
             "sd_closed_form": exact.get(name, np.nan),
             "first_error": first[ERROR][i],
@@ -163,8 +174,13 @@ def _summary_rows(cell: Cell, theory: Estimability, statistics: Statistics) -> p
                 **_labels(cell),
                 "parameter": name,
                 "unit": recorded_unit(unit),
+                "truth": float(to_recorded(followed.truth[i], unit)),
+                **_columns("bias", shown(bias), plain=True),
+                **_columns("sd_empirical", shown(sd), "sd", plain=True),
+                **_columns("sd_posteriori_mean", shown(posteriori), "sd_posteriori"),
+                **_columns("sd_priori_mean", shown(priori), "sd_priori"),
                 **{key: float(to_recorded(value, unit)) for key, value in in_si.items()},
-                **_ratio(n, mean[POSTERIORI][i], sd[POSTERIORI][i], sd[ERROR][i]),
+                **_ratio(posteriori[i], sd[i]),
                 **_coverage(statistics, i),
                 "n_replicates": statistics.moments.simulated,
                 "n_converged": n,
@@ -175,40 +191,36 @@ def _summary_rows(cell: Cell, theory: Estimability, statistics: Statistics) -> p
     return pd.DataFrame(rows)
 
 
-def _bias(n: int, mean: float, sd: float) -> dict[str, float]:
-    """Mean error with its 95 % confidence interval."""
-    half = sigmas_95(n - 1) * sd / np.sqrt(n) if n > 1 else np.nan
-    return {"bias": mean, "bias_ci95_low": mean - half, "bias_ci95_high": mean + half}
-
-
-def _ratio(n: int, mean: float, sd: float, sd_of_errors: float) -> dict[str, float]:
-    """Mean sigma a posteriori over empirical sd, with its 95 % confidence interval.
-
-    The relative error of an empirical sd of n values is 1/√(2(n − 1)).
-    """
-    ratio = mean / sd_of_errors
-    spread = np.nan
-    if n > 1:
-        spread = np.sqrt(1 / (2 * (n - 1)) + (sd / mean) ** 2 / n)
+def _ratio(posteriori: Estimates, sd: Estimates) -> dict[str, float]:
+    """Mean sigma a posteriori over empirical sd, with its 95 % confidence interval."""
+    ratio = float(posteriori.value / sd.value)
+    spread = float(np.hypot(posteriori.error / posteriori.value, sd.error / sd.value))
     return {
         "sd_ratio": ratio,
-        "sd_ratio_ci95_low": ratio * np.exp(-Z95 * spread),
-        "sd_ratio_ci95_high": ratio * np.exp(Z95 * spread),
+        "sd_ratio_ci95_low": ratio * math.exp(-Z95 * spread),
+        "sd_ratio_ci95_high": ratio * math.exp(Z95 * spread),
     }
 
 
 def _coverage(statistics: Statistics, i: int) -> dict[str, float]:
-    """Share of the nominal 95 % intervals that hold the truth, with its 95 % (Wilson) interval.
+    """Share of the nominal 95 % intervals that hold the truth, with its 95 % interval.
 
-    The intervals are estimate ± t σ a posteriori, t of Student's distribution with r degrees of
-    freedom; without redundancy there are none.
+    Without a gain the interval is Wilson's. With one, few intervals hold the truth in simulation
+    and not in linear theory, or the other way round; one more of these than there were is allowed
+    for, as none may have been seen.
     """
-    n, moments = statistics.converged, statistics.moments
+    n, moments, inside = statistics.converged, statistics.moments, statistics.inside[i]
     if moments.redundancy <= 0 or n == 0:
-        return dict.fromkeys(("coverage_95", "coverage_95_low", "coverage_95_high"), np.nan)
-    inside = int(moments.inside[i])
-    low, high = wilson(inside, n)
-    return {"coverage_95": inside / n, "coverage_95_low": low, "coverage_95_high": high}
+        return dict.fromkeys(COVERAGE, np.nan)
+    plain = float(inside.plain)
+    low, high = wilson(round(plain * n), n)
+    alone = math.sqrt(plain * (1 - plain) / n)
+    error = float(np.hypot(inside.error, 1 / n))
+    if inside.gain == 1 or error >= alone:
+        return dict(zip(COVERAGE, (plain, alone, 1.0, low, high), strict=True))
+    value, half = float(inside.value), Z95 * error
+    low, high = max(value - half, 0.0), min(value + half, 1.0)
+    return dict(zip(COVERAGE, (value, error, (alone / error) ** 2, low, high), strict=True))
 
 
 def _closed_forms(cell: Cell) -> dict[str, float]:
@@ -237,71 +249,72 @@ def _closed_forms(cell: Cell) -> dict[str, float]:
 def _correlation_rows(cell: Cell, statistics: Statistics) -> pd.DataFrame:
     """Mean correlation from Σ_xx beside the empirical one over the calibrations."""
     names = list(statistics.followed.units) if statistics.moments.simulated else []
-    mean, empirical = statistics.correlations()
     pairs = len(names) ** 2
+    empirical = statistics.correlation
     return pd.DataFrame(
         {
             "cell": np.full(pairs, cell.name, object),
             "parameter_1": np.repeat(np.array(names, object), len(names)),
             "parameter_2": np.tile(np.array(names, object), len(names)),
-            "adjustment": mean.ravel()[:pairs],
-            "empirical": empirical.ravel()[:pairs],
+            "adjustment": statistics.mean_correlation.ravel()[:pairs],
+            "empirical": empirical.value.ravel()[:pairs],
+            "empirical_se": empirical.error.ravel()[:pairs],
+            "empirical_gain": empirical.gain.ravel()[:pairs],
+            "empirical_plain": empirical.plain.ravel()[:pairs],
         }
     )
 
 
 def _quantile_rows(
-    cell: Cell, statistics: Statistics, distributions: Mapping[Key, Distribution]
+    cell: Cell, statistics: Statistics, distributions: Mapping[Key, Controlled]
 ) -> pd.DataFrame:
     """Quantiles of the errors and sds of each parameter and of the tilt error, in shown units."""
     units = {**statistics.followed.units, **dict.fromkeys(TILTS, "rad")}
     n = statistics.converged
     tail = np.minimum(PROBABILITIES, 1 - PROBABILITIES)
-    shown = PROBABILITIES[(tail >= 0.0249) | (n * tail >= 0.999)]
-    with_unit = {
-        key: distribution for key, distribution in distributions.items() if key[1] in units
-    }
-    values = [
-        to_recorded(distribution.quantile(shown), units[name])
-        for (_, name), distribution in with_unit.items()
-    ]
-    errors = [RELATIVE_ERROR if isinstance(each, Sketch) else 0.0 for each in with_unit.values()]
-
-    def each(items: Iterable[Any]) -> NDArray[Any]:
-        return np.repeat(np.array([*items]), len(shown))
-
-    rows = {
-        "quantity": each(quantity for quantity, _ in with_unit),
-        "name": each(name for _, name in with_unit),
-        "unit": each(recorded_unit(units[name]) for _, name in with_unit),
-        "probability": np.tile(shown, len(with_unit)),
-        "value": np.ravel(values),
-        "relative_error": each(errors),
-    }
-    labels = _labels(cell)
-    if not with_unit:
-        return pd.DataFrame(columns=[*labels, *rows]).assign(**labels, n_converged=n)
-    return pd.DataFrame({**labels, **rows, "n_converged": n})
+    chosen = np.flatnonzero((tail >= 0.0249) | (n * tail >= 0.999))
+    rows = []
+    for (quantity, name), distribution in distributions.items():
+        if name in units:  # of effects there are claims, but no quantiles
+            unit = units[name]
+            estimates = distribution.quantile(chosen).scaled(float(to_recorded(1.0, unit)))
+            rows.append(
+                pd.DataFrame(
+                    {
+                        "quantity": quantity,
+                        "name": name,
+                        "unit": recorded_unit(unit),
+                        "probability": PROBABILITIES[chosen],
+                        "value": estimates.value,
+                        "value_se": estimates.error,
+                        "value_gain": estimates.gain,
+                        "value_plain": estimates.plain,
+                        "relative_error": distribution.relative_error,
+                    }
+                )
+            )
+    if not rows:
+        return pd.DataFrame(columns=[*_labels(cell), *QUANTILES]).assign(
+            **_labels(cell), n_converged=n
+        )
+    return pd.concat(rows, ignore_index=True).assign(**_labels(cell), n_converged=n)
 
 
 def _leveling_row(
-    cell: Cell,
-    statistics: Statistics,
-    tilt: TiltError | None,
-    distributions: Mapping[Key, Distribution],
+    cell: Cell, statistics: Statistics, distributions: Mapping[Key, Controlled]
 ) -> pd.DataFrame:
     """Rms of the tilt error over all calibrations, and its 95 % quantiles."""
-    rms, q95 = np.full(len(ANGLES), np.nan), np.full(len(TILTS), np.nan)
-    n = statistics.converged
-    if tilt is not None:
-        u = len(tilt.reference)
-        columns = statistics.followed.columns(ERROR)
-        rms = tilt.rms_of_all(statistics.moments.comoment[columns, columns][:u, :u] / n)
-    if (TILT, TILTS[0]) in distributions:
-        q95 = np.array([float(distributions[TILT, name].quantile(0.95)) for name in TILTS])
-    row = _labels(cell)
+    rms = statistics.tilt_rms.scaled(1 / MGON)
+    row: dict[str, Any] = _labels(cell)
+    nothing = Estimates(*np.full(4, np.nan))
+    bounds = {
+        name: distributions[TILT, name].at(0.95).scaled(1 / MGON)
+        if (TILT, name) in distributions
+        else nothing
+        for name in TILTS
+    }
     for i, angle in enumerate(ANGLES):
-        row[f"{angle}_rms_mgon"] = rms[i] / MGON
-        row[f"{angle}_rms_q95_mgon"] = q95[i] / MGON
-    row["both_rms_q95_mgon"] = q95[-1] / MGON
-    return pd.DataFrame({**row, "n_converged": n}, index=[0])
+        row |= _columns(f"{angle}_rms_mgon", rms[i], f"{angle}_rms", plain=True)
+    for name in TILTS:
+        row |= _columns(f"{name}_rms_q95_mgon", bounds[name], f"{name}_rms_q95", plain=True)
+    return pd.DataFrame({**row, "n_converged": statistics.converged}, index=[0])

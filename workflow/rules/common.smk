@@ -64,8 +64,7 @@ wildcard_constraints:
 def part_spec(part):
     """Everything that the numbers of a part depend on, as plain data."""
     shares = [share.to_dict() for share in PARTS[part]]
-    leveling = {} if KEPT else {"leveling": STUDY.leveling.model_dump()}
-    return {"seed": STUDY.seed, "shares": shares, **leveling}
+    return {"seed": STUDY.seed, "shares": shares, "leveling": STUDY.leveling.model_dump()}
 
 
 @cache

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from accelstudy.study.cell import Cell
-from accelstudy.study.monte_carlo.distributions import Distribution
+from accelstudy.study.monte_carlo.distributions import Controlled
 from accelstudy.study.monte_carlo.statistics import Statistics
 
 Array = NDArray[np.float64]
@@ -77,7 +77,7 @@ class Evidence:
     """
 
     statistics: Mapping[tuple[str, str], Statistics]
-    ratios: Mapping[tuple[str, str], Distribution]
+    ratios: Mapping[tuple[str, str], Controlled]
     cells: Mapping[tuple[str, str], Cell]
     scheme: str
     correlations: pd.DataFrame

@@ -10,6 +10,7 @@ from accelstudy.basics.units import recorded_unit, to_recorded
 from accelstudy.effects import get_effect
 from accelstudy.study.claims.base import Array, Claim, Evidence, SchemeClaim, register, verdict
 from accelstudy.study.monte_carlo.followed import EFFECT, POSTERIORI
+from accelstudy.study.monte_carlo.moments import PROBABILITIES
 
 EFFECTS = {"bias": "bias", "scale": "scale", "nonorthogonality": "misalignment"}
 """Effect -> the paper's word for it."""
@@ -39,8 +40,8 @@ def _mean_sigma(evidence: Evidence, effect: str) -> tuple[Array, Array, Array]:
     """Mean sigma a posteriori of each gravity-based parameter, its standard error, the truth."""
     statistics = evidence.statistics[evidence.scheme, "gravity"]
     columns = statistics.followed.effects[effect]
-    mean, error = statistics.mean(POSTERIORI), statistics.error_of_mean(POSTERIORI)
-    return mean[columns], error[columns], np.abs(statistics.followed.truth[columns])
+    mean = statistics.mean(POSTERIORI)[columns]
+    return mean.value, mean.error, np.abs(statistics.followed.truth[columns])
 
 
 def _bias_claim(evidence: Evidence) -> Claim:
@@ -169,7 +170,8 @@ def _reductions_by_scheme(evidence: Evidence) -> Iterable[SchemeClaim]:
             if (scheme, effect) not in evidence.ratios:
                 continue  # no redundancy, no sigma a posteriori
             ratio = evidence.ratios[scheme, effect]
-            low, median, high = (100 * (1 - ratio.quantile([0.975, 0.5, 0.025]))).tolist()
+            central = [PROBABILITIES.tolist().index(p) for p in (0.975, 0.5, 0.025)]
+            low, median, high = (100 * (1 - ratio.quantile(np.array(central)).value)).tolist()
             (gravity, _), (robot, _) = _mean_sigmas(evidence, scheme, effect)
             mean = 100 * (1 - robot / gravity)
             percentile = float(100 * (1 - ratio.share_below(1 - paper / 100)))
@@ -212,6 +214,6 @@ def _mean_sigmas(evidence: Evidence, scheme: str, effect: str) -> list[tuple[flo
     for approach in ("gravity", "robot"):
         statistics = evidence.statistics[scheme, approach]
         at = list(statistics.followed.effects).index(effect)
-        error = statistics.error_of_mean(EFFECT)[at]
-        sigmas.append((float(statistics.mean(EFFECT)[at]), float(error)))
+        mean = statistics.mean(EFFECT)[at]
+        sigmas.append((float(mean.value), float(mean.error)))
     return sigmas

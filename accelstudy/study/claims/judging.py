@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -18,16 +18,18 @@ from accelstudy.study.cell import Cell
 from accelstudy.study.cells import study_cells
 from accelstudy.study.claims.base import Array, Evidence, judge, schemes_with_both
 from accelstudy.study.config import StudyConfig
+from accelstudy.study.monte_carlo.control import Control
 from accelstudy.study.monte_carlo.distributions import (
     EXACT,
-    Distribution,
+    Controlled,
     Sample,
+    kept_pairs,
     kept_sketches,
-    kept_values,
 )
-from accelstudy.study.monte_carlo.followed import EFFECT
+from accelstudy.study.monte_carlo.followed import EFFECT, cell_tilt_error
+from accelstudy.study.monte_carlo.moments import EDGES, PROBABILITIES, apart_by_quantile
 from accelstudy.study.monte_carlo.sketch import Sketch
-from accelstudy.study.monte_carlo.statistics import Statistics, read_statistics
+from accelstudy.study.monte_carlo.statistics import Statistics, read_trees
 
 SWEEP = "config/sweeps/positions.yaml"
 """A study for readers of the claims who want one of their own."""
@@ -62,6 +64,7 @@ def judge_claims(
     evidence = evidence_from(
         cells,
         parts,
+        study.leveling.model_dump(),
         scheme=settings.scheme,
         correlations=read_table(correlations),
         sensitivity=read_table(sensitivity),
@@ -78,7 +81,10 @@ def judge_claims(
 
 
 def evidence_from(
-    cells: Iterable[Cell], parts: Mapping[str, Sequence[str | Path]], **rest: Any
+    cells: Iterable[Cell],
+    parts: Mapping[str, Sequence[str | Path]],
+    leveling: Mapping[str, Any],
+    **rest: Any,
 ) -> Evidence:
     """Collect the evidence.
 
@@ -86,38 +92,84 @@ def evidence_from(
     ----------
     cells : cells with the model of the claims
     parts : paths of `moments`, `sketches` and, where they are kept, `estimates` of these cells
+    leveling : mapping with max_tilt_gon and attitudes
     **rest : as in `Evidence`
     """
     by_name = {cell.name: cell for cell in cells}
-    merged = read_statistics(parts["moments"], by_name.values())
-    by_key = {(by_name[name].scheme, by_name[name].approach): by_name[name] for name in merged}
-    statistics = {key: merged[cell.name][0] for key, cell in by_key.items()}
-    ratios: dict[tuple[str, str], Distribution] = {}
-    for scheme in schemes_with_both(by_key):
-        pair = [(by_key[scheme, a], statistics[scheme, a]) for a in ("gravity", "robot")]
-        if all(summed.moments.redundancy > 0 and summed.converged for _, summed in pair):
-            for effect, ratio in _ratios(pair, parts).items():
-                ratios[scheme, effect] = ratio
-    return Evidence(statistics=statistics, ratios=ratios, cells=by_key, **rest)
+    found = {}
+    for name, tree in read_trees(parts["moments"], by_name).items():
+        cell = by_name[name]
+        control = Control.of(cell, leveling)
+        statistics = Statistics.of(cell, tree, control, cell_tilt_error(cell, leveling))
+        found[cell.scheme, cell.approach] = _Calibrations(cell, statistics, control)
+    ratios: dict[tuple[str, str], Controlled] = {}
+    for scheme in schemes_with_both(found):
+        pair = found[scheme, "gravity"], found[scheme, "robot"]
+        if all(each.statistics.moments.redundancy > 0 and each.number for each in pair):
+            for effect in pair[0].statistics.followed.effects:
+                ratios[scheme, effect] = _ratio(*pair, effect, parts)
+    return Evidence(
+        statistics={key: each.statistics for key, each in found.items()},
+        ratios=ratios,
+        cells={key: each.cell for key, each in found.items()},
+        **rest,
+    )
 
 
-def _ratios(
-    pair: Sequence[tuple[Cell, Statistics]], parts: Mapping[str, Sequence[str | Path]]
-) -> dict[str, Distribution]:
-    """Ratios by effect, robot-aided over gravity-based, of independent sessions.
+class _Calibrations(NamedTuple):
+    """The calibrations of a cell."""
+
+    cell: Cell
+    statistics: Statistics
+    control: Control | None
+
+    @property
+    def number(self) -> int:
+        """Number of those that converged."""
+        return self.statistics.converged
+
+
+def _ratio(
+    gravity: _Calibrations,
+    robot: _Calibrations,
+    effect: str,
+    parts: Mapping[str, Sequence[str | Path]],
+) -> Controlled:
+    """Ratio of the sigma of an effect, robot-aided over gravity-based, of independent sessions.
 
     Kept calibrations are paired by their number; with sketches, each is paired with each.
     """
-    keys = [(EFFECT, effect) for effect in pair[0][1].followed.effects]
-    if parts.get("estimates") and all(summed.converged <= EXACT for _, summed in pair):
-        gravity, robot = (
-            kept_values(parts["estimates"], cell, summed.converged, keys) for cell, summed in pair
-        )
-        n = min(gravity.shape[1], robot.shape[1])
-        values = robot[:, :n] / gravity[:, :n]
-        return {effect: Sample(row) for (_, effect), row in zip(keys, values, strict=True)}
-    gravity_sketches, robot_sketches = (kept_sketches(parts["sketches"], cell) for cell, _ in pair)
-    return {key[1]: RatioOfSketches(robot_sketches[key], gravity_sketches[key]) for key in keys}
+    n = min(gravity.number, robot.number)
+    if not parts.get("estimates") or max(gravity.number, robot.number) > EXACT:
+        sketches = [kept_sketches(parts["sketches"], each.cell) for each in (robot, gravity)]
+        return Controlled(RatioOfSketches(*(each[EFFECT, effect] for each in sketches)), n)
+    above, linear_above = _kept(robot, effect, parts["estimates"])
+    below, linear_below = _kept(gravity, effect, parts["estimates"])
+    ratio = above[:n] / below[:n]
+    numerator, denominator = robot.control, gravity.control
+    if numerator is None or denominator is None:
+        return Controlled(Sample(ratio), n)
+    linear = linear_above[:n] / linear_below[:n]
+
+    def known(probabilities: Array) -> Array:
+        return numerator.ratio_quantiles(denominator, effect, probabilities)
+
+    apart = apart_by_quantile(ratio - linear, linear, known(EDGES))
+    return Controlled(
+        Sample(ratio), n, linear=Sample(linear), known=known(PROBABILITIES), apart=apart
+    )
+
+
+def _kept(of: _Calibrations, effect: str, estimates: Sequence[str | Path]) -> tuple[Array, Array]:
+    """Sigma of an effect in the kept calibrations that converged, and by linear theory."""
+    followed, values = of.statistics.followed, []
+    column = followed.keys.index((EFFECT, effect))
+    for simulated, linear in kept_pairs(estimates, of.cell, of.control):
+        own = followed.values(simulated)[:, column]
+        theory = own if linear is None else followed.values(linear)[simulated.converged, column]
+        values.append((own, theory))
+    own, theory = zip(*values, strict=True)
+    return np.concatenate(own), np.concatenate(theory)
 
 
 class RatioOfSketches:
@@ -142,12 +194,12 @@ class RatioOfSketches:
         """Quantiles."""
         from scipy import optimize  # slow to import, and studies that keep replicates do without
 
-        return np.array(
-            [
-                optimize.brentq(lambda x, p=p: self.share_below(x) - p, *self.ends, rtol=1e-9)
-                for p in np.atleast_1d(probabilities)
-            ]
-        )
+        wanted = np.asarray(probabilities, dtype=float)
+        each = [
+            optimize.brentq(lambda x, p=p: self.share_below(x) - p, *self.ends, rtol=1e-9)
+            for p in wanted.ravel()
+        ]
+        return np.reshape(each, wanted.shape)
 
 
 def claims_page(claims: pd.DataFrame, by_scheme: pd.DataFrame) -> str:

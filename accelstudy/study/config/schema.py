@@ -79,6 +79,11 @@ class StudyConfig(Block):
     )
     grids: list[Grid] = Field(default_factory=list, description="sets of cells")
     presets: Presets | None = Field(None, description="Table 1 of the paper")
+    control: Literal["linear", "none"] = Field(
+        "linear",
+        description="How estimates are made of the replicates: with linear theory as control "
+        "variate, or as plain averages",
+    )
     keep: Literal["replicates", "summary"] = Field(
         "replicates",
         description="replicates: store every calibration in estimates/; summary: store none. Both "

@@ -16,8 +16,7 @@ from accelstudy.basics.units import GON
 from accelstudy.effects import get_effect
 from accelstudy.leveling.error import TiltError, cap_forces, tilt_error
 from accelstudy.study.cell import Cell
-from accelstudy.study.monte_carlo.moments import Moments, moments_of
-from accelstudy.study.monte_carlo.sketch import Key, Sketch
+from accelstudy.study.monte_carlo.sketch import Key
 
 Array = NDArray[np.float64]
 
@@ -25,6 +24,8 @@ ERROR, PRIORI, POSTERIORI, EFFECT = "error", "sd_priori", "sd_posteriori", "sd_o
 TILT = "tilt"
 """Quantities: of each parameter, of each effect (the mean of its parameters' sds a posteriori), and
 the rms over attitudes of the errors of roll and of pitch."""
+LINEAR = "linear_"
+"""What the name of a quantity begins with where it is that of linear theory."""
 ANGLES = ("roll", "pitch")
 TILTS = (*ANGLES, "both")
 """Names of the tilt errors that have quantiles: of each angle by itself, and of the larger of the
@@ -50,14 +51,13 @@ class Followed:
     def of(cls, cell: Cell) -> Followed:
         """Take what a cell estimates."""
         units = cell.parameter_units
-        truth = {**cell.truth, "g": cell.gravity}
         names = list(units)
         effects = {
             spec: [names.index(p.name) for p in get_effect(spec).parameters]
             for spec in cell.effects
             if len({p.unit for p in get_effect(spec).parameters}) == 1
         }
-        return cls(units, np.array([truth.get(name, 0.0) for name in units]), effects)
+        return cls(units, cell.true_values, effects)
 
     @cached_property
     def keys(self) -> list[Key]:
@@ -80,44 +80,46 @@ class Followed:
         errors = block.estimates[converged] - self.truth
         return np.column_stack([errors, priori, posteriori, *effects])
 
-    def moments(self, block: Block, values: Array) -> Moments:
-        """Moments of a chunk, given its `values`."""
-        # NaN without redundancy: outside.
-        half = sigmas_95(block.redundancy) * values[:, self.columns(POSTERIORI)]
-        inside = np.count_nonzero(np.abs(values[:, self.columns(ERROR)]) <= half, axis=0)
-        return moments_of(
-            values, len(block.converged), block.redundancy, inside, block.correlation_sum
-        )
+    def inside(self, values: Array, redundancy: int) -> NDArray[np.bool_]:
+        """Whether nominal 95 % intervals hold the truth, (R, u); NaN without redundancy: outside.
 
-    def sketched(self, redundancy: int) -> list[Key]:
-        """Quantities that have quantiles."""
+        The intervals are estimate ± t σ a posteriori, t of Student's distribution.
+        """
+        half = sigmas_95(redundancy) * values[:, self.columns(POSTERIORI)]
+        return np.asarray(np.abs(values[:, self.columns(ERROR)]) <= half)
+
+    def distributed(self, redundancy: int) -> list[Key]:
+        """Quantities that have quantiles, tilt errors last."""
         defined = (ERROR, POSTERIORI, EFFECT) if redundancy > 0 else (ERROR,)
-        return [key for key in self.keys if key[0] in defined]
+        return [*(k for k in self.keys if k[0] in defined), *((TILT, name) for name in TILTS)]
 
 
-class CellSketches:
-    """Sketches of the quantities of a cell.
+@dataclass(frozen=True)
+class Distributed:
+    """The quantities of a cell that have quantiles.
 
     Parameters
     ----------
     followed : Followed
-    tilt : TiltError, about a calibration that is like the others; None without any
+    redundancy : int
+    tilt : TiltError, of the calibrations of the cell
     """
 
-    def __init__(self, followed: Followed, tilt: TiltError | None) -> None:
-        self.followed = followed
-        self.tilt = tilt
-        self.by_key: dict[Key, Sketch] = {}
+    followed: Followed
+    redundancy: int
+    tilt: TiltError
 
-    def add(self, block: Block, values: Array) -> None:
-        """Count the calibrations of a block, given their `Followed.values`."""
-        keys = self.followed.keys
-        for key in self.followed.sketched(block.redundancy):
-            self.by_key.setdefault(key, Sketch()).add(values[:, keys.index(key)])
-        if self.tilt is not None:
-            estimates = block.estimates[block.converged][:, : len(self.tilt.reference)]
-            for name, rms in zip(TILTS, tilts(self.tilt, estimates), strict=True):
-                self.by_key.setdefault((TILT, name), Sketch()).add(rms)
+    @cached_property
+    def keys(self) -> list[Key]:
+        """Quantity and name of each column of `of`."""
+        return self.followed.distributed(self.redundancy)
+
+    def of(self, block: Block) -> Array:
+        """Quantities of the converged calibrations, (R, s)."""
+        values = self.followed.values(block)
+        chosen = [self.followed.keys.index(key) for key in self.keys[: -len(TILTS)]]
+        estimates = block.estimates[block.converged][:, : len(self.tilt.reference)]
+        return np.column_stack([values[:, chosen], tilts(self.tilt, estimates).T])
 
 
 def tilts(tilt: TiltError, estimates: Array) -> Array:
@@ -126,13 +128,12 @@ def tilts(tilt: TiltError, estimates: Array) -> Array:
     return np.vstack([each, each.max(axis=0)])
 
 
-def cell_tilt_error(cell: Cell, reference: Array, leveling: Mapping[str, Any]) -> TiltError:
-    """Tilt error that the calibrations of a cell leave, about one of them.
+def cell_tilt_error(cell: Cell, leveling: Mapping[str, Any]) -> TiltError:
+    """Tilt error that the calibrations of a cell leave, about the calibration without noise.
 
     Parameters
     ----------
     cell : Cell
-    reference : (u,) array, SI, estimates; gravity may follow them
     leveling : mapping with max_tilt_gon and attitudes
     """
     simulated, estimated = cell.simulated_model, cell.estimated_model
@@ -141,8 +142,14 @@ def cell_tilt_error(cell: Cell, reference: Array, leveling: Mapping[str, Any]) -
         simulated,
         simulated.vector(cell.truth),
         estimated,
-        reference[: estimated.n_parameters],
+        reference_of(cell)[: estimated.n_parameters],
         forces,
         cell.gravity,
         cell.holds.use(forces, cell.positions.n_positions),
     )
+
+
+def reference_of(cell: Cell) -> Array:
+    """Estimates from observations without noise, (u,); if there are none, the truth."""
+    theory = cell.linear_theory
+    return cell.true_values if theory is None else theory.reference

@@ -11,54 +11,19 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 
-from accelstudy.adjustment.calibration import Block
-from accelstudy.design.estimability import estimability
 from accelstudy.files.tables import parquet_writer
-from accelstudy.leveling.error import TiltError
-from accelstudy.simulation.sessions import BLOCK, session
+from accelstudy.simulation.sessions import BLOCK
 from accelstudy.study.batches import Share
 from accelstudy.study.cell import CHUNK, Cell
-from accelstudy.study.compiling import calibrator
-from accelstudy.study.monte_carlo.followed import CellSketches, Followed, cell_tilt_error
+from accelstudy.study.monte_carlo.control import Control
+from accelstudy.study.monte_carlo.followed import cell_tilt_error
 from accelstudy.study.monte_carlo.moments import MOMENTS, Node, Tree, moments_table
+from accelstudy.study.monte_carlo.replicates import Pair, blocks
 from accelstudy.study.monte_carlo.sketch import SKETCHES, sketch_table
-
-Array = NDArray[np.float64]
+from accelstudy.study.monte_carlo.summing import CellSketches, Summed
 
 log = logging.getLogger(__name__)
-
-
-def blocks(cell: Cell, seed: int, first: int, count: int) -> Iterator[Block]:
-    """Simulate and calibrate blocks of an estimable cell, one after another.
-
-    Parameters
-    ----------
-    cell : Cell
-    seed : int, of the study
-    first, count : int, number of the first block, from 0 on, and how many are asked for; there are
-        no more than `Cell.n_blocks`
-    """
-    simulated, estimated = cell.simulated_model, cell.estimated_model
-    calibrate = calibrator(cell)
-    ideal = session(
-        simulated,
-        simulated.vector(cell.truth),
-        cell.positions.directions,
-        cell.gravity,
-        cell.hold,
-    )
-    drawn = ideal.draw_blocks(
-        cell.noise,
-        cell.replicates,
-        range(first, min(first + count, cell.n_blocks)),
-        lambda block: np.random.default_rng(cell.seed(seed, block)),
-        BLOCK,
-        angles=cell.conditions.uses_angles,
-    )
-    for observed in drawn:
-        yield calibrate(estimated, cell.conditions, observed)
 
 
 _NAME = pa.dictionary(pa.int32(), pa.string())
@@ -71,8 +36,10 @@ ESTIMATES = pa.schema(
         "unit": _NAME,
         "truth": pa.float64(),
         "estimate": pa.float64(),
+        "linear_estimate": pa.float64(),
         "sigma_priori": pa.float64(),
         "omega": pa.float64(),
+        "linear_omega": pa.float64(),
         "redundancy": pa.int32(),
         "iterations": pa.int32(),
         "converged": pa.bool_(),
@@ -80,7 +47,8 @@ ESTIMATES = pa.schema(
 )
 """One row per cell, replicate and parameter, SI. Columns that follow from these are not stored: the
 error is estimate − truth, σ̂0² = omega / redundancy, and sigma_posteriori = σ̂0 · sigma_priori
-(`read_estimates` adds them). Columns that repeat within a replicate need next to no space."""
+(`read_estimates` adds them). `linear_estimate` and `linear_omega` are those of linear theory of the
+same noise; null without a control. Columns that repeat within a replicate need next to no space."""
 
 
 def simulate_batch(
@@ -92,13 +60,13 @@ def simulate_batch(
 
     Parameters
     ----------
-    spec : mapping with `seed`, `shares` (plain data of `accelstudy.study.batches.Share`)
-        and, for `sketches`, `leveling` (max_tilt_gon and attitudes)
+    spec : mapping with `seed`, `shares` (plain data of `accelstudy.study.batches.Share`) and
+        `leveling` (max_tilt_gon and attitudes)
     outputs : paths of `moments`, and of `estimates`, where replicates are kept, or of `sketches`
     provenance : see `accelstudy.files.tables.origin`
     """
     shares = [Share.from_dict(data) for data in spec["shares"]]
-    measured = ("estimate", "sigma_priori")
+    measured = ("estimate", "linear_estimate", "sigma_priori")
     with ExitStack() as files:
 
         def opened(name: str, schema: pa.Schema, **options: Any) -> Callable[[pa.Table], None]:
@@ -111,30 +79,21 @@ def simulate_batch(
         write_estimates = opened("estimates", ESTIMATES, measured=measured)
         for number, share in enumerate(shares, 1):
             cell = share.cell
-            design = estimability(
-                cell.positions,
-                cell.estimated_model,
-                cell.conditions,
-                cell.noise,
-                gravity=cell.gravity,
-                hold=cell.hold,
-            )
+            design = cell.estimability
             if not design.estimable:
                 log.info("%d/%d %s: %s", number, len(shares), cell.name, design.reason)
                 continue
-            followed, tree = Followed.of(cell), Tree()
-            sketches = None
-            if "sketches" in outputs:
-                sketches = CellSketches(followed, _pilot_tilt(cell, spec["seed"], spec["leveling"]))
-            for index, chunk in _chunks(share, spec["seed"]):
-                values = followed.values(chunk)
-                tree.add(Node(index, 1, followed.moments(chunk, values)))
-                if sketches is not None:
-                    sketches.add(chunk, values)
+            control = Control.of(cell, spec["leveling"])
+            summed = Summed(cell, control, cell_tilt_error(cell, spec["leveling"]), spec["seed"])
+            tree, sketches = Tree(), CellSketches(summed.distributed)
+            for index, chunk in _chunks(share, spec["seed"], control):
+                tree.add(Node(index, 1, summed.moments(chunk)))
+                if "sketches" in outputs:
+                    sketches.add(chunk)
                 if "estimates" in outputs:
                     write_estimates(_estimates_table(cell, chunk, index * CHUNK * BLOCK))
             write_moments(moments_table(cell.name, tree))
-            if sketches is not None:
+            if "sketches" in outputs:
                 write_sketches(sketch_table(cell.name, sketches.by_key))
             counts = tree.nodes
             log.info(
@@ -147,29 +106,18 @@ def simulate_batch(
             )
 
 
-def _chunks(share: Share, seed: int) -> Iterator[tuple[int, Block]]:
+def _chunks(share: Share, seed: int, control: Control | None) -> Iterator[tuple[int, Pair]]:
     """Number and content of each chunk of a share."""
-    drawn = blocks(share.cell, seed, share.first * CHUNK, share.count * CHUNK)
+    drawn = blocks(share.cell, seed, share.first * CHUNK, share.count * CHUNK, control)
     for index in range(share.first, share.first + share.count):
-        yield index, Block.joined(islice(drawn, CHUNK))
+        yield index, Pair.joined(islice(drawn, CHUNK))
 
 
-def _pilot_tilt(cell: Cell, seed: int, leveling: Mapping[str, Any]) -> TiltError | None:
-    """Tilt error about the mean of the first block of a cell in which a calibration converged.
-
-    It is the same in all jobs. It is None if no calibration of the first chunk converged.
-    """
-    for block in blocks(cell, seed, 0, CHUNK):
-        if block.converged.any():
-            return cell_tilt_error(cell, block.estimates[block.converged].mean(axis=0), leveling)
-    return None
-
-
-def _estimates_table(cell: Cell, chunk: Block, first: int) -> pa.Table:
+def _estimates_table(cell: Cell, pair: Pair, first: int) -> pa.Table:
     """Rows of a chunk whose first replicate has the number `first`."""
     units = cell.parameter_units
+    chunk, linear = pair
     n_replicates, u = chunk.estimates.shape
-    truth = {**cell.truth, "g": cell.gravity}
 
     def per_replicate(values: Any) -> Any:
         return np.repeat(values, u)
@@ -182,15 +130,19 @@ def _estimates_table(cell: Cell, chunk: Block, first: int) -> pa.Table:
         "replicate": per_replicate(np.arange(first, first + n_replicates)),
         "parameter": _coded(per_parameter(list(range(u))), list(units)),
         "unit": _coded(per_parameter(list(range(u))), list(units.values())),
-        "truth": per_parameter([truth.get(name, 0.0) for name in units]),
+        "truth": per_parameter([*cell.true_values]),
         "estimate": chunk.estimates.ravel(),
+        "linear_estimate": None if linear is None else linear.estimates.ravel(),
         "sigma_priori": chunk.sigma_priori.ravel(),
         "omega": per_replicate(chunk.omega),
+        "linear_omega": None if linear is None else per_replicate(linear.omega),
         "redundancy": np.full(n_replicates * u, chunk.redundancy),
         "iterations": per_replicate(chunk.iterations),
         "converged": per_replicate(chunk.converged),
     }
-    return pa.table(columns, schema=ESTIMATES)
+    missing = pa.nulls(n_replicates * u, pa.float64())
+    whole = {name: missing if each is None else each for name, each in columns.items()}
+    return pa.table(whole, schema=ESTIMATES)
 
 
 def _coded(codes: Any, names: list[str]) -> pa.DictionaryArray:

@@ -1,21 +1,84 @@
-"""Statistics of the calibrations of a cell, from all its chunks."""
+"""Statistics of the calibrations of a cell, from all its chunks.
+
+Means are estimated with linear theory as control variate (Owen, *Monte Carlo theory, methods and
+examples*, ch. 8). With the number x of a calibration, the number y of linear theory of the same
+noise, its known mean μ_y, and a coefficient β by regression,
+
+    E x ≈ ⟨x⟩ − β (⟨y⟩ − μ_y).
+
+Where calibrations fail, x is that of the others and y that of all: the mean is the ratio of
+⟨c x⟩ − β (⟨y⟩ − μ_y) to ⟨c⟩, c being 1 where one converged and 0 elsewhere.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.files.parquet import read_parquet
 from accelstudy.files.tables import REMEDY
+from accelstudy.leveling.error import TiltError
 from accelstudy.study.cell import Cell
+from accelstudy.study.monte_carlo.averaged import (
+    CORRELATION,
+    FACTOR,
+    INSIDE,
+    PRODUCT,
+    SQUARE,
+    Averaged,
+)
+from accelstudy.study.monte_carlo.control import Control
 from accelstudy.study.monte_carlo.followed import ERROR, Followed
-from accelstudy.study.monte_carlo.moments import Moments, Tree, moments_of, read_nodes
+from accelstudy.study.monte_carlo.moments import (
+    PROBABILITIES,
+    Moments,
+    Tree,
+    paired_moments,
+    read_nodes,
+)
 
 Array = NDArray[np.float64]
+
+LEAST = 20
+"""Replicates from which on a coefficient is estimated; fewer are only averaged."""
+
+
+@dataclass(frozen=True)
+class Estimates:
+    """Estimated numbers.
+
+    Attributes
+    ----------
+    value : array, the estimates
+    error : array, their standard errors by the number of replicates
+    gain : array, variance of plain averages over that of the estimates; 1 without a control
+    plain : array, plain averages of the replicates
+    """
+
+    value: Array
+    error: Array
+    gain: Array
+    plain: Array
+
+    def __getitem__(self, chosen: Any) -> Estimates:
+        each = (self.value, self.error, self.gain, self.plain)
+        return Estimates(*(values[chosen] for values in each))
+
+    def root(self) -> Estimates:
+        """Square roots of the numbers, with their errors to first order."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            value = np.sqrt(self.value)
+            return Estimates(value, self.error / (2 * value), self.gain, np.sqrt(self.plain))
+
+    def scaled(self, factor: Array | float) -> Estimates:
+        """The numbers times known positive factors."""
+        return Estimates(self.value * factor, self.error * factor, self.gain, self.plain * factor)
 
 
 @dataclass(frozen=True)
@@ -24,74 +87,183 @@ class Statistics:
 
     Attributes
     ----------
-    followed : Followed, the quantities
+    averaged : Averaged, the numbers of which there are means
     moments : Moments, of all calibrations
+    known : (k,) array, means of the numbers by linear theory, NaN where it does not know them; None
+        without a control
     """
 
-    followed: Followed
+    averaged: Averaged
     moments: Moments
+    known: Array | None
+
+    @classmethod
+    def of(cls, cell: Cell, tree: Tree, control: Control | None, tilt: TiltError) -> Statistics:
+        """Return those of a cell from the moments of all its chunks."""
+        moments = tree.total
+        averaged = Averaged(Followed.of(cell), moments.centre, cell.estimability.cofactors, tilt)
+        known = None if control is None else control.means(averaged)
+        return cls(averaged, moments, known)
 
     @classmethod
     def of_none(cls, cell: Cell) -> Statistics:
         """Return the statistics of a cell that was not simulated."""
         followed = Followed.of(cell)
-        q, u = len(followed.keys), len(followed.units)
-        nothing = np.zeros(u, np.int64), np.zeros((u, u))
-        return cls(followed, moments_of(np.zeros((0, q)), 0, 0, *nothing))
+        u = len(followed.units)
+        averaged = Averaged(followed, followed.truth, np.full((u, u), np.nan), None)
+        k, nan = averaged.count, np.full(len(followed.keys), np.nan)
+        empty = np.zeros((0, k)), np.zeros((0, k)), np.zeros(0, bool)
+        apart = np.zeros((3, 0, len(PROBABILITIES)))
+        moments = Moments(
+            0,
+            0,
+            0,
+            followed.truth,
+            **paired_moments(*empty),
+            apart=apart,
+            correlation_sum=np.zeros((u, u)),
+            first=nan,
+        )
+        return cls(averaged, moments, None)
+
+    @property
+    def followed(self) -> Followed:
+        """The quantities."""
+        return self.averaged.followed
+
+    @property
+    def control(self) -> str:
+        """Which control variate the estimates have: `linear` or `none`."""
+        controlled = self.known is not None and self.moments.simulated >= LEAST
+        return "linear" if controlled else "none"
 
     @property
     def converged(self) -> int:
         """Number of calibrations that converged."""
         return self.moments.converged
 
-    def mean(self, quantity: str) -> Array:
-        """Mean of a quantity, one number per parameter or effect, SI; NaN without calibrations."""
-        mean = self.moments.mean[self.followed.columns(quantity)]
-        return mean if self.converged else np.full_like(mean, np.nan)
-
     def first(self, quantity: str) -> Array:
-        """A quantity in the first calibration that converged, like `mean`."""
+        """A quantity of `Followed` in the first calibration that converged, (u,) or (e,)."""
         return self.moments.first[self.followed.columns(quantity)]
 
-    def covariance(self, quantity: str) -> Array:
-        """Empirical covariances of a quantity; NaN for fewer than two calibrations."""
-        columns = self.followed.columns(quantity)
+    def mean(self, quantity: str) -> Estimates:
+        """Means of a quantity of `Averaged`, SI; NaN without calibrations.
+
+        Those of errors and their products are about the centre.
+        """
+        return self._means[self.averaged.columns[quantity]]
+
+    @property
+    def bias(self) -> Estimates:
+        """Mean errors, (u,), SI."""
+        mean, shift = self.mean(ERROR), self.averaged.centre - self.followed.truth
+        return Estimates(mean.value + shift, mean.error, mean.gain, mean.plain + shift)
+
+    @property
+    def sd(self) -> Estimates:
+        """Empirical standard deviations of the estimates, (u,), SI."""
+        mean, products = self.mean(ERROR), self.mean(PRODUCT)
+        u = len(mean.value)
+        squares = products[np.cumsum(np.arange(1, u + 1)) - 1]
         n = self.converged
-        return self.moments.comoment[columns, columns] / (n - 1 if n > 1 else np.nan)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            value = squares.value - mean.value**2 + mean.error**2
+            plain = (squares.plain - mean.plain**2) * (n / np.float64(n - 1))
+        return Estimates(value, squares.error, squares.gain, plain).root()
 
-    def sd(self, quantity: str) -> Array:
-        """Empirical standard deviation of a quantity, like `mean`."""
-        return np.sqrt(np.diagonal(self.covariance(quantity)))
+    @property
+    def mean_correlation(self) -> Array:
+        """Mean of the correlations from Σ_xx, (u, u)."""
+        return self.moments.correlation_sum / (self.converged or np.nan)
 
-    def error_of_mean(self, quantity: str) -> Array:
-        """Standard error of the mean of a quantity, like `mean`."""
-        columns = self.followed.columns(quantity)
-        return np.sqrt(np.diagonal(self.moments.comoment)[columns]) / (self.converged or np.nan)
+    @property
+    def correlation(self) -> Estimates:
+        """Empirical correlations over the calibrations, (u, u)."""
+        mean, sd = self.mean(ERROR), self.sd
+        products, influence = self.mean(PRODUCT), self.mean(CORRELATION)
+        u = len(sd.value)
+        i, j = np.tril_indices(u)
+        below, at = i != j, np.tril_indices(u, -1)
+        enough = self.converged > u
 
-    def correlations(self) -> tuple[Array, Array]:
-        """Correlations of the parameters: mean of those from Σ_xx, and over the calibrations."""
-        mean = self.moments.correlation_sum / (self.converged or np.nan)
-        covariance = self.covariance(ERROR)
-        if self.converged <= len(covariance):
-            return mean, np.full_like(covariance, np.nan)
-        sd = np.sqrt(np.diagonal(covariance))
-        return mean, np.clip(covariance / sd[:, None] / sd, -1, 1)
+        def whole(values: Array, diagonal: float) -> Array:
+            matrix = np.full((u, u), diagonal if enough else np.nan)
+            if enough:
+                matrix[at] = values
+                matrix.T[at] = values
+            return matrix
+
+        def scaled(product: Array, mean: Array, spread: Array) -> Array:
+            return np.clip((product - mean[i] * mean[j])[below] / spread, -1, 1)
+
+        def spread(of: Array) -> Array:
+            return np.asarray(of[at[0]] * of[at[1]])
+
+        bias_free = spread(sd.value) - spread(mean.error)
+        n = max(self.converged, 2)
+        scale = np.sqrt(np.diagonal(self.averaged.cofactors))
+        units = spread(scale) / spread(sd.value)
+        return Estimates(
+            whole(scaled(products.value, mean.value, bias_free), 1.0),
+            whole(influence.error * units, 0.0),
+            whole(influence.gain, np.nan),
+            whole(scaled(products.plain, mean.plain, spread(sd.plain) * (1 - 1 / n)), 1.0),
+        )
+
+    @property
+    def factor(self) -> Estimates:
+        """Mean variance factor σ̂0², (1,)."""
+        return self.mean(FACTOR)
+
+    @property
+    def inside(self) -> Estimates:
+        """Shares of the nominal 95 % intervals that hold the truth, (u,)."""
+        return self.mean(INSIDE)
+
+    @property
+    def tilt_rms(self) -> Estimates:
+        """Rms over attitudes and calibrations of the errors of roll and of pitch, (2,), rad."""
+        return self.mean(SQUARE).root()
+
+    @cached_property
+    def _means(self) -> Estimates:
+        """Means of all numbers, (k,)."""
+        m = self.moments
+        n, converged = m.simulated, m.converged
+        if not converged:
+            return Estimates(*np.full((4, len(m.linear)), np.nan))
+        share = converged / n
+        plain = (m.difference + m.linear) / share
+        # Numbers about their mean, 0 where a calibration failed, minus those of linear theory.
+        differences, crosses, controls = m.squares
+        failed = m.linear_converged - converged * m.linear
+        own = n * (m.difference + m.linear) - m.linear_converged - converged * m.difference
+        differences = differences - 2 * plain * own + plain**2 * converged * (1 - share)
+        crosses = crosses - plain * failed
+        known = np.full(len(plain), np.nan) if self.known is None else self.known
+        used = np.isfinite(known) & (controls > 0) & (n >= LEAST)
+        rest = np.divide(crosses, controls, out=np.full_like(crosses, -1.0), where=used)
+        left = np.where(used, differences - rest * crosses, differences + 2 * crosses + controls)
+        whole = differences + 2 * crosses + controls
+        known = np.where(used, known, m.linear)
+        # Equal to plain − (1 + rest) (linear − known) / share, with less rounding.
+        value = (m.difference + known - rest * (m.linear - known)) / share
+        with np.errstate(divide="ignore", invalid="ignore"):
+            spread = n * np.float64(n - 1) if converged > 1 else np.nan
+            error = np.sqrt(np.maximum(left, 0.0) / spread) / share
+            gain = np.where(used, whole / left, 1.0)
+        return Estimates(value, error, gain, plain)
 
 
-def read_statistics(
-    paths: Iterable[str | Path], cells: Iterable[Cell]
-) -> dict[str, tuple[Statistics, Tree]]:
-    """Merge the moments of cells from the files of their parts, in order; by name of the cell.
+def read_trees(paths: Iterable[str | Path], cells: Iterable[str]) -> dict[str, Tree]:
+    """Moments of cells from the files of their parts, in order, by name of the cell.
 
     Cells that were not simulated are not in it.
     """
-    wanted = {cell.name: cell for cell in cells}
+    wanted = set(cells)
     trees: dict[str, Tree] = {}
     for path in paths:
         for name, node in read_nodes(read_parquet(path, REMEDY)):
             if name in wanted:
                 trees.setdefault(name, Tree()).add(node)
-    return {
-        name: (Statistics(Followed.of(wanted[name]), tree.total), tree)
-        for name, tree in trees.items()
-    }
+    return trees
