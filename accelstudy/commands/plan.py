@@ -122,8 +122,8 @@ _SECTIONS = {
 @quantity_option("robot_accuracy", QUANTITIES["robot_accuracy"])
 @click.option(
     "--replicates",
-    type=click.IntRange(200, 1_000_000),
-    default=10_000,
+    type=click.IntRange(20, 1_000_000),
+    default=200,
     show_default=True,
     help="Simulated calibrations of each candidate at the top.",
 )

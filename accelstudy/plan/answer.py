@@ -83,7 +83,7 @@ class Answer:
         return study_of(self.question, [r.candidate for r in chosen], self.seed, self.replicates)
 
 
-def answer(question: Question, seed: int = 1, replicates: int = 10_000) -> Answer:
+def answer(question: Question, seed: int = 1, replicates: int = 200) -> Answer:
     """Compare all calibrations, rank those that reach the target, and simulate the first."""
     compared = candidates(question)
     for equipment in question.equipment:

@@ -69,7 +69,7 @@ class PlanConfig(Block):
     sensors: OneOrMore[str] = Field(
         default=["all"], description="data sheets that are compared: names, files, or all"
     )
-    replicates: Replicates = Field(10_000, description="simulated calibrations of each at the top")
+    replicates: Replicates = Field(200, description="simulated calibrations of each at the top")
 
     @model_validator(mode="after")
     def _sensors_exist(self) -> Self:

@@ -19,7 +19,7 @@ from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import BLOCK, Noise, session
 from accelstudy.study import compiling
 from accelstudy.study.compiling import POSITIONS_PER_PARAMETER
-from accelstudy.study.monte_carlo.simulate import blocks
+from accelstudy.study.monte_carlo.replicates import blocks
 
 pytest.importorskip("llvmlite")
 
@@ -184,7 +184,7 @@ def test_a_compiled_cell_of_a_study(approach):
     cell = replace(cell, compiled=True)
     found = simulated(cell)
     assert_same(found, simulated(replace(cell, compiled=False)))
-    (second,) = blocks(cell, 1, 1, 1)
+    (second,) = (pair.simulated for pair in blocks(cell, 1, 1, 1))
     assert second.estimates.tobytes() == found.estimates[BLOCK:].tobytes()
 
 

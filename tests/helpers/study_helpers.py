@@ -1,12 +1,12 @@
 """A small study without Snakemake: configured, simulated and summarised as the workflow does it."""
 
-from accelstudy.adjustment.calibration import Block
 from accelstudy.basics.units import MGON
 from accelstudy.files.tables import collect, read_table
 from accelstudy.study.batches import Share, batches
 from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study
-from accelstudy.study.monte_carlo.simulate import blocks, simulate_batch
+from accelstudy.study.monte_carlo.replicates import Pair, blocks
+from accelstudy.study.monte_carlo.simulate import simulate_batch
 from accelstudy.study.summary import summarise_batch
 from accelstudy.study.tables import TABLES
 
@@ -42,14 +42,16 @@ def make_cells(*grids, **keys):
     return {cell.name: cell for cell in study_cells(make_study(grids=list(grids), **keys))}
 
 
+LEVELING = {"max_tilt_gon": 50, "attitudes": 200}
+
+
 def simulated(cell, seed=1):
     """All replicates of a cell in one block."""
-    return Block.joined(blocks(cell, seed, 0, cell.n_blocks))
+    return Pair.joined(blocks(cell, seed, 0, cell.n_blocks)).simulated
 
 
-def simulate(folder, shares, seed=1, leveling=None):
-    """Run the first stage; the paths of what it wrote. With `leveling` no replicates are kept."""
-    kept = "sketches" if leveling else "estimates"
+def simulate(folder, shares, seed=1, kept="estimates", leveling=LEVELING):
+    """Run the first stage; the paths of what it wrote: `estimates`, or `sketches` instead."""
     paths = {name: folder / f"{name}.parquet" for name in ("moments", kept)}
     spec = {"seed": seed, "shares": [share.to_dict() for share in shares], "leveling": leveling}
     simulate_batch(spec, paths, PROVENANCE)
@@ -79,7 +81,8 @@ def run_study(folder, batch_size=None, **keys):
                 place / f"{i:04d}",
                 job,
                 study.seed,
-                None if study.keep == "replicates" else leveling,
+                "estimates" if study.keep == "replicates" else "sketches",
+                leveling,
             )
             for i, job in enumerate(batch.jobs)
         ]

@@ -8,7 +8,16 @@ import pandas as pd
 import pytest
 from page_helpers import text_of
 from scipy.special import gammaln
-from study_helpers import NINE, PAPER_TRUTH, PROVENANCE, grid, make_study, parts_in, run_study
+from study_helpers import (
+    LEVELING,
+    NINE,
+    PAPER_TRUTH,
+    PROVENANCE,
+    grid,
+    make_study,
+    parts_in,
+    run_study,
+)
 
 from accelstudy.basics.units import MGON
 from accelstudy.basics.wording import interval, number
@@ -19,7 +28,7 @@ from accelstudy.study.cells import study_cells
 from accelstudy.study.claims import NOT_REPRODUCED, REPRODUCED, SLIP, evidence_from, judge
 from accelstudy.study.claims.judging import claims_markdown, claims_page, judge_claims
 from accelstudy.study.figures import draw_figures, figure_tables
-from accelstudy.study.monte_carlo.distributions import Sample
+from accelstudy.study.monte_carlo.distributions import Controlled, Sample
 from accelstudy.study.sensitivity import analyse_shapley
 
 STANDARD_ERRORS = 4.5
@@ -62,7 +71,7 @@ def tables(folder):
 @pytest.fixture(scope="module")
 def evidence(tables, folder):
     return evidence_from(
-        study_cells(make_study(**KEYS)), parts_in(folder), scheme="mclaren-24",
+        study_cells(make_study(**KEYS)), parts_in(folder), LEVELING, scheme="mclaren-24",
         correlations=tables["correlations"], sensitivity=tables["sensitivity"],
         shapley=tables["shapley"], base_samples=BASE_SAMPLES, resamples=RESAMPLES, seed=1,
     )  # fmt: skip
@@ -178,15 +187,18 @@ def with_reduction(evidence, percent, replicates=500, spread=0.05):
     for scheme in evidence.schemes:
         sigma0 = np.exp(spread / 2 * rng.standard_normal((2, replicates)))
         robot, gravity = sigma0 * [[1 - percent / 100], [1]]
-        ratios[scheme, "bias"] = Sample(robot / gravity)
+        ratios[scheme, "bias"] = Controlled(Sample(robot / gravity), len(robot))
         for approach, values in (("gravity", gravity), ("robot", robot)):
             real = statistics[scheme, approach]
-            at = real.followed.keys.index(("sd_of_effect", "bias"))
-            mean, comoment = real.moments.mean.copy(), real.moments.comoment.copy()
-            mean[at] = values.mean()
-            comoment[at, at] = values.var() * real.converged
-            moments = replace(real.moments, mean=mean, comoment=comoment)
-            statistics[scheme, approach] = replace(real, moments=moments)
+            effects = list(real.followed.effects)
+            at = real.averaged.columns["sd_of_effect"].start + effects.index("bias")
+            # Plain averages, without a control variate.
+            difference, linear = real.moments.difference.copy(), real.moments.linear.copy()
+            squares, known = real.moments.squares.copy(), real.known.copy()
+            difference[at], linear[at], known[at] = values.mean(), 0.0, np.nan
+            squares[:, at] = values.var() * real.converged, 0.0, 0.0
+            moments = replace(real.moments, difference=difference, linear=linear, squares=squares)
+            statistics[scheme, approach] = replace(real, moments=moments, known=known)
     return replace(evidence, statistics=statistics, ratios=ratios)
 
 

@@ -266,14 +266,21 @@ def test_figure_7_draws_the_mean_sd_and_the_first_simulation(tables, paper):
     rows = tables["estimates"].astype({"cell": str})
     rows = rows[(rows["parameter"] == "b_x") & (rows["cell"] == f"{NINE}/mclaren-24/gravity")]
     rows = rows.assign(error=rows["estimate"] - rows["truth"])
-    sigma = np.sqrt(rows["omega"] / rows["redundancy"]) * rows["sigma_priori"]
+    of_cell = {"cell": f"{NINE}/mclaren-24/gravity", "unit": "mm/s^2"}
+    summary, quantiles = (
+        table[(table[list(of_cell)].astype(str) == pd.Series(of_cell)).all(axis=1)]
+        for table in (tables["summary"], tables["quantiles"])
+    )
+    (sigma,) = summary.loc[summary["parameter"] == "b_x", "sd_posteriori_mean"]
     axes = draw("figure-7", tables, paper).axes
     bars = [patch.get_height() for patch in axes[1].patches]
-    assert 1e3 * sigma.mean() == pytest.approx(bars[0])
+    assert sigma == pytest.approx(bars[0])
     errors = [y for line in axes[0].get_lines() for y in np.atleast_1d(line.get_ydata())]
     assert np.isclose(errors, 1e3 * rows.loc[rows["replicate"] == 0, "error"].iloc[0]).any()
     ends = axes[0].collections[0].get_segments()[0][:, 1]
-    np.testing.assert_allclose(ends, 1e3 * np.quantile(rows["error"], [0.025, 0.975]))
+    found = quantiles[(quantiles["quantity"] == "error") & (quantiles["name"] == "b_x")]
+    found = found[found["probability"].isin([0.025, 0.975])]
+    np.testing.assert_allclose(ends, found["value"])
 
 
 def test_figure_8_has_no_diagonal(tables, paper):

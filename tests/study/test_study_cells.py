@@ -14,7 +14,7 @@ from accelstudy.sensors.models import MODELS, PRESETS
 from accelstudy.simulation.sessions import BLOCK, Noise
 from accelstudy.study.batches import batches
 from accelstudy.study.cells import study_cells
-from accelstudy.study.monte_carlo.simulate import blocks
+from accelstudy.study.monte_carlo.replicates import blocks
 
 GRAVITY, ROBOT = f"{NINE}/mclaren-24/gravity", f"{NINE}/mclaren-24/robot"
 
@@ -154,7 +154,7 @@ def test_more_replicates_extend_the_fewer():
 
 def test_a_block_does_not_depend_on_those_before_it():
     cell = make_cells(grid(replicates=BLOCK + 30))[ROBOT]
-    (last,) = blocks(cell, 1, 1, 5)
+    (last,) = (pair.simulated for pair in blocks(cell, 1, 1, 5))
     np.testing.assert_array_equal(last.estimates, estimates(cell)[BLOCK:])
     assert last.correlation_sum.diagonal() == pytest.approx(np.full(9, 30), rel=1e-12)
 

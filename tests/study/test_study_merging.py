@@ -1,5 +1,6 @@
 """However a cell is shared out to jobs, and whether its replicates are kept: the same tables."""
 
+import dataclasses
 from itertools import pairwise
 
 import numpy as np
@@ -14,8 +15,8 @@ from accelstudy.study import cell as cells_module
 from accelstudy.study.batches import batches, job_size
 from accelstudy.study.cells import study_cells
 from accelstudy.study.claims import evidence_from
-from accelstudy.study.monte_carlo import distributions, simulate
-from accelstudy.study.monte_carlo.moments import Moments, Node, Tree, moments_of
+from accelstudy.study.monte_carlo import distributions, replicates, simulate
+from accelstudy.study.monte_carlo.moments import Moments, Node, Tree, paired_moments
 from accelstudy.study.tables import TABLES
 
 RNG = np.random.default_rng(3)
@@ -34,7 +35,7 @@ SMALL = {
 def _small_chunks():
     """Blocks of 25 replicates and chunks of 2 blocks."""
     with pytest.MonkeyPatch.context() as patch:
-        for module in (cells_module, simulate, batching):
+        for module in (cells_module, replicates, simulate, batching):
             patch.setattr(module, "BLOCK", 25)
             patch.setattr(module, "CHUNK", 2)
         yield
@@ -75,35 +76,55 @@ def test_splitting_a_cell_changes_no_bit(kept, summed, size, tmp_path):
     assert len(list((tmp_path / "summed").glob("*/*/sketches.parquet"))) > 5
 
 
+def leaf(x, y, converged):
+    """Moments of numbers (R, k), as of one chunk."""
+    k = x.shape[1]
+    return Moments(
+        simulated=len(x),
+        converged=int(converged.sum()),
+        redundancy=3,
+        centre=np.zeros(2),
+        **paired_moments(x, y, converged),
+        apart=np.full((3, 2, 17), float(len(x))),
+        correlation_sum=np.full((2, 2), 0.1 * len(x)),
+        first=x[0] if converged.any() else np.full(k, np.nan),
+    )
+
+
 def test_a_tree_does_not_depend_on_how_its_leaves_come():
-    q = 4
-    leaves = [
-        moments_of(RNG.standard_normal((n, q)), 5, 3, np.full(q, n), np.full((q, q), 0.1 * n))
-        for n in (5, 0, 3, 5, 5, 5, 1, 5, 5, 4, 5)
-    ]
+    leaves = []
+    for n in (5, 0, 3, 5, 5, 5, 1, 5, 5, 4, 5):
+        converged = np.arange(5) < n
+        x = RNG.standard_normal((5, 4)) * converged[:, None]
+        leaves.append(leaf(x, RNG.standard_normal((5, 4)), converged))
     whole = Tree(Node(i, 1, leaf) for i, leaf in enumerate(leaves)).total
     for ends in ([0, 11], [0, 1, 11], [0, 3, 4, 9, 11], range(12)):
         tree = Tree()
         for first, end in pairwise(ends):
             for node in Tree(Node(i, 1, leaves[i]) for i in range(first, end)).nodes:
                 tree.add(node)
-        for field in ("mean", "comoment", "correlation_sum", "inside", "first"):
-            np.testing.assert_array_equal(getattr(tree.total, field), getattr(whole, field))
+        for field in dataclasses.fields(whole):
+            np.testing.assert_array_equal(
+                getattr(tree.total, field.name), getattr(whole, field.name)
+            )
     assert (whole.simulated, whole.converged) == (55, 43)
     with pytest.raises(ValueError, match="chunk 12 does not follow"):
         Tree([Node(0, 1, leaves[0])]).add(Node(12, 1, leaves[0]))
 
 
 def test_merged_moments_are_those_of_all():
-    """Though the mean is far from zero."""
-    values = 1e3 + 1e-4 * RNG.standard_normal((100, 3))
-    none = np.zeros(3, int), np.zeros((3, 3))
-    tree = Tree(Node(i, 1, moments_of(part, 10, 1, *none)) for i, part in
-                enumerate(np.split(values, 10)))  # fmt: skip
-    total: Moments = tree.total
-    np.testing.assert_allclose(total.mean, values.mean(axis=0), rtol=1e-14)
-    centred = values - values.mean(axis=0)
-    np.testing.assert_allclose(total.comoment, centred.T @ centred, rtol=1e-7)
+    """Though the means are far from zero, and the differences small."""
+    y = 1e3 + RNG.standard_normal((100, 3))
+    x = y + 1e-4 * RNG.standard_normal((100, 3))
+    converged = np.arange(100) != 7
+    parts = (np.split(each, 10) for each in (x, y, converged))
+    tree = Tree(Node(i, 1, leaf(*part)) for i, part in enumerate(zip(*parts, strict=True)))
+    total, whole = tree.total, leaf(x, y, converged)
+    for name in ("difference", "linear", "squares", "linear_converged"):
+        np.testing.assert_allclose(getattr(total, name), getattr(whole, name), rtol=1e-7)
+    centred = y - y.mean(axis=0)
+    np.testing.assert_allclose(total.squares[2], (centred**2).sum(axis=0), rtol=1e-10)
+    np.testing.assert_allclose(total.difference, (x - y).mean(axis=0), rtol=1e-7)
 
 
 # --- nothing is kept -----------------------------------------------------------------------------
@@ -125,15 +146,6 @@ def test_without_replicates_the_tables_are_the_same(kept, summed):
     np.testing.assert_allclose(near["value_sketched"], near["value"], rtol=0.002)
 
 
-def test_a_tilt_error_is_that_about_the_pilot(kept, summed):
-    """The calibration about which tilt errors are linear is the mean of a block, not of all."""
-    column = ["roll_rms_q95_mgon", "pitch_rms_q95_mgon", "both_rms_q95_mgon"]
-    rows = kept["leveling"]["model"] == "bias-scale"
-    np.testing.assert_allclose(
-        summed["leveling"].loc[rows, column], kept["leveling"].loc[rows, column], rtol=0.002
-    )
-
-
 def test_many_kept_replicates_are_sketched(kept, monkeypatch, tmp_path):
     monkeypatch.setattr(distributions, "EXACT", 100)
     tables = run_study(tmp_path, batch_size=200, **SMALL)
@@ -151,12 +163,13 @@ def test_claims_need_no_replicates(tmp_path):
     for keep in ("replicates", "summary"):
         run_study(tmp_path / keep, batch_size=200, keep=keep, **keys)
         evidence = evidence_from(
-            study_cells(make_study(**keys)), parts_in(tmp_path / keep), scheme="mclaren-24",
+            study_cells(make_study(**keys)), parts_in(tmp_path / keep),
+            make_study(**keys).leveling.model_dump(), scheme="mclaren-24",
             correlations=None, sensitivity=None, shapley=None, base_samples=2, resamples=1, seed=1,
         )  # fmt: skip
         ratios[keep] = evidence.ratios["mclaren-24", "bias"]
     for p, limit in ((0.025, 0.08), (0.5, 0.04), (0.975, 0.08)):
-        kept, summed = (float(np.squeeze(ratio.quantile(p))) for ratio in ratios.values())
+        kept, summed = (float(ratio.at(p).value) for ratio in ratios.values())
         assert summed == pytest.approx(kept, rel=limit)
     assert ratios["summary"].share_below(0.6) == pytest.approx(
         ratios["replicates"].share_below(0.6), abs=0.06
@@ -168,8 +181,8 @@ def test_claims_need_no_replicates(tmp_path):
 
 def test_jobs_grow_with_the_study():
     """No study has more jobs than Snakemake can plan."""
-    for replicates, jobs in ((10, 1), (10**6, 3), (10**8, 63), (10**11, 1954)):
-        (batch,) = batches([*make_cells(grid(approaches="robot", replicates=replicates)).values()])
+    for count, jobs in ((10, 1), (10**6, 3), (10**8, 63), (10**11, 1954)):
+        (batch,) = batches([*make_cells(grid(approaches="robot", replicates=count)).values()])
         assert len(batch.jobs) == pytest.approx(jobs, rel=0.01)
         first = [share.first for (share,) in batch.jobs]
         ends = [share.first + share.count for (share,) in batch.jobs]

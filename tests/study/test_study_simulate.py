@@ -35,7 +35,8 @@ from accelstudy.files.tables import (
 )
 from accelstudy.study.monte_carlo import simulate as module
 from accelstudy.study.monte_carlo.moments import MOMENTS
-from accelstudy.study.monte_carlo.simulate import ESTIMATES, blocks
+from accelstudy.study.monte_carlo.replicates import blocks
+from accelstudy.study.monte_carlo.simulate import ESTIMATES
 from accelstudy.study.tables import read_estimates
 
 GRAVITY, ROBOT = f"{NINE}/mclaren-24/gravity", f"{NINE}/mclaren-24/robot"

@@ -14,7 +14,7 @@ from study_helpers import NINE, PAPER_SENSOR, grid, run_study
 
 from accelstudy.schemes import get_scheme
 from accelstudy.study.compiling import calibrator
-from accelstudy.study.monte_carlo import simulate as module
+from accelstudy.study.monte_carlo import replicates as module
 from accelstudy.study.tables import read_estimates
 
 STANDARD_ERRORS = 4.5
@@ -65,10 +65,14 @@ def test_sds_are_those_of_the_closed_forms(summary):
 
 
 def test_sds_are_those_of_linear_theory(summary):
-    deviation = summary["sd_empirical"] / summary["sd_linear"] - 1
+    """Of the replicates alone, and to a millionth with linear theory as control variate."""
     limit = STANDARD_ERRORS / np.sqrt(2 * (REPLICATES - 1))
-    assert deviation.abs().max() < limit
-    np.testing.assert_allclose(summary["sd_priori_mean"], summary["sd_linear"], rtol=2e-3)
+    assert (summary["sd_plain"] / summary["sd_linear"] - 1).abs().max() < limit
+    deviation = summary["sd_empirical"] / summary["sd_linear"] - 1
+    assert deviation.abs().max() < 1e-4
+    assert (summary["sd_se"] / summary["sd_empirical"]).max() < 1e-4
+    assert summary["sd_gain"].min() > 1e4
+    np.testing.assert_allclose(summary["sd_priori_mean"], summary["sd_linear"], rtol=1e-4)
 
 
 def test_gravity_based_sds_of_24_positions(summary):
@@ -76,18 +80,19 @@ def test_gravity_based_sds_of_24_positions(summary):
     rows = of(summary, f"{MCLAREN}/gravity")
     assert [*rows["unit"]] == 3 * ["mm/s^2"] + 3 * ["ppm"] + 3 * ["mgon"]
     published = np.repeat([0.7071, 101.97, 10.264], 3)
-    limit = STANDARD_ERRORS / np.sqrt(2 * (REPLICATES - 1))
-    np.testing.assert_allclose(rows["sd_empirical"], published, rtol=limit)
+    # The published numbers are rounded, and of an ideal sensor.
+    np.testing.assert_allclose(rows["sd_empirical"], published, rtol=1e-3)
     np.testing.assert_allclose(rows["sd_closed_form"], published, rtol=2e-3)
 
 
 def test_estimates_are_unbiased(summary):
-    error = summary["sd_empirical"] / np.sqrt(REPLICATES)
-    assert (summary["bias"].abs() / error).max() < STANDARD_ERRORS
+    """Up to terms of second order in the noise, which plain averages cannot show."""
+    error = summary["sd_plain"] / np.sqrt(REPLICATES)
+    assert (summary["bias_plain"].abs() / error).max() < STANDARD_ERRORS
+    assert (summary["bias"].abs() / summary["sd_empirical"]).max() < 1e-3
     low, high = summary["bias_ci95_low"], summary["bias_ci95_high"]
-    np.testing.assert_allclose(high - low, 2 * 1.96 * error, rtol=2e-3)
+    np.testing.assert_allclose(high - low, 2 * 1.96 * summary["bias_se"], rtol=2e-3)
     np.testing.assert_allclose((high + low) / 2, summary["bias"], atol=1e-12)
-    assert_share_of_intervals((low <= 0) & (high >= 0))
 
 
 def assert_share_of_intervals(holds):
@@ -108,9 +113,10 @@ def test_coverage_of_the_confidence_intervals(summary):
     assert abs(known["coverage_95"].mean() - 0.95) < STANDARD_ERRORS * single / np.sqrt(cells)
 
 
-def test_wilson_interval_of_the_coverage(summary):
-    row = of(summary, f"{MCLAREN}/robot").loc["b_x"]
-    p, n, z = row["coverage_95"], REPLICATES, 1.959964
+def test_wilson_interval_of_the_coverage(tmp_path):
+    tables = run_study(tmp_path, grids=[grid(replicates=500, approaches="robot")], control="none")
+    row = of(tables["summary"], f"{MCLAREN}/robot").loc["b_x"]
+    p, n, z = row["coverage_95"], 500, 1.959964
     centre = (p + z**2 / (2 * n)) / (1 + z**2 / n)
     half = z / (1 + z**2 / n) * np.sqrt(p * (1 - p) / n + z**2 / (4 * n**2))
     assert row["coverage_95_low"] == pytest.approx(centre - half, rel=1e-6)
@@ -210,7 +216,9 @@ def test_correlation_of_the_scales(study, cell, published, digits):
 def test_empirical_correlations_are_those_of_the_adjustment(study):
     table = study["correlations"]
     limit = STANDARD_ERRORS / np.sqrt(REPLICATES)
-    assert (table["empirical"] - table["adjustment"]).abs().max() < limit
+    assert (table["empirical_plain"] - table["adjustment"]).abs().max() < limit
+    assert (table["empirical"] - table["adjustment"]).abs().max() < 1e-3
+    assert table["empirical_se"].max() < 1e-4
 
 
 # --- what did not converge -----------------------------------------------------------------------
@@ -230,8 +238,8 @@ def assert_flagged(tables, cell, failed):
     for name, found in good.groupby("parameter", observed=True):
         in_si = {"mm/s^2": 1e-3, "ppm": 1e-6, "mgon": np.pi / 200e3}[summary.loc[name, "unit"]]
         error = (found["estimate"] - found["truth"]) / in_si
-        assert summary.loc[name, "bias"] == pytest.approx(error.mean(), rel=1e-9)
-        assert summary.loc[name, "sd_empirical"] == pytest.approx(error.std(), rel=1e-9)
+        assert summary.loc[name, "bias_plain"] == pytest.approx(error.mean(), rel=1e-9)
+        assert summary.loc[name, "sd_plain"] == pytest.approx(error.std(), rel=1e-9)
     n = good["replicate"].nunique()
     assert set(summary["n_converged"]) == {n}
     assert set(summary["n_replicates"]) == {n + failed}
@@ -346,7 +354,7 @@ def test_tilt_of_a_calibrated_sensor(study, tmp_path):
     assert abs(both - 2.2365) < STANDARD_ERRORS * np.sqrt(0.95 * 0.05 / 3000) / density
     table = study["leveling"].set_index("cell")
     gravity, robot = (table.loc[f"{MCLAREN}/{name}"] for name in ("gravity", "robot"))
-    assert (robot.filter(like="_rms") < gravity.filter(like="_rms")).all()
+    assert (robot.filter(like="_mgon")[1:] < gravity.filter(like="_mgon")[1:]).all()
 
 
 def test_units_and_truth(summary):
@@ -356,13 +364,23 @@ def test_units_and_truth(summary):
     np.testing.assert_allclose(rows["truth"], truth, rtol=1e-12)
 
 
-def test_what_is_read_back_is_what_was_summarised(study, tmp_path):
-    """The summary follows from the estimates alone."""
+def test_what_is_read_back_is_what_was_simulated(study, tmp_path):
+    """Plain averages follow from the estimates alone."""
     path = tmp_path / "estimates.parquet"
     study["estimates"].to_parquet(path)
     table = read_estimates(path, f"{MCLAREN}/robot")
     half = table["sigma_posteriori"] * 1.9983405  # Student's t, 63 degrees of freedom
     inside = (table["error"].abs() <= half).groupby(table["parameter"], observed=True).mean()
     rows = of(study["summary"], f"{MCLAREN}/robot")
-    np.testing.assert_allclose(inside[rows.index], rows["coverage_95"], atol=1e-12)
+    assert (inside[rows.index] - rows["coverage_95"]).abs().max() < STANDARD_ERRORS * np.sqrt(
+        0.05 * 0.95 / REPLICATES
+    )
+    bias = table.groupby("parameter", observed=True)["error"].mean()
+    factors = {"mm/s^2": 1e3, "ppm": 1e6, "mgon": 200e3 / np.pi}
+    np.testing.assert_allclose(
+        bias[rows.index] * rows["unit"].map(factors), rows["bias_plain"], rtol=1e-9
+    )
+    # Linear theory of the same noise is beside them, and differs by next to nothing.
+    apart = table["estimate"] - table["linear_estimate"]
+    assert (apart.abs() < 1e-3 * table["sigma_priori"]).all()
     assert get_scheme("mclaren-24").n_positions == 24

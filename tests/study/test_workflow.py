@@ -210,12 +210,6 @@ def test_dry_run(tmp_path):
     assert not (tmp_path / "results").exists()
 
 
-def test_other_attitudes_do_not_simulate_again(single):
-    plan = planned(single, config={**TINY, "leveling": {"attitudes": 30}})
-    assert "summarise" in plan
-    assert "simulate" not in plan
-
-
 def test_another_unit_of_angles_draws_again(single, monkeypatch):
     monkeypatch.setitem(ENVIRONMENT, "ACCELSTUDY_ANGLE_UNIT", "deg")
     assert planned(single).keys() == {"explorer", "figures"}

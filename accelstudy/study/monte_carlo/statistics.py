@@ -45,6 +45,8 @@ from accelstudy.study.monte_carlo.moments import (
 
 Array = NDArray[np.float64]
 
+ROUNDING = 1e-24
+"""Variances below this share of that of plain averages are rounding."""
 LEAST = 20
 """Replicates from which on a coefficient is estimated; fewer are only averaged."""
 
@@ -250,8 +252,8 @@ class Statistics:
         value = (m.difference + known - rest * (m.linear - known)) / share
         with np.errstate(divide="ignore", invalid="ignore"):
             spread = n * np.float64(n - 1) if converged > 1 else np.nan
-            error = np.sqrt(np.maximum(left, 0.0) / spread) / share
-            gain = np.where(used, whole / left, 1.0)
+            error = np.sqrt(np.maximum(left, ROUNDING * whole) / spread) / share
+            gain = np.where(used, whole / np.maximum(left, ROUNDING * whole), 1.0)
         return Estimates(value, error, gain, plain)
 
 
