@@ -16,8 +16,11 @@ Array = NDArray[np.float64]
 
 DIRECTIONS = 4096
 """Directions over which a share is averaged."""
-BOTH_ERROR = 5e-4
-"""Bound of the relative error of a quantile of the larger of roll and pitch, by their number."""
+BOTH_ERROR, LOW_BOTH_ERROR = 1e-3, 5e-3
+"""Bounds of the relative error of a quantile of the larger of roll and pitch by their number, and
+below a probability of 0.25."""
+NEGLIGIBLE = 1e-4
+"""Share of the mean square that neglected dimensions have together."""
 NODES = 28
 """Nodes of the inverse Laplace transform; its error is below 1e-9."""
 CENTRAL = 1e-6
@@ -61,15 +64,24 @@ class TiltDistribution:
     def quantile(self, probabilities: ArrayLike) -> Array:
         """Quantiles of roll, of pitch and of the larger, (3, k), rad."""
         wanted = special.ndtri(np.asarray(probabilities, dtype=float))
-        at = np.log(self.approximate_quantile(special.ndtr(wanted)))
-        before, below = at - 0.1, special.ndtri(self.share_below(np.exp(at - 0.1)))
-        for _ in range(STEPS):
-            share = special.ndtri(self.share_below(np.exp(at)))
-            with np.errstate(invalid="ignore", divide="ignore"):
-                step = (wanted - share) * (at - before) / (share - below)
-            step = np.clip(np.where(np.isfinite(step), step, 0.0), -1.0, 1.0)
-            before, below, at = at, share, at + step
-        return np.exp(at)
+        start = np.log(self.approximate_quantile(special.ndtr(wanted)))
+        if not self._central:
+            return np.exp(_solved(self._normal_scores, start, wanted)[0])
+
+        def scores(angle: int) -> Callable[[Array], Array]:
+            return lambda at: np.asarray(special.ndtri(self._exact(angle, np.exp(at))))
+
+        each = [_solved(scores(a), start[a], wanted)[0] for a in (0, 1)]
+        largest = np.sqrt(np.sort(self._along[2].max(axis=0)))
+
+        def uncorrected(at: Array) -> Array:
+            shares = [self._length(bound / largest).mean() for bound in np.exp(at)]
+            return np.asarray(special.ndtri(shares))
+
+        both, slope = _solved(uncorrected, np.maximum(*each), wanted)
+        exact = special.ndtri(self.share_below(np.exp([*each, both]))[2])
+        step = np.where(np.isfinite(slope) & np.isfinite(exact), (wanted - exact) / slope, 0.0)
+        return np.exp([*each, both + step])
 
     def approximate_quantile(self, probabilities: ArrayLike) -> Array:
         """Quantiles as of `quantile`, of the scaled χ²; for the larger, the larger quantile."""
@@ -89,10 +101,10 @@ class TiltDistribution:
         -------
         (3, k) array
         """
-        length = _lengths(len(self.covariance))
+        length = self._length
         ends = {}
         for angle, bound in ((0, bounds[0]), (1, bounds[1]), (2, bounds[2]), (3, bounds[2])):
-            constant, linear, square = (each[angle % 2] for each in self._along)
+            constant, linear, square = (each[angle % 2] for each in self._along[:3])
             root = linear**2 - square * (constant - bound[:, None] ** 2)
             half = np.sqrt(np.maximum(root, 0.0))
             far = np.where(root > 0, (half - linear) / square, 0.0)
@@ -115,6 +127,9 @@ class TiltDistribution:
             larger[i] += slope @ [exact[a][i] - mean[a] for a in (0, 1)]
         return np.array([*(self._exact(a, bounds[a]) for a in (0, 1)), larger])
 
+    def _normal_scores(self, at: Array) -> Array:
+        return np.asarray(special.ndtri(self.share_below(np.exp(at))))
+
     @cached_property
     def _forms(self) -> tuple[Array, Array]:
         """H (2, u, u) and g (2, u) of the squared errors constant + 2 g y + y H y."""
@@ -130,14 +145,28 @@ class TiltDistribution:
         return bool(np.all(offset < CENTRAL * self.mean_squares))
 
     @cached_property
-    def _along(self) -> tuple[Array, Array, Array]:
-        """Constant (2,), linear and square (2, d) of the squared error over the length of y."""
+    def _along(self) -> tuple[Array, Array, Array, int]:
+        """Constant (2,), linear and square (2, d) of the squared error over the length of y, and u.
+
+        Without offset, y has only the dimensions that matter; the others count by their mean.
+        """
         forms, linear = self._forms
-        along = _directions(len(self.covariance))
-        square = np.stack([np.einsum("du,du->d", along @ form, along) for form in forms])
-        if self._central:
-            return np.zeros(2), np.zeros_like(square), np.maximum(square, np.finfo(float).tiny)
-        return self.tilt.constant, linear @ along.T, np.maximum(square, np.finfo(float).tiny)
+        if not self._central:
+            along = _directions(len(linear[0]))
+            return self.tilt.constant, linear @ along.T, _squares(forms, along), len(linear[0])
+        both = forms / np.trace(forms, axis1=1, axis2=2)[:, None, None]
+        sizes, vectors = np.linalg.eigh(both.sum(axis=0))
+        kept = np.cumsum(sizes) > NEGLIGIBLE * sizes.sum()
+        rotated = vectors.T @ forms @ vectors
+        rest = np.diagonal(rotated, axis1=1, axis2=2)[:, ~kept].sum(axis=1)
+        count = int(kept.sum())
+        squares = _squares(rotated[:, kept][:, :, kept], _directions(count))
+        return rest, np.zeros_like(squares), squares, count
+
+    @property
+    def _length(self) -> Callable[[Array], Array]:
+        """Share of the lengths of y that are below given ones."""
+        return _lengths(self._along[3])
 
     def _exact(self, angle: int, bounds: Array) -> Array:
         """Share below bounds (k,) of the error of one angle without offset."""
@@ -148,6 +177,26 @@ class TiltDistribution:
         for size in sizes[sizes > np.finfo(float).eps * sizes[-1]]:
             transform /= np.sqrt(1 + 2 * size * p)
         return np.clip((weights @ transform).real / bounds**2, 0.0, 1.0)
+
+
+def _solved(scores: Callable[[Array], Array], start: Array, wanted: Array) -> tuple[Array, Array]:
+    """Where normal scores are as wanted, by the secant method, and their slope there."""
+    before, at = start - 0.1, start
+    below, slope = scores(before), np.ones_like(start)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        for _ in range(STEPS):
+            here = scores(at)
+            found = (here - below) / (at - before)
+            slope = np.where(np.isfinite(found) & (found > 0), found, slope)
+            step = np.where(np.isfinite(here), (wanted - here) / slope, 0.0)
+            before, below, at = at, here, at + np.clip(step, -1.0, 1.0)
+    return at, slope
+
+
+def _squares(forms: Array, along: Array) -> Array:
+    """Values (2, d) of quadratic forms (2, u, u) in directions (d, u)."""
+    values = np.stack([np.einsum("du,du->d", along @ form, along) for form in forms])
+    return np.asarray(np.maximum(values, np.finfo(float).tiny))
 
 
 @cache

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from accelstudy.adjustment.calibration import Block
 from accelstudy.files.parquet import whole_parquet
 from accelstudy.files.tables import REMEDY
+from accelstudy.leveling.distribution import BOTH_ERROR, LOW_BOTH_ERROR
 from accelstudy.study.cell import CHUNK, Cell
 from accelstudy.study.monte_carlo.control import Control
 from accelstudy.study.monte_carlo.followed import LINEAR, Distributed, cell_tilt_error
@@ -84,6 +85,7 @@ class Controlled:
     linear : Distribution or None, of all replicates by linear theory
     known : (k,) array, its quantiles at the levels; NaN where they are not known
     apart : (3, b) array, see `Moments.apart`
+    inexact : (k,) array or 0, bound of the relative error of `known`
     """
 
     plain: Distribution
@@ -93,6 +95,12 @@ class Controlled:
     linear: Distribution | None = None
     known: Array | None = None
     apart: Array | None = None
+    inexact: Array | float = 0.0
+
+    def relative_error(self, chosen: NDArray[np.int_]) -> Array:
+        """Bound of the relative error of quantiles by how they are computed, (k,)."""
+        sketched = RELATIVE_ERROR if isinstance(self.plain, Sketch) else 0.0
+        return np.broadcast_to(np.maximum(self.inexact, sketched), self.levels.shape)[chosen]
 
     def quantile(self, chosen: NDArray[np.int_]) -> Estimates:
         """Quantiles at some of the levels, by their number."""
@@ -128,11 +136,6 @@ class Controlled:
         shift = estimates.value - estimates.plain
         at = np.asarray(values, dtype=float)
         return self.plain.share_below(at - np.interp(at, estimates.value, shift))
-
-    @property
-    def relative_error(self) -> float:
-        """Bound of the relative error of quantiles by what they are computed from."""
-        return RELATIVE_ERROR if isinstance(self.plain, Sketch) else 0.0
 
     def _sd_apart(self, probability: float) -> float:
         """Sd of the differences from linear theory near a quantile."""
@@ -231,9 +234,18 @@ def _controlled(
     if control is None or moments.simulated < LEAST:
         return {key: Controlled(plain[key], count, failed, levels) for key in distributed.keys}
     known = control.quantiles(levels)
+    inexact = dict.fromkeys(distributed.keys, np.zeros(len(levels)))
+    inexact[distributed.keys[-1]] = np.where(levels < 0.25, LOW_BOTH_ERROR, BOTH_ERROR)
     return {
         key: Controlled(
-            plain[key], count, failed, levels, linear[key], known[i], moments.apart[:, i]
+            plain[key],
+            count,
+            failed,
+            levels,
+            linear[key],
+            known[i],
+            moments.apart[:, i],
+            inexact[key],
         )
         for i, key in enumerate(distributed.keys)
     }
