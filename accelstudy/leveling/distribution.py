@@ -16,16 +16,16 @@ Array = NDArray[np.float64]
 
 DIRECTIONS = 4096
 """Directions over which a share is averaged."""
-BOTH_ERROR, LOW_BOTH_ERROR = 1e-3, 5e-3
-"""Bounds of the relative error of a quantile of the larger of roll and pitch by their number, and
-below a probability of 0.25."""
+INEXACT = {True: (1e-3, 0.02), False: (5e-3, 0.1)}
+"""Bounds of the relative error of a quantile by their number, and below a probability of 0.25: of
+the larger of roll and pitch, and of any where there is an offset."""
 NEGLIGIBLE = 1e-4
 """Share of the mean square that neglected dimensions have together."""
 NODES = 28
 """Nodes of the inverse Laplace transform; its error is below 1e-9."""
 CENTRAL = 1e-6
 """Offsets below this share of the mean square count as none."""
-STEPS = 5
+STEPS = 8
 """Steps of the secant method for a quantile."""
 
 
@@ -82,6 +82,13 @@ class TiltDistribution:
         exact = special.ndtri(self.share_below(np.exp([*each, both]))[2])
         step = np.where(np.isfinite(slope) & np.isfinite(exact), (wanted - exact) / slope, 0.0)
         return np.exp([*each, both + step])
+
+    def relative_error(self, probabilities: ArrayLike) -> Array:
+        """Bounds of the relative errors of quantiles as of `quantile`, (3, k)."""
+        usual, low = INEXACT[self._central]
+        each = np.where(np.asarray(probabilities, dtype=float) < 0.25, low, usual)
+        single = np.zeros_like(each) if self._central else each
+        return np.stack([single, single, each])
 
     def approximate_quantile(self, probabilities: ArrayLike) -> Array:
         """Quantiles as of `quantile`, of the scaled χ²; for the larger, the larger quantile."""
@@ -188,7 +195,8 @@ def _solved(scores: Callable[[Array], Array], start: Array, wanted: Array) -> tu
             here = scores(at)
             found = (here - below) / (at - before)
             slope = np.where(np.isfinite(found) & (found > 0), found, slope)
-            step = np.where(np.isfinite(here), (wanted - here) / slope, 0.0)
+            # Where a share is 0 or 1, the quantile is some way further.
+            step = np.where(np.isfinite(here), (wanted - here) / slope, -0.1 * np.sign(here))
             before, below, at = at, here, at + np.clip(step, -1.0, 1.0)
     return at, slope
 
