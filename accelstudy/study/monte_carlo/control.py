@@ -143,7 +143,7 @@ class Control:
         return np.vstack([*rows, tilts(probabilities)])
 
     def inexact(self, probabilities: Array) -> Array:
-        """Bounds of the errors of `quantiles`, relative, (s, k)."""
+        """Relative errors of `quantiles` by how they are computed, (s, k)."""
         tilts = self._tilts.relative_error(probabilities)
         exact = len(self.distributed.keys) - len(TILTS)
         return np.vstack([np.zeros((exact, len(probabilities))), tilts])

@@ -84,7 +84,7 @@ class Controlled:
     linear : Distribution or None, of all replicates by linear theory
     known : (k,) array, its quantiles at the levels; NaN where they are not known
     apart : (3, b) array, see `Moments.apart`
-    inexact : (k,) array, bounds of the relative errors of `known`
+    inexact : (k,) array, relative errors of `known`
     """
 
     plain: Distribution
