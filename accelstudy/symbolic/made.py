@@ -8,11 +8,11 @@ gave the formulas their numbers.
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import marshal
 import sys
 from collections.abc import Callable
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -78,10 +78,6 @@ def _versions() -> tuple[str, ...]:
     digest = hashlib.sha256()
     for path in sorted(path for room in ROOMS for path in (root / room).rglob("*.py")):
         digest.update(hashlib.sha256(path.read_bytes()).digest())
-    sympy = importlib.util.find_spec("sympy")
-    assert sympy is not None
-    assert sympy.origin is not None
-    release = Path(sympy.origin).with_name("release.py").read_text(encoding="utf-8")
     # NumPy rounds its functions in as many ways as there are processors.
     processor = np.show_config(mode="dicts")["SIMD Extensions"]["found"]
-    return digest.hexdigest(), sys.version, release, np.__version__, str(processor)
+    return digest.hexdigest(), sys.version, version("sympy"), np.__version__, str(processor)
