@@ -24,7 +24,7 @@ from accelstudy.files.kept import kept_or_made
 KIND = "formulas"
 """Under which it is kept."""
 ROOMS = (
-    *("basics", "files", "symbolic", "effects", "leveling", "positions", "approaches"),
+    *("basics", "files", "symbolic", "effects", "leveling", "approaches"),
     *("sensors", "adjustment", "kernel", "pole"),
 )
 """Folders of the package with all that formulas, and what is made of them, depend on."""
