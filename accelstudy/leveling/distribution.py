@@ -16,8 +16,8 @@ Array = NDArray[np.float64]
 
 DIRECTIONS = 4096
 """Directions over which a share is averaged."""
-FROM = (0.9, 0.5, 0.05, 0.0)
-INEXACT = {True: (1.5e-4, 1.2e-3, 4e-3, 0.02), False: (2e-3, 5e-3, 0.02, 0.1)}
+FROM = (0.9, 0.5, 0.2, 0.02, 0.0)
+INEXACT = {True: (1.5e-4, 1.2e-3, 2e-3, 6.5e-3, 0.03), False: (2e-3, 5e-3, 0.01, 0.1, 0.1)}
 """Relative errors of quantiles by their number (rms over the set-ups of the paper's study), from
 probabilities of `FROM` on: of the larger of roll and pitch, and of any where there is an offset."""
 NEGLIGIBLE = 1e-4
