@@ -113,3 +113,27 @@ class LinearTheory:
         estimates = z @ self._solution
         explained = np.einsum("ru,ru->r", estimates @ self._normal, estimates)
         return estimates, self.misfit + np.einsum("rm,rm->r", z + 2 * self._rest, z) - explained
+
+    def directions(self, scale: Array) -> tuple[Array, Array]:
+        """The part of the noise that linear theory sees, P ε, and the errors, root · P ε.
+
+        Parameters
+        ----------
+        scale : (n o + 1,) array, standard deviations of the errors of the observations, position
+            by position, and of gravity; ε are the errors over them
+
+        Returns
+        -------
+        P : (r, n o + 1) array with orthonormal rows; its transpose is its pseudo-inverse
+        root : (u, r) array, whose product with its transpose is the covariance
+        """
+        n, c, o = self._whitening.shape
+        solution = self._solution[: n * c].reshape(n, c, -1)
+        by_errors = np.einsum("nco,ncu->nou", self._whitening, solution).reshape(n * o, -1)
+        by_gravity = -self._gravity * self._solution[-1] * bool(self._gravity)
+        slope = np.vstack([by_errors, by_gravity]).T * scale
+        size = np.linalg.norm(slope, axis=1)
+        size[size == 0] = 1.0
+        left, values, seen = np.linalg.svd(slope / size[:, None], full_matrices=False)
+        kept = values > np.finfo(float).eps * len(scale) * values[0]
+        return seen[kept], size[:, None] * left[:, kept] * values[kept]
