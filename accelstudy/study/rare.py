@@ -174,7 +174,7 @@ def rare_tilts(
     if theory is None:
         raise InputError(f"{cell.name}: has no calibration without noise, so no linear theory")
     u = model.n_parameters
-    tilt = cell_tilt_error(cell, theory.reference, leveling)
+    tilt = cell_tilt_error(cell, leveling)
     scale = _scales(cell, approach.uses_angles)
     sees, root = theory.directions(scale)
     distribution = TiltDistribution(tilt, theory.covariance[:u, :u])
