@@ -140,12 +140,14 @@ def _numbers(tables: Tables) -> pd.DataFrame:
         excess=relative - 1,
         excess_se=2 * relative * rows["sd_se"] / rows["sd_empirical"],
     )
+    rows = rows[np.isfinite(rows[["bias_se", "excess_se"]]).all(axis=1)]
     both_tails = 0.05 / max(len(rows), 1)
     sigmas = special.stdtrit(rows["n_converged"] - 1, 1 - both_tails / 2)
     for name in ("bias", "excess"):
         size, half = rows[name].abs(), sigmas * rows[f"{name}_se"]
-        rows[name] = rows[name].where(size > half)
-        rows[f"{name}_size"], rows[f"{name}_limit"] = rows[name].abs(), size + half
+        seen = rows[name].where(size > half)
+        columns = {name: seen, f"{name}_size": seen.abs(), f"{name}_limit": size + half}
+        rows = rows.assign(**columns)
     keys = ["cell", "model", "approach", "sensor_sigma_mps2", "group"]
     by_group = rows.groupby(keys, sort=False)
     found = by_group[[f"{n}_{what}" for n in ("bias", "excess") for what in ("size", "limit")]]
