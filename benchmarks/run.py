@@ -21,6 +21,7 @@ import around  # noqa: E402
 import cores  # noqa: E402
 import figure  # noqa: E402
 import growth  # noqa: E402
+import precision  # noqa: E402
 import roofline  # noqa: E402
 import speeds  # noqa: E402
 from page import put  # noqa: E402
@@ -28,7 +29,7 @@ from processes import cores_here  # noqa: E402
 from ways import WAYS  # noqa: E402
 
 PARTS = (speeds, roofline, growth, cores, around)
-NAMES = ("machine", *(part.__name__ for part in PARTS))
+NAMES = ("machine", "precision", *(part.__name__ for part in PARTS))
 """Tables of the page."""
 
 
@@ -61,6 +62,8 @@ def main(arguments):
         results[part] = part.run()
         texts[part.__name__] = part.tables(results[part])
         print(f"\n{part.__doc__}\n\n{texts[part.__name__]}", flush=True)
+    texts["precision"] = precision.tables(precision.run(results[speeds][0]))
+    print(f"\n{precision.__doc__}\n\n{texts['precision']}", flush=True)
     if path:
         for name, text in texts.items():
             page = put(page, name, text)

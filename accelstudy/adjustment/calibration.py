@@ -130,8 +130,8 @@ class CalibrationProblem:
 
         with_gravity = observed.sigma_gravity > 0
         equations = equations_of(model.trace, approach, with_gravity)
-        initial = np.zeros((len(forces), len(equations.parameters)))
-        direct, weights = np.zeros_like(initial), np.zeros(len(equations.parameters))
+        initial = np.zeros((len(forces), equations.n_parameters))
+        direct, weights = np.zeros_like(initial), np.zeros(equations.n_parameters)
         weights[: model.n_parameters] = model.prior_weights
         if observed.initial is not None:
             initial[:, : model.n_parameters] = observed.initial
@@ -167,7 +167,7 @@ class CalibrationProblem:
     def linearised(self, parameters: Array, adjusted: Array) -> Linearisation:
         """Linearise one session at parameters (u',) and observations (n, o)."""
         forces, latent = adjusted[:, :3], adjusted[:, :3]
-        if self.conditions.equations.known_force is None:
+        if not self.conditions.equations.knows_force:
             p = parameters[: self.model.n_parameters]
             g = parameters[-1] if self.with_gravity else self.conditions.gravity
             latent = self.model.sensitive_force(forces, p, g, self.conditions.hold)

@@ -25,10 +25,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.adjustment.gauss_helmert import Linearisation
 from accelstudy.approaches import Approach
+from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import HoldConditions
 from accelstudy.sensors.trace import SensorTrace
 from accelstudy.symbolic.algebra import sp
-from accelstudy.symbolic.tracing import TracedFunction, derivative, inverse, symbolic, symbols
+from accelstudy.symbolic.made import key_of
+from accelstudy.symbolic.tracing import (
+    Traced,
+    derivative,
+    inverse,
+    symbolic,
+    symbols,
+    traced,
+)
 
 Array = NDArray[np.float64]
 
@@ -42,45 +51,70 @@ class CalibrationEquations:
     approach : Approach
     estimates_gravity : bool
         Whether g is the last of the parameters, or fixed.
+
+    Attributes
+    ----------
+    key : str, under which functions are kept; None if they are not
+    n_parameters, n_observations : int, the latter per position
+    knows_force : bool, whether the angles tell the force by the approach
     """
 
     def __init__(self, trace: SensorTrace, approach: Approach, estimates_gravity: bool) -> None:
         self.trace = trace
         self.approach = approach
         self.estimates_gravity = estimates_gravity
-        self.angles = symbols("phi_r", "theta_r") if approach.uses_angles else ()
-        self.parameters = (*trace.p, trace.g) if estimates_gravity else trace.p
-        self.observations = (*trace.output, *self.angles)
+        self.key = key_of(*trace.kinds, type(approach), f"gravity {estimates_gravity}")
+        self.n_parameters = trace.n_parameters + estimates_gravity
+        self.n_observations = 5 if approach.uses_angles else 3
+        level = (0.0, 0.0)
+        self.knows_force = (
+            approach.uses_angles and approach.force(level, STANDARD_GRAVITY, np) is not None
+        )
+
+    @cached_property
+    def angles(self) -> tuple[sp.Symbol, ...]:
+        """Symbols of the robot's readings."""
+        return symbols("phi_r", "theta_r") if self.approach.uses_angles else ()
+
+    @property
+    def parameters(self) -> tuple[sp.Symbol, ...]:
+        """Symbols of the parameters."""
+        formulas = self.trace.formulas
+        return (*formulas.p, formulas.g) if self.estimates_gravity else formulas.p
+
+    @property
+    def observations(self) -> tuple[sp.Symbol, ...]:
+        """Symbols of the observations."""
+        return (*self.trace.formulas.output, *self.angles)
 
     @cached_property
     def attitude(self) -> tuple[Any, ...]:
         """Roll and pitch without the errors of the robot's reading."""
-        errors = self.trace.reading_errors(self.angles) if self.angles else ()
+        errors = self.trace.formulas.reading_errors(self.angles) if self.angles else ()
         return tuple(a - e for a, e in zip(self.angles, errors, strict=True))
 
     @cached_property
-    def known_force(self) -> sp.Matrix | None:
-        """Force in the body frame by the approach, as a function of readings; None if unknown."""
-        force = self.approach.force(self.attitude, self.trace.g, symbolic) if self.angles else None
-        return None if force is None else sp.Matrix(force)
+    def known_force(self) -> sp.Matrix:
+        """Force in the body frame by an approach that knows it, as a function of readings."""
+        return sp.Matrix(self.approach.force(self.attitude, self.trace.formulas.g, symbolic))
 
-    @cached_property
-    def sensitive(self) -> TracedFunction:
-        """f_a of the force that the approach knows, generated."""
-        assert self.known_force is not None
-        f_a = inverse(self.trace.t_matrix) * self.known_force
-        return TracedFunction((*self.trace.arguments, *self.angles), f_a)
+    @property
+    def arguments(self) -> tuple[sp.Symbol, ...]:
+        """Symbols in the order in which generated functions take them."""
+        return (*self.trace.formulas.arguments, *self.angles)
 
-    @cached_property
-    def linear(self) -> TracedFunction:
-        """[ψ | A | B] as a function of f_a, f_s, x and the robot's readings, generated."""
-        expressions = (
-            self._in_body() if self.known_force is None else self._in_output(self.known_force)
-        )
-        return TracedFunction((*self.trace.arguments, *self.angles), expressions)
+    @traced
+    def sensitive(self) -> Traced:
+        """f_a of the force that the approach knows."""
+        return self.arguments, inverse(self.trace.formulas.t_matrix) * self.known_force
+
+    @traced
+    def linear(self) -> Traced:
+        """[ψ | A | B] as a function of f_a, f_s, x and the robot's readings."""
+        return self.arguments, self._in_output() if self.knows_force else self._in_body()
 
     def _in_body(self) -> sp.Matrix:
-        trace = self.trace
+        trace = self.trace.formulas
         force = symbols("f_b_x", "f_b_y", "f_b_z")
         psi = sp.Matrix(self.approach.conditions(force, self.attitude, trace.g, symbolic))
         by_force = derivative(psi, force)
@@ -91,8 +125,9 @@ class CalibrationEquations:
         at = dict(zip(force, trace.t_matrix * sp.Matrix(trace.force), strict=True))
         return sp.Matrix.hstack(psi, a, b).xreplace(at)
 
-    def _in_output(self, known_force: sp.Matrix) -> sp.Matrix:
-        trace, h = self.trace, sp.Matrix(self.trace.h)
+    def _in_output(self) -> sp.Matrix:
+        trace, known_force = self.trace.formulas, self.known_force
+        h = sp.Matrix(trace.h)
         by_force = derivative(h, trace.force) * inverse(trace.t_matrix)
         turned = derivative(trace.t_matrix * sp.Matrix(trace.force), self.parameters)
         by_known = by_force * (derivative(known_force, self.parameters) - turned)
@@ -124,7 +159,7 @@ class CalibrationConditions:
             x, g = parameters[:-1], parameters[-1]
         forces, angles = adjusted[:3], adjusted[3:]
         arguments = (x, self.settings, g, self.hold)
-        if eq.known_force is not None:
+        if eq.knows_force:
             f_a = trace.evaluate(eq.sensitive, forces, forces, *arguments, *angles)[:, 0]
         else:
             f_a = latent + trace.evaluate(trace.newton_step, latent, forces, *arguments)[:, 0]

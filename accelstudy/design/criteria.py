@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
+from functools import cached_property
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -299,6 +300,8 @@ def _kept(normal: Array, chosen: NDArray[np.bool_]) -> Array:
 
 
 def _placed(block: Array, chosen: NDArray[np.bool_]) -> Array:
+    if chosen.all():
+        return block
     whole = np.zeros((len(chosen), len(chosen)))
     whole[np.ix_(chosen, chosen)] = block
     return whole
@@ -330,23 +333,37 @@ class WorseAngle(Criterion):
 
     def value(self, normal: Array) -> Array:
         """Logarithm of the power mean of the two mean squares."""
-        cofactors = np.linalg.inv(self._block(normal))
-        roll, pitch = (POWER * np.log(np.sum(w * cofactors, axis=(-2, -1))) for w in self.weights)
+        roll, pitch = POWER * np.log(self._squares(self._cofactors(normal)))
         return np.asarray((np.logaddexp(roll, pitch) - np.log(2)) / POWER)
 
     def gradient(self, normal: Array) -> Array:
         """− N⁻¹ W N⁻¹, where the form W is nearly that of the worse angle."""
-        cofactors = np.linalg.inv(self._block(normal))
-        squares = np.sum(self.weights * cofactors, axis=(-2, -1))
+        cofactors = self._cofactors(normal)
+        squares = self._squares(cofactors)
         shares = squares ** (POWER - 1) / np.sum(squares**POWER)
-        weight = np.einsum("a,auw->uw", shares, self.weights)
-        result = np.zeros_like(normal)
-        result[np.ix_(self.estimated, self.estimated)] = -cofactors @ weight @ cofactors
-        return result
+        weight = (shares @ self._flat).reshape(cofactors.shape)
+        return _placed(-cofactors @ weight @ cofactors, self.estimated)
 
-    def _block(self, normal: Array) -> Array:
+    @cached_property
+    def _kept(self) -> Any:
+        """Places of the estimated parameters in a normal matrix."""
         kept = np.flatnonzero(self.estimated)
-        return np.asarray(normal[..., kept[:, None], kept] + RIDGE * np.eye(len(kept)))
+        return ... if self.estimated.all() else (..., kept[:, None], kept)
+
+    @cached_property
+    def _flat(self) -> Array:
+        return self.weights.reshape(2, -1)
+
+    @cached_property
+    def _ridge(self) -> Array:
+        return RIDGE * np.eye(self.weights.shape[-1])
+
+    def _cofactors(self, normal: Array) -> Array:
+        return np.asarray(np.linalg.inv(normal[self._kept] + self._ridge))
+
+    def _squares(self, cofactors: Array) -> Array:
+        """Mean squares of roll and of pitch, (2, ...)."""
+        return np.asarray(self._flat @ cofactors.reshape(*cofactors.shape[:-2], -1).T)
 
 
 def worse_angle(task: Task) -> WorseAngle:

@@ -95,13 +95,24 @@ class _Grid:
         informations = self.task.informations(flat).reshape(m, n, *self.task.prior.shape)
         inside = np.all(self.constraints.margins(flat) >= -TOLERANCE, axis=1).reshape(m, n)
         changes = informations - informations[0]
+        flat_changes = changes.reshape(m, n, -1)
         normal = self.task.prior + informations[0].sum(axis=0)
-        value, slope = float(self.criterion.value(normal)), self.criterion.gradient(normal)
+        value = float(self.criterion.value(normal))
         taken = np.zeros(n, dtype=int)
-        for i in range(n):
+
+        def promising(first: int) -> NDArray[np.bool_]:
             # A convex criterion cannot fall by more than its derivative says.
-            promised = np.sum(changes[:, i] * slope, axis=(1, 2))
-            tried = np.flatnonzero(inside[:, i] & (promised < -self.gain))
+            promised = flat_changes[:, first:] @ self.criterion.gradient(normal).ravel()
+            return inside[:, first:] & (promised < -self.gain)
+
+        at, tries = 0, promising(0)
+        while at < n:
+            left = tries[:, at - n :].any(axis=0)
+            if not left.any():
+                break
+            i = at = at + int(np.argmax(left))
+            tried = np.flatnonzero(tries[:, i - n])
+            at += 1
             if self.constraints.pair is not None:
                 others = np.delete(around[taken, np.arange(n)], i, axis=0)
                 tried = tried[self.constraints.pair.apart(around[tried, i], others).all(axis=1)]
@@ -112,7 +123,7 @@ class _Grid:
             if values[best] < value - self.gain:
                 taken[i], value = tried[best], float(values[best])
                 normal = normal + changes[taken[i], i]
-                slope = self.criterion.gradient(normal)
+                tries = promising(at)
         return self.moves[taken]
 
     def _further(self, t: Array, moved: Array) -> Array:

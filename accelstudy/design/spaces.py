@@ -14,7 +14,6 @@ from itertools import combinations, product
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
@@ -167,6 +166,8 @@ def listed_in(path: Path) -> Listed:
     InputError
         If it cannot be read, or has neither.
     """
+    import pandas as pd  # slow to import, and seldom needed
+
     try:
         table = pd.read_csv(StringIO(read_text(path)), comment="#", dtype=str)
     except InputError:

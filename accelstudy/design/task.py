@@ -107,7 +107,7 @@ class Task:
         return np.where(size > 1e-12 * size.max(), size, 1.0)
 
     def _rows(self, directions: Array) -> Array:
-        hold = HoldPlan().hold(len(directions))
+        hold = HoldPlan().hold(len(directions)) if self.extended.hold_columns else None
         return position_rows(
             self.extended, self.approach, self.noise, directions, None, self.gravity, hold
         )

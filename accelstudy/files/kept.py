@@ -6,6 +6,7 @@ import contextlib
 import hashlib
 import os
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 _DIGEST = hashlib.sha256().digest_size
@@ -17,7 +18,16 @@ def kept_in(kind: str) -> Path:
     return Path(caches) / "accelstudy" / kind
 
 
-def kept(kind: str, key: str) -> bytes | None:
+def kept_or_made(kind: str, key: str, make: Callable[[], bytes]) -> bytes:
+    """Return what was made before, or make it and keep it."""
+    content = _kept(kind, key)
+    if content is None:
+        content = make()
+        _keep(kind, key, content)
+    return content
+
+
+def _kept(kind: str, key: str) -> bytes | None:
     """Return what was made before, if it is there and whole."""
     try:
         stored = (kept_in(kind) / key).read_bytes()
@@ -27,7 +37,7 @@ def kept(kind: str, key: str) -> bytes | None:
     return content if hashlib.sha256(content).digest() == digest else None
 
 
-def keep(kind: str, key: str, content: bytes) -> None:
+def _keep(kind: str, key: str, content: bytes) -> None:
     """Keep it for the next process, where that can be written.
 
     It appears whole or not at all: processes that start together each write their own file and

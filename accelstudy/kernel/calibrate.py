@@ -74,8 +74,8 @@ class Kernel:
         variances = problem.cofactors
         unit = np.sqrt(np.divide(1.0, variances, out=np.zeros_like(variances), where=variances > 0))
         columns = [variances, unit]
-        if len(known.expressions):
-            unused, p = np.zeros((3, 1, n)), np.zeros((len(trace.p), 1))
+        if known.shape[0]:
+            unused, p = np.zeros((3, 1, n)), np.zeros((trace.n_parameters, 1))
             g = np.array([conditions.gravity], dtype=float)
             values = trace.evaluate(
                 known, unused, unused, p, conditions.settings, g, conditions.hold

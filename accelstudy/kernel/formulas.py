@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial, reduce
-from typing import Any
-
-import sympy as sp
+from typing import Any, TypeAlias
 
 from accelstudy.kernel.lanes import Code, Mask, Term, absolute, fma, sqrt
+from accelstudy.symbolic.algebra import sp
 
-Table = dict[sp.Symbol, Term]
+Table: TypeAlias = "dict[sp.Symbol, Term]"
 
 
 class Formulas:
@@ -84,7 +83,7 @@ def _value(code: Code, e: Any, values: Table) -> Term:
         return first * second
     if e.is_Pow:
         return _power(code, _value(code, e.base, values), e.exp)
-    write = _FUNCTIONS.get(e.func)
+    write = _FUNCTIONS.get(e.func.__name__)
     if write is None:
         raise NotImplementedError(f"no code for {e.func}")
     return write(code, *(_value(code, part, values) for part in e.args))
@@ -187,16 +186,16 @@ def _extreme(name: str) -> Callable[..., Term]:
     return lambda code, *values: reduce(partial(code.intrinsic, name), values)
 
 
-_FUNCTIONS: dict[Any, Callable[..., Term]] = {
-    sp.sin: lambda code, a: _turned(code, a, 0),
-    sp.cos: lambda code, a: _turned(code, a, 1),
-    sp.tan: _tangent,
-    sp.exp: lambda code, a: code.library("exp", a),
-    sp.atan2: lambda code, a, b: code.library("atan2", a, b),
-    sp.Abs: lambda code, a: absolute(a),
-    sp.sign: _sign,
-    sp.Heaviside: _step,
-    sp.Max: _extreme("maximum"),
-    sp.Min: _extreme("minimum"),
+_FUNCTIONS: dict[str, Callable[..., Term]] = {
+    "sin": lambda code, a: _turned(code, a, 0),
+    "cos": lambda code, a: _turned(code, a, 1),
+    "tan": _tangent,
+    "exp": lambda code, a: code.library("exp", a),
+    "atan2": lambda code, a, b: code.library("atan2", a, b),
+    "Abs": lambda code, a: absolute(a),
+    "sign": _sign,
+    "Heaviside": _step,
+    "Max": _extreme("maximum"),
+    "Min": _extreme("minimum"),
 }
 """Functions of `accelstudy.symbolic.tracing.symbolic` and of their derivatives."""

@@ -15,7 +15,6 @@ from functools import cached_property
 from typing import Any, TypeAlias
 
 import numpy as np
-import sympy as sp
 
 from accelstudy.adjustment.equations import CalibrationEquations
 from accelstudy.adjustment.gauss_helmert import (
@@ -38,7 +37,9 @@ from accelstudy.kernel.lanes import (
     larger,
 )
 from accelstudy.kernel.lanes import sqrt as root
-from accelstudy.symbolic.tracing import TracedFunction, symbols
+from accelstudy.symbolic.algebra import sp
+from accelstudy.symbolic.made import kept_under
+from accelstudy.symbolic.tracing import Traced, symbols, traced
 
 NAME = "calibrate"
 INTEGERS = ("positions", "replicates")
@@ -79,35 +80,46 @@ class KernelFunction:
     @property
     def unknowns(self) -> int:
         """Parameters u."""
-        return len(self.equations.parameters)
+        return self.equations.n_parameters
 
     @property
     def observed(self) -> int:
         """Observations o per position."""
-        return len(self.equations.observations)
+        return self.equations.n_observations
 
     @property
     def conditions(self) -> int:
         """Conditions c per position."""
-        return int(self.equations.linear.expressions.shape[0])
+        return self.equations.linear.shape[0]
+
+    @property
+    def key(self) -> str | None:
+        """Under which the numbers of `known`, and the text of the function, are kept."""
+        return self.equations.key
+
+    @property
+    def n_latent(self) -> int:
+        """Numbers f_a of the iteration before; none where the approach knows the force."""
+        return 0 if self.equations.knows_force else 3
 
     @cached_property
     def latent(self) -> tuple[sp.Symbol, ...]:
-        """Symbols of f_a of the iteration before; none where the approach knows the force."""
-        return () if self.equations.known_force is not None else symbols("a_x", "a_y", "a_z")
+        """Their symbols."""
+        return symbols("a_x", "a_y", "a_z")[: self.n_latent]
 
     @cached_property
     def _same(self) -> frozenset[sp.Symbol]:
-        lanes = {*self.equations.parameters, *self.equations.observations, *self.latent}
-        return frozenset(self.equations.trace.arguments) - lanes - set(self.equations.trace.force)
+        eq, trace = self.equations, self.equations.trace.formulas
+        lanes = {*eq.parameters, *eq.observations, *self.latent, *trace.force}
+        return frozenset(trace.arguments) - lanes
 
     @cached_property
     def sensitive(self) -> Formulas:
         """f_a from the known force, or from that of the iteration before."""
         eq, trace = self.equations, self.equations.trace
-        if not self.latent:
+        if eq.knows_force:
             return Formulas(list(eq.sensitive.expressions), self._same)
-        before = dict(zip(trace.force, self.latent, strict=True))
+        before = dict(zip(trace.formulas.force, self.latent, strict=True))
         step = trace.newton_step.expressions.xreplace(before)
         return Formulas([a + s for a, s in zip(self.latent, step, strict=True)], self._same)
 
@@ -116,24 +128,23 @@ class KernelFunction:
         """[ψ | A | B], row by row."""
         return Formulas(list(self.equations.linear.expressions), self._same)
 
-    @cached_property
-    def known(self) -> TracedFunction:
+    @traced
+    def known(self) -> Traced:
         """Known numbers of a position, (k, 1)."""
         expressions = [*self.sensitive.known.values(), *self.linear.known.values()]
-        return TracedFunction(
-            self.equations.trace.arguments, sp.Matrix(len(expressions), 1, expressions)
-        )
+        arguments = self.equations.trace.formulas.arguments
+        return arguments, sp.Matrix(len(expressions), 1, expressions)
 
     @property
     def columns(self) -> int:
         """Numbers of `known` per position."""
-        return 2 * self.observed + len(self.known.expressions)
+        return 2 * self.observed + self.known.shape[0]
 
     @property
     def work(self) -> int:
         """Vectors of `work` per position."""
         c, u, o = self.conditions, self.unknowns, self.observed
-        return 2 * o + len(self.latent) + c * (u + 1 + o)
+        return 2 * o + self.n_latent + c * (u + 1 + o)
 
 
 Rows: TypeAlias = list[list[Term]]
@@ -141,8 +152,8 @@ Rows: TypeAlias = list[list[Term]]
 
 
 def text_of(function: KernelFunction) -> str:
-    """Write the function as LLVM's text."""
-    return str(_Writer(function).code)
+    """Write the function as LLVM's text, which is kept."""
+    return kept_under(function.key, "kernel", lambda: str(_Writer(function).code))
 
 
 class _Writer:
@@ -237,7 +248,7 @@ class _Writer:
             largest.set(size)
             self.write(i, 0, values)
             self.write(i, o, [0.0] * o)
-            if self.of.latent:
+            if self.of.n_latent:
                 self.write(i, 2 * o, values[:3])
         return larger(largest.get() * (ROUNDING * np.finfo(float).eps), STEP_TOLERANCE)
 
@@ -290,13 +301,13 @@ class _Writer:
         l, v = self.read(i, 0, o), self.read(i, o, o)
         table: dict[Any, Term] = dict(zip(eq.parameters, x, strict=True))
         table |= zip(eq.observations, (a + b for a, b in zip(l, v, strict=True)), strict=True)
-        if self.of.latent:
+        if self.of.n_latent:
             table |= zip(self.of.latent, self.read(i, 2 * o, 3), strict=True)
         sensitive, linear = self.of.sensitive, self.of.linear
         f_a = self.evaluate(sensitive, table, i, 2 * o)
-        if self.of.latent:
+        if self.of.n_latent:
             self.write(i, 2 * o, f_a)
-        table |= zip(eq.trace.force, f_a, strict=True)
+        table |= zip(eq.trace.formulas.force, f_a, strict=True)
         values = self.evaluate(linear, table, i, 2 * o + len(sensitive.known))
         rows = [values[k * (1 + u + o) : (k + 1) * (1 + u + o)] for k in range(c)]
         psi = [row[0] for row in rows]
@@ -338,7 +349,7 @@ class _Writer:
         ]
         for number, value in enumerate(value for row in self.stored for value in row):
             if isinstance(value, Lanes):  # a constant is not stored
-                self.write(i, 2 * o + len(self.of.latent) + number, [value])
+                self.write(i, 2 * o + self.of.n_latent + number, [value])
 
     def evaluate(
         self, formulas: Formulas, table: dict[Any, Term], i: str, column: int
@@ -350,7 +361,7 @@ class _Writer:
     def residuals(self, i: str, dx: list[Term], size_v: Variable, omega: Variable) -> None:
         """Residuals of a position after a step, v = −(B Q)ᵀ L⁻ᵀ (A dx + w)."""
         u, o = self.u, self.o
-        number = 2 * o + len(self.of.latent)
+        number = 2 * o + self.of.n_latent
         v_new: list[Term] = [0.0] * o
         total: Term = omega.get()
         for stored in self.stored:

@@ -16,17 +16,20 @@ Array = NDArray[np.float64]
 
 DIRECTIONS = 4096
 """Directions over which a share is averaged."""
-BOTH_ERROR, LOW_BOTH_ERROR = 1e-3, 5e-3
-"""Bounds of the relative error of a quantile of the larger of roll and pitch by their number, and
-below a probability of 0.25."""
+FROM = (0.9, 0.5, 0.05, 0.0)
+INEXACT = {True: (1.5e-4, 1.2e-3, 4e-3, 0.02), False: (2e-3, 5e-3, 0.02, 0.1)}
+"""Relative errors of quantiles by their number (rms over the set-ups of the paper's study), from
+probabilities of `FROM` on: of the larger of roll and pitch, and of any where there is an offset."""
 NEGLIGIBLE = 1e-4
 """Share of the mean square that neglected dimensions have together."""
 NODES = 28
 """Nodes of the inverse Laplace transform; its error is below 1e-9."""
 CENTRAL = 1e-6
 """Offsets below this share of the mean square count as none."""
-STEPS = 5
+STEPS = 8
 """Steps of the secant method for a quantile."""
+LEAST_STEP = 1e-6
+"""Shorter ones, of the logarithm of a quantile, do not tell a slope."""
 
 
 @dataclass(frozen=True)
@@ -79,9 +82,18 @@ class TiltDistribution:
             return np.asarray(special.ndtri(shares))
 
         both, slope = _solved(uncorrected, np.maximum(*each), wanted)
-        exact = special.ndtri(self.share_below(np.exp([*each, both]))[2])
-        step = np.where(np.isfinite(slope) & np.isfinite(exact), (wanted - exact) / slope, 0.0)
-        return np.exp([*each, both + step])
+        for _ in range(2):
+            exact = special.ndtri(self.share_below(np.exp([*each, both]))[2])
+            step = np.where(np.isfinite(slope) & np.isfinite(exact), (wanted - exact) / slope, 0.0)
+            both = both + step
+        return np.exp([*each, both])
+
+    def relative_error(self, probabilities: ArrayLike) -> Array:
+        """Relative errors of quantiles as of `quantile` by the directions, (3, k)."""
+        p = np.asarray(probabilities, dtype=float)
+        each = np.select([p >= least for least in FROM], INEXACT[self._central])
+        single = np.zeros_like(each) if self._central else each
+        return np.stack([single, single, each])
 
     def approximate_quantile(self, probabilities: ArrayLike) -> Array:
         """Quantiles as of `quantile`, of the scaled χ²; for the larger, the larger quantile."""
@@ -187,8 +199,10 @@ def _solved(scores: Callable[[Array], Array], start: Array, wanted: Array) -> tu
         for _ in range(STEPS):
             here = scores(at)
             found = (here - below) / (at - before)
-            slope = np.where(np.isfinite(found) & (found > 0), found, slope)
-            step = np.where(np.isfinite(here), (wanted - here) / slope, 0.0)
+            told = np.isfinite(found) & (found > 0) & (np.abs(at - before) > LEAST_STEP)
+            slope = np.where(told, found, slope)
+            # Where a share is 0 or 1, the quantile is some way further.
+            step = np.where(np.isfinite(here), (wanted - here) / slope, -0.1 * np.sign(here))
             before, below, at = at, here, at + np.clip(step, -1.0, 1.0)
     return at, slope
 

@@ -14,7 +14,7 @@ def first_best(values: ArrayLike, tied: float = TIED) -> int:
     as those of a symmetric set are, the smallest value would then be another one.
     """
     values = np.asarray(values)
-    return int(np.flatnonzero(values <= np.nanmin(values) + tied)[0])
+    return int(np.flatnonzero(values <= np.fmin.reduce(values) + tied)[0])
 
 
 def in_order(values: ArrayLike, tied: float = TIED) -> NDArray[np.int_]:

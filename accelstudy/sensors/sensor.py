@@ -21,9 +21,8 @@ from numpy.typing import ArrayLike, NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import Effect, HoldConditions, Parameter, get_effect
-from accelstudy.sensors.trace import SensorTrace, trace_of
-from accelstudy.symbolic.algebra import sp
-from accelstudy.symbolic.tracing import TracedFunction, derivative
+from accelstudy.sensors.trace import HOLD, SensorTrace, trace_of
+from accelstudy.symbolic.tracing import TracedFunction
 
 
 @dataclass(frozen=True)
@@ -91,20 +90,18 @@ class SensorModel:
 
     @property
     def trace(self) -> SensorTrace:
-        """The model in symbols, and the functions generated from it."""
+        """The functions generated from the model."""
         return trace_of(tuple(type(effect) for effect in self.effects))
 
     @cached_property
     def hold_columns(self) -> tuple[str, ...]:
         """Columns of `HoldConditions` on which the output or the robot's reading depends."""
-        trace = self.trace
-        readings = trace.reading_errors(trace.force[:2])
-        used = sp.Matrix([*trace.h, *trace.t_matrix, *readings]).free_symbols
-        names = {name for name, symbol in trace.hold.items() if symbol in used}
-        for tau, symbol in zip(trace.lags(self.settings), trace.lagged.values(), strict=True):
-            if symbol in used:
+        used = self.trace.conditions
+        names = {name for name in HoldConditions.columns() if HOLD + name in used}
+        for tau, name in self.trace.lags(self.settings):
+            if name in used:
                 names |= {"temperature", "time"} if tau > 0 else {"temperature"}
-        return tuple(name for name in trace.hold if name in names)
+        return tuple(name for name in HoldConditions.columns() if name in names)
 
     def sense(
         self,
@@ -278,13 +275,5 @@ def not_affine(model: SensorModel) -> tuple[str, ...]:
     return tuple(
         effect.name
         for effect in model.effects
-        if effect.part == "sensor" and not _is_affine(type(effect))
+        if effect.part == "sensor" and not trace_of((type(effect),)).affine
     )
-
-
-def _is_affine(kind: type[Effect]) -> bool:
-    trace = trace_of((kind,))
-    slopes = derivative(trace.h, trace.force).free_symbols
-    used = set().union(*(sp.sympify(part).free_symbols for part in trace.h))
-    conditions = {*trace.hold.values(), *trace.lagged.values()}
-    return not (slopes & {*trace.force, trace.g} or used & conditions)

@@ -12,10 +12,22 @@ from numpy.typing import NDArray
 from accelstudy.effects import Effect, HoldConditions
 from accelstudy.effects.hold_symbols import HoldSymbols
 from accelstudy.symbolic.algebra import sp
-from accelstudy.symbolic.tracing import TracedFunction, derivative, inverse, symbolic, symbols
+from accelstudy.symbolic.made import kept_under, key_of
+from accelstudy.symbolic.tracing import (
+    Traced,
+    TracedFunction,
+    derivative,
+    inverse,
+    symbolic,
+    symbols,
+    traced,
+)
+
+HOLD = "hold_"
+"""Before the names of columns of `HoldConditions`, in those of their symbols."""
 
 
-class SensorTrace:
+class SensorFormulas:
     """A composition of kinds of effects evaluated with symbols, those of their settings included.
 
     Attributes
@@ -30,7 +42,7 @@ class SensorTrace:
         self.force = symbols("f_x", "f_y", "f_z")
         self.output = symbols("l_x", "l_y", "l_z")
         (self.g,) = symbols("g")
-        self._hold = HoldSymbols("hold_")
+        self._hold = HoldSymbols(HOLD)
         effects = [_in_symbols(kind) for kind in kinds]
         parameters = [symbols(*(q.name for q in effect.parameters)) for effect in effects]
         self._effects = list(zip(effects, parameters, strict=True))
@@ -40,8 +52,10 @@ class SensorTrace:
         self.t_matrix = sp.eye(3)
         for effect, p in self._effects:
             self.t_matrix += sp.Matrix(effect.axes(p, symbolic))
-        self._before_last = self._adding(self.force, last=False)
-        self.h = self._adding(self._before_last, last=True)
+        self.before_last = self._adding(self.force, last=False)
+        self.h = self._adding(self.before_last, last=True)
+        # Only now all temperatures behind a lag are known.
+        self._readings = self.reading_errors(self.force[:2])
 
     def _adding(self, force: Sequence[Any], last: bool) -> list[Any]:
         """Add what effects make of a force, those that act last or the others."""
@@ -51,27 +65,6 @@ class SensorTrace:
                 added = effect.output(tuple(force), p, self.g, self._hold, symbolic)
                 total = [a + b for a, b in zip(total, added, strict=True)]
         return total
-
-    @property
-    def hold(self) -> dict[str, sp.Symbol]:
-        """Symbols of the columns of `HoldConditions`."""
-        return self._hold.columns
-
-    @property
-    def lagged(self) -> dict[sp.Symbol, sp.Symbol]:
-        """Symbols of temperatures behind a lag, by that of the lag."""
-        return self._hold.lagged_by
-
-    @property
-    def informed(self) -> tuple[int, ...]:
-        """Which parameters, by number, have a prior."""
-        has = [effect.informed for effect, p in self._effects for _ in p]
-        return tuple(i for i, known in enumerate(has) if known)
-
-    def lags(self, settings: NDArray[np.float64]) -> list[float]:
-        """Lags of the temperatures of `lagged`, of settings (s,)."""
-        values = dict(zip(self.settings, settings, strict=True))
-        return [float(values[tau]) for tau in self.lagged]
 
     def reading_errors(self, angles: tuple[Any, Any]) -> tuple[Any, Any]:
         """Sum of what the effects add to the robot's reading of roll and pitch."""
@@ -84,8 +77,91 @@ class SensorTrace:
     @property
     def arguments(self) -> tuple[sp.Symbol, ...]:
         """Symbols in the order in which generated functions take them."""
-        conditions = (*self.hold.values(), *self.lagged.values())
+        conditions = (*self._hold.columns.values(), *self._hold.lagged_by.values())
         return (*self.force, *self.output, *self.p, *self.settings, self.g, *conditions)
+
+    @property
+    def lags(self) -> list[tuple[int, str]]:
+        """Number of the setting with the lag, and name, of each temperature behind a lag."""
+        return [(self.settings.index(tau), str(t)) for tau, t in self._hold.lagged_by.items()]
+
+    @property
+    def conditions(self) -> list[str]:
+        """Names of columns of holds, and of temperatures behind lags, that occur."""
+        return self._conditions_in([*self.h, *self.t_matrix, *self._readings])
+
+    def _conditions_in(self, expressions: Sequence[Any]) -> list[str]:
+        conditions = {*self._hold.columns.values(), *self._hold.lagged_by.values()}
+        return sorted(map(str, sp.Matrix(expressions).free_symbols & conditions))
+
+    @property
+    def affine(self) -> bool:
+        """Whether the output is linear in the force, and depends on nothing but it."""
+        slopes = derivative(self.h, self.force).free_symbols
+        return not (slopes & {*self.force, self.g} or self._conditions_in(self.h))
+
+    @cached_property
+    def h_inverse(self) -> sp.Matrix:
+        """(∂f_s/∂f_a)⁻¹, (3, 3)."""
+        return inverse(derivative(self.h, self.force))
+
+    @cached_property
+    def body_by_output(self) -> sp.Matrix:
+        """∂f_b/∂f_s = T H⁻¹, (3, 3), as a function of f_a."""
+        return self.t_matrix * self.h_inverse
+
+    def body_by(self, parameters: tuple[sp.Symbol, ...]) -> sp.Matrix:
+        """∂f_b/∂x at a given output, (3, u), as a function of f_a."""
+        f_b = self.t_matrix * sp.Matrix(self.force)
+        return derivative(f_b, parameters) - self.body_by_output * derivative(self.h, parameters)
+
+    @property
+    def slope_of_last(self) -> sp.Matrix:
+        """∂f_s/∂f_o, (3, 3), as a function of f_a."""
+        slope = derivative(self._adding(self.force, last=True), self.force)
+        return slope.xreplace(dict(zip(self.force, self.before_last, strict=True)))
+
+
+class SensorTrace:
+    """Functions that are generated from a composition of kinds of effects.
+
+    Attributes
+    ----------
+    kinds : tuple of types of Effect
+    key : str, under which they are kept; None if they are not
+    n_parameters : int
+    informed : tuple of int, which parameters, by number, have a prior
+    """
+
+    def __init__(self, kinds: tuple[type[Effect], ...]) -> None:
+        self.kinds = kinds
+        self.key = key_of(*kinds)
+        has = [kind.informed for kind in kinds for _ in kind.parameters]
+        self.n_parameters = len(has)
+        self.informed = tuple(i for i, known in enumerate(has) if known)
+
+    @cached_property
+    def formulas(self) -> SensorFormulas:
+        """The composition in symbols."""
+        return SensorFormulas(self.kinds)
+
+    @cached_property
+    def conditions(self) -> frozenset[str]:
+        """Names of columns of holds, and of temperatures behind lags, that occur."""
+        return frozenset(kept_under(self.key, "conditions", lambda: self.formulas.conditions))
+
+    @cached_property
+    def affine(self) -> bool:
+        """Whether the output is linear in the force, and depends on nothing but it."""
+        return kept_under(self.key, "affine", lambda: self.formulas.affine)
+
+    @cached_property
+    def _lags(self) -> list[tuple[int, str]]:
+        return kept_under(self.key, "lags", lambda: self.formulas.lags)
+
+    def lags(self, settings: NDArray[np.float64]) -> list[tuple[float, str]]:
+        """Lags of temperatures, of settings (s,), with the names of the temperatures."""
+        return [(float(settings[number]), name) for number, name in self._lags]
 
     def evaluate(
         self,
@@ -105,72 +181,56 @@ class SensorTrace:
         """
         hold = hold or HoldConditions()
         columns = [
-            hold.column(name) if symbol in function.used else 0.0
-            for name, symbol in self.hold.items()
+            hold.column(name) if HOLD + name in function.used else 0.0 for name in hold.columns()
         ]
         columns += [
-            hold.lagged(tau) if symbol in function.used else 0.0
-            for tau, symbol in zip(self.lags(settings), self.lagged.values(), strict=True)
+            hold.lagged(tau) if name in function.used else 0.0 for tau, name in self.lags(settings)
         ]
         shape = np.broadcast_shapes(force.shape[1:], (*parameters.shape[1:], 1), (*g.shape, 1))
         x = (*parameters[..., None], *settings)
         return function(shape, *force, *output, *x, g[..., None], *columns, *more)
 
-    @cached_property
-    def sense(self) -> TracedFunction:
+    @traced
+    def sense(self) -> Traced:
         """f_s of f_b."""
-        f_a = inverse(self.t_matrix) * sp.Matrix(self.force)
-        at = dict(zip(self.force, f_a, strict=True))
-        h = [sp.sympify(e).subs(at, simultaneous=True) for e in self.h]
-        return TracedFunction(self.arguments, sp.Matrix(h))
+        at = self.formulas
+        f_a = inverse(at.t_matrix) * sp.Matrix(at.force)
+        of = dict(zip(at.force, f_a, strict=True))
+        h = [sp.sympify(e).subs(of, simultaneous=True) for e in at.h]
+        return at.arguments, sp.Matrix(h)
 
-    @cached_property
-    def reading(self) -> TracedFunction:
+    @traced
+    def reading(self) -> Traced:
         """Errors of the robot's reading, with roll and pitch in place of the first two forces."""
-        return TracedFunction(self.arguments, sp.Matrix(self.reading_errors(self.force[:2])))
+        at = self.formulas
+        return at.arguments, sp.Matrix(at.reading_errors(at.force[:2]))
 
-    @cached_property
-    def h_inverse(self) -> sp.Matrix:
-        """(∂f_s/∂f_a)⁻¹, (3, 3)."""
-        return inverse(derivative(self.h, self.force))
+    @traced
+    def body_jacobian(self) -> Traced:
+        """∂f_b/∂x for the parameters of the model."""
+        return self.formulas.arguments, self.formulas.body_by(self.formulas.p)
 
-    @cached_property
-    def body_by_output(self) -> sp.Matrix:
-        """∂f_b/∂f_s = T H⁻¹, (3, 3), as a function of f_a."""
-        return self.t_matrix * self.h_inverse
+    @traced
+    def output_jacobian(self) -> Traced:
+        """∂f_b/∂f_s."""
+        return self.formulas.arguments, self.formulas.body_by_output
 
-    def body_by(self, parameters: tuple[sp.Symbol, ...]) -> sp.Matrix:
-        """∂f_b/∂x at a given output, (3, u), as a function of f_a."""
-        f_b = self.t_matrix * sp.Matrix(self.force)
-        return derivative(f_b, parameters) - self.body_by_output * derivative(self.h, parameters)
+    @traced
+    def by_last(self) -> Traced:
+        """∂f_s/∂f_o: what the last effects make of a change that comes before them."""
+        return self.formulas.arguments, self.formulas.slope_of_last
 
-    @cached_property
-    def body_jacobian(self) -> TracedFunction:
-        """∂f_b/∂x for the parameters of the model, generated."""
-        return TracedFunction(self.arguments, self.body_by(self.p))
-
-    @cached_property
-    def output_jacobian(self) -> TracedFunction:
-        """∂f_b/∂f_s, generated."""
-        return TracedFunction(self.arguments, self.body_by_output)
-
-    @cached_property
-    def by_last(self) -> TracedFunction:
-        """∂f_s/∂f_o, generated: what the last effects make of a change that comes before them."""
-        slope = derivative(self._adding(self.force, last=True), self.force)
-        at = dict(zip(self.force, self._before_last, strict=True))
-        return TracedFunction(self.arguments, slope.xreplace(at))
-
-    @cached_property
-    def newton_step(self) -> TracedFunction:
+    @traced
+    def newton_step(self) -> Traced:
         """What to add to f_a so that the model's output comes closer to l."""
-        misfit = sp.Matrix(self.output) - sp.Matrix(self.h)
-        return TracedFunction(self.arguments, self.h_inverse * misfit)
+        at = self.formulas
+        return at.arguments, at.h_inverse * (sp.Matrix(at.output) - sp.Matrix(at.h))
 
-    @cached_property
-    def body(self) -> TracedFunction:
+    @traced
+    def body(self) -> Traced:
         """f_b of f_a."""
-        return TracedFunction(self.arguments, self.t_matrix * sp.Matrix(self.force))
+        at = self.formulas
+        return at.arguments, at.t_matrix * sp.Matrix(at.force)
 
 
 @cache

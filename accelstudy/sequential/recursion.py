@@ -41,6 +41,8 @@ EXACT = 1e-10
 _ARRAYS = tuple(field.name for field in fields(Whitened))
 _SESSIONS = -2
 """Axis of the sessions in the arrays of `Whitened`; the last axis is that of the positions."""
+_OF_SESSIONS = ("solved", "passes", "_bent", "_rate", "_x", "_at", "_mean", "_start")
+"""Arrays that begin with the sessions, and change in place when a position is taken."""
 
 
 @dataclass(frozen=True)
@@ -159,10 +161,17 @@ class Recursion:
         for n in range(self.n_positions + 1, observed.forces.shape[1] + 1):
             self._take(observed.take(np.arange(n)))
 
+    def copy(self) -> Recursion:
+        """Return the same sessions, which take further positions without a change of these."""
+        part = copy(self)
+        for name in _OF_SESSIONS:
+            setattr(part, name, getattr(self, name).copy())
+        return part
+
     def only(self, chosen: NDArray[np.int_]) -> Recursion:
         """Return some of the sessions, to continue with them alone."""
         part = copy(self)
-        for name in ("solved", "passes", "_bent", "_rate", "_x", "_at", "_mean", "_start"):
+        for name in _OF_SESSIONS:
             setattr(part, name, getattr(self, name)[chosen])
         part._triangles, part._latent = self._triangles[chosen], self._latent[:, chosen]
         part._white = _of_sessions(self._white, chosen)

@@ -91,6 +91,7 @@ class Screening:
         self.used: list[int] = []
         self.aside: list[int] = []
         self.last: LastPosition | None = None
+        self._observed = observed  # of which all positions of the recursion were taken
         self.recursion = self._recursion(observed, [])
         self.add(observed)
 
@@ -122,12 +123,13 @@ class Screening:
         before = self.aside[-1] if self.aside else None
         conflict = p < CONFLICT
         repeats = conflict and before is not None and not _apart(observed, i, before)
+        without = (self.used, self.recursion)
         if conflict:
             self.aside.append(i)
         else:
             self._use(i, observed)
         doubtful = before is not None or self.refuted
-        if doubtful and not repeats and self._sort_anew(observed, i):
+        if doubtful and not repeats and self._sort_anew(observed, i, *without):
             conflict, p = i in self.aside, self._p_value(i, observed)
             if not conflict:
                 self._use(i, observed)
@@ -137,7 +139,8 @@ class Screening:
         self.last = LastPosition(i, agreement, p, repeats)
 
     def _use(self, i: int, observed: Observations) -> None:
-        self.used.append(i)
+        self.used = [*self.used, i]
+        self.recursion = self.recursion.copy()
         self.recursion.add(observed.take(np.array(self.used)))
 
     def _p_value(self, i: int, observed: Observations) -> float:
@@ -149,10 +152,13 @@ class Screening:
         omega = None if self.sigma_trusted else recursion.omega
         return float(prediction.p_value(omega, recursion.redundancy)[0])
 
-    def _sort_anew(self, observed: Observations, i: int) -> bool:
+    def _sort_anew(
+        self, observed: Observations, i: int, before: list[int], recursion: Recursion
+    ) -> bool:
         """Test all positions up to i against all others; return whether that was possible.
 
-        Afterwards all are sorted except i, if it is in no conflict.
+        Afterwards all are sorted except i, if it is in no conflict. Before i, those of `before`
+        were in use, and in `recursion`.
         """
         whole, most = observed.take(np.arange(i + 1)), int(MANY * (i + 1))
         try:
@@ -164,7 +170,10 @@ class Screening:
         too_many = len(suspected) > most
         self.aside = [] if too_many else sorted(suspect.position for suspect in suspected)
         self.used = [j for j in range(i) if j not in self.aside]
-        self.recursion = self._recursion(observed, self.used)
+        # Of the same session, the same positions in the same order have the same recursion.
+        if self.used != before or observed is not self._observed:
+            recursion, self._observed = self._recursion(observed, self.used), observed
+        self.recursion = recursion
         return True
 
 

@@ -289,7 +289,7 @@ def _quantile_rows(
                         "value_se": estimates.error,
                         "value_gain": estimates.gain,
                         "value_plain": estimates.plain,
-                        "relative_error": distribution.relative_error(chosen),
+                        "relative_error": distribution.relative_error,
                     }
                 )
             )

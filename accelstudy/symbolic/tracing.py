@@ -2,21 +2,22 @@
 
 A sensor model, an approach and the leveling equations are written once, in components. Here they
 are evaluated with SymPy symbols, differentiated exactly, freed of common subexpressions and turned
-into NumPy functions. The symbolic form is kept (`TracedFunction.expressions`), so that other
+into NumPy functions. The symbolic form can be had (`TracedFunction.expressions`), so that other
 kernels can be generated from the same definitions.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Any, ClassVar
+from functools import cached_property, partial, reduce
+from types import CodeType, FunctionType
+from typing import Any, ClassVar, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.symbolic.algebra import sp
+from accelstudy.symbolic.made import kept_under, key_of
 
 
 class _Symbolic:
@@ -75,36 +76,68 @@ def inverse(matrix: sp.Matrix) -> sp.Matrix:
     return (place.adjugate() / place.det(method="berkowitz")).xreplace(entries)
 
 
-@dataclass(frozen=True)
+Traced: TypeAlias = "tuple[tuple[sp.Symbol, ...], sp.Matrix]"
+"""Arguments, and a matrix of expressions of them."""
+
+
 class TracedFunction:
-    """A generated NumPy function and the symbolic form from which it was generated.
+    """A NumPy function that is generated from formulas, and the formulas themselves.
+
+    A call returns an array whose shape begins with that of the matrix of expressions. The function
+    is kept on disk, and the formulas are traced only if it is not there, or if they are asked for.
 
     Parameters
     ----------
-    arguments : tuple of Symbol
-    expressions : matrix of expressions; a call returns an array whose shape begins with theirs
+    trace : function without arguments that returns arguments and expressions
+    key : str, under which the function is kept; None if it is not (`symbolic.made.key_of`)
+    name : str, of the function among those of the key
     """
 
-    arguments: tuple[sp.Symbol, ...]
-    expressions: sp.Matrix
+    def __init__(self, trace: Callable[[], Traced], key: str | None, name: str) -> None:
+        self._trace = trace
+        self._key, self._name = key, name
 
     @cached_property
-    def _entries(self) -> list[tuple[int, int]]:
-        rows, columns = self.expressions.shape
-        return [(i, j) for i in range(rows) for j in range(columns) if self.expressions[i, j] != 0]
+    def _traced(self) -> Traced:
+        return self._trace()
+
+    @property
+    def arguments(self) -> tuple[sp.Symbol, ...]:
+        """Symbols of the arguments."""
+        return self._traced[0]
+
+    @property
+    def expressions(self) -> sp.Matrix:
+        """Matrix of expressions."""
+        return self._traced[1]
+
+    def _generate(self) -> tuple[tuple[int, int], list[tuple[int, int]], list[str], CodeType]:
+        """Shape, entries that are not zero, symbols that occur, and the code of a function."""
+        matrix = self.expressions
+        rows, columns = matrix.shape
+        entries = [(i, j) for i in range(rows) for j in range(columns) if matrix[i, j] != 0]
+        nonzero = [matrix[entry] for entry in entries]
+        function = sp.lambdify(self.arguments, nonzero, modules="numpy", cse=True)
+        used = sorted(str(symbol) for symbol in matrix.free_symbols)
+        return (rows, columns), entries, used, function.__code__
+
+    @cached_property
+    def _generated(self) -> tuple[tuple[int, int], list[tuple[int, int]], list[str], CodeType]:
+        return kept_under(self._key, self._name, self._generate)
 
     @cached_property
     def _function(self) -> Callable[..., list[Any]]:
-        nonzero = [self.expressions[entry] for entry in self._entries]
-        function: Callable[..., list[Any]] = sp.lambdify(
-            self.arguments, nonzero, modules="numpy", cse=True
-        )
-        return function
+        return FunctionType(self._generated[3], _NAMES)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return self._generated[0]
 
     @cached_property
-    def used(self) -> frozenset[sp.Basic]:
-        """Arguments on which the result depends."""
-        return frozenset(self.expressions.free_symbols)
+    def used(self) -> frozenset[str]:
+        """Names of the arguments on which the result depends."""
+        return frozenset(self._generated[2])
 
     def __call__(self, shape: tuple[int, ...], *arguments: Any) -> NDArray[np.float64]:
         """Evaluate at arrays that broadcast to `shape`; returns an array (rows, columns, *shape).
@@ -112,10 +145,32 @@ class TracedFunction:
         The components come first, so that each is contiguous. Entries that are zero by structure
         cost nothing.
         """
-        result = np.zeros((*self.expressions.shape, *shape))
-        for entry, value in zip(self._entries, self._function(*arguments), strict=True):
+        result = np.zeros((*self.shape, *shape))
+        for entry, value in zip(self._generated[1], self._function(*arguments), strict=True):
             result[entry] = value
         return result
+
+
+_NAMES = {**vars(np), "reduce": reduce}
+"""Functions of generated code."""
+
+
+class HasKey(Protocol):
+    """Something that formulas are of."""
+
+    @property
+    def key(self) -> str | None:
+        """Under which they are kept."""
+
+
+def traced(trace: Callable[[Any], Traced]) -> cached_property[TracedFunction]:
+    """Make a property of a method that returns arguments and expressions: the function of them."""
+
+    def function(of: HasKey) -> TracedFunction:
+        return TracedFunction(partial(trace, of), of.key, trace.__name__)
+
+    function.__doc__ = trace.__doc__
+    return cached_property(function)
 
 
 def jacobian_of(
@@ -125,10 +180,14 @@ def jacobian_of(
 
     Returns a function of an array (..., n) with values (..., m, n).
     """
-    variables = symbols(*(f"v{i}" for i in range(n)))
-    traced = TracedFunction(variables, derivative(function(variables, symbolic), variables))
+
+    def trace() -> Traced:
+        variables = symbols(*(f"v{i}" for i in range(n)))
+        return variables, derivative(function(variables, symbolic), variables)
+
+    matrix = TracedFunction(trace, key_of(function, str(n)), "jacobian")
 
     def evaluate(values: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.moveaxis(traced(values.shape[:-1], *np.moveaxis(values, -1, 0)), (0, 1), (-2, -1))
+        return np.moveaxis(matrix(values.shape[:-1], *np.moveaxis(values, -1, 0)), (0, 1), (-2, -1))
 
     return evaluate

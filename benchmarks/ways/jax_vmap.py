@@ -56,7 +56,7 @@ class Vmap(Way):
 
 
 def _inner(equations):
-    return equations.trace.newton_step if equations.known_force is None else equations.sensitive
+    return equations.sensitive if equations.knows_force else equations.trace.newton_step
 
 
 def _function(traced):
@@ -66,24 +66,24 @@ def _function(traced):
     def evaluate(n, known):
         values = function(*(known[symbol] for symbol in traced.arguments))
         rows = [jnp.broadcast_to(jnp.asarray(value, dtype=float), n) for value in values]
-        return jnp.stack(rows).reshape(*traced.expressions.shape, n)
+        return jnp.stack(rows).reshape(*traced.shape, n)
 
     return evaluate
 
 
 def _fit(equations, inner, linear, observed, cofactors, gravity):
     """Estimates and standard deviations a posteriori, (2, u), of observations (o, n)."""
-    trace = equations.trace
-    u, n = len(trace.p), observed.shape[1]
-    unused = dict.fromkeys((*trace.hold.values(), *trace.lagged.values()), 0.0)
+    formulas = equations.trace.formulas
+    u, n = equations.n_parameters, observed.shape[1]
+    unused = dict.fromkeys(formulas.arguments, 0.0)
 
     def step(x, v, f_a):
         adjusted = observed + v
-        known = {trace.g: gravity, **unused}
-        known |= zip((*trace.p, *equations.observations), (*x, *adjusted), strict=True)
-        known |= zip(trace.force, f_a, strict=True)
-        f_a = inner(n, known)[:, 0] + (f_a if equations.known_force is None else 0.0)
-        values = linear(n, known | dict(zip(trace.force, f_a, strict=True)))
+        known = {**unused, formulas.g: gravity}
+        known |= zip((*formulas.p, *equations.observations), (*x, *adjusted), strict=True)
+        known |= zip(formulas.force, f_a, strict=True)
+        f_a = inner(n, known)[:, 0] + (0.0 if equations.knows_force else f_a)
+        values = linear(n, known | dict(zip(formulas.force, f_a, strict=True)))
         psi, a, b = values[:, 0], values[:, 1 : 1 + u], values[:, 1 + u :]
 
         bq = b * cofactors
@@ -117,7 +117,7 @@ def _fit(equations, inner, linear, observed, cofactors, gravity):
 
     start = (jnp.zeros(u), jnp.zeros_like(observed), observed[:3], jnp.inf, jnp.zeros(u))
     _, (x, _, _, size, sigma) = jax.lax.while_loop(going_on, iteration, (0, start))
-    conditions = equations.linear.expressions.shape[0]
+    conditions = equations.linear.shape[0]
     result = jnp.stack([x, sigma / np.sqrt(conditions * n - u)])
     return jnp.where(size <= STEP_TOLERANCE, result, jnp.nan)
 

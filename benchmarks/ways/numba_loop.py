@@ -77,8 +77,8 @@ class _Text:
     def __init__(self, equations):
         self.equations = equations
         self.u, self.o = len(equations.parameters), len(equations.observations)
-        self.c = equations.linear.expressions.shape[0]
-        self.latent = 3 if equations.known_force is None else 0
+        self.c = equations.linear.shape[0]
+        self.latent = 0 if equations.knows_force else 3
         self.work = 2 * self.o + self.latent + self.c * (self.u + 1 + self.o)
         self.lines, self.indent, self.count = [], "", 0
         with self.block("def fit(observed, cofactors, g, work, results):"):
@@ -133,20 +133,20 @@ class _Text:
     def position(self, x, normal, right):
         """Add a position to the normal equations; returns what it keeps for the residuals."""
         u, o, equations = self.u, self.o, self.equations
-        trace = equations.trace
+        trace, formulas = equations.trace, equations.trace.formulas
         v = [self.named(f"work[i, {o + k}]") for k in range(o)]
         adjusted = [self.named(f"work[i, {k}] + {v[k]}") for k in range(o)]
-        table = dict(zip(equations.parameters, x, strict=True)) | {trace.g: "g"}
+        table = dict(zip(equations.parameters, x, strict=True)) | {formulas.g: "g"}
         table |= dict(zip(equations.observations, adjusted, strict=True))
         inner = equations.sensitive if not self.latent else trace.newton_step
         before = [self.named(f"work[i, {2 * o + k}]") for k in range(self.latent)]
-        table |= zip(trace.force[: self.latent], before, strict=True)
+        table |= zip(formulas.force[: self.latent], before, strict=True)
         f_a = self.formulas(inner.expressions, table)
         if self.latent:
             f_a = [self.named(f"{a} + {b}") for a, b in zip(before, f_a, strict=True)]
         for k, value in enumerate(f_a[: self.latent]):
             self.line(f"work[i, {2 * o + k}] = {value}")
-        table |= zip(trace.force, f_a, strict=True)
+        table |= zip(formulas.force, f_a, strict=True)
         values = self.formulas(equations.linear.expressions, table)
         rows = [values[k : k + 1 + u + o] for k in range(0, len(values), 1 + u + o)]
         psi, a, b = zip(*((row[0], row[1 : 1 + u], row[1 + u :]) for row in rows), strict=True)

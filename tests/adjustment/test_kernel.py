@@ -133,7 +133,7 @@ def test_the_formulas_of_every_effect(approach):
         n = len(traced.arguments)
         rng = np.random.default_rng(first)
         values = rng.uniform(-4, 4, (n, LANES))
-        values[[a in model.trace.settings for a in traced.arguments]] = 0.7
+        values[[a in model.trace.formulas.settings for a in traced.arguments]] = 0.7
 
         formulas = Formulas(list(traced.expressions), frozenset())
         code = Code("f", (), ("x", "y"))

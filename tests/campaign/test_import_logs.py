@@ -236,7 +236,7 @@ def test_a_matlab_file_that_does_not_fit(tmp_path, monkeypatch):
         raise MemoryError
 
     savemat(tmp_path / "log.mat", {"log": TABLE})
-    monkeypatch.setattr("accelstudy.campaign.importing.sources.loadmat", full)
+    monkeypatch.setattr("scipy.io.loadmat", full)
     with pytest.raises(InputError, match="too large, as a MATLAB file is held in memory"):
         open_log(tmp_path / "log.mat", **BY_PLACE)
 
@@ -253,7 +253,7 @@ def test_only_the_chosen_array_is_read(tmp_path, monkeypatch):
         read.extend(variable_names)
         return loadmat(path, variable_names=variable_names)
 
-    monkeypatch.setattr("accelstudy.campaign.importing.sources.loadmat", load)
+    monkeypatch.setattr("scipy.io.loadmat", load)
     _, forces = everything(open_log(tmp_path / "log.mat", variable="log", **BY_PLACE))
     np.testing.assert_array_equal(forces, FORCES)
     assert read == ["log"]

@@ -87,8 +87,10 @@ def allan_moments(samples: ArrayLike) -> AllanMoments:
     np.cumsum(samples - samples.mean(axis=0), axis=0, out=sums[1:])
     factors = averaging_factors(len(samples) // 2)
     squares = np.zeros((len(factors), samples.shape[1], samples.shape[1]))
+    twice, memory = 2.0 * sums, np.empty_like(sums)
     for i, m in enumerate(factors):
-        second = sums[2 * m :] - 2.0 * sums[m:-m] + sums[: -2 * m]
+        second = np.subtract(sums[2 * m :], twice[m:-m], out=memory[: len(sums) - 2 * m])
+        second += sums[: -2 * m]
         squares[i] = second.T @ second / (2.0 * m * m)
     averaged = np.array(factors, dtype=int)
     n = len(samples)

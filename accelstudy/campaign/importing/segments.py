@@ -394,8 +394,10 @@ class Envelope:
             values = np.column_stack([batch.forces, np.sqrt(batch.variance)])
             span = np.searchsorted(self.edges, batch.time, side="right") - 1
             span = np.clip(span, 0, len(self.low) - 1)
-            np.fmin.at(self.low, span, values)
-            np.fmax.at(self.high, span, values)
+            first = np.flatnonzero(np.diff(span, prepend=-1))  # time goes on
+            of = span[first]
+            self.low[of] = np.fmin(self.low[of], np.fmin.reduceat(values, first))
+            self.high[of] = np.fmax(self.high[of], np.fmax.reduceat(values, first))
             yield batch
 
     def less(self, offset: Array) -> Envelope:

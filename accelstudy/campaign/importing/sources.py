@@ -13,20 +13,22 @@ from contextlib import AbstractContextManager, contextmanager
 from io import TextIOWrapper
 from itertools import islice
 from pathlib import Path
-from typing import Any, BinaryIO, Protocol, TextIO, cast
+from typing import TYPE_CHECKING, Any, BinaryIO, Protocol, TextIO, cast
 
 import numpy as np
-import pandas as pd
-import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
-from scipy.io import loadmat, whosmat
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.wording import one_line
 from accelstudy.files.parquet import whole_parquet
 from accelstudy.files.reading import readable
 from accelstudy.sensors.conversion import LARGEST
+
+# Slow to import, so where a file needs it: what calibrates a campaign reads no log.
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa
+    import pyarrow.parquet as pq
 
 Array = NDArray[np.float64]
 
@@ -155,6 +157,8 @@ class TextSource:
         self, places: Sequence[int], chunk_size: int, clock: int | None = None
     ) -> Iterator[Array]:
         """Rows of some columns; see `Source`."""
+        import pandas as pd
+
         origins: list[Any] = []
         try:
             with (
@@ -253,6 +257,8 @@ class TextSource:
 
 def _chunks(reader: Iterator[pd.DataFrame]) -> Iterator[pd.DataFrame]:
     """Yield tables of a reader; raise the warning that pandas gives where it loses cells."""
+    import pandas as pd
+
     while True:
         with warnings.catch_warnings():
             warnings.simplefilter("error", pd.errors.ParserWarning)
@@ -299,6 +305,8 @@ def _most_frequent(counts: Iterator[int]) -> int:
 
 def _numbers_of_text(column: pd.Series) -> NDArray[Any]:
     """Numbers of a column, NaN where there is none; whole numbers stay integers."""
+    import pandas as pd
+
     if pd.api.types.is_bool_dtype(column):
         return np.full(len(column), np.nan)
     numbers = pd.to_numeric(column, errors="coerce")
@@ -346,6 +354,8 @@ class MatlabSource:
 
 def _matlab_array(path: Path, variable: str | None) -> NDArray[Any]:
     """Array of a MATLAB file, a row per sample."""
+    from scipy.io import loadmat, whosmat
+
     arrays = {
         name: shape
         for name, shape, kind in whosmat(path)
@@ -383,6 +393,8 @@ class ParquetSource:
         self, places: Sequence[int], chunk_size: int, clock: int | None = None
     ) -> Iterator[Array]:
         """Rows of some columns; see `Source`."""
+        import pyarrow as pa
+
         for place in places:
             kind = self._types[place]
             if not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
@@ -413,6 +425,8 @@ class ParquetSource:
 
 def _numbers(column: pa.Array) -> NDArray[Any]:
     """Numbers of a column, NaN where there is none; whole numbers stay integers."""
+    import pyarrow as pa
+
     if column.null_count or not pa.types.is_integer(column.type):
         column = column.cast(pa.float64(), safe=False)
     return column.to_numpy(zero_copy_only=False)

@@ -16,7 +16,7 @@ import pandas as pd
 from accelstudy.basics.units import angles_in, display_unit, unit_label
 from accelstudy.basics.wording import comma_list, counted
 from accelstudy.drawing.style import approach_colour, approach_marker, model_title
-from accelstudy.files.kept import keep, kept
+from accelstudy.files.kept import kept_or_made
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.tables import read_table
 from accelstudy.pages import render
@@ -311,12 +311,11 @@ def library() -> str:
 
     To bundle it takes two seconds, so the text is kept for the next study.
     """
-    key = f"vega-{version('vl-convert-python')}"
-    packed = kept("explorer", key)
-    if packed is None:
-        import vl_convert
+    return kept_or_made("explorer", f"vega-{version('vl-convert-python')}", _bundled).decode()
 
-        code = vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;")
-        packed = base64.b64encode(gzip.compress(code.encode(), mtime=0))
-        keep("explorer", key, packed)
-    return packed.decode()
+
+def _bundled() -> bytes:
+    import vl_convert
+
+    code = vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;")
+    return base64.b64encode(gzip.compress(code.encode(), mtime=0))

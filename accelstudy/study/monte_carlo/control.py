@@ -142,6 +142,12 @@ class Control:
         tilts = self._tilts.quantile if exact else self._tilts.approximate_quantile
         return np.vstack([*rows, tilts(probabilities)])
 
+    def inexact(self, probabilities: Array) -> Array:
+        """Relative errors of `quantiles` by how they are computed, (s, k)."""
+        tilts = self._tilts.relative_error(probabilities)
+        exact = len(self.distributed.keys) - len(TILTS)
+        return np.vstack([np.zeros((exact, len(probabilities))), tilts])
+
     def ratio_quantiles(self, other: Control, effect: str, probabilities: Array) -> Array:
         """Quantiles of the sigma of an effect over that of another, independent cell, (k,)."""
         if not (self._determines_factor and other._determines_factor):

@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike, NDArray
 from accelstudy.adjustment.calibration import Block
 from accelstudy.files.parquet import whole_parquet
 from accelstudy.files.tables import REMEDY
-from accelstudy.leveling.distribution import BOTH_ERROR, LOW_BOTH_ERROR
 from accelstudy.study.cell import CHUNK, Cell
 from accelstudy.study.monte_carlo.control import Control
 from accelstudy.study.monte_carlo.followed import LINEAR, Distributed, cell_tilt_error
@@ -85,7 +84,7 @@ class Controlled:
     linear : Distribution or None, of all replicates by linear theory
     known : (k,) array, its quantiles at the levels; NaN where they are not known
     apart : (3, b) array, see `Moments.apart`
-    inexact : (k,) array or 0, bound of the relative error of `known`
+    inexact : (k,) array, relative errors of `known`
     """
 
     plain: Distribution
@@ -95,12 +94,12 @@ class Controlled:
     linear: Distribution | None = None
     known: Array | None = None
     apart: Array | None = None
-    inexact: Array | float = 0.0
+    inexact: Array | None = None
 
-    def relative_error(self, chosen: NDArray[np.int_]) -> Array:
-        """Bound of the relative error of quantiles by how they are computed, (k,)."""
-        sketched = RELATIVE_ERROR if isinstance(self.plain, Sketch) else 0.0
-        return np.broadcast_to(np.maximum(self.inexact, sketched), self.levels.shape)[chosen]
+    @property
+    def relative_error(self) -> float:
+        """Bound of the relative error of quantiles by the buckets of sketches."""
+        return RELATIVE_ERROR if isinstance(self.plain, Sketch) else 0.0
 
     def quantile(self, chosen: NDArray[np.int_]) -> Estimates:
         """Quantiles at some of the levels, by their number."""
@@ -119,10 +118,15 @@ class Controlled:
             apart = MEAN_OF_NORMAL * sd / slope + self.failed / (self.count + self.failed)
             agreement = np.nan_to_num(np.clip(1 - apart / (2 * p * (1 - p)), 0.0, 1.0))
             scale = np.where(agreement > 0, slope * 2 * wide / (high - low), 0.0)
-            value = plain - agreement * scale * (linear - known)
+            corrected = plain - agreement * scale * (linear - known)
             left = variance * (1 - agreement**2)
             if not self.failed:  # no more than the difference of one replicate
                 left = np.minimum(left, sd**2)
+            if self.inexact is not None:
+                left = left + (self.inexact[chosen] * known * agreement * scale) ** 2
+            better = left < variance
+            left = np.where(better, left, variance)
+            value = np.where(better, corrected, plain)
             return Estimates(value, np.sqrt(left), variance / left, plain)
 
     def at(self, probability: float) -> Estimates:
@@ -233,9 +237,7 @@ def _controlled(
     count, failed = moments.converged, moments.simulated - moments.converged
     if control is None or moments.simulated < LEAST:
         return {key: Controlled(plain[key], count, failed, levels) for key in distributed.keys}
-    known = control.quantiles(levels)
-    inexact = dict.fromkeys(distributed.keys, np.zeros(len(levels)))
-    inexact[distributed.keys[-1]] = np.where(levels < 0.25, LOW_BOTH_ERROR, BOTH_ERROR)
+    known, inexact = control.quantiles(levels), control.inexact(levels)
     return {
         key: Controlled(
             plain[key],
@@ -245,7 +247,7 @@ def _controlled(
             linear[key],
             known[i],
             moments.apart[:, i],
-            inexact[key],
+            inexact[i],
         )
         for i, key in enumerate(distributed.keys)
     }

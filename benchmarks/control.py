@@ -1,0 +1,187 @@
+"""Whether controlled estimates are right: against plain averages, and with other seeds.
+
+    python benchmarks/control.py            # some hours of one core
+    python benchmarks/control.py --quick    # minutes
+
+It prints the tables of `docs/guides/control.md`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import pandas as pd
+
+from accelstudy.files.tables import read_table
+from accelstudy.study.batches import Share
+from accelstudy.study.cell import Cell
+from accelstudy.study.cells import study_cells
+from accelstudy.study.config import read_study
+from accelstudy.study.monte_carlo.simulate import simulate_batch
+from accelstudy.study.summary import summarise_batch
+from accelstudy.study.tables import TABLES
+
+CONFIG = Path(__file__).parent.parent / "config" / "config.yaml"
+NOISES = (0.002, 0.02, 0.1, 0.3)
+FAILING = (1.0,)
+LEVELING = {"max_tilt_gon": 50.0, "attitudes": 50}
+ORIGIN = {"config_hash": "-", "seed": 1}
+
+
+def cells_of(noises: Sequence[float], where: Sequence[str] = ()) -> list[Cell]:
+    """Estimable cells of the paper's study with the noise of forces and angles scaled."""
+    study = read_study(CONFIG)
+    chosen = []
+    for cell in study_cells(study):
+        if (where and cell.name not in where) or not cell.estimability.estimable:
+            continue
+        for noise in noises:
+            factor = noise / cell.noise.sigma_force
+            scaled = replace(
+                cell.noise, sigma_force=noise, sigma_angle=factor * cell.noise.sigma_angle
+            )
+            name = f"{cell.name}/{noise:g}"
+            chosen.append(replace(cell, name=name, noise=scaled, compiled=False))
+    return chosen
+
+
+def estimates(cell: Cell, replicates: int, seed: int, compiled: bool = False) -> pd.DataFrame:
+    """All estimates of a cell with their standard errors, by the files that a study writes."""
+    cell = replace(cell, replicates=replicates, compiled=compiled)
+    with TemporaryDirectory() as folder:
+        parts = {name: Path(folder) / name for name in ("moments", "sketches")}
+        shares = [Share(cell, 0, cell.n_chunks).to_dict()]
+        simulate_batch({"seed": seed, "shares": shares, "leveling": LEVELING}, parts, ORIGIN)
+        outputs = {name: Path(folder) / f"all-{name}" for name in (*TABLES, *parts)}
+        each = {name: [path] for name, path in parts.items()}
+        summarise_batch({"cells": [cell.to_dict()]}, each, LEVELING, outputs, ORIGIN)
+        tables = {name: read_table(outputs[name]) for name in TABLES}
+    return pd.concat(_rows(tables), ignore_index=True).assign(cell=cell.name)
+
+
+def _rows(tables: dict[str, pd.DataFrame]) -> Iterator[pd.DataFrame]:
+    """Each kind of estimate as rows of kind, name, value, error, gain and plain average."""
+    summary = tables["summary"]
+    share = summary["n_converged"] / summary["n_replicates"]
+    for kind, value, short in (("bias", "bias", "bias"), ("sd", "sd_empirical", "sd")):
+        yield _table(kind, summary["parameter"], summary, value, short).assign(converged=share)
+    for kind, value, short in (
+        ("sd a posteriori", "sd_posteriori_mean", "sd_posteriori"),
+        ("coverage", "coverage_95", "coverage_95"),
+    ):
+        yield _table(kind, summary["parameter"], summary, value, short)
+    pairs = tables["correlations"]
+    pairs = pairs[pairs["parameter_1"].astype(str) < pairs["parameter_2"].astype(str)]
+    names = pairs["parameter_1"].astype(str) + " " + pairs["parameter_2"].astype(str)
+    yield _table("correlation", names, pairs, "empirical", "empirical")
+    yield _table("variance factor", ["-"], tables["cells"], "variance_factor", "variance_factor")
+    for angle in ("roll", "pitch"):
+        rms = f"{angle}_rms"
+        yield _table("tilt rms", [angle], tables["leveling"], f"{rms}_mgon", rms)
+    quantiles = tables["quantiles"]
+    quantiles = quantiles[quantiles["probability"].isin([0.025, 0.25, 0.5, 0.75, 0.95, 0.975])]
+    for quantity, rows in quantiles.groupby("quantity", sort=False):
+        names = rows["name"].astype(str) + " " + rows["probability"].astype(str)
+        kind = {"tilt": "tilt bound", "error": "quantile of an error"}
+        yield _table(kind.get(str(quantity), "quantile of an sd"), names, rows, "value", "value")
+
+
+def _table(
+    kind: str, names: Iterable[str], rows: pd.DataFrame, value: str, short: str
+) -> pd.DataFrame:
+    plain = rows.get(f"{short}_plain")
+    return pd.DataFrame(
+        {
+            "kind": kind,
+            "name": [*names],
+            "value": rows[value].to_numpy(float),
+            "error": rows[f"{short}_se"].to_numpy(float),
+            "gain": rows[f"{short}_gain"].to_numpy(float),
+            "plain": np.nan if plain is None else plain.to_numpy(float),
+        }
+    )
+
+
+def against_plain(cell: Cell, plain: int, controlled: int = 1000) -> pd.DataFrame:
+    """z of controlled estimates against plain averages of many replicates of another seed."""
+    many = estimates(replace(cell, control="none"), plain, 2, plain > 100_000)
+    few = estimates(cell, controlled, 1)
+    both = few.merge(many, on=["cell", "kind", "name"], suffixes=("", "_many"))
+    both["z"] = (both["value"] - both["value_many"]) / np.hypot(both["error"], both["error_many"])
+    return both
+
+
+def coverage(cell: Cell, seeds: int, controlled: int, many: int) -> pd.DataFrame:
+    """z of controlled estimates of many seeds against that of very many replicates."""
+    truth = estimates(cell, many, 10_000, many > 100_000)[["kind", "name", "value", "error"]]
+    found = pd.concat([estimates(cell, controlled, seed) for seed in range(seeds)])
+    both = found.merge(truth, on=["kind", "name"], suffixes=("", "_many"))
+    both["z"] = (both["value"] - both["value_many"]) / np.hypot(both["error"], both["error_many"])
+    return both
+
+
+def shown(rows: pd.DataFrame, by: Sequence[str]) -> str:
+    """A table of how the z-scores are spread, as Markdown."""
+    rows = rows[np.isfinite(rows["z"])]
+    grouped = rows.groupby([*by], sort=False)
+    table = pd.DataFrame(
+        {
+            "n": grouped.size(),
+            "rms of z": grouped["z"].agg(lambda z: float(np.sqrt(np.mean(z**2)))),
+            "within 1.96": grouped["z"].agg(lambda z: float(np.mean(np.abs(z) < 1.96))),
+            "largest": grouped["z"].agg(lambda z: float(np.abs(z).max())),
+            "gain (median)": grouped["gain"].median(),
+        }
+    ).reset_index()
+    lines = ["| " + " | ".join(table.columns) + " |", "|" + "---|" * len(table.columns)]
+    for row in table.itertuples(index=False):
+        cells = [f"{x:.3g}" if isinstance(x, float) else str(x) for x in row]
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def stages(quick: bool) -> dict[str, tuple[Callable[[Cell], pd.DataFrame], list[Cell]]]:
+    """Title of each stage, and what is done of which cells."""
+    of_figures = [
+        f"bias-scale-nonorthogonality/mclaren-24/{approach}" for approach in ("gravity", "robot")
+    ]
+    plain, some, many, seeds = (10**5, 2000, 10**5, 20) if quick else (10**7, 20_000, 10**6, 200)
+    return {
+        "figures": (partial(against_plain, plain=plain), cells_of(NOISES, of_figures)),
+        "failing": (partial(against_plain, plain=many), cells_of(FAILING, of_figures)),
+        "coverage": (
+            partial(coverage, seeds=seeds, controlled=1000, many=many),
+            cells_of((*NOISES, *FAILING), of_figures),
+        ),
+        "all": (partial(against_plain, plain=some), cells_of(NOISES)),
+    }
+
+
+def main() -> None:
+    """Print all tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--cores", type=int, default=1)
+    parser.add_argument("--out", type=Path, help="folder for the z-scores, as Parquet")
+    options = parser.parse_args()
+    with ProcessPoolExecutor(options.cores) as pool:
+        for title, (task, cells) in stages(options.quick).items():
+            rows = pd.concat(pool.map(task, cells), ignore_index=True)
+            rows["noise"] = rows["cell"].str.rsplit("/", n=1).str[1].astype(float)
+            if options.out:
+                options.out.mkdir(parents=True, exist_ok=True)
+                rows.to_parquet(options.out / f"{title}.parquet")
+            print(f"\n## {title}\n\n{shown(rows, ['kind', 'noise'])}")
+            sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,158 @@
+"""What is made of formulas is kept on disk: the same numbers without SymPy, or made again."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import accelstudy
+from accelstudy.adjustment import calibrate
+from accelstudy.adjustment.equations import equations_of
+from accelstudy.approaches import approach_names, get_approach
+from accelstudy.effects import Effect, HoldConditions, get_effect
+from accelstudy.files.kept import kept_in
+from accelstudy.jobs.code import code_files
+from accelstudy.schemes import get_scheme
+from accelstudy.sensors.models import get_model
+from accelstudy.sensors.sensor import not_affine
+from accelstudy.sensors.trace import trace_of
+from accelstudy.simulation.sessions import Noise, session
+from accelstudy.symbolic import made
+from accelstudy.symbolic.tracing import TracedFunction
+
+MODEL = "bias+scale+saturation(knee=8)[k_sat_z]+thermal_bias+encoder_offset"
+PACKAGE = Path(accelstudy.__file__).parent
+
+
+@pytest.fixture(autouse=True)
+def caches(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "caches"))
+    forget()
+    yield
+    forget()
+
+
+def forget():
+    """Forget what this process has traced."""
+    trace_of.cache_clear()
+    equations_of.cache_clear()
+
+
+def numbers():
+    """Bytes of a simulated session and of its calibrations, and what is known of the model."""
+    forget()
+    model, scheme = get_model(MODEL), get_scheme("fibonacci-30")
+    temperature = np.random.default_rng(1).uniform(0, 40, scheme.n_positions)
+    x = np.linspace(-1e-3, 1e-3, model.n_parameters)
+    ideal = session(model, x, scheme.directions, hold=HoldConditions(temperature=temperature))
+    observed = ideal.draw(Noise(), 3, np.random.default_rng(2))
+    found = [model.trace.conditions, not_affine(model), ideal.forces.tobytes()]
+    found.append(model.correction_jacobian(ideal.forces, x, hold=ideal.hold).tobytes())
+    for approach in approach_names():
+        result = calibrate(model, get_approach(approach), observed)
+        found += [result.parameters.tobytes(), result.cofactors.tobytes()]
+    return found
+
+
+def refuse(*_):
+    raise AssertionError
+
+
+def test_kept_functions_give_the_same_bits_and_are_not_made_again(monkeypatch):
+    first = numbers()
+    monkeypatch.setattr(TracedFunction, "_generate", refuse)
+    assert numbers() == first
+
+
+def test_damaged_and_unwritable_caches_are_no_harm(tmp_path, monkeypatch):
+    first = numbers()
+    for file in kept_in(made.KIND).iterdir():
+        content = file.read_bytes()
+        file.write_bytes(content[:-1] + bytes([content[-1] ^ 1]))
+    assert numbers() == first
+    with monkeypatch.context() as patch:  # now they are whole again
+        patch.setattr(TracedFunction, "_generate", refuse)
+        assert numbers() == first
+    closed = tmp_path / "closed"
+    closed.write_text("no folder", encoding="utf-8")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(closed))
+    assert numbers() == first
+
+
+LATER = """\
+import sys
+from accelstudy.sensors.models import get_model
+print(get_model(sys.argv[1]).sense([[0.0, 0.0, -9.8]], [0.001] * 6).tolist())
+print("sympy.core" in sys.modules)
+"""
+
+
+def test_a_later_process_loads_no_sympy():
+    ran = [
+        subprocess.run(
+            [sys.executable, "-c", LATER, "bias-scale"], capture_output=True, text=True, check=True
+        ).stdout.splitlines()
+        for _ in range(2)
+    ]
+    assert ran[0][0] == ran[1][0]
+    assert [lines[1] for lines in ran] == ["True", "False"]
+
+
+def test_different_formulas_have_different_keys():
+    specs = (
+        *("bias", "saturation", "saturation[k_sat_z]", "saturation[k_sat_x]", "learned"),
+        *("learned(coordinate=yaw)", "learned(target=scale)", "learned(length=0.25)"),
+    )
+    kinds = [type(get_effect(spec)) for spec in specs]
+    keys = [made.key_of(kind) for kind in kinds]
+    assert None not in keys
+    assert len({*keys, made.key_of(*kinds), made.key_of(*kinds[::-1])}) == len(specs) + 2
+    assert made.key_of(type(get_effect("saturation(knee=9)"))) == keys[1]  # settings are symbols
+
+
+def test_what_is_not_of_the_package_is_not_kept():
+    class Own(Effect):
+        name = "own"
+        parameters = get_effect("bias").parameters
+
+    assert made.key_of(type(get_effect("bias")), Own) is None
+    assert made.kept_under(None, "name", lambda: [1]) == [1]
+    assert not kept_in(made.KIND).exists()
+    patched = type("Patched", (type(get_effect("bias")),), {"output": lambda *_: (1, 1, 1)})
+    assert made.key_of(patched) is None
+
+
+@pytest.fixture
+def copied(tmp_path, monkeypatch):
+    """A copy of the package, of whose files keys are made."""
+    for room in made.ROOMS:
+        shutil.copytree(PACKAGE / room, tmp_path / "package" / room)
+    init = tmp_path / "package" / "__init__.py"
+    monkeypatch.setattr(accelstudy, "__file__", str(init))
+    made._versions.cache_clear()
+    yield init.parent
+    made._versions.cache_clear()
+
+
+def test_another_formula_or_processor_makes_other_keys(copied, monkeypatch):
+    kind = type(get_effect("bias"))
+    before = made.key_of(kind)
+    with (copied / "effects" / "scale.py").open("a", encoding="utf-8") as file:
+        file.write("# changed\n")
+    made._versions.cache_clear()
+    changed = made.key_of(kind)
+    monkeypatch.setattr(made, "version", lambda name: "0")
+    made._versions.cache_clear()
+    assert len({before, changed, made.key_of(kind)}) == 3
+
+
+@pytest.mark.parametrize(
+    "file",
+    ["sensors/trace.py", "adjustment/equations.py", "kernel/writing.py", "leveling/angles.py"],
+)
+def test_keys_have_all_files_on_which_formulas_depend(file):
+    rooms = {path.relative_to(PACKAGE).parts[0] for path in code_files(PACKAGE / file)}
+    assert rooms - {"__init__.py"} <= {*made.ROOMS}
