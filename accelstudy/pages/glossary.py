@@ -13,6 +13,8 @@ TERMS = {
     "a priori": "as stated beforehand, in the header of the campaign",
     "condition": "uncertainty of the least known combination of parameters over that of the best "
     "known; for the scaled design 1 is ideal and 10⁶ hopeless",
+    "control variate": "a number whose mean is known, drawn with the same noise as one whose mean "
+    "is wanted; only their difference is left to chance",
     "credible set": "the most probable explanations, as many as it takes for a probability of 0.9",
     "excess χ²": "sum of the squared residuals beyond what the noise explains",
     "family": "effects that act alike and are easily confused",

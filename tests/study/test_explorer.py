@@ -215,9 +215,10 @@ def test_figures_that_show_a_set_up(study, tables):
     shown = dict(zip(tables["cells"]["cell"], figures_of(study, cells), strict=True))
     assert {name for names in shown.values() for name in names} <= set(figure_names(study))
     usual = shown[f"{NINE}/mclaren-24/robot"]
-    assert usual == ["sweep-sensor-noise", "sweep-robot-noise", "closed-forms"]
+    both = ["closed-forms", "beyond-linear-theory"]
+    assert usual == ["sweep-sensor-noise", "sweep-robot-noise", *both]
     other = shown[f"{NINE}/mclaren-24/robot/sensor_sigma_mps2=0.001/robot_sigma_mgon=0.32"]
-    assert other == ["closed-forms"]
+    assert other == both
     assert "closed-forms" not in shown[f"{CROSS}/mclaren-24/gravity"]
 
 

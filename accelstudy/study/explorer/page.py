@@ -35,6 +35,7 @@ from accelstudy.study.explorer.content import (
     without_robot,
 )
 from accelstudy.study.figures import angle_unit, figure_names, get_figure
+from accelstudy.study.figures.beyond_linear_theory import is_drawn
 from accelstudy.study.figures.factors import (
     FACTORS,
     NOISES,
@@ -295,6 +296,7 @@ def _tests(study: StudyConfig) -> dict[str, Callable[[Mapping[Any, Any]], bool]]
     for factor in FACTORS:
         tests[f"sweep-{factor.name}"] = _drawn(study, factor)
     tests["closed-forms"] = lambda cell: bool(cell["n_converged"])
+    tests["beyond-linear-theory"] = lambda cell: bool(is_drawn(cell))
     return tests
 
 

@@ -55,11 +55,14 @@ else is held: at the study's default where it was run, otherwise at the middle o
 were run (the lower of two). A line without markers is an approach that does not use what varies.
 Crosses at the top stand where a cell cannot be estimated or none of its calibrations converged;
 open markers, where some did not converge. For an error of gravity the bias (rms over the group) is
-drawn too where it is significant for all parameters of the group.
+drawn too where it is significant for all parameters of the group and above 1 % of their sds.
 """
 
 SYSTEMATIC = "gravity_error_mps2"
 """The quantity whose effect is a bias, which is drawn beside the sd."""
+SMALLEST_BIAS = 0.01
+"""Smallest bias that is drawn, as a share of the sd. Adjustments have a bias of their own, which is
+smaller and yet can be significant."""
 TILTS = ("roll", "pitch")
 MARKERS = ("o", "^", "s", "D")
 LINES = ("-", "--", ":", "-.")
@@ -150,9 +153,10 @@ def _values(block: Block, tables: Tables) -> pd.DataFrame:
     summary, leveling = tables["summary"], tables["leveling"]
     counts = tables["cells"][["cell", "estimable", "n_converged", "n_replicates"]]
     cells = block.cells[["cell", "model", "subject", "approach", "x"]].merge(counts, on="cell")
+    certain = (summary["bias_ci95_low"] > 0) | (summary["bias_ci95_high"] < 0)
     parameters = summary.assign(
         group=[group_of(name) for name in summary["parameter"]],
-        significant=(summary["bias_ci95_low"] > 0) | (summary["bias_ci95_high"] < 0),
+        significant=certain & (summary["bias"].abs() > SMALLEST_BIAS * summary["sd_empirical"]),
         squared=summary["bias"] ** 2,
     )
     groups = parameters.groupby(["cell", "group", "unit"], sort=False, as_index=False).agg(

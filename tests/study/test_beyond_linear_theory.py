@@ -1,0 +1,78 @@
+"""The figure of what simulation adds: numbers where there are any, limits elsewhere."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from study_helpers import NINE, grid, make_study, run_study
+
+from accelstudy.study.figures import draw, figure_names
+
+NAME = "beyond-linear-theory"
+SIGMA = 0.3
+"""Noise of the sensor in a simulation that shows an excess, m/s²."""
+REPLICATES = 12_000
+
+
+def marks(figure, kind):
+    """Places of the marks of one kind in each panel, from left to right."""
+    return [
+        [x for line in ax.get_lines() if line.get_marker() == kind for x in line.get_xdata()]
+        for ax in figure.axes
+    ]
+
+
+def tables(**columns):
+    """Tables of one set-up, simulated often: its biases and scales have an sd of 10."""
+    names = ["b_x", "b_y", "b_z", "s_x", "s_y", "s_z"]
+    labels = {"cell": "a", "model": "bias-scale", "approach": "gravity", "n_converged": 10**6}
+    labels |= {"sensor_sigma_mps2": 0.002, "gravity_error_mps2": 0.0}
+    numbers = {"bias": 0.0, "bias_se": 0.01, "sd_empirical": 10.0, "sd_se": 0.01, "sd_linear": 10.0}
+    summary = pd.DataFrame({"parameter": names, **labels, **numbers, **columns})
+    return {"summary": summary, "cells": pd.DataFrame({**labels, "control": "linear"}, index=[0])}
+
+
+@pytest.mark.parametrize("empirical", [11.0, 9.0])
+def test_what_differs_from_zero_is_a_number_and_the_rest_a_limit(empirical):
+    sds = [10, 10, 10, 10, empirical, 10.001]
+    figure = draw(NAME, tables(bias=[0, -1, 0.5, 0, 0, 0], sd_empirical=sds), make_study())
+    bias, excess, noise = marks(figure, "o")
+    size = abs((empirical / 10) ** 2 - 1)
+    np.testing.assert_allclose(bias, 0.1)  # of the biases, the largest
+    np.testing.assert_allclose(excess, size)  # of the scales
+    np.testing.assert_allclose(noise, 2 * np.sqrt(0.01 / size))  # mm/s²
+    # Six numbers a panel share the 5 %: 2.638 standard errors on either side.
+    at_most, limits, _ = marks(figure, "<")
+    np.testing.assert_allclose(at_most, 0.02638 / min(empirical, 10), rtol=1e-3)
+    np.testing.assert_allclose(limits, 2.638 * 2e-3, rtol=1e-3)
+    np.testing.assert_allclose(marks(figure, ">")[2], 2 * np.sqrt(0.01 / np.array(limits)))
+    whites = [line for line in figure.axes[1].get_lines() if line.get_markerfacecolor() == "white"]
+    assert sum(len(line.get_xdata()) for line in whites) == (empirical < 10)
+
+
+def test_it_is_drawn_where_linear_theory_knows_what_is_simulated():
+    assert NAME in figure_names(make_study())
+    without = [
+        {"control": "none"},
+        {"noise": {"effects": ["heavy_tails(nu=3)"]}},
+        {"simulated_effects": ["bias", "scale"]},
+    ]
+    for keys in without:
+        assert NAME not in figure_names(make_study(**keys))
+
+
+def test_at_the_noise_that_it_shows_linear_theory_is_off_by_one_percent(tmp_path):
+    def simulated(sigma, seed):
+        keys = {"seed": seed, "keep": "summary", "leveling": {"attitudes": 10}}
+        cells = grid(replicates=REPLICATES, approaches="gravity", sensor_sigma_mps2=sigma)
+        return run_study(tmp_path / str(seed), grids=[cells], **keys)
+
+    figure = draw(NAME, simulated(2 * SIGMA, 1), make_study())
+    _, excess, noise = marks(figure, "o")
+    rows = simulated(noise[-1] / 1000, 2)["summary"]
+    rows = rows[rows["parameter"].str.startswith("alpha")]
+    ratio = rows["sd_empirical"] / rows["sd_linear"]
+    error = 2 * rows["sd_se"] / rows["sd_linear"]
+    at_first = 0.01 / excess[-1] * error.max() * 2  # the error grows with the noise
+    assert excess[-1] > 0.03
+    assert (ratio**2 - 1).max() == pytest.approx(0.01, abs=4 * np.hypot(error.max(), at_first))
+    assert set(rows["model"]) == {NINE}
