@@ -39,7 +39,7 @@ def test_tails_of_small_noise_are_those_of_the_linear_distribution(approach):
     cell = cell_of(approach)
     ideal = ideal_of(cell)
     theory = LinearTheory.of(cell.estimated_model, cell.conditions, ideal.observations(cell.noise))
-    tilt = cell_tilt_error(cell, theory.reference, LEVELING)
+    tilt = cell_tilt_error(cell, LEVELING)
     exact = TiltDistribution(tilt, theory.covariance).quantile(1 - np.array(TAILS))
     found = rare_tilts(cell, 1, LEVELING, TAILS, range(10))
     value, error, _ = found.quantile(TAILS)
@@ -52,7 +52,7 @@ def test_tails_of_small_noise_are_those_of_the_linear_distribution(approach):
 def test_large_noise_agrees_with_plain_simulation():
     cell = cell_of("gravity", 0.3)
     value, error, _ = rare_tilts(cell, 1, LEVELING, TAILS, range(10)).quantile([1e-2])
-    tilt = cell_tilt_error(cell, np.array([*cell.truth.values()])[:9], LEVELING)
+    tilt = cell_tilt_error(cell, LEVELING)
     observed = ideal_of(cell).draw(cell.noise, 20_000, np.random.default_rng(2))
     result = calibrate(cell.estimated_model, cell.conditions, observed)
     plain = tilts(tilt, result.parameters[result.converged])
