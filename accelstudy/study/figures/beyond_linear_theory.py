@@ -17,6 +17,7 @@ from accelstudy.drawing.style import (
     group_label,
     group_of,
     in_order,
+    log_ticks,
     model_title,
     new_figure,
     say_empty,
@@ -63,8 +64,8 @@ def _as_simulated(study: StudyConfig) -> bool:
     proportion; the excess grows with the square of the noise. The dotted line is the noise of the
     study. Each mark is a set-up, with the largest number of the parameters of its group. A pale
     triangle is a limit: the number is not distinguished from zero, and lies beyond the triangle
-    where it points. Open markers are variances below those of linear theory. By chance, all marks
-    and limits of a panel are right together with a probability of 95 %.
+    where it points. Open markers are variances below those of linear theory. All marks and limits
+    of a panel are right together with a probability of 95 %.
     """,
     tables=("cells", "summary"),
     when=_as_simulated,
@@ -76,6 +77,8 @@ def beyond_linear_theory(tables: Tables, study: StudyConfig) -> Figure:
     from matplotlib.ticker import NullLocator
 
     rows = _numbers(tables)
+    approaches = sorted(set(rows["approach"]))
+    places = {name: APART * (2 * k + 1 - len(approaches)) for k, name in enumerate(approaches)}
     models = list(dict.fromkeys(rows["model"]))
     left_out, models = len(models[MOST_MODELS:]), models[:MOST_MODELS]
     groups = {model: in_order(rows["group"][rows["model"] == model]) for model in models}
@@ -89,7 +92,7 @@ def beyond_linear_theory(tables: Tables, study: StudyConfig) -> Figure:
         members = rows[rows["model"] == model]
         axes[0].set_title(model_title(model), loc="left")
         for ax, quantity in zip(axes, ("bias", "excess", "noise"), strict=True):
-            _draw(ax, members, groups[model], quantity)
+            _draw(ax, members, groups[model], quantity, places)
         axes[0].set_yticks(range(len(groups[model])), map(group_label, groups[model]))
     noise, unit = NOISES[0], unit_label(display_unit(NOISES[0].unit))
     at = dict.fromkeys(noise.shown(rows["sensor_sigma_mps2"].unique()))
@@ -100,12 +103,13 @@ def beyond_linear_theory(tables: Tables, study: StudyConfig) -> Figure:
         excess.axvline(OFF, color=INK, linewidth=0.6)
         for level in at if len(at) == 1 else ():
             sigma.axvline(level, color=INK, linewidth=0.8, linestyle=":")
+    if models:
+        log_ticks(panels[-1, 2].xaxis, *panels[-1, 2].get_xlim())
     panels[-1, 0].set_xlabel("|bias| / sd")
     panels[-1, 1].set_xlabel("|variance / linear theory − 1|")
     panels[-1, 2].set_xlabel(f"{noise.title} for {100 * OFF:g} % / {unit}")
     if left_out:
         fig.text(0, 0, f"{left_out} more models are not drawn; their numbers are in the tables.")
-    approaches = [name for name in ("gravity", "robot") if (rows["approach"] == name).any()]
     dark: Style = {"linestyle": "", "color": INK}
     below = Line2D([], [], marker="o", markerfacecolor="white", **dark, label="lower variance")
     fig.legend(
@@ -161,22 +165,25 @@ def _numbers(tables: Tables) -> pd.DataFrame:
     )
 
 
-def _draw(ax: Axes, rows: pd.DataFrame, groups: list[str], quantity: str) -> None:
+def _draw(
+    ax: Axes, rows: pd.DataFrame, groups: list[str], quantity: str, places: dict[str, float]
+) -> None:
     """Draw the marks and limits of one quantity of one model, group under group."""
     ax.set_ylim(len(groups) - 0.5, -0.5)
     ax.set_yticks([])
     ax.grid(False, axis="y")
     if quantity == "noise":
         rows = rows[rows["sensor_sigma_mps2"] > 0]
-    for k, (approach, members) in enumerate(rows.groupby("approach")):
-        y = np.array([groups.index(name) for name in members["group"]]) + (2 * k - 1) * APART
+    for approach, place in places.items():
+        members = rows[rows["approach"] == approach]
+        y = np.array([groups.index(name) for name in members["group"]]) + place
         seen = members[f"{quantity}_size"].notna().to_numpy()
         below = seen & members["below"].to_numpy() & (quantity != "bias")
-        style: Style = {"linestyle": "", "color": approach_colour(str(approach))}
+        style: Style = {"linestyle": "", "color": approach_colour(approach)}
         limits = members[f"{quantity}_limit"].to_numpy()
         pointing = ">" if quantity == "noise" else "<"
         ax.plot(limits[~seen], y[~seen], pointing, **style, **LIMIT)
-        sizes, marker = members[f"{quantity}_size"].to_numpy(), approach_marker(str(approach))
+        sizes, marker = members[f"{quantity}_size"].to_numpy(), approach_marker(approach)
         style |= {"marker": marker, "markersize": 2.5}
         ax.plot(sizes[seen & ~below], y[seen & ~below], **style)
         ax.plot(sizes[below], y[below], **style, markerfacecolor="white")
