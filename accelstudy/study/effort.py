@@ -29,7 +29,7 @@ SECONDS_PER_JOB = 3.0
 """To start Python, twice for each batch of cells and once for each of the other jobs."""
 OTHER_JOBS = 10
 
-BYTES_ON_DISK = 16
+BYTES_ON_DISK = 24
 """Per calibration and parameter that is kept."""
 BYTES_OF_SKETCHES = 1e6
 """Per cell in a job that keeps no replicates."""

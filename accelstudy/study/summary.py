@@ -281,6 +281,7 @@ def _quantile_rows(
             rows.append(
                 pd.DataFrame(
                     {
+                        **_labels(cell),
                         "quantity": quantity,
                         "name": name,
                         "unit": recorded_unit(unit),
@@ -297,7 +298,7 @@ def _quantile_rows(
         return pd.DataFrame(columns=[*_labels(cell), *QUANTILES]).assign(
             **_labels(cell), n_converged=n
         )
-    return pd.concat(rows, ignore_index=True).assign(**_labels(cell), n_converged=n)
+    return pd.concat(rows, ignore_index=True).assign(n_converged=n)
 
 
 def _leveling_row(
