@@ -23,6 +23,8 @@ SECONDS_TO_KEEP, SECONDS_TO_SUM = 9e-6, 4e-6
 """To write and summarise a calibration, or only to summarise it. The adjustment adds to this, per
 position and parameter, by gravity, with the robot, and by compiled code:"""
 SECONDS_BY_GRAVITY, SECONDS_WITH_ROBOT, SECONDS_COMPILED = 0.11e-6, 0.26e-6, 0.03e-6
+SECONDS_PER_CELL = 0.1
+"""For its linear theory and the distribution of its tilt error, however few its calibrations."""
 SECONDS_PER_RESAMPLED_VALUE = 0.01e-6
 """Sensitivity: per base sample, input, bootstrap resample and attitude."""
 SECONDS_PER_JOB = 3.0
@@ -114,7 +116,7 @@ def _seconds(study: StudyConfig, cell: Cell) -> float:
         rate = SECONDS_COMPILED
     terms = cell.positions.n_positions * cell.n_unknowns
     around = SECONDS_TO_KEEP if _keeps(study) else SECONDS_TO_SUM
-    return cell.replicates * (around + rate * terms)
+    return SECONDS_PER_CELL + cell.replicates * (around + rate * terms)
 
 
 def _memory(study: StudyConfig, cell: Cell) -> float:
