@@ -4,15 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from study_helpers import grid, make_study
+from study_helpers import grid, make_study, run_rare
 
 from accelstudy.adjustment.calibration import calibrate
 from accelstudy.basics.units import MGON
-from accelstudy.files.tables import read_table
 from accelstudy.leveling.distribution import TiltDistribution
 from accelstudy.study.cells import rare_cells, study_cells
 from accelstudy.study.monte_carlo.followed import cell_tilt_error, tilts
-from accelstudy.study.rare import LEAST, RareTilts, rare_table, rare_tilts
+from accelstudy.study.rare import LEAST, RareTilts, rare_tilts
 
 LEVELING = {"max_tilt_gon": 50.0, "attitudes": 20}
 TAILS = [1e-2, 1e-4, 1e-6]
@@ -70,12 +69,11 @@ def test_a_tail_that_too_few_calibrations_reach_is_not_known():
 def test_the_table_has_the_cells_that_can_be_estimated(tmp_path):
     study = make_study(
         grids=[grid(schemes=["mclaren-24", "faces-6"], approaches="gravity")],
+        leveling=LEVELING,
         rare={"replicates": 1000, "shares": [0.1, 0.3]},
     )
+    table = run_rare(tmp_path, study)
     cells = rare_cells(study, study_cells(study))
-    spec = {"seed": 1, "cells": [cell.to_dict() for cell in cells], "leveling": LEVELING}
-    rare_table({**spec, "shares": study.rare.shares}, tmp_path / "rare.parquet", {"seed": 1})
-    table = read_table(tmp_path / "rare.parquet")
     assert set(table["cell"]) == {cells[0].name}
     assert [*table["name"].unique()] == ["roll", "pitch", "both"]
     assert set(table["n_replicates"]) == {1000}

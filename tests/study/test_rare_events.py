@@ -3,12 +3,9 @@
 import numpy as np
 import pytest
 from scipy.stats import binomtest
-from study_helpers import NINE, PROVENANCE, grid, make_study, run_study
+from study_helpers import NINE, grid, make_study, run_rare, run_study
 
-from accelstudy.files.tables import read_table
-from accelstudy.study.cells import rare_cells, study_cells
 from accelstudy.study.figures import draw, figure_names
-from accelstudy.study.rare import rare_table
 
 KEYS = {
     "keep": "summary",
@@ -27,11 +24,7 @@ def study():
 def tables(tmp_path_factory):
     folder = tmp_path_factory.mktemp("rare")
     tables = run_study(folder, **KEYS)
-    study = make_study(**KEYS)
-    cells = [cell.to_dict() for cell in rare_cells(study, study_cells(study))]
-    spec = {"seed": 1, "cells": cells, "leveling": study.leveling.model_dump()}
-    rare_table({**spec, "shares": study.rare.shares}, folder / "rare.parquet", PROVENANCE)
-    return {**tables, "rare": read_table(folder / "rare.parquet")}
+    return {**tables, "rare": run_rare(folder, make_study(**KEYS))}
 
 
 @pytest.fixture(scope="module")

@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     from accelstudy.study.config import StudyConfig
 
 LINES: Style = {"roll": "-", "pitch": "--"}
-POINTS: Style = {"linestyle": "", "marker": "o", "markersize": 3}
+MARKERS = {"roll": "o", "pitch": "s"}
+POINTS: Style = {"markersize": 3, "elinewidth": 0.8}
 MOST = 3
 """Number of set-ups whose tails are drawn, one panel each."""
 NONE: Style = {"linestyle": "", "marker": "v", "markersize": 4, "fillstyle": "none"}
@@ -81,10 +82,9 @@ def rare_events(tables: Tables, study: StudyConfig) -> Figure:
         handles=[
             *approach_handles(dict.fromkeys(cells["approach"]), linestyle="-", marker=""),
             *(
-                Line2D([], [], color=INK, linestyle=style, label=name)
+                Line2D([], [], color=INK, linestyle=style, label=name, marker=MARKERS[name])
                 for name, style in LINES.items()
             ),
-            Line2D([], [], color=INK, label="drawn in the tail", **POINTS),
             Line2D([], [], color=INK, label="none failed: 97.5 % limit", **NONE),
         ],
         loc="outside lower center",
@@ -110,9 +110,8 @@ def _draw_rare(ax: Axes, rare: pd.DataFrame, cells: set[str]) -> None:
     for (cell, name), points in rows.groupby(["cell", "name"], sort=False):
         values, _ = shown(points["value_mgon"], "mgon")
         half, _ = shown(Z95 * points["value_se_mgon"], "mgon")
-        style = {**POINTS, "linestyle": LINES[str(name)], "elinewidth": 0.8}
-        colour = approach_colour(points["approach"].iloc[0])
-        bars = ax.errorbar(points["share_beyond"], values, half, color=colour, **style)
+        colour, marker = approach_colour(points["approach"].iloc[0]), MARKERS[str(name)]
+        bars = ax.errorbar(points["share_beyond"], values, half, color=colour, fmt=marker, **POINTS)
         bars[0].set_gid(f"{cell} {name} rare")
 
 
