@@ -63,6 +63,8 @@ RATE = Range(1e-6, 1e9, "per second")
 
 CELLS = Range(1, 100_000)
 REPLICATES = Range(1, 10**11)
+RARE_REPLICATES = Range(1000, 10**6)
+RARE_SHARE = Range(1e-9, 0.5)
 SESSIONS = Range(100, 100_000)
 ATTITUDES = Range(1, 100_000)
 BASE_SAMPLES = Range(2, 2**20)

@@ -16,6 +16,7 @@ from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import BLOCK
 from accelstudy.study.batches import batches
 from accelstudy.study.cell import Cell
+from accelstudy.study.cells import rare_cells
 from accelstudy.study.config import StudyConfig
 from accelstudy.study.monte_carlo.distributions import EXACT
 
@@ -81,10 +82,11 @@ def study_effort(study: StudyConfig, cells: Sequence[Cell]) -> Effort:
     InputError
         If no machine can do it; the message names the key.
     """
+    rare = rare_cells(study, cells)
     effort = Effort(
         cells=len(cells),
-        calibrations=sum(cell.replicates for cell in cells),
-        seconds=sum(_seconds(study, cell) for cell in cells)
+        calibrations=sum(cell.replicates for cell in (*cells, *rare)),
+        seconds=sum(_seconds(study, cell) for cell in (*cells, *rare))
         + _seconds_of_sensitivity(study)
         + SECONDS_PER_JOB * (sum(1 + len(batch.jobs) for batch in batches(cells)) + OTHER_JOBS),
         memory=max((_memory(study, cell) for cell in cells), default=0.0),

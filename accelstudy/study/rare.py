@@ -10,24 +10,48 @@ are mixed is φ itself, so no weight is larger than their number (Owen 2013, sec
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
-from accelstudy.adjustment.linear_theory import LinearTheory
-from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import MGON
+from accelstudy.files.tables import parquet_writer
 from accelstudy.leveling.distribution import TiltDistribution
 from accelstudy.leveling.error import TiltError
-from accelstudy.simulation.sessions import BLOCK, Errors, session
+from accelstudy.simulation.sessions import BLOCK, Errors
 from accelstudy.study.cell import Cell
 from accelstudy.study.compiling import calibrator
-from accelstudy.study.monte_carlo.followed import cell_tilt_error, tilts
+from accelstudy.study.monte_carlo.followed import TILTS, cell_tilt_error, tilts
 
 Array = NDArray[np.float64]
+
+log = logging.getLogger(__name__)
+
+LEAST = 50
+"""Effective number of calibrations beyond a quantile below which it is not known."""
+
+RARE = pa.schema(
+    {
+        "cell": pa.string(),
+        "name": pa.string(),
+        "share_beyond": pa.float64(),
+        "value_mgon": pa.float64(),
+        "value_se_mgon": pa.float64(),
+        "equivalent": pa.float64(),
+        "effective": pa.float64(),
+        "share_failed": pa.float64(),
+        "share_failed_se": pa.float64(),
+        "n_replicates": pa.int64(),
+    }
+)
+"""One row per cell, angle (of `TILTS`) and share. Values are NaN where they are not known."""
 
 
 @dataclass(frozen=True)
@@ -44,20 +68,15 @@ class RareTilts:
     weights: Array
 
     @property
-    def effective(self) -> float:
-        """Effective sample size of all weights."""
-        return float(self.weights.sum() ** 2 / (self.weights**2).sum())
+    def failed(self) -> tuple[float, float]:
+        """Share of the calibrations that do not converge, and its standard error."""
+        share = self.weights * np.isnan(self.tilts[0])
+        return float(share.mean()), float(share.std(ddof=1) / np.sqrt(len(share)))
 
-    @property
-    def failed(self) -> tuple[int, float, float]:
-        """Calibrations that did not converge: their number, share and its standard error."""
-        failed = np.isnan(self.tilts[0])
-        share = self.weights * failed
-        error = share.std(ddof=1) / np.sqrt(len(share))
-        return int(np.count_nonzero(failed)), float(share.mean()), float(error)
-
-    def quantile(self, beyond: ArrayLike) -> tuple[Array, Array, Array]:
+    def quantile(self, beyond: ArrayLike) -> tuple[Array, Array, Array, Array]:
         """Tilt errors that given shares of the calibrations that converge exceed.
+
+        All are NaN where fewer than `LEAST` calibrations effectively lie beyond.
 
         Parameters
         ----------
@@ -65,33 +84,34 @@ class RareTilts:
 
         Returns
         -------
-        value : (3, k) array, rad; NaN where no calibration lies beyond
+        value : (3, k) array, rad
         error : (3, k) array, rad, standard error
         equivalent : (3, k) array, plain calibrations with the same standard error
+        effective : (3, k) array, effective sample size of the calibrations beyond, the smallest
+            from the quantile to the middle
         """
         shares = np.atleast_1d(np.asarray(beyond, dtype=float))
-        results = np.full((3, 3, len(shares)), np.nan)
+        results = np.full((4, 3, len(shares)), np.nan)
         converged = np.isfinite(self.tilts[0])
-        weights = np.where(converged, self.weights, 0.0)
-        n = len(weights)
         # The mean weight is known, so the share that converged follows from those that failed.
-        kept = 1 - self.failed[1]
-        for angle, values in enumerate(self.tilts):
-            order = np.argsort(-np.where(converged, values, -np.inf), kind="stable")
-            largest = values[order][: np.count_nonzero(converged)]
-            above = np.cumsum(weights[order])[: len(largest)] / n / kept
-            squares = np.cumsum(weights[order] ** 2)[: len(largest)] / n / kept**2
+        n, kept = len(converged), 1 - self.failed[0]
+        for angle, values in enumerate(self.tilts[:, converged]):
+            order = np.argsort(-values, kind="stable")
+            largest, weights = np.log(values[order]), self.weights[converged][order] / kept
+            above, squares = np.cumsum(weights) / n, np.cumsum(weights**2) / n
+            # Weights that are large further in may be missing further out.
+            effective = np.minimum.accumulate((n * above**2 / squares)[::-1])[::-1]
             for i, share in enumerate(shares):
                 at = int(np.searchsorted(above, share))
-                if at == 0 or at >= len(largest):
+                if at == len(above) or effective[at] < LEAST:
                     continue
-                error = np.sqrt(max(squares[at] - share**2, 0.0) / n)
-                near = np.clip([share - error, share + error], above[0], above[-1])
+                error = np.sqrt((squares[at] - share**2) / n)
                 # Woodruff's interval: the quantiles of the share less and plus its error.
-                high, low = np.exp(np.interp(near, above, np.log(largest)))
-                value = np.exp(np.interp(share, above, np.log(largest)))
-                results[:, angle, i] = value, (high - low) / 2, share * (1 - share) / error**2
-        return results[0], results[1], results[2]
+                near = share + error * np.array([-1, 0, 1])
+                high, value, low = np.exp(np.interp(near, above, largest))
+                equivalent = share * (1 - share) / error**2
+                results[:, angle, i] = value, (high - low) / 2, equivalent, effective[at]
+        return results[0], results[1], results[2], results[3]
 
 
 @dataclass(frozen=True)
@@ -100,8 +120,8 @@ class _Proposal:
 
     Attributes
     ----------
-    constant : (2,) array; linear : (2, r) array; forms : (2, r, r) array
-        Squared errors of roll and of pitch, constant + 2 linear y + y form y.
+    linear : (2, r) array; forms : (2, r, r) array
+        Squared errors of roll and of pitch but for a constant, 2 linear y + y form y.
     components : list of angle, θ, mean (r,), root (r, r) of the covariance, and log E exp(θ Q)
     """
 
@@ -146,33 +166,22 @@ class _Proposal:
 
 
 def rare_tilts(
-    cell: Cell,
-    seed: int,
-    leveling: Mapping[str, Any],
-    beyond: Sequence[float],
-    blocks: range,
+    cell: Cell, seed: int, leveling: Mapping[str, Any], beyond: Sequence[float]
 ) -> RareTilts:
-    """Simulate calibrations of a cell of which many leave a rare tilt error.
+    """Simulate the calibrations of a cell such that many leave a rare tilt error.
+
+    Each block of `BLOCK` calibrations has random numbers of its own.
 
     Parameters
     ----------
-    cell : Cell
+    cell : Cell, with linear theory
     seed : int, of the study
     leveling : mapping with max_tilt_gon and attitudes
     beyond : shares in whose tail is drawn
-    blocks : range, numbers of the blocks of `BLOCK` calibrations, each with its own random numbers
-
-    Raises
-    ------
-    InputError
-        If the cell has no calibration without noise.
     """
-    simulated, model, approach = cell.simulated_model, cell.estimated_model, cell.conditions
-    truth = simulated.vector(cell.truth)
-    ideal = session(simulated, truth, cell.positions.directions, cell.gravity, cell.hold)
-    theory = LinearTheory.of(model, approach, ideal.observations(cell.noise))
-    if theory is None:
-        raise InputError(f"{cell.name}: has no calibration without noise, so no linear theory")
+    ideal, theory = cell.ideal, cell.linear_theory
+    model, approach = cell.estimated_model, cell.conditions
+    assert theory is not None
     u = model.n_parameters
     tilt = cell_tilt_error(cell, leveling)
     scale = _scales(cell, approach.uses_angles)
@@ -181,18 +190,52 @@ def rare_tilts(
     squares = distribution.approximate_quantile(1 - np.asarray(beyond, dtype=float))[:2] ** 2
     proposal = _Proposal.of(tilt, root[:u], squares)
     calibrate = calibrator(cell)
-    found, weights = [], []
-    for block in blocks:
+    found, weights = np.full((3, cell.replicates), np.nan), np.empty(cell.replicates)
+    for block in range(cell.n_blocks):
+        part = slice(block * BLOCK, min((block + 1) * BLOCK, cell.replicates))
         rng = np.random.default_rng(cell.seed(seed, block).spawn(1)[0])
-        normal = ideal.errors(cell.noise, BLOCK, rng, angles=approach.uses_angles)
-        y, weight = proposal.draw(BLOCK, rng)
+        normal = ideal.errors(cell.noise, part.stop - part.start, rng, angles=approach.uses_angles)
+        y, weights[part] = proposal.draw(part.stop - part.start, rng)
         observed = ideal.disturbed(_with_part(normal, y, sees, scale), cell.noise, rng)
         result = calibrate(model, approach, observed)
-        each = np.full((3, BLOCK), np.nan)
-        each[:, result.converged] = tilts(tilt, result.estimates[result.converged][:, :u])
-        found.append(each)
-        weights.append(weight)
-    return RareTilts(np.concatenate(found, axis=1), np.concatenate(weights))
+        kept = result.converged
+        found[:, part][:, kept] = tilts(tilt, result.estimates[kept][:, :u])
+    return RareTilts(found, weights)
+
+
+def rare_table(spec: Mapping[str, Any], output: str | Path, provenance: Mapping[str, Any]) -> None:
+    """Simulate rare tilt errors of cells, and write the table `rare`.
+
+    Parameters
+    ----------
+    spec : mapping with `seed`, `cells` (plain data of `Cell`), `leveling` and `shares`
+    output : path of the table
+    provenance : see `accelstudy.files.tables.origin`
+    """
+    shares = spec["shares"]
+    with parquet_writer(output, RARE, provenance) as write:
+        for cell in map(Cell.from_dict, spec["cells"]):
+            if not cell.estimability.estimable or cell.linear_theory is None:
+                log.info("%s: has no linear theory", cell.name)
+                continue
+            found = rare_tilts(cell, spec["seed"], spec["leveling"], shares)
+            value, error, equivalent, effective = map(np.ravel, found.quantile(shares))
+            rows = len(value)
+            failed, failed_error = (np.full(rows, each) for each in found.failed)
+            columns = {
+                "cell": [cell.name] * rows,
+                "name": np.repeat(TILTS, len(shares)),
+                "share_beyond": np.tile(shares, len(TILTS)),
+                "value_mgon": value / MGON,
+                "value_se_mgon": error / MGON,
+                "equivalent": equivalent,
+                "effective": effective,
+                "share_failed": failed,
+                "share_failed_se": failed_error,
+                "n_replicates": np.full(rows, cell.replicates),
+            }
+            write(pa.table(columns, schema=RARE))
+            log.info("%s: %d replicates", cell.name, cell.replicates)
 
 
 def _scales(cell: Cell, angles: bool) -> Array:

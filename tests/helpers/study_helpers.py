@@ -3,10 +3,11 @@
 from accelstudy.basics.units import MGON
 from accelstudy.files.tables import collect, read_table
 from accelstudy.study.batches import Share, batches
-from accelstudy.study.cells import study_cells
+from accelstudy.study.cells import rare_cells, study_cells
 from accelstudy.study.config import parse_study
 from accelstudy.study.monte_carlo.replicates import Pair, blocks
 from accelstudy.study.monte_carlo.simulate import simulate_batch
+from accelstudy.study.rare import rare_table
 from accelstudy.study.summary import summarise_batch
 from accelstudy.study.tables import TABLES
 
@@ -101,6 +102,14 @@ def run_study(folder, batch_size=None, **keys):
         collect(wholes[name], folder / f"{name}.parquet", PROVENANCE)
     tables = {name: read_table(folder / f"{name}.parquet") for name in TABLES}
     return {**tables, **({"estimates": read_table(estimates)} if estimates else {})}
+
+
+def run_rare(folder, study):
+    """The table of rare tilt errors."""
+    cells = [cell.to_dict() for cell in rare_cells(study, study_cells(study))]
+    spec = {"seed": study.seed, "cells": cells, "leveling": study.leveling.model_dump()}
+    rare_table({**spec, "shares": study.rare.shares}, folder / "rare.parquet", PROVENANCE)
+    return read_table(folder / "rare.parquet")
 
 
 def parts_in(folder):

@@ -1,15 +1,16 @@
-"""The figure of rare events, of a study that keeps no replicates."""
+"""The figure of rare events, of a study that asks for them."""
 
 import numpy as np
 import pytest
 from scipy.stats import binomtest
-from study_helpers import NINE, grid, make_study, run_study
+from study_helpers import NINE, grid, make_study, run_rare, run_study
 
 from accelstudy.study.figures import draw, figure_names
 
 KEYS = {
     "keep": "summary",
     "leveling": {"attitudes": 5},
+    "rare": {"replicates": 2000, "shares": [0.01, 1e-4]},
     "grids": [grid(replicates=300), grid(replicates=60, approaches="gravity", sensor_sigma_mps2=3)],
 }
 
@@ -21,7 +22,9 @@ def study():
 
 @pytest.fixture(scope="module")
 def tables(tmp_path_factory):
-    return run_study(tmp_path_factory.mktemp("rare"), **KEYS)
+    folder = tmp_path_factory.mktemp("rare")
+    tables = run_study(folder, **KEYS)
+    return {**tables, "rare": run_rare(folder, make_study(**KEYS))}
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +32,7 @@ def axes(study, tables):
     return draw("rare-events", tables, study).axes
 
 
-def test_only_a_study_that_keeps_no_replicates_has_it(study):
+def test_only_a_study_that_asks_for_rare_tilt_errors_has_it(study):
     assert "rare-events" in figure_names(study)
     assert "rare-events" not in figure_names(make_study(grids=KEYS["grids"]))
 
@@ -37,6 +40,7 @@ def test_only_a_study_that_keeps_no_replicates_has_it(study):
 def test_tails_are_the_quantiles_of_the_set_up_with_the_least_noise(axes, tables):
     tails, _ = axes
     drawn = {line.get_gid(): line.get_xydata() for line in tails.get_lines()}
+    points = {gid: drawn.pop(gid) for gid in [*drawn] if gid.endswith(" rare")}
     cells = [f"{NINE}/mclaren-24/{approach}" for approach in ("gravity", "robot")]
     assert set(drawn) == {f"{cell} {angle}" for cell in cells for angle in ("roll", "pitch")}
     table = tables["quantiles"]
@@ -46,6 +50,12 @@ def test_tails_are_the_quantiles_of_the_set_up_with_the_least_noise(axes, tables
     assert y[np.isclose(x, 0.01)] == pytest.approx([q99])
     assert (np.diff(x) < 0).all()
     assert (np.diff(y) > 0).all()
+    assert set(points) == {f"{gid} rare" for gid in drawn}
+    rare = tables["rare"]
+    one = rare[(rare["cell"] == cells[1]) & (rare["name"] == "roll")]
+    np.testing.assert_array_equal(
+        points[f"{cells[1]} roll rare"], one[["share_beyond", "value_mgon"]]
+    )
 
 
 def test_failures_have_exact_intervals(axes, tables):

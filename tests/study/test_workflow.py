@@ -32,7 +32,7 @@ CONFIG = ROOT / "config" / "config.yaml"
 # Two models, two schemes, two approaches: eight cells, of which one cannot be estimated.
 TINY = {
     "study": "tiny", "paper": False, "sensitivity": None, "presets": None,
-    "leveling": {"attitudes": 20},
+    "leveling": {"attitudes": 20}, "rare": {"replicates": 1000},
     "grids": [
         grid(["bias-scale", NINE], ["mclaren-24", "faces-6"], 60, approaches=["gravity", "robot"]),
     ],
@@ -150,6 +150,7 @@ def test_all_is_made(single):
     for name in TABLES:
         table = read_table(results / f"{name}.parquet")
         assert table["cell"].nunique() == (8 if name in ("cells", "summary") else 7)
+    assert read_table(results / "rare.parquet")["cell"].nunique() == 7
     estimates = read_table(results / "estimates")
     assert len(estimates) == 60 * (2 * 2 * 6 + 9 + 2 * 9)
     hashes = {read_origin(path)["config_hash"] for path in results.rglob("*.parquet")}
@@ -206,7 +207,8 @@ def planned(folder, **options):
 
 def test_dry_run(tmp_path):
     plan = planned(tmp_path)
-    assert plan == {"simulate": 1, "summarise": 1, "collect": 1, "figures": 1, "explorer": 1}
+    once = ("simulate", "rare", "summarise", "collect", "figures", "explorer")
+    assert plan == dict.fromkeys(once, 1)
     assert not (tmp_path / "results").exists()
 
 

@@ -2,7 +2,7 @@ from functools import cache
 
 from accelstudy.study.figures import captions, figure_names, figure_tables, get_figure
 from accelstudy.study.batches import batches
-from accelstudy.study.cells import study_cells
+from accelstudy.study.cells import rare_cells, study_cells
 from accelstudy.study.config import parse_study
 from accelstudy.study.effort import study_effort
 from accelstudy.jobs.job import setup_digest
@@ -13,6 +13,7 @@ STUDY = STUDY.model_copy(update={"angle_unit": STUDY.angle_unit or angle_unit()}
 with in_a_line():
     CELLS = study_cells(STUDY)
     EFFORT = study_effort(STUDY, CELLS)
+RARE_CELLS = {cell.name: cell for cell in rare_cells(STUDY, CELLS)}
 
 # Jobs get the checked configuration, with all defaults.
 config.update(STUDY.model_dump(mode="json"))
@@ -40,16 +41,17 @@ WRITTEN = {
     ),
 }
 WHOLE = ("moments", "sketches")
+COLLECTED = [*TABLES, *(["rare"] if STUDY.rare else [])]
 MEMORY = max(1000, round(EFFORT.memory / 1e6))
 FIGURES = figure_names(STUDY)
 # What figures and explorer take from the configuration; all else reaches them by the tables.
 SHOWN = {"angle_unit", "gravity_mps2", "grids", "leveling", "models", "noise", "presets"}
 SHOWN |= {"schemes", "sensitivity"}
 DRAWN = STUDY.model_dump(mode="json", include=SHOWN)
-CELL_FIGURES = [name for name in FIGURES if set(figure_tables(name)) <= {*TABLES}]
+CELL_FIGURES = [name for name in FIGURES if set(figure_tables(name)) <= {*COLLECTED}]
 SENSITIVITY_FIGURES = [name for name in FIGURES if name not in CELL_FIGURES]
 FINAL_TABLES = [
-    *TABLES,
+    *COLLECTED,
     *(["sensitivity", "shapley"] if STUDY.sensitivity else []),
     *(["claims", "claims_by_scheme"] if STUDY.paper else []),
 ]

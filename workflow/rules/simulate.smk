@@ -15,3 +15,27 @@ rule simulate:
         "Simulate and calibrate batch {wildcards.part}"
     script:
         "../scripts/simulate.py"
+
+
+rule rare:
+    output:
+        f"{BATCH}/rare.parquet",
+    log:
+        f"{RESULTS}/logs/rare/{{batch}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/rare/{{batch}}.tsv"
+    threads: 1
+    resources:
+        mem_mb=megabytes(MEMORY),
+    params:
+        spec=lambda wildcards: {
+            "seed": STUDY.seed,
+            "cells": [RARE_CELLS[cell.name].to_dict() for cell in BATCHES[wildcards.batch].cells],
+            "leveling": STUDY.leveling.model_dump(),
+            "shares": STUDY.rare.shares,
+        },
+        code=code_of("rare"),
+    message:
+        "Simulate rare tilt errors of batch {wildcards.batch}"
+    script:
+        "../scripts/rare.py"

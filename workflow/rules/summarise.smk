@@ -25,9 +25,9 @@ rule summarise:
 
 rule collect:
     input:
-        **{table: expand(f"{BATCH}/{table}.parquet", batch=BATCHES) for table in TABLES},
+        **{table: expand(f"{BATCH}/{table}.parquet", batch=BATCHES) for table in COLLECTED},
     output:
-        **{table: f"{RESULTS}/{table}.parquet" for table in TABLES},
+        **{table: f"{RESULTS}/{table}.parquet" for table in COLLECTED},
     log:
         f"{RESULTS}/logs/collect.log",
     benchmark:

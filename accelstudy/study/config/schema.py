@@ -39,6 +39,7 @@ from accelstudy.study.config.blocks import (
     NoiseConfig,
     Presets,
     Quantity,
+    RareConfig,
     SensitivityConfig,
 )
 
@@ -90,6 +91,9 @@ class StudyConfig(Block):
         "give all tables and figures; with summary, quantiles are right to 0.1 %",
     )
     leveling: LevelingConfig = LevelingConfig()
+    rare: RareConfig | None = Field(
+        None, description="tilt errors that few calibrations leave, such as one in a million"
+    )
     sensitivity: SensitivityConfig | None = Field(None, description="figures 4 to 6")
     angle_unit: Literal["gon", "deg"] | None = Field(
         None,

@@ -18,7 +18,10 @@ if TYPE_CHECKING:
 Tables: TypeAlias = "Mapping[str, pd.DataFrame]"
 Draw: TypeAlias = "Callable[[Tables, StudyConfig], Figure]"
 
-TABLES = ("cells", "summary", "correlations", "leveling", "quantiles", "sensitivity", "shapley")
+TABLES = (
+    *("cells", "summary", "correlations", "leveling", "quantiles"),
+    *("rare", "sensitivity", "shapley"),
+)
 """Names of the tables that a figure may need."""
 
 _REGISTRY: Registry[FigureEntry] = Registry("figure")

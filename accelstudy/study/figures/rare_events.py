@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from accelstudy.basics.shares import Z95
 from accelstudy.basics.units import unit_label
 from accelstudy.drawing.style import (
     FULL,
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
     from accelstudy.study.config import StudyConfig
 
 LINES: Style = {"roll": "-", "pitch": "--"}
+MARKERS = {"roll": "o", "pitch": "s"}
+POINTS: Style = {"markersize": 3, "elinewidth": 0.8}
 MOST = 3
 """Number of set-ups whose tails are drawn, one panel each."""
 NONE: Style = {"linestyle": "", "marker": "v", "markersize": 4, "fillstyle": "none"}
@@ -39,12 +42,15 @@ NONE: Style = {"linestyle": "", "marker": "v", "markersize": 4, "fillstyle": "no
     """
     What happens once in thousands of calibrations and more. Left: the tilt error, as its rms over
     all attitudes up to the study's largest tilt, over the share of calibrations that leave more of
-    it, for the least noise of the sensor in the study. Right: the share of calibrations that do
+    it, for the least noise of the sensor in the study. Lines are quantiles of the calibrations of
+    each cell, as far as their number reaches. Points are of calibrations that were drawn where
+    linear theory expects large errors, and weighted; their intervals of 95 % are mostly shorter
+    than the points are wide. Right: the share of calibrations that do
     not converge, over the noise of the sensor, with intervals of 95 %; a triangle is the upper
     limit where none failed.
     """,
-    tables=("cells", "quantiles"),
-    when=lambda study: study.keep == "summary",
+    tables=("cells", "quantiles", "rare"),
+    when=lambda study: study.rare is not None,
 )
 def rare_events(tables: Tables, study: StudyConfig) -> Figure:
     """Tilt error over the share of calibrations that leave more, and shares that do not converge.
@@ -53,7 +59,7 @@ def rare_events(tables: Tables, study: StudyConfig) -> Figure:
     """
     from matplotlib.lines import Line2D
 
-    cells, tilt = tables["cells"], tables["quantiles"]
+    cells, tilt, rare = tables["cells"], tables["quantiles"], tables["rare"]
     tilt = tilt[(tilt["quantity"] == "tilt") & (tilt["probability"] >= 0.5)]
     tilt = tilt[tilt["name"].isin(LINES)]
     tilt = tilt[tilt["sensor_sigma_mps2"] == tilt["sensor_sigma_mps2"].min()]
@@ -65,6 +71,8 @@ def rare_events(tables: Tables, study: StudyConfig) -> Figure:
     for ax, (model, scheme) in zip(tails, setups, strict=False):
         of_setup = tilt[(tilt["model"] == model) & (tilt["scheme"] == scheme)]
         _draw_tails(ax, of_setup)
+        _draw_rare(ax, rare.merge(cells[["cell", "approach"]]), set(of_setup["cell"]))
+        ax.set_ylim(bottom=0)
         ax.set_title(f"{model_title(model)}, {scheme}")
     _draw_failures(failures, cells[cells["n_replicates"] > 0])
     left_out = len(setups[MOST:])
@@ -74,7 +82,7 @@ def rare_events(tables: Tables, study: StudyConfig) -> Figure:
         handles=[
             *approach_handles(dict.fromkeys(cells["approach"]), linestyle="-", marker=""),
             *(
-                Line2D([], [], color=INK, linestyle=style, label=name)
+                Line2D([], [], color=INK, linestyle=style, label=name, marker=MARKERS[name])
                 for name, style in LINES.items()
             ),
             Line2D([], [], color=INK, label="none failed: 97.5 % limit", **NONE),
@@ -94,8 +102,17 @@ def _draw_tails(ax: Axes, rows: pd.DataFrame) -> None:
         ax.set_ylabel(f"tilt error / {unit}")
     ax.set_xscale("log")
     ax.invert_xaxis()
-    ax.set_ylim(bottom=0)
     ax.set_xlabel("share of calibrations that leave more")
+
+
+def _draw_rare(ax: Axes, rare: pd.DataFrame, cells: set[str]) -> None:
+    rows = rare[rare["cell"].isin(cells) & rare["name"].isin(LINES)]
+    for (cell, name), points in rows.groupby(["cell", "name"], sort=False):
+        values, _ = shown(points["value_mgon"], "mgon")
+        half, _ = shown(Z95 * points["value_se_mgon"], "mgon")
+        colour, marker = approach_colour(points["approach"].iloc[0]), MARKERS[str(name)]
+        bars = ax.errorbar(points["share_beyond"], values, half, color=colour, fmt=marker, **POINTS)
+        bars[0].set_gid(f"{cell} {name} rare")
 
 
 def _draw_failures(ax: Axes, cells: pd.DataFrame) -> None:
