@@ -212,7 +212,7 @@ def _coverage(statistics: Statistics, i: int) -> dict[str, float]:
     n, moments, inside = statistics.converged, statistics.moments, statistics.inside[i]
     if moments.redundancy <= 0 or n == 0:
         return dict.fromkeys(COVERAGE, np.nan)
-    plain = float(inside.plain)
+    plain = min(max(float(inside.plain), 0.0), 1.0)  # a mean of ones may round to more than one
     low, high = wilson(round(plain * n), n)
     alone = math.sqrt(plain * (1 - plain) / n)
     error = float(np.hypot(inside.error, 1 / n))

@@ -4,6 +4,7 @@ Limits of single statistics are 4.5 standard errors.
 """
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -13,8 +14,10 @@ from scipy.stats import binom
 from study_helpers import NINE, PAPER_SENSOR, grid, run_study
 
 from accelstudy.schemes import get_scheme
+from accelstudy.study import summary as module_of_tables
 from accelstudy.study.compiling import calibrator
 from accelstudy.study.monte_carlo import replicates as module
+from accelstudy.study.monte_carlo.statistics import Estimates
 from accelstudy.study.tables import read_estimates
 
 STANDARD_ERRORS = 4.5
@@ -121,6 +124,16 @@ def test_wilson_interval_of_the_coverage(tmp_path):
     half = z / (1 + z**2 / n) * np.sqrt(p * (1 - p) / n + z**2 / (4 * n**2))
     assert row["coverage_95_low"] == pytest.approx(centre - half, rel=1e-6)
     assert row["coverage_95_high"] == pytest.approx(centre + half, rel=1e-6)
+
+
+def test_a_coverage_that_rounds_to_more_than_one():
+    """A mean of ones is made of differences and of linear theory's, each rounded."""
+    inside = Estimates(*(np.array([x]) for x in (0.95, 1e-4, 9.0, np.nextafter(1, 2))))
+    moments = SimpleNamespace(redundancy=3)
+    statistics = SimpleNamespace(converged=30, moments=moments, inside=inside)
+    row = module_of_tables._coverage(statistics, 0)
+    assert (row["coverage_95"], row["coverage_95_high"]) == (1, 1)
+    assert row["coverage_95_se"] == 0
 
 
 def test_ratio_of_sigma_a_posteriori_to_the_empirical_one(study, summary):
