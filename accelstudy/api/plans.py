@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -112,11 +113,7 @@ def plan(
 
     def value(name: str) -> float:
         given = QUANTITIES[name]
-        usual = given.usual or f"inf{given.unit}"
-        text = quantities.get(name)
-        if text is None and not given.usual:
-            return float("inf")
-        return quantity(name, usual if text is None else text, given)
+        return quantity(name, quantities.get(name, given.usual), given)
 
     question = Question(
         quantity("tilt_accuracy", tilt_accuracy, QUANTITIES["tilt_accuracy"]),
@@ -132,7 +129,7 @@ def plan(
         confidence,
         tuple(sorted({quantity("holds", hold, QUANTITIES["hold"]) for hold in holds})),
         value("robot_accuracy"),
-        value("max_time"),
+        math.inf if quantities.get("max_time") is None else value("max_time"),
         max_positions,
         tuple(schemes),
     )

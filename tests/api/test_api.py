@@ -76,7 +76,7 @@ WRONG = {
     "acs.read_log(table, rate='fast')": "rate_hz",
     "acs.read_log(table, columns=['ax'])": "columns: expected a mapping",
     "acs.find_holds({'fx': 1})": "log: expected a path",
-    "acs.find_holds(acs.read_log(table, rate=100, columns={'fx': 'a', 'fy': 'b', 'fz': 'c'}))": "'a'",
+    "acs.find_holds(acs.read_log(table, columns={'fx': 'a', 'fy': 'b', 'fz': 'c'}))": "'a'",
     "acs.find_holds(table, gravity='9.8')": "gravity: expected a number with its unit",
     "acs.read_campaign(None)": "folder: expected a path, not None",
     "acs.simulate_campaign(colour=1)": "unknown setting 'colour'",
