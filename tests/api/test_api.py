@@ -46,7 +46,7 @@ def guide(tmp_path_factory):
 def test_the_calibration_finds_the_bias(guide):
     parameters = guide["calibration"].parameters
     found = parameters.loc[["b_x", "b_y", "b_z"]]
-    assert (abs(found["value"] - BIAS) < 4 * found["sigma"]).all()
+    assert (abs(found["value"] - np.array(BIAS)) < 4 * found["sigma"]).all()
     assert (guide["folder"] / "calibrated/calibration.json").exists()
     assert len(guide["leveled"]) == len(logged())
 
