@@ -25,7 +25,7 @@ def path_of(name: str, value: Any) -> Path:
 
 def quantity(name: str, value: Any, given: Given) -> float:
     """Quantity in SI: a number in SI, or text with a unit, as on the command line."""
-    if isinstance(value, Real) and not isinstance(value, bool):
+    if not isinstance(value, bool) and isinstance(value, Real):
         value = f"{float(value)!r}{given.unit}"
     of_type(name, value, str, expected=f"a number in {given.unit} or a text with its unit")
     try:
