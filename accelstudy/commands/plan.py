@@ -158,8 +158,15 @@ def plan_command(
     simulates those at the top. The sensor is --sensor or, if only its noise is known, --sigma. If
     nothing reaches the accuracy, one line says what would be reachable, and the exit status is 1.
     """
+    if (sensor is None) == (sigma is None):
+        raise InputError(
+            "plan: give the sensor by --sensor, or its noise by --sigma"
+            + (", not both" if sensor else "")
+        )
     begin("comparing calibrations, which takes some seconds ...")
-    from accelstudy.api.plans import plan as planned
+    from accelstudy.data_sheets import of_sigma
+    from accelstudy.planning.answer import answer
+    from accelstudy.planning.question import Equipment, Question, equipment_of, get_sensor
     from accelstudy.planning.wording import (
         answer_lines,
         assumption_lines,
@@ -169,24 +176,21 @@ def plan_command(
         unreachable,
     )
 
-    plan = planned(
-        tilt_accuracy=tilt_accuracy,
-        sigma=sigma,
-        sensor=sensor,
-        equipment=equipment,
-        confidence=confidence,
-        holds=holds,
-        schemes=schemes,
-        max_positions=max_positions,
-        replicates=replicates,
-        seed=seed,
-        tilt_range=tilt_range,
-        max_time=max_time,
-        moving_time=moving_time,
-        robot_moving_time=robot_moving_time,
-        robot_setup_time=robot_setup_time,
-        robot_accuracy=robot_accuracy,
-    ).answer
+    by_hand = Equipment("gravity", moving_time, 0.0)
+    robot = Equipment("robot", robot_moving_time, robot_setup_time)
+    question = Question(
+        tilt_accuracy,
+        tilt_range,
+        of_sigma(sigma) if sigma is not None else get_sensor(str(sensor)),
+        equipment_of(equipment, by_hand, robot),
+        confidence,
+        tuple(sorted(set(holds))),
+        robot_accuracy,
+        math.inf if max_time is None else max_time,
+        max_positions,
+        schemes,
+    )
+    plan = answer(question, seed, replicates)
     if not plan.ranked:
         click.echo(unreachable(plan))
         raise click.exceptions.Exit(NOT_REACHED)
@@ -194,7 +198,7 @@ def plan_command(
         click.echo(line)
     for line in ("", *table_lines(plan), "", *reason_lines(plan)):
         say(line)
-    for line in ("", *assumption_lines(plan.question)):
+    for line in ("", *assumption_lines(question)):
         say(line)
     if out is not None:
         from accelstudy.basics.suggested import study_again
