@@ -11,6 +11,7 @@ from accelstudy.api.given import of_type, quantity, table_html
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY, Given
+from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON
 from accelstudy.planning.quantities import QUANTITIES
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
@@ -20,7 +21,8 @@ from accelstudy.study.cell import Cell
 from accelstudy.study.monte_carlo.distributions import simulated_distributions
 from accelstudy.study.monte_carlo.statistics import Statistics
 
-LEVELING = {"max_tilt_gon": 30.0, "attitudes": 200}
+LEVELING = {"max_tilt_gon": MAX_TILT_GON, "attitudes": ATTITUDES}
+"""Where the tilt error is evaluated, as in a study by default."""
 GRAVITY = Given("m/s^2", "", "Local gravity.")
 
 
@@ -65,7 +67,7 @@ class Simulation:
 
     @property
     def tilt(self) -> pd.DataFrame:
-        """Rms tilt error of roll and of pitch that the calibration leaves, rad."""
+        """Rms tilt error of roll and of pitch that the calibration leaves up to 50 gon, rad."""
         rms = self.statistics.tilt_rms
         index = pd.Index(["roll", "pitch"], name="angle")
         table = pd.DataFrame({"rms": rms.value, "rms_error": rms.error}, index=index)
