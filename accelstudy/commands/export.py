@@ -20,13 +20,18 @@ def export_command(calibration: Path, form: str, level: bool) -> None:
     """Print a CALIBRATION in a form that a device takes.
 
     CALIBRATION is a calibration.json. json and yaml carry every effect: parameters with sigmas and
-    units, and the formulas to implement. c is a header in C99 with the function accel_calibrate. It
-    takes the reading and, if the model has effects of these, temperature, time and vibration.
-    matrix holds M in force = M · (x, y, z, 1), if nothing but the force matters, and that linearly.
+    units, and the formulas to implement. matrix holds M in force = M · (x, y, z, 1), if nothing but
+    the force matters, and that linearly.
 
-    px4 is a parameter file for PX4: offset, scale and a polynomial of the temperature for each axis.
-    ros is that of the ROS package imu_calib: a matrix and a bias. What such a file cannot hold is
-    said, with the errors of roll and pitch that it leaves. All are in the axes of the log.
+    c is a header in C99 with the function accel_calibrate. It takes the reading and, where effects
+    depend on them, temperature, time and vibration. What depends on the position before is refused.
+
+    px4 is a parameter file for PX4: an offset, a scale and a polynomial of the temperature for each
+    axis. ros is one for the ROS package imu_calib: a matrix and a bias. They are closest to the
+    calibration over all attitudes. What they cannot hold is said, with the errors of roll and pitch
+    that it leaves.
+
+    Readings and forces are in the axes of the log.
     """
     from accelstudy.campaign.calibration.applying import read_calibration
     from accelstudy.campaign.calibration.export import export, losses

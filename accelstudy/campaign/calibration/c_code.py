@@ -332,7 +332,7 @@ class _Code:
         columns = {name: hold.column(name) for name in KNOWN}
         columns |= {name: columns["temperature"] for name in self.lags}
         columns[KEPT] = np.minimum(columns["time"], self._end)
-        force, steps = np.linalg.solve(self._axes, forces.T).T, []
+        force, steps = forces @ np.linalg.inv(self._axes).T, []
         for stage in self._stages:
             force, _ = stage.sensed(force, columns)
             steps.append(stage.steps(force, columns))
@@ -411,7 +411,7 @@ class _Code:
         lines += [f"    {all_three}", "        found[i] = output[i] - found[i];"]
         lines += ["    accel_solve(slope, found, step);"]
         lines += [f"    {all_three}", "        f[i] += step[i];", "}"]
-        if self.implicit:
+        if steps > 1:
             size = " + ".join(f"ACCEL(fabs)(step[{i}])" for i in range(3))
             lines += [f"lost = lost || !({size} < {_number(LOST)});"]
         return [*lines, all_three, "    output[i] = f[i];"]
@@ -463,9 +463,9 @@ class _Code:
         lines += ["            + axes[i][2] * partial[k][2];"]
         lines += ["    for (i = 0; i < 3; i++)", "        partial[k][i] = -step[i];", "}"]
         f0 = sp.Matrix(symbols(*(f"f0[{i}]" for i in range(3))))
-        parts = [part for stage in self._stages for part, _ in stage.parts]
-        for k, (part, p) in enumerate((part, p) for part in parts for p in part.p):
-            turn = part.axes.diff(p) * f0
+        axes = sum((part.axes for stage in self._stages for part, _ in stage.parts), sp.zeros(3))
+        for k, p in enumerate(all_p):
+            turn = axes.diff(p) * f0
             lines += _assigned({f"partial[{k}][{i}]": turn[i] for i in range(3) if turn[i]}, "+=")
         by = {f"angle_by[{i}][{j}]": by_force[i, j] for i in range(2) for j in range(3)}
         lines += [*_assigned(_named("angle", signed)), *_assigned(by)]
@@ -476,28 +476,28 @@ class _Code:
 
     def notes(self, unit: str, level: bool) -> Iterable[str]:
         """Say what the functions take and give."""
-        calibration = self._calibration
+        calibration, end = self._calibration, self._end
         yield (
-            f"accel_calibrate: from a reading in {unit} to the specific force in m/s^2, both in the "
-            f"axes {self._frame.description}."
+            f"accel_calibrate: from a reading in {unit} to the specific force in m/s^2, both in "
+            f"the axes {self._frame.description}."
         )
         for name in self.columns:
             if name in self.lags:
                 yield (
-                    f"{name}: degC. It begins as the temperature; dt seconds later add (temperature "
-                    f"- {name}) * (1 - exp(-dt / {self.lags[name]:g}))."
+                    f"{name}: degC. It begins as the temperature; dt seconds later add "
+                    f"(temperature - {name}) * (1 - exp(-dt / {self.lags[name]:g}))."
                 )
             else:
                 yield f"{name}: {ARGUMENTS[name]}."
         for effect in calibration.model.effects:
-            if effect.drifts and np.isfinite(self._end):
-                yield f"{effect.name}: stays as it was at the end of the session, {self._end:.0f} s."
+            if effect.drifts and np.isfinite(end):
+                yield f"{effect.name}: stays as it was at the end of the session, {end:.0f} s."
         if self.implicit:
             yield (
-                f"The force is solved for in {max(self.steps)} Newton steps. They leave an error of less "
-                f"than {BOUND:g} m/s^2 ({BOUND / calibration.gravity / MGON:.2g} mgon) at up to "
-                f"{FORCES[-1]:g} g, in the ranges of the calibration. The force is NAN where none "
-                "explains the reading."
+                f"The force is solved for in {max(self.steps)} Newton steps. They leave an error "
+                f"of less than {BOUND:g} m/s^2 ({BOUND / calibration.gravity / MGON:.2g} mgon) at "
+                f"up to {FORCES[-1]:g} g, in the ranges of the calibration. The force is NAN where "
+                "none explains the reading."
             )
         if level:
             yield (
@@ -506,8 +506,8 @@ class _Code:
                 "At a pitch close to a right angle roll has no meaning, and sigmas do not hold."
             )
         yield (
-            f"All is in float, with rounding errors below {ROUNDING:g} m/s^2 at 1 g, or in double if "
-            "ACCEL_DOUBLE is defined."
+            f"All is in float, with rounding errors below {ROUNDING:g} m/s^2 at 1 g, or in double "
+            "if ACCEL_DOUBLE is defined."
         )
 
 
@@ -543,7 +543,7 @@ def _printer() -> Any:
     """Print numbers and functions in the precision for which the header is compiled."""
     from sympy.printing.c import C99CodePrinter
 
-    class Printer(C99CodePrinter):
+    class Printer(C99CodePrinter):  # type: ignore[misc]  # SymPy is untyped
         def _print_Float(self, expr: Any) -> str:
             return _number(float(expr))
 
@@ -569,8 +569,9 @@ def _printer() -> Any:
     return Printer({"user_functions": {name: f"ACCEL({c})" for name, c in names.items()}})
 
 
-def _number(value: float) -> str:
-    return f"ACCEL({float(value)!r})"
+def _number(value: float, digits: int = 12) -> str:
+    text = f"{value:.{digits}g}"
+    return f"ACCEL({text if set('.e') & set(text) else f'{text}.0'})"
 
 
 def _c(expression: Any) -> str:
@@ -594,7 +595,7 @@ def _matrix(values: ArrayLike) -> Any:
 
 def _table(values: Array) -> str:
     """Numbers of a matrix, of which nine digits are enough."""
-    rows = (", ".join(_number(float(f"{value:.9g}")) for value in row) for row in values)
+    rows = (", ".join(_number(value, 9) for value in row) for row in values)
     return "{\n" + ",\n".join(f"    {{{row}}}" for row in rows) + "\n}"
 
 

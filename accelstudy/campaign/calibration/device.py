@@ -26,15 +26,19 @@ LEVELS = 5
 """Values of a condition that matters."""
 
 
+def unknown(needs: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
+    """Effects that need a column that no device knows, of effects each with a column."""
+    return [(effect, column) for effect, column in needs if column not in KNOWN]
+
+
 def must_be_known(needs: Iterable[tuple[str, str]]) -> None:
-    """Raise `InputError` if one of effects depends on a column that no device knows."""
-    for effect, column in needs:
-        if column not in KNOWN:
-            what = "position before" if column.startswith("step_") else column
-            raise InputError(
-                f"{effect} depends on the {what}, which no device knows; calibrate without it, or "
-                "take the form json, which has its formula"
-            )
+    """Raise `InputError` if one of effects needs a column that no device knows."""
+    for effect, column in unknown(needs):
+        what = "position before" if column.startswith("step_") else column
+        raise InputError(
+            f"{effect} depends on the {what}, which no device knows; calibrate without it, or "
+            "take the form json, which has its formula"
+        )
 
 
 def in_use(

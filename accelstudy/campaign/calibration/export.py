@@ -64,7 +64,7 @@ def device_matrix(calibration: Mapping[str, Any]) -> Array:
     if unfit := not_affine(_model(calibration)):
         raise InputError(
             f"no matrix can hold {comma_list(list(unfit))} of the model {calibration['model']!r}; "
-            "the forms json, yaml and c carry all effects"
+            "the forms json and yaml carry all effects, and c all that a device can know"
         )
     affine = calibration["affine"]
     if affine is None:
@@ -125,9 +125,8 @@ def losses(calibration: Mapping[str, Any], form: str) -> tuple[str, ...]:
 def _of_device(calibration: Mapping[str, Any]) -> tuple[Calibration, Conversion, Frame, Array, str]:
     """A calibration without its rig, and the readings that a device has."""
     raw, frame = _readings(calibration)
-    return (
-        calibration_of(calibration), raw, frame, mending(calibration), _unit(calibration)
-    )  # fmt: skip
+    unit = _unit(calibration)
+    return calibration_of(calibration), raw, frame, mending(calibration), unit
 
 
 def _model(calibration: Mapping[str, Any]) -> SensorModel:

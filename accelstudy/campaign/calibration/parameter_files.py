@@ -1,7 +1,7 @@
 """A calibration as parameters of programs that have a form of their own: PX4 and ROS.
 
-They hold a sensor whose reading is A f + o, of a force f. What such a form cannot hold is left out: A
-and o are those that come closest to the readings of the calibrated sensor, by least squares over
+They hold a sensor whose reading of a force f is A f + o. What such a form cannot hold is left out:
+A and o are those that come closest to the readings of the calibrated sensor, by least squares over
 all attitudes at rest and over the conditions of the calibration. So they are its scales and biases
 as long as it has these. What is lost is stated as errors of roll and pitch.
 """

@@ -15,6 +15,8 @@ from accelstudy.basics import suggested
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.levels import REFUTED
 from accelstudy.basics.progress import stage
+from accelstudy.campaign.calibration.applying import calibration_of
+from accelstudy.campaign.calibration.device import unknown
 from accelstudy.campaign.calibration.document import json_text
 from accelstudy.campaign.format import read_campaign
 from accelstudy.diagnosis.decision.posterior import CREDIBLE
@@ -232,7 +234,8 @@ def next_steps(
         return steps
     use = "Level a log with the calibration that is beside this page"
     steps.append((use, suggested.apply(result)))
-    steps.append(("Take it to a device", suggested.export("c", result)))
+    form = "json" if unknown(calibration_of(calibration).needs) else "c"
+    steps.append(("Take it to a device", suggested.export(form, result)))
     if d.extended is not d.model:
         command = suggested.calibrate("CAMPAIGN", Path(place) / "model.yaml", d.approach.name)
         steps.append(("Calibrate the next campaign with this model", command))
