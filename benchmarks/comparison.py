@@ -11,6 +11,7 @@ go into a page, if one is given. Missing data are downloaded.
 import json
 import sys
 from dataclasses import replace
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -119,7 +120,7 @@ def ferraris(folder):
     cal, *fits = (work() for work in works.values())
     k_imucal = np.linalg.inv(cal.R_a) @ np.linalg.inv(cal.K_a)
     rows = [
-        ("", "imucal 2.6.0", *(f"accelstudy, {n}"
+        ("", f"imucal {version('imucal')}", *(f"accelstudy, {n}"
          for n in
          ("six positions", f"{found.n_positions} holds", "six positions as placed"))),
         ("assumes", "the six faces are exact", "nothing of the attitudes",

@@ -13,7 +13,7 @@ from accelstudy.commands.options import PATH, example
 @click.command("export", epilog=example("accelstudy export calibrated/calibration.json --form c"))
 @click.argument("calibration", type=PATH)
 @click.option(
-    "--form", default="json", show_default=True, help="json, yaml, c, matrix, px4 or ros."
+    "--form", default="json", show_default=True, help="Form: json, yaml, c, matrix, px4 or ros."
 )
 @click.option("--level", is_flag=True, help="For c: add roll and pitch with their sigmas.")
 def export_command(calibration: Path, form: str, level: bool) -> None:

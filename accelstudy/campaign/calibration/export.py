@@ -97,10 +97,22 @@ def mending(calibration: Mapping[str, Any]) -> Array:
 def export(calibration: Mapping[str, Any], form: str, level: bool = False) -> str:
     """Text of a calibration in one of `FORMS`.
 
+    Parameters
+    ----------
+    calibration : mapping, content of calibration.json
+    form : one of `FORMS`
+    level : bool, whether the form "c" has a function of roll and pitch, too
+
+    Raises
+    ------
+    UnknownNameError, InputError
+        If there is no such form, or it cannot hold the calibration.
+
+    Notes
+    -----
     "json" and "yaml" hold everything: parameters with sigmas, formulas of the effects and, if there
-    is one, the matrix. "c" is a header file with a function, and with `level` with another one, of
-    roll and pitch with their sigmas. "matrix" has plain 3 × 4 numbers. "px4" and "ros" are files of
-    parameters, in which `losses` of the calibration are missing.
+    is one, the matrix. "c" is a header in C99. "matrix" has plain 3 × 4 numbers. "px4" and "ros"
+    are files of parameters, in which `losses` of the calibration are missing.
     """
     if level and form != "c":
         raise InputError(f"the form {form} has no place for roll and pitch; c has")
