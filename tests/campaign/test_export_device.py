@@ -333,6 +333,7 @@ def px4_of(text):
     """Parameters of a file for QGroundControl."""
     rows = [line.split("\t") for line in text.splitlines() if not line.startswith("#")]
     assert all(len(row) == 5 and len(row[2]) <= 16 for row in rows)
+    assert all(("." in row[3]) == (row[4] == "9") and "e" not in row[3] for row in rows)
     assert {row[4]: row[2] for row in rows if row[4] == "6"} in ({}, {"6": "TC_A_ENABLE"})
     return {name: float(value) for _, _, name, value, _ in rows}
 

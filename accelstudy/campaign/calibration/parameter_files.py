@@ -177,7 +177,7 @@ class PX4(ParameterFile):
     """Parameters CAL_ACC0_* and TC_A0_* of PX4, in a file that QGroundControl loads.
 
     PX4 corrects each axis by itself: (reading − TC − OFF) · SCALE, with TC = X1 ΔT + X2 ΔT² +
-    X3 ΔT³, ΔT = T − TREF (Accelerometer::Correct and TemperatureCompensation of PX4 1.11 to 1.16).
+    X3 ΔT³, ΔT = T − TREF (its Accelerometer::Correct and TemperatureCompensation).
     """
 
     program, axes, warms = "PX4", True, True
@@ -210,7 +210,11 @@ class PX4(ParameterFile):
                 values |= {f"TC_A0_X{k}_{i}": x if k else 0.0 for k, x in enumerate(powers)}
             yield f"1\t1\tTC_A_ENABLE\t1\t{INTEGER}"
         for name, value in sorted(values.items()):
-            yield f"1\t1\t{name}\t{np.round(value, 15) + 0.0:.9g}\t{REAL}"
+            # Readers of such files take a number without a point for an integer, or for none.
+            text = np.format_float_positional(
+                np.round(value, 15) + 0.0, 9, unique=False, fractional=False, trim="0"
+            )
+            yield f"1\t1\t{name}\t{text}\t{REAL}"
 
 
 class ROS(ParameterFile):
