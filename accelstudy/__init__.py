@@ -1,15 +1,64 @@
-"""Monte Carlo study of the calibration of tri-axial accelerometers for leveling."""
+"""Monte Carlo study of the calibration of tri-axial accelerometers for leveling.
 
+What a program needs stands here, and is imported when it is first asked for.
+"""
+
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    __version__: str
-else:
+    from accelstudy.api.calibrations import Calibration, calibrate
+    from accelstudy.api.campaigns import find_holds, read_campaign, simulate_campaign
+    from accelstudy.api.diagnoses import Diagnosis, diagnose
+    from accelstudy.api.logs import Log, read_log
+    from accelstudy.api.plans import Plan, plan
+    from accelstudy.api.simulations import Simulation, simulate
+    from accelstudy.basics.errors import InputError
+    from accelstudy.campaign.session import Campaign
 
-    def __getattr__(name):
-        """Version of the package; looked up when asked for, since that takes long."""
-        if name != "__version__":
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    __version__: str
+
+_PLACES = {
+    "api.calibrations": ("Calibration", "calibrate"),
+    "api.campaigns": ("find_holds", "read_campaign", "simulate_campaign"),
+    "api.diagnoses": ("Diagnosis", "diagnose"),
+    "api.logs": ("Log", "read_log"),
+    "api.plans": ("Plan", "plan"),
+    "api.simulations": ("Simulation", "simulate"),
+    "basics.errors": ("InputError",),
+    "campaign.session": ("Campaign",),
+}
+_MODULES = {name: module for module, names in _PLACES.items() for name in names}
+
+__all__ = [
+    "Calibration",
+    "Campaign",
+    "Diagnosis",
+    "InputError",
+    "Log",
+    "Plan",
+    "Simulation",
+    "calibrate",
+    "diagnose",
+    "find_holds",
+    "plan",
+    "read_campaign",
+    "read_log",
+    "simulate",
+    "simulate_campaign",
+]
+
+
+def __getattr__(name: str) -> object:
+    """Import a name when it is asked for, since that takes long."""
+    if name == "__version__":
         from importlib.metadata import version
 
         return version(__name__)
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,6 +1,6 @@
 # Plan calibrations for a required tilt accuracy: sensor, positions and time:
 # snakemake --cores 2 --snakefile workflow/plan.smk --configfile config/plan-example.yaml
-from accelstudy.plan.config import parse_example, parse_section
+from accelstudy.planning.config import parse_example, parse_section
 
 
 include: "rules/start.smk"

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.wording import counted
 from accelstudy.campaign.header import COLUMNS, LogLayout
 from accelstudy.effects import HoldConditions
 from accelstudy.sensors.conversion import Conversion
@@ -17,7 +18,7 @@ from accelstudy.sensors.conversion import Conversion
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Campaign:
     """One calibration session of one sensor, in SI; n static holds in order of acquisition.
 
@@ -72,6 +73,9 @@ class Campaign:
     excluded: Campaign | None = None
     reasons: Mapping[int, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = field(default=())
+
+    def __repr__(self) -> str:
+        return f"Campaign({self.name!r}, {counted(self.n_positions, 'position')})"
 
     @property
     def n_positions(self) -> int:

@@ -22,7 +22,7 @@ from accelstudy.commands.options import (
     quiet_option,
     seed_option,
 )
-from accelstudy.plan.quantities import QUANTITIES
+from accelstudy.planning.quantities import QUANTITIES
 
 NOT_REACHED = 1
 """Exit status where no calibration reaches the target."""
@@ -165,9 +165,9 @@ def plan_command(
         )
     begin("comparing calibrations, which takes some seconds ...")
     from accelstudy.data_sheets import of_sigma
-    from accelstudy.plan.answer import answer
-    from accelstudy.plan.question import Equipment, Question, equipment_of, get_sensor
-    from accelstudy.plan.wording import (
+    from accelstudy.planning.answer import answer
+    from accelstudy.planning.question import Equipment, Question, equipment_of, get_sensor
+    from accelstudy.planning.wording import (
         answer_lines,
         assumption_lines,
         how_to,
@@ -202,7 +202,7 @@ def plan_command(
         say(line)
     if out is not None:
         from accelstudy.basics.suggested import study_again
-        from accelstudy.plan.output import write_plan
+        from accelstudy.planning.output import write_plan
 
         inputs = [Path(sensor)] if sensor is not None and Path(sensor).exists() else []
         write_plan(plan, out, {"config_hash": None, "seed": seed}, inputs, force)

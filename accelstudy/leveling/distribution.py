@@ -26,10 +26,14 @@ NODES = 28
 """Nodes of the inverse Laplace transform; its error is below 1e-9."""
 CENTRAL = 1e-6
 """Offsets below this share of the mean square count as none."""
-STEPS = 8
-"""Steps of the secant method for a quantile."""
+STEPS = 20
+"""Most steps of the secant method for a quantile."""
 LEAST_STEP = 1e-6
 """Shorter ones, of the logarithm of a quantile, do not tell a slope."""
+LAST_STEP = 1e-7
+"""After a step that is shorter for all quantiles, they are found."""
+LENGTHS = 40_001
+"""Lengths of which shares are tabulated; between them, shares are right to 1e-8."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +87,7 @@ class TiltDistribution:
 
         both, slope = _solved(uncorrected, np.maximum(*each), wanted)
         for _ in range(2):
-            exact = special.ndtri(self.share_below(np.exp([*each, both]))[2])
+            exact = special.ndtri(self._share_of_both(np.exp(both)))
             step = np.where(np.isfinite(slope) & np.isfinite(exact), (wanted - exact) / slope, 0.0)
             both = both + step
         return np.exp([*each, both])
@@ -113,31 +117,40 @@ class TiltDistribution:
         -------
         (3, k) array
         """
-        length = self._length
-        ends = {}
-        for angle, bound in ((0, bounds[0]), (1, bounds[1]), (2, bounds[2]), (3, bounds[2])):
-            constant, linear, square = (each[angle % 2] for each in self._along[:3])
-            root = linear**2 - square * (constant - bound[:, None] ** 2)
-            half = np.sqrt(np.maximum(root, 0.0))
-            far = np.where(root > 0, (half - linear) / square, 0.0)
-            ends[angle] = np.maximum((-linear - half) / square, 0.0), far
+        if self._central:
+            each = [self._exact(angle, bounds[angle]) for angle in (0, 1)]
+        else:
+            each = [self._shares(self._ends(bounds[a])[:, a]).mean(axis=1) for a in (0, 1)]
+        return np.array([*each, self._share_of_both(bounds[2])])
 
-        def share(near: Array, far: Array) -> Array:
-            return np.maximum(length(far) - (length(near) if near.any() else 0.0), 0.0)
-
-        (near_roll, far_roll), (near_pitch, far_pitch) = ends[2], ends[3]
-        both = share(np.maximum(near_roll, near_pitch), np.minimum(far_roll, far_pitch))
-        if not self._central:
-            return np.array([share(*ends[a]).mean(axis=1) for a in (0, 1)] + [both.mean(axis=1)])
+    def _share_of_both(self, bounds: Array) -> Array:
+        """Share of the larger error that is below bounds (k,)."""
+        near, far = ends = self._ends(bounds)
+        both = self._shares(np.stack([near.max(axis=0), far.min(axis=0)]))
         larger = both.mean(axis=1)
-        exact = [self._exact(a, bounds[2]) for a in (0, 1)]
+        if not self._central:
+            return np.asarray(larger)
+        exact = [self._exact(angle, bounds) for angle in (0, 1)]
+        single = self._shares(ends)
+        mean = single.mean(axis=2)
         for i, each in enumerate(both):
-            single = np.array([share(*(end[i] for end in ends[a])) for a in (2, 3)])
-            mean = single.mean(axis=1)
-            apart = single - mean[:, None]
+            apart = single[:, i] - mean[:, i, None]
             slope = np.linalg.lstsq(apart @ apart.T, apart @ (each - larger[i]), rcond=1e-9)[0]
-            larger[i] += slope @ [exact[a][i] - mean[a] for a in (0, 1)]
-        return np.array([*(self._exact(a, bounds[a]) for a in (0, 1)), larger])
+            larger[i] += slope @ [exact[a][i] - mean[a, i] for a in (0, 1)]
+        return np.asarray(larger)
+
+    def _ends(self, bounds: Array) -> Array:
+        """Lengths of y from and to which errors are below bounds (k,): (2, angle, k, direction)."""
+        constant, linear, square = (each[:, None] for each in self._along[:3])
+        root = linear**2 - square * (constant[..., None] - bounds[:, None] ** 2)
+        half = np.sqrt(np.maximum(root, 0.0))
+        far = np.where(root > 0, np.maximum((half - linear) / square, 0.0), 0.0)
+        return np.stack([np.maximum((-linear - half) / square, 0.0), far])
+
+    def _shares(self, ends: Array) -> Array:
+        """Shares of y whose length is between ends (2, ..., direction)."""
+        near, far = ends
+        return np.maximum(self._length(far) - (self._length(near) if near.any() else 0.0), 0.0)
 
     def _normal_scores(self, at: Array) -> Array:
         return np.asarray(special.ndtri(self.share_below(np.exp(at))))
@@ -192,18 +205,30 @@ class TiltDistribution:
 
 
 def _solved(scores: Callable[[Array], Array], start: Array, wanted: Array) -> tuple[Array, Array]:
-    """Where normal scores are as wanted, by the secant method, and their slope there."""
+    """Where normal scores are as wanted, and their slope there.
+
+    By the secant method. A step that leaves the bounds seen so far ends half way between them.
+    """
     before, at = start - 0.1, start
     below, slope = scores(before), np.ones_like(start)
+    low = np.where(below < wanted, before, -np.inf)
+    high = np.where(below > wanted, before, np.inf)
     with np.errstate(invalid="ignore", divide="ignore"):
         for _ in range(STEPS):
             here = scores(at)
+            low = np.where(here < wanted, np.maximum(low, at), low)
+            high = np.where(here > wanted, np.minimum(high, at), high)
             found = (here - below) / (at - before)
             told = np.isfinite(found) & (found > 0) & (np.abs(at - before) > LEAST_STEP)
             slope = np.where(told, found, slope)
             # Where a share is 0 or 1, the quantile is some way further.
             step = np.where(np.isfinite(here), (wanted - here) / slope, -0.1 * np.sign(here))
-            before, below, at = at, here, at + np.clip(step, -1.0, 1.0)
+            to = at + np.clip(step, -1.0, 1.0)
+            half = (low + high) / 2
+            to = np.where(((to < low) | (to > high)) & np.isfinite(half), half, to)
+            before, below, at = at, here, to
+            if np.all(np.abs(at - before) < LAST_STEP):
+                break
     return at, slope
 
 
@@ -231,9 +256,16 @@ def _directions(u: int) -> Array:
 @cache
 def _lengths(u: int) -> Callable[[Array], Array]:
     """The share of standard normals in u dimensions whose length is below given ones."""
-    length = np.linspace(0.0, np.sqrt(u) + 9.0, 40_001)
+    length, step = np.linspace(0.0, np.sqrt(u) + 9.0, LENGTHS, retstep=True)
     below = special.gammainc(u / 2, length**2 / 2)
-    return lambda at: np.interp(at, length, below)
+    slope = np.append(np.diff(below), 0.0)
+
+    def share(at: Array) -> Array:
+        at = np.minimum(at * (1 / step), LENGTHS - 1)
+        place = at.astype(np.intp)
+        return np.asarray(below[place] + (at - place) * slope[place])
+
+    return share
 
 
 @cache

@@ -273,32 +273,28 @@ def _quantile_rows(
     n = statistics.converged
     tail = np.minimum(PROBABILITIES, 1 - PROBABILITIES)
     chosen = np.flatnonzero((tail >= 0.0249) | (n * tail >= 0.999))
-    rows = []
+    names, estimates, errors = [], [], []
     for (quantity, name), distribution in distributions.items():
         if name in units:  # of effects there are claims, but no quantiles
-            unit = units[name]
-            estimates = distribution.quantile(chosen).scaled(float(to_recorded(1.0, unit)))
-            rows.append(
-                pd.DataFrame(
-                    {
-                        **_labels(cell),
-                        "quantity": quantity,
-                        "name": name,
-                        "unit": recorded_unit(unit),
-                        "probability": PROBABILITIES[chosen],
-                        "value": estimates.value,
-                        "value_se": estimates.error,
-                        "value_gain": estimates.gain,
-                        "value_plain": estimates.plain,
-                        "relative_error": distribution.relative_error,
-                    }
-                )
-            )
-    if not rows:
+            factor = float(to_recorded(1.0, units[name]))
+            at = distribution.quantile(chosen).scaled(factor)
+            names.append((quantity, name, recorded_unit(units[name])))
+            estimates.append([at.value, at.error, at.gain, at.plain])
+            errors.append(distribution.relative_error)
+    if not names:
         return pd.DataFrame(columns=[*_labels(cell), *QUANTILES]).assign(
             **_labels(cell), n_converged=n
         )
-    return pd.concat(rows, ignore_index=True).assign(n_converged=n)
+    size = len(chosen)
+    each = np.repeat(np.array(names, dtype=object), size, axis=0).T
+    columns = [
+        *each,
+        np.tile(PROBABILITIES[chosen], len(names)),
+        *np.moveaxis(np.array(estimates), 1, 0).reshape(4, -1),
+        np.repeat(errors, size),
+    ]
+    quantiles = dict(zip(QUANTILES, columns, strict=True))
+    return pd.DataFrame({**_labels(cell), **quantiles, "n_converged": n})
 
 
 def _leveling_row(

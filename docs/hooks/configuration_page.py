@@ -8,7 +8,7 @@ from accelstudy.diagnosis.round_trip import RoundTrip
 from accelstudy.field.config import FieldConfig
 from accelstudy.hidden.config import HiddenConfig
 from accelstudy.hidden.real_noise import RealNoiseConfig
-from accelstudy.plan.config import Example, PlanConfig
+from accelstudy.planning.config import Example, PlanConfig
 from accelstudy.pole.config import PoleConfig
 from accelstudy.proposal.config import DesignsConfig
 from accelstudy.sequential.config import SequentialConfig

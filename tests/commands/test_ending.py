@@ -24,7 +24,7 @@ def started(code, *arguments, **options):
     return subprocess.run(command, stderr=subprocess.PIPE, text=True, check=False, **options)
 
 
-@pytest.mark.parametrize("module", ["click", "accelstudy.plan.answer"])
+@pytest.mark.parametrize("module", ["click", "accelstudy.planning.answer"])
 def test_an_interrupt_of_an_import_is_one_line(module):
     code = (
         "import signal, sys\n"

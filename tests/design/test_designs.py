@@ -11,7 +11,7 @@ from accelstudy.basics.units import GON, MGON
 from accelstudy.design.estimability import estimability
 from accelstudy.design.task import Task, position_rows
 from accelstudy.leveling.error import cap_forces, tilt_error
-from accelstudy.plan.config import parse_example, parse_section
+from accelstudy.planning.config import parse_example, parse_section
 from accelstudy.proposal.config import DesignsConfig
 from accelstudy.proposal.efficiency import efficiency_table
 from accelstudy.proposal.figure import efficiency_figure

@@ -47,8 +47,8 @@ OF_STUDIES = {
 }
 """Pictures of the pages of a study."""
 DRAWN = {
-    "plan": ("make plan-example", "accelstudy/plan/figure.py"),
-    "plan-sensors": ("make plan-example", "accelstudy/plan/comparison.py"),
+    "plan": ("make plan-example", "accelstudy/planning/figure.py"),
+    "plan-sensors": ("make plan-example", "accelstudy/planning/comparison.py"),
     "designs-efficiency": ("make plan-example", "accelstudy/proposal/figure.py"),
     "sequential": ("make plan-example", "accelstudy/sequential/figure.py"),
     "pole-gnss": ("make plan-example", "accelstudy/pole/figure.py"),

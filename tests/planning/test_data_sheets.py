@@ -18,7 +18,7 @@ from accelstudy.data_sheets import (
     read_data_sheet,
 )
 from accelstudy.data_sheets.sheet import FLICKER, flicker_change
-from accelstudy.plan.question import get_sensor
+from accelstudy.planning.question import get_sensor
 
 
 @pytest.mark.parametrize("name", data_sheet_names())

@@ -24,15 +24,15 @@ from accelstudy.design.estimability import estimability
 from accelstudy.design.spaces import Constraints, Sphere
 from accelstudy.files.tables import read_origin, read_table
 from accelstudy.leveling.error import cap_forces, leveling_error, tilt_error
-from accelstudy.plan import candidates as known
-from accelstudy.plan.answer import answer
-from accelstudy.plan.candidates import NINE, candidates
-from accelstudy.plan.optimised import Sought
-from accelstudy.plan.question import BY_HAND, ROBOT, Question
-from accelstudy.plan.reasons import in_use, limits, needs, spoilers
-from accelstudy.plan.simulated import simulate, study_of
-from accelstudy.plan.theory import theory_of
-from accelstudy.plan.wording import (
+from accelstudy.planning import candidates as known
+from accelstudy.planning.answer import answer
+from accelstudy.planning.candidates import NINE, candidates
+from accelstudy.planning.optimised import Sought
+from accelstudy.planning.question import BY_HAND, ROBOT, Question
+from accelstudy.planning.reasons import in_use, limits, needs, spoilers
+from accelstudy.planning.simulated import simulate, study_of
+from accelstudy.planning.theory import theory_of
+from accelstudy.planning.wording import (
     answer_lines,
     effort,
     positions_command,
@@ -75,7 +75,7 @@ def told():
         return plans[0]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("accelstudy.plan.answer.answer", kept)
+        patch.setattr("accelstudy.planning.answer.answer", kept)
         printed = succeed(*QUESTION.split()).stdout
     return plans[0], printed
 

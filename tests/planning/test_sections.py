@@ -12,7 +12,7 @@ from accelstudy.basics.units import MGON
 from accelstudy.field import config as field
 from accelstudy.files.reading import read_layer
 from accelstudy.files.tables import read_origin, read_table
-from accelstudy.plan.config import PlanConfig, parse_example, parse_section
+from accelstudy.planning.config import PlanConfig, parse_example, parse_section
 from accelstudy.pole import output as pole
 from accelstudy.pole.config import PoleConfig
 from accelstudy.sequential.config import SequentialConfig

@@ -35,7 +35,7 @@ from accelstudy.files.tables import (
 )
 from accelstudy.study.monte_carlo import simulate as module
 from accelstudy.study.monte_carlo.moments import MOMENTS
-from accelstudy.study.monte_carlo.replicates import blocks
+from accelstudy.study.monte_carlo.replicates import chunks
 from accelstudy.study.monte_carlo.simulate import ESTIMATES
 from accelstudy.study.tables import read_estimates
 
@@ -213,9 +213,9 @@ def test_nothing_is_left_of_an_interrupted_batch(monkeypatch, tmp_path):
         calls.append(cell.name)
         if len(calls) == 2:
             raise KeyboardInterrupt
-        return blocks(cell, *which)
+        return chunks(cell, *which)
 
-    monkeypatch.setattr(module, "blocks", broken)
+    monkeypatch.setattr(module, "chunks", broken)
     with pytest.raises(KeyboardInterrupt):
         simulate_cells(tmp_path, make_cells(grid()).values())
     assert calls == [GRAVITY, ROBOT]

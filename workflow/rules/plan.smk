@@ -1,4 +1,4 @@
-from accelstudy.plan.config import PlanConfig
+from accelstudy.planning.config import PlanConfig
 
 PLAN = section(EXAMPLE, "plan", PlanConfig, SOURCE)
 PLAN_FILES = ["plan.parquet", "plan.md", "plan.svg", "plan.png", "positions.yaml", "study.yaml"]

@@ -1,7 +1,7 @@
 from pathlib import Path
 
 from accelstudy.jobs.job import job
-from accelstudy.plan.output import make_plan
+from accelstudy.planning.output import make_plan
 
 with job(snakemake) as provenance:
     make_plan(

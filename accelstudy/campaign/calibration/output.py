@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from accelstudy.basics.levels import REFUTED
 from accelstudy.basics.suggested import HERE
-from accelstudy.campaign.calibration.assessment import assess
+from accelstudy.campaign.calibration.assessment import Assessment, assess
 from accelstudy.campaign.calibration.document import (
     assessed_positions,
     calibration_document,
@@ -55,8 +56,7 @@ def write_calibration(
     """
     folder = Path(folder)
     assessment = assess(fit)
-    document = calibration_document(fit)
-    quality = quality_document(assessment)
+    content = calibration_content(fit, assessment)
     positions = assessed_positions(assessment)
     drawn = save_all(
         {
@@ -72,18 +72,22 @@ def write_calibration(
         folder / "report.html",
         "campaign/calibration/report.html.j2",
         " ".join(lines),
-        doc=document,
-        quality=quality,
+        doc=content,
+        quality=content["quality"],
         lines=lines,
         positions=_listed(positions).to_dict("records"),
         refuted=REFUTED,
         figures=drawn,
         next_steps=next_steps(fit, assessment.state, source, Path(place) / HERE),
     )
-    content = {**document, "quality": quality}
     with whole_file(folder / "calibration.json") as path:
         path.write_text(json_text(content), encoding="utf-8")
     return content
+
+
+def calibration_content(fit: CampaignFit, assessment: Assessment) -> dict[str, Any]:
+    """Content of calibration.json."""
+    return {**calibration_document(fit), "quality": quality_document(assessment)}
 
 
 def _listed(positions: pd.DataFrame) -> pd.DataFrame:
@@ -99,7 +103,12 @@ def residual_figure(fit: CampaignFit, positions: pd.DataFrame) -> Figure:
     look so. Otherwise it shows the noise that the residuals have themselves.
     """
     figure = new_figure(FULL, 62)
-    ax = figure.add_subplot()
+    draw_residuals(figure.add_subplot(), fit, positions)
+    return figure
+
+
+def draw_residuals(ax: Axes, fit: CampaignFit, positions: pd.DataFrame) -> None:
+    """Draw what `residual_figure` shows."""
     x, y = positions["position"], 1e3 * positions["norm_residual_mps2"]
     stated = fit.campaign.sigma_force
     two_sigma = 2e3 * (fit.sigma_position if stated is None else stated)
@@ -115,7 +124,6 @@ def residual_figure(fit: CampaignFit, positions: pd.DataFrame) -> Figure:
     ax.set(xlabel="position", ylabel="|f| − g / (mm/s²)")
     ax.margins(x=0.02)
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, 1.15), ncols=3)
-    return figure
 
 
 def correlation_figure(fit: CampaignFit) -> Figure:

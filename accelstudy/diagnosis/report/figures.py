@@ -33,6 +33,7 @@ from accelstudy.drawing.style import (
     MISSING,
     log_ticks,
     new_figure,
+    say_empty,
 )
 
 Array = NDArray[np.float64]
@@ -249,13 +250,27 @@ HEIGHT = 0.64
 def explanations_figure(explanations: tuple[Explanation, ...]) -> Figure:
     """Posterior of each explanation, each bar from where the one above it ends."""
     shown = explanations[:BARS]
+    rest = np.cumsum([one.posterior for one in shown])[-1] < 1
+    figure = new_figure(COLUMN, 14 + 4 * len(_colours(shown)) + 7 * (len(shown) + rest))
+    draw_explanations(figure.add_subplot(), explanations)
+    return figure
+
+
+def _colours(shown: tuple[Explanation, ...]) -> dict[str, str]:
+    """Colour of each family."""
     families = [family for one in shown for family in _families(one) if family]
-    colours = dict(zip(dict.fromkeys(families), COLOURS, strict=False))
+    return dict(zip(dict.fromkeys(families), COLOURS, strict=False))
+
+
+def draw_explanations(ax: Axes, explanations: tuple[Explanation, ...]) -> None:
+    """Draw what `explanations_figure` shows; nothing is missing if there are none."""
+    shown = explanations[:BARS]
+    if not shown:
+        say_empty(ax, "nothing is missing")
+        return
+    colours = _colours(shown)
     ends = np.cumsum([one.posterior for one in shown])
     rest = max(0.0, 1 - float(ends[-1]))
-
-    figure = new_figure(COLUMN, 14 + 4 * len(colours) + 7 * (len(shown) + (rest > 0)))
-    ax = figure.add_subplot()
     for row, (one, end) in enumerate(zip(shown, ends, strict=True)):
         parts = _families(one)
         height = HEIGHT / len(parts)
@@ -282,8 +297,7 @@ def explanations_figure(explanations: tuple[Explanation, ...]) -> Figure:
     ax.grid(axis="y", visible=False)
     if colours:
         handles = [Patch(color=colour, label=family) for family, colour in colours.items()]
-        figure.legend(handles=handles, loc="outside upper left", ncols=1)
-    return figure
+        ax.figure.legend(handles=handles, loc="outside upper left", ncols=1)
 
 
 def _families(explanation: Explanation) -> list[str]:

@@ -18,11 +18,11 @@ from numpy.typing import ArrayLike, NDArray
 from accelstudy.adjustment.calibration import Block
 from accelstudy.files.parquet import whole_parquet
 from accelstudy.files.tables import REMEDY
-from accelstudy.study.cell import CHUNK, Cell
+from accelstudy.study.cell import Cell
 from accelstudy.study.monte_carlo.control import Control
 from accelstudy.study.monte_carlo.followed import LINEAR, Distributed, cell_tilt_error
 from accelstudy.study.monte_carlo.moments import EDGES, PROBABILITIES, Node, Tree
-from accelstudy.study.monte_carlo.replicates import Pair, blocks
+from accelstudy.study.monte_carlo.replicates import Pair, chunks
 from accelstudy.study.monte_carlo.sketch import (
     RELATIVE_ERROR,
     Key,
@@ -198,10 +198,11 @@ def simulated_distributions(
     levels : probabilities of the quantiles
     """
     control, tilt = Control.of(cell, leveling), cell_tilt_error(cell, leveling)
-    summed, tree, pairs = Summed(cell, control, tilt, seed), Tree(), []
-    for index in range(cell.n_chunks):
-        pairs.append(Pair.joined(blocks(cell, seed, index * CHUNK, CHUNK, control)))
-        tree.add(Node(index, 1, summed.moments(pairs[-1])))
+    centre, drawn = chunks(cell, seed, 0, cell.n_chunks, control)
+    summed, tree, pairs = Summed(cell, control, tilt, centre), Tree(), []
+    for index, pair in drawn:
+        pairs.append(pair)
+        tree.add(Node(index, 1, summed.moments(pair)))
     statistics = Statistics.of(cell, tree, control, tilt)
     if not statistics.converged:
         return statistics, {}

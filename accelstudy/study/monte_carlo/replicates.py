@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -58,12 +59,41 @@ def blocks(
         yield Pair(calibrate(cell.estimated_model, cell.conditions, observed), linear)
 
 
-def pilot_mean(cell: Cell, control: Control | None, seed: int) -> Array:
+def chunks(
+    cell: Cell, seed: int, first: int, count: int, control: Control | None
+) -> tuple[Array, Iterator[tuple[int, Pair]]]:
+    """Centre of the estimates, and number and content of chunks of an estimable cell.
+
+    Parameters
+    ----------
+    cell : Cell
+    seed : int, of the study
+    first, count : int, number of the first chunk, and how many there are
+    control : Control or None
+
+    Returns
+    -------
+    centre : (u,) array, near the mean of the estimates; the same whichever chunks are asked for
+    chunks : iterator of number and Pair
+    """
+    drawn = blocks(cell, seed, first * CHUNK, count * CHUNK, control)
+    opening = list(islice(drawn, CHUNK))
+
+    def each() -> Iterator[tuple[int, Pair]]:
+        yield first, Pair.joined(opening)
+        for index in range(first + 1, first + count):
+            yield index, Pair.joined(islice(drawn, CHUNK))
+
+    pilot = blocks(cell, seed, 0, CHUNK, control) if first else opening
+    return _pilot_mean(cell, control, pilot), each()
+
+
+def _pilot_mean(cell: Cell, control: Control | None, pilot: Iterable[Pair]) -> Array:
     """Mean of the estimates in the first block of a cell in which a calibration converged, (u,).
 
-    It is the same in all jobs. It is the truth if no calibration of the first chunk converged.
+    It is the truth if no calibration of the first chunk converged.
     """
-    for block, linear in blocks(cell, seed, 0, CHUNK, control):
+    for block, linear in pilot:
         if block.converged.any():
             estimates = block.estimates[block.converged]
             if control is not None and linear is not None and block.converged.all():

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ from accelstudy.study.cell import CHUNK, Cell
 from accelstudy.study.monte_carlo.control import Control
 from accelstudy.study.monte_carlo.followed import cell_tilt_error
 from accelstudy.study.monte_carlo.moments import MOMENTS, Node, Tree, moments_table
-from accelstudy.study.monte_carlo.replicates import Pair, blocks
+from accelstudy.study.monte_carlo.replicates import Pair, chunks
 from accelstudy.study.monte_carlo.sketch import SKETCHES, sketch_table
 from accelstudy.study.monte_carlo.summing import CellSketches, Summed
 
@@ -84,9 +83,11 @@ def simulate_batch(
                 log.info("%d/%d %s: %s", number, len(shares), cell.name, design.reason)
                 continue
             control = Control.of(cell, spec["leveling"])
-            summed = Summed(cell, control, cell_tilt_error(cell, spec["leveling"]), spec["seed"])
+            tilt = cell_tilt_error(cell, spec["leveling"])
+            centre, drawn = chunks(cell, spec["seed"], share.first, share.count, control)
+            summed = Summed(cell, control, tilt, centre)
             tree, sketches = Tree(), CellSketches(summed.distributed)
-            for index, chunk in _chunks(share, spec["seed"], control):
+            for index, chunk in drawn:
                 tree.add(Node(index, 1, summed.moments(chunk)))
                 if "sketches" in outputs:
                     sketches.add(chunk)
@@ -104,13 +105,6 @@ def simulate_batch(
                 sum(node.moments.simulated for node in counts),
                 sum(node.moments.simulated - node.moments.converged for node in counts),
             )
-
-
-def _chunks(share: Share, seed: int, control: Control | None) -> Iterator[tuple[int, Pair]]:
-    """Number and content of each chunk of a share."""
-    drawn = blocks(share.cell, seed, share.first * CHUNK, share.count * CHUNK, control)
-    for index in range(share.first, share.first + share.count):
-        yield index, Pair.joined(islice(drawn, CHUNK))
 
 
 def _estimates_table(cell: Cell, pair: Pair, first: int) -> pa.Table:

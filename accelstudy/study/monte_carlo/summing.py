@@ -12,7 +12,7 @@ from accelstudy.study.monte_carlo.averaged import Averaged
 from accelstudy.study.monte_carlo.control import Control
 from accelstudy.study.monte_carlo.followed import LINEAR, Distributed, Followed
 from accelstudy.study.monte_carlo.moments import EDGES, Moments, apart_by_quantile, paired_moments
-from accelstudy.study.monte_carlo.replicates import Pair, pilot_mean
+from accelstudy.study.monte_carlo.replicates import Pair
 from accelstudy.study.monte_carlo.sketch import Key, Sketch
 
 Array = NDArray[np.float64]
@@ -26,13 +26,12 @@ class Summed:
     cell : Cell
     control : Control or None
     tilt : TiltError
-    seed : int, of the study
+    centre : (u,) array, about which errors are taken
     """
 
-    def __init__(self, cell: Cell, control: Control | None, tilt: TiltError, seed: int) -> None:
+    def __init__(self, cell: Cell, control: Control | None, tilt: TiltError, centre: Array) -> None:
         followed = Followed.of(cell)
         design = cell.estimability
-        centre = pilot_mean(cell, control, seed)
         self.averaged = Averaged(followed, centre, design.cofactors, tilt)
         self.distributed = Distributed(followed, design.redundancy, tilt)
         count = len(self.distributed.keys)

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY, recorded_unit, to_recorded
 from accelstudy.effects import get_effect
 from accelstudy.leveling.error import ATTITUDES
-from accelstudy.plan.candidates import Candidate
-from accelstudy.plan.optimised import is_best
-from accelstudy.plan.question import Question
+from accelstudy.planning.candidates import Candidate
+from accelstudy.planning.optimised import is_best
+from accelstudy.planning.question import Question
 from accelstudy.schemes.files import held
 from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study

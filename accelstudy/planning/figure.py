@@ -17,17 +17,22 @@ from accelstudy.drawing.style import (
     log_ticks,
     new_figure,
 )
-from accelstudy.plan.answer import Answer, Ranked, by_time
-from accelstudy.plan.candidates import Candidate
+from accelstudy.planning.answer import Answer, Ranked, by_time
+from accelstudy.planning.candidates import Candidate
 
 LABELS = {"gravity": "by hand, gravity alone", "robot": "with a robot"}
 
 
 def plan_figure(answer: Answer) -> Figure:
     """Draw all candidates, the front of the best, and the simulated candidates of the table."""
-    question = answer.question
     figure = new_figure(FULL, 95)
-    ax = figure.subplots()
+    draw_plan(figure.subplots(), answer)
+    return figure
+
+
+def draw_plan(ax: Axes, answer: Answer) -> None:
+    """Draw what `plan_figure` shows."""
+    question = answer.question
     for equipment in question.equipment:
         compared = [c for c in answer.compared if c.equipment == equipment]
         if compared:
@@ -63,7 +68,6 @@ def plan_figure(answer: Answer) -> Figure:
     )
     ax.set_ylabel(f"tilt error left, {measure} / {display_unit('rad')}")
     ax.legend(handles=_handles(answer), loc="lower left", bbox_to_anchor=(0, 1), ncols=2)
-    return figure
 
 
 def _draw_equipment(ax: Axes, compared: list[Candidate], confidence: float | None) -> None:

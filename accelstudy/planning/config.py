@@ -11,8 +11,8 @@ from pydantic import BaseModel, Field, model_validator
 from accelstudy.basics.errors import InputError
 from accelstudy.data_sheets import data_sheet_names, of_sigma
 from accelstudy.files.validation import Block, OneOrMore, PathName, Replicates, Seed, checked
-from accelstudy.plan.quantities import QUANTITIES
-from accelstudy.plan.question import Question, equipment_of, get_sensor
+from accelstudy.planning.quantities import QUANTITIES
+from accelstudy.planning.question import Question, equipment_of, get_sensor
 
 
 class PlanCase(Block):

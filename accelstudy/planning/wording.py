@@ -10,14 +10,14 @@ import shlex
 from accelstudy.basics.units import GON, MGON, angle_note, display_unit, to_display
 from accelstudy.basics.wording import amount, interval, number, words
 from accelstudy.pages import lines
-from accelstudy.plan.answer import OTHER_CONFIDENCE, Answer, Ranked
-from accelstudy.plan.candidates import NINE, Candidate, shortest
-from accelstudy.plan.optimised import is_best, request_of
-from accelstudy.plan.question import Question
-from accelstudy.plan.reasons import PLAIN, in_use, limits, needs, spoilers
+from accelstudy.planning.answer import OTHER_CONFIDENCE, Answer, Ranked
+from accelstudy.planning.candidates import NINE, Candidate, shortest
+from accelstudy.planning.optimised import is_best, request_of
+from accelstudy.planning.question import Question
+from accelstudy.planning.reasons import PLAIN, in_use, limits, needs, spoilers
 from accelstudy.sensors.sensor import SensorModel
 
-SENTENCES = "plan/wording.txt.j2"
+SENTENCES = "planning/wording.txt.j2"
 
 
 def answer_lines(answer: Answer) -> list[str]:

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.effects import get_effect
-from accelstudy.plan.candidates import PLANNED_MODELS, Candidate
-from accelstudy.plan.question import Question
-from accelstudy.plan.theory import OF_RIG, Theory, theory_of
+from accelstudy.planning.candidates import PLANNED_MODELS, Candidate
+from accelstudy.planning.question import Question
+from accelstudy.planning.theory import OF_RIG, Theory, theory_of
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.progress import track
-from accelstudy.plan.question import Equipment, Question
-from accelstudy.plan.theory import Expected, theory_of
+from accelstudy.planning.question import Equipment, Question
+from accelstudy.planning.theory import Expected, theory_of
 from accelstudy.schemes import Scheme, get_scheme, scheme_names
 from accelstudy.sensors.models import MODELS, get_model
 from accelstudy.sensors.sensor import SensorModel
@@ -29,7 +29,7 @@ PLANNED_MODELS = (
 FAMILY = "fibonacci"
 SIZES = (*range(4, 25), 27, *range(30, 61, 5), *range(70, 101, 10), *range(120, 401, 40))
 """Family of evenly spread positions, and the sizes of it that are tried. They show about how many
-positions are needed; `accelstudy.plan.optimised` seeks the fewest."""
+positions are needed; `accelstudy.planning.optimised` seeks the fewest."""
 LEAST_REDUNDANCY = 0.25
 """Least share of redundant conditions; with fewer a wrong position would not be noticed."""
 

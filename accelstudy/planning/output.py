@@ -15,12 +15,12 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.suggested import study_again
 from accelstudy.basics.units import MGON
 from accelstudy.files.outputs import PLAN, result_folder
-from accelstudy.plan.answer import Answer, answer
-from accelstudy.plan.candidates import Candidate
-from accelstudy.plan.config import PlanCase
-from accelstudy.plan.optimised import is_best, request_of
-from accelstudy.plan.reasons import limits
-from accelstudy.plan.wording import (
+from accelstudy.planning.answer import Answer, answer
+from accelstudy.planning.candidates import Candidate
+from accelstudy.planning.config import PlanCase
+from accelstudy.planning.optimised import is_best, request_of
+from accelstudy.planning.reasons import limits
+from accelstudy.planning.wording import (
     answer_lines,
     assumption_lines,
     how_to,
@@ -96,7 +96,7 @@ def plan_files(
     from accelstudy.drawing.saving import save
     from accelstudy.drawing.style import DPI, STYLE
     from accelstudy.files.tables import write_table
-    from accelstudy.plan.figure import plan_figure
+    from accelstudy.planning.figure import plan_figure
 
     write_table(folder / "plan.parquet", plan_table(answer), provenance)
     head = STUDY_HEAD.format(command=study_again(shown / "study.yaml"))

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from accelstudy.basics.progress import track
-from accelstudy.plan.candidates import Candidate, candidates
-from accelstudy.plan.optimised import Sought, cheapest
-from accelstudy.plan.question import ROBOT, Equipment, Question
-from accelstudy.plan.simulated import Simulated, simulate, study_of
+from accelstudy.planning.candidates import Candidate, candidates
+from accelstudy.planning.optimised import Sought, cheapest
+from accelstudy.planning.question import ROBOT, Equipment, Question
+from accelstudy.planning.simulated import Simulated, simulate, study_of
 
 SHOWN = 8
 """Candidates in the table."""

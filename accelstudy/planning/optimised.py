@@ -9,8 +9,8 @@ from functools import cache
 
 from accelstudy.basics.units import GON, MGON
 from accelstudy.design.criteria import WorseAngle
-from accelstudy.plan.candidates import LEAST_REDUNDANCY, Candidate, of_scheme, sigma_of
-from accelstudy.plan.question import Equipment, Question
+from accelstudy.planning.candidates import LEAST_REDUNDANCY, Candidate, of_scheme, sigma_of
+from accelstudy.planning.question import Equipment, Question
 from accelstudy.proposal.request import Request
 from accelstudy.schemes import Scheme
 from accelstudy.schemes.files import remember

@@ -11,7 +11,7 @@ from typing import Literal
 from accelstudy.basics.errors import InputError
 from accelstudy.data_sheets import DataSheet, get_data_sheet, read_data_sheet
 from accelstudy.effects import get_effect
-from accelstudy.plan.quantities import QUANTITIES
+from accelstudy.planning.quantities import QUANTITIES
 from accelstudy.schemes import Scheme, get_scheme, is_scheme_file
 
 HOLDS = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0)

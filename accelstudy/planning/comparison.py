@@ -14,10 +14,10 @@ from accelstudy.basics.units import GON, MGON, display_unit, to_display
 from accelstudy.drawing.saving import save
 from accelstudy.drawing.style import DPI, FULL, STYLE, approach_colour, log_ticks, new_figure
 from accelstudy.files.tables import write_table
-from accelstudy.plan.answer import by_time
-from accelstudy.plan.candidates import candidates
-from accelstudy.plan.question import Question, get_sensor
-from accelstudy.plan.wording import model_words
+from accelstudy.planning.answer import by_time
+from accelstudy.planning.candidates import candidates
+from accelstudy.planning.question import Question, get_sensor
+from accelstudy.planning.wording import model_words
 from accelstudy.schemes.optimal import stored_designs
 
 TILT_RANGE = 30 * GON

@@ -1,0 +1,1 @@
+"""The functions for programs: few, and thin over the rooms that do the work."""

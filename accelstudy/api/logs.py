@@ -1,0 +1,89 @@
+"""Logs of a program: a file, or a table in memory, and how it is read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from shutil import rmtree
+from tempfile import mkdtemp
+from typing import Any
+from weakref import finalize
+
+import pandas as pd
+
+from accelstudy.api.given import of_type, path_of
+from accelstudy.campaign.header import LogLayout
+from accelstudy.campaign.importing.sources import open_source
+from accelstudy.files.validation import checked
+
+
+@dataclass(frozen=True, repr=False)
+class Log:
+    """A log, and how it is read; its numbers stay in the file until they are needed.
+
+    Attributes
+    ----------
+    path : Path
+    layout : dict, keys of the settings of `import` that were given
+    """
+
+    path: Path
+    layout: dict[str, Any]
+
+    def __repr__(self) -> str:
+        return f"Log({self.path.name!r}, {', '.join(self.layout) or 'nothing given'})"
+
+
+def read_log(
+    log: str | PathLike[str] | pd.DataFrame,
+    *,
+    rate: float | None = None,
+    columns: Mapping[str, str | int] | None = None,
+    **layout: Any,
+) -> Log:
+    """Say which log to read, and how.
+
+    Parameters
+    ----------
+    log : path or DataFrame
+        Text (CSV or columns, perhaps .gz), MATLAB or Parquet, or a table in memory.
+    rate : float, Hz, optional
+        Samples per second, where there is no column of time.
+    columns : mapping, optional
+        ``fx``, ``fy``, ``fz``, ``temperature`` and ``vibration`` to the name of a column, or its
+        number from 0.
+    layout
+        Other keys of the settings of ``accelstudy import`` that say how a log is read: ``time``,
+        ``time_unit``, ``unit``, ``scale``, ``offset``, ``frame``, ``variable``.
+
+    Returns
+    -------
+    Log
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or a key or a value is wrong.
+    """
+    if columns is not None:
+        of_type("columns", columns, Mapping, expected="a mapping, as {'fx': 'ax'}")
+        columns = dict(columns)
+    given = {"rate_hz": rate, "columns": columns, **layout}
+    given = {key: value for key, value in given.items() if value is not None}
+    checked(LogLayout, given, "read_log")
+    if not isinstance(log, pd.DataFrame):
+        path = path_of("log", log)
+        open_source(path, given.get("variable"))
+        return Log(path, given)
+    folder = Path(mkdtemp(prefix="accelstudy-"))
+    table = Log(folder / "DataFrame.parquet", given)
+    finalize(table, rmtree, folder, ignore_errors=True)
+    log.rename(columns=str).to_parquet(table.path, index=False)
+    return table
+
+
+def log_of(log: Any) -> Log:
+    """Return a log as such, whatever way it was given."""
+    return log if isinstance(log, Log) else read_log(log)
