@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -15,7 +15,7 @@ from pydantic import BaseModel, Field, model_validator
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.wording import counted
 from accelstudy.campaign.header import LogLayout, Nominal, PerAxis
-from accelstudy.effects import HoldConditions
+from accelstudy.effects import Effect, HoldConditions
 from accelstudy.files.reading import read_json
 from accelstudy.files.validation import Finite, NotNegative, Number, Positive, checked
 from accelstudy.leveling.angles import angles_of, jacobian, tilt_slope
@@ -58,13 +58,7 @@ class Calibration:
     @cached_property
     def needs(self) -> tuple[tuple[str, str], ...]:
         """Effects that need more than the force, each with a column of `HoldConditions`."""
-        if not self.model.hold_columns:
-            return ()
-        return tuple(
-            (effect.name, column)
-            for effect in self.model.effects
-            for column in compose(effect.spec, (effect.spec,)).hold_columns
-        )
+        return needs_of(self.model.effects) if self.model.hold_columns else ()
 
     @property
     def drifts(self) -> tuple[str, ...]:
@@ -256,6 +250,15 @@ def calibration_of(content: Any, where: str = NO_CALIBRATION) -> Calibration:
         content=document.model_dump(),
         log=document.log,
         ranges=document.ranges,
+    )
+
+
+def needs_of(effects: Iterable[Effect]) -> tuple[tuple[str, str], ...]:
+    """Effects that need more than the force, each with a column of `HoldConditions`."""
+    return tuple(
+        (effect.name, column)
+        for effect in effects
+        for column in compose(effect.spec, (effect.spec,)).hold_columns
     )
 
 
