@@ -3,6 +3,7 @@
 `make docs` checks the rest: links, anchors, and the files, commands and options that pages name.
 """
 
+import json
 import re
 import sys
 
@@ -13,15 +14,19 @@ from study_helpers import grid, make_study, run_rare, run_study
 
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.batch.overview import CAMPAIGN_COLUMNS, PARAMETER_COLUMNS
+from accelstudy.campaign.calibration.applying import calibration_of
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.document import (
     assessed_positions,
     calibration_document,
+    json_text,
     quality_document,
 )
 from accelstudy.campaign.calibration.export import export
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
+from accelstudy.epochs.comparison import compare
+from accelstudy.epochs.output import comparison_document
 from accelstudy.files.tables import read_table
 from accelstudy.sensors.models import get_model
 from accelstudy.study.sensitivity import analyse_sensitivity, analyse_shapley
@@ -62,8 +67,10 @@ def test_each_key_of_a_calibration_is_described(pages):
     fit = fit_campaign(campaign, get_model("bias-scale"), get_approach("robot"))
     assessment = assess(fit)
     document = {**calibration_document(fit), "quality": quality_document(assessment)}
+    one = calibration_of(json.loads(json_text(document)))
     written = {
         "calibration.json": set(_keys(document)),
+        "comparison.json": set(_keys(comparison_document(compare(one, one)))),
         "positions.parquet": set(assessed_positions(assessment)),
         "campaigns.parquet": set(CAMPAIGN_COLUMNS),
         "parameters.parquet": set(PARAMETER_COLUMNS),

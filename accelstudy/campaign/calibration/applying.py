@@ -190,6 +190,8 @@ class _Document(BaseModel):
     unit: Literal["m/s^2", "g", "counts"]
     nominal: Nominal | None
     gravity_mps2: Positive
+    sigma_source: Literal["a priori", "a posteriori"] = "a posteriori"
+    redundancy: int = 0
     sigma_position_mps2: NotNegative | None
     sigma_reading_mps2: NotNegative | None = None
     sigmas_95: Positive | None = None
