@@ -35,7 +35,7 @@ from accelstudy.commands.options import (
 @angle_unit_option
 @quiet_option
 def compare_command(first: Path, second: Path, out: Path, tilt_range: float, force: bool) -> None:
-    """Compare two calibrations of one sensor, and say whether it is still what it was.
+    """Say whether a sensor is still what it was.
 
     FIRST and SECOND are calibration.json files, the older one first. The congruence test of
     deformation analysis takes all parameters with both covariance matrices; if it rejects, the

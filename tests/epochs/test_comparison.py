@@ -6,35 +6,17 @@ import numpy as np
 import pytest
 from calling import refusal, succeed
 from page_helpers import assert_sound, text_of
+from session_helpers import NINE, SENSOR, document, write_document
 
-from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.applying import calibration_of
-from accelstudy.campaign.calibration.assessment import assess
-from accelstudy.campaign.calibration.document import (
-    calibration_document,
-    json_text,
-    quality_document,
-)
-from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
+from accelstudy.campaign.calibration.document import json_text
 from accelstudy.epochs.comparison import compare
 from accelstudy.leveling.angles import angles_of, wrapped
 from accelstudy.leveling.error import cap_forces
-from accelstudy.sensors.models import get_model
 
-SENSOR = ("bias: 0.1, 0.05, -0.1", "scale: 0.002, -0.001, 0.003",
-          "nonorthogonality: 0.003, -0.002, 0.001")  # fmt: skip
 CROSS = "cross_axis_misalignment: 0.004, 0.003, -0.002"
 WARM = "thermal_bias: 0.002, -0.001, 0.001"
-NINE = "bias-scale-nonorthogonality"
-
-
-def document(seed, *, model=NINE, approach="gravity", effects=SENSOR, **settings):
-    """Content of the calibration.json of a session with the sensor."""
-    settings = CampaignSettings(seed=seed, effects=effects, name=f"session-{seed}", **settings)
-    fit = fit_campaign(simulate_campaign(settings)[0], get_model(model), get_approach(approach))
-    return {**calibration_document(fit), "quality": quality_document(assess(fit))}
 
 
 def calibrated(seed, **options):
@@ -98,8 +80,8 @@ def test_what_cannot_be_compared_is_said():
 @pytest.mark.parametrize("changed", [True, False])
 def test_the_command_writes_what_it_says(changed, tmp_path):
     effects = ("bias: 0.1, 0.07, -0.1", *SENSOR[1:]) if changed else SENSOR
-    for name, content in (("a", document(1)), ("b", document(2, effects=effects))):
-        (tmp_path / f"{name}.json").write_text(json_text(content), encoding="utf-8")
+    write_document(tmp_path / "a.json", 1)
+    write_document(tmp_path / "b.json", 2, effects=effects)
     out = tmp_path / "out"
     told = succeed("compare", tmp_path / "a.json", tmp_path / "b.json", "--out", out).stdout
     content = json.loads((out / "comparison.json").read_text(encoding="utf-8"))
