@@ -33,6 +33,7 @@ class SensorEvidence:
     Attributes
     ----------
     campaign : str
+    p_value : float, of anything missing in this campaign alone
     odds : dict of name to log odds: an effect, a kind of noise, a bumped position, or "unknown"
         with the coordinate and the target that something without a name has
     pairs : dict of two names to the log odds of both together
@@ -44,6 +45,7 @@ class SensorEvidence:
     """
 
     campaign: str
+    p_value: float
     odds: dict[str, float]
     pairs: dict[tuple[str, str], float]
     classes: tuple[tuple[str, ...], ...]
@@ -91,6 +93,7 @@ def sensor_evidence(
     names, by_chance = _by_chance(problem, chance)
     return SensorEvidence(
         campaign=campaign.name,
+        p_value=detection.p_value,
         odds=odds,
         pairs=pairs,
         classes=tuple(members for _, members in weighing.classes),

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -29,8 +30,8 @@ LEVEL = 0.05
 """Level of the test whether anything is missing in a lot."""
 FALSE_ODD = 0.05
 """False discovery rate of odd sensors."""
-FEW = 2.0
-"""Expected number of sensors below which what they lack is no matter of the lot."""
+FEW = 2
+"""Sensors that have to lack the same, or it is no matter of the lot."""
 HAS = 0.5
 """Posterior probability from which a sensor counts among those that lack an effect."""
 
@@ -44,6 +45,7 @@ class Size:
     name, unit : str, SI
     mean, scatter : float, of the type
     sigma : float, of the mean
+    each, sigma_each : (n,) arrays, of the sensors; NaN where a campaign cannot show it
     """
 
     name: str
@@ -51,6 +53,8 @@ class Size:
     mean: float
     scatter: float
     sigma: float
+    each: Array
+    sigma_each: Array
 
 
 @dataclass(frozen=True)
@@ -173,9 +177,9 @@ class Lot:
     @cached_property
     def _rare(self) -> NDArray[np.bool_]:
         """Whether fewer than two sensors lack it, if it is one of the lot, (K,)."""
-        of = self.mixture.of_effects
-        carriers = np.array([self.mixture.lacking(k).sum() for k in range(len(of))])
-        return np.asarray(carriers < FEW * of)
+        of = np.maximum(self.mixture.of_effects, 1e-300)
+        surely = [np.sum(self.mixture.lacking(k) > HAS * of[k]) for k in range(len(of))]
+        return np.array(surely) < FEW
 
     @property
     def alternatives(self) -> list[tuple[tuple[str, ...], float]]:
@@ -237,31 +241,23 @@ def with_sizes(
     specs = {k: _spec(lot, k, found) for k, found in lot.found if found.names[0] in effect_names()}
     if not specs:
         return [found for _, found in lot.found]
-    effects = (*(e.spec for e in model.effects), *specs.values())
+    effects = (*(effect.spec for effect in model.effects), *specs.values())
     extended = compose(composition_name(compose("type", effects).effects), effects)
-    values, variances = [], []
-    for campaign in campaigns:
-        try:
+    values, sigmas = np.full((2, len(campaigns), extended.n_parameters), np.nan)
+    for i, campaign in enumerate(campaigns):
+        with suppress(InputError):  # the campaign cannot show all of it
             fit = fit_campaign(campaign, extended, approach or usual_approach(campaign))
-            values.append(fit.parameters)
-            variances.append(np.diag(fit.covariance))
-        except InputError:  # the campaign cannot show all of it
-            values.append(np.full(extended.n_parameters, np.nan))
-            variances.append(np.full(extended.n_parameters, np.nan))
-    first, results = model.n_parameters, {}
+            values[i], sigmas[i] = fit.parameters, np.sqrt(np.diag(fit.covariance))
+    first, results = model.n_parameters, dict[int, tuple[Size, ...]]()
     for k, spec in specs.items():
-        parameters = compose(spec, (spec,)).parameters
-        rows = lot.mixture.lacking(k) > HAS
-        sizes = []
-        for j, parameter in enumerate(parameters, start=first):
-            of = np.array(values)[rows, j], np.array(variances)[rows, j]
-            mean, scatter, sigma = random_effects(*of)
-            sizes.append(Size(parameter.name, parameter.unit, mean, scatter, sigma))
-        results[k] = tuple(sizes)
+        parameters, rows = compose(spec, (spec,)).parameters, lot.mixture.lacking(k) > HAS
+        results[k] = tuple(
+            Size(p.name, p.unit, *random_effects(values[rows, j], sigmas[rows, j] ** 2),
+                 values[:, j], sigmas[:, j])
+            for j, p in enumerate(parameters, start=first)
+        )  # fmt: skip
         first += len(parameters)
-    return [
-        Found(f.names, f.posterior, f.share, f.share_ci95, results.get(k, ())) for k, f in lot.found
-    ]
+    return [replace(found, sizes=results.get(k, ())) for k, found in lot.found]
 
 
 def _spec(lot: Lot, k: int, found: Found) -> str:

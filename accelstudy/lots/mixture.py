@@ -80,7 +80,7 @@ class Mixture:
             weight = np.log(MISSING * (1 - MORE)) + np.log(prior[i])
             found[(i,)] = weight + empty._evidence((i,))
         singles = sorted(((i,) for i in range(k)), key=lambda s: -found[s])[:STRONGEST]
-        strongest = singles
+        strongest: list[Names] = [*singles]
         for size in (2, 3):
             tried = {tuple(sorted({*s, i})) for s in strongest for (i,) in singles if i not in s}
             log = np.log(MISSING * MORE ** (size - 1)) - np.log(special.comb(k, size))
