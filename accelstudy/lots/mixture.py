@@ -83,6 +83,8 @@ class Mixture:
         strongest: list[Names] = [*singles]
         for size in (2, 3):
             tried = {tuple(sorted({*s, i})) for s in strongest for (i,) in singles if i not in s}
+            if not tried:
+                break
             log = np.log(MISSING * MORE ** (size - 1)) - np.log(special.comb(k, size))
             for names in sorted(tried):
                 found[names] = log + empty._evidence(names)
@@ -230,7 +232,7 @@ def lot_odds(odds: Sequence[Array], prior: Array) -> Array:
     -------
     (...) array
     """
-    nodes, weights = _nodes(1)
+    nodes, weights = _nodes(2)
     logs = np.zeros((*odds[0].shape, len(nodes)))
     for each in odds:
         logs += np.logaddexp(np.log(1 - nodes), each[..., None] + np.log(nodes))
