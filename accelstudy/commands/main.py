@@ -26,6 +26,7 @@ from accelstudy.commands.ending import bad_input_as_one_line, interruptible
 from accelstudy.commands.export import export_command
 from accelstudy.commands.importing import import_command
 from accelstudy.commands.init import init_command
+from accelstudy.commands.lot import lot_command
 from accelstudy.commands.models import models_command
 from accelstudy.commands.options import ANGLE_UNIT
 from accelstudy.commands.plan import plan_command
@@ -43,6 +44,7 @@ SECTIONS: dict[str, tuple[click.Command, ...]] = {
         advise_command,
         calibrate_command,
         diagnose_command,
+        lot_command,
         check_sigmas_command,
         apply_command,
         export_command,

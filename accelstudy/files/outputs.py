@@ -84,6 +84,7 @@ POLE = Kind(
     ("budget.parquet", "monte-carlo.parquet", "budget.svg", "budget.png"),
 )
 COMPARISON = Kind("comparison of calibrations", "comparison.json", ("report.html",), ("figures",))
+LOT = Kind("lot", "lot.json", ("report.html",), ("figures",))
 PLAN = Kind(
     "plan",
     "plan.parquet",
@@ -95,7 +96,7 @@ STUDY = Kind(
     ("README.md", "config/config.yaml", "profiles/default/config.yaml"),
     replaced=False,
 )
-_KINDS = (BATCH_JOB, DIAGNOSIS, CALIBRATION, CAMPAIGN, POLE, PLAN, COMPARISON)
+_KINDS = (BATCH_JOB, DIAGNOSIS, CALIBRATION, CAMPAIGN, POLE, PLAN, COMPARISON, LOT)
 
 
 @contextmanager

@@ -15,6 +15,8 @@ from places import ROOT
 from session_helpers import write_document
 from study_helpers import PROVENANCE
 
+from accelstudy.campaign.format import write_campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.commands.main import main
 from accelstudy.files.tables import write_table
 from accelstudy.schemes import get_scheme
@@ -76,13 +78,16 @@ def environment_of(site):
 def steps(site, walked):
     """What came of all commands, in a folder that holds what a reader has.
 
-    That is a log of a sensor, two calibrations of another and, for studies, the configurations and
-    the verdicts of one.
+    That is a log of a sensor, two calibrations of another, campaigns of three and, for studies, the
+    configurations and the verdicts of one.
     """
     folder = walked
     log_csv(folder / "log.csv")
     for seed, season in enumerate(("spring", "autumn")):
         write_document(folder / season / "calibration.json", seed)
+    for seed in (1, 2, 3):
+        session = simulate_campaign(CampaignSettings(seed=seed, scheme="fibonacci-18"))[0]
+        write_campaign(session, folder / f"sensor-{seed}")
     shutil.copytree(ROOT / "config", folder / "config")
     claim = {
         "claim": "c", "section": "4.2", "statement": "it holds", "unit": "%", "paper": 50.0,

@@ -7,6 +7,7 @@ import json
 import re
 import sys
 
+import numpy as np
 import pytest
 import yaml
 from places import ROOT
@@ -28,6 +29,9 @@ from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.epochs.comparison import compare
 from accelstudy.epochs.output import comparison_document
 from accelstudy.files.tables import read_table
+from accelstudy.lots.evidence import SensorEvidence
+from accelstudy.lots.lot import Lot
+from accelstudy.lots.output import lot_document
 from accelstudy.sensors.models import get_model
 from accelstudy.study.sensitivity import analyse_sensitivity, analyse_shapley
 
@@ -71,6 +75,7 @@ def test_each_key_of_a_calibration_is_described(pages):
     written = {
         "calibration.json": set(_keys(document)),
         "comparison.json": set(_keys(comparison_document(compare(one, one)))),
+        "lot.json": set(_keys(_lot())),
         "positions.parquet": set(assessed_positions(assessment)),
         "campaigns.parquet": set(CAMPAIGN_COLUMNS),
         "parameters.parquet": set(PARAMETER_COLUMNS),
@@ -101,11 +106,24 @@ def test_each_name_of_an_exported_calibration_is_described(pages):
     assert described["imu_calib.yaml"] == set(yaml.safe_load(export(document, "ros")))
 
 
+def _lot():
+    """Content of lot.json, of sensors that lack the same."""
+    name, odds, by_chance = "thermal_bias", np.array([20.0]), np.zeros((1000, 1))
+    each = [
+        SensorEvidence(c, 0.5, {name: 20.0}, {}, ((name,),), {}, by_chance, (name,), odds)
+        for c in "abc"
+    ]
+    lot = Lot(tuple(each))
+    return lot_document(lot, [found for _, found in lot.found])
+
+
 def _keys(document):
     """Keys as the page has them: those of blocks that it takes apart stand behind a dot."""
     for key, value in document.items():
         if key != "quality":
             yield key
-        inner = value[0] if key == "parameters" else value
-        if key in ("parameters", "affine", "quality"):
+        inner = (
+            value[0] if key in ("parameters", "effects") and isinstance(value[0], dict) else value
+        )
+        if listed or key in ("affine", "quality"):
             yield from (f"{key}.{each}" for each in inner)

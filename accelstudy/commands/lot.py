@@ -1,0 +1,64 @@
+"""The command that evaluates the campaigns of a lot together."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from accelstudy.basics.progress import say, track
+from accelstudy.commands.options import (
+    PATH,
+    angle_unit_option,
+    approach_option,
+    example,
+    force_option,
+    model_option,
+    quiet_option,
+    seed_option,
+)
+
+
+@click.command("lot", epilog=example("accelstudy lot sensor-1 sensor-2 sensor-3 --out lot"))
+@click.argument("campaigns", type=PATH, nargs=-1, required=True, metavar="CAMPAIGN...")
+@click.option("--out", type=PATH, required=True, help="Folder to write to.")
+@model_option
+@approach_option(None)
+@seed_option
+@force_option
+@angle_unit_option
+@quiet_option
+def lot_command(
+    campaigns: tuple[Path, ...], model: str, approach: str | None, out: Path, seed: int, force: bool
+) -> None:
+    """Say what sensors of one type lack together.
+
+    CAMPAIGN are folders, one per sensor. They may differ in positions, columns and approach. What
+    one campaign alone cannot show, many show together: whether anything is missing in the lot, at
+    one level for all, in how many of the sensors, how large it is, and which sensor is odd.
+
+    The folder of results gets report.html, lot.json and a figure.
+    """
+    from accelstudy.approaches import get_approach
+    from accelstudy.basics.errors import InputError
+    from accelstudy.campaign.format import read_campaign
+    from accelstudy.files.outputs import LOT, result_folder
+    from accelstudy.lots.evidence import sensor_evidence
+    from accelstudy.lots.lot import Lot, with_sizes
+    from accelstudy.lots.output import write_lot
+    from accelstudy.sensors.models import get_model
+
+    if len(campaigns) < 2:
+        raise InputError("CAMPAIGN: a lot has two sensors or more; `diagnose` takes one")
+    chosen = get_model(model), None if approach is None else get_approach(approach)
+    with result_folder(out, LOT, campaigns, force) as folder:
+        measured = [read_campaign(campaign) for campaign in campaigns]
+        lot = Lot(
+            tuple(
+                sensor_evidence(one, *chosen, seed=seed + i)
+                for i, one in enumerate(track(measured, "evidence of the sensors", len(measured)))
+            )
+        )
+        content = write_lot(lot, with_sizes(lot, measured, *chosen), folder)
+    click.echo(content["verdict"])
+    say(f"report: {out / 'report.html'}")

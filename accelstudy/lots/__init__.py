@@ -1,0 +1,1 @@
+"""Lots: what many sensors of one type say together about what their model lacks."""

@@ -1,0 +1,240 @@
+"""The mixture of a lot: which effects its sensors lack, how many of them do, and which ones.
+
+An effect k of the lot is missing in each sensor with the probability ρ_k, its share, which is
+uniform a priori. Effects are missing independently of each other. A set Z of effects of the lot has
+the evidence
+
+    B_Z = ∫ Π_i [(1 − ε) Σ_{s ⊆ Z} Π_{k ∈ s} ρ_k Π_{k ∈ Z∖s} (1 − ρ_k) r_i(s) + ε r̄_i] dρ,
+
+with r_i(s) the odds of the campaign of sensor i for the set s against nothing, and r̄_i their mean
+over all that could be missing: a sensor may be odd, and then lack something of its own. Sets have
+up to three effects, and a sensor lacks up to two of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+Array = NDArray[np.float64]
+Names = tuple[int, ...]
+
+ODD = 0.01
+"""Prior probability that a sensor is odd."""
+MISSING = 0.5
+"""Prior probability that the lot lacks anything."""
+MORE = 0.15
+"""Prior probability of two effects rather than one, and of three rather than two."""
+STRONGEST, FURTHER = 12, 3
+"""Effects of which pairs are tried, and pairs to which a third one is added."""
+LEAST = 1e-6
+"""Posterior below which a set does not count."""
+NODES = {1: 64, 2: 24, 3: 12}
+"""Nodes of the integral over each share, by the number of effects."""
+
+
+@dataclass(frozen=True)
+class Weighted:
+    """A set of effects of the lot.
+
+    Attributes
+    ----------
+    names : tuple of int, places of the effects
+    log_weight : float, log of its evidence times its prior weight
+    """
+
+    names: Names
+    log_weight: float
+
+
+@dataclass(frozen=True, eq=False)
+class Mixture:
+    """The posterior of a lot.
+
+    Attributes
+    ----------
+    odds : (n, K) array, log odds of each sensor for each effect against nothing
+    pairs : mapping of two places, in order, to (n,) arrays of log odds of both together
+    prior : (K,) array, prior probabilities of the effects, which sum to 1
+    sets : list of Weighted, most probable first
+    """
+
+    odds: Array
+    pairs: Mapping[tuple[int, int], Array]
+    prior: Array
+    sets: list[Weighted]
+
+    @classmethod
+    def of(cls, odds: Array, pairs: Mapping[tuple[int, int], Array], prior: Array) -> Mixture:
+        """Weigh the sets of effects, the strongest first."""
+        empty = cls(odds, pairs, prior, [])
+        k = odds.shape[1]
+        found: dict[Names, float] = {(): np.log(1 - MISSING) + empty._evidence(())}
+        for i in range(k):
+            weight = np.log(MISSING * (1 - MORE)) + np.log(prior[i])
+            found[(i,)] = weight + empty._evidence((i,))
+        singles = sorted(((i,) for i in range(k)), key=lambda s: -found[s])[:STRONGEST]
+        strongest: list[Names] = [*singles]
+        for size in (2, 3):
+            tried = {tuple(sorted({*s, i})) for s in strongest for (i,) in singles if i not in s}
+            if not tried:
+                break
+            log = np.log(MISSING * MORE ** (size - 1)) - np.log(special.comb(k, size))
+            for names in sorted(tried):
+                found[names] = log + empty._evidence(names)
+            strongest = sorted(tried, key=lambda s: -found[s])[:FURTHER]
+        ordered = sorted(found.items(), key=lambda item: -item[1])
+        return cls(odds, pairs, prior, [Weighted(n, float(w)) for n, w in ordered])
+
+    @cached_property
+    def probabilities(self) -> Array:
+        """Posterior of each of `sets`."""
+        return special.softmax([one.log_weight for one in self.sets])
+
+    @property
+    def missing(self) -> float:
+        """Posterior probability that the lot lacks anything."""
+        return 1 - sum(p for one, p in zip(self.sets, self.probabilities, strict=True)
+                       if not one.names)  # fmt: skip
+
+    @cached_property
+    def of_effects(self) -> Array:
+        """Posterior probability of each effect to be one of the lot, (K,)."""
+        each = np.zeros(self.odds.shape[1])
+        for one, p in zip(self.sets, self.probabilities, strict=True):
+            each[[*one.names]] += p
+        return each
+
+    def share(self, k: int) -> tuple[float, float, float]:
+        """Share of the sensors that lack an effect: mean, and the interval that holds 95 %."""
+        grid, density = np.linspace(0, 1, 401), np.zeros(401)
+        for one, p in zip(self.sets, self.probabilities, strict=True):
+            if k in one.names and p > LEAST:
+                nodes, weights = self._posterior(one.names)
+                # A mixture of narrow steps between the nodes of the integral.
+                place = one.names.index(k)
+                values, mass = nodes[place], weights.sum(
+                    axis=tuple(a for a in range(len(one.names)) if a != place)
+                )  # fmt: skip
+                log = np.log(np.maximum(mass / _nodes(len(one.names))[1], 1e-300))
+                fine = np.exp(np.interp(grid, values, log))
+                density += p * fine / fine.sum()
+        density /= density.sum()
+        below = np.cumsum(density)
+        low, high = np.interp([0.025, 0.975], below, grid)
+        return float(grid @ density), float(low), float(high)
+
+    @cached_property
+    def sensors(self) -> tuple[dict[Names, Array], Array]:
+        """Posterior of each sensor to lack a set of effects, {set: (n,)}, and to be odd, (n,)."""
+        n = len(self.odds)
+        lacks: dict[Names, Array] = {}
+        odd = np.zeros(n)
+        for one, p in zip(self.sets, self.probabilities, strict=True):
+            if p < LEAST:
+                continue
+            _, weights = self._posterior(one.names)
+            parts, strange = self._parts(one.names)
+            total = np.logaddexp.reduce([*parts.values(), strange])
+            for subset, log in parts.items():
+                mass = np.exp(log - total).reshape(n, -1) @ weights.ravel()
+                lacks[subset] = lacks.get(subset, np.zeros(n)) + p * mass
+            odd += p * np.exp(strange - total).reshape(n, -1) @ weights.ravel()
+        return lacks, odd
+
+    def odd_in(self, names: Names) -> Array:
+        """Posterior of each sensor to be odd, (n,), if the lot lacks some effects."""
+        _, weights = self._posterior(names)
+        parts, strange = self._parts(names)
+        total = np.logaddexp.reduce([*parts.values(), strange])
+        odd = np.exp(strange - total).reshape(len(self.odds), -1) @ np.atleast_1d(weights).ravel()
+        return np.asarray(odd)
+
+    def lacking(self, k: int) -> Array:
+        """Posterior of each sensor to lack an effect, (n,)."""
+        return np.asarray(sum((p for names, p in self.sensors[0].items() if k in names),
+                              np.zeros(len(self.odds))))  # fmt: skip
+
+    @cached_property
+    def _anything(self) -> Array:
+        """Log odds of each sensor for anything, (n,)."""
+        return np.asarray(special.logsumexp(self.odds + np.log(self.prior), axis=1))
+
+    def _together(self, subset: Names) -> Array:
+        """Log odds of the sensors for some effects together, (n,)."""
+        if not subset:
+            return np.zeros(len(self.odds))
+        if len(subset) == 1:
+            return self.odds[:, subset[0]]
+        one, other = subset
+        both = np.maximum(self.odds[:, one], self.odds[:, other])
+        found = self.pairs.get((one, other))
+        return both if found is None else np.where(np.isnan(found), both, found)
+
+    def _parts(self, names: Names) -> tuple[dict[Names, Array], Array]:
+        """Log of what each subset, and oddness, contributes: (n, nodes ...) arrays."""
+        size = len(names)
+        shape = (len(self.odds), *(NODES[size],) * size) if size else (len(self.odds),)
+        rho = np.meshgrid(*[_nodes(size)[0]] * size, indexing="ij") if size else []
+        parts = {}
+        for subset in (s for r in range(min(size, 2) + 1) for s in combinations(names, r)):
+            log = np.full(shape[1:], np.log(1 - ODD))
+            for place, i in enumerate(names):
+                log = log + np.log(rho[place] if i in subset else 1 - rho[place])
+            parts[subset] = self._together(subset).reshape(-1, *[1] * size) + log
+        strange = (np.log(ODD) + self._anything).reshape(-1, *[1] * size)
+        return parts, np.broadcast_to(strange, shape)
+
+    def _log_likelihood(self, names: Names) -> Array:
+        parts, strange = self._parts(names)
+        return np.asarray(np.logaddexp.reduce([*parts.values(), strange]).sum(axis=0))
+
+    def _evidence(self, names: Names) -> float:
+        logs = self._log_likelihood(names)
+        return float(special.logsumexp(logs + _log_weights(len(names))))
+
+    def _posterior(self, names: Names) -> tuple[list[Array], Array]:
+        """Nodes of each share, and their posterior probabilities (nodes ...)."""
+        logs = self._log_likelihood(names) + _log_weights(len(names))
+        return [_nodes(len(names))[0]] * len(names), np.exp(logs - special.logsumexp(logs))
+
+
+def _nodes(size: int) -> tuple[Array, Array]:
+    """Nodes and weights of the integral over a share."""
+    if not size:
+        return np.zeros(0), np.zeros(0)
+    nodes, weights = np.polynomial.legendre.leggauss(NODES[size])
+    return (nodes + 1) / 2, weights / 2
+
+
+def _log_weights(size: int) -> Array:
+    weights = np.ones(())
+    for _ in range(size):
+        weights = np.multiply.outer(weights, _nodes(size)[1])
+    return np.asarray(np.log(weights))
+
+
+def lot_odds(odds: Sequence[Array], prior: Array) -> Array:
+    """Log odds that one effect is missing in a share of the sensors, against nothing.
+
+    Parameters
+    ----------
+    odds : n arrays (..., K), log odds of the sensors
+    prior : (K,) array
+
+    Returns
+    -------
+    (...) array
+    """
+    nodes, weights = _nodes(2)
+    logs = np.zeros((*odds[0].shape, len(nodes)))
+    for each in odds:
+        logs += np.logaddexp(np.log(1 - nodes), each[..., None] + np.log(nodes))
+    by_effect = special.logsumexp(logs + np.log(weights), axis=-1)
+    return np.asarray(special.logsumexp(by_effect + np.log(prior), axis=-1))

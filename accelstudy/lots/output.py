@@ -1,0 +1,136 @@
+"""What a lot writes: JSON, a figure and a page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from accelstudy.basics.units import shown_unit, to_display
+from accelstudy.basics.wording import probability, words
+from accelstudy.campaign.calibration.document import json_number, json_text
+from accelstudy.drawing.saving import save_all
+from accelstudy.drawing.style import (
+    FULL,
+    INK,
+    MISSING,
+    group_colour,
+    group_of,
+    new_figure,
+    say_empty,
+    symbol,
+)
+from accelstudy.files.outputs import whole_file
+from accelstudy.lots.lot import LEVEL, Found, Lot
+from accelstudy.pages import lines, write_page
+
+ODD = "#D55E00"
+
+
+def said(lot: Lot, found: Sequence[Found]) -> list[str]:
+    """Say what the lot lacks, and which of its sensors are odd; the verdict comes first."""
+    alternatives = [
+        f"{' or '.join(map(words, names[:3]))} ({probability(p)})" for names, p in lot.alternatives
+    ]
+    top = [max(each.odds, key=lambda name, e=each: e.odds[name]) for each in lot.sensors]  # type: ignore[misc]
+    single = sum(name in found[0].names for name in top) if found else 0
+    return lines(
+        "lots/wording.txt.j2",
+        "verdict",
+        lot,
+        found,
+        alternatives,
+        lot.odd,
+        len(lot.sensors),
+        sum(each.p_value < LEVEL for each in lot.sensors),
+        single,
+    )
+
+
+def lot_document(lot: Lot, found: Sequence[Found]) -> dict[str, Any]:
+    """Describe a lot, in SI."""
+    return {
+        "schema_version": 1,
+        "sensors": len(lot.sensors),
+        "anything": {"p_value": lot.p_value, "missing": lot.missing, "level": LEVEL},
+        "effects": [
+            {
+                "names": list(f.names),
+                "posterior": f.posterior,
+                "share": f.share,
+                "share_ci95": list(f.share_ci95),
+                "parameters": [
+                    {
+                        "name": size.name,
+                        "mean": json_number(size.mean),
+                        "scatter": json_number(size.scatter),
+                        "sigma": json_number(size.sigma),
+                        "unit": size.unit,
+                    }
+                    for size in f.sizes
+                ],
+            }
+            for f in found
+        ],
+        "alternatives": [{"names": list(n), "posterior": p} for n, p in lot.alternatives],
+        "odd": [
+            {"campaign": o.campaign, "posterior": o.posterior, "names": list(o.names),
+             "reason": f"it shows {' or '.join(map(words, o.names))}, and the others do not"}
+            for o in lot.odd
+        ],
+        "each": [
+            {"campaign": campaign, "names": list(names), "posterior": p}
+            for campaign, names, p in lot.each()
+        ],
+        "verdict": " ".join(said(lot, found)),
+    }  # fmt: skip
+
+
+def write_lot(lot: Lot, found: Sequence[Found], folder: str | Path) -> dict[str, Any]:
+    """Write lot.json, report.html and the figure into a folder; returns the content."""
+    folder, content = Path(folder), lot_document(lot, found)
+    drawn = save_all({"sensors": lambda: sensors_figure(lot, found)}, folder / "figures")
+    sentences = said(lot, found)
+    state = "no_effect" if not lot.missing else "named" if found else "unknown"
+    write_page(
+        folder / "report.html",
+        "lots/report.html.j2",
+        " ".join(sentences),
+        doc=content,
+        state=state,
+        lines=sentences,
+        figures=drawn,
+    )
+    with whole_file(folder / "lot.json") as path:
+        path.write_text(json_text(content), encoding="utf-8")
+    return content
+
+
+def sensors_figure(lot: Lot, found: Sequence[Found]) -> Figure:
+    """Draw what each sensor has of what the lot lacks, with 95 % intervals, a parameter a row."""
+    sizes = [size for f in found for size in f.sizes]
+    figure = new_figure(FULL, 24 + 30 * max(len(sizes), 1))
+    panels = figure.subplots(max(len(sizes), 1), 1, sharex=True, squeeze=False)[:, 0]
+    if not sizes:
+        say_empty(panels[0], "nothing of the catalogue was found")
+    odd = {o.campaign for o in lot.odd}
+    strange = np.array([each.campaign in odd for each in lot.sensors])
+    places = np.arange(1, len(lot.sensors) + 1)
+    for ax, size in zip(panels, sizes, strict=False):
+        colour = group_colour(group_of(size.name))
+        each, sigma, mean, scatter = (
+            to_display(x, size.unit) for x in (size.each, size.sigma_each, size.mean, size.scatter)
+        )
+        ax.axhspan(mean - 2 * scatter, mean + 2 * scatter, color=MISSING)
+        ax.axhline(mean, color=colour, linewidth=0.8)
+        ax.axhline(0, color=INK, linewidth=0.8)
+        ax.errorbar(places, each, 1.96 * sigma, fmt="o", color=colour, capsize=2)
+        ax.plot(places[strange], each[strange], "o", markersize=9, markerfacecolor="none",
+                color=ODD)  # fmt: skip
+        ax.set_ylabel(f"{symbol(size.name)} / ({shown_unit(size.unit)})")
+    panels[-1].set_xlabel("sensor")
+    figure.suptitle("Each sensor with its 95 % interval; band: the type, ± 2 scatter; circle: odd")
+    return figure

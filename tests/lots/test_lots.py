@@ -1,0 +1,173 @@
+"""Lots: the mixture beside plain integrals and simulated sensors, and the command."""
+
+import json
+from itertools import product
+
+import numpy as np
+import pytest
+from calling import refusal, succeed
+from page_helpers import assert_sound, text_of
+from scipy import integrate
+
+from accelstudy.campaign.format import write_campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
+from accelstudy.lots.evidence import DRAWS, SensorEvidence, lot_classes
+from accelstudy.lots.lot import LEVEL, Lot, random_effects
+from accelstudy.lots.mixture import MISSING, MORE, ODD, Mixture
+
+STANDARD_ERRORS = 3.3
+NAMES = ("thermal_bias", "quadratic_scale", "warm_up")
+SPREAD = 3.0
+"""Sd of what is missing, in units of the noise; a sensor shows it in one number."""
+
+
+def odds_of(shown):
+    """Log odds of N(0, 1 + SPREAD²) against N(0, 1)."""
+    total = 1 + SPREAD**2
+    return shown**2 / 2 * (1 - 1 / total) - np.log(total) / 2
+
+
+def shown_by(rng, lacks):
+    """Numbers, of sensors (n, K) that lack things or do not."""
+    noise = rng.standard_normal(lacks.shape)
+    return noise + SPREAD * lacks * rng.standard_normal(lacks.shape)
+
+
+def sensor(name, odds, rng):
+    """Evidence in which each effect shows in a number of its own."""
+    by_chance = odds_of(rng.standard_normal((DRAWS, len(NAMES))))
+    known = dict(zip(NAMES, odds.tolist(), strict=True))
+    pairs = {(a, b): known[a] + known[b] for a, b in product(NAMES, NAMES) if a < b}
+    return SensorEvidence(name, 0.5, known, pairs, tuple((n,) for n in NAMES), {}, by_chance,
+                          NAMES, odds)  # fmt: skip
+
+
+def lot_of(lacks, rng):
+    each = odds_of(shown_by(rng, np.asarray(lacks, dtype=float)))
+    return Lot(tuple(sensor(f"sensor {i}", odds, rng) for i, odds in enumerate(each)))
+
+
+def test_the_evidence_of_a_set_is_its_integral():
+    rng = np.random.default_rng(1)
+    odds, prior = rng.normal(0, 2, (4, 2)), np.array([0.7, 0.3])
+    pairs = {(0, 1): odds.sum(axis=1) - 0.5}
+    mixture = Mixture.of(odds, pairs, prior)
+    strange = ODD * (np.exp(odds) @ prior)
+
+    def likelihood(a, b=0.0):
+        sets = (1 - a) * (1 - b) + a * (1 - b) * np.exp(odds[:, 0])
+        sets = sets + (1 - a) * b * np.exp(odds[:, 1]) + a * b * np.exp(pairs[0, 1])
+        return np.prod((1 - ODD) * sets + strange)
+
+    expected = {
+        (): (1 - MISSING) * likelihood(0.0),
+        (0,): MISSING * (1 - MORE) * 0.7 * integrate.quad(likelihood, 0, 1)[0],
+        (0, 1): MISSING * MORE * integrate.dblquad(likelihood, 0, 1, 0, 1)[0],
+    }
+    found = {one.names: np.exp(one.log_weight) for one in mixture.sets}
+    for names, value in expected.items():
+        assert found[names] == pytest.approx(value, rel=1e-6)
+    # Each sensor lacks some set, or is odd.
+    lacks, odd = mixture.sensors
+    np.testing.assert_allclose(sum(lacks.values()) + odd, 1, rtol=1e-6)
+
+
+def test_intervals_of_the_share_hold_it():
+    """Of shares that are drawn from the prior 95 % of the intervals hold them."""
+    rng, n = np.random.default_rng(2), 100
+    inside = []
+    for _ in range(n):
+        share = rng.random()
+        odds = odds_of(shown_by(rng, np.column_stack([rng.random(20) < share, np.zeros(20)])))
+        _, low, high = Mixture.of(odds, {}, np.array([0.5, 0.5])).share(0)
+        inside.append(low <= share <= high)
+    assert np.mean(inside) == pytest.approx(0.95, abs=STANDARD_ERRORS * np.sqrt(0.0475 / n))
+
+
+def test_probabilities_of_sensors_are_right():
+    """Of what is said with a probability of p, a part p is so."""
+    rng, said, true = np.random.default_rng(3), [], []
+    for _ in range(40):
+        lacks = rng.random(20) < rng.random()
+        odds = odds_of(shown_by(rng, np.column_stack([lacks, np.zeros(20)])))
+        said += Mixture.of(odds, {}, np.array([0.5, 0.5])).lacking(0).tolist()
+        true += lacks.tolist()
+    for low, high in ((0.0, 0.2), (0.2, 0.6), (0.6, 0.9), (0.9, 1.0)):
+        chosen = (np.array(said) >= low) & (np.array(said) < high)
+        p = np.mean(np.array(said)[chosen])
+        apart = STANDARD_ERRORS * np.sqrt(p * (1 - p) / chosen.sum()) + 0.03
+        assert np.mean(np.array(true)[chosen]) == pytest.approx(p, abs=apart)
+
+
+def test_nothing_missing_is_called_so_at_one_level():
+    rng, n = np.random.default_rng(4), 150
+    p = [lot_of(np.zeros((10, 3)), rng).p_value for _ in range(n)]
+    share = np.mean(np.array(p) < LEVEL)
+    assert share == pytest.approx(LEVEL, abs=STANDARD_ERRORS * np.sqrt(LEVEL * (1 - LEVEL) / n))
+
+
+def test_what_the_lot_lacks_is_named_and_what_one_sensor_lacks_makes_it_odd():
+    rng = np.random.default_rng(5)
+    lacks = np.zeros((20, 3))
+    lacks[:12, 0] = 1
+    assert [f.names for _, f in lot_of(2 * lacks, rng).found] == [("thermal_bias",)]
+    odds = odds_of(shown_by(rng, np.zeros((20, 3))))
+    odds[7, 1] = 25.0
+    lot = Lot(tuple(sensor(f"sensor {i}", each, rng) for i, each in enumerate(odds)))
+    assert lot.missing
+    assert lot.found == []
+    assert [(o.campaign, o.names) for o in lot.odd] == [("sensor 7", ("quadratic_scale",))]
+    assert not any(names for _, names, _ in lot.each() if names not in ((), ("odd",), NAMES[1:2]))
+
+
+def test_names_that_no_campaign_tells_apart_are_one_class():
+    def shows(*classes):
+        odds = {name: 1.0 - i / 10 for i, name in enumerate(sorted(n for c in classes for n in c))}
+        return SensorEvidence("c", 0.5, odds, {}, classes, {}, np.zeros((1, 0)), (), np.zeros(0))
+
+    together = [shows(("a", "b"), ("c",))] * 2
+    assert lot_classes(together) == [("a", "b"), ("c",)]
+    assert lot_classes([*together, *[shows(("a",), ("b",), ("c",))] * 3]) == [
+        ("a",),
+        ("b",),
+        ("c",),
+    ]
+
+
+def test_the_scatter_of_a_type_is_found():
+    """Mean and scatter of many sensors with known ones, and a single sensor."""
+    rng = np.random.default_rng(6)
+    sigmas = rng.uniform(0.5, 1.5, 2000)
+    values = 3 + rng.normal(0, 0.8, 2000) + sigmas * rng.standard_normal(2000)
+    mean, scatter, sigma = random_effects(values, sigmas**2)
+    assert mean == pytest.approx(3, abs=STANDARD_ERRORS * sigma)
+    assert scatter == pytest.approx(0.8, abs=0.1)
+    assert random_effects(np.array([2.0, np.nan]), np.array([0.25, 0.25])) == (2.0, 0.0, 0.5)
+    assert np.isnan(random_effects(np.array([]), np.array([]))).all()
+
+
+def test_the_command_says_what_a_lot_lacks(tmp_path):
+    """Eight sensors with a thermal bias, and one without it that has something else."""
+    for i in range(9):
+        effect = "quadratic_scale" if i == 8 else "thermal_bias: 0.0003, -0.0003, 0.0003"
+        settings = CampaignSettings(
+            name=f"sensor-{i}", seed=i, effects=(effect,), temperature=(15, 35),
+            temperature_order="random",
+        )  # fmt: skip
+        write_campaign(simulate_campaign(settings)[0], tmp_path / f"sensor-{i}")
+    folders = sorted(tmp_path.glob("sensor-*"))
+    told = succeed("lot", *folders, "--out", tmp_path / "lot").stdout
+    content = json.loads((tmp_path / "lot/lot.json").read_text(encoding="utf-8"))
+    assert content["anything"]["missing"]
+    (effect,) = content["effects"]
+    assert effect["names"][0] == "thermal_bias"
+    assert effect["share_ci95"][0] < 8 / 9 < effect["share_ci95"][1]
+    for parameter, true in zip(effect["parameters"], (3e-4, -3e-4, 3e-4), strict=True):
+        assert parameter["mean"] == pytest.approx(true, abs=4 * parameter["sigma"])
+    assert [o["campaign"] for o in content["odd"]] == ["sensor-8"]
+    assert content["verdict"] in told
+    page = (tmp_path / "lot/report.html").read_text(encoding="utf-8")
+    assert_sound(page)
+    assert "A lot of 9 sensors" in text_of(page)
+    line = refusal("lot", folders[0], "--out", tmp_path / "one")
+    assert "two sensors or more" in line
