@@ -31,11 +31,8 @@ _QUANTITIES = {
 }
 _NAMES = ("effects", "noise_effects", "gross_errors")
 _TYPES = get_type_hints(CampaignSettings)
-_Settings: Any = create_model(
-    "Settings",
-    __config__=ConfigDict(extra="forbid"),
-    **{each.name: (_TYPES[each.name], each.default) for each in fields(CampaignSettings)},
-)
+_KEYS: Any = {each.name: (_TYPES[each.name], each.default) for each in fields(CampaignSettings)}
+_Settings = create_model("Settings", __config__=ConfigDict(extra="forbid"), **_KEYS)
 
 
 @for_programs

@@ -31,11 +31,16 @@ _KEYWORDS = {"range": "range_mps2", "threshold": "threshold_mps2"}
 
 
 def python_words(text: str) -> str:
-    """Say in words of Python what was written for a command: ``--time-unit`` is ``time_unit``."""
+    """Say in words of Python what was written for a command: --time-unit is `time_unit`."""
     if "accelstudy " not in text:  # a command that is quoted keeps its options
-        text = _OPTION.sub(lambda m: _KEYWORDS.get(m[1], m[1].replace("-", "_")), text)
+        text = _OPTION.sub(_keyword, text)
     folder = rf"{re.escape(gettempdir())}\W{IN_MEMORY}\w+\W"
     return re.sub(rf"{folder}(DataFrame)\.parquet", r"\1", text)
+
+
+def _keyword(option: re.Match[str]) -> str:
+    name = _KEYWORDS.get(option[1], option[1].replace("-", "_"))
+    return f"`{name}`" if option.start() else name
 
 
 def for_programs(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:

@@ -92,7 +92,9 @@ def read_log(
         log.rename(columns=str).to_parquet(table.path, index=False)
     except (TypeError, ValueError, NotImplementedError) as error:
         reason = one_line(error)
-        raise InputError(f"log: the DataFrame cannot be a log, which has numbers: {reason}") from None
+        raise InputError(
+            f"log: the DataFrame cannot be a log, which has numbers: {reason}"
+        ) from None
     return table
 
 

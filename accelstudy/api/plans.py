@@ -18,6 +18,7 @@ from accelstudy.api.given import (
     whole,
 )
 from accelstudy.basics import bounds
+from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import UnknownNameError
 from accelstudy.drawing.style import FULL
 from accelstudy.pages.notebook import notebook_html
@@ -40,6 +41,9 @@ _MORE = (
     "robot_setup_time",
     "robot_accuracy",
 )
+
+
+_OPTIONAL = ("sigma", "max_time")
 
 
 @dataclass(frozen=True, repr=False)
@@ -124,22 +128,22 @@ def plan(
     for key in quantities:
         if key not in _MORE:
             raise UnknownNameError("quantity", key, _MORE)
-    for key in _MORE:
-        quantities.setdefault(key, QUANTITIES[key].usual or None)
-    quantities |= {"tilt_accuracy": tilt_accuracy, "sigma": sigma}
+    given = {"tilt_accuracy": tilt_accuracy, "sigma": sigma}
+    given |= {key: QUANTITIES[key].usual or None for key in _MORE} | quantities
+    in_si: dict[str, Any] = dict.fromkeys(_OPTIONAL) | {
+        key: quantity(key, value, QUANTITIES[key])
+        for key, value in given.items()
+        if value is not None or key not in _OPTIONAL
+    }
     question = question_of(
+        **in_si,
         sensor=None if sensor is None else str(path_of("sensor", sensor)),
         equipment=equipment,
         confidence=None if confidence is None else confidence_of(str(confidence)),
         holds=[quantity("holds", hold, QUANTITIES["hold"]) for hold in each(holds)],
         schemes=names("schemes", schemes),
-        max_positions=whole("max_positions", max_positions, MOST_POSITIONS),
-        **{
-            key: None
-            if value is None and key in ("sigma", "max_time")
-            else quantity(key, value, QUANTITIES[key])
-            for key, value in quantities.items()
-        },
+        max_positions=whole("max_positions", max_positions, Range(*MOST_POSITIONS)),
     )
-    whole("replicates", replicates, REPLICATES)
-    return Plan(answer(question, whole("seed", seed, bounds.SEED), replicates))
+    whole("seed", seed, bounds.SEED)
+    whole("replicates", replicates, Range(*REPLICATES))
+    return Plan(answer(question, seed, replicates))

@@ -90,13 +90,9 @@ class Campaign:
             if (values := getattr(self, name)) is not None:
                 columns[f"{name} / {unit}"] = values
         table = pd.DataFrame(columns, index=pd.Index(self.positions, name="position"))
-        known = "unknown" if self.sigma_force is None else f"{1e3 * self.sigma_force:.3g} mm/s²"
-        said = [
-            f"{counted(self.n_positions, 'position')}, {'with' if self.angles is not None else 'without'} "
-            f"a robot, noise of a mean {known}",
-            *self.warnings,
-        ]
-        return notebook_html(f"Campaign {self.name}", "; ".join(said), table)
+        robot = "without" if self.angles is None else "with"
+        said = f"{counted(self.n_positions, 'position')} {robot} a robot"
+        return notebook_html(f"Campaign {self.name}", "; ".join([said, *self.warnings]), table)
 
     @property
     def n_positions(self) -> int:

@@ -99,7 +99,7 @@ _SECTIONS = {
 @quantity_option("max_time", QUANTITIES["max_time"])
 @click.option(
     "--max-positions",
-    type=click.IntRange(MOST_POSITIONS.least, MOST_POSITIONS.most),
+    type=click.IntRange(*MOST_POSITIONS),
     default=200,
     show_default=True,
     help="Largest number of positions.",
@@ -110,7 +110,7 @@ _SECTIONS = {
 @quantity_option("robot_accuracy", QUANTITIES["robot_accuracy"])
 @click.option(
     "--replicates",
-    type=click.IntRange(REPLICATES.least, REPLICATES.most),
+    type=click.IntRange(*REPLICATES),
     default=200,
     show_default=True,
     help="Simulated calibrations of each candidate at the top.",

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from accelstudy.basics.bounds import Range
 from accelstudy.basics.units import GON, MGON, Given
 
 DAY = 86400.0
 
-MOST_POSITIONS = Range(4, 400)
-REPLICATES = Range(20, 1_000_000)
-"""Numbers of positions that may be the largest, and of simulated calibrations of a candidate."""
+MOST_POSITIONS = (4, 400)
+REPLICATES = (20, 1_000_000)
+"""From how many to how many positions may be the most, and candidates may be simulated."""
 
 QUANTITIES = {
     "tilt_accuracy": Given(

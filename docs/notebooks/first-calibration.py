@@ -17,4 +17,4 @@ calibration = acs.calibrate(campaign)
 calibration
 
 # %%
-calibration.plot();
+ax = calibration.plot()
