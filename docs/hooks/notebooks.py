@@ -1,0 +1,49 @@
+"""Notebooks: executed while the site is built, shown as pages, and ready to be downloaded.
+
+In git each is a script, without any output. Nothing of an execution is kept.
+"""
+
+import re
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import jupytext
+from mkdocs.structure.files import File
+from nbclient import NotebookClient
+from nbconvert import MarkdownExporter
+from traitlets.config import Config
+
+NOTEBOOKS = Path(__file__).parents[1] / "notebooks"
+DOWNLOAD = "\n\n[:material-download: This page as a notebook]({name}.ipynb){{ download }}\n"
+FIGURES = ["--InlineBackend.figure_formats=svg"]
+
+
+def page(name, notebook):
+    """Page of an executed notebook, and the files of its figures."""
+    with TemporaryDirectory() as folder:
+        # A file in place of the network, of which nothing is needed, not even within the machine.
+        connection = Config({"KernelManager": {"transport": "ipc", "ip": f"{folder}/kernel"}})
+        notebook = NotebookClient(
+            notebook, kernel_name="python3", extra_arguments=FIGURES, config=connection,
+            resources={"metadata": {"path": folder}},
+        ).execute()  # fmt: skip
+    text, resources = MarkdownExporter().from_notebook_node(
+        notebook, {"output_files_dir": name, "unique_key": "figure"}
+    )
+    title, rest = text.lstrip().split("\n", 1)
+    # Tables look as those of all pages.
+    rest = re.sub(r"<style scoped>.*?</style>", "", rest, flags=re.DOTALL)
+    rest = re.sub(r'<table border="\d" class="dataframe">', "<table>", rest)
+    rest = rest.replace("![svg](", "![figure](")
+    return title + DOWNLOAD.format(name=name) + rest, resources["outputs"]
+
+
+def on_files(files, config):
+    """Add a page, its figures, and the notebook without outputs for each script."""
+    for script in sorted(NOTEBOOKS.glob("*.py")):
+        notebook, name = jupytext.read(script), script.stem
+        made = {f"{name}.ipynb": jupytext.writes(notebook, fmt="ipynb")}
+        made[f"{name}.md"], figures = page(name, notebook)
+        for path, content in (made | figures).items():
+            files.append(File.generated(config, f"notebooks/{path}", content=content))
+    return files
