@@ -116,11 +116,14 @@ def drawing(ax: Any, width: float, height_mm: float) -> Iterator[Axes]:
 
     from accelstudy.drawing.style import MM, STYLE
 
-    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
-        if ax is None:
-            import matplotlib.pyplot as plt
+    figure = None
+    if ax is None:
+        import matplotlib.pyplot as plt
 
-            ax = plt.subplots(figsize=(width, height_mm * MM), layout="constrained")[1]
+        # A notebook gets ready to show figures at its first one, and the style would undo that.
+        figure = plt.figure(figsize=(width, height_mm * MM), layout="constrained")
+    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
+        ax = ax if figure is None else figure.add_subplot()
         yield ax
         for axis in (ax.xaxis, ax.yaxis):
             axis.get_major_ticks()  # made in this style, and not where the figure is shown

@@ -13,7 +13,7 @@ from weakref import finalize
 
 import pandas as pd
 
-from accelstudy.api.given import IN_MEMORY, for_programs, of_type, path_of
+from accelstudy.api.given import IN_MEMORY, for_programs, of_type, path_of, python_words
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.wording import one_line
 from accelstudy.campaign.header import LogLayout
@@ -35,12 +35,17 @@ class Log:
     path: Path
     layout: dict[str, Any]
 
+    @property
+    def name(self) -> str:
+        """Name of the file; DataFrame, if it was made for one."""
+        return Path(python_words(str(self.path))).name
+
     def __repr__(self) -> str:
-        return f"Log({self.path.name!r}, {', '.join(self.layout) or 'nothing given'})"
+        return f"Log({self.name!r}, {', '.join(self.layout) or 'nothing given'})"
 
     def _repr_html_(self) -> str:
-        given = pd.Series(self.layout, name="value", dtype=object).to_frame()
-        return notebook_html("Log", self.path.name, given)
+        given = pd.DataFrame(self.layout.items(), columns=["setting", "value"], dtype=object)
+        return notebook_html("Log", self.name, given)
 
 
 @for_programs

@@ -15,5 +15,9 @@ ROWS = 12
 
 def notebook_html(title: str, sentence: str, table: pd.DataFrame) -> str:
     """Show a result in a notebook: what it is, a sentence on it, and its table."""
-    rows = table.to_html(border=0, float_format="{:.4g}".format, na_rep="–", max_rows=ROWS)
+    if table.index.names != [None]:
+        table = table.reset_index()
+    rows = table.to_html(
+        border=0, index=False, float_format="{:.4g}".format, na_rep="–", max_rows=ROWS
+    )
     return f"<p><b>{escape(title)}</b>: {escape(sentence)}</p>{rows}"

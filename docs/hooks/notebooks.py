@@ -3,7 +3,9 @@
 In git each is a script, without any output. Nothing of an execution is kept.
 """
 
+import os
 import re
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -14,12 +16,12 @@ from nbconvert import MarkdownExporter
 from traitlets.config import Config
 
 NOTEBOOKS = Path(__file__).parents[1] / "notebooks"
-DOWNLOAD = "\n\n[:material-download: This page as a notebook]({name}.ipynb){{ download }}\n"
+DOWNLOAD = "\n\n[Download this page as a notebook]({name}.ipynb){{ download }}\n"
 FIGURES = ["--InlineBackend.figure_formats=svg"]
 
 
 def page(name, notebook):
-    """Page of an executed notebook, and the files of its figures."""
+    """The page of a notebook and its figures, by their paths."""
     with TemporaryDirectory() as folder:
         # A file in place of the network, of which nothing is needed, not even within the machine.
         connection = Config({"KernelManager": {"transport": "ipc", "ip": f"{folder}/kernel"}})
@@ -33,17 +35,18 @@ def page(name, notebook):
     title, rest = text.lstrip().split("\n", 1)
     # Tables look as those of all pages.
     rest = re.sub(r"<style scoped>.*?</style>", "", rest, flags=re.DOTALL)
-    rest = re.sub(r'<table border="\d" class="dataframe">', "<table>", rest)
+    rest = re.sub(r'<table[^>]* class="dataframe">', "<table>", rest)
     rest = rest.replace("![svg](", "![figure](")
-    return title + DOWNLOAD.format(name=name) + rest, resources["outputs"]
+    return {f"{name}.md": title + DOWNLOAD.format(name=name) + rest, **resources["outputs"]}
 
 
 def on_files(files, config):
     """Add a page, its figures, and the notebook without outputs for each script."""
-    for script in sorted(NOTEBOOKS.glob("*.py")):
-        notebook, name = jupytext.read(script), script.stem
-        made = {f"{name}.ipynb": jupytext.writes(notebook, fmt="ipynb")}
-        made[f"{name}.md"], figures = page(name, notebook)
-        for path, content in (made | figures).items():
-            files.append(File.generated(config, f"notebooks/{path}", content=content))
+    notebooks = {path.stem: jupytext.read(path) for path in sorted(NOTEBOOKS.glob("*.py"))}
+    plain = {f"{name}.ipynb": jupytext.writes(each, "ipynb") for name, each in notebooks.items()}
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        pages = threads.map(page, notebooks, notebooks.values())
+        for made in (plain, *pages):
+            for path, content in made.items():
+                files.append(File.generated(config, f"notebooks/{path}", content=content))
     return files

@@ -1,14 +1,15 @@
 # %% [markdown]
 # # A first calibration
 #
-# A sensor was turned by hand into 24 positions, and rested in each for four seconds. Its readings are
-# a log. This notebook finds the rests in the log, calibrates the sensor with them, and levels with the
-# result.
+# A sensor was turned by hand into 24 positions, and rested in each for ten seconds. Its readings
+# are a log. This notebook finds the rests in the log, calibrates the sensor with them, and levels
+# with the result.
 #
 # ## The log
 #
-# You need no sensor to try this. The next cell makes a log of one whose errors are known: a bias on
-# each axis, and x reads 0.2 % too much. For a log of your own take `table = pd.read_csv("imu.csv")`.
+# You need no sensor to try this. The next cell makes a log of one whose errors are known: a bias
+# on each axis, and x reads 0.2 % too much. For a log of your own take `table =
+# pd.read_csv("imu.csv")`.
 
 # %%
 import numpy as np
@@ -22,7 +23,7 @@ rng = np.random.default_rng(1)
 at_rest = -GRAVITY * get_scheme("fibonacci-24").directions
 rows = []
 for before, after in zip(np.roll(at_rest, 1, axis=0), at_rest, strict=True):
-    rows += [np.linspace(before, after, 100), np.tile(after, (400, 1))]  # a turn, and a rest
+    rows += [np.linspace(before, after, 100), np.tile(after, (1000, 1))]  # a turn, and a rest
 readings = np.concatenate(rows) * [1.002, 1, 1] + [0.05, 0.01, 0.03]
 readings += 0.005 * rng.standard_normal(readings.shape)
 table = pd.DataFrame(readings, columns=["ax", "ay", "az"])
@@ -47,8 +48,8 @@ campaign = acs.find_holds(log, gravity=GRAVITY)
 campaign
 
 # %% [markdown]
-# The notes say what was found and assumed. The last line is on the noise of a mean: where it is much
-# larger than that of white noise, longer rests would help little.
+# The notes say what was found and assumed. The last line is on the noise of a mean: where it is
+# much larger than that of white noise, longer rests would help little.
 
 # %%
 print(*campaign.notes, sep="\n")
@@ -64,8 +65,8 @@ calibration = acs.calibrate(campaign)
 calibration
 
 # %% [markdown]
-# The figure has the verdict at a glance: residuals of good positions lie within the band, and show no
-# pattern.
+# The figure has the verdict at a glance: residuals of good positions lie within the band, and show
+# no pattern.
 
 # %%
 ax = calibration.plot()
@@ -81,8 +82,8 @@ found.assign(truth=truth, error_in_sigmas=(found["value"] - truth) / found["sigm
 # %% [markdown]
 # ## Leveling
 #
-# `apply` adds the calibrated force, roll and pitch, and their standard deviations to each row of a log.
-# The units stand in the names of the columns.
+# `apply` adds the calibrated force, roll and pitch, and their standard deviations to each row of a
+# log. The units stand in the names of the columns.
 
 # %%
 leveled = calibration.apply(log)
@@ -96,4 +97,5 @@ leveled.head()
 calibration.save("calibrated", force=True)
 
 # %% [markdown]
-# If a calibration is rejected, [the sensor has an effect that the model lacks](what-is-missing.md).
+# If a calibration is rejected, [the sensor has an effect that the model
+# lacks](what-is-missing.md).

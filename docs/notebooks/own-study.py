@@ -27,17 +27,17 @@ result = acs.simulate(
 result
 
 # %% [markdown]
-# The table has the tilt error that a calibration leaves at tilts up to 50 gon, in rad: its rms, and
-# what 95 of 100 calibrations stay below, each with the standard error of the simulation.
+# The table has the tilt error that a calibration leaves at tilts up to 50 gon, in rad: its rms,
+# and what 95 of 100 calibrations stay below, each with the standard error of the simulation.
 #
 # ## Every calibration
 #
-# `estimates` has each single calibration as an `xarray.Dataset`. Its dimensions have names, so that
-# a mean over replicates is `mean("replicate")`, whatever their order.
+# `estimates` has each single calibration as an `xarray.Dataset`. Its dimensions have names, so
+# that a mean over replicates is `mean("replicate")`, whatever their order.
 
 # %%
 calibrations = result.estimates
-calibrations
+print(calibrations)
 
 # %% [markdown]
 # Are the estimates free of bias? Their mean should be off the truth by a few of its own standard
@@ -52,29 +52,32 @@ print(f"largest of {in_errors.size}: {float(in_errors.max()):.1f} standard error
 # %% [markdown]
 # ## The answer
 #
-# The tilt error falls with the root of the number of positions. By hand it takes about four times as
-# many positions as with this robot.
+# The tilt error falls with the root of the number of positions. By hand it takes about four times
+# as many positions as with this robot.
 
 # %%
-MGON = 1.5708e-5  # rad
-rms = result.tilt["rms"].xs("roll", level="angle").to_numpy().reshape(len(numbers), 2) / MGON
+leveling = result.tables["leveling"]
+leveling["positions"] = leveling["scheme"].str.removeprefix("fibonacci-").astype(int)
+rms = leveling.pivot(index="positions", columns="approach", values="roll_rms_mgon")
+rms
+
+# %%
 _, ax = plt.subplots(figsize=(6, 3.2), layout="constrained")
-for values, name, colour in zip(rms.T, ["gravity", "robot"], ["#4A4A4A", "#C2247A"], strict=True):
-    ax.loglog(numbers, values, "o-", color=colour, label=name)
-    ax.loglog(numbers, values[0] * np.sqrt(numbers[0] / np.array(numbers)), ":", color=colour)
+for approach, colour in {"gravity": "#4A4A4A", "robot": "#C2247A"}.items():
+    ax.loglog(rms[approach], "o", color=colour, label=approach)
+    ax.loglog(rms[approach].iloc[0] * np.sqrt(rms.index[0] / rms.index), ":", color=colour)
 ax.set_xticks(numbers, numbers)
+ax.set_yticks([5, 10, 20], [5, 10, 20])
 ax.minorticks_off()
-ax.set_yticks([2, 5, 10, 20], [2, 5, 10, 20])
 ax.set(xlabel="positions", ylabel="rms tilt error in roll / mgon")
 ax.legend(title="dotted: 1/√n")
-rms
 
 # %% [markdown]
 # ## The tables of a study
 #
-# `tables` are the same tables that [a study of the workflow](../guides/configuration.md) writes, with
-# the same numbers for the same cells and seed: correlations, quantiles, comparisons with linear
-# theory. [Tables of a study](../reference/tables.md) lists their columns.
+# `tables` are the same tables that [a study of the workflow](../guides/configuration.md) writes,
+# with the same numbers for the same cells and seed: correlations, quantiles, comparisons with
+# linear theory. [Tables of a study](../reference/tables.md) lists their columns.
 
 # %%
 columns = ["scheme", "approach", "n_positions", "redundancy", "condition", "n_converged"]

@@ -1,8 +1,8 @@
 # %% [markdown]
 # # Planning a calibration
 #
-# How many positions does it take, and is a robot needed? The answer follows from the accuracy of roll
-# and pitch that you want, and from the sensor.
+# How many positions does it take, and is a robot needed? The answer follows from the accuracy of
+# roll and pitch that you want, and from the sensor.
 #
 # ## The cheapest calibration
 #
@@ -11,6 +11,7 @@
 
 # %%
 import matplotlib.pyplot as plt
+import numpy as np
 
 import accelstudy as acs
 
@@ -46,15 +47,19 @@ print(surer.verdict)
 # %% [markdown]
 # ## A plan, checked
 #
-# A plan can be checked by simulating what it recommends. The share of the calibrations that
-# stay below the accuracy must be about what was asked for.
+# A plan can be checked by simulating what it recommends. The share of the calibrations that stay
+# below the accuracy must be about what was asked for.
 
 # %%
 best = surer.table.iloc[0]
 check = acs.simulate(
-    best["model"], best["scheme"], "gravity", sigma=best["sensor_sigma_mps2"], replicates=2000
+    best["model"],
+    best["scheme"],
+    best["equipment"],
+    sigma=best["sensor_sigma_mps2"],
+    replicates=2000,
 )
-MGON = 1.5708e-5  # rad
+MGON = np.pi / 200e3  # rad
 worse = check.estimates["tilt"].max("angle") / MGON
 _, ax = plt.subplots(figsize=(6, 2.5), layout="constrained")
 ax.hist(worse.values.ravel(), bins=60, color="#4A4A4A")
@@ -63,5 +68,5 @@ ax.set(xlabel="larger of the tilt errors in roll and in pitch / mgon", ylabel="c
 print(f"below 20 mgon: {100 * float((worse < 20).mean()):.0f} %")
 
 # %% [markdown]
-# [The cheapest calibration](../guides/plan.md) has all options, and `sensor` takes
-# [a data sheet](../reference/data-sheets.md) in place of `sigma`.
+# [The cheapest calibration](../guides/plan.md) has all options, and `sensor` takes [a data
+# sheet](../reference/data-sheets.md) in place of `sigma`.

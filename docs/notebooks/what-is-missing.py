@@ -6,8 +6,9 @@
 #
 # ## A campaign with a secret
 #
-# The sensor below has the usual errors and one more: its bias follows the temperature. A robot holds
-# it in 30 positions, in random order, while the temperature goes up and down between 15 and 40 °C.
+# The sensor below has the usual errors and one more: its bias follows the temperature. A robot
+# holds it in 30 positions, in random order, while the temperature goes up and down between 15 and
+# 40 °C.
 
 # %%
 import pandas as pd
@@ -37,8 +38,8 @@ ax = calibration.plot()
 # %% [markdown]
 # ## The diagnosis
 #
-# `diagnose` weighs every effect of the catalogue, and every pair of them, against noise, gross errors
-# and each other. It takes some seconds.
+# `diagnose` weighs every effect of the catalogue, and every pair of them, against noise, gross
+# errors and each other. It takes some seconds.
 
 # %%
 diagnosis = acs.diagnose(campaign)
@@ -50,8 +51,8 @@ ax = diagnosis.plot()
 # %% [markdown]
 # ## The calibration with what was found
 #
-# The diagnosis brings a calibration with the effect in its model. It has three parameters more, one
-# for each axis, in m/s² per kelvin.
+# The diagnosis brings a calibration with the effect in its model. It has three parameters more,
+# one for each axis, in m/s² per kelvin.
 
 # %%
 mended = diagnosis.calibration
@@ -59,8 +60,8 @@ print(mended.verdict)
 ax = mended.plot()
 
 # %% [markdown]
-# What the effect did to the other parameters, and how much better they are known without it in the
-# residuals:
+# Without the effect in the model, the other parameters are off by many of the standard deviations
+# that they have with it.
 
 # %%
 both = {"usual model": calibration.parameters, "with the effect": mended.parameters}
@@ -68,5 +69,5 @@ pd.concat({name: table[["value", "sigma"]] for name, table in both.items()}, axi
 
 # %% [markdown]
 # To use this calibration, a log needs a column of temperature. `diagnosis.result` leads to all the
-# rest: tests of the noise, limits of the effects that were not found, and
-# [what else a diagnosis says](../guides/diagnosis.md).
+# rest: tests of the noise, limits of the effects that were not found, and [what else a diagnosis
+# says](../guides/diagnosis.md).
