@@ -11,9 +11,18 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from accelstudy.api.given import IN_MEMORY, drawing, for_programs, of_type, path_of, python_words
+from accelstudy.api.given import (
+    IN_MEMORY,
+    drawing,
+    for_programs,
+    of_type,
+    path_of,
+    python_words,
+    quantity,
+)
 from accelstudy.api.logs import log_of
 from accelstudy.approaches import get_approach
+from accelstudy.basics.units import Given
 from accelstudy.basics.wording import counted
 from accelstudy.campaign.calibration.applying import read_calibration
 from accelstudy.campaign.calibration.assessment import assess
@@ -33,6 +42,8 @@ from accelstudy.sensors.models import get_model
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+SIGMA = Given("m/s^2", "", "Noise of a reading.")
 
 
 @dataclass(frozen=True, repr=False)
@@ -67,13 +78,14 @@ class Calibration:
         return rows.set_index("name")
 
     @for_programs
-    def apply(self, log: Any, *, sigma: float | None = None) -> pd.DataFrame:
+    def apply(self, log: Any, *, sigma: float | str | None = None) -> pd.DataFrame:
         """Level a log.
 
         Parameters
         ----------
         log : Log, or what `read_log` takes
-        sigma : float, m/s², of a reading; as within the holds of the campaign if omitted
+        sigma : float in m/s² or str with a unit, of a reading; as within the holds of the campaign
+            if omitted
 
         Returns
         -------
@@ -82,10 +94,11 @@ class Calibration:
             the names say, and their sigmas. Warnings stand in ``attrs["warnings"]``.
         """
         log = log_of(log)
+        reading = None if sigma is None else quantity("sigma", sigma, SIGMA)
         with TemporaryDirectory(prefix=IN_MEMORY) as folder:
             kept, out = Path(folder) / "calibration.json", Path(folder) / "leveled.parquet"
             kept.write_text(json_text(dict(self.content)), encoding="utf-8")
-            leveled = level_log(read_calibration(kept), log.path, out, log.layout, sigma)
+            leveled = level_log(read_calibration(kept), log.path, out, log.layout, reading)
             table = pd.read_parquet(out)
         table.attrs["warnings"] = list(map(python_words, leveled.warnings))
         return table

@@ -11,6 +11,7 @@ from pydantic import ConfigDict, create_model
 from accelstudy.api.given import for_programs, names, path_of, python_words, quantity
 from accelstudy.api.logs import Log, log_of
 from accelstudy.basics import bounds
+from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import Given
 from accelstudy.campaign.format import read_campaign as read_folder
 from accelstudy.campaign.importing.logs import import_log
@@ -60,7 +61,10 @@ def find_holds(log: Log, *, gravity: float | str | None = None, **settings: Any)
     content = {"name": log.path.stem, **log.layout, **settings}
     if gravity is not None:
         content["gravity"] = {"value_mps2": quantity("gravity", gravity, GRAVITY)}
-    campaign, report = import_log(log.path, parse_settings(content, "find_holds"))
+    given = parse_settings(content, "find_holds")
+    if given.sensors:
+        raise InputError("sensors: several sensors make several campaigns; give the columns of one")
+    campaign, report = import_log(log.path, given)
     notes, warnings = (
         tuple(map(python_words, each)) for each in (report.lines(), campaign.warnings)
     )

@@ -65,9 +65,9 @@ def of_type(name: str, value: Any, *types: type, expected: str) -> None:
         raise InputError(f"{name}: expected {expected}, not {shown(value)}")
 
 
-def path_of(name: str, value: Any) -> Path:
+def path_of(name: str, value: Any, expected: str = "a path") -> Path:
     """Path that was given as one, or as text."""
-    of_type(name, value, str, PathLike, expected="a path")
+    of_type(name, value, str, PathLike, expected=expected)
     return Path(value)
 
 

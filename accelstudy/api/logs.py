@@ -87,7 +87,7 @@ def read_log(
     given = {key: value for key, value in given.items() if value is not None}
     checked(LogLayout, given, "read_log")
     if not isinstance(log, pd.DataFrame):
-        path = path_of("log", log)
+        path = path_of("log", log, "a path or a DataFrame")
         open_source(path, given.get("variable"))
         return Log(path, given)
     folder = Path(mkdtemp(prefix=IN_MEMORY))
@@ -96,7 +96,7 @@ def read_log(
     try:
         log.rename(columns=str).to_parquet(table.path, index=False)
     except (TypeError, ValueError, NotImplementedError) as error:
-        reason = one_line(error)
+        reason = one_line(error.args[-1])
         raise InputError(
             f"log: the DataFrame cannot be a log, which has numbers: {reason}"
         ) from None
