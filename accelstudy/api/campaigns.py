@@ -72,9 +72,17 @@ def find_holds(log: Log, *, gravity: float | str | None = None, **settings: Any)
 
 
 @for_programs
-def read_campaign(folder: str | PathLike[str]) -> Campaign:
-    """Read a campaign from its folder; see `accelstudy.campaign.format.read_campaign`."""
-    return read_folder(path_of("folder", folder))
+def read_campaign(folder: str | PathLike[str], *, plausible: bool = True) -> Campaign:
+    """Read a campaign from its folder; see `accelstudy.campaign.format.read_campaign`.
+
+    Parameters
+    ----------
+    folder : path
+    plausible : bool
+        Whether data that cannot be right, as of wrong units, is refused; `diagnose` tells what is
+        wrong with it, too.
+    """
+    return read_folder(path_of("folder", folder), plausible=plausible)
 
 
 @for_programs
