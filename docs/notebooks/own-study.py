@@ -52,25 +52,28 @@ print(f"largest of {in_errors.size}: {float(in_errors.max()):.1f} standard error
 # %% [markdown]
 # ## The answer
 #
-# The tilt error falls with the root of the number of positions. By hand it takes about four times
-# as many positions as with this robot.
+# The rms tilt error of roll, in mgon, falls with the root of the number of positions. By hand it
+# takes about four times as many positions as with this robot.
 
 # %%
 leveling = result.tables["leveling"]
-leveling["positions"] = leveling["scheme"].str.removeprefix("fibonacci-").astype(int)
-rms = leveling.pivot(index="positions", columns="approach", values="roll_rms_mgon")
+positions = leveling["scheme"].str.removeprefix("fibonacci-").astype(int)
+rms = leveling.assign(positions=positions).pivot(
+    index="positions", columns="approach", values="roll_rms_mgon"
+)
 rms
 
 # %%
 _, ax = plt.subplots(figsize=(6, 3.2), layout="constrained")
 for approach, colour in {"gravity": "#4A4A4A", "robot": "#C2247A"}.items():
-    ax.loglog(rms[approach], "o", color=colour, label=approach)
-    ax.loglog(rms[approach].iloc[0] * np.sqrt(rms.index[0] / rms.index), ":", color=colour)
+    ax.loglog(numbers, rms[approach], "o", color=colour, label=approach)
+    root = rms[approach].iloc[0] * np.sqrt(numbers[0] / np.array(numbers))
+    ax.loglog(numbers, root, ":", color=colour)
+ax.legend(title="dotted: 1/√n")
+ax.set(xlabel="positions", ylabel="rms tilt error in roll / mgon")
 ax.set_xticks(numbers, numbers)
 ax.set_yticks([5, 10, 20], [5, 10, 20])
 ax.minorticks_off()
-ax.set(xlabel="positions", ylabel="rms tilt error in roll / mgon")
-ax.legend(title="dotted: 1/√n")
 
 # %% [markdown]
 # ## The tables of a study
