@@ -17,6 +17,7 @@ from traitlets.config import Config
 
 NOTEBOOKS = Path(__file__).parents[1] / "notebooks"
 DOWNLOAD = "\n\n[Download this page as a notebook]({name}.ipynb){{ download }}\n"
+KERNEL = {"name": "python3", "display_name": "Python 3", "language": "python"}
 FIGURES = ["--InlineBackend.figure_formats=svg"]
 
 
@@ -26,7 +27,7 @@ def page(name, notebook):
         # A file in place of the network, of which nothing is needed, not even within the machine.
         connection = Config({"KernelManager": {"transport": "ipc", "ip": f"{folder}/kernel"}})
         notebook = NotebookClient(
-            notebook, kernel_name="python3", extra_arguments=FIGURES, config=connection,
+            notebook, extra_arguments=FIGURES, config=connection,
             resources={"metadata": {"path": folder}},
         ).execute()  # fmt: skip
     text, resources = MarkdownExporter().from_notebook_node(
@@ -43,6 +44,8 @@ def page(name, notebook):
 def on_files(files, config):
     """Add a page, its figures, and the notebook without outputs for each script."""
     notebooks = {path.stem: jupytext.read(path) for path in sorted(NOTEBOOKS.glob("*.py"))}
+    for notebook in notebooks.values():
+        notebook.metadata = {"kernelspec": KERNEL}
     plain = {f"{name}.ipynb": jupytext.writes(each, "ipynb") for name, each in notebooks.items()}
     with ThreadPoolExecutor(os.cpu_count()) as threads:
         pages = threads.map(page, notebooks, notebooks.values())
