@@ -8,9 +8,8 @@ from typing import Any, get_type_hints
 
 from pydantic import ConfigDict, create_model
 
-from accelstudy.api.given import for_programs, names, path_of, python_words, quantity
+from accelstudy.api.given import GRAVITY, for_programs, names, path_of, python_words, quantity
 from accelstudy.api.logs import Log, log_of
-from accelstudy.basics import bounds
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import Given
 from accelstudy.campaign.format import read_campaign as read_folder
@@ -22,7 +21,6 @@ from accelstudy.campaign.simulated import simulate_campaign as simulated
 from accelstudy.files.validation import checked
 from accelstudy.planning.quantities import QUANTITIES
 
-GRAVITY = Given("m/s^2", "", "Local gravity.", bounds.GRAVITY.least, bounds.GRAVITY.most)
 _QUANTITIES = {
     "sigma": QUANTITIES["sigma"],
     "sigma_angle": Given("rad", "", "Noise of the robot's angles."),

@@ -13,6 +13,7 @@ from pathlib import Path
 from tempfile import gettempdir
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
+from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, shown
 from accelstudy.basics.units import Given
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 
+GRAVITY = Given("m/s^2", "", "Local gravity.", bounds.GRAVITY.least, bounds.GRAVITY.most)
 IN_MEMORY = "accelstudy-"
 """What the names of folders begin with that hold a table in memory as a file."""
 _OPTION = re.compile(r"(?<![\w-])--([a-z][a-z-]*)")

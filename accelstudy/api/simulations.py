@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from accelstudy.adjustment.calibration import Block
-from accelstudy.api.given import each, for_programs, names, of_type, quantity, whole
+from accelstudy.api.given import GRAVITY, each, for_programs, names, of_type, quantity, whole
 from accelstudy.approaches import get_approach
 from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
@@ -39,7 +39,6 @@ if TYPE_CHECKING:
 
 LEVELING = LevelingConfig().model_dump()
 """Where the tilt error is evaluated, as in a study by default."""
-GRAVITY = Given("m/s^2", "", "Local gravity.", bounds.GRAVITY.least, bounds.GRAVITY.most)
 REPLICATES = Range(2, 10**8)
 """Calibrations of a cell; all of them are in memory."""
 DIGITS = 12

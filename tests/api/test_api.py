@@ -14,6 +14,7 @@ from places import ROOT
 from study_helpers import grid, run_study
 
 import accelstudy as acs
+from accelstudy.campaign.format import write_campaign
 from accelstudy.drawing.style import STYLE
 from accelstudy.schemes import get_scheme
 
@@ -53,6 +54,11 @@ def test_the_calibration_finds_the_bias(guide):
     assert (abs(found["value"] - np.array(BIAS)) < 4 * found["sigma"]).all()
     assert (guide["folder"] / "calibrated/calibration.json").exists()
     assert len(guide["leveled"]) == len(logged())
+    log = acs.read_log(logged(), rate=100, columns=COLUMNS)
+    louder = guide["calibration"].apply(log, sigma="50 mm/s^2")
+    assert (louder["sigma_roll_mgon"] > 2 * guide["leveled"]["sigma_roll_mgon"]).all()
+    with pytest.raises(acs.InputError, match="sigma: expected a number with its unit"):
+        guide["calibration"].apply(log, sigma="2")
 
 
 @pytest.mark.parametrize("name", ["log", "campaign", "calibration", "diagnosis", "plan", "result"])
@@ -129,6 +135,14 @@ def test_every_calibration_of_a_study_is_in_a_dataset():
     assert np.allclose(bias.std("replicate")[:3], first["sd"], rtol=0.4)
     rms = np.sqrt((found["tilt"][0] ** 2).mean("replicate"))
     assert np.allclose(rms, result.tilt.loc[result.cells[0].name, "rms"], rtol=0.4)
+
+
+def test_what_reading_refuses_is_diagnosed(tmp_path):
+    given = acs.simulate_campaign(scheme="fibonacci-24", gross_errors="unit_error(force=0.102)")
+    write_campaign(given, tmp_path, plausible=False)
+    with pytest.raises(acs.InputError, match="looks like g"):
+        acs.read_campaign(tmp_path)
+    assert acs.diagnose(acs.read_campaign(tmp_path, plausible=False)).verdict == "gross_error"
 
 
 WRONG = {
