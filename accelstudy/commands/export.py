@@ -13,22 +13,33 @@ from accelstudy.commands.options import PATH, example
 @click.command("export", epilog=example("accelstudy export calibrated/calibration.json --form c"))
 @click.argument("calibration", type=PATH)
 @click.option(
-    "--form", default="json", show_default=True, help="Form of the output: json, yaml, c or matrix."
+    "--form", default="json", show_default=True, help="Form: json, yaml, c, matrix, px4 or ros."
 )
-def export_command(calibration: Path, form: str) -> None:
+@click.option("--level", is_flag=True, help="For c: add roll and pitch with their sigmas.")
+def export_command(calibration: Path, form: str, level: bool) -> None:
     """Print a CALIBRATION in a form that a device takes.
 
     CALIBRATION is a calibration.json. json and yaml carry every effect: parameters with sigmas and
-    units, and the formulas to implement. c and matrix hold M in force = M · (x, y, z, 1), with
-    readings and forces in the axes of the log. No matrix carries an effect that is not linear in
-    the force, or that depends on time, temperature, vibration or the position before; for these c
-    holds a function, which takes them.
+    units, and the formulas to implement. matrix holds M in force = M · (x, y, z, 1), if nothing but
+    the force matters, and that linearly.
+
+    c is a header in C99 with the function accel_calibrate. It takes the reading and, where effects
+    depend on them, temperature, time and vibration. What depends on the position before is refused.
+
+    px4 is a parameter file for PX4: an offset, a scale and a polynomial of the temperature for each
+    axis. ros is one for the ROS package imu_calib: a matrix and a bias. They are closest to the
+    calibration over all attitudes. What they cannot hold is said, with the errors of roll and pitch
+    that it leaves.
+
+    Readings and forces are in the axes of the log.
     """
     from accelstudy.campaign.calibration.applying import read_calibration
-    from accelstudy.campaign.calibration.export import export
+    from accelstudy.campaign.calibration.export import export, losses
 
     content = read_calibration(calibration).content
-    text = export(content, form)
+    text = export(content, form, level)
     if mended := content["mended"]:
         warn(f"the calibration is of mended data: {mended['reason']}")
+    for loss in losses(content, form):
+        warn(loss)
     click.echo(text, nl=False)

@@ -16,6 +16,7 @@ from accelstudy.commands.calibrate import calibrate_command
 from accelstudy.commands.cells import cells_command
 from accelstudy.commands.check_sigmas import check_sigmas_command
 from accelstudy.commands.claims import claims_command
+from accelstudy.commands.compare import compare_command
 from accelstudy.commands.config_schema import config_schema_command
 from accelstudy.commands.data_sheet import data_sheet_command
 from accelstudy.commands.design import design_command
@@ -45,6 +46,7 @@ SECTIONS: dict[str, tuple[click.Command, ...]] = {
         check_sigmas_command,
         apply_command,
         export_command,
+        compare_command,
     ),
     "Before a calibration, and what it is worth": (
         plan_command,

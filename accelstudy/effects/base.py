@@ -255,8 +255,13 @@ def formulas(effect: Effect) -> dict[str, Texts | list[Texts]]:
     return texts
 
 
-def expressions(effect: Effect) -> tuple[tuple[Any, ...], Matrix, tuple[Any, Any]]:
-    """Evaluate an effect with symbols for all but its settings, which stay numbers."""
+def expressions(
+    effect: Effect, hold: HoldSymbols | None = None
+) -> tuple[tuple[Any, ...], Matrix, tuple[Any, Any]]:
+    """Evaluate an effect with symbols for all but its settings, which stay numbers.
+
+    Effects that are evaluated with the same `hold` share its symbols.
+    """
     numbered = type(effect)()
     numbered.settings = {
         name: sp.Integer(int(value)) if float(value).is_integer() else sp.Float(value)
@@ -264,7 +269,7 @@ def expressions(effect: Effect) -> tuple[tuple[Any, ...], Matrix, tuple[Any, Any
     }
     p = symbols(*(parameter.name for parameter in effect.parameters))
     f, (g,) = symbols(*(f"f_{axis}" for axis in AXES)), symbols("g")
-    hold = HoldSymbols()
+    hold = hold or HoldSymbols()
     return (
         numbered.output(f, p, g, hold, symbolic),
         numbered.axes(p, symbolic),

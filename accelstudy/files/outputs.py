@@ -83,6 +83,7 @@ POLE = Kind(
     "pole.json",
     ("budget.parquet", "monte-carlo.parquet", "budget.svg", "budget.png"),
 )
+COMPARISON = Kind("comparison of calibrations", "comparison.json", ("report.html",), ("figures",))
 PLAN = Kind(
     "plan",
     "plan.parquet",
@@ -94,7 +95,7 @@ STUDY = Kind(
     ("README.md", "config/config.yaml", "profiles/default/config.yaml"),
     replaced=False,
 )
-_KINDS = (BATCH_JOB, DIAGNOSIS, CALIBRATION, CAMPAIGN, POLE, PLAN)
+_KINDS = (BATCH_JOB, DIAGNOSIS, CALIBRATION, CAMPAIGN, POLE, PLAN, COMPARISON)
 
 
 @contextmanager

@@ -54,6 +54,8 @@ BADGES = {
     "unknown": ("? UNKNOWN", "open"),
     "noise_model": ("≈ NOISE", "noise"),
     "gross_error": ("! GROSS ERROR", "wrong"),
+    "unchanged": ("✓ UNCHANGED", "good"),
+    "changed": ("➜ CHANGED", "found"),
     "reproduced": ("✓ reproduced", "good"),
     "not reproduced": ("✗ not reproduced", "bad"),
     "slip in the paper": ("! slip in the paper", "noise"),

@@ -99,7 +99,7 @@ def formats():
         )
     calibration = []
     for name, (about, columns) in calibration_files().items():
-        kind = "key" if name.endswith(".json") else "column"
+        kind = {".json": "key", ".parquet": "column"}.get(Path(name).suffix, "name")
         whose = "Batch" if about.startswith("A batch") else "Calibration"
         heads = (kind, "unit", "meaning")
         calibration += [f"## {whose}: `{name}`", about, _columns(heads, columns)]

@@ -23,5 +23,6 @@ python compare.py
 # --8<-- [end:apply]
 
 # --8<-- [start:export]
-accelstudy export calibrated/calibration.json --form c
+accelstudy export calibrated/calibration.json --form c > calibration.h
+tail -n 8 calibration.h
 # --8<-- [end:export]

@@ -273,7 +273,7 @@ def test_a_bad_log_is_one_line(calibrations, tmp_path):
     assert log.read_text(encoding="utf-8") == "1,2,9\n"
 
 
-@pytest.mark.parametrize("form", ["json", "yaml", "c", "matrix"])
+@pytest.mark.parametrize("form", ["json", "yaml", "c", "matrix", "px4", "ros"])
 def test_export_prints(calibrations, form):
     result = succeed("export", calibrations["gravity"][1] / "calibration.json", "--form", form)
     assert len(result.output.splitlines()) >= 3

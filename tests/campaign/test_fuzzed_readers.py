@@ -99,7 +99,7 @@ def use(content, folder, form):
     one_line_at_most(folder, "export", file, "--form", form)
 
 
-forms = st.sampled_from(["json", "yaml", "c", "matrix"])
+forms = st.sampled_from(["json", "yaml", "c", "matrix", "px4", "ros"])
 
 
 @settings(max_examples=150)

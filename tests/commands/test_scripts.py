@@ -37,6 +37,7 @@ RESULTS = {
     "effects": (),
     "public": (),
     "calibrate": ("accepted", "--out", "plain"),
+    "compare": ("plain/calibration.json", "plain/calibration.json", "--out", "compared"),
 }  # fmt: skip
 """Arguments of commands that have --quiet."""
 HAVE = {
@@ -45,7 +46,7 @@ HAVE = {
     "apply": r"^3000 of 3000 rows leveled: leveled.csv$", "check-sigmas": "sd_empirical",
     "advise": "tilt accuracy: roll", "data-sheet": "^sigma of the mean of a position: 2 mm/s²$",
     "design": "roll/gon", "schemes": "faces-6", "effects": "^warm_up: ", "public": "^xsens-mti: ",
-    "calibrate": "^ACCEPTED: ",
+    "calibrate": "^ACCEPTED: ", "compare": "^UNCHANGED: ",
 }  # fmt: skip
 """What its result has."""
 

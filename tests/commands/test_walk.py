@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from places import ROOT
+from session_helpers import write_document
 from study_helpers import PROVENANCE
 
 from accelstudy.commands.main import main
@@ -75,10 +76,13 @@ def environment_of(site):
 def steps(site, walked):
     """What came of all commands, in a folder that holds what a reader has.
 
-    That is a log of a sensor and, for studies, the configurations and the verdicts of one.
+    That is a log of a sensor, two calibrations of another and, for studies, the configurations and
+    the verdicts of one.
     """
     folder = walked
     log_csv(folder / "log.csv")
+    for seed, season in enumerate(("spring", "autumn")):
+        write_document(folder / season / "calibration.json", seed)
     shutil.copytree(ROOT / "config", folder / "config")
     claim = {
         "claim": "c", "section": "4.2", "statement": "it holds", "unit": "%", "paper": 50.0,

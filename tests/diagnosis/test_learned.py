@@ -1,8 +1,6 @@
 """Learned functions: beside plain Gaussian processes, exported, and in campaigns that hide one."""
 
-import ctypes
 import json
-import subprocess
 from dataclasses import replace
 
 import numpy as np
@@ -156,21 +154,6 @@ def test_exported_formulas_correct_as_the_calibration_does(calibration, readings
             known |= dict(zip(("f_x", "f_y", "f_z"), f_a, strict=True))
             f_a = reading - added("output")
         np.testing.assert_allclose((np.eye(3) + added("axes")) @ f_a, one, atol=1e-10)
-
-
-def test_exported_c_corrects_as_the_calibration_does(calibration, readings, tmp_path):
-    code = export(calibration.content, "c")
-    (tmp_path / "all.c").write_text(code.replace("static void", "void"))
-    library = tmp_path / "all.so"
-    command = ["cc", "-Wall", "-Werror", "-shared", "-fPIC", "-o", library, tmp_path / "all.c"]
-    subprocess.run([*command, "-lm"], check=True)
-    function = ctypes.CDLL(str(library)).accelerometer_calibrate
-    three = ctypes.c_double * 3
-    expected = calibration.correct(readings[0], some_holds(8, temperature=readings[1]))
-    for reading, warm, one in zip(*readings, expected, strict=True):
-        got = three()
-        function(three(*reading), ctypes.c_double(warm), got)
-        np.testing.assert_allclose(list(got), one, atol=1e-10)
 
 
 @pytest.fixture(scope="module")

@@ -70,9 +70,13 @@ def output_of(command):
         os.chdir(arguments[0])
         return ""
     if program == "accelstudy":
-        result = CliRunner().invoke(main, arguments)
+        arguments, _, file = (" ".join(map(shlex.quote, arguments))).partition(" '>' ")
+        result = CliRunner().invoke(main, shlex.split(arguments))
         if result.exit_code:
             raise RuntimeError(f"{command}: {result.output}") from result.exception
+        if file:
+            Path(file).write_text(result.stdout, encoding="utf-8")
+            return result.stderr
         return result.output
     if program == "python":
         printed = io.StringIO()

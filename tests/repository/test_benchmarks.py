@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from places import ROOT
+from page_helpers import assert_told_alike
+from places import DATA, ROOT, needs_data
 
 from accelstudy.approaches import get_approach
 
@@ -56,6 +57,15 @@ def test_tables_of_a_page_are_replaced_and_the_rest_is_kept():
     assert new == "Before\n\n<!-- speeds -->\n\n| \\1 |\n\n<!-- end of speeds -->\nafter\n"
     with pytest.raises(ValueError, match="roofline"):
         put(page, "roofline", "x")
+
+
+@needs_data
+def test_the_comparison_with_authors_is_what_its_page_shows():
+    import comparison
+
+    page = (ROOT / "docs/guides/comparison.md").read_text(encoding="utf-8")
+    shown = page.partition("<!-- authors -->")[2].partition("<!-- end of authors -->")[0]
+    assert_told_alike(comparison.authors(DATA), shown)
 
 
 def test_the_page_of_speed_has_a_place_for_each_table(monkeypatch):

@@ -3,22 +3,30 @@
 `make docs` checks the rest: links, anchors, and the files, commands and options that pages name.
 """
 
+import json
+import re
 import sys
 
 import pytest
+import yaml
 from places import ROOT
 from study_helpers import grid, make_study, run_rare, run_study
 
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.batch.overview import CAMPAIGN_COLUMNS, PARAMETER_COLUMNS
+from accelstudy.campaign.calibration.applying import calibration_of
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.document import (
     assessed_positions,
     calibration_document,
+    json_text,
     quality_document,
 )
+from accelstudy.campaign.calibration.export import export
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
+from accelstudy.epochs.comparison import compare
+from accelstudy.epochs.output import comparison_document
 from accelstudy.files.tables import read_table
 from accelstudy.sensors.models import get_model
 from accelstudy.study.sensitivity import analyse_sensitivity, analyse_shapley
@@ -59,14 +67,38 @@ def test_each_key_of_a_calibration_is_described(pages):
     fit = fit_campaign(campaign, get_model("bias-scale"), get_approach("robot"))
     assessment = assess(fit)
     document = {**calibration_document(fit), "quality": quality_document(assessment)}
+    one = calibration_of(json.loads(json_text(document)))
     written = {
         "calibration.json": set(_keys(document)),
+        "comparison.json": set(_keys(comparison_document(compare(one, one)))),
         "positions.parquet": set(assessed_positions(assessment)),
         "campaigns.parquet": set(CAMPAIGN_COLUMNS),
         "parameters.parquet": set(PARAMETER_COLUMNS),
     }
     described = {name: set(columns) for name, (_, columns) in pages.calibration_files().items()}
-    assert described == written
+    assert {name: described[name] for name in written} == written
+    assert described.keys() - written == {"calibration.h", "calibration.params", "imu_calib.yaml"}
+
+
+def test_each_name_of_an_exported_calibration_is_described(pages):
+    settings = CampaignSettings(scheme="fibonacci-24", temperature=(10, 40), vibration=(0, 1))
+    effects = ("thermal_bias(tau=60)", "thermal_curve", "vibration_rectification", "warm_up")
+    model = get_model(f"bias-scale+{'+'.join(effects)}")
+    document = calibration_document(
+        fit_campaign(simulate_campaign(settings)[0], model, get_approach("robot"))
+    )
+    code = export(document, "c", level=True).split("*/", 1)[1]
+    signatures = re.findall(r"void (accel_(?:calibrate|level))\((.*)\)", code)
+    names = {
+        word for name, arguments in signatures for word in (name, *re.findall(r"\w+", arguments))
+    }
+    names = {name.removesuffix("_60") for name in names if name not in ("const", "2", "3")}
+    lines = [line.split("\t") for line in export(document, "px4").splitlines() if line[0] != "#"]
+    first = {re.sub(r"[YZ](?=OFF|SCALE)", "X", re.sub(r"_[12]$", "_0", line[2])) for line in lines}
+    described = {name: set(columns) for name, (_, columns) in pages.calibration_files().items()}
+    assert described["calibration.h"] == names
+    assert described["calibration.params"] == first
+    assert described["imu_calib.yaml"] == set(yaml.safe_load(export(document, "ros")))
 
 
 def _keys(document):

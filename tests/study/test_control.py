@@ -200,6 +200,7 @@ def test_few_replicates_have_no_control(tmp_path):
     tables = run_study(tmp_path, grids=[grid(replicates=19)])
     assert set(tables["cells"]["control"]) == {"none"}
     assert (tables["summary"]["sd_gain"] == 1).all()
+    assert tables["quantiles"]["value_se"].isna().all()
 
 
 @pytest.mark.parametrize("effect", ["heavy_tails(nu=3)", "quantisation", "coloured_noise"])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -15,7 +15,7 @@ from pydantic import BaseModel, Field, model_validator
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.wording import counted
 from accelstudy.campaign.header import LogLayout, Nominal, PerAxis
-from accelstudy.effects import HoldConditions
+from accelstudy.effects import Effect, HoldConditions
 from accelstudy.files.reading import read_json
 from accelstudy.files.validation import Finite, NotNegative, Number, Positive, checked
 from accelstudy.leveling.angles import angles_of, jacobian, tilt_slope
@@ -58,13 +58,7 @@ class Calibration:
     @cached_property
     def needs(self) -> tuple[tuple[str, str], ...]:
         """Effects that need more than the force, each with a column of `HoldConditions`."""
-        if not self.model.hold_columns:
-            return ()
-        return tuple(
-            (effect.name, column)
-            for effect in self.model.effects
-            for column in compose(effect.spec, (effect.spec,)).hold_columns
-        )
+        return needs_of(self.model.effects) if self.model.hold_columns else ()
 
     @property
     def drifts(self) -> tuple[str, ...]:
@@ -188,11 +182,16 @@ class _Document(BaseModel):
 
     schema_version: Annotated[Literal[1], Number]
     campaign: str
+    sensor: str | None = None
     model: str
+    approach: str = ""
+    n_positions: int | None = None
     effects: Annotated[list[str], Field(min_length=1)]
     unit: Literal["m/s^2", "g", "counts"]
     nominal: Nominal | None
     gravity_mps2: Positive
+    sigma_source: Literal["a priori", "a posteriori"] = "a posteriori"
+    redundancy: int = 0
     sigma_position_mps2: NotNegative | None
     sigma_reading_mps2: NotNegative | None = None
     sigmas_95: Positive | None = None
@@ -228,10 +227,18 @@ def read_calibration(path: str | Path) -> Calibration:
     if Path(path).is_dir():
         raise InputError(f"{path}: a folder; give the calibration.json in it")
     content = read_json(path, NO_CALIBRATION)
-    return _calibration(checked(_Document, content, f"{path}: {NO_CALIBRATION}"))
+    return calibration_of(content, f"{path}: {NO_CALIBRATION}")
 
 
-def _calibration(document: _Document) -> Calibration:
+def calibration_of(content: Any, where: str = NO_CALIBRATION) -> Calibration:
+    """Take the content of `calibration.json`; `where` begins the message if it is something else.
+
+    Raises
+    ------
+    InputError
+        If it is no calibration.
+    """
+    document = checked(_Document, content, where)
     whole = compose(document.model, tuple(document.effects))
     # Effects of the rig were estimated together with those of the sensor, but stay with the rig.
     specs = [effect.spec for effect in whole.effects if effect.part == "sensor"]
@@ -246,6 +253,25 @@ def _calibration(document: _Document) -> Calibration:
         log=document.log,
         ranges=document.ranges,
     )
+
+
+def needs_of(effects: Iterable[Effect]) -> tuple[tuple[str, str], ...]:
+    """Effects that need more than the force, each with a column of `HoldConditions`."""
+    return tuple(
+        (effect.name, column)
+        for effect in effects
+        for column in compose(effect.spec, (effect.spec,)).hold_columns
+    )
+
+
+def noise_of_reading(calibration: Calibration) -> float:
+    """Noise of a reading, m/s²: the noise within the holds of the campaign.
+
+    If that is unknown it is the noise of the mean of a hold, which is smaller; 0 if neither is
+    known.
+    """
+    sigmas = (calibration.content.get(f"sigma_{what}_mps2") for what in ("reading", "position"))
+    return next((sigma for sigma in sigmas if sigma is not None), 0.0)
 
 
 class Watch:

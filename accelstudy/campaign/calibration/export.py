@@ -12,7 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.wording import comma_list
-from accelstudy.campaign.calibration.c_code import c_function
+from accelstudy.campaign.calibration.applying import Calibration, calibration_of
+from accelstudy.campaign.calibration.c_code import c_header
+from accelstudy.campaign.calibration.parameter_files import PROGRAMS
 from accelstudy.effects import Effect
 from accelstudy.effects.base import formulas
 from accelstudy.sensors.conversion import Conversion, conversion_of
@@ -22,7 +24,7 @@ from accelstudy.sensors.sensor import SensorModel, not_affine
 
 Array = NDArray[np.float64]
 
-FORMS = ("json", "yaml", "c", "matrix")
+FORMS = ("json", "yaml", "c", "matrix", "px4", "ros")
 
 STEPS = (
     "f_s = mending · to_frd · ((raw − offset) · scale), m/s²",
@@ -62,7 +64,7 @@ def device_matrix(calibration: Mapping[str, Any]) -> Array:
     if unfit := not_affine(_model(calibration)):
         raise InputError(
             f"no matrix can hold {comma_list(list(unfit))} of the model {calibration['model']!r}; "
-            "the forms json, yaml and c carry all effects"
+            "the forms json and yaml carry all effects, and c all that a device can know"
         )
     affine = calibration["affine"]
     if affine is None:
@@ -92,22 +94,51 @@ def mending(calibration: Mapping[str, Any]) -> Array:
     return np.eye(3) if mended.get("matrix") is None else np.array(mended["matrix"], dtype=float)
 
 
-def export(calibration: Mapping[str, Any], form: str) -> str:
+def export(calibration: Mapping[str, Any], form: str, level: bool = False) -> str:
     """Text of a calibration in one of `FORMS`.
 
+    Parameters
+    ----------
+    calibration : mapping, content of calibration.json
+    form : one of `FORMS`
+    level : bool, whether the form "c" has a function of roll and pitch, too
+
+    Raises
+    ------
+    UnknownNameError, InputError
+        If there is no such form, or it cannot hold the calibration.
+
+    Notes
+    -----
     "json" and "yaml" hold everything: parameters with sigmas, formulas of the effects and, if there
-    is one, the matrix. "c" is a header file with the matrix or, where there is none, with a
-    function; "matrix" has its plain 3 × 4 numbers.
+    is one, the matrix. "c" is a header in C99. "matrix" has plain 3 × 4 numbers. "px4" and "ros"
+    are files of parameters, in which `losses` of the calibration are missing.
     """
+    if level and form != "c":
+        raise InputError(f"the form {form} has no place for roll and pitch; c has")
     if form == "matrix":
         return "\n".join(_row(row, " ") for row in device_matrix(calibration)) + "\n"
     if form == "c":
-        return _c_header(calibration)
+        return c_header(*_of_device(calibration), level)
+    if form in PROGRAMS:
+        return PROGRAMS[form](*_of_device(calibration)).text
     if form == "json":
         return json.dumps(_whole(calibration), indent=2, ensure_ascii=False) + "\n"
     if form == "yaml":
         return yaml.safe_dump(_whole(calibration), sort_keys=False, allow_unicode=True)
     raise UnknownNameError("form", form, FORMS)
+
+
+def losses(calibration: Mapping[str, Any], form: str) -> tuple[str, ...]:
+    """What a form cannot hold of a calibration, a sentence each."""
+    return PROGRAMS[form](*_of_device(calibration)).lost if form in PROGRAMS else ()
+
+
+def _of_device(calibration: Mapping[str, Any]) -> tuple[Calibration, Conversion, Frame, Array, str]:
+    """A calibration without its rig, and the readings that a device has."""
+    raw, frame = _readings(calibration)
+    unit = _unit(calibration)
+    return calibration_of(calibration), raw, frame, mending(calibration), unit
 
 
 def _model(calibration: Mapping[str, Any]) -> SensorModel:
@@ -185,50 +216,3 @@ def _unit(calibration: Mapping[str, Any]) -> str:
 
 def _row(values: ArrayLike, separator: str) -> str:
     return separator.join(f"{value: .12e}" for value in np.asarray(values))
-
-
-def _c_header(calibration: Mapping[str, Any]) -> str:
-    raw, frame = _readings(calibration)
-    lines = [f"Accelerometer calibration of {calibration['campaign']}."]
-    model = _model(calibration)
-    if not_affine(model):
-        values = iter(calibration["parameters"])
-        each = [(e, [next(values)["value"] for _ in e.parameters]) for e in model.effects]
-        stays = [(effect, p) for effect, p in each if effect.part == "sensor"]
-        linear = mending(calibration) @ frame.matrix * raw.scale
-        columns, code = c_function(
-            stays,
-            calibration["gravity_mps2"],
-            np.column_stack([linear, -linear @ raw.offset]),
-            frame.matrix,
-        )
-        code = f"#include <math.h>\n\n{code}"
-        lines.append(f"From raw readings in {_unit(calibration)} to the specific force in m/s^2.")
-        lines += [f"{name}: {SYMBOLS[_symbol(name)]}." for name in columns]
-        lines += [
-            f"{effect.name}: {'; '.join(notes)}."
-            for effect, _ in stays
-            if (notes := _notes(effect))
-        ]
-    else:
-        rows = ",\n".join(f"    {{{_row(row, ', ')}}}" for row in device_matrix(calibration))
-        code = f"static const double accelerometer_calibration[3][4] = {{\n{rows}\n}};"
-        lines.append(
-            f"Specific force in m/s^2 = M * (x, y, z, 1), with x, y, z in {_unit(calibration)}."
-        )
-    lines.append(f"Both are in the axes {frame.description}.")
-    if (calibration.get("mended") or {}).get("matrix") is not None:
-        lines.append(f"It mends the readings, too: {calibration['mended']['reason']}.")
-    comment = "\n * ".join(line.replace("*/", "* /") for line in lines)
-    return (
-        f"/* {comment} */\n"
-        "#ifndef ACCELEROMETER_CALIBRATION_H\n#define ACCELEROMETER_CALIBRATION_H\n\n"
-        f"{code}\n\n#endif\n"
-    )
-
-
-def _symbol(name: str) -> str:
-    """Symbol that stands for a name, and for the likes of it."""
-    if name.startswith("temperature_lagged"):
-        return "temperature_lagged"
-    return {"step_y": "step_x", "step_z": "step_x", "pitch": "roll", "yaw": "roll"}.get(name, name)

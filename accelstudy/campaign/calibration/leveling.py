@@ -16,7 +16,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import track
 from accelstudy.basics.units import attitude_unit, display_unit, to_attitude, to_display
 from accelstudy.basics.wording import counted, quantity_text, short_list
-from accelstudy.campaign.calibration.applying import MARGIN, Calibration, Watch
+from accelstudy.campaign.calibration.applying import MARGIN, Calibration, Watch, noise_of_reading
 from accelstudy.campaign.calibration.readings import Readings, readings_of
 from accelstudy.campaign.calibration.tables import chunk_writer, column_names, is_parquet, numbers
 from accelstudy.campaign.checks import likely_fault
@@ -137,16 +137,6 @@ def _estimated(calibration: Calibration) -> tuple[str, ...]:
         "the sigmas of the calibration come from few residuals: to hold 95 % of the errors it "
         f"takes up to {needed:.2f} sigmas of roll and pitch",
     )
-
-
-def noise_of_reading(calibration: Calibration) -> float:
-    """Noise of a reading, m/s²: the noise within the holds of the campaign.
-
-    If that is unknown it is the noise of the mean of a hold, which is smaller; 0 if neither is
-    known.
-    """
-    sigmas = (calibration.content.get(f"sigma_{what}_mps2") for what in ("reading", "position"))
-    return next((sigma for sigma in sigmas if sigma is not None), 0.0)
 
 
 def _leveled(

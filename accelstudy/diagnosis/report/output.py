@@ -15,6 +15,8 @@ from accelstudy.basics import suggested
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.levels import REFUTED
 from accelstudy.basics.progress import stage
+from accelstudy.campaign.calibration.applying import needs_of
+from accelstudy.campaign.calibration.device import unknown
 from accelstudy.campaign.calibration.document import json_text
 from accelstudy.campaign.format import read_campaign
 from accelstudy.diagnosis.decision.posterior import CREDIBLE
@@ -232,7 +234,9 @@ def next_steps(
         return steps
     use = "Level a log with the calibration that is beside this page"
     steps.append((use, suggested.apply(result)))
-    steps.append(("Take it to a device", suggested.export("c", result)))
+    on_device = [effect for effect in d.extended.effects if effect.part == "sensor"]
+    form = "json" if unknown(needs_of(on_device)) else "c"
+    steps.append(("Take it to a device", suggested.export(form, result)))
     if d.extended is not d.model:
         command = suggested.calibrate("CAMPAIGN", Path(place) / "model.yaml", d.approach.name)
         steps.append(("Calibrate the next campaign with this model", command))

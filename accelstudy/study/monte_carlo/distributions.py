@@ -107,9 +107,11 @@ class Controlled:
         wide = np.minimum(p, 1 - p) / 2
         plain, low, high = self.plain.quantile([p, p - wide, p + wide])
         slope = (high - low) / (2 * wide)
-        variance = p * (1 - p) / self.count * slope**2
+        # Too few values have no density: their error is unknown.
+        variance = p * (1 - p) / self.count * (slope**2 if self.count >= LEAST else np.nan)
         known = np.full(len(p), np.nan) if self.known is None else self.known[chosen]
-        if self.linear is None or self.apart is None or not np.isfinite(known).all():
+        few = self.count < LEAST
+        if few or self.linear is None or self.apart is None or not np.isfinite(known).all():
             return Estimates(plain, np.sqrt(variance), np.ones(len(p)), plain)
         linear, low, high = self.linear.quantile([p, p - wide, p + wide])
         sd = np.array([self._sd_apart(each) for each in p])

@@ -1,0 +1,429 @@
+"""Calibrations on a device: functions in C, compiled, and parameters of PX4 and ROS."""
+
+import ctypes
+import json
+import re
+import shutil
+import subprocess
+from itertools import combinations
+
+import numpy as np
+import pytest
+import yaml
+from calling import refusal, succeed
+
+from accelstudy.approaches import get_approach
+from accelstudy.basics.errors import InputError
+from accelstudy.campaign.calibration.applying import Calibration, calibration_of
+from accelstudy.campaign.calibration.c_code import HEAD, SOLVE, c_header
+from accelstudy.campaign.calibration.document import calibration_document
+from accelstudy.campaign.calibration.export import device_matrix, export, losses
+from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
+from accelstudy.effects import HoldConditions, effect_names, get_effect
+from accelstudy.sensors.conversion import conversion_of
+from accelstudy.sensors.frames import FRD, parse_frame
+from accelstudy.sensors.models import compose, get_model
+
+G = 9.81
+MGON = np.pi / 200 / 1000
+RANGES = {"temperature_degC": [10, 40], "time_s": [0, 1000], "vibration_mps2": [0, 0.5]}
+BEFORE = ("hysteresis", "settling")
+EFFECTS = [
+    name for name in effect_names() if get_effect(name).part == "sensor" and name not in BEFORE
+]
+PAIRS = [*combinations(EFFECTS, 2), tuple(EFFECTS)]
+"""Effects two by two, and all at once."""
+ALONE = [
+    *((name,) for name in EFFECTS),
+    ("thermal_bias(tau=300)",),
+    ("learned(coordinate=temperature, low=10, high=40, length=1.5, amplitude=0.1)",),
+    ("learned(coordinate=force, low=-15, high=15, length=1.5, amplitude=0.1)",),
+    ("learned(coordinate=vibration, target=square, low=0, high=0.5, length=1.5, amplitude=0.001)",),
+    ("learned(coordinate=time wave, period=300, amplitude=0.1)",),
+    ("thermal_bias(tau=0.5)", "learned(coordinate=temperature rate, tau=100, length=1.5)"),
+    ("bias", "scale", "nonorthogonality", "thermal_bias", "bias_drift", "vibration_rectification"),
+    ("quadratic_scale", "saturation"),
+]
+"""Effects, some shapes of them, and some models."""
+CONTENT = {
+    "campaign": "made", "sensor": "a */ b", "model": "m", "approach": "gravity",
+    "n_positions": 24, "quality": {"state": "accepted"}, "mended": None,
+    "sigma_reading_mps2": 0.01,
+}  # fmt: skip
+
+
+def calibration_with(specs, ranges=RANGES, values=None):
+    """A calibration of effects of cheap equipment."""
+    model = compose("m", specs)
+    u, rng = model.n_parameters, np.random.default_rng(model.n_parameters)
+    if values is None:
+        sizes = [np.minimum(e.typical[1], e.deviations) for e in model.effects]
+        values = np.concatenate(sizes) * rng.choice([-1, 1], u)
+    root = 0.1 * np.abs(values)[:, None] * (np.eye(u) + rng.uniform(-0.2, 0.2, (u, u)))
+    return Calibration(model, np.array(values), root @ root.T, G, CONTENT, None, ranges)
+
+
+def conditions(n, until=1000.0):
+    rng = np.random.default_rng(7)
+    return {
+        "temperature": rng.uniform(10, 40, n),
+        "time": np.sort(rng.uniform(0, until, n)),
+        "vibration": rng.uniform(0, 0.5, n),
+    }
+
+
+def attitudes(n, size=1.0):
+    vectors = np.random.default_rng(5).normal(size=(n, 3))
+    return size * G * vectors / np.linalg.norm(vectors, axis=1)[:, None]
+
+
+def holds(known):
+    still = np.zeros(len(known["time"]))
+    return HoldConditions(**known, step_x=still, step_y=still, step_z=still)
+
+
+def readings_of(calibration, forces, hold):
+    """Output of a sensor, composed of its effects by NumPy alone."""
+    effects, values, axes = [], iter(calibration.parameters), np.eye(3)
+    for effect in calibration.model.effects:
+        p = tuple(next(values) for _ in effect.parameters)
+        axes += np.array(effect.axes(p, np), dtype=float)
+        effects.append((effect, p))
+    output = np.linalg.solve(axes, forces.T)
+    for last in (False, True):
+        of = tuple(output)
+        for effect, p in effects:
+            if effect.last == last:
+                added = effect.output(of, p, G, hold, np)
+                output = output + np.stack([a + np.zeros(len(forces)) for a in added])
+    return output.T
+
+
+class Library:
+    """Functions of headers, all compiled together, in one precision."""
+
+    def __init__(self, headers, folder, double):
+        self.real = ctypes.c_double if double else ctypes.c_float
+        self.columns = {}
+        texts = [HEAD, SOLVE]
+        for name, header in headers.items():
+            body = header[header.index(HEAD) + len(HEAD) :].removesuffix("#endif\n")
+            body = body.replace(SOLVE, "")
+            texts.append(re.sub(r"\baccel_(?!real|solve)(\w+)", rf"{name}_\1", body))
+            signature = re.search(rf"{name}_calibrate\(([^)]*)\)", texts[-1])[1]
+            names = [argument.split()[-1] for argument in signature.split(",")[1:-1]]
+            self.columns[name] = names
+            given = "".join(f", known[{k} * n + i]" for k in range(len(names)))
+            level = f"reading + 3 * i{given}, noise, out + 7 * i + 3, out + 7 * i + 5"
+            level = f"{name}_level({level});" if "accel_level" in body else ""
+            texts.append(
+                f"void run_{name}(int n, const accel_real *reading, const accel_real *known,"
+                " accel_real noise, accel_real *out)\n{\n    int i;\n    (void)known;\n"
+                "    (void)noise;\n"
+                f"    for (i = 0; i < n; i++) {{\n        {name}_calibrate(reading + 3 * i{given},"
+                f" out + 7 * i);\n        {level}\n    }}\n}}"
+            )
+        texts.append("#endif\n")
+        source, library = folder / "all.c", folder / "all.so"
+        source.write_text("\n".join(texts), encoding="utf-8")
+        warnings = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion"]
+        command = ["cc", *warnings, "-shared", "-fPIC", "-o", library, source, "-lm"]
+        subprocess.run([*command, *(["-DACCEL_DOUBLE"] if double else [])], check=True)
+        self._library = ctypes.CDLL(str(library))
+
+    def __call__(self, name, readings, known, noise=0.01):
+        """Forces (n, 3), angles (n, 2) and sigmas (n, 2)."""
+        pointer, n = ctypes.POINTER(self.real), len(readings)
+        of = [known[column] for column in self.columns[name]] or [np.zeros(n)]
+        arrays = [np.ascontiguousarray(a, dtype=self.real) for a in (readings, np.stack(of))]
+        out = np.full((n, 7), np.nan, dtype=self.real)
+        reading, columns, result = (a.ctypes.data_as(pointer) for a in (*arrays, out))
+        getattr(self._library, f"run_{name}")(n, reading, columns, self.real(noise), result)
+        return out[:, :3].astype(float), out[:, 3:5].astype(float), out[:, 5:].astype(float)
+
+
+def header_of(calibration, level=False, unit="m/s^2"):
+    return c_header(calibration, conversion_of(unit), FRD, np.eye(3), unit, level)
+
+
+needs_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler (cc)")
+
+
+@pytest.fixture(scope="module")
+def of_effects():
+    """Calibrations by name: of each effect, of all, and of each pair."""
+    alone = {f"alone{i}": calibration_with(specs) for i, specs in enumerate(ALONE)}
+    return alone, {f"pair{i}": calibration_with(pair) for i, pair in enumerate(PAIRS)}
+
+
+@pytest.fixture(scope="module")
+def headers(of_effects):
+    alone, pairs = of_effects
+    headers = {name: header_of(each, level=True) for name, each in alone.items()}
+    return headers | {name: header_of(each) for name, each in pairs.items()}
+
+
+@pytest.fixture(scope="module", params=["float", "double"])
+def compiled(request, headers, tmp_path_factory):
+    folder = tmp_path_factory.mktemp(request.param)
+    return request.param, Library(headers, folder, double=request.param == "double")
+
+
+def settled(known, library, name):
+    """Conditions in which what lags behind the thermometer is as warm."""
+    lagged = [column for column in library.columns[name] if column.startswith("temperature_lagged")]
+    return known | {column: known["temperature"] for column in lagged}
+
+
+@needs_cc
+def test_c_of_each_effect_is_what_apply_does(compiled, of_effects):
+    """Forces, angles and sigmas; also after the session, when drifts have ended."""
+    precision, library = compiled
+    exact = precision == "double"
+    known = conditions(60, until=2000.0)
+    known["temperature"] = np.full(60, 27.0)  # nothing lags behind it
+    for name, calibration in of_effects[0].items():
+        hold = holds(known)
+        readings = readings_of(calibration, attitudes(60), hold)
+        force, angle, sigma = library(name, readings, settled(known, library, name))
+        expected = calibration.correct(readings, hold)
+        assert np.isfinite(expected).all()
+        np.testing.assert_allclose(force, expected, rtol=0, atol=2e-6 if exact else 1.1e-5)
+        angles, sigmas = calibration.level(readings, 0.01, hold)
+        tilt = np.cos(angles[:, 1:])  # near the roll pole, roll means nothing
+        difference = (angle - angles + np.pi) % (2 * np.pi) - np.pi
+        np.testing.assert_allclose(difference * tilt, 0, atol=1e-6 if exact else 5e-6)
+        np.testing.assert_allclose(sigma, sigmas, rtol=1e-5 if exact else 2e-3, err_msg=name)
+
+
+@needs_cc
+@pytest.mark.parametrize("size", [0.6, 1.0, 1.45])
+def test_c_of_each_pair_gives_the_force_that_made_the_reading(compiled, of_effects, size):
+    """Readings are composed by NumPy; the error is below what the head of a header says."""
+    precision, library = compiled
+    known, forces = conditions(40), attitudes(40, size)
+    for name, calibration in of_effects[1].items():
+        readings = readings_of(calibration, forces, holds(known))
+        force, _, _ = library(name, readings, settled(known, library, name))
+        bound = 1e-6 if precision == "double" else size * 1.1e-5
+        np.testing.assert_allclose(
+            force, forces, rtol=0, atol=bound, err_msg=str(calibration.model)
+        )
+
+
+@needs_cc
+def test_c_follows_a_lag_as_its_head_says(tmp_path):
+    calibration = calibration_with(("thermal_bias(tau=300)",))
+    library = Library({"lag": header_of(calibration)}, tmp_path, double=True)
+    time = np.arange(0.0, 1000.0)
+    temperature = 20 + 15 * (time / 1000)
+    lagged, factor = [temperature[0]], 1 - np.exp(-1 / 300)
+    for now in temperature[1:]:
+        lagged.append(lagged[-1] + (now - lagged[-1]) * factor)
+    hold = HoldConditions(time=time, temperature=temperature)
+    readings = np.tile([0.0, 0.0, -G], (len(time), 1))
+    force, _, _ = library("lag", readings, {"temperature_lagged_300": np.array(lagged)})
+    expected = calibration.correct(readings, hold)
+    largest = 0.007 * 0.5 * 15 / 1000  # half a second behind a straight line, at 7 mm/s²/K
+    np.testing.assert_allclose(force, expected, rtol=0, atol=1.1 * largest)
+
+
+@needs_cc
+def test_c_has_no_force_where_apply_has_none(tmp_path):
+    """Hard clipping: nothing is known of what lies beyond the knee."""
+    calibration = calibration_with(("saturation(knee=9)",), values=[1.0, 1.0, 1.0])
+    library = Library({"clips": header_of(calibration)}, tmp_path, double=False)
+    readings = np.array([[0.0, 0.0, -8.0], [0.0, 9.5, 0.0]])
+    force, _, _ = library("clips", readings, {})
+    np.testing.assert_allclose(force[0], [0, 0, -8], atol=1e-5)
+    assert np.isnan(force[1]).all()
+    assert np.isnan(calibration.correct(readings)[1]).any()
+
+
+@needs_cc
+@pytest.mark.parametrize("frame", ["frd", "flu", "rfu"])
+def test_c_takes_counts_in_the_axes_of_the_log(frame, tmp_path):
+    """A large offset costs no digits: the first thing that is done is to take it away."""
+    calibration = calibration_with(("bias", "scale", "nonorthogonality", "quadratic_scale"))
+    turn, axes = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]]), parse_frame(frame)
+    raw = conversion_of("counts", [0.002, 0.0021, 0.0019], [33000.3, 33100.4, 32900.2])
+    header = c_header(calibration, raw, axes, turn, "counts", level=True)
+    library = Library({"log": header}, tmp_path, double=False)
+    forces, hold = attitudes(30), HoldConditions()
+    counts = raw.from_si(axes.from_frd(readings_of(calibration, forces, hold) @ turn))
+    force, angle, _ = library("log", counts, {})
+    np.testing.assert_allclose(force, axes.from_frd(forces), rtol=0, atol=2e-5)
+    angles, _ = calibration.level(axes.to_frd(raw.to_si(counts)) @ turn.T, 0.01)
+    difference = (angle - axes.signs[:2] * angles + np.pi) % (2 * np.pi) - np.pi
+    np.testing.assert_allclose(difference * np.cos(angles[:, 1:]), 0, atol=1e-5)
+
+
+def test_a_header_says_what_it_takes_and_where_it_is_from():
+    header = header_of(calibration_with(tuple(EFFECTS)), level=True)
+    comment = " ".join(header[: header.index("*/")].replace("\n *", " ").split())
+    for words in (
+        "temperature: degC", "time: s since the start", "vibration: m/s^2, rms", "g = 9.81 m/s^2",
+        "Newton steps", "less than 1e-06 m/s^2", "bias_drift: stays as it was", "24 positions",
+        "b_T_x = ", "m/s^2/K", "Verdict: accepted", "of a * / b",
+    ):  # fmt: skip
+        assert words in comment
+    assert "malloc" not in header
+    for_one = header_of(calibration_with(("bias", "scale")))
+    assert "Newton" not in for_one
+    assert "accel_solve" not in for_one
+    assert "accel_calibrate(const accel_real reading[3], accel_real force[3])" in for_one
+
+
+@pytest.fixture(scope="module")
+def calibrated(tmp_path_factory):
+    """Function that fits a model to a campaign with its effects, and writes calibration.json."""
+    folder = tmp_path_factory.mktemp("calibrated")
+
+    def of(model, *, temperature=False, **changes):
+        path = folder / f"{model.replace('/', '-')}{len(changes)}.json"
+        if not path.exists():
+            settings = CampaignSettings(
+                scheme="fibonacci-36", repeat_first=6, order="random", seed=11,
+                effects=tuple(model.split("+")[1:]),
+                **({"temperature": (10, 40), "temperature_order": "random"} if temperature else {}),
+            )  # fmt: skip
+            campaign, _ = simulate_campaign(settings)
+            fit = fit_campaign(campaign, get_model(model), get_approach("gravity"))
+            path.write_text(json.dumps({**calibration_document(fit), **changes}), encoding="utf-8")
+        return path
+
+    return of
+
+
+@pytest.mark.parametrize("form", ["c", "px4", "ros"])
+@pytest.mark.parametrize(("spec", "what"), [
+    ("hysteresis", "position before"),
+    ("settling", "position before"),
+    ("learned(coordinate=previous, low=-10, high=10)", "position before"),
+    ("learned(coordinate=yaw)", "yaw"),
+    ("learned(coordinate=order, low=1, high=30)", "order"),
+])  # fmt: skip
+def test_what_no_device_knows_is_refused_in_one_line(form, spec, what, calibrated, tmp_path):
+    content = json.loads(calibrated("bias-scale-nonorthogonality").read_text())
+    effect = get_effect(spec)
+    first = content["parameters"][0]
+    content["effects"] = [spec]
+    content["parameters"] = [{**first, "name": p.name} for p in effect.parameters]
+    content["covariance"] = (np.eye(len(effect.parameters)) * 1e-8).tolist()
+    path = tmp_path / "calibration.json"
+    path.write_text(json.dumps(content), encoding="utf-8")
+    line = refusal("export", path, "--form", form)
+    assert f"{effect.name} depends on the {what}, which no device knows" in line
+    assert line.count("\n") == 1
+
+
+def test_only_c_levels(calibrated):
+    path = calibrated("bias-scale-nonorthogonality")
+    assert "accel_level(" in succeed("export", path, "--form", "c", "--level").stdout
+    assert "accel_level" not in succeed("export", path, "--form", "c").stdout
+    assert "no place for roll and pitch" in refusal("export", path, "--form", "px4", "--level")
+    content = json.loads(path.read_text())
+    content["covariance"] = [[None] * 9] * 9
+    with pytest.raises(InputError, match="has no sigmas; export it without --level"):
+        export(content, "c", level=True)
+
+
+def px4_of(text):
+    """Parameters of a file for QGroundControl."""
+    rows = [line.split("\t") for line in text.splitlines() if not line.startswith("#")]
+    assert all(len(row) == 5 and len(row[2]) <= 16 for row in rows)
+    assert all(("." in row[3]) == (row[4] == "9") and "e" not in row[3] for row in rows)
+    assert {row[4]: row[2] for row in rows if row[4] == "6"} in ({}, {"6": "TC_A_ENABLE"})
+    return {name: float(value) for _, _, name, value, _ in rows}
+
+
+def corrected_by_px4(p, readings, temperature):
+    """What PX4 makes of readings, as its documentation says."""
+    warmer = np.clip(temperature, p.get("TC_A0_TMIN", 0), p.get("TC_A0_TMAX", 0)) - p.get(
+        "TC_A0_TREF", 0
+    )
+    columns = []
+    for i, axis in enumerate("XYZ"):
+        thermal = sum(p.get(f"TC_A0_X{k}_{i}", 0.0) * warmer**k for k in range(4))
+        offset, scale = p[f"CAL_ACC0_{axis}OFF"], p[f"CAL_ACC0_{axis}SCALE"]
+        columns.append((readings[:, i] - thermal - offset) * scale)
+    return np.stack(columns, axis=1)
+
+
+def test_px4_holds_bias_scale_and_curves_of_the_temperature(calibrated):
+    path = calibrated("bias-scale+thermal_bias+thermal_curve", temperature=True)
+    result = succeed("export", path, "--form", "px4")
+    assert result.stderr == ""
+    found = px4_of(result.stdout)
+    assert found["TC_A_ENABLE"] == 1
+    calibration = calibration_of(json.loads(path.read_text()))
+    temperature = np.linspace(*calibration.ranges["temperature_degC"], 30)
+    hold = HoldConditions(temperature=temperature)
+    forces = attitudes(30)
+    readings = readings_of(calibration, forces, hold)
+    expected = calibration.correct(readings, hold)
+    np.testing.assert_allclose(corrected_by_px4(found, readings, temperature), expected, atol=1e-6)
+
+
+@pytest.mark.parametrize(("model", "form", "missing"), [
+    ("bias-scale-nonorthogonality", "px4", "nonorthogonality"),
+    ("bias-scale-nonorthogonality+quadratic_scale", "px4", "nonorthogonality and quadratic_scale"),
+    ("bias-scale-nonorthogonality+quadratic_scale", "ros", "quadratic_scale"),
+    ("bias-scale-nonorthogonality+thermal_bias", "ros", "thermal_bias"),
+])  # fmt: skip
+def test_what_a_file_cannot_hold_is_said_with_its_size(model, form, missing, calibrated):
+    """The errors of roll and pitch by a device of our own, at tilts drawn at random."""
+    path = calibrated(model, temperature="thermal" in model)
+    result = succeed("export", path, "--form", form)
+    (warning,) = result.stderr.splitlines()
+    assert f"has no place for {missing};" in warning
+    assert warning.removeprefix("warning: ") in result.stdout
+    said = [float(n) for n in re.findall(r"by ([\d.]+) mgon", warning)[:2]]
+    calibration = calibration_of(json.loads(path.read_text()))
+    rng, n = np.random.default_rng(3), 20000
+    z, azimuth = rng.uniform(np.cos(np.pi / 4), 1, n), rng.uniform(0, 2 * np.pi, n)
+    r = np.sqrt(1 - z**2)
+    forces = -calibration.gravity * np.stack([r * np.cos(azimuth), r * np.sin(azimuth), z], axis=1)
+    low, high = calibration.ranges.get("temperature_degC", (20, 20))
+    temperature = rng.choice(np.linspace(low, high, 5), n)
+    readings = readings_of(calibration, forces, HoldConditions(temperature=temperature))
+    if form == "px4":
+        found = corrected_by_px4(px4_of(result.stdout), readings, temperature)
+    else:
+        file = yaml.safe_load(result.stdout)
+        found = readings @ np.reshape(file["SM"], (3, 3)).T - file["bias"]
+
+    def roll_pitch(f):
+        return np.stack([np.arctan2(-f[:, 1], -f[:, 2]), np.arcsin(f[:, 0] / norm(f))], axis=1)
+
+    error = (roll_pitch(found) - roll_pitch(forces)) / MGON
+    np.testing.assert_allclose(np.sqrt(np.mean(error**2, axis=0)), said, rtol=0.03)
+
+
+def norm(vectors):
+    return np.linalg.norm(vectors, axis=1)
+
+
+@pytest.mark.parametrize("frame", ["frd", "flu"])
+def test_ros_holds_what_a_matrix_holds(frame, calibrated):
+    """SM · reading − bias, as the node apply_calib takes it."""
+    log = {"unit": "counts", "scale": [0.02, 0.021, 0.019], "offset": [5, 1, -4], "frame": frame}
+    content = json.loads(calibrated("bias-scale-nonorthogonality").read_text()) | {"log": log}
+    text = export(content, "ros")
+    assert losses(content, "ros") == ()
+    file = yaml.safe_load(text)
+    matrix = device_matrix(content)
+    np.testing.assert_allclose(np.reshape(file["SM"], (3, 3)), matrix[:, :3], atol=1e-11)
+    np.testing.assert_allclose(file["bias"], -matrix[:, 3], atol=1e-9)
+    assert "readings in counts" in text
+    with pytest.raises(InputError, match="PX4 takes readings in m/s\\^2"):
+        export(content, "px4")
+
+
+def test_px4_has_no_lag(calibrated):
+    content = json.loads(
+        calibrated("bias-scale+thermal_bias(tau=300)", temperature=True).read_text()
+    )
+    (loss,) = losses(content, "px4")
+    assert "thermal_bias with one of 300 s is right at a settled temperature only" in loss

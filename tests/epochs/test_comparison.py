@@ -1,0 +1,103 @@
+"""Calibrations of one simulated sensor, compared by function and by command."""
+
+import json
+
+import numpy as np
+import pytest
+from calling import refusal, succeed
+from page_helpers import assert_sound, text_of
+from session_helpers import NINE, SENSOR, document, write_document
+
+from accelstudy.basics.errors import InputError
+from accelstudy.campaign.calibration.applying import calibration_of
+from accelstudy.campaign.calibration.document import json_text
+from accelstudy.epochs.comparison import compare
+from accelstudy.leveling.angles import angles_of, wrapped
+from accelstudy.leveling.error import cap_forces
+
+CROSS = "cross_axis_misalignment: 0.004, 0.003, -0.002"
+WARM = "thermal_bias: 0.002, -0.001, 0.001"
+
+
+def calibrated(seed, **options):
+    return calibration_of(json.loads(json_text(document(seed, **options))))
+
+
+def test_a_robot_and_gravity_have_the_same_sensor_in_common():
+    """Without noise a calibration by gravity is that by the robot, with the rotation taken out."""
+    options = {"effects": (*SENSOR, CROSS), "sigma": 1e-9, "sigma_angle": 2e-11}
+    by_gravity = calibrated(1, **options)
+    by_robot = calibrated(2, model=f"{NINE}-crossaxis", approach="robot", **options)
+    for c in (compare(by_gravity, by_robot), compare(by_robot, by_gravity)):
+        assert c.model.name == NINE
+        np.testing.assert_allclose(*c.values, atol=1e-8)
+        assert c.only_in(by_robot) == ["cross_axis_misalignment"]
+        assert c.only_in(by_gravity) == []
+        # Their tilts are relative to the sensor's own axes: a rotation is no change.
+        assert c.tilt[0].max() < 1e-8
+
+
+def test_what_is_brought_to_a_smaller_model_scatters_as_is_said():
+    """Differences of many pairs of sessions, beside the covariance that is stated for each."""
+    robot = {"model": f"{NINE}-crossaxis+thermal_bias", "approach": "robot",
+             "temperature": (15, 35), "temperature_order": "random"}  # fmt: skip
+    effects = (*SENSOR, CROSS, WARM)
+    first = calibrated(1, model=f"{NINE}+thermal_bias", effects=effects, temperature=(15, 35),
+                       temperature_order="random")  # fmt: skip
+    each = [compare(first, calibrated(seed, effects=effects, **robot)) for seed in range(2, 14)]
+    values = np.array([c.values[1] for c in each])
+    roots = [np.linalg.cholesky(c.epochs.covariances[1]) for c in each]
+    apart = [
+        np.linalg.solve(r, d) for r, d in zip(roots, values - values.mean(axis=0), strict=True)
+    ]
+    degrees = (len(each) - 1) * values.shape[1]
+    assert np.sum(np.square(apart)) / degrees == pytest.approx(1, abs=3.3 * np.sqrt(2 / degrees))
+
+
+def test_the_change_of_roll_and_pitch_is_that_of_readings():
+    first = calibrated(1)
+    second = calibrated(2, effects=("bias: 0.1, 0.07, -0.1", *SENSOR[1:]))
+    c = compare(first, second)
+    forces = cap_forces(c.tilt_range, 5000, second.gravity)
+    readings = first.model.sense(forces, first.parameters)
+    apart = wrapped(angles_of(second.correct(readings)) - angles_of(forces))
+    np.testing.assert_allclose(c.tilt[0], np.sqrt(np.mean(apart**2, axis=0)), rtol=0.01)
+    assert [c.parameters[i].name for i in c.changed] == ["b_y"]
+
+
+def test_what_cannot_be_compared_is_said():
+    one = document(1)
+    counts = {**one, "unit": "counts", "nominal": {"scale": [1e-3] * 3, "offset": [0.0] * 3}}
+    with pytest.raises(InputError, match="nominal: the two calibrations"):
+        compare(calibration_of(one), calibration_of(counts))
+    with pytest.raises(InputError, match="the second calibration has no sigmas"):
+        compare(calibration_of(one), calibrated(1, scheme="fibonacci-9", sigma_known=False))
+    other = calibrated(1, model="quadratic_scale", scheme="fibonacci-30")
+    with pytest.raises(InputError, match="none in common"):
+        compare(calibration_of(one), other)
+
+
+@pytest.mark.parametrize("changed", [True, False])
+def test_the_command_writes_what_it_says(changed, tmp_path):
+    effects = ("bias: 0.1, 0.07, -0.1", *SENSOR[1:]) if changed else SENSOR
+    write_document(tmp_path / "a.json", 1)
+    write_document(tmp_path / "b.json", 2, effects=effects)
+    out = tmp_path / "out"
+    told = succeed("compare", tmp_path / "a.json", tmp_path / "b.json", "--out", out).stdout
+    content = json.loads((out / "comparison.json").read_text(encoding="utf-8"))
+    assert content["state"] == ("changed" if changed else "unchanged")
+    assert (content["test"]["p_value"] < content["test"]["level"]) == changed
+    assert [p["name"] for p in content["parameters"] if p["changed"]] == ["b_y"] * changed
+    assert told.startswith(f"{content['state'].upper()}: {content['verdict']}")
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert_sound(page)
+    assert "session-1 and session-2 compared" in text_of(page)
+    assert (out / "figures/changes.svg").is_file()
+
+
+def test_bad_input_ends_in_one_line(tmp_path):
+    path = tmp_path / "a.json"
+    path.write_text("{}", encoding="utf-8")
+    line = refusal("compare", path, path, "--out", tmp_path / "out")
+    assert line.startswith(f"error: {path}: not a calibration.json")
+    assert not (tmp_path / "out").exists()
