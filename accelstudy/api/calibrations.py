@@ -11,9 +11,18 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from accelstudy.api.given import axes_of, of_type, path_of, table_html
+from accelstudy.api.given import (
+    IN_MEMORY,
+    drawing,
+    for_programs,
+    of_type,
+    path_of,
+    python_words,
+    quantity,
+)
 from accelstudy.api.logs import log_of
 from accelstudy.approaches import get_approach
+from accelstudy.basics.units import Given
 from accelstudy.basics.wording import counted
 from accelstudy.campaign.calibration.applying import read_calibration
 from accelstudy.campaign.calibration.assessment import assess
@@ -26,11 +35,15 @@ from accelstudy.campaign.calibration.output import (
     write_calibration,
 )
 from accelstudy.campaign.session import Campaign
+from accelstudy.drawing.style import FULL
 from accelstudy.files.outputs import CALIBRATION, result_folder
+from accelstudy.pages.notebook import notebook_html
 from accelstudy.sensors.models import get_model
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+SIGMA = Given("m/s^2", "", "Noise of a reading.")
 
 
 @dataclass(frozen=True, repr=False)
@@ -51,7 +64,7 @@ class Calibration:
         return f"Calibration({self.content['campaign']!r}, {n}, {self.verdict})"
 
     def _repr_html_(self) -> str:
-        return table_html("Calibration", self.content["quality"]["verdict"], self.parameters)
+        return notebook_html("Calibration", self.content["quality"]["verdict"], self.parameters)
 
     @property
     def verdict(self) -> str:
@@ -64,13 +77,15 @@ class Calibration:
         rows = pd.DataFrame(self.content["parameters"])[["name", "value", "sigma", "unit"]]
         return rows.set_index("name")
 
-    def apply(self, log: Any, *, sigma: float | None = None) -> pd.DataFrame:
+    @for_programs
+    def apply(self, log: Any, *, sigma: float | str | None = None) -> pd.DataFrame:
         """Level a log.
 
         Parameters
         ----------
         log : Log, or what `read_log` takes
-        sigma : float, m/s², of a reading; as within the holds of the campaign if omitted
+        sigma : float in m/s² or str with a unit, of a reading; as within the holds of the campaign
+            if omitted
 
         Returns
         -------
@@ -79,14 +94,16 @@ class Calibration:
             the names say, and their sigmas. Warnings stand in ``attrs["warnings"]``.
         """
         log = log_of(log)
-        with TemporaryDirectory(prefix="accelstudy-") as folder:
+        reading = None if sigma is None else quantity("sigma", sigma, SIGMA)
+        with TemporaryDirectory(prefix=IN_MEMORY) as folder:
             kept, out = Path(folder) / "calibration.json", Path(folder) / "leveled.parquet"
             kept.write_text(json_text(dict(self.content)), encoding="utf-8")
-            leveled = level_log(read_calibration(kept), log.path, out, log.layout, sigma)
+            leveled = level_log(read_calibration(kept), log.path, out, log.layout, reading)
             table = pd.read_parquet(out)
-        table.attrs["warnings"] = list(leveled.warnings)
+        table.attrs["warnings"] = list(map(python_words, leveled.warnings))
         return table
 
+    @for_programs
     def save(self, folder: str | PathLike[str], *, force: bool = False) -> None:
         """Write what ``accelstudy calibrate`` writes into a folder."""
         path = path_of("folder", folder)
@@ -96,11 +113,12 @@ class Calibration:
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw |f| − g of each position, mm/s²."""
-        ax = axes_of(ax)
-        draw_residuals(ax, self.fit, assessed_positions(assess(self.fit)))
+        with drawing(ax, FULL, 62) as ax:
+            draw_residuals(ax, self.fit, assessed_positions(assess(self.fit)))
         return ax
 
 
+@for_programs
 def calibrate(
     campaign: Campaign, *, model: str = "bias-scale-nonorthogonality", approach: str = "gravity"
 ) -> Calibration:
@@ -119,5 +137,6 @@ def calibrate(
     """
     of_type("campaign", campaign, Campaign, expected="a Campaign, as find_holds returns")
     of_type("model", model, str, expected="the name of a model")
+    of_type("approach", approach, str, expected="the name of an approach")
     fit = fit_campaign(campaign, get_model(model), get_approach(approach))
     return Calibration(calibration_content(fit, assess(fit)), fit)

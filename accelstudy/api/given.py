@@ -2,13 +2,63 @@
 
 from __future__ import annotations
 
-from numbers import Real
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import wraps
+from math import isfinite
+from numbers import Integral, Real
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from tempfile import gettempdir
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
+from accelstudy.basics import bounds
+from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, shown
 from accelstudy.basics.units import Given
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result")
+
+GRAVITY = Given("m/s^2", "", "Local gravity.", bounds.GRAVITY.least, bounds.GRAVITY.most)
+IN_MEMORY = "accelstudy-"
+"""What the names of folders begin with that hold a table in memory as a file."""
+_OPTION = re.compile(r"(?<![\w-])--([a-z][a-z-]*)")
+_KEYWORDS = {"range": "range_mps2", "threshold": "threshold_mps2"}
+"""Options whose keywords have other names."""
+
+
+def python_words(text: str) -> str:
+    """Say in words of Python what was written for a command: --time-unit is `time_unit`."""
+    if "accelstudy " not in text:  # a command that is quoted keeps its options
+        text = _OPTION.sub(_keyword, text)
+    folder = rf"{re.escape(gettempdir())}\W{IN_MEMORY}\w+\W"
+    return re.sub(rf"{folder}(DataFrame)\.parquet", r"\1", text)
+
+
+def _keyword(option: re.Match[str]) -> str:
+    name = _KEYWORDS.get(option[1], option[1].replace("-", "_"))
+    return f"`{name}`" if option.start() else name
+
+
+def for_programs(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
+    """Let the errors of a function speak to the user of Python."""
+
+    @wraps(function)
+    def within(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
+        try:
+            return function(*args, **kwargs)
+        except InputError as error:
+            text = python_words(str(error))
+            if text == str(error):
+                raise
+            raise InputError(text) from None
+
+    return within
 
 
 def of_type(name: str, value: Any, *types: type, expected: str) -> None:
@@ -17,15 +67,23 @@ def of_type(name: str, value: Any, *types: type, expected: str) -> None:
         raise InputError(f"{name}: expected {expected}, not {shown(value)}")
 
 
-def path_of(name: str, value: Any) -> Path:
+def path_of(name: str, value: Any, expected: str = "a path") -> Path:
     """Path that was given as one, or as text."""
-    of_type(name, value, str, PathLike, expected="a path")
+    of_type(name, value, str, PathLike, expected=expected)
     return Path(value)
+
+
+def whole(name: str, value: Any, allowed: Range) -> int:
+    """Whole number within a range."""
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise InputError(f"{name}: expected a whole number, not {shown(value)}")
+    allowed.check_key(name, int(value))
+    return int(value)
 
 
 def quantity(name: str, value: Any, given: Given) -> float:
     """Quantity in SI: a number in SI, or text with a unit, as on the command line."""
-    if not isinstance(value, bool) and isinstance(value, Real):
+    if not isinstance(value, bool) and isinstance(value, Real) and isfinite(value):
         value = f"{float(value)!r}{given.unit}"
     of_type(name, value, str, expected=f"a number in {given.unit} or a text with its unit")
     try:
@@ -34,18 +92,40 @@ def quantity(name: str, value: Any, given: Given) -> float:
         raise InputError(f"{name}: {error}") from None
 
 
-def table_html(title: str, verdict: str, table: Any) -> str:
-    """Show a result in a notebook: what it is, its verdict, and its table."""
-    from html import escape
-
-    rows = table.to_html(border=0, float_format=lambda value: f"{value:.4g}")
-    return f"<p><b>{escape(title)}</b>: {escape(verdict)}</p>{rows}"
+def each(value: Any) -> Sequence[Any]:
+    """One or several values as a sequence; a text is one."""
+    several = not isinstance(value, str | bytes | Mapping) and hasattr(value, "__iter__")
+    return tuple(value) if several else (value,)
 
 
-def axes_of(ax: Any) -> Any:
-    """Axes to draw in: those that are given, else those of a new figure of pyplot."""
-    if ax is not None:
-        return ax
-    import matplotlib.pyplot as plt
+def names(name: str, value: Any) -> tuple[str, ...]:
+    """One name or several."""
+    for one in each(value):
+        of_type(name, one, str, expected="a name, or several")
+    return tuple(each(value))
 
-    return plt.subplots(layout="constrained")[1]
+
+@contextmanager
+def drawing(ax: Any, width: float, height_mm: float) -> Iterator[Axes]:
+    """Draw in the style of all figures: into given axes, else into those of a new figure of pyplot.
+
+    Parameters
+    ----------
+    ax : Axes, or None
+    width, height_mm : float, of the new figure; the width in inches
+    """
+    import matplotlib as mpl
+
+    from accelstudy.drawing.style import MM, STYLE
+
+    figure = None
+    if ax is None:
+        import matplotlib.pyplot as plt
+
+        # A notebook gets ready to show figures at its first one, and the style would undo that.
+        figure = plt.figure(figsize=(width, height_mm * MM), layout="constrained")
+    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
+        ax = ax if figure is None else figure.add_subplot()
+        yield ax
+        for axis in (ax.xaxis, ax.yaxis):
+            axis.get_major_ticks()  # made in this style, and not where the figure is shown

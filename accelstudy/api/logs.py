@@ -13,10 +13,13 @@ from weakref import finalize
 
 import pandas as pd
 
-from accelstudy.api.given import of_type, path_of
+from accelstudy.api.given import IN_MEMORY, for_programs, of_type, path_of, python_words
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.wording import one_line
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing.sources import open_source
 from accelstudy.files.validation import checked
+from accelstudy.pages.notebook import notebook_html
 
 
 @dataclass(frozen=True, repr=False)
@@ -32,10 +35,20 @@ class Log:
     path: Path
     layout: dict[str, Any]
 
+    @property
+    def name(self) -> str:
+        """Name of the file; DataFrame, if it was made for one."""
+        return Path(python_words(str(self.path))).name
+
     def __repr__(self) -> str:
-        return f"Log({self.path.name!r}, {', '.join(self.layout) or 'nothing given'})"
+        return f"Log({self.name!r}, {', '.join(self.layout) or 'nothing given'})"
+
+    def _repr_html_(self) -> str:
+        given = pd.DataFrame(self.layout.items(), columns=["setting", "value"], dtype=object)
+        return notebook_html("Log", self.name, given)
 
 
+@for_programs
 def read_log(
     log: str | PathLike[str] | pd.DataFrame,
     *,
@@ -74,13 +87,19 @@ def read_log(
     given = {key: value for key, value in given.items() if value is not None}
     checked(LogLayout, given, "read_log")
     if not isinstance(log, pd.DataFrame):
-        path = path_of("log", log)
+        path = path_of("log", log, "a path or a DataFrame")
         open_source(path, given.get("variable"))
         return Log(path, given)
-    folder = Path(mkdtemp(prefix="accelstudy-"))
+    folder = Path(mkdtemp(prefix=IN_MEMORY))
     table = Log(folder / "DataFrame.parquet", given)
     finalize(table, rmtree, folder, ignore_errors=True)
-    log.rename(columns=str).to_parquet(table.path, index=False)
+    try:
+        log.rename(columns=str).to_parquet(table.path, index=False)
+    except (TypeError, ValueError, NotImplementedError) as error:
+        reason = one_line(error.args[-1])
+        raise InputError(
+            f"log: the DataFrame cannot be a log, which has numbers: {reason}"
+        ) from None
     return table
 
 

@@ -2,27 +2,48 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from accelstudy.api.given import axes_of, quantity, table_html
-from accelstudy.basics.errors import InputError, UnknownNameError
-from accelstudy.data_sheets import of_sigma
+from accelstudy.api.given import (
+    drawing,
+    each,
+    for_programs,
+    names,
+    path_of,
+    quantity,
+    whole,
+)
+from accelstudy.basics import bounds
+from accelstudy.basics.bounds import Range
+from accelstudy.basics.errors import UnknownNameError
+from accelstudy.drawing.style import FULL
+from accelstudy.pages.notebook import notebook_html
 from accelstudy.planning.answer import Answer, answer
 from accelstudy.planning.figure import draw_plan
 from accelstudy.planning.output import plan_table
-from accelstudy.planning.quantities import QUANTITIES
-from accelstudy.planning.question import Equipment, Question, equipment_of, get_sensor
+from accelstudy.planning.quantities import MOST_POSITIONS, QUANTITIES, REPLICATES
+from accelstudy.planning.question import confidence_of, question_of
 from accelstudy.planning.wording import answer_lines, unreachable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 EQUIPMENT = ("gravity", "robot", "both")
+_MORE = (
+    "tilt_range",
+    "max_time",
+    "moving_time",
+    "robot_moving_time",
+    "robot_setup_time",
+    "robot_accuracy",
+)
+
+
+_OPTIONAL = ("sigma", "max_time")
 
 
 @dataclass(frozen=True, repr=False)
@@ -41,7 +62,7 @@ class Plan:
 
     def _repr_html_(self) -> str:
         columns = ["equipment", "model", "scheme", "n_positions", "hold_s", "minutes"]
-        return table_html("Plan", self.verdict, self.table[columns])
+        return notebook_html("Plan", self.verdict, self.table[columns])
 
     @property
     def verdict(self) -> str:
@@ -60,20 +81,21 @@ class Plan:
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the tilt error left over the time in the field."""
-        ax = axes_of(ax)
-        draw_plan(ax, self.answer)
+        with drawing(ax, FULL, 95) as ax:
+            draw_plan(ax, self.answer)
         return ax
 
 
+@for_programs
 def plan(
     *,
     tilt_accuracy: float | str,
     sigma: float | str | None = None,
     sensor: str | None = None,
     equipment: str = "both",
-    confidence: float | None = None,
-    holds: Sequence[float | str] = (),
-    schemes: Sequence[str] = (),
+    confidence: float | str | None = None,
+    holds: float | str | Sequence[float | str] = (),
+    schemes: str | Sequence[str] = (),
     max_positions: int = 200,
     replicates: int = 200,
     seed: int = 1,
@@ -87,7 +109,8 @@ def plan(
     sigma : float in m/s² or str with a unit, of the mean of a position
     sensor : str, instead of `sigma`: a data sheet, a YAML file, or the folder of a campaign
     equipment : "gravity", "robot" or "both"
-    confidence : float, share of the calibrations that must reach the accuracy; None for the rms
+    confidence : float or str, share of the calibrations that must reach the accuracy, 0.95 or
+        "95%"; None for the rms
     holds : durations of a hold that are tried, in s or with a unit
     schemes : names or files of further schemes
     max_positions, replicates, seed : int
@@ -100,37 +123,27 @@ def plan(
     InputError
         If a quantity or a name is wrong, or not one of `sigma` and `sensor` is given.
     """
-    if (sensor is None) == (sigma is None):
-        raise InputError(
-            "plan: give the sensor by --sensor, or its noise by --sigma"
-            + (", not both" if sensor else "")
-        )
     if equipment not in EQUIPMENT:
         raise UnknownNameError("equipment", equipment, EQUIPMENT)
     for key in quantities:
-        if key not in QUANTITIES:
-            raise UnknownNameError("quantity", key, QUANTITIES)
-
-    def value(name: str) -> float:
-        given = QUANTITIES[name]
-        return quantity(name, quantities.get(name, given.usual), given)
-
-    question = Question(
-        quantity("tilt_accuracy", tilt_accuracy, QUANTITIES["tilt_accuracy"]),
-        value("tilt_range"),
-        get_sensor(str(sensor))
-        if sigma is None
-        else of_sigma(quantity("sigma", sigma, QUANTITIES["sigma"])),
-        equipment_of(
-            equipment,
-            Equipment("gravity", value("moving_time"), 0.0),
-            Equipment("robot", value("robot_moving_time"), value("robot_setup_time")),
-        ),
-        confidence,
-        tuple(sorted({quantity("holds", hold, QUANTITIES["hold"]) for hold in holds})),
-        value("robot_accuracy"),
-        math.inf if quantities.get("max_time") is None else value("max_time"),
-        max_positions,
-        tuple(schemes),
+        if key not in _MORE:
+            raise UnknownNameError("quantity", key, _MORE)
+    given = {"tilt_accuracy": tilt_accuracy, "sigma": sigma}
+    given |= {key: QUANTITIES[key].usual or None for key in _MORE} | quantities
+    in_si: dict[str, Any] = dict.fromkeys(_OPTIONAL) | {
+        key: quantity(key, value, QUANTITIES[key])
+        for key, value in given.items()
+        if value is not None or key not in _OPTIONAL
+    }
+    question = question_of(
+        **in_si,
+        sensor=None if sensor is None else str(path_of("sensor", sensor)),
+        equipment=equipment,
+        confidence=None if confidence is None else confidence_of(str(confidence)),
+        holds=[quantity("holds", hold, QUANTITIES["hold"]) for hold in each(holds)],
+        schemes=names("schemes", schemes),
+        max_positions=whole("max_positions", max_positions, Range(*MOST_POSITIONS)),
     )
+    whole("seed", seed, bounds.SEED)
+    whole("replicates", replicates, Range(*REPLICATES))
     return Plan(answer(question, seed, replicates))

@@ -1,133 +1,287 @@
-"""A study of one cell, in memory."""
+"""A study in memory."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import inf
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pandas as pd
 
-from accelstudy.api.given import of_type, quantity, table_html
+from accelstudy.adjustment.calibration import Block
+from accelstudy.api.given import GRAVITY, each, for_programs, names, of_type, quantity, whole
 from accelstudy.approaches import get_approach
-from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import STANDARD_GRAVITY, Given
-from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON
+from accelstudy.basics import bounds
+from accelstudy.basics.bounds import Range
+from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.units import MGON, STANDARD_GRAVITY, Given
+from accelstudy.basics.wording import counted
+from accelstudy.pages.notebook import notebook_html
 from accelstudy.planning.quantities import QUANTITIES
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
-from accelstudy.simulation.hold_plan import HoldPlan
-from accelstudy.simulation.sessions import Noise
 from accelstudy.study.cell import Cell
-from accelstudy.study.monte_carlo.distributions import simulated_distributions
+from accelstudy.study.cells import study_cells
+from accelstudy.study.config import parse_study
+from accelstudy.study.config.blocks import LevelingConfig
+from accelstudy.study.monte_carlo.distributions import Controlled, simulated_cell
+from accelstudy.study.monte_carlo.followed import ANGLES, TILT, cell_tilt_error
+from accelstudy.study.monte_carlo.sketch import Key
 from accelstudy.study.monte_carlo.statistics import Statistics
+from accelstudy.study.summary import cell_tables
+from accelstudy.study.tables import TABLES
 
-LEVELING = {"max_tilt_gon": MAX_TILT_GON, "attitudes": ATTITUDES}
+if TYPE_CHECKING:
+    import xarray as xr
+
+LEVELING = LevelingConfig().model_dump()
 """Where the tilt error is evaluated, as in a study by default."""
-GRAVITY = Given("m/s^2", "", "Local gravity.")
+REPLICATES = Range(2, 10**8)
+"""Calibrations of a cell; all of them are in memory."""
+DIGITS = 12
+"""Of a quantity in the configuration, so that 3.2 mgon stays that number."""
+
+
+@dataclass(frozen=True)
+class _Simulated:
+    """What the calibrations of a cell gave; without replicates where it is not estimable."""
+
+    statistics: Statistics
+    distributions: Mapping[Key, Controlled]
+    replicates: Block | None
 
 
 @dataclass(frozen=True, repr=False)
 class Simulation:
-    """Simulated calibrations of one set-up, summed up.
+    """Simulated calibrations of one set-up, or of several: the cells of a study.
 
     Attributes
     ----------
-    cell : Cell, the set-up
-    statistics : Statistics
+    cells : tuple of Cell
+    simulated : tuple, for each cell its `statistics`, `distributions` and `replicates`
     """
 
-    cell: Cell
-    statistics: Statistics
+    cells: tuple[Cell, ...]
+    simulated: tuple[_Simulated, ...]
 
     def __repr__(self) -> str:
-        return f"Simulation({self.cell.name!r}, {self.statistics.converged} calibrations)"
+        return f"Simulation({self._what})"
 
     def _repr_html_(self) -> str:
-        return table_html("Simulation", repr(self), self.parameters)
+        table = self.parameters if len(self.cells) == 1 else self.tilt
+        return notebook_html("Simulation", self._what, table)
+
+    @property
+    def _what(self) -> str:
+        n = sum(one.statistics.converged for one in self.simulated)
+        what = self.cells[0].name if len(self.cells) == 1 else f"{len(self.cells)} cells"
+        return f"{what}, {counted(n, 'calibration')}"
+
+    @cached_property
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """The tables of a study: cells, summary, correlations, leveling and quantiles.
+
+        Their columns are those of the files of a study; units stand in their names, or in a column.
+        """
+        rows = [
+            cell_tables(cell, one.statistics, one.distributions)
+            for cell, one in zip(self.cells, self.simulated, strict=True)
+        ]
+        return {
+            name: pd.concat([tables[name] for tables in rows], ignore_index=True) for name in TABLES
+        }
 
     @property
     def parameters(self) -> pd.DataFrame:
         """Bias and standard deviation of each estimated parameter with their errors, SI.
 
-        The errors are standard errors by the number of replicates.
+        The errors are standard errors by the number of replicates. Of several cells the index has
+        the name of the cell, too.
         """
-        bias, sd = self.statistics.bias, self.statistics.sd
-        units = self.cell.parameter_units
-        return pd.DataFrame(
-            {
-                "truth": self.cell.true_values,
+        tables = []
+        for cell, one in zip(self.cells, self.simulated, strict=True):
+            bias, sd = one.statistics.bias, one.statistics.sd
+            columns = {
+                "truth": cell.true_values,
                 "bias": bias.value,
                 "bias_error": bias.error,
                 "sd": sd.value,
                 "sd_error": sd.error,
-                "unit": list(units.values()),
-            },
-            index=pd.Index(units, name="name"),
-        )
+                "unit": list(cell.parameter_units.values()),
+            }
+            tables.append(pd.DataFrame(columns, index=pd.Index(cell.parameter_units, name="name")))
+        return self._joined(tables)
 
     @property
     def tilt(self) -> pd.DataFrame:
-        """Rms tilt error of roll and of pitch that the calibration leaves up to 50 gon, rad."""
-        rms = self.statistics.tilt_rms
-        index = pd.Index(["roll", "pitch"], name="angle")
-        table = pd.DataFrame({"rms": rms.value, "rms_error": rms.error}, index=index)
-        table.attrs["units"] = {"rms": "rad", "rms_error": "rad"}
+        """Tilt error of roll and of pitch that the calibration leaves up to 50 gon, rad.
+
+        The columns are its rms over all calibrations, and `q95`, which 95 of 100 calibrations stay
+        below, each with its standard error.
+        """
+        tables = []
+        for one in self.simulated:
+            rms = one.statistics.tilt_rms
+            bound = [
+                one.distributions[TILT, angle].at(0.95) if one.distributions else None
+                for angle in ANGLES
+            ]
+            columns = {
+                "rms": rms.value,
+                "rms_error": rms.error,
+                "q95": [np.nan if b is None else float(b.value) for b in bound],
+                "q95_error": [np.nan if b is None else float(b.error) for b in bound],
+            }
+            tables.append(pd.DataFrame(columns, index=pd.Index(ANGLES, name="angle")))
+        table = self._joined(tables)
+        table.attrs["units"] = dict.fromkeys(table, "rad")
         return table
 
+    @cached_property
+    def estimates(self) -> xr.Dataset:
+        """Every calibration, SI: an `xarray.Dataset` of cell × replicate × parameter.
 
+        Its variables are `estimate`, its a-posteriori standard deviation `sigma`, the `truth` of
+        each cell, and `tilt`, the rms error of each angle up to 50 gon. A calibration that did not
+        converge is NaN, and so is a parameter that a cell does not estimate.
+        """
+        import xarray as xr
+
+        units = {name: u for cell in self.cells for name, u in cell.parameter_units.items()}
+        count = max(cell.replicates for cell in self.cells)
+        estimate = np.full((len(self.cells), count, len(units)), np.nan)
+        sigma, truth = np.full_like(estimate, np.nan), np.full_like(estimate[:, 0], np.nan)
+        tilt = np.full((len(self.cells), count, len(ANGLES)), np.nan)
+        for i, (cell, one) in enumerate(zip(self.cells, self.simulated, strict=True)):
+            at = [list(units).index(name) for name in cell.parameter_units]
+            truth[i, at] = cell.true_values
+            if (block := one.replicates) is None:
+                continue
+            n, good = len(block.estimates), np.flatnonzero(block.converged)
+            freedom = block.redundancy if block.redundancy > 0 else np.nan
+            estimate[i, :n, at] = block.estimates.T
+            sigma[i, :n, at] = (np.sqrt(block.omega / freedom)[:, None] * block.sigma_priori).T
+            error = cell_tilt_error(cell, LEVELING)
+            tilt[i, good] = error.rms(block.estimates[good][:, : len(error.reference)])
+        parameters, noted = ("cell", "replicate", "parameter"), {"units": "SI, as `unit` says"}
+        return xr.Dataset(
+            {
+                "estimate": (parameters, estimate, noted),
+                "sigma": (parameters, sigma, noted),
+                "truth": (("cell", "parameter"), truth, noted),
+                "tilt": (("cell", "replicate", "angle"), tilt, {"units": "rad"}),
+            },
+            {
+                "cell": [cell.name for cell in self.cells],
+                "replicate": np.arange(1, count + 1),
+                "parameter": list(units),
+                "angle": list(ANGLES),
+                "unit": ("parameter", list(units.values())),
+                **{
+                    key: ("cell", [getattr(cell, key) for cell in self.cells])
+                    for key in ("model", "scheme", "approach")
+                },
+                "sensor_sigma": (
+                    "cell",
+                    [cell.noise.sigma_force for cell in self.cells],
+                    {"units": "m/s^2"},
+                ),
+            },
+        )
+
+    def _joined(self, tables: Sequence[pd.DataFrame]) -> pd.DataFrame:
+        """Tables of all cells; that of a single one without its name."""
+        if len(tables) == 1:
+            return tables[0]
+        return pd.concat(tables, keys=[cell.name for cell in self.cells], names=["cell"])
+
+
+@for_programs
 def simulate(
-    model: str,
-    scheme: str,
-    approach: str,
+    model: str | Sequence[str],
+    scheme: str | Sequence[str],
+    approach: str | Sequence[str],
     *,
-    sigma: float | str,
+    sigma: float | str | Sequence[float | str],
     robot_accuracy: float | str = "3.2 mgon",
     gravity: float | str = STANDARD_GRAVITY,
-    truth: Mapping[str, float] | None = None,
+    truth: Mapping[str, float | str] | None = None,
     replicates: int = 1000,
     seed: int = 1,
 ) -> Simulation:
-    """Simulate the calibrations of one set-up.
+    """Simulate the calibrations of one set-up, or of every combination of several.
+
+    A study of the workflow with the same cells, noise and seed gives the same numbers.
 
     Parameters
     ----------
-    model, scheme, approach : str, names or files
-    sigma : float in m/s² or str with a unit, of the mean of a position
+    model, scheme, approach : str, a name or a file, or several of them
+    sigma : float in m/s² or str with a unit, of the mean of a position; or several
     robot_accuracy : float in rad or str with a unit, of the robot's roll and pitch
     gravity : float in m/s² or str with a unit
-    truth : mapping of parameter to true value, SI; 0 if omitted
+    truth : mapping of parameter to true value, SI or with a unit; 0 if omitted. Of several models
+        each has those that are its own.
     replicates, seed : int
 
     Raises
     ------
     InputError
-        If a name or a value is wrong, or the positions do not determine the model.
+        If a name or a value is wrong, or the positions do not determine any of the models.
     """
-    for name, value in {"model": model, "scheme": scheme, "approach": approach}.items():
-        of_type(name, value, str, expected="a name")
-    for name, count, least in (("replicates", replicates, 2), ("seed", seed, 0)):
-        of_type(name, count, int, expected="a whole number")
-        if count < least:
-            raise InputError(f"{name}: must be at least {least}, not {count}")
-    composed, positions = get_model(model), get_scheme(scheme)
-    effects = tuple(effect.spec for effect in composed.effects)
-    cell = Cell(
-        f"{composed.name} {positions.name} {approach}",
-        composed.name,
-        effects,
-        effects,
-        positions.name,
-        get_approach(approach).name,
-        replicates,
-        Noise(
-            quantity("sigma", sigma, QUANTITIES["sigma"]),
-            quantity("robot_accuracy", robot_accuracy, QUANTITIES["robot_accuracy"]),
-        ),
-        quantity("gravity", gravity, GRAVITY),
-        dict(truth or {}),
-        HoldPlan(),
+    grid: dict[str, Any] = {
+        "models": [get_model(one).name for one in names("model", model)],
+        "schemes": [get_scheme(one).name for one in names("scheme", scheme)],
+        "approaches": [get_approach(one).name for one in names("approach", approach)],
+        "sensor_sigma_mps2": [_si("sigma", one, QUANTITIES["sigma"]) for one in each(sigma)],
+        "replicates": whole("replicates", replicates, REPLICATES),
+    }
+    for key, values in zip(("model", "scheme", "approach", "sigma"), grid.values(), strict=False):
+        if not values:
+            raise InputError(f"{key}: none is given")
+    robot = _si("robot_accuracy", robot_accuracy, QUANTITIES["robot_accuracy"], MGON)
+    study = parse_study(
+        {
+            "study": "python",
+            "seed": whole("seed", seed, bounds.SEED),
+            "gravity_mps2": _si("gravity", gravity, GRAVITY),
+            "noise": {
+                "sensor": {"sigma_mps2": grid["sensor_sigma_mps2"][0]},
+                "robot": {"sigma_mgon": robot},
+            },
+            "grids": [grid],
+        },
+        "simulate",
     )
-    composed.vector(cell.truth)
+    cells = _with_truth(study_cells(study), truth)
+    if not any(cell.estimability.estimable for cell in cells):
+        raise InputError(f"{cells[0].name}: {cells[0].estimability.reason}")
+    return Simulation(tuple(cells), tuple(_simulated(cell, seed) for cell in cells))
+
+
+def _simulated(cell: Cell, seed: int) -> _Simulated:
     if not cell.estimability.estimable:
-        raise InputError(f"{cell.name}: {cell.estimability.reason}")
-    return Simulation(cell, simulated_distributions(cell, seed, LEVELING)[0])
+        return _Simulated(Statistics.of_none(cell), {}, None)
+    return _Simulated(*simulated_cell(cell, seed, LEVELING))
+
+
+def _si(name: str, value: float | str, given: Given, unit: float = 1.0) -> float:
+    """Quantity in a unit of the configuration."""
+    return float(f"{quantity(name, value, given) / unit:.{DIGITS}g}")
+
+
+def _with_truth(cells: Sequence[Cell], truth: Mapping[str, float | str] | None) -> list[Cell]:
+    """Cells whose sensors have these true parameters."""
+    of_type("truth", truth or {}, Mapping, expected="a mapping of parameter to value")
+    units = {p.name: p.unit for cell in cells for p in cell.simulated_model.parameters}
+    values = {}
+    for name, value in (truth or {}).items():
+        if name not in units:
+            raise UnknownNameError("parameter of the truth", name, units)
+        values[name] = quantity(f"truth: {name}", value, Given(units[name], "", "", -inf))
+    return [
+        replace(cell, truth={**cell.truth, **{k: v for k, v in values.items() if k in cell.truth}})
+        for cell in cells
+    ]

@@ -47,6 +47,7 @@ class Campaign:
     excluded : Campaign, optional, the holds that were left out, with the same columns
     reasons : mapping of int to str, why, by position
     warnings : tuple of str, what was ignored when the campaign was read
+    notes : tuple of str, what the import of its log found and assumed
     """
 
     name: str
@@ -73,9 +74,25 @@ class Campaign:
     excluded: Campaign | None = None
     reasons: Mapping[int, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = field(default=())
+    notes: tuple[str, ...] = field(default=())
 
     def __repr__(self) -> str:
         return f"Campaign({self.name!r}, {counted(self.n_positions, 'position')})"
+
+    def _repr_html_(self) -> str:
+        import pandas as pd
+
+        from accelstudy.pages.notebook import notebook_html
+
+        units = {"time": "s", "temperature": "°C", "vibration": "m/s²"}
+        columns = dict(zip(("fx / m/s²", "fy / m/s²", "fz / m/s²"), self.forces.T, strict=True))
+        for name, unit in units.items():
+            if (values := getattr(self, name)) is not None:
+                columns[f"{name} / {unit}"] = values
+        table = pd.DataFrame(columns, index=pd.Index(self.positions, name="position"))
+        robot = "without" if self.angles is None else "with"
+        said = f"{counted(self.n_positions, 'position')} {robot} a robot"
+        return notebook_html(f"Campaign {self.name}", "; ".join([said, *self.warnings]), table)
 
     @property
     def n_positions(self) -> int:

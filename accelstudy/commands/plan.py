@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any
 
 import click
 
-from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import begin, say
 from accelstudy.commands.options import (
     PATH,
@@ -22,7 +20,7 @@ from accelstudy.commands.options import (
     quiet_option,
     seed_option,
 )
-from accelstudy.planning.quantities import QUANTITIES
+from accelstudy.planning.quantities import MOST_POSITIONS, QUANTITIES, REPLICATES
 
 NOT_REACHED = 1
 """Exit status where no calibration reaches the target."""
@@ -37,19 +35,9 @@ class Confidence(click.ParamType):  # type: ignore[type-arg]
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> float | None:
         """Share, or None for the rms."""
-        if value is None or value == "rms":
-            return None
-        text = str(value).strip()
-        try:
-            share = float(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
-        except ValueError:
-            share = math.nan
-        if not 0.5 <= share <= 0.999:
-            raise InputError(
-                f"--confidence: must be rms, or a share from 50% to 99.9% of the calibrations, "
-                f"not {text!r}"
-            )
-        return share
+        from accelstudy.planning.question import confidence_of
+
+        return value if value is None else confidence_of(str(value).strip())
 
 
 _SECTIONS = {
@@ -111,7 +99,7 @@ _SECTIONS = {
 @quantity_option("max_time", QUANTITIES["max_time"])
 @click.option(
     "--max-positions",
-    type=click.IntRange(4, 400),
+    type=click.IntRange(*MOST_POSITIONS),
     default=200,
     show_default=True,
     help="Largest number of positions.",
@@ -122,7 +110,7 @@ _SECTIONS = {
 @quantity_option("robot_accuracy", QUANTITIES["robot_accuracy"])
 @click.option(
     "--replicates",
-    type=click.IntRange(20, 1_000_000),
+    type=click.IntRange(*REPLICATES),
     default=200,
     show_default=True,
     help="Simulated calibrations of each candidate at the top.",
@@ -133,24 +121,12 @@ _SECTIONS = {
 @angle_unit_option
 @quiet_option
 def plan_command(
-    tilt_accuracy: float,
-    tilt_range: float,
     sensor: str | None,
-    sigma: float | None,
-    equipment: str,
-    confidence: float | None,
-    holds: tuple[float, ...],
-    schemes: tuple[str, ...],
-    max_time: float | None,
-    max_positions: int,
-    moving_time: float,
-    robot_moving_time: float,
-    robot_setup_time: float,
-    robot_accuracy: float,
     replicates: int,
     seed: int,
     out: Path | None,
     force: bool,
+    **asked: Any,
 ) -> None:
     """Find the cheapest calibration for a tilt accuracy.
 
@@ -158,15 +134,11 @@ def plan_command(
     simulates those at the top. The sensor is --sensor or, if only its noise is known, --sigma. If
     nothing reaches the accuracy, one line says what would be reachable, and the exit status is 1.
     """
-    if (sensor is None) == (sigma is None):
-        raise InputError(
-            "plan: give the sensor by --sensor, or its noise by --sigma"
-            + (", not both" if sensor else "")
-        )
+    from accelstudy.planning.question import question_of
+
+    question = question_of(sensor=sensor, **asked)
     begin("comparing calibrations, which takes some seconds ...")
-    from accelstudy.data_sheets import of_sigma
     from accelstudy.planning.answer import answer
-    from accelstudy.planning.question import Equipment, Question, equipment_of, get_sensor
     from accelstudy.planning.wording import (
         answer_lines,
         assumption_lines,
@@ -176,20 +148,6 @@ def plan_command(
         unreachable,
     )
 
-    by_hand = Equipment("gravity", moving_time, 0.0)
-    robot = Equipment("robot", robot_moving_time, robot_setup_time)
-    question = Question(
-        tilt_accuracy,
-        tilt_range,
-        of_sigma(sigma) if sigma is not None else get_sensor(str(sensor)),
-        equipment_of(equipment, by_hand, robot),
-        confidence,
-        tuple(sorted(set(holds))),
-        robot_accuracy,
-        math.inf if max_time is None else max_time,
-        max_positions,
-        schemes,
-    )
     plan = answer(question, seed, replicates)
     if not plan.ranked:
         click.echo(unreachable(plan))

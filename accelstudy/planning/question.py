@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
 from accelstudy.basics.errors import InputError
-from accelstudy.data_sheets import DataSheet, get_data_sheet, read_data_sheet
+from accelstudy.data_sheets import DataSheet, get_data_sheet, of_sigma, read_data_sheet
 from accelstudy.effects import get_effect
 from accelstudy.planning.quantities import QUANTITIES
 from accelstudy.schemes import Scheme, get_scheme, is_scheme_file
@@ -126,6 +126,67 @@ class Question:
             if is_scheme_file(text) and get_scheme(text).name == scheme.name:
                 return str(Path(text).resolve())
         return scheme.name
+
+
+def question_of(
+    *,
+    tilt_accuracy: float,
+    tilt_range: float,
+    sensor: str | None,
+    sigma: float | None,
+    equipment: str,
+    confidence: float | None,
+    holds: Iterable[float],
+    schemes: Iterable[str],
+    max_time: float | None,
+    max_positions: int,
+    moving_time: float,
+    robot_moving_time: float,
+    robot_setup_time: float,
+    robot_accuracy: float,
+) -> Question:
+    """Make a question of what the options of `accelstudy plan` say, in SI.
+
+    Raises
+    ------
+    InputError
+        If there is no such sensor, or not one of `sensor` and `sigma` is given.
+    """
+    if (sensor is None) == (sigma is None):
+        raise InputError(
+            "plan: give the sensor by --sensor, or its noise by --sigma"
+            + (", not both" if sensor else "")
+        )
+    by_hand = Equipment("gravity", moving_time, 0.0)
+    robot = Equipment("robot", robot_moving_time, robot_setup_time)
+    return Question(
+        tilt_accuracy,
+        tilt_range,
+        of_sigma(sigma) if sigma is not None else get_sensor(str(sensor)),
+        equipment_of(equipment, by_hand, robot),
+        confidence,
+        tuple(sorted(set(holds))),
+        robot_accuracy,
+        math.inf if max_time is None else max_time,
+        max_positions,
+        tuple(schemes),
+    )
+
+
+def confidence_of(text: str) -> float | None:
+    """Share of the calibrations that a text tells, ``95%`` or ``0.95``; None for ``rms``."""
+    if text == "rms":
+        return None
+    try:
+        share = float(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
+    except ValueError:
+        share = math.nan
+    if not 0.5 <= share <= 0.999:
+        raise InputError(
+            f"--confidence: must be rms, or a share from 50% to 99.9% of the calibrations, "
+            f"not {text!r}"
+        )
+    return share
 
 
 def sizes_of(sheet: DataSheet) -> dict[str, Size]:

@@ -83,14 +83,24 @@ def summarise_batch(
                         parts, statistics, distributed, control, cell
                     )
                 write_sketches(sketch_table(cell.name, plain_sketches(distributions)))
-            rows["cells"].append(_cell_row(cell, statistics))
-            rows["summary"].append(_summary_rows(cell, statistics))
-            rows["correlations"].append(_correlation_rows(cell, statistics))
-            rows["quantiles"].append(_quantile_rows(cell, statistics, distributions))
-            row = _leveling_row(cell, statistics, distributions)
-            rows["leveling"].append(row if cell.estimability.estimable else row[:0])
+            for name, table in cell_tables(cell, statistics, distributions).items():
+                rows[name].append(table)
     for name in TABLES:
         write_table(outputs[name], pd.concat(rows[name], ignore_index=True), provenance)
+
+
+def cell_tables(
+    cell: Cell, statistics: Statistics, distributions: Mapping[Key, Controlled]
+) -> dict[str, pd.DataFrame]:
+    """Rows of a cell in each of `TABLES`."""
+    leveling = _leveling_row(cell, statistics, distributions)
+    return {
+        "cells": _cell_row(cell, statistics),
+        "summary": _summary_rows(cell, statistics),
+        "correlations": _correlation_rows(cell, statistics),
+        "leveling": leveling if cell.estimability.estimable else leveling[:0],
+        "quantiles": _quantile_rows(cell, statistics, distributions),
+    }
 
 
 def _labels(cell: Cell) -> dict[str, Any]:

@@ -8,9 +8,14 @@ import matplotlib
 import numpy as np
 import pandas as pd
 import pytest
+import yaml
+from matplotlib import pyplot
 from places import ROOT
+from study_helpers import grid, run_study
 
 import accelstudy as acs
+from accelstudy.campaign.format import write_campaign
+from accelstudy.drawing.style import STYLE
 from accelstudy.schemes import get_scheme
 
 matplotlib.use("agg")
@@ -49,13 +54,18 @@ def test_the_calibration_finds_the_bias(guide):
     assert (abs(found["value"] - np.array(BIAS)) < 4 * found["sigma"]).all()
     assert (guide["folder"] / "calibrated/calibration.json").exists()
     assert len(guide["leveled"]) == len(logged())
+    log = acs.read_log(logged(), rate=100, columns=COLUMNS)
+    louder = guide["calibration"].apply(log, sigma="50 mm/s^2")
+    assert (louder["sigma_roll_mgon"] > 2 * guide["leveled"]["sigma_roll_mgon"]).all()
+    with pytest.raises(acs.InputError, match="sigma: expected a number with its unit"):
+        guide["calibration"].apply(log, sigma="2")
 
 
 @pytest.mark.parametrize("name", ["log", "campaign", "calibration", "diagnosis", "plan", "result"])
 def test_a_result_shows_itself_on_one_line_and_in_a_notebook(guide, name):
-    assert len(repr(guide[name]).splitlines()) == 1
-    if name not in ("log", "campaign"):
-        assert "<table" in guide[name]._repr_html_()
+    assert len(repr(guide[name])) <= 100
+    assert "\n" not in repr(guide[name])
+    assert "<table" in guide[name]._repr_html_()
 
 
 @pytest.mark.parametrize("name", ["calibration", "diagnosis", "plan"])
@@ -64,14 +74,79 @@ def test_a_plot_goes_into_the_axes_that_are_given(guide, name):
     assert guide[name].plot(ax) is ax
 
 
+@pytest.mark.parametrize("name", ["calibration", "diagnosis", "plan"])
+def test_a_plot_of_its_own_has_the_style_of_all_figures(guide, name):
+    with matplotlib.rc_context({"interactive": True, "backend": "agg"}):
+        ax = guide[name].plot()
+        assert matplotlib.is_interactive()
+    assert {label.get_fontsize() for label in ax.get_xticklabels()} == {STYLE["xtick.labelsize"]}
+    assert not ax.spines["top"].get_visible()
+    pyplot.close(ax.figure)
+
+
 def test_a_table_in_memory_is_a_log_as_a_file_is(guide):
     log = acs.read_log(logged(), rate=100, columns=COLUMNS)
     campaign = acs.find_holds(log, gravity="9.80795 m/s^2")
     assert np.allclose(campaign.forces, guide["campaign"].forces)
+    assert campaign.notes[0].startswith("log: ")
+    assert (repr(log), campaign.name) == ("Log('DataFrame', rate_hz, columns)", "DataFrame")
+
+
+def test_a_study_in_memory_has_the_numbers_of_one_of_the_workflow(tmp_path):
+    scheme, given = tmp_path / "mine.yaml", ["fibonacci-9", str(tmp_path / "mine.yaml")]
+    directions = (-get_scheme("fibonacci-12").directions).tolist()
+    scheme.write_text(yaml.safe_dump({"scheme": "mine", "directions": directions}))
+    result = acs.simulate(
+        ["bias", "bias-scale"], given, ["gravity", "robot"], sigma=["3 mm/s^2", 0.001],
+        robot_accuracy="3.2 mgon", truth={"b_x": 0.05, "s_y": "200 ppm"}, replicates=40,
+    )  # fmt: skip
+    written = run_study(
+        tmp_path,
+        noise={"sensor": {"sigma_mps2": 0.003}},
+        sensor={
+            "bias": {"value": [0.05, 0, 0], "unit": "m/s^2"},
+            "scale": {"value": [0, 200, 0], "unit": "ppm"},
+        },
+        grids=[
+            grid(["bias", "bias-scale"], given, replicates=40, sensor_sigma_mps2=[0.003, 0.001])
+        ],
+    )
+    for name, table in result.tables.items():
+        pd.testing.assert_frame_equal(table, written[name], check_dtype=False, rtol=1e-9)
+    kept, estimates = written["estimates"], result.estimates["estimate"].to_numpy()
+    assert np.array_equal(estimates[np.isfinite(estimates)], kept["estimate"].to_numpy())
+
+
+def test_every_calibration_of_a_study_is_in_a_dataset():
+    result = acs.simulate(
+        ["bias", "bias-scale-nonorthogonality"], "faces-6", "gravity", sigma=0.002, replicates=50
+    )
+    found = result.estimates
+    assert dict(found.sizes) == {"cell": 2, "replicate": 50, "parameter": 9, "angle": 2}
+    assert found["unit"].to_series()[["b_x", "s_y"]].tolist() == ["m/s^2", "1"]
+    assert found["tilt"].attrs["units"] == "rad"
+    bias, undetermined = found["estimate"]
+    assert np.isfinite(bias).sum("replicate").to_series().to_dict() == {
+        name: 50 if name.startswith("b_") else 0 for name in found["parameter"].to_numpy()
+    }
+    assert (~np.isfinite(undetermined)).all()
+    assert result.tables["cells"]["reason"].str.len().astype(bool).tolist() == [False, True]
+    first = result.parameters.loc[result.cells[0].name]
+    assert np.allclose(bias.std("replicate")[:3], first["sd"], rtol=0.4)
+    rms = np.sqrt((found["tilt"][0] ** 2).mean("replicate"))
+    assert np.allclose(rms, result.tilt.loc[result.cells[0].name, "rms"], rtol=0.4)
+
+
+def test_what_reading_refuses_is_diagnosed(tmp_path):
+    given = acs.simulate_campaign(scheme="fibonacci-24", gross_errors="unit_error(force=0.102)")
+    write_campaign(given, tmp_path, plausible=False)
+    with pytest.raises(acs.InputError, match="looks like g"):
+        acs.read_campaign(tmp_path)
+    assert acs.diagnose(acs.read_campaign(tmp_path, plausible=False)).verdict == "gross_error"
 
 
 WRONG = {
-    "acs.read_log(3)": "log: expected a path, not 3",
+    "acs.read_log(3)": "log: expected a path or a DataFrame, not 3",
     "acs.read_log('none.csv')": "none.csv: no such file",
     "acs.read_log(table, rate='fast')": "rate_hz",
     "acs.read_log(table, columns=['ax'])": "columns: expected a mapping",
@@ -79,13 +154,29 @@ WRONG = {
     "acs.find_holds(acs.read_log(table, columns={'fx': 'a', 'fy': 'b', 'fz': 'c'}))": "'a'",
     "acs.find_holds(table, gravity='9.8')": "gravity: expected a number with its unit",
     "acs.read_campaign(None)": "folder: expected a path, not None",
-    "acs.simulate_campaign(colour=1)": "unknown setting 'colour'",
+    "acs.read_log(table.assign(note=[1, 'x'] * 6000))": "log: the DataFrame cannot be a log",
+    "acs.find_holds(table / 9.8)": "DataFrame: which column is time?",
+    "acs.find_holds(acs.read_log(table / 9.8, rate=100))": "g; give `unit` g",
+    "acs.find_holds(acs.read_log(table, rate=100), sensors={'a': [0, 1, 2]})": "sensors: several",
+    "acs.simulate_campaign(repeats='x')": "repeats: must be a whole number",
+    "acs.simulate_campaign(sigma='2')": "sigma: expected a number with its unit",
+    "acs.simulate_campaign(effects=3)": "effects: expected a name, or several",
+    "acs.simulate_campaign(temperature=20)": "temperature: must be a list",
+    "acs.simulate_campaign(colour=1)": "colour: unknown key (known: name",
     "acs.calibrate('folder')": "campaign: expected a Campaign",
     "acs.diagnose({})": "campaign: expected a Campaign",
-    "acs.plan(tilt_accuracy=10)": "plan: give the sensor",
+    "acs.plan(tilt_accuracy=1e-4)": "plan: give the sensor",
+    "acs.plan(tilt_accuracy=1e-4, sigma=1, confidence=2)": "confidence: must be rms, or a share",
+    "acs.plan(tilt_accuracy=1e-4, sigma=1, max_positions=3)": "max_positions: must be from 4",
+    "acs.plan(tilt_accuracy=1e-4, sigma=1, schemes=3)": "schemes: expected a name",
+    "acs.plan(tilt_accuracy=1e-4, sigma=1, holds='10')": "holds: expected a number with its unit",
     "acs.plan(tilt_accuracy='10', sigma=0.002)": "tilt_accuracy: expected a number with its unit",
     "acs.simulate('m', 'mclaren-24', 'robot', sigma=1e-3)": "unknown",
     "acs.simulate('bias', 'mclaren-24', 'robot', sigma=None)": "sigma: expected a number",
+    "acs.simulate('bias', [], 'robot', sigma=1e-3)": "scheme: none is given",
+    "acs.simulate('bias', 'faces-6', 'robot', sigma=1, truth={'s_x': 1})": "parameter of the truth",
+    "acs.simulate('bias', 'faces-6', 'robot', sigma=1, truth={'b_x': ''})": "truth: b_x: expected",
+    "acs.simulate('bias', 'faces-6', 'robot', sigma=1, replicates=1)": "replicates: must be from 2",
 }
 
 

@@ -190,7 +190,14 @@ def cell_distributions(
 def simulated_distributions(
     cell: Cell, seed: int, leveling: Mapping[str, Any], levels: Array = PROBABILITIES
 ) -> tuple[Statistics, dict[Key, Controlled]]:
-    """Simulate a cell in memory: its statistics, and its distributions where any converged.
+    """Return what `simulated_cell` does, without the replicates."""
+    return simulated_cell(cell, seed, leveling, levels)[:2]
+
+
+def simulated_cell(
+    cell: Cell, seed: int, leveling: Mapping[str, Any], levels: Array = PROBABILITIES
+) -> tuple[Statistics, dict[Key, Controlled], Block]:
+    """Simulate a cell in memory.
 
     Parameters
     ----------
@@ -198,6 +205,12 @@ def simulated_distributions(
     seed : int, of the study
     leveling : mapping with max_tilt_gon and attitudes
     levels : probabilities of the quantiles
+
+    Returns
+    -------
+    statistics : Statistics
+    distributions : dict of Controlled; empty if no calibration converged
+    replicates : Block, all of them
     """
     control, tilt = Control.of(cell, leveling), cell_tilt_error(cell, leveling)
     centre, drawn = chunks(cell, seed, 0, cell.n_chunks, control)
@@ -206,10 +219,12 @@ def simulated_distributions(
         pairs.append(pair)
         tree.add(Node(index, 1, summed.moments(pair)))
     statistics = Statistics.of(cell, tree, control, tilt)
+    replicates = Block.joined(pair.simulated for pair in pairs)
     if not statistics.converged:
-        return statistics, {}
+        return statistics, {}, replicates
     samples = _samples(pairs, summed.distributed)
-    return statistics, _controlled(*samples, statistics, summed.distributed, control, levels)
+    found = _controlled(*samples, statistics, summed.distributed, control, levels)
+    return statistics, found, replicates
 
 
 def _samples(
