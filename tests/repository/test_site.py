@@ -122,8 +122,7 @@ def _keys(document):
     for key, value in document.items():
         if key != "quality":
             yield key
-        inner = (
-            value[0] if key in ("parameters", "effects") and isinstance(value[0], dict) else value
-        )
+        listed = key in ("parameters", "effects") and isinstance(value[0], dict)
+        inner = value[0] if listed else value
         if listed or key in ("affine", "quality"):
             yield from (f"{key}.{each}" for each in inner)
