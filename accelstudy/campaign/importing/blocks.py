@@ -18,7 +18,6 @@ from accelstudy.campaign.importing.windows import (
     Threshold,
     given_threshold,
     survey_log,
-    windows,
 )
 
 Array = NDArray[np.float64]
@@ -51,7 +50,7 @@ def segment_blocks(
     """
     survey = survey_log(log, (size // 2) | 1)
     envelope = Envelope(survey.span, survey.total)
-    for _ in envelope.along(windows(log, survey.width)):
+    for _ in envelope.along(survey.kept.again()):
         pass
     segments: dict[int, Segment] = {}
     left_out, scatter = {}, {}

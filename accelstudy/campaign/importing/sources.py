@@ -190,7 +190,7 @@ class TextSource:
                         column[0] if place == clock else None
                         for column, place in zip(columns, places, strict=True)
                     ]
-                    yield np.column_stack([since(*c) for c in zip(columns, origins, strict=True)])
+                    yield beside([since(*c) for c in zip(columns, origins, strict=True)])
         except InputError:
             raise
         except pd.errors.EmptyDataError:
@@ -343,7 +343,7 @@ class MatlabSource:
         origins = [self.values[0, place] if place == clock else None for place in places]
         for first in range(0, len(self.values), chunk_size):
             rows = self.values[first : first + chunk_size]
-            yield np.column_stack(
+            yield beside(
                 [since(rows[:, place], zero) for place, zero in zip(places, origins, strict=True)]
             )
 
@@ -412,7 +412,7 @@ class ParquetSource:
                     column[0] if place == clock else None
                     for column, place in zip(columns, places, strict=True)
                 ]
-                yield np.column_stack([since(*c) for c in zip(columns, origins, strict=True)])
+                yield beside([since(*c) for c in zip(columns, origins, strict=True)])
 
     def look_up(self, row: int, place: int) -> tuple[str, str]:
         """Where a value stands, and the value; see `Source`."""
@@ -430,6 +430,11 @@ def _numbers(column: pa.Array) -> NDArray[Any]:
     if column.null_count or not pa.types.is_integer(column.type):
         column = column.cast(pa.float64(), safe=False)
     return column.to_numpy(zero_copy_only=False)
+
+
+def beside(columns: Sequence[Array]) -> Array:
+    """Columns (k,) as one array (k, c), each of them contiguous, as sums along them are faster."""
+    return np.array(columns).T
 
 
 def since(values: NDArray[Any], zero: Any) -> Array:
