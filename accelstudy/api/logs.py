@@ -48,7 +48,8 @@ def read_log(
     Parameters
     ----------
     log : path or DataFrame
-        Text (CSV or columns, perhaps .gz), MATLAB or Parquet, or a table in memory.
+        Text (CSV or columns, perhaps .gz), MATLAB, Parquet, a bag of ROS, a ULog of
+        PX4, or a table in memory.
     rate : float, Hz, optional
         Samples per second, where there is no column of time.
     columns : mapping, optional

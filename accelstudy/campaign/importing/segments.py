@@ -40,7 +40,7 @@ class Segmentation:
         turns slowly, or they are too short
     envelope : Envelope, of the log, for its figure
     left_out : mapping of int to str, segments that are no positions, and why
-    size : int, samples of each, if the log consists of blocks
+    size : int, samples of each, or of the shortest, if the log consists of blocks
     """
 
     segments: Mapping[int, Segment]

@@ -55,6 +55,11 @@ def surveyed(
     return [(s, choose_threshold(s, log)) for s, log in zip(surveys, logs, strict=True)]
 
 
+def usual_window(log: Recording) -> float:
+    """Length of a window, s: 1 s, or 9 samples of a slow log if its unit of time is plausible."""
+    return 1.0 if log.likely_unit() else max(1.0, (_SMALLEST + 1) * log.step)
+
+
 def samples_in(log: Recording, window: float) -> int:
     """Samples in a window of `window` seconds; odd, so that it has a middle.
 
@@ -173,7 +178,8 @@ class KeptWindows:
 
     def __init__(self, log: Recording, width: int) -> None:
         self._log, self._width = log, width
-        self._file = SpooledTemporaryFile(IN_MEMORY)
+        # It lives as long as the survey, which no block of code does.
+        self._file = SpooledTemporaryFile(IN_MEMORY)  # noqa: SIM115
         finalize(self, self._file.close)
         self._count = 0
 
