@@ -15,7 +15,7 @@ import pandas as pd
 
 from accelstudy.api.given import of_type, path_of
 from accelstudy.campaign.header import LogLayout
-from accelstudy.campaign.importing.sources import open_source
+from accelstudy.campaign.importing.opening import open_source
 from accelstudy.files.validation import checked
 
 

@@ -186,7 +186,7 @@ def files_of(given: Sequence[Path]) -> list[Path]:
     InputError
         If there is none.
     """
-    from accelstudy.campaign.importing.sources import BAG_OF_FOLDER
+    from accelstudy.campaign.importing.recorded import BAG_OF_FOLDER
 
     files: list[Path] = []
     for path in given:

@@ -16,13 +16,14 @@ from accelstudy.campaign.calibration.applying import Calibration
 from accelstudy.campaign.calibration.export import campaign_conversion, mending
 from accelstudy.campaign.calibration.tables import column_names, numbers, read_chunks
 from accelstudy.campaign.header import LogLayout
+from accelstudy.campaign.importing.opening import open_source
 from accelstudy.campaign.importing.recording import (
     AXES,
     locate,
     nanoseconds_beside,
     time_factor_of,
 )
-from accelstudy.campaign.importing.sources import CHUNK, Source, nanoseconds, open_source
+from accelstudy.campaign.importing.sources import CHUNK, Source, nanoseconds
 from accelstudy.effects import Course, HoldConditions
 from accelstudy.files.reading import overlay
 from accelstudy.files.validation import checked
@@ -195,7 +196,7 @@ def readings_of(
 def _with_format(
     source: Source, calibration: Calibration, given: Mapping[str, Any]
 ) -> Mapping[str, Any]:
-    """What the format of the log says, overlaid with `given`; not if the campaign's has its columns."""
+    """What the format of a log says, overlaid with `given`, unless the campaign's is like it."""
     own = {**source.layout}
     if calibration.log is not None and calibration.log.columns.get("fx") in source.names:
         return given

@@ -14,6 +14,7 @@ from accelstudy.campaign.importing.blocks import segment_blocks
 from accelstudy.campaign.importing.holds import DetectedHolds, detected_holds
 from accelstudy.campaign.importing.making import ImportReport, campaign_of_holds
 from accelstudy.campaign.importing.means import import_means
+from accelstudy.campaign.importing.opening import open_source
 from accelstudy.campaign.importing.recording import AXES, Log, LogSeries, Recording, open_log
 from accelstudy.campaign.importing.segments import segment_logs
 from accelstudy.campaign.importing.settings import (
@@ -22,7 +23,7 @@ from accelstudy.campaign.importing.settings import (
     named_after,
     parse_selection,
 )
-from accelstudy.campaign.importing.sources import Source, open_source
+from accelstudy.campaign.importing.sources import Source
 from accelstudy.campaign.importing.windows import surveyed, usual_window
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.reading import overlay

@@ -20,7 +20,8 @@ from numpy.typing import ArrayLike, NDArray
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import CLOCK_UNITS, UNITS
 from accelstudy.basics.wording import short_list
-from accelstudy.campaign.importing.sources import CHUNK, Source, check_numbers, open_source
+from accelstudy.campaign.importing.opening import open_source
+from accelstudy.campaign.importing.sources import CHUNK, Source, check_numbers
 from accelstudy.sensors.conversion import Conversion, conversion_of
 from accelstudy.sensors.frames import FRD, Frame
 

@@ -37,11 +37,7 @@ CHUNK = 65536
 
 GZIP = b"\x1f\x8b"
 """First bytes of a gzipped file."""
-BAG_OF_FOLDER = "metadata.yaml"
-"""File by which a folder is a bag of ROS 2."""
 
-_BAGS = (b"#ROSBAG V2.0", b"\x89MCAP0", b"SQLite format 3\0")
-_ULOG = b"ULog\x01\x12\x35"
 _PREVIEW = 65536  # characters of a text from which its layout is told
 _COMMENTS = "#%"
 _LAYOUTS = ((",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), (None, "."), (None, ","))
@@ -82,54 +78,6 @@ class Source(Protocol):
     def look_up(self, row: int, place: int) -> tuple[str, str]:
         """Describe where a row is in the file, and what its cell in a column says."""
         ...
-
-
-def open_source(path: str | Path, variable: str | None = None) -> Source:
-    """Open a file of numbers, by its ending and its first bytes."""
-    path = Path(path)
-    if (path / BAG_OF_FOLDER).is_file():
-        return _open_bag(path, variable)
-    with readable(path), path.open("rb") as file:
-        start = file.read(128)
-    if not start:
-        raise InputError(f"{path}: the file is empty")
-    if path.suffix.lower() in (".parquet", ".pq"):
-        return ParquetSource(path)
-    if start.startswith(GZIP):
-        kind = Path(path.stem).suffix.lower()
-        if kind in (".parquet", ".pq", ".mat"):
-            raise InputError(f"{path}: unpack it first; only text is read from gzip")
-        return TextSource(path)
-    # An ASCII .mat has no zero bytes; every binary one has some in its header.
-    if path.suffix.lower() == ".mat" and 0 in start:
-        return open_matlab(path, variable)
-    if start.startswith(_BAGS):
-        return _open_bag(path, variable)
-    if start.startswith(_ULOG):
-        from accelstudy.campaign.importing.ulogs import open_ulog
-
-        return open_ulog(path, variable)
-    if start.startswith(b"\x89HDF"):
-        raise InputError(f"{path}: a MATLAB 7.3 (HDF5) file; save it with -v7")
-    return TextSource(path)
-
-
-def _open_bag(path: Path, topic: str | None) -> Source:
-    from accelstudy.campaign.importing.bags import open_bag
-
-    return open_bag(path, topic)
-
-
-@contextmanager
-def needed_for(path: Path, what: str, library: str, extra: str) -> Iterator[None]:
-    """Import what reads a format; if it is missing, say what to install."""
-    try:
-        yield
-    except ImportError:
-        raise InputError(
-            f"{path}: {what} is read by the library {library}, which is not installed; "
-            f"pip install 'accelstudy[{extra}]'"
-        ) from None
 
 
 def chosen_of(path: Path, what: str, found: Collection[str], wanted: str | None) -> str:
