@@ -33,10 +33,7 @@ BAG_OF_FOLDER = "metadata.yaml"
 _IMU, _TEMPERATURE = "sensor_msgs/msg/Imu", "sensor_msgs/msg/Temperature"
 _BAG_COLUMNS = {f"f{axis}": f"linear_acceleration.{axis}" for axis in "xyz"}
 _SENSOR = "sensor_accel"
-_ULOG_COLUMNS = {
-    **{f"f{axis}": f"{_SENSOR}.{axis}" for axis in "xyz"},
-    "temperature": "temperature",
-}
+_FIELDS = {"fx": "x", "fy": "y", "fz": "z", "temperature": "temperature"}
 
 
 def open_bag(path: Path, topic: str | None = None) -> ArraySource:
@@ -149,12 +146,8 @@ def open_ulog(path: Path, instance: str | None = None) -> ArraySource:
     # Microseconds since the start of the controller; older logs have only the time of the message.
     time = values.get("timestamp_sample", values["timestamp"])
     time = time if np.any(time) else values["timestamp"]
-    columns = {
-        key: name
-        for key, name in _ULOG_COLUMNS.items()
-        if name.removeprefix(f"{_SENSOR}.") in values
-    }
-    forces = [values[name.removeprefix(f"{_SENSOR}.")] for name in columns.values()]
+    fields = {key: field for key, field in _FIELDS.items() if field in values}
+    columns = {key: f"{_SENSOR}.{field}" for key, field in fields.items()}
     layout = {
         "columns": columns,
         "time": "time",
@@ -162,7 +155,7 @@ def open_ulog(path: Path, instance: str | None = None) -> ArraySource:
         "time_unit": "s",
         "frame": "frd",
     }
-    rows = np.column_stack([1e-6 * time, *forces]).astype(float)
+    rows = np.column_stack([1e-6 * time, *(values[field] for field in fields.values())])
     return ArraySource(path, rows, ["time", *columns.values()], layout)
 
 
