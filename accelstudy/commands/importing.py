@@ -55,7 +55,7 @@ _SECTIONS = {
 @click.option("--sensor", multiple=True, help="Columns of one of several sensors: NAME=ax,ay,az.")
 @click.option("--offset", help="For counts: reading at 0 m/s².  [default: from the holds]")
 @click.option("--range", "full_range", help="Measuring range, ±: 78.5 (m/s²), 8g or 32767counts.")
-@click.option("--frame", help="Where x, y, z point: frd, flu (ROS), rfu …  [default: frd, or that of the file]")
+@click.option("--frame", help="Where x, y, z point: frd, flu, rfu …  [default: frd; of ROS flu]")
 @click.option("--threshold", type=float, help="Largest sd at rest, m/s².  [default: from the log]")
 @click.option(
     "--exclude", multiple=True, help="What to leave out, and why: 13:moved, 120s-135s:moved."
